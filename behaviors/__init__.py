@@ -1,0 +1,1 @@
+"""Percepts to velocity: one motor schema a file, and the arbiter that sums them. Pure."""

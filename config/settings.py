@@ -1,0 +1,164 @@
+"""Everything the main process can be told: the robot, what it should recognise, how it sees, moves and logs.
+
+The sections are named as in the files, so that a dotted path names a value everywhere: in a file, after
+``--set``, and in an error.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from config.model import ModelConfig
+from config.robot import RobotConfig
+from config.strict import Many, Strict
+from config.world import WorldConfig
+
+
+class CycleConfig(Strict):
+    """The perception-action cycle."""
+
+    rate_hz: float = Field(default=20.0, ge=1.0, le=200.0)
+    perception_budget_s: float = Field(default=0.005, ge=0.0, le=1.0)
+    """Time perception may take in a cycle; refinement stops there and resumes in the next."""
+
+
+class SegmentsConfig(Strict):
+    """Which pairs of readings of one sensor make an outline segment (paper §3.2)."""
+
+    baseline_min_m: float = Field(default=0.15, gt=0.0, le=10.0)
+    """Two readings nearer than this are not paired: their quantisation would dominate the direction."""
+    baseline_max_m: float = Field(default=0.45, gt=0.0, le=10.0)
+    """Two readings farther apart than this hardly see the same surface."""
+    gap_max_s: float = Field(default=3.0, gt=0.0, le=60.0)
+    """Two readings further apart in time than this are not consecutive."""
+    length_max_m: float = Field(default=0.6, gt=0.0, le=10.0)
+    """A longer tangent joins two different surfaces."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> SegmentsConfig:
+        if self.baseline_min_m >= self.baseline_max_m:
+            raise ValueError(
+                f"baseline_min_m {self.baseline_min_m} is not below baseline_max_m {self.baseline_max_m}"
+            )
+        return self
+
+
+class MapConfig(Strict):
+    """The outline map, the paper's raw map."""
+
+    capacity: int = Field(default=4096, ge=16, le=4_000_000)
+    """Segments held at most; the oldest leaves for a new one."""
+    age_max_s: float = Field(default=120.0, gt=0.0)
+    """Segments leave the map at this age."""
+
+
+class ClustersConfig(Strict):
+    """Minimum-distance clustering (paper Table 1)."""
+
+    threshold_m: float = Field(default=0.4572, gt=0.0, le=100.0)
+    """T: a segment farther than this from every cluster's centre founds a new cluster."""
+    segments_min: int = Field(default=8, ge=1)
+    """Clusters of fewer segments get no model."""
+
+
+class RelaxationConfig(Strict):
+    """Relaxation of the model onto a cluster's segments (paper §3.4)."""
+
+    gamma: float = Field(default=2.0, gt=0.0, le=100.0)
+    """γ: sphere_i = γ times the length of model segment i."""
+    negligible_m: float = Field(default=1e-5, gt=0.0)
+    negligible_rad: float = Field(default=1e-5, gt=0.0)
+    """The process stops when the total increment is below both."""
+    iterations_max: int = Field(default=500, ge=1, le=1_000_000)
+    """A model that has not settled by then is left as it is until new evidence comes."""
+    iterations_per_quantum: int = Field(default=20, ge=1, le=100_000)
+
+
+class RecognitionConfig(Strict):
+    """When a relaxed model counts as an object seen."""
+
+    residual_max_m: float = Field(default=0.06, gt=0.0)
+    """Root mean square orthogonal distance of the cluster's segments from the model, at most."""
+    coverage_min: float = Field(default=0.35, ge=0.0, le=1.0)
+    """Share of the model's length that segments lie on, at least."""
+
+
+class PerceptionConfig(Strict):
+    """Perception: the paper's steps and their constants."""
+
+    segments: SegmentsConfig = SegmentsConfig()
+    map: MapConfig = MapConfig()
+    clusters: ClustersConfig = ClustersConfig()
+    relaxation: RelaxationConfig = RelaxationConfig()
+    recognition: RecognitionConfig = RecognitionConfig()
+
+
+class MoveAheadConfig(Strict):
+    """The move-ahead schema (Arkin 1989): a unit vector along a heading, in the odometry's frame."""
+
+    move_ahead_gain: float = Field(default=1.0, ge=0.0, le=100.0)
+    move_ahead_direction_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
+    distance_m: float | None = Field(default=None, gt=0.0)
+    """How far to go from where the drive began; without end where it is not given."""
+    at_end: Literal["stop", "turn_back"] = "stop"
+
+
+class AvoidStaticObstacleConfig(Strict):
+    """The avoid-static-obstacle schema (Arkin 1989), distances from the robot's rim to the echo."""
+
+    avoid_obstacle_gain: float = Field(default=1.0, ge=0.0, le=100.0)
+    avoid_obstacle_sphere_m: float = Field(default=0.6, gt=0.0, le=100.0)
+    """S: obstacles farther away than this do not matter."""
+    avoid_obstacle_safety_margin_m: float = Field(default=0.15, ge=0.0, le=100.0)
+    """R: nearer than this the repulsion is unbounded."""
+    summing: Literal["sum", "largest"] = "largest"
+    """Add all echoes' vectors, or keep only the largest magnitude along the sum's direction."""
+    echo_age_max_s: float = Field(default=1.0, gt=0.0, le=60.0)
+    """An echo older than this is no longer an obstacle."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> AvoidStaticObstacleConfig:
+        if self.avoid_obstacle_safety_margin_m >= self.avoid_obstacle_sphere_m:
+            raise ValueError("avoid_obstacle_safety_margin_m is not below avoid_obstacle_sphere_m")
+        return self
+
+
+class ArbiterConfig(Strict):
+    """How the sum of the schemas becomes a velocity."""
+
+    base_velocity_m_s: float = Field(default=0.3, gt=0.0, le=10.0)
+    """Speed for a sum of magnitude one, straight ahead."""
+    cautious_velocity_m_s: float = Field(default=0.1, ge=0.0, le=10.0)
+    """Speed kept while the robot must turn."""
+    turn_gain_per_s: float = Field(default=2.0, gt=0.0, le=100.0)
+    """Turning rate for each radian between the drive heading and the sum's direction."""
+
+
+class BehaviorsConfig(Strict):
+    """The motor schemas that are active, and their arbiter."""
+
+    move_ahead: MoveAheadConfig = MoveAheadConfig()
+    avoid_static_obstacle: AvoidStaticObstacleConfig = AvoidStaticObstacleConfig()
+    arbiter: ArbiterConfig = ArbiterConfig()
+
+
+class LogConfig(Strict):
+    """Where the log goes and how much of it."""
+
+    file: str | None = None
+    """JSON lines; none where it is not given."""
+    level: Literal["debug", "info", "warning", "error"] = "info"
+
+
+class Settings(RobotConfig):
+    """All settings of one run: the robot's sections at the top, then what it recognises and does."""
+
+    models: Many[ModelConfig] = Field(min_length=1)
+    world: WorldConfig | None = None
+    """What the emulator shows where no port is given."""
+    cycle: CycleConfig = CycleConfig()
+    perception: PerceptionConfig = PerceptionConfig()
+    behaviors: BehaviorsConfig = BehaviorsConfig()
+    log: LogConfig = LogConfig()

@@ -1,0 +1,84 @@
+"""What the runtime asks of any robot's driver: a sans-I/O object between the line's bytes and messages.
+
+The runtime moves bytes between a line and a driver, and tells it the time; the driver never waits, reads a clock
+or touches a port. So the same driver runs on a serial port, on the emulator's pty, and in virtual time in memory.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+from drivers.messages import Firing, Identity, LinkCounts, Odometry, Twist
+
+
+class LineState(Enum):
+    """How far the conversation with the robot has come."""
+
+    CLOSED = "closed"
+    """No line is open."""
+    GREETING = "greeting"
+    """The line is open; the robot has not yet identified itself and taken the firing pattern."""
+    READY = "ready"
+    """The robot answers, fires, and takes commands."""
+    DOWN = "down"
+    """The line is open and the robot does not answer; `RobotDriver.trouble` says more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """Everything that arrived since it was last taken, in order."""
+
+    firings: tuple[Firing, ...]
+    odometry: Odometry | None
+    """The newest one, None where none came."""
+    rebooted: bool
+    """The robot restarted: its clock and odometry began again at zero."""
+
+
+class RobotDriver(Protocol):
+    """A robot on the other end of a line. Times are the host's, in seconds, never decreasing."""
+
+    @property
+    def state(self) -> LineState:
+        """How far the conversation has come."""
+
+    @property
+    def trouble(self) -> str | None:
+        """Why the state is DOWN or GREETING longer than it should be: what happened, likely cause, next action."""
+
+    @property
+    def identity(self) -> Identity | None:
+        """What the robot said of itself, None until it has."""
+
+    @property
+    def counts(self) -> LinkCounts:
+        """Frames over the line so far."""
+
+    def opened(self, now_s: float) -> None:
+        """Begin (again) on a line just opened: greet the robot and set its firing pattern."""
+
+    def closed(self) -> None:
+        """Forget what was under way: the line is gone."""
+
+    def receive(self, data: bytes, now_s: float) -> None:
+        """Take bytes from the line, any chunking."""
+
+    def tick(self, now_s: float) -> None:
+        """Let time pass: commands unanswered are sent again, silence becomes DOWN."""
+
+    def drive(self, twist: Twist) -> None:
+        """Ask for a velocity; replaces one that is not yet on the line."""
+
+    def halt(self) -> None:
+        """Stop at once and latch; goes before everything else, drops a DRIVE not yet on the line."""
+
+    def release(self) -> None:
+        """Clear the latch, so that DRIVE is obeyed again."""
+
+    def outgoing(self, *, writable: bool) -> bytes:
+        """Return what should go on the line now; only HALT while the line is not `writable`."""
+
+    def take(self) -> Heard:
+        """Return and forget what arrived since the last call."""

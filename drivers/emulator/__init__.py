@@ -1,0 +1,1 @@
+"""The robot side as a program of its own: acoustics, body, and the device that speaks the protocol."""

@@ -1,0 +1,1 @@
+"""When, whether and wiring: the cycle, its modes, its records, and the command."""
