@@ -27,14 +27,12 @@ class CycleConfig(Strict):
 class SegmentsConfig(Strict):
     """Which pairs of readings of one sensor make an outline segment (paper §3.2)."""
 
-    baseline_min_m: float = Field(default=0.15, gt=0.0, le=10.0)
+    baseline_min_m: float = Field(default=0.25, gt=0.0, le=10.0)
     """Two readings nearer than this are not paired: their quantisation would dominate the direction."""
-    baseline_max_m: float = Field(default=0.45, gt=0.0, le=10.0)
+    baseline_max_m: float = Field(default=0.5, gt=0.0, le=10.0)
     """Two readings farther apart than this hardly see the same surface."""
     gap_max_s: float = Field(default=3.0, gt=0.0, le=60.0)
     """Two readings further apart in time than this are not consecutive."""
-    length_max_m: float = Field(default=0.6, gt=0.0, le=10.0)
-    """A longer tangent joins two different surfaces."""
 
     @model_validator(mode="after")
     def _ordered(self) -> SegmentsConfig:
@@ -52,6 +50,8 @@ class MapConfig(Strict):
     """Segments held at most; the oldest leaves for a new one."""
     age_max_s: float = Field(default=120.0, gt=0.0)
     """Segments leave the map at this age."""
+    contradiction_margin_m: float = Field(default=0.2, ge=0.0, le=10.0)
+    """A segment leaves when a sensor that faces it hears an echo from this much behind it."""
 
 
 class ClustersConfig(Strict):
@@ -61,6 +61,7 @@ class ClustersConfig(Strict):
     """T: a segment farther than this from every cluster's centre founds a new cluster."""
     segments_min: int = Field(default=8, ge=1)
     """Clusters of fewer segments get no model."""
+    clusters_max: int = Field(default=128, ge=1, le=4096)
 
 
 class RelaxationConfig(Strict):
@@ -79,10 +80,15 @@ class RelaxationConfig(Strict):
 class RecognitionConfig(Strict):
     """When a relaxed model counts as an object seen."""
 
-    residual_max_m: float = Field(default=0.06, gt=0.0)
-    """Root mean square orthogonal distance of the cluster's segments from the model, at most."""
+    tolerance_m: float = Field(default=0.1, gt=0.0)
+    tolerance_deg: float = Field(default=30.0, gt=0.0, le=90.0)
+    """A segment supports the model where it lies this near to a side and this parallel to it."""
+    support_min: float = Field(default=0.5, ge=0.0, le=1.0)
+    """Share of the cluster's segments that support the model, at least."""
+    separation_m: float = Field(default=0.3, ge=0.0)
+    """Two candidates that rest nearer to one another than this are one object."""
     coverage_min: float = Field(default=0.35, ge=0.0, le=1.0)
-    """Share of the model's length that segments lie on, at least."""
+    """Share of the model's outline whose sides have support, at least."""
 
 
 class PerceptionConfig(Strict):
@@ -134,6 +140,8 @@ class ArbiterConfig(Strict):
     """Speed kept while the robot must turn."""
     turn_gain_per_s: float = Field(default=2.0, gt=0.0, le=100.0)
     """Turning rate for each radian between the drive heading and the sum's direction."""
+    clearance_m: float = Field(default=0.05, ge=0.0, le=10.0)
+    """The speed is held to what the base can stop from with this much left between its rim and an echo ahead."""
 
 
 class BehaviorsConfig(Strict):

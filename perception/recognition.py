@@ -1,0 +1,86 @@
+"""How well a relaxed model explains a cluster, and with that whether an object is seen at all (paper §3.4).
+
+The paper asks for a goodness of fit and leaves it open. Two numbers carry it here: how near the segments lie to the
+model's outline, and how much of the outline has segments on it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from perception.kernel import Floats, Ints, kernel
+
+
+@kernel
+def goodness_of_fit(
+    sides: Floats,
+    segments: Floats,
+    members: Ints,
+    x: float,
+    y: float,
+    theta: float,
+    tolerance_m: float,
+    tolerance_rad: float,
+    hit: Ints,
+) -> tuple[int, float, float]:
+    """Compare a cluster's segments with the outline of the model at a pose.
+
+    A segment supports the model where its middle lies within `tolerance_m` of the nearest side and its direction
+    within `tolerance_rad` of that side's.
+
+    Parameters
+    ----------
+    sides, segments, members, x, y, theta
+        As for `perception.relaxation.increment`.
+    tolerance_m, tolerance_rad : float
+        Metres, radians.
+    hit : (m,) int
+        Scratch, one a side.
+
+    Returns
+    -------
+    (int, float, float)
+        Supporting segments, their root mean square distance from the outline (m, inf where there are none), and the
+        share of the outline's length whose sides have support.
+    """
+    c = math.cos(theta)
+    s = math.sin(theta)
+    half_pi = 0.5 * math.pi
+    for i in range(sides.shape[0]):
+        hit[i] = 0
+    support = 0
+    squares = 0.0
+    for k in range(members.shape[0]):
+        j = members[k]
+        mx = 0.5 * (segments[j, 0] + segments[j, 2]) - x
+        my = 0.5 * (segments[j, 1] + segments[j, 3]) - y
+        px = c * mx + s * my
+        py = -s * mx + c * my
+        best = math.inf
+        nearest = 0
+        for i in range(sides.shape[0]):
+            ux = math.cos(sides[i, 2])
+            uy = math.sin(sides[i, 2])
+            along = (px - sides[i, 0]) * ux + (py - sides[i, 1]) * uy
+            half = 0.5 * sides[i, 3]
+            along = min(max(along, -half), half)
+            distance = math.hypot(px - sides[i, 0] - along * ux, py - sides[i, 1] - along * uy)
+            if distance < best:
+                best = distance
+                nearest = i
+        da = (segments[j, 4] + half_pi - theta - sides[nearest, 2]) % math.pi
+        if da > half_pi:
+            da -= math.pi
+        if best <= tolerance_m and abs(da) <= tolerance_rad:
+            support += 1
+            squares += best * best
+            hit[nearest] += 1
+    if support == 0:
+        return 0, math.inf, 0.0
+    covered = 0.0
+    length = 0.0
+    for i in range(sides.shape[0]):
+        length += sides[i, 3]
+        if hit[i] > 0:
+            covered += sides[i, 3]
+    return support, math.sqrt(squares / support), covered / length
