@@ -69,8 +69,8 @@ class RelaxationConfig(Strict):
 
     gamma: float = Field(default=2.0, gt=0.0, le=100.0)
     """γ: sphere_i = γ times the length of model segment i."""
-    negligible_m: float = Field(default=1e-5, gt=0.0)
-    negligible_rad: float = Field(default=1e-5, gt=0.0)
+    negligible_m: float = Field(default=3e-4, gt=0.0)
+    negligible_rad: float = Field(default=1e-3, gt=0.0)
     """The process stops when the total increment is below both."""
     iterations_max: int = Field(default=500, ge=1, le=1_000_000)
     """A model that has not settled by then is left as it is until new evidence comes."""
@@ -93,6 +93,9 @@ class RecognitionConfig(Strict):
 
 class PerceptionConfig(Strict):
     """Perception: the paper's steps and their constants."""
+
+    method: Literal["paper"] = "paper"
+    """How objects are recognised."""
 
     segments: SegmentsConfig = SegmentsConfig()
     map: MapConfig = MapConfig()
@@ -117,8 +120,8 @@ class AvoidStaticObstacleConfig(Strict):
     avoid_obstacle_gain: float = Field(default=1.0, ge=0.0, le=100.0)
     avoid_obstacle_sphere_m: float = Field(default=0.6, gt=0.0, le=100.0)
     """S: obstacles farther away than this do not matter."""
-    avoid_obstacle_safety_margin_m: float = Field(default=0.15, ge=0.0, le=100.0)
-    """R: nearer than this the repulsion is unbounded."""
+    avoid_obstacle_safety_margin_m: float = Field(default=0.2, ge=0.0, le=100.0)
+    """R: nearer than this the repulsion is unbounded; above the least range the ring can report, or it never is."""
     summing: Literal["sum", "largest"] = "largest"
     """Add all echoes' vectors, or keep only the largest magnitude along the sum's direction."""
     echo_age_max_s: float = Field(default=1.0, gt=0.0, le=60.0)
@@ -140,8 +143,11 @@ class ArbiterConfig(Strict):
     """Speed kept while the robot must turn."""
     turn_gain_per_s: float = Field(default=2.0, gt=0.0, le=100.0)
     """Turning rate for each radian between the drive heading and the sum's direction."""
-    clearance_m: float = Field(default=0.05, ge=0.0, le=10.0)
-    """The speed is held to what the base can stop from with this much left between its rim and an echo ahead."""
+    clearance_m: float = Field(default=0.16, ge=0.0, le=10.0)
+    """The speed is held to what the base can stop from with this much left between its rim and an echo ahead.
+
+    Just above the least range the ring can report: such an echo may be from anything nearer.
+    """
 
 
 class BehaviorsConfig(Strict):
@@ -156,7 +162,7 @@ class LogConfig(Strict):
     """Where the log goes and how much of it."""
 
     file: str | None = None
-    """JSON lines; none where it is not given."""
+    """JSON lines; where it is not given, echolocate/echolocate.jsonl in the user's state folder."""
     level: Literal["debug", "info", "warning", "error"] = "info"
 
 
@@ -170,3 +176,11 @@ class Settings(RobotConfig):
     perception: PerceptionConfig = PerceptionConfig()
     behaviors: BehaviorsConfig = BehaviorsConfig()
     log: LogConfig = LogConfig()
+
+    @model_validator(mode="after")
+    def _distinct_models(self) -> Settings:
+        names = [m.name for m in self.models]
+        twice = next((n for n in names if names.count(n) > 1), None)
+        if twice is not None:
+            raise ValueError(f"two models are named {twice}: a report could not tell them apart")
+        return self

@@ -97,9 +97,14 @@ class Candidates:
         self._turn = 0
 
     @property
+    def awake(self) -> int:
+        """How many candidates have not come to rest."""
+        return int(np.count_nonzero(self._left[: self._count]))
+
+    @property
     def pending(self) -> bool:
         """Whether a candidate has not come to rest."""
-        return bool(self._left[: self._count].any())
+        return self.awake > 0
 
     def follow(self, clusters: Clusters, outline: OutlineMap) -> None:
         """Carry candidates over to the clusters as they are now; wake those whose cluster changed; place new ones."""

@@ -24,7 +24,8 @@ class FreshEchoes:
     def __init__(self, mounts: Floats) -> None:
         self._mounts = mounts
         self._points = np.zeros((len(mounts), 2))
-        self._times = np.full(len(mounts), -np.inf)
+        self._times = np.zeros(len(mounts))
+        self._heard = np.zeros(len(mounts), dtype=np.bool_)
 
     def update(self, firing: Firing) -> None:
         """Take in one firing."""
@@ -36,13 +37,14 @@ class FreshEchoes:
         reach = firing.ranges_m[heard]
         self._points[heard, 0] = firing.pose.x + c * x - s * y + reach * np.cos(axis)
         self._points[heard, 1] = firing.pose.y + s * x + c * y + reach * np.sin(axis)
-        self._times[fired] = np.where(heard[fired], firing.t_s, -np.inf)
+        self._times[fired] = firing.t_s
+        self._heard[fired] = heard[fired]
 
     def points(self, t: float, age_max_s: float) -> Floats:
         """Return the echoes not older than `age_max_s` at time `t`: shape (k, 2), m, a copy."""
-        fresh: Floats = self._points[t - self._times <= age_max_s]
+        fresh: Floats = self._points[self._heard & (t - self._times <= age_max_s)]
         return fresh
 
     def clear(self) -> None:
         """Forget all echoes."""
-        self._times[:] = -np.inf
+        self._heard[:] = False

@@ -72,7 +72,6 @@ class Perception:
             config.clusters.segments_min, config.clusters.threshold_m,
         )  # fmt: skip
         self._echoes = FreshEchoes(mounts)
-        self._time = -math.inf
 
     @property
     def pending(self) -> bool:
@@ -81,7 +80,6 @@ class Perception:
 
     def observe(self, firing: Firing) -> int:
         """Take in one firing and return how many outline segments it completed."""
-        self._time = firing.t_s
         self._echoes.update(firing)
         segments = self._extractor.extract(firing)
         living = self.outline.count
@@ -98,9 +96,9 @@ class Perception:
         """Do one quantum of refinement and return its iterations, zero where nothing is left to improve."""
         return self.candidates.refine(self.clusters, self.outline)
 
-    def obstacles(self, age_max_s: float) -> Floats:
-        """Return each sensor's last echo not older than that, as points of shape (k, 2) in m."""
-        return self._echoes.points(self._time, age_max_s)
+    def obstacles(self, t_s: float, age_max_s: float) -> Floats:
+        """Return each sensor's last echo not older than that at the robot's time `t_s`: points of shape (k, 2), m."""
+        return self._echoes.points(t_s, age_max_s)
 
     def objects(self) -> tuple[SeenObject, ...]:
         """Return what is recognised now, best first.

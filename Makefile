@@ -1,0 +1,48 @@
+# Two commands matter: `make run` starts the robot in the emulator, `make test` proves that it works.
+
+PYTHON ?= python3.11
+VENV   := .venv
+BIN    := $(VENV)/bin
+PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+
+.PHONY: run test lint tests boundscheck coverage clean
+
+run: $(VENV)/run.stamp
+	@$(BIN)/echolocate run
+
+test: lint tests boundscheck coverage
+
+lint: $(VENV)/test.stamp
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+tests: $(VENV)/test.stamp
+	$(BIN)/python -m pytest
+
+# Compiled code reads beyond an array in silence; this run does not let it.
+boundscheck: $(VENV)/test.stamp
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(BIN)/python -m pytest -q -m "not realtime" \
+		tests/perception tests/drivers/test_acoustics.py tests/drivers/test_emulator.py
+
+# Coverage sees into kernels only where they are not compiled.
+coverage: $(VENV)/test.stamp
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest -q -m "not realtime and not compiled"
+	$(BIN)/python -m coverage report --skip-covered --fail-under=90
+
+clean:
+	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage
+
+$(VENV)/bin/python:
+	@command -v $(PYTHON) >/dev/null || { echo "make: $(PYTHON) is not here; install it, or name another: make PYTHON=python3.12"; exit 1; }
+	@$(PYTHON) -c "import ensurepip" 2>/dev/null || { echo "installing $(PYTHON)-venv, without which Debian's Python makes no environments"; \
+		$$([ $$(id -u) = 0 ] || echo sudo) sh -c "apt-get -qq update && apt-get -qq install -y $(PYTHON)-venv"; }
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/run.stamp: pyproject.toml | $(VENV)/bin/python
+	$(PIP) --editable .
+	@touch $@
+
+$(VENV)/test.stamp: pyproject.toml | $(VENV)/bin/python
+	$(PIP) --editable ".[dev]"
+	@touch $@

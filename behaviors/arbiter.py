@@ -1,0 +1,126 @@
+"""The arbiter: adds the schemas' vectors and answers with a velocity the base can drive, or with a reason to stop.
+
+A decision that lacks a part is a stop, never a guess: what comes out is either within every limit or no velocity.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from behaviors.clearance import stoppable_speed_m_s
+from behaviors.response import Response
+from config.robot import BodyConfig
+from config.settings import ArbiterConfig
+from perception.percept import Percept, Twist, wrap_angle
+
+NEGLIGIBLE: Final = 0.01
+"""A sum below this is no wish to move: schemas in balance leave a residue whose direction is noise."""
+
+CAUTIOUS_ANGLE_RAD: Final = math.pi / 4.0
+"""Off course by this much the robot goes at its cautious velocity; off by twice this it turns on the spot."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Drive at this velocity."""
+
+    twist: Twist
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Stop, for this reason; a text for the operator."""
+
+    reason: str
+
+
+Decision: TypeAlias = Drive | Stop
+
+
+def arbitrate(
+    responses: Sequence[Response],
+    percept: Percept,
+    body: BodyConfig,
+    config: ArbiterConfig,
+    expected: Sequence[str],
+) -> Decision:
+    """Return the velocity for the sum of all responses, or why there is none.
+
+    The sum's magnitude is clamped to 1; the speed is the base velocity times it, less the more the robot has to
+    turn, and never more than it can stop from before the nearest echo ahead. The base limits its acceleration
+    itself.
+
+    Parameters
+    ----------
+    responses
+        One of each schema, in any order.
+    percept
+        Pose and obstacles of this cycle.
+    body
+        Limits of the base.
+    config
+        Velocities and turning gain.
+    expected
+        Names of the schemas that must have answered.
+
+    Returns
+    -------
+    Decision
+        `Drive` with 0 ≤ v ≤ `speed_max_m_s` and abs(w) ≤ `turn_max_rad_s`, both finite; or `Stop`.
+    """
+    complaint = _complaint(responses, percept, expected)
+    if complaint is not None:
+        return Stop(complaint)
+    x, y = sum(r.x for r in responses), sum(r.y for r in responses)
+    magnitude = min(1.0, math.hypot(x, y))
+    if magnitude < NEGLIGIBLE:
+        return Drive(Twist(0.0, 0.0))
+    angle = wrap_angle(math.atan2(y, x) - percept.pose.theta)
+    speed = magnitude * _course_speed_m_s(abs(angle), config)
+    v = min(speed, body.speed_max_m_s, stoppable_speed_m_s(percept, body, config.clearance_m))
+    w = max(-body.turn_max_rad_s, min(body.turn_max_rad_s, config.turn_gain_per_s * angle))
+    # Not `v > limit or …`: only this form also refuses NaN.
+    if not (0.0 <= v <= body.speed_max_m_s and abs(w) <= body.turn_max_rad_s):
+        return Stop(
+            f"the arbiter worked out a velocity outside the base's limits (v {v:g} m/s, w {w:g} rad/s), "
+            "which is a fault of this program: keep the recording of this run and report it"
+        )
+    return Drive(Twist(v, w))
+
+
+def _course_speed_m_s(angle_rad: float, config: ArbiterConfig) -> float:
+    """Return base velocity on course, falling linearly to the cautious one and on to zero at a right angle."""
+    cautious = min(config.cautious_velocity_m_s, config.base_velocity_m_s)
+    if angle_rad < CAUTIOUS_ANGLE_RAD:
+        share = angle_rad / CAUTIOUS_ANGLE_RAD
+        return (1.0 - share) * config.base_velocity_m_s + share * cautious
+    return max(0.0, 2.0 - angle_rad / CAUTIOUS_ANGLE_RAD) * cautious
+
+
+def _complaint(responses: Sequence[Response], percept: Percept, expected: Sequence[str]) -> str | None:
+    """Return why these inputs allow no decision, None where they do."""
+    given, wanted = Counter(r.schema for r in responses), Counter(expected)
+    if missing := sorted(wanted - given):
+        return f"no answer from the schema {', '.join(missing)}: the decision lacks a part, so the robot stops"
+    if surplus := sorted(given - wanted):
+        return f"the schema {', '.join(surplus)} answered without being asked: its vector belongs to no decision"
+    for r in responses:
+        if not (math.isfinite(r.x) and math.isfinite(r.y)):
+            return (
+                f"the schema {r.schema} answered ({r.x:g}, {r.y:g}), which is no vector: "
+                "look for an echo or a pose that is not a number"
+            )
+    if not (math.isfinite(sum(r.x for r in responses)) and math.isfinite(sum(r.y for r in responses))):
+        return "the schemas' vectors are too large to add: look for a gain or a pose that is out of all proportion"
+    pose = percept.pose
+    if not all(map(math.isfinite, (pose.x, pose.y, pose.theta))):
+        return f"the pose ({pose.x:g}, {pose.y:g}, {pose.theta:g}) is not a place: check the odometry, then re-arm"
+    if not np.isfinite(percept.obstacles).all():
+        return "an echo is not a finite point: check the ring's ranges and the odometry, then re-arm"
+    return None

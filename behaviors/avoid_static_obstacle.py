@@ -1,0 +1,76 @@
+"""The avoid-static-obstacle schema (Arkin 1989): every echo pushes the robot away, the harder the nearer it is."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from behaviors.response import Response
+from config.settings import AvoidStaticObstacleConfig
+from perception.percept import Floats, Percept
+
+SCHEMA: Final = "avoid_static_obstacle"
+
+UNBOUNDED: Final = 1e6
+"""Magnitude inside the safety margin for a gain of one. The equation says infinity, but infinities from two sides
+add up to NaN; this outweighs every other schema at its largest gain by 10⁴ and still has a direction."""
+
+
+def repulsions(gaps_m: Floats, config: AvoidStaticObstacleConfig) -> Floats:
+    """Return the magnitude of each obstacle's push.
+
+    Arkin, *Motor Schema-Based Mobile Robot Navigation*, IJRR 8(4), 1989: 0 for d > S, (S − d)/(S − R)·G for
+    R < d ≤ S, and unbounded for d ≤ R.
+
+    Parameters
+    ----------
+    gaps_m
+        d, shape (n,): from the robot's rim to each echo, negative for an echo from inside the rim.
+    config
+        S is `avoid_obstacle_sphere_m`, R `avoid_obstacle_safety_margin_m`, G `avoid_obstacle_gain`.
+    """
+    sphere, margin = config.avoid_obstacle_sphere_m, config.avoid_obstacle_safety_margin_m
+    # Comparisons with NaN are false, so a NaN distance stays NaN and reaches the arbiter, which stops for it.
+    magnitudes = (sphere - gaps_m) / (sphere - margin)
+    magnitudes[gaps_m > sphere] = 0.0
+    magnitudes[gaps_m <= margin] = UNBOUNDED
+    pushes: Floats = config.avoid_obstacle_gain * magnitudes
+    return pushes
+
+
+def avoid_static_obstacle(percept: Percept, body_radius_m: float, config: AvoidStaticObstacleConfig) -> Response:
+    """Return the sum of all pushes, each straight away from its echo.
+
+    With ``summing="largest"`` the sum's direction is kept and its magnitude limited to the largest single push
+    along that direction: ten echoes of one wall then push like one wall, and opposite walls still cancel.
+
+    Parameters
+    ----------
+    percept
+        Pose and obstacles; without obstacles the vector is zero.
+    body_radius_m
+        Distances count from the rim, this far from the pose.
+    config
+        The schema's constants.
+    """
+    if len(percept.obstacles) == 0:
+        return Response(SCHEMA, 0.0, 0.0)
+    dx = percept.pose.x - percept.obstacles[:, 0]
+    dy = percept.pose.y - percept.obstacles[:, 1]
+    distances = np.hypot(dx, dy)
+    # An echo in the robot's very centre has no direction; the way back is where the robot has just been safe.
+    centred = distances == 0.0
+    dx[centred], dy[centred] = -math.cos(percept.pose.theta), -math.sin(percept.pose.theta)
+    lengths = np.where(centred, 1.0, distances)
+    pushes = repulsions(distances - body_radius_m, config) / lengths
+    px, py = pushes * dx, pushes * dy
+    x, y = float(px.sum()), float(py.sum())
+    magnitude = math.hypot(x, y)
+    # Not `== 0` to stay clear of dividing by what rounding leaves of pushes that cancel.
+    if config.summing == "largest" and magnitude > 1e-9 * float(np.hypot(px, py).sum()):
+        largest = float((px * (x / magnitude) + py * (y / magnitude)).max())
+        shrink = min(1.0, largest / magnitude)
+        x, y = x * shrink, y * shrink
+    return Response(SCHEMA, x, y)

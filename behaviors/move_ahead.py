@@ -1,0 +1,66 @@
+"""The move-ahead schema (Arkin 1989): a unit vector along a fixed heading, whatever the robot sees.
+
+How far it has come is state, and behaviours hide none: the leg goes in with each call and comes out again, so that
+a replay that starts from the same leg drives the same way.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+from behaviors.response import Response
+from config.settings import MoveAheadConfig
+from perception.percept import Percept, Pose
+
+SCHEMA: Final = "move_ahead"
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """The way under way: where it began (metres, odometry's frame), which way it goes, whether it is over."""
+
+    origin_x: float
+    origin_y: float
+    outbound: bool = True
+    done: bool = False
+
+    @classmethod
+    def starting_at(cls, pose: Pose) -> Leg:
+        """Return the leg of a drive that begins at `pose`."""
+        return cls(pose.x, pose.y)
+
+
+def move_ahead(percept: Percept, leg: Leg, config: MoveAheadConfig) -> tuple[Response, Leg]:
+    """Return the schema's vector and the leg to hand in next time.
+
+    Distance counts along the heading only, so that a detour round an obstacle does not shorten the leg. A leg that
+    is done stays done even if the robot is pushed back: motion does not resume by itself.
+
+    Parameters
+    ----------
+    percept
+        Only the pose is used.
+    leg
+        The leg so far; ``Leg.starting_at(pose)`` at the beginning of a drive.
+    config
+        Gain, direction, and what happens after `distance_m`.
+    """
+    direction = math.radians(config.move_ahead_direction_deg)
+    ux, uy = math.cos(direction), math.sin(direction)
+    leg = _advance(leg, (percept.pose.x - leg.origin_x) * ux + (percept.pose.y - leg.origin_y) * uy, config)
+    if leg.done:
+        return Response(SCHEMA, 0.0, 0.0), leg
+    magnitude = config.move_ahead_gain if leg.outbound else -config.move_ahead_gain
+    return Response(SCHEMA, magnitude * ux, magnitude * uy), leg
+
+
+def _advance(leg: Leg, progress_m: float, config: MoveAheadConfig) -> Leg:
+    if config.distance_m is None or leg.done:
+        return leg
+    if leg.outbound and progress_m >= config.distance_m:
+        return replace(leg, done=True) if config.at_end == "stop" else replace(leg, outbound=False)
+    if not leg.outbound and progress_m <= 0.0:
+        return replace(leg, outbound=True)
+    return leg

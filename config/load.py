@@ -1,0 +1,238 @@
+"""From files, names and `--set` to settings that hold, or to a ConfigError that says what does not.
+
+Layers, the lower first: the robot file, the run file, single settings from the command line. The world and the
+models are files of their own; the run file names them.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from config.files import ConfigError, Kind, dotted, list_shipped, read_document
+from config.layers import Layers, Source
+from config.model import ModelConfig
+from config.overrides import apply_overrides, parse_override
+from config.problems import describe_all, given_type, shown, unknown_key
+from config.robot import RobotConfig
+from config.settings import Settings
+from config.world import WorldConfig
+
+__all__ = [
+    "ConfigError",
+    "list_shipped",
+    "load_any",
+    "load_model",
+    "load_robot",
+    "load_settings",
+    "load_world",
+]
+
+DEFAULT_RUN = "hallway"
+DEFAULT_WORLD = "hallway"
+DEFAULT_MODEL = "semicircle"
+"""The paper's experiment: what a run shows and recognises where its file does not say."""
+
+MODELS_MAX = 64
+"""More files than that are not read for one run."""
+
+COMMAND_LINE = Source("command line")
+NAMES = ("robot", "world", "models")
+"""Keys of a run file that name other files."""
+
+M = TypeVar("M", bound=BaseModel)
+
+
+def load_robot(name_or_path: str | os.PathLike[str]) -> RobotConfig:
+    """Return the robot of a shipped name or a file.
+
+    Raises
+    ------
+    ConfigError
+        Where the file cannot be read or says something wrong.
+    """
+    return _load("robots", name_or_path, RobotConfig)
+
+
+def load_world(name_or_path: str | os.PathLike[str]) -> WorldConfig:
+    """Return the world of a shipped name or a file.
+
+    Raises
+    ------
+    ConfigError
+        Where the file cannot be read or says something wrong.
+    """
+    return _load("worlds", name_or_path, WorldConfig)
+
+
+def load_model(name_or_path: str | os.PathLike[str]) -> ModelConfig:
+    """Return the object model of a shipped name or a file.
+
+    Raises
+    ------
+    ConfigError
+        Where the file cannot be read or says something wrong.
+    """
+    return _load("models", name_or_path, ModelConfig)
+
+
+def load_any(
+    name_or_path: str | os.PathLike[str], overrides: Sequence[str] = ()
+) -> Settings | WorldConfig | ModelConfig:
+    """Load a file of whichever kind its top-level keys speak of; a robot file counts as a run with that robot.
+
+    Raises
+    ------
+    ConfigError
+        Where the file cannot be read or says something wrong.
+    """
+    table = read_document("runs", name_or_path).table
+    if not overrides:
+        of_run, of_world, of_model = (
+            sum(key in schema.model_fields or key in also for key in table)
+            for schema, also in ((Settings, NAMES), (WorldConfig, ()), (ModelConfig, ()))
+        )
+        if of_world > max(of_run, of_model):
+            return load_world(Path(name_or_path))
+        if of_model > of_run:
+            return load_model(Path(name_or_path))
+    return load_settings(name_or_path, overrides)
+
+
+def load_settings(
+    config: str | os.PathLike[str] | None = None,
+    overrides: Sequence[str] = (),
+    *,
+    robot: str | None = None,
+    world: str | None = None,
+    models: Sequence[str] = (),
+) -> Settings:
+    """Return all settings of a run.
+
+    Parameters
+    ----------
+    config
+        Name or path of a run file; the shipped hallway run where it is None.
+    overrides
+        Texts of the form ``dotted.path=value``, each on top of the ones before it.
+    robot, world, models
+        Names or paths, instead of those in the run file.
+
+    Raises
+    ------
+    ConfigError
+        With a line for each problem, naming the file or ``--set`` the value came from.
+    """
+    run = read_document("runs", DEFAULT_RUN if config is None else config)
+    problems: list[str] = []
+    changes = []
+    for text in overrides:
+        try:
+            changes.append(parse_override(text))
+        except ConfigError as error:
+            problems += error.problems
+
+    names = Layers(run.source)
+    names.lay({"world": DEFAULT_WORLD, "models": [DEFAULT_MODEL]}, run.source)
+    names.lay({key: run.table[key] for key in NAMES if key in run.table}, run.source)
+    asked = {"robot": robot, "world": world, "models": list(models) or None}
+    names.lay({key: value for key, value in asked.items() if value is not None}, COMMAND_LINE)
+    if isinstance(names.tree["models"], str):
+        names.lay({"models": [names.tree["models"]]}, names.source_of(("models",)))
+    problems += apply_overrides([c for c in changes if c.names_files], names)
+
+    settings = Layers(run.source)
+    if "robot" in names.tree:
+        settings, more = _robot_layer(names)
+        problems += more
+    elif "ring" not in run.table and "body" not in run.table:
+        known = ", ".join(list_shipped("robots"))
+        problems.append(f"{run.source.name}: robot: missing; name a robot or a robot file; known robots: {known}")
+    settings.lay({key: value for key, value in run.table.items() if key not in NAMES}, run.source)
+    problems += _lay_world(names, settings)
+    problems += _lay_models(names, settings)
+    problems += apply_overrides([c for c in changes if not c.names_files], settings)
+    if problems:
+        raise ConfigError(*problems)
+    return _validated(Settings, settings)
+
+
+def _load(kind: Kind, name: str | os.PathLike[str], model: type[M]) -> M:
+    document = read_document(kind, name)
+    layers = Layers(document.source)
+    layers.lay(document.table, document.source)
+    return _validated(model, layers)
+
+
+def _validated(model: type[M], layers: Layers) -> M:
+    try:
+        return model.model_validate(layers.tree)
+    except ValidationError as error:
+        raise ConfigError(*describe_all(error, layers, model)) from None
+
+
+def _robot_layer(names: Layers) -> tuple[Layers, list[str]]:
+    """Return the lowest layer, a robot file's, and what is wrong with its top level.
+
+    Merged with a run file, a section that no robot file may have would go unnoticed.
+    """
+    named_by, name = names.source_of(("robot",)), names.tree["robot"]
+    if not isinstance(name, str):
+        return Layers(named_by), [_not_a_name("robot", name, named_by)]
+    try:
+        document = read_document("robots", name, named_by)
+    except ConfigError as error:
+        return Layers(named_by), list(error.problems)
+    source, table = document.source, document.table
+    stray = [key for key in table if key not in RobotConfig.model_fields]
+    layers = Layers(source)
+    layers.lay({key: value for key, value in table.items() if key not in stray}, source)
+    return layers, [f"{source.name}: {dotted((key,))}: {unknown_key((key,), RobotConfig)}" for key in stray]
+
+
+def _lay_world(names: Layers, settings: Layers) -> list[str]:
+    named_by, world = names.source_of(("world",)), names.tree["world"]
+    table, source, problems = _named_table("worlds", "world", world, named_by)
+    if not problems:
+        settings.put(("world",), table, source if source is named_by else source.mounted(("world",)))
+    return problems
+
+
+def _lay_models(names: Layers, settings: Layers) -> list[str]:
+    named_by, models = names.source_of(("models",)), names.tree["models"]
+    if isinstance(models, str):
+        models = [models]
+    if not isinstance(models, list):
+        return [f"{named_by.name}: models = {shown(models)}: must be a list of names, not {given_type(models)}"]
+    if len(models) > MODELS_MAX:
+        return [f"{named_by.name}: models: may have at most {MODELS_MAX} entries, has {len(models)}"]
+    settings.put(("models",), [None] * len(models), named_by)
+    problems = []
+    for i, model in enumerate(models):
+        named_by = names.source_of(("models", i))
+        table, source, more = _named_table("models", f"models.{i}", model, named_by)
+        if not more:
+            settings.put(("models", i), table, source if source is named_by else source.mounted(("models", i)))
+        problems += more
+    return problems
+
+
+def _named_table(kind: Kind, key: str, value: object, named_by: Source) -> tuple[dict[str, Any], Source, list[str]]:
+    """Return the table `value` names, or is, with its source; or what is wrong with it."""
+    if isinstance(value, dict):
+        return value, named_by, []
+    if not isinstance(value, str):
+        return {}, named_by, [_not_a_name(key, value, named_by)]
+    try:
+        document = read_document(kind, value, named_by)
+    except ConfigError as error:
+        return {}, named_by, list(error.problems)
+    return document.table, document.source, []
+
+
+def _not_a_name(key: str, value: object, source: Source) -> str:
+    return f"{source.name}: {key} = {shown(value)}: must be a name or a path (a string), not {given_type(value)}"

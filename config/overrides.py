@@ -1,0 +1,68 @@
+"""Single settings from the command line: `--set ring.firing=octets`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from config.files import DEPTH_MAX, ConfigError, TomlSyntaxError, one_line, parse_toml
+from config.layers import Layers, Location, PathError, Source
+
+OVERRIDE = Source("--set")
+
+
+@dataclass(frozen=True)
+class Override:
+    """One value and where it goes."""
+
+    location: Location
+    value: Any
+
+    @property
+    def names_files(self) -> bool:
+        """Whether this says which files to read, so that it must act before they are read."""
+        head, depth = self.location[0], len(self.location)
+        return (head in ("robot", "world", "models") and depth == 1) or (head == "models" and depth == 2)
+
+
+def parse_override(text: str) -> Override:
+    """Parse `dotted.path=value`; the value is TOML, or else a string without its quotes.
+
+    Raises
+    ------
+    ConfigError
+        Where the text has no such form.
+    """
+    shown = one_line(text) if len(text) <= 60 else one_line(text[:59]) + "…"
+    path, equals, value = text.partition("=")
+    keys = tuple(key.strip() for key in path.split("."))
+    if not equals or not all(keys):
+        raise ConfigError(f"--set {shown}: must have the form section.key=value, as in --set ring.firing=octets")
+    if len(keys) > DEPTH_MAX:
+        raise ConfigError(f"--set {shown}: no setting lies that deep")
+    return Override(keys, _parse_value(value.strip(), f"--set {shown}"))
+
+
+def apply_overrides(overrides: list[Override], layers: Layers) -> list[str]:
+    """Put each override on top of `layers`, and return a line for each that has no place there."""
+    problems = []
+    for override in overrides:
+        try:
+            layers.put(override.location, override.value, OVERRIDE)
+        except PathError as error:
+            path = one_line(".".join(map(str, override.location)))
+            problems.append(f"--set: {path}: {one_line(str(error))}")
+    return problems
+
+
+def _parse_value(text: str, shown: str) -> Any:  # noqa: ANN401 - whatever TOML holds
+    if "\n" in text or "\r" in text:
+        return text
+    try:
+        return parse_toml(f"value = {text}", shown)["value"]
+    except TomlSyntaxError:
+        if text.startswith(("[", "{", '"', "'")):
+            raise ConfigError(
+                f"{shown}: the value begins like a TOML list, table or string but is none; mind the shell's quoting"
+            ) from None
+        return text

@@ -1,0 +1,227 @@
+"""Plain words for what pydantic found: file, dotted path, value, what is allowed, the nearest known name."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import re
+import types
+from collections.abc import Iterator
+from types import MappingProxyType
+from typing import Annotated, Any, Union, get_args, get_origin
+
+import annotated_types
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
+
+from config.files import did_you_mean, dotted
+from config.layers import Layers, Location
+
+EXPECTED = MappingProxyType(
+    {
+        "float_type": "a number",
+        "int_type": "an integer",
+        "bool_type": "true or false",
+        "string_type": "a string",
+        "tuple_type": "a list",
+        "model_type": "a table",
+        "model_attributes_type": "a table",
+        "dict_type": "a table",
+    }
+)
+"""What a field wants, by the kind of pydantic's complaint."""
+
+GIVEN: tuple[tuple[type | tuple[type, ...], str], ...] = (
+    (bool, "true or false"),
+    (int, "an integer"),
+    (float, "a number with a fraction"),
+    (str, "a string"),
+    ((list, tuple), "a list"),
+    (dict, "a table"),
+    ((datetime.date, datetime.time), "a date or time"),
+)
+"""What TOML held; bool comes before int because Python's bool is one."""
+
+BOUNDS = MappingProxyType(
+    {
+        "greater_than": "above",
+        "greater_than_equal": "at least",
+        "less_than": "below",
+        "less_than_equal": "at most",
+    }
+)
+
+PROBLEMS_MAX = 100
+"""Problems told at most; more of them means the file is of another kind altogether."""
+
+
+def describe_all(error: ValidationError, layers: Layers, model: type[BaseModel]) -> list[str]:
+    """Return one line for each problem in `error`, in the order of the schema.
+
+    Parameters
+    ----------
+    error
+        What pydantic raised for the tree of `layers`.
+    layers
+        The tree, which knows where each value came from.
+    model
+        The schema the tree was held against.
+    """
+    found = error.errors(include_url=False)
+    at_fault = {details["loc"] for details in found}
+    above_faults = {where[:n] for where in at_fault for n in range(len(where))}
+    # A list is also called too short when its entries are bad; that is no second problem.
+    told = [d for d in found if d["type"] != "too_short" or d["loc"] not in above_faults]
+    lines = [_describe(details, layers, model) for details in told[:PROBLEMS_MAX]]
+    return lines if len(told) <= PROBLEMS_MAX else [*lines, f"… and {len(told) - PROBLEMS_MAX} problems more"]
+
+
+def shown(value: object) -> str:
+    """Return a value as TOML would write it, cut short where it is long."""
+    if isinstance(value, str):
+        text = json.dumps(value, ensure_ascii=not value.isprintable())
+    elif isinstance(value, bool):
+        text = "true" if value else "false"
+    elif isinstance(value, list | tuple):
+        text = f"[{', '.join(shown(v) for v in value[:20])}]"
+    elif isinstance(value, dict):
+        text = "{…}"
+    else:
+        text = str(value)
+    return text if len(text) <= 60 else text[:59] + "…"
+
+
+def given_type(value: object) -> str:
+    """Return what kind of thing a value is, in TOML's terms."""
+    return next((name for kinds, name in GIVEN if isinstance(value, kinds)), type(value).__name__)
+
+
+def unknown_key(location: Location, model: type[BaseModel], also: tuple[str, ...] = ()) -> str:
+    """Return the text for a key no schema knows: the nearest name here, or the same name elsewhere, or all names."""
+    key = str(location[-1])
+    parent = _unwrapped(_annotation_at(model, location[:-1]))
+    known = (*_fields(parent), *also)
+    near = did_you_mean(key, known)
+    elsewhere = [] if near else [dotted(p) for p in _every_location(model) if p[-1] == key][:2]
+    if elsewhere:
+        near = f"; did you mean {' or '.join(elsewhere)}?"
+    return f"unknown key{near or '; known here: ' + ', '.join(known)}"
+
+
+def _describe(details: ErrorDetails, layers: Layers, model: type[BaseModel]) -> str:
+    location, kind, value = details["loc"], details["type"], details["input"]
+    context = details.get("ctx", {})
+    if kind == "value_error":
+        return _describe_whole(location, str(context.get("error", details["msg"])), value, layers)
+    source = layers.source_of(location)
+    path = dotted(source.local(location))
+    if kind == "missing":
+        return f"{source.name}: {path}: missing"
+    if kind == "extra_forbidden":
+        also = ("robot",) if len(location) == 1 and "models" in model.model_fields else ()
+        return f"{source.name}: {path}: {unknown_key(location, model, also)}"
+    return f"{source.name}: {path} = {shown(value)}: {_complaint(details, model)}"
+
+
+def _complaint(details: ErrorDetails, model: type[BaseModel]) -> str:
+    location, kind, value = details["loc"], details["type"], details["input"]
+    context = details.get("ctx", {})
+    if kind in EXPECTED:
+        return f"must be {EXPECTED[kind]}, not {given_type(value)}"
+    if kind in BOUNDS:
+        bound = next(v for k, v in context.items() if k in ("gt", "ge", "lt", "le"))
+        return f"must be {BOUNDS[kind]} {_number(bound)}{_other_bounds(model, location, kind)}"
+    if kind == "finite_number":
+        return "must be a finite number"
+    if kind == "literal_error":
+        names = [str(a) for a in get_args(_unwrapped(_annotation_at(model, location)))]
+        return f"must be one of {', '.join(names)}{did_you_mean(value, names) if isinstance(value, str) else ''}"
+    if kind == "too_short":
+        return f"needs at least {_entries(context['min_length'])}, has {len(value)}"
+    if kind == "too_long":
+        return f"may have at most {_entries(context['max_length'])}, has {len(value)}"
+    if kind == "string_too_short":
+        return "must not be empty"
+    if kind == "string_pattern_mismatch":
+        return f"must match {context['pattern']}"
+    return details["msg"][:1].lower() + details["msg"][1:]
+
+
+def _describe_whole(location: Location, text: str, table: object, layers: Layers) -> str:
+    """Describe a disagreement among the values of one table: name the sources of those the text speaks of."""
+    keys = table.keys() if isinstance(table, dict) else ()
+    spoken_of = [(*location, k) for k in keys if re.search(rf"\b{re.escape(k)}\b", text)]
+    sources = [s for where in spoken_of for s in [layers.source_of(where)]] or layers.sources_within(location)
+    names = layers.newest_first(sources)
+    path = dotted(sources[0].local(location) if len(names) == 1 else location)
+    return f"{' over '.join(names)}: {path + ': ' if path else ''}{text}"
+
+
+def _entries(count: int) -> str:
+    return "one entry" if count == 1 else f"{count} entries"
+
+
+def _number(bound: object) -> str:
+    return f"{bound:g}" if isinstance(bound, float) else str(bound)
+
+
+def _other_bounds(model: type[BaseModel], location: Location, kind: str) -> str:
+    field = _field_at(model, location)
+    words: list[str] = []
+    for bound in field.metadata if field is not None else ():
+        for constraint, attribute, word in (
+            (annotated_types.Gt, "gt", "greater_than"),
+            (annotated_types.Ge, "ge", "greater_than_equal"),
+            (annotated_types.Lt, "lt", "less_than"),
+            (annotated_types.Le, "le", "less_than_equal"),
+        ):
+            if isinstance(bound, constraint) and word != kind:
+                words.append(f"{BOUNDS[word]} {_number(getattr(bound, attribute))}")
+    return f" (and {' and '.join(words)})" if words else ""
+
+
+def _unwrapped(annotation: Any) -> Any:  # noqa: ANN401 - an annotation can be anything
+    """Return an annotation without Annotated and without the None of an optional field."""
+    while True:
+        origin, arguments = get_origin(annotation), get_args(annotation)
+        if origin is Annotated:
+            annotation = arguments[0]
+        elif origin in (Union, types.UnionType):
+            annotation = next(a for a in arguments if a is not type(None))
+        else:
+            return annotation
+
+
+def _annotation_at(model: Any, location: Location) -> Any:  # noqa: ANN401
+    """Return the annotation of what lies at `location`; None beyond the schema's end."""
+    annotation: Any = model
+    for key in location:
+        annotation = _unwrapped(annotation)
+        if isinstance(key, int):
+            items = get_args(annotation)
+            annotation = items[min(key, len(items) - 1)] if items else None
+            if annotation is Ellipsis:
+                annotation = items[0]
+        else:
+            field = _fields(annotation).get(key)
+            annotation = None if field is None else field.annotation
+    return annotation
+
+
+def _field_at(model: type[BaseModel], location: Location) -> FieldInfo | None:
+    if not location or not isinstance(location[-1], str):
+        return None
+    return _fields(_unwrapped(_annotation_at(model, location[:-1]))).get(location[-1])
+
+
+def _fields(annotation: Any) -> dict[str, FieldInfo]:  # noqa: ANN401
+    is_model = isinstance(annotation, type) and issubclass(annotation, BaseModel)
+    return dict(annotation.model_fields) if is_model else {}
+
+
+def _every_location(annotation: Any, at: Location = ()) -> Iterator[Location]:  # noqa: ANN401
+    """Yield every key of the schema that is not inside a list."""
+    for key, field in _fields(_unwrapped(annotation)).items():
+        yield (*at, key)
+        yield from _every_location(field.annotation, (*at, key))

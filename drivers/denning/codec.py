@@ -1,0 +1,306 @@
+"""Frames to bytes and back: stuffing, checksum and field layout, without a line, a clock or a wait.
+
+The decoder is total. Whatever bytes come, it raises nothing, holds no more than one frame's worth of them, and
+finds its feet again at the next zero; what it could not use is counted.
+"""
+
+from __future__ import annotations
+
+import binascii
+import struct
+from collections import deque
+from collections.abc import Callable
+from types import MappingProxyType
+from typing import Literal, NamedTuple
+
+from cobs import cobs
+
+from drivers.denning.frames import (
+    MASKS_MAX,
+    NO_ECHO,
+    TENTHS_MIN,
+    WINDOW_MAX,
+    WINDOW_MIN,
+    Ack,
+    Drive,
+    Echo,
+    Frame,
+    Halt,
+    Hello,
+    Ident,
+    Nak,
+    NakCode,
+    Odom,
+    Pattern,
+    Release,
+)
+
+FRAME_MAX = 128
+"""Longest frame before stuffing, checksum included."""
+_STUFFED_MAX = FRAME_MAX + 1
+"""COBS adds one byte to anything up to 254 long."""
+_OVERHEAD = 4
+"""Type, sequence number and checksum."""
+_NAME_BYTES = 16
+_MASK_BYTES = 3
+_REJECTED_MAX = 64
+"""Refusals kept for one who may never ask for them."""
+
+_RANGES = MappingProxyType(
+    {
+        "B": (0, 0xFF),
+        "H": (0, 0xFFFF),
+        "I": (0, 0xFFFF_FFFF),
+        "h": (-0x8000, 0x7FFF),
+        "i": (-0x8000_0000, 0x7FFF_FFFF),
+    }
+)
+
+
+class _Layout(NamedTuple):
+    """How one type of frame lies on the wire: its fixed fields, before whatever varies in length."""
+
+    type: int
+    make: Callable[..., Frame]
+    codes: str
+    fields: tuple[str, ...]
+
+    @property
+    def size(self) -> int:
+        """Bytes of the fixed fields."""
+        return struct.calcsize("<" + self.codes)
+
+
+_HOST = (
+    _Layout(0x01, Hello, "B", ("version",)),
+    _Layout(0x02, Pattern, "", ()),
+    _Layout(0x10, Drive, "hh", ("v_mm_s", "w_mrad_s")),
+    _Layout(0x11, Halt, "", ()),
+    _Layout(0x12, Release, "", ()),
+)
+_ROBOT = (
+    _Layout(
+        0x81,
+        Ident,
+        "BBHHHI",
+        ("version", "sensors", "ring_radius_mm", "deadman_ms", "odometry_period_ms", "boot_id"),
+    ),
+    _Layout(0x82, Ack, "B", ("of",)),
+    _Layout(0x83, Nak, "BB", ("of", "code")),
+    _Layout(
+        0x90,
+        Odom,
+        "IiiiihhBB",
+        (
+            "t_us",
+            "x_0p1mm",
+            "y_0p1mm",
+            "heading_1em4rad",
+            "ring_yaw_1em4rad",
+            "v_mm_s",
+            "w_mrad_s",
+            "flags",
+            "last_drive_seq",
+        ),
+    ),
+    _Layout(0x91, Echo, "IB", ("t_us", "step")),
+)
+_BY_CLASS = MappingProxyType({layout.make: layout for layout in (*_HOST, *_ROBOT)})
+_BY_TYPE = MappingProxyType(
+    {
+        "host": {layout.type: layout for layout in _HOST},
+        "robot": {layout.type: layout for layout in _ROBOT},
+    }
+)
+
+
+def crc(data: bytes) -> int:
+    """Return the CRC-16/CCITT-FALSE of `data`."""
+    return binascii.crc_hqx(data, 0xFFFF)
+
+
+def encode(frame: Frame) -> bytes:
+    """Return `frame` as it goes on the line, the closing zero included.
+
+    Raises
+    ------
+    ValueError
+        A field does not fit; the message names the field, its value and its range.
+    """
+    layout = _BY_CLASS[type(frame)]
+    body = bytes((layout.type, _checked(frame, "seq", frame.seq, 0, 0xFF)))
+    values = []
+    for field, code in zip(layout.fields, layout.codes, strict=True):
+        values.append(_checked(frame, field, getattr(frame, field), *_RANGES[code]))
+    body += struct.pack("<" + layout.codes, *values) + _encode_tail(frame)
+    stuffed: bytes = cobs.encode(body + struct.pack("<H", crc(body)))
+    return stuffed + b"\0"
+
+
+def _checked(frame: Frame, field: str, value: int, low: int, high: int) -> int:
+    if not isinstance(value, int) or not low <= value <= high:
+        raise ValueError(f"{type(frame).__name__}.{field} is {value!r}: it must be a whole number, {low} to {high}")
+    return value
+
+
+def _mask_bytes(frame: Frame, field: str, mask: int) -> bytes:
+    return _checked(frame, field, mask, 0, 0xFF_FFFF).to_bytes(_MASK_BYTES, "little")
+
+
+def _encode_tail(frame: Frame) -> bytes:
+    """Return what follows the fixed fields, for the types that vary in length."""
+    match frame:
+        case Pattern():
+            head = (
+                _checked(frame, "masks (their number)", len(frame.masks), 0, MASKS_MAX),
+                _checked(frame, "step_period_ms", frame.step_period_ms, *_RANGES["H"]),
+                _checked(frame, "window", frame.window, WINDOW_MIN, WINDOW_MAX),
+            )
+            masks = (_mask_bytes(frame, f"masks[{k}]", mask) for k, mask in enumerate(frame.masks))
+            return struct.pack("<BHB", *head) + b"".join(masks)
+        case Ident():
+            name = frame.name.encode(errors="replace")
+            if len(name) > _NAME_BYTES or b"\0" in name:
+                raise ValueError(f"Ident.name is {frame.name!r}: it must be 0 to {_NAME_BYTES} bytes without a zero")
+            return name.ljust(_NAME_BYTES, b"\0")
+        case Echo():
+            mask = _mask_bytes(frame, "mask", frame.mask)
+            fired = frame.mask.bit_count()
+            if len(frame.tenths_ft) != fired:
+                raise ValueError(f"Echo.tenths_ft has {len(frame.tenths_ft)} values: its mask asks for {fired}")
+            for k, tenths in enumerate(frame.tenths_ft):
+                if tenths != 0:
+                    _checked(frame, f"tenths_ft[{k}]", tenths, TENTHS_MIN, NO_ECHO)
+            return mask + bytes(frame.tenths_ft)
+        case _:
+            return b""
+
+
+def _decode_tail(layout: _Layout, tail: bytes) -> tuple[object, ...] | NakCode:
+    """Return the fields after the fixed ones, or why there are none."""
+    if layout.make is Pattern:
+        if len(tail) < 4 or len(tail) != 4 + _MASK_BYTES * tail[0]:
+            return NakCode.WRONG_LENGTH
+        count, step_period_ms, window = struct.unpack_from("<BHB", tail)
+        if count > MASKS_MAX or window < WINDOW_MIN:
+            return NakCode.VALUE_OUT_OF_RANGE
+        starts = range(4, len(tail), _MASK_BYTES)
+        return step_period_ms, window, tuple(int.from_bytes(tail[k : k + _MASK_BYTES], "little") for k in starts)
+    if layout.make is Ident:
+        if len(tail) != _NAME_BYTES:
+            return NakCode.WRONG_LENGTH
+        try:
+            name = tail.rstrip(b"\0").decode()
+        except UnicodeDecodeError:
+            return NakCode.VALUE_OUT_OF_RANGE
+        return NakCode.VALUE_OUT_OF_RANGE if "\0" in name else (name,)
+    if layout.make is Echo:
+        mask = int.from_bytes(tail[:_MASK_BYTES], "little")
+        if len(tail) < _MASK_BYTES or len(tail) != _MASK_BYTES + mask.bit_count():
+            return NakCode.WRONG_LENGTH
+        tenths = tuple(tail[_MASK_BYTES:])
+        return NakCode.VALUE_OUT_OF_RANGE if any(0 < t < TENTHS_MIN for t in tenths) else (mask, tenths)
+    return NakCode.WRONG_LENGTH if tail else ()
+
+
+class Decoder:
+    """Bytes of one direction to frames.
+
+    Parameters
+    ----------
+    direction
+        The side the frames come from.
+
+    Attributes
+    ----------
+    frames, bad
+        Frames decoded, and frames dropped: unstuffable, overlong, short, wrong checksum, or nonsense inside.
+    lost
+        Frames that gaps in the sender's sequence numbers tell of; one that came but was unreadable is among them.
+    """
+
+    def __init__(self, direction: Literal["host", "robot"]) -> None:
+        self.frames = 0
+        self.bad = 0
+        self.lost = 0
+        self._layouts = _BY_TYPE[direction]
+        self._pending = bytearray()
+        self._skipping = False
+        self._seq: int | None = None
+        self._rejected: deque[tuple[int, NakCode]] = deque(maxlen=_REJECTED_MAX)
+
+    @property
+    def rejected(self) -> list[tuple[int, NakCode]]:
+        """Frames with the right checksum that make no sense: sequence number and reason, the newest 64."""
+        return list(self._rejected)
+
+    def take_rejected(self) -> list[tuple[int, NakCode]]:
+        """Return and forget `rejected`."""
+        taken = self.rejected
+        self._rejected.clear()
+        return taken
+
+    @property
+    def pending(self) -> int:
+        """Bytes held of a frame not yet whole; never more than a frame's worth."""
+        return len(self._pending)
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """Return the frames that `data` completes, in order; any chunking gives the same frames."""
+        found: list[Frame] = []
+        start = 0
+        while (end := data.find(b"\0", start)) >= 0:
+            self._gather(data, start, end)
+            start = end + 1
+            if self._pending:
+                frame = self._decode(bytes(self._pending))
+                if frame is not None:
+                    found.append(frame)
+            self._pending.clear()
+            self._skipping = False
+        self._gather(data, start, len(data))
+        return found
+
+    def _gather(self, data: bytes, start: int, end: int) -> None:
+        if self._skipping:
+            return
+        if len(self._pending) + end - start > _STUFFED_MAX:
+            self.bad += 1
+            self._skipping = True
+            self._pending.clear()
+            return
+        self._pending += data[start:end]
+
+    def _decode(self, stuffed: bytes) -> Frame | None:
+        try:
+            body = cobs.decode(stuffed)
+        except cobs.DecodeError:
+            self.bad += 1
+            return None
+        if len(body) < _OVERHEAD or crc(body[:-2]) != int.from_bytes(body[-2:], "little"):
+            self.bad += 1
+            return None
+        self._count_gap(body[1])
+        frame = self._parse(body[0], body[1], body[2:-2])
+        if isinstance(frame, NakCode):
+            self.bad += 1
+            self._rejected.append((body[1], frame))
+            return None
+        self.frames += 1
+        return frame
+
+    def _count_gap(self, seq: int) -> None:
+        if self._seq is not None and seq != self._seq:
+            self.lost += (seq - self._seq - 1) % 256
+        self._seq = seq
+
+    def _parse(self, kind: int, seq: int, payload: bytes) -> Frame | NakCode:
+        layout = self._layouts.get(kind)
+        if layout is None:
+            return NakCode.UNKNOWN_TYPE
+        if len(payload) < layout.size:
+            return NakCode.WRONG_LENGTH
+        tail = _decode_tail(layout, payload[layout.size :])
+        if isinstance(tail, NakCode):
+            return tail
+        return layout.make(seq, *struct.unpack_from("<" + layout.codes, payload), *tail)

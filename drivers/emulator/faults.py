@@ -1,0 +1,137 @@
+"""The fault script: what goes wrong with the robot or its line, and when.
+
+```toml
+[[fault]]
+at_s = 3.0
+kind = "mute"
+duration_s = 0.5
+```
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import Field, ValidationError
+from pydantic_core import ErrorDetails
+
+from config.files import SIZE_MAX, ConfigError, dotted, one_line, parse_document
+from config.problems import shown as shown_value
+from config.strict import Many, Strict
+
+
+class _Timed(Strict):
+    at_s: float = Field(ge=0.0)
+    """Seconds after the emulator began."""
+    duration_s: float = Field(default=0.0, ge=0.0)
+
+
+class Mute(_Timed):
+    """The robot sends nothing."""
+
+    kind: Literal["mute"]
+
+
+class Deaf(_Timed):
+    """The robot reads nothing."""
+
+    kind: Literal["deaf"]
+
+
+class Garbage(_Timed):
+    """Random bytes on the line between the robot's frames."""
+
+    kind: Literal["garbage"]
+    bytes_per_s: float = Field(default=2000.0, gt=0.0, le=1e6)
+
+
+class BitErrors(_Timed):
+    """Bits flip on the line, in both directions."""
+
+    kind: Literal["bit_errors"]
+    rate: float = Field(default=1e-3, gt=0.0, le=1.0)
+    """Probability for each bit."""
+
+
+class Reboot(_Timed):
+    """The robot restarts, and is gone for `duration_s`."""
+
+    kind: Literal["reboot"]
+
+
+class Bumper(_Timed):
+    """The bumper is pressed, and held for `duration_s`."""
+
+    kind: Literal["bumper"]
+
+
+class MotorFault(_Timed):
+    """A motor fails, and cannot be released for `duration_s`."""
+
+    kind: Literal["motor_fault"]
+
+
+class StuckSensor(_Timed):
+    """A sensor reports one range whatever there is; without a range it reports a fault."""
+
+    kind: Literal["stuck_sensor"]
+    sensor: int = Field(ge=0, le=23)
+    range_m: float | None = Field(default=None, ge=0.0)
+
+
+class OdometryJump(_Timed):
+    """The odometry's pose jumps."""
+
+    kind: Literal["odometry_jump"]
+    dx_m: float = 0.0
+    dy_m: float = 0.0
+    dheading_rad: float = 0.0
+
+
+class Unplug(_Timed):
+    """The line is pulled out for `duration_s`: a hang-up, and no port to open."""
+
+    kind: Literal["unplug"]
+
+
+Fault: TypeAlias = (
+    Mute | Deaf | Garbage | BitErrors | Reboot | Bumper | MotorFault | StuckSensor | OdometryJump | Unplug
+)
+
+
+class FaultScript(Strict):
+    """A fault script file."""
+
+    fault: Many[Annotated[Fault, Field(discriminator="kind")]] = ()
+
+
+def load_faults(path: str | Path) -> tuple[Fault, ...]:
+    """Return the faults of the script at `path`.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be read, is not TOML, or holds something that is not a fault; a line for each problem.
+    """
+    shown = one_line(str(path))
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(SIZE_MAX + 1)
+    except OSError as error:
+        raise ConfigError(f"{shown}: cannot be read: {error.strerror or error}") from None
+    except ValueError as error:  # a NUL in the path
+        raise ConfigError(f"{shown}: not a path: {one_line(str(error))}") from None
+    try:
+        return FaultScript.model_validate(parse_document(data, shown)).fault
+    except ValidationError as error:
+        problems = (_describe(details) for details in error.errors(include_url=False))
+        raise ConfigError(*(f"{shown}: {problem}" for problem in problems)) from None
+
+
+def _describe(details: ErrorDetails) -> str:
+    # Behind the number of a fault pydantic names its kind, which is no key of the file.
+    where = dotted(part for i, part in enumerate(details["loc"]) if i != 2)
+    given = "" if isinstance(details["input"], dict | list | tuple) else f" = {shown_value(details['input'])}"
+    text = details["msg"]
+    return f"{where}{given}: {text[:1].lower()}{text[1:]}"

@@ -1,0 +1,133 @@
+"""A world file as plain arrays: circles, straight surfaces, and the corners where surfaces meet.
+
+A corner is described by the open sectors round it, because what a corner does to sound depends on the side it is
+seen from: a sector narrower than half a turn is a concave corner to whoever stands in it, a wider one a convex edge.
+A wall that ends on another wall, or crosses it, makes corners as well.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from config.world import BoxConfig, PolygonConfig, WorldConfig
+from drivers.messages import Floats
+
+JOIN_M = 1e-4
+"""Surfaces whose ends are nearer than this meet: a world file is typed with rounded numbers."""
+_FLAT_RAD = 1e-3
+"""Two surfaces that go on in one direction make no corner."""
+
+_Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """What reflects and what the body can hit, in world coordinates; float64, C order.
+
+    Attributes
+    ----------
+    circles
+        Shape (circles, 3): centre x, y and radius, metres.
+    segments
+        Shape (segments, 4): x and y of both ends, metres.
+    corners
+        Shape (sectors, 4): x, y, the direction in which an open sector begins, and its opening counter-clockwise
+        from there; metres and radians.
+    """
+
+    circles: Floats
+    segments: Floats
+    corners: Floats
+
+
+def compile_scene(world: WorldConfig) -> Scene:
+    """Return the surfaces of `world`; a surface shorter than `JOIN_M` is left out."""
+    sides = [((wall.x1_m, wall.y1_m), (wall.x2_m, wall.y2_m)) for wall in world.wall]
+    for outline in [*map(_box_outline, world.box), *map(_polygon_outline, world.polygon)]:
+        sides += zip(outline, outline[1:] + outline[:1], strict=True)
+    sides = [(a, b) for a, b in sides if math.dist(a, b) > JOIN_M]
+    return Scene(
+        circles=_table([(drum.x_m, drum.y_m, drum.radius_m) for drum in world.drum], 3),
+        segments=_table([(*a, *b) for a, b in sides], 4),
+        corners=_table(_sectors(sides), 4),
+    )
+
+
+def _table(rows: list[tuple[float, ...]], columns: int) -> Floats:
+    return np.array(rows, dtype=np.float64).reshape(len(rows), columns)
+
+
+def _box_outline(box: BoxConfig) -> list[_Point]:
+    angle = math.radians(box.angle_deg)
+    c, s = math.cos(angle), math.sin(angle)
+    half = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
+    local = [(i * box.width_m, j * box.depth_m) for i, j in half]
+    return [(box.x_m + c * x - s * y, box.y_m + s * x + c * y) for x, y in local]
+
+
+def _polygon_outline(polygon: PolygonConfig) -> list[_Point]:
+    return list(polygon.vertices_m)
+
+
+def _sectors(sides: list[tuple[_Point, _Point]]) -> list[tuple[float, ...]]:
+    """Return the open sectors round every point where a side ends or two sides cross."""
+    rows: list[tuple[float, ...]] = []
+    for x, y in _meeting_points(sides):
+        directions = _directions_from((x, y), sides)
+        for i, start in enumerate(directions):
+            end = directions[(i + 1) % len(directions)]
+            opening = (end - start) % (2.0 * math.pi) or 2.0 * math.pi
+            if abs(opening - math.pi) > _FLAT_RAD:
+                rows.append((x, y, start, opening))
+    return rows
+
+
+def _meeting_points(sides: list[tuple[_Point, _Point]]) -> list[_Point]:
+    found: list[_Point] = []
+    crossings = [
+        p for i, side in enumerate(sides) for other in sides[:i] if (p := _crossing(side, other)) is not None
+    ]
+    for point in [end for side in sides for end in side] + crossings:
+        if all(math.dist(point, other) > JOIN_M for other in found):
+            found.append(point)
+    return found
+
+
+def _crossing(first: tuple[_Point, _Point], second: tuple[_Point, _Point]) -> _Point | None:
+    (ax, ay), (bx, by) = first
+    (cx, cy), (dx, dy) = second
+    ux, uy, vx, vy = bx - ax, by - ay, dx - cx, dy - cy
+    across = ux * vy - uy * vx
+    if abs(across) < 1e-12 * math.hypot(ux, uy) * math.hypot(vx, vy):
+        return None
+    t = ((cx - ax) * vy - (cy - ay) * vx) / across
+    s = ((cx - ax) * uy - (cy - ay) * ux) / across
+    return (ax + t * ux, ay + t * uy) if 0.0 <= t <= 1.0 and 0.0 <= s <= 1.0 else None
+
+
+def _directions_from(point: _Point, sides: list[tuple[_Point, _Point]]) -> list[float]:
+    """Return the directions in which surface leaves `point`, ascending, each once."""
+    directions: list[float] = []
+    for a, b in sides:
+        if _distance_to_side(point, a, b) > JOIN_M:
+            continue
+        for end in (a, b):
+            if math.dist(point, end) > JOIN_M:
+                direction = math.atan2(end[1] - point[1], end[0] - point[0]) % (2.0 * math.pi)
+                if all(_angle_between(direction, other) > _FLAT_RAD for other in directions):
+                    directions.append(direction)
+    return sorted(directions)
+
+
+def _angle_between(a: float, b: float) -> float:
+    return abs((a - b + math.pi) % (2.0 * math.pi) - math.pi)
+
+
+def _distance_to_side(point: _Point, a: _Point, b: _Point) -> float:
+    ux, uy = b[0] - a[0], b[1] - a[1]
+    along = ((point[0] - a[0]) * ux + (point[1] - a[1]) * uy) / (ux * ux + uy * uy)
+    along = min(1.0, max(0.0, along))
+    return math.dist(point, (a[0] + along * ux, a[1] + along * uy))

@@ -1,0 +1,57 @@
+"""Which faults are on: the fault script as a clockwork that the robot asks."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from drivers.emulator.faults import Fault
+
+F = TypeVar("F", bound=Fault)
+
+
+class FaultSchedule:
+    """Faults begin and end in the order of their times; one without duration ends right after it began."""
+
+    def __init__(self, faults: Sequence[Fault]) -> None:
+        edges = []
+        for fault in faults:
+            begin = round(fault.at_s * 1e6)
+            edges += [(begin, True, fault), (begin + round(fault.duration_s * 1e6), False, fault)]
+        self._edges = deque(sorted(edges, key=lambda edge: edge[0]))
+        self._active: list[Fault] = []
+
+    @property
+    def next_us(self) -> int | None:
+        """When the next fault begins or ends, microseconds; None where nothing more happens."""
+        return self._edges[0][0] if self._edges else None
+
+    def due(self, now_us: int) -> Iterator[tuple[bool, Fault]]:
+        """Yield each fault that begins (True) or ends (False) by now; the caller turns it on or off."""
+        while self._edges and self._edges[0][0] <= now_us:
+            _, begins, fault = self._edges.popleft()
+            yield begins, fault
+
+    def turn(self, fault: Fault, *, on: bool) -> None:
+        """Count a fault on or off."""
+        if on:
+            self._active.append(fault)
+        else:
+            self._active.remove(fault)
+
+    def has(self, kind: type[Fault]) -> bool:
+        """Tell whether a fault of this kind is on."""
+        return any(isinstance(fault, kind) for fault in self._active)
+
+    def all(self, kind: type[F]) -> list[F]:
+        """Return the faults of this kind that are on."""
+        return [fault for fault in self._active if isinstance(fault, kind)]
+
+
+def flip_bits(data: bytes, rate: float, rng: np.random.Generator) -> bytes:
+    """Return `data` with each bit flipped with probability `rate`."""
+    flips = rng.random(8 * len(data)) < rate
+    return (np.frombuffer(data, dtype=np.uint8) ^ np.packbits(flips)).tobytes()

@@ -1,0 +1,60 @@
+"""Opening a serial port, and saying in one line why it cannot be opened.
+
+Opening blocks: on a lost USB adapter, or a driver that waits for a modem line, for as long as it likes. So `link`
+does it in a thread.
+"""
+
+from __future__ import annotations
+
+import errno
+import termios
+from collections.abc import Callable
+from typing import TypeAlias
+
+import serial
+
+from config.robot import LinkConfig
+
+OpenPort: TypeAlias = Callable[[LinkConfig], serial.Serial]
+
+
+OPENING_ERRORS = (OSError, ValueError, OverflowError, termios.error)
+"""What the serial library raises where a port cannot be opened or set up."""
+
+
+class LinkError(Exception):
+    """The serial line cannot be had: what happened, likely cause, next action, in one line."""
+
+
+def open_port(config: LinkConfig) -> serial.Serial:
+    """Open the port, for this process alone. Blocks."""
+    return serial.Serial(config.port, config.baud, exclusive=True, timeout=0, write_timeout=0)
+
+
+def explain(config: LinkConfig, error: BaseException) -> str:
+    """Return in one line why `config.port` could not be opened."""
+    port = config.port
+    number = getattr(error, "errno", None)
+    text = " ".join(str(error).split())
+    if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR):
+        return (
+            f"no such port {port}; likely the robot is not plugged in or the name is another: look for it with "
+            f"`ls /dev/tty* /dev/serial/by-id`, and give it as --port or link.port"
+        )
+    if number in (errno.EACCES, errno.EPERM):
+        return (
+            f"no permission to open {port}; likely this user is not in the port's group (dialout on most systems): "
+            f"add the user to it and log in again"
+        )
+    if number in (errno.EAGAIN, errno.EBUSY, errno.EWOULDBLOCK):
+        return (
+            f"port {port} is in use by another program; find it with `fuser {port}` and end it, or use another port"
+        )
+    not_a_tty = isinstance(error, termios.error) or "Could not configure port" in text
+    if number in (errno.EISDIR, errno.ENOTTY) or not_a_tty:
+        return f"{port} is not a serial port ({text}); give the serial device of the robot as --port or link.port"
+    if isinstance(error, TimeoutError):
+        return f"opening {port} does not come to an end ({text}); likely its adapter hangs: unplug and plug it again"
+    if isinstance(error, ValueError | OverflowError):
+        return f"{port} cannot be set to {config.baud} baud ({text}); correct link.baud"
+    return f"cannot open {port} ({text}); check the cable and the port's name"

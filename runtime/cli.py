@@ -1,0 +1,236 @@
+"""The command `echolocate`: what can be called, with which options, and how each call ends.
+
+Commands import what they need when they are called, so that help and mistakes answer at once, and numba hears where
+its cache is before it is loaded.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated, Literal
+
+from cyclopts import App, CycloptsError, Parameter
+
+from runtime import VERSION
+from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
+
+app = App(
+    name="echolocate",
+    help="A robot's main process that recognises and locates objects by sonar alone.",
+    version=VERSION,
+)
+
+Sets = Annotated[
+    tuple[str, ...],
+    Parameter(
+        name="--set",
+        negative="",
+        allow_leading_hyphen=False,
+        help="Override one setting, as in ring.firing=quadrants.",
+    ),
+]
+JsonFile = Annotated[str | None, Parameter(name="--json", help="Write the summary to this file.")]
+UnitsOption = Annotated[Literal["m", "ft"], Parameter(help="Units of what is printed.")]
+Flag = Parameter(negative="")
+
+
+@app.command
+def run(
+    config: str | None = None,
+    /,
+    *,
+    port: str | None = None,
+    arm: Annotated[bool, Flag] = False,
+    seconds: float | None = None,
+    headless: Annotated[bool, Flag] = False,
+    record: str | None = None,
+    json: JsonFile = None,
+    world: str | None = None,
+    seed: int = 0,
+    trace: str | None = None,
+    faults: str | None = None,
+    units: UnitsOption = "m",
+    sets: Sets = (),
+) -> int:
+    """Run the robot's main process; without a port, on the emulator in the paper's hall.
+
+    Parameters
+    ----------
+    config
+        Run file, or the name of a shipped one.
+    port
+        Serial port of the robot. The robot waits in READY until it is armed.
+    arm
+        Arm once, at the start. Without a port this is done anyway.
+    seconds
+        End after this time.
+    headless
+        No live view: log lines instead.
+    record
+        Write every firing to this ring log.
+    world
+        World of the emulator, a file or a name.
+    seed
+        Of everything random in the emulator.
+    trace
+        Write the emulator's truth to this CSV file.
+    faults
+        Fault script of the emulator.
+    """
+    from runtime.commands.run import Emulation, run_robot
+
+    emulation = Emulation(world=world, seed=seed, trace=trace, faults=faults)
+    return run_robot(
+        config, sets, port=port, arm=arm, seconds=seconds, headless=headless, record=record, json_file=json,
+        emulation=emulation, units=units,
+    )  # fmt: skip
+
+
+@app.command
+def emulate(
+    *,
+    world: str | None = None,
+    link: str | None = None,
+    faults: str | None = None,
+    seed: int = 0,
+    robot: str | None = None,
+    trace: str | None = None,
+    config: str | None = None,
+    sets: Sets = (),
+    end_with_parent: Annotated[bool, Parameter(negative="", show=False)] = False,
+) -> int:
+    """Be the robot's side alone, on a pseudo-terminal, until interrupted.
+
+    Parameters
+    ----------
+    world
+        What stands in the hall: a file or the name of a shipped world.
+    link
+        Path that will lead to the pseudo-terminal.
+    faults
+        Fault script.
+    seed
+        Of everything random.
+    robot
+        Robot file, or the name of a shipped one.
+    trace
+        Write the truth to this CSV file, a hundred rows a second.
+    config
+        Run file to take robot and world from.
+    """
+    from runtime.commands.emulate import emulate_robot
+
+    return emulate_robot(
+        config, sets, world=world, robot=robot, link=link, faults=faults, seed=seed, trace=trace,
+        end_with_parent=end_with_parent,
+    )  # fmt: skip
+
+
+@app.command
+def replay(
+    log: str,
+    /,
+    *,
+    robot: str | None = None,
+    model: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    json: JsonFile = None,
+    units: UnitsOption = "m",
+    sets: Sets = (),
+) -> int:
+    """Run perception over a ring log.
+
+    Parameters
+    ----------
+    log
+        CSV with the header t,x,y,theta[,ring_yaw],r00,r01,…
+    robot
+        Robot file, or the name of a shipped one.
+    model
+        Object model to look for: a file or a name; may be repeated.
+    """
+    from runtime.commands.replay import replay_log
+
+    return replay_log(log, sets, robot=robot, models=model, json_file=json, units=units)
+
+
+@app.command
+def experiment(
+    name: Literal["hallway", "irregular"],
+    /,
+    *,
+    method: Literal["paper"] = "paper",
+    world: str | None = None,
+    seeds: int = 1,
+    json: JsonFile = None,
+    units: UnitsOption = "ft",
+    sets: Sets = (),
+) -> int:
+    """Repeat the paper's experiment in virtual time, and print its Table 2.
+
+    Parameters
+    ----------
+    name
+        The simulated hallway, or the irregular one of the real run.
+    method
+        How objects are recognised.
+    world
+        Another world, a file or a name.
+    seeds
+        Repeat with this many seeds, from 0 on.
+    """
+    from runtime.commands.experiment import run_experiment
+
+    return run_experiment(
+        name, (*sets, f"perception.method={method}"), world=world, seeds=seeds, json_file=json, units=units
+    )
+
+
+@app.command
+def check(config: str, /, *, sets: Sets = ()) -> int:
+    """Say whether a configuration is good, and if not, where and why.
+
+    Parameters
+    ----------
+    config
+        Run, robot, world or model file, or the name of a shipped run.
+    """
+    from runtime.commands.check import check_config
+
+    return check_config(config, sets)
+
+
+def complain(text: str) -> None:
+    """Say what is wrong on stderr, one line for each thing."""
+    for line in text.splitlines() or [""]:
+        sys.stderr.write(f"echolocate: {line}\n")
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and exit with 0 done, 1 the work failed, 2 the call or configuration was wrong."""
+    sys.exit(call(sys.argv[1:] if arguments is None else arguments))
+
+
+def call(arguments: list[str]) -> int:
+    """Run one command and return its exit code; what a user can cause becomes a line on stderr."""
+    from config.load import ConfigError
+    from runtime.kernels import use_cache
+
+    use_cache()
+    try:
+        result = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+    except CycloptsError as error:
+        complain(f"{' '.join(str(error).split())} See `echolocate --help`.")
+        return WRONG_CALL
+    except ConfigError as error:
+        complain(str(error))
+        return WRONG_CALL
+    except Complaint as complaint:
+        complain(str(complaint))
+        return complaint.exit_code
+    except KeyboardInterrupt:
+        return FAILED
+    return result if isinstance(result, int) else DONE
+
+
+if __name__ == "__main__":
+    main()

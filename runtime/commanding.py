@@ -1,0 +1,25 @@
+"""From a cycle's command to the robot's driver, the same on a serial line and in virtual time."""
+
+from __future__ import annotations
+
+from drivers.driver import RobotDriver
+from drivers.messages import Twist
+from runtime.modes import Request
+from runtime.step import Command, Inputs, Order
+
+
+def give(driver: RobotDriver, command: Command) -> None:
+    """Hand `command` to the driver; None hands it nothing."""
+    match command:
+        case Twist():
+            driver.drive(command)
+        case Order.HALT:
+            driver.halt()
+        case Order.RELEASE:
+            driver.release()
+
+
+def gather(driver: RobotDriver, now_s: float, request: Request | None) -> Inputs:
+    """Return everything a cycle that begins at `now_s` is told."""
+    driver.tick(now_s)
+    return Inputs(now_s, driver.state, driver.trouble, driver.take(), request)

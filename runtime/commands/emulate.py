@@ -1,0 +1,49 @@
+"""`echolocate emulate`: the robot's side alone, on a pseudo-terminal."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Sequence
+
+from config.load import load_settings
+from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
+
+
+def emulate_robot(
+    config: str | None,
+    sets: Sequence[str],
+    *,
+    world: str | None,
+    robot: str | None,
+    link: str | None,
+    faults: str | None,
+    seed: int,
+    trace: str | None,
+    end_with_parent: bool,
+) -> int:
+    """Carry out the command; see `runtime.cli.emulate`."""
+    settings = load_settings(config, sets, world=world, robot=robot)
+    from drivers.emulator.faults import load_faults
+    from drivers.emulator.pty import EmulatorError, serve
+
+    if settings.world is None:
+        raise Complaint("no world is given: name one with --world", WRONG_CALL)
+    script = () if faults is None else load_faults(faults)
+
+    def ready(path: str) -> None:
+        sys.stdout.write(f"ready on {path}\n")
+        sys.stdout.flush()
+
+    try:
+        asyncio.run(
+            serve(
+                settings, settings.world, link_path=link, faults=script, seed=seed, trace_path=trace,
+                ready=ready, exit_with_parent=end_with_parent,
+            )
+        )  # fmt: skip
+    except EmulatorError as error:
+        raise Complaint(str(error), FAILED) from error
+    except ValueError as error:
+        raise Complaint(str(error), WRONG_CALL) from error
+    return DONE

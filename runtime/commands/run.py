@@ -1,0 +1,181 @@
+"""`echolocate run`: the robot's main process, on a serial port or on an emulator of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import queue
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from config.load import load_settings
+from config.settings import Settings
+from runtime import VERSION
+from runtime.commands.firing import refuse_impossible_firing
+from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
+from runtime.kernels import ready_kernels
+from runtime.logs import open_log
+from runtime.tables import Units, objects_table
+
+if TYPE_CHECKING:
+    from drivers.messages import Firing
+    from runtime.process import RobotProcess
+    from runtime.summary import RunSummary
+
+
+@dataclass(frozen=True, slots=True)
+class Emulation:
+    """What the emulator is asked for where no port is given."""
+
+    world: str | None
+    seed: int
+    trace: str | None
+    faults: str | None
+
+    def arguments(self, config: str | None, sets: Sequence[str]) -> list[str]:
+        """Return the arguments of ``echolocate emulate`` that ask for it."""
+        named = {
+            "--config": config,
+            "--world": self.world,
+            "--seed": str(self.seed),
+            "--trace": self.trace,
+            "--faults": self.faults,
+        }
+        words = [word for option, value in named.items() if value is not None for word in (option, value)]
+        return words + [word for text in sets for word in ("--set", text)]
+
+
+def run_robot(
+    config: str | None,
+    sets: Sequence[str],
+    *,
+    port: str | None,
+    arm: bool,
+    seconds: float | None,
+    headless: bool,
+    record: str | None,
+    json_file: str | None,
+    emulation: Emulation,
+    units: Units,
+) -> int:
+    """Carry out the command; see `runtime.cli.run`."""
+    settings = load_settings(config, sets, world=emulation.world)
+    refuse_impossible_firing(settings.ring)
+    if seconds is not None and not seconds > 0.0:
+        raise Complaint(f"--seconds {seconds}: must be above 0", WRONG_CALL)
+    port = port if port is not None else settings.link.port
+    if port is not None:
+        settings = on_port(settings, port)
+    console = Console(stderr=True)
+    ready_kernels(settings, console)
+    live = not headless and console.is_terminal
+    log = open_log(settings.log, terminal=not live)
+    log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
+    with contextlib.ExitStack() as stack:
+        on_firing = None if record is None else stack.enter_context(recording(record))
+
+        async def whole() -> RunSummary:
+            from runtime.emulated import emulator
+
+            async with contextlib.AsyncExitStack() as running:
+                chosen = settings
+                if port is None:
+                    emulated = await running.enter_async_context(emulator(emulation.arguments(config, sets)))
+                    chosen = on_port(settings, emulated)
+                return await watch(
+                    chosen, log, console, live=live, units=units, on_firing=on_firing,
+                    arm=arm or port is None, seconds=seconds,
+                )  # fmt: skip
+
+        summary = asyncio.run(whole())
+    if json_file is not None:
+        from runtime.summary import write_json
+
+        write_json(json_file, summary)
+    out = Console()
+    out.print(objects_table(summary["objects"], units))
+    return FAILED if summary["mode"] == "FAULT" else DONE
+
+
+def on_port(settings: Settings, port: str) -> Settings:
+    """Return the settings with the serial port replaced."""
+    return settings.model_copy(update={"link": settings.link.model_copy(update={"port": port})})
+
+
+async def watch(
+    settings: Settings,
+    log: object,
+    console: Console,
+    *,
+    live: bool,
+    units: Units,
+    on_firing: Callable[[Firing], None] | None,
+    arm: bool,
+    seconds: float | None,
+) -> RunSummary:
+    """Run the process under the eyes of the live view, and end it on SIGINT or SIGTERM."""
+    from runtime.process import Observers, RobotProcess
+    from runtime.view import View, keys
+
+    with contextlib.ExitStack() as stack:
+        view = View(settings, console, units) if live else None
+        observers = Observers(None if view is None else view.on_cycle, on_firing)
+        process = RobotProcess(settings, log, observers)  # type: ignore[arg-type]
+        stack.enter_context(stopping_on_signals(process))
+        if view is not None:
+            stack.enter_context(view.shown())
+            stack.enter_context(keys(process.request, process.stop))
+        return await process.run(arm=arm, seconds=seconds)
+
+
+@contextlib.contextmanager
+def stopping_on_signals(process: RobotProcess) -> Iterator[None]:
+    """End the run in good order on SIGINT and SIGTERM; SIGUSR1 arms a robot that has no keyboard."""
+    from runtime.modes import Request
+
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, process.stop)
+    loop.add_signal_handler(signal.SIGUSR1, process.request, Request.ARM)
+    try:
+        yield
+    finally:
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1):
+            loop.remove_signal_handler(number)
+
+
+@contextlib.contextmanager
+def recording(path: str) -> Iterator[Callable[[Firing], None]]:
+    """Write the run's firings to a ring log, in a thread: a slow disk delays no cycle.
+
+    Raises
+    ------
+    Complaint
+        The file cannot be written.
+    """
+    from runtime.ringlog import RingLogError, write_ring_log
+
+    waiting: queue.SimpleQueue[Firing | None] = queue.SimpleQueue()
+    failures: list[RingLogError] = []
+
+    def work() -> None:
+        try:
+            write_ring_log(Path(path), iter(waiting.get, None))
+        except RingLogError as error:
+            failures.append(error)
+
+    writer = threading.Thread(target=work, name="ring log")
+    writer.start()
+    try:
+        yield waiting.put
+    finally:
+        waiting.put(None)
+        writer.join()
+    if failures:
+        raise Complaint(str(failures[0]), FAILED)

@@ -1,0 +1,83 @@
+"""The emulator as a child process: started, waited for, and ended by the robot's main process."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import sys
+import tempfile
+from collections.abc import AsyncIterator, Sequence
+from pathlib import Path
+from typing import Final
+
+from runtime.complaint import FAILED, Complaint
+
+READY_WORD: Final = "ready"
+"""First word of the one line the emulator prints."""
+
+START_MAX_S: Final = 60.0
+"""Even a machine that compiles the emulator's kernels is through by then."""
+
+END_MAX_S: Final = 2.0
+
+
+@contextlib.asynccontextmanager
+async def emulator(arguments: Sequence[str]) -> AsyncIterator[str]:
+    """Run ``echolocate emulate`` beside this process and give the port it answers on.
+
+    It gets a session of its own, so that Ctrl-C on the terminal reaches this process only, which then halts the
+    robot before it goes. When this process is killed the emulated base stops by itself and the emulator ends.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Further arguments of the command.
+
+    Raises
+    ------
+    Complaint
+        The emulator did not get ready; its own words are in the message.
+    """
+    with tempfile.TemporaryDirectory(prefix="echolocate-") as folder:
+        port = Path(folder) / "robot"
+        process = await asyncio.create_subprocess_exec(
+            sys.executable, "-m", "runtime.cli", "emulate", "--link", str(port), "--end-with-parent", *arguments,
+            stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE, start_new_session=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+        )  # fmt: skip
+        try:
+            await _wait_until_ready(process)
+            yield str(port)
+        finally:
+            await _end(process)
+
+
+async def _wait_until_ready(process: asyncio.subprocess.Process) -> None:
+    out, err = process.stdout, process.stderr
+    if out is None or err is None:
+        raise Complaint("the emulator was started without pipes: this is a fault of the program", FAILED)
+    try:
+        line = await asyncio.wait_for(out.readline(), START_MAX_S)
+    except TimeoutError:
+        line = b""
+    if not line.startswith(READY_WORD.encode()):
+        if process.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+        words = (await err.read()).decode(errors="replace").strip()
+        why = words.removeprefix("echolocate: ") or f"no answer within {START_MAX_S:.0f} s"
+        raise Complaint(f"the emulator did not start: {why}", FAILED)
+
+
+async def _end(process: asyncio.subprocess.Process) -> None:
+    if process.returncode is None:
+        with contextlib.suppress(ProcessLookupError):
+            process.send_signal(signal.SIGTERM)
+        try:
+            await asyncio.wait_for(process.wait(), END_MAX_S)
+        except TimeoutError:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+            await process.wait()

@@ -1,0 +1,109 @@
+"""The paper's simulated experiment: drive down the hall, and set estimates against truth as its Table 2 does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, TypedDict
+
+from config.settings import Settings
+from config.world import WorldConfig
+from drivers.messages import Pose
+from runtime.complaint import FAILED, Complaint
+from runtime.modes import Mode
+from runtime.simulate import Simulated, simulate
+
+GATE_M: Final = 0.3048
+"""An estimate farther than a foot from every drum is a false one."""
+
+SECONDS_MAX: Final = 600.0
+
+
+class DrumRow(TypedDict):
+    """A row of Table 2, metres in world coordinates."""
+
+    truth: tuple[float, float]
+    estimate: tuple[float, float] | None
+    error: float | None
+
+
+class Outcome(TypedDict):
+    """The experiment's summary: the JSON form of the public surface."""
+
+    drums: list[DrumRow]
+    false: int
+    mean_error: float | None
+    max_error: float | None
+    times_real_time: float
+
+
+@dataclass(frozen=True, slots=True)
+class SeedOutcome:
+    """One run of the experiment."""
+
+    seed: int
+    rows: list[DrumRow]
+    false: int
+    virtual_s: float
+    wall_s: float
+
+
+def run_seed(settings: Settings, world: WorldConfig, seed: int) -> SeedOutcome:
+    """Run the experiment once in virtual time.
+
+    Raises
+    ------
+    Complaint
+        The robot stopped for a reason, touched something, or did not get through in `SECONDS_MAX`.
+    """
+    run = simulate(settings, world, seed, SECONDS_MAX)
+    if run.state.mode.mode is Mode.SAFE_STOP:
+        raise Complaint(
+            f"seed {seed}: the robot stopped after {run.virtual_s:.1f} s: {run.state.mode.reason}", FAILED
+        )
+    if run.truth.contacts:
+        raise Complaint(f"seed {seed}: the robot touched something", FAILED)
+    if run.state.leg is None or not run.state.leg.done:
+        raise Complaint(
+            f"seed {seed}: the robot did not get through in {SECONDS_MAX:.0f} s: look for a way that is too narrow "
+            "for its radius and safety margin",
+            FAILED,
+        )
+    rows, false = against_truth(world, estimates(run))
+    return SeedOutcome(seed, rows, false, run.virtual_s, run.wall_s)
+
+
+def estimates(run: Simulated) -> list[tuple[float, float]]:
+    """Return where objects were seen, in world coordinates, m."""
+    places = [run.start.compose(Pose(o.x, o.y, o.theta)) for o in run.state.perception.objects()]
+    return [(p.x, p.y) for p in places]
+
+
+def against_truth(world: WorldConfig, seen: list[tuple[float, float]]) -> tuple[list[DrumRow], int]:
+    """Pair drums with estimates, nearest pairs first and each at most once; return the rows and the false ones."""
+    drums = [(d.x_m, d.y_m) for d in world.drum]
+    pairs = sorted((math.dist(d, e), i, j) for i, d in enumerate(drums) for j, e in enumerate(seen))
+    match: dict[int, int] = {}
+    for distance, i, j in pairs:
+        if distance <= GATE_M and i not in match and j not in match.values():
+            match[i] = j
+    rows: list[DrumRow] = []
+    for i, drum in enumerate(drums):
+        estimate = seen[match[i]] if i in match else None
+        error = None if estimate is None else math.dist(drum, estimate)
+        rows.append({"truth": drum, "estimate": estimate, "error": error})
+    return rows, len(seen) - len(match)
+
+
+def summarise(outcomes: list[SeedOutcome]) -> Outcome:
+    """Return the summary over all runs: their rows one after another."""
+    rows = [row for outcome in outcomes for row in outcome.rows]
+    errors = [row["error"] for row in rows if row["error"] is not None]
+    wall_s = sum(outcome.wall_s for outcome in outcomes)
+    return {
+        "drums": rows,
+        "false": sum(outcome.false for outcome in outcomes),
+        "mean_error": sum(errors) / len(errors) if errors else None,
+        "max_error": max(errors, default=None),
+        "times_real_time": sum(outcome.virtual_s for outcome in outcomes) / wall_s if wall_s else 0.0,
+    }

@@ -1,0 +1,119 @@
+"""Where compiled kernels are kept, and compiling them before the robot needs them.
+
+Numba's own cache sits beside the sources, does not notice a change in another file, and fails where it cannot
+write. So each version of the sources gets a folder of its own, named by their content, in the user's cache; and one
+process compiles everything before a second one starts.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from config.settings import Settings
+
+PACKAGES: Final = ("perception", "drivers.emulator")
+"""Where kernels live."""
+
+WARM: Final = "warm"
+"""A file of this name says that everything was compiled into this folder once."""
+
+
+def cache_folder() -> Path:
+    """Return the folder for the kernels of these very sources, Python and numba; made if it can be."""
+    digest = hashlib.sha256(f"{sys.version}{version('numba')}{version('numpy')}".encode())
+    for package in PACKAGES:
+        spec = find_spec(package)
+        for place in spec.submodule_search_locations or () if spec else ():
+            for source in sorted(Path(place).glob("*.py")):
+                digest.update(source.read_bytes())
+    mine = f"echolocate-{os.getuid()}"
+    homes = [Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"), Path(tempfile.gettempdir()) / mine]
+    for home in homes:
+        folder = home / "echolocate" / "kernels" / digest.hexdigest()[:16]
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder
+        except OSError:
+            continue
+    return Path(tempfile.mkdtemp(prefix="echolocate-"))
+
+
+def use_cache() -> Path:
+    """Tell numba where to keep kernels; call it before numba is imported. An existing setting is respected."""
+    return Path(os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder())))
+
+
+def is_warm(folder: Path) -> bool:
+    """Say whether everything was compiled into `folder` before."""
+    return (folder / WARM).exists() or os.environ.get("NUMBA_DISABLE_JIT", "0") not in {"", "0"}
+
+
+def warm_up(settings: Settings) -> None:
+    """Run every kernel once, on a robot that drives past a wall, so that none is compiled later.
+
+    Parameters
+    ----------
+    settings : Settings
+        Ring, models and constants of the run.
+    """
+    import numpy as np
+
+    from drivers.messages import Firing, Pose
+    from perception.pipeline import Perception
+
+    eager = settings.perception.model_copy(
+        update={"clusters": settings.perception.clusters.model_copy(update={"segments_min": 1})}
+    )
+    perception = Perception(settings.ring, settings.models, eager)
+    for k in range(24):
+        ranges = np.full(len(settings.ring.mounts), 2.0)
+        perception.observe(Firing(0.1 * k, Pose(0.1 * k, 0.0, 0.0), 0.0, ranges))
+        while perception.pending:
+            perception.refine()
+    perception.objects()
+
+
+def ready_kernels(settings: Settings, console: Console) -> None:
+    """Have every kernel compiled, or say that it takes a while and compile it.
+
+    Parameters
+    ----------
+    settings : Settings
+        Ring, models and constants of the run.
+    console : Console
+        Where to say so.
+    """
+    folder = use_cache()
+    if is_warm(folder):
+        warm_up(settings)
+        return
+    with console.status("compiling kernels; this happens once"):
+        compile_all(settings, folder)
+
+
+def compile_all(settings: Settings, folder: Path) -> None:
+    """Compile the kernels of perception and of the emulator, and note that it was done."""
+    from config.world import DrumConfig, WallConfig, WorldConfig
+    from drivers.emulator.device import EmulatedRobot
+
+    warm_up(settings)
+    for model in ("cone", "specular"):
+        acoustics = WorldConfig().acoustics.model_copy(update={"model": model, "crosstalk": 0.5})
+        world = WorldConfig(
+            drum=(DrumConfig(x_m=2.0, y_m=0.0, radius_m=0.3),),
+            wall=(WallConfig(x1_m=3.0, y1_m=-3.0, x2_m=3.0, y2_m=3.0),),
+            acoustics=acoustics,
+        )
+        EmulatedRobot(settings, world, seed=0).advance(0.5)
+    (folder / WARM).touch()

@@ -1,0 +1,128 @@
+"""The modes of the main process, as a pure function of what happened.
+
+CONNECTING until the robot answers, READY until an operator arms it, DRIVE until anything is wrong, then SAFE_STOP
+with a reason. Leaving SAFE_STOP takes an explicit re-arm: motion never resumes by itself. FAULT is the program's own
+failure and is not left at all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Final
+
+from drivers.driver import LineState
+from drivers.messages import Flags
+
+ARMING_MIN_S: Final = 0.1
+"""After a RELEASE the flags are believed only once odometry sent after it can have arrived."""
+
+ARMING_MAX_S: Final = 1.0
+"""A latch that does not clear in this time has a cause that releasing does not remove."""
+
+DEADMAN_GRACE_S: Final = 0.5
+"""How long the deadman's flag may still tell of the time before the first DRIVE."""
+
+
+class Mode(Enum):
+    """What the main process is doing."""
+
+    CONNECTING = "CONNECTING"
+    READY = "READY"
+    DRIVE = "DRIVE"
+    SAFE_STOP = "SAFE_STOP"
+    FAULT = "FAULT"
+
+
+class Request(Enum):
+    """What an operator asks for."""
+
+    ARM = "arm"
+    HALT = "halt"
+
+
+@dataclass(frozen=True, slots=True)
+class ModeState:
+    """A mode, since when (s), why, and since when it is being armed."""
+
+    mode: Mode = Mode.CONNECTING
+    since_s: float = 0.0
+    reason: str | None = None
+    arming_s: float | None = None
+
+    def enter(self, mode: Mode, now_s: float, reason: str | None = None) -> ModeState:
+        """Return the state of having just entered `mode`."""
+        return ModeState(mode, now_s, reason)
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What the modes depend on, as one cycle finds it."""
+
+    now_s: float
+    line: LineState
+    trouble: str | None
+    flags: Flags
+    rebooted: bool
+    request: Request | None
+
+
+def advance(state: ModeState, seen: Situation) -> ModeState:
+    """Return the mode that follows from what a cycle finds before it decides anything.
+
+    Parameters
+    ----------
+    state : ModeState
+        The mode so far.
+    seen : Situation
+        Line, flags and the operator's request.
+    """
+    if state.mode is Mode.FAULT:
+        return state
+    if state.mode is Mode.DRIVE:
+        reason = why_stop(state, seen)
+        return state if reason is None else state.enter(Mode.SAFE_STOP, seen.now_s, reason)
+    if seen.request is Request.HALT:
+        return state.enter(Mode.SAFE_STOP, seen.now_s, "halted by the operator; re-arm to go on")
+    if seen.line is not LineState.READY:
+        if state.mode is Mode.SAFE_STOP:
+            return replace(state, arming_s=None)
+        return replace(state, mode=Mode.CONNECTING, reason=seen.trouble, arming_s=None)
+    if state.mode is Mode.CONNECTING:
+        state = state.enter(Mode.READY, seen.now_s)
+    return _arm(state, seen)
+
+
+def why_stop(state: ModeState, seen: Situation) -> str | None:
+    """Return the reason why driving must end, None where there is none."""
+    if seen.request is Request.HALT:
+        return "halted by the operator; re-arm to go on"
+    if seen.line is not LineState.READY:
+        return seen.trouble or "the line to the robot is gone: check cable and power, then re-arm"
+    if seen.rebooted:
+        return "the robot restarted, so its odometry began anew: check why, then re-arm"
+    if seen.flags & Flags.BUMPER:
+        return "bumper contact: free the robot, then re-arm"
+    if seen.flags & Flags.MOTOR_FAULT:
+        return "the base reports a motor fault: check its drives, then re-arm"
+    if seen.flags & Flags.LATCHED:
+        return "the base latched without being told to from here: check its emergency stop, then re-arm"
+    if seen.flags & Flags.DEADMAN and seen.now_s - state.since_s > DEADMAN_GRACE_S:
+        return "the base's deadman tripped: commands came too late; check line and load, then re-arm"
+    return None
+
+
+def _arm(state: ModeState, seen: Situation) -> ModeState:
+    """Go through the arming of a robot that stands in READY or SAFE_STOP on a line that works."""
+    if seen.request is Request.ARM and state.arming_s is None:
+        return replace(state, arming_s=seen.now_s)
+    if state.arming_s is None:
+        return state
+    waited = seen.now_s - state.arming_s
+    if waited >= ARMING_MIN_S and not seen.flags & Flags.LATCHED:
+        return state.enter(Mode.DRIVE, seen.now_s)
+    if waited > ARMING_MAX_S:
+        return state.enter(
+            Mode.SAFE_STOP, seen.now_s, "the base's latch does not clear: look for bumper contact or a motor fault"
+        )
+    return state

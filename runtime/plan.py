@@ -1,0 +1,110 @@
+"""A plan of what the robot sees, in characters: segments, objects, the trail and the robot itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Final
+
+from rich.text import Text
+
+from drivers.messages import Floats, Pose
+from perception.pipeline import SeenObject
+
+ARROWS: Final = "→↗↑↖←↙↓↘"
+CELL_ASPECT: Final = 2.0
+"""A character cell is about this much taller than wide."""
+MARGIN_M: Final = 0.6
+
+
+class Plan:
+    """A character raster over a rectangle of the plane that holds all given points.
+
+    Parameters
+    ----------
+    points : iterable of (x, y)
+        What must be inside, m.
+    columns, rows : int
+        Size in characters.
+    """
+
+    def __init__(self, points: Iterable[tuple[float, float]], columns: int, rows: int) -> None:
+        places = list(points)
+        xs, ys = [x for x, _ in places], [y for _, y in places]
+        width, height = max(xs) - min(xs) + 2 * MARGIN_M, max(ys) - min(ys) + 2 * MARGIN_M
+        self._columns, self._rows = columns, rows
+        self._cell = max(width / columns, height / (rows * CELL_ASPECT))
+        self._left = 0.5 * (max(xs) + min(xs)) - 0.5 * columns * self._cell
+        self._top = 0.5 * (max(ys) + min(ys)) + 0.5 * rows * self._cell * CELL_ASPECT
+        self._cells: dict[tuple[int, int], tuple[str, str]] = {}
+
+    @property
+    def cell_m(self) -> float:
+        """Width of a character, m."""
+        return self._cell
+
+    def mark(self, x: float, y: float, character: str, style: str) -> None:
+        """Put a character at a place; places outside are left out."""
+        column = math.floor((x - self._left) / self._cell)
+        row = math.floor((self._top - y) / (self._cell * CELL_ASPECT))
+        if 0 <= column < self._columns and 0 <= row < self._rows:
+            self._cells[row, column] = (character, style)
+
+    def circle(self, x: float, y: float, radius: float, character: str, style: str) -> None:
+        """Draw a circle."""
+        steps = max(8, math.ceil(4.0 * math.pi * radius / self._cell))
+        for k in range(steps):
+            angle = 2.0 * math.pi * k / steps
+            self.mark(x + radius * math.cos(angle), y + radius * math.sin(angle), character, style)
+
+    def text(self) -> Text:
+        """Return the raster."""
+        text = Text(no_wrap=True)
+        for row in range(self._rows):
+            for column in range(self._columns):
+                character, style = self._cells.get((row, column), (" ", ""))
+                text.append(character, style)
+            text.append("\n")
+        return text
+
+
+def draw_plan(
+    pose: Pose,
+    trail: list[tuple[float, float]],
+    segments: Floats,
+    objects: tuple[SeenObject, ...],
+    size_m: dict[str, float],
+    columns: int,
+    rows: int,
+) -> Text:
+    """Return the plan as text.
+
+    Parameters
+    ----------
+    pose : Pose
+        Of the robot.
+    trail : list of (x, y)
+        Where it was, m.
+    segments : (n, 5) float
+        Outline segments: ends x, y, x, y (m), normal (rad).
+    objects : tuple of SeenObject
+        What is recognised.
+    size_m : dict
+        Radius at which to draw each model, m.
+    columns, rows : int
+        Size in characters.
+    """
+    middles = 0.5 * (segments[:, 0:2] + segments[:, 2:4])
+    places = [(float(x), float(y)) for x, y in middles]
+    plan = Plan([*trail, (pose.x, pose.y), *((o.x, o.y) for o in objects), *places], columns, rows)
+    for x, y in trail:
+        plan.mark(x, y, "·", "dim")
+    for seen in objects:
+        plan.circle(seen.x, seen.y, size_m.get(seen.model, 0.3), "o", "green")
+    for x, y in places:
+        plan.mark(x, y, "•", "yellow")
+    for number, seen in enumerate(objects, 1):
+        plan.mark(seen.x, seen.y, str(number % 10), "bold green")
+    eighth = round(pose.theta / (math.pi / 4)) % 8
+    plan.mark(pose.x, pose.y, ARROWS[eighth], "bold cyan")
+    return plan.text()

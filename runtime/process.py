@@ -1,0 +1,242 @@
+"""The robot's main process: one asyncio loop that gathers inputs, runs the step, and carries out what it decides.
+
+Everything that waits, reads a clock or touches a port is here or below in drivers/; everything that decides is in
+`runtime.step` and below.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from config.settings import Settings
+from drivers.denning.robot import DenningRobot
+from drivers.driver import LineState, RobotDriver
+from drivers.link import Link, LinkError
+from drivers.messages import Firing, Flags
+from perception.pipeline import Perception
+from runtime.books import Books
+from runtime.commanding import gather, give
+from runtime.complaint import FAILED, WRONG_CALL, Complaint
+from runtime.modes import Mode, Request
+from runtime.pacing import Pacer
+from runtime.step import Command, CycleRecord, State, step
+from runtime.summary import RunSummary, object_row
+
+if TYPE_CHECKING:
+    from structlog.typing import FilteringBoundLogger
+
+CONNECT_MAX_S: Final = 5.0
+"""A robot that has not answered properly by then will not without help."""
+
+HALT_MAX_S: Final = 0.5
+"""How long the end of a run waits for the base to confirm the HALT."""
+
+LATE_SHARE: Final = 0.1
+"""A cycle that begins later than this share of its period is late."""
+
+
+@dataclass(frozen=True, slots=True)
+class Observers:
+    """Who watches the run; none of them may take long."""
+
+    on_cycle: Callable[[CycleRecord, State, Books, RobotDriver], None] | None = None
+    on_firing: Callable[[Firing], None] | None = None
+
+
+class RobotProcess:
+    """One run on one robot.
+
+    Parameters
+    ----------
+    settings : Settings
+        With `link.port` set.
+    log : structlog logger
+        For what an operator should know afterwards.
+    observers : Observers
+        View and recorder.
+    clock : callable
+        Monotonic, s.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        log: FilteringBoundLogger,
+        observers: Observers = Observers(),
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._settings = settings
+        self._log = log
+        self._observers = observers
+        self._clock = clock
+        self._driver = DenningRobot(settings)
+        self._link = Link(settings.link, self._opened, self._received, self._closed)
+        self._state = State(Perception(settings.ring, settings.models, settings.perception))
+        self._period_s = 1.0 / settings.cycle.rate_hz
+        self.books = Books(LATE_SHARE * self._period_s)
+        self._missed = 0
+        self._stop_reasons: list[str] = []
+        self._request: Request | None = None
+        self._stop = asyncio.Event()
+
+    def request(self, request: Request) -> None:
+        """Take an operator's request into the next cycle; a HALT is not overruled by an ARM in the same one."""
+        if self._request is not Request.HALT:
+            self._request = request
+
+    def stop(self) -> None:
+        """End the run in good order: halt the base, then close the line."""
+        self._stop.set()
+
+    async def run(self, *, arm: bool, seconds: float | None) -> RunSummary:
+        """Run until told to stop or `seconds` have passed, and return the summary.
+
+        Parameters
+        ----------
+        arm : bool
+            Arm once, as soon as the robot is ready.
+        seconds : float, optional
+            Counted from the first cycle.
+
+        Raises
+        ------
+        Complaint
+            The port cannot be opened, the robot does not answer as it should, or the program itself failed.
+        """
+        await self._connect()
+        keeper = asyncio.create_task(self._link.run(), name="link")
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+        try:
+            if arm:
+                self.request(Request.ARM)
+            await self._cycle(seconds)
+        finally:
+            gc.enable()
+            gc.unfreeze()
+            await self._shut_down(keeper)
+        return self._summary()
+
+    async def _connect(self) -> None:
+        """Open the port and wait until the robot is ready."""
+        try:
+            await self._link.open_once()
+        except LinkError as error:
+            in_use = "in use" in str(error)
+            raise Complaint(str(error), FAILED if in_use else WRONG_CALL) from error
+        give_up_s = self._clock() + CONNECT_MAX_S
+        while self._driver.state is not LineState.READY and not self._stop.is_set():
+            now_s = self._clock()
+            self._driver.tick(now_s)
+            self._send()
+            lost = None if self._link.is_open else self._link.last_error
+            if now_s > give_up_s or lost is not None or self._driver.state is LineState.DOWN:
+                await self._link.stop()
+                raise Complaint(lost or self._driver.trouble or self._nobody(), FAILED)
+            await asyncio.sleep(0.005)
+        self._log.info("robot ready", port=self._settings.link.port, robot=self._driver.identity)
+
+    def _nobody(self) -> str:
+        return f"nothing on {self._settings.link.port} answers like the robot: check its power and link.baud"
+
+    async def _cycle(self, seconds: float | None) -> None:
+        """Run cycles on their grid of deadlines until the run ends."""
+        pacer = Pacer(self._clock(), self._period_s)
+        began_s = pacer.deadline_s
+        while not self._stop.is_set():
+            start_s = self._clock()
+            if seconds is not None and start_s - began_s >= seconds:
+                return
+            try:
+                self._one_cycle(start_s)
+            except Exception as error:
+                self._driver.halt()
+                self._send()
+                self._log.exception("the cycle failed")
+                raise Complaint(
+                    f"the cycle failed ({type(error).__name__}: {error}) and the robot is halted: this is a fault "
+                    "of the program; the log has the details",
+                    FAILED,
+                ) from error
+            self.books.enter(self._clock() - start_s, start_s - pacer.deadline_s)
+            deadline_s = pacer.advance(self._clock())
+            self._missed = pacer.missed
+            await asyncio.sleep(max(0.0, deadline_s - self._clock()))
+
+    def _one_cycle(self, start_s: float) -> None:
+        request, self._request = self._request, None
+        inputs = gather(self._driver, start_s, request)
+        budget_s = self._settings.cycle.perception_budget_s
+        mode = self._state.mode.mode
+        record = step(
+            self._state, inputs, self._settings, self._carry_out, lambda _done: self._clock() - start_s < budget_s
+        )
+        if self._state.mode.mode is not mode:
+            self._note_mode()
+        if self._observers.on_firing is not None:
+            for firing in inputs.heard.firings:
+                self._observers.on_firing(firing)
+        if self._observers.on_cycle is not None:
+            self._observers.on_cycle(record, self._state, self.books, self._driver)
+
+    def _note_mode(self) -> None:
+        state = self._state.mode
+        if state.mode is Mode.SAFE_STOP and state.reason is not None:
+            self._stop_reasons.append(state.reason)
+        self._log.info("mode", mode=state.mode.value, reason=state.reason, cycle=self._state.cycle)
+
+    def _carry_out(self, command: Command) -> None:
+        give(self._driver, command)
+        self._send()
+
+    def _send(self) -> None:
+        if self._link.is_open and (data := self._driver.outgoing(writable=self._link.writable)):
+            self._link.send(data)
+
+    def _opened(self) -> None:
+        self._driver.opened(self._clock())
+
+    def _received(self, data: bytes) -> None:
+        self._driver.receive(data, self._clock())
+
+    def _closed(self, reason: str) -> None:
+        self._driver.closed()
+        if not self._stop.is_set():
+            self._log.warning("line lost", reason=reason)
+
+    async def _shut_down(self, keeper: asyncio.Task[None]) -> None:
+        """Halt the base and wait until it says so; then close the line."""
+        self._stop.set()
+        self._driver.halt()
+        give_up_s = self._clock() + HALT_MAX_S
+        halted = False
+        while self._link.is_open and not halted and self._clock() < give_up_s:
+            self._driver.tick(self._clock())
+            self._send()
+            await asyncio.sleep(0.005)
+            odometry = self._driver.take().odometry
+            halted = odometry is not None and bool(odometry.flags & Flags.LATCHED)
+        if not halted:
+            self._log.warning("the base did not confirm the halt; its deadman stops it")
+        keeper.cancel()
+        await asyncio.gather(keeper, return_exceptions=True)
+
+    def _summary(self) -> RunSummary:
+        counts = self._driver.counts
+        return {
+            "objects": [object_row(seen) for seen in self._state.perception.objects()],
+            "cycles": self.books.cycles,
+            "cycle_us": self.books.cycle_us(),
+            "late": self.books.late,
+            "missed": self._missed,
+            "lag_us": self.books.lag_us(),
+            "link": {"frames": counts.frames, "bad": counts.bad, "lost": counts.lost},
+            "mode": self._state.mode.mode.value,
+            "stop_reasons": self._stop_reasons,
+        }

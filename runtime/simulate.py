@@ -1,0 +1,88 @@
+"""The closed loop in virtual time: the same robot, protocol and cycle as on a line, as fast as the machine can.
+
+No wall clock decides anything here, so one seed is one run. Refinement gets a fixed number of quanta a cycle in
+place of a time budget.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from config.settings import Settings
+from config.world import WorldConfig
+from drivers.denning.robot import DenningRobot
+from drivers.emulator.device import EmulatedRobot, Truth
+from drivers.emulator.memory import MemoryLine
+from drivers.messages import Pose
+from perception.pipeline import Perception
+from runtime.commanding import gather, give
+from runtime.modes import Mode, Request
+from runtime.step import CycleRecord, State, step
+
+QUANTA_PER_CYCLE: Final = 50
+"""What the default budget affords on a slow machine; virtual time needs a number instead of a clock."""
+
+SETTLING_S: Final = 1.0
+"""How long a robot that has arrived still listens, so that the last echoes count."""
+
+
+@dataclass(frozen=True, slots=True)
+class Simulated:
+    """What a run in virtual time left behind."""
+
+    state: State
+    start: Pose
+    """Where the odometry began, in world coordinates."""
+    truth: Truth
+    virtual_s: float
+    wall_s: float
+
+
+def enough_quanta(done: int) -> bool:
+    """Say whether refinement may go on after `done` quanta."""
+    return done < QUANTA_PER_CYCLE
+
+
+def simulate(
+    settings: Settings,
+    world: WorldConfig,
+    seed: int,
+    seconds_max: float,
+    on_cycle: Callable[[CycleRecord, Truth], None] | None = None,
+) -> Simulated:
+    """Drive through `world` until the leg is done, the robot stops for a reason, or the time is up.
+
+    Parameters
+    ----------
+    settings : Settings
+        The robot and everything it does.
+    world : WorldConfig
+        What it meets.
+    seed : int
+        Of everything random.
+    seconds_max : float
+        Virtual time after which the run ends.
+    on_cycle : callable, optional
+        Gets every record, and the truth of that moment.
+    """
+    robot = EmulatedRobot(settings, world, seed)
+    driver = DenningRobot(settings)
+    line = MemoryLine(driver, robot)
+    state = State(Perception(settings.ring, settings.models, settings.perception))
+    start = robot.truth.pose
+    began = time.perf_counter()
+    until, now, cycles = seconds_max, 0.0, 0
+    while now < until:
+        cycles += 1
+        now = cycles / settings.cycle.rate_hz
+        line.exchange(now)
+        request = Request.ARM if state.mode.mode is Mode.READY else None
+        record = step(state, gather(driver, now, request), settings, lambda c: give(driver, c), enough_quanta)
+        if on_cycle is not None:
+            on_cycle(record, robot.truth)
+        if state.mode.mode is Mode.SAFE_STOP or (state.leg is not None and state.leg.done):
+            until = min(until, now + SETTLING_S)
+    return Simulated(state, start, robot.truth, now, time.perf_counter() - began)

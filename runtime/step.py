@@ -1,0 +1,178 @@
+"""One perception-action cycle: the pure heart of the program.
+
+`step` gets every input as an argument and reaches the world through two callables only: one that carries out the
+command, one that says whether refinement may go on. Handing it the same inputs and the same answers gives the same
+record again, to the bit; that is what a replay is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Literal, TypeAlias
+
+from behaviors.arbiter import Drive, Stop, arbitrate
+from behaviors.avoid_static_obstacle import avoid_static_obstacle
+from behaviors.move_ahead import Leg, move_ahead
+from config.settings import Settings
+from drivers.driver import Heard, LineState
+from drivers.messages import Flags, Odometry, Twist
+from perception.percept import Percept
+from perception.pipeline import Perception
+from runtime.modes import Mode, ModeState, Request, Situation, advance
+
+STANDSTILL = Twist(0.0, 0.0)
+
+
+class Order(Enum):
+    """What a base can be told besides a velocity."""
+
+    HALT = "halt"
+    RELEASE = "release"
+
+
+Command: TypeAlias = Twist | Order | None
+StopCause: TypeAlias = Literal["budget", "converged", "nothing"]
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """Everything a cycle is told. `now_s` is the host's clock."""
+
+    now_s: float
+    line: LineState
+    trouble: str | None
+    heard: Heard
+    request: Request | None = None
+
+
+@dataclass(slots=True)
+class State:
+    """Everything a cycle leaves to the next one."""
+
+    perception: Perception
+    mode: ModeState = field(default_factory=ModeState)
+    leg: Leg | None = None
+    odometry: Odometry | None = None
+    last_firing_s: float = 0.0
+    cycle: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class CycleRecord:
+    """What went into a cycle, what it decided, and what it counted."""
+
+    cycle: int
+    inputs: Inputs
+    mode: ModeState
+    command: Command
+    new_segments: int
+    segments: int
+    clusters: int
+    quanta: int
+    iterations: int
+    refinement: StopCause
+
+
+def step(
+    state: State,
+    inputs: Inputs,
+    settings: Settings,
+    carry_out: Callable[[Command], None],
+    may_refine: Callable[[int], bool],
+) -> CycleRecord:
+    """Run one cycle: perceive, decide, command, and then refine for as long as it may.
+
+    Parameters
+    ----------
+    state : State
+        Left by the cycle before. Updated.
+    inputs : Inputs
+        What arrived since.
+    settings : Settings
+        The run's settings.
+    carry_out : callable
+        Gets the command before refinement begins, so that no refinement ever delays a stop.
+    may_refine : callable
+        Asked with the number of quanta done before each further one.
+
+    Returns
+    -------
+    CycleRecord
+        The whole cycle.
+    """
+    new_segments = _perceive(state, inputs)
+    command = _decide(state, inputs, settings)
+    carry_out(command)
+    quanta, iterations, refinement = _refine(state.perception, may_refine)
+    state.cycle += 1
+    return CycleRecord(
+        state.cycle, inputs, state.mode, command, new_segments, state.perception.outline.living,
+        state.perception.clusters.count, quanta, iterations, refinement,
+    )  # fmt: skip
+
+
+def _perceive(state: State, inputs: Inputs) -> int:
+    """Take in what arrived: the part of perception that always runs."""
+    if inputs.heard.rebooted:
+        state.perception.forget()
+        state.odometry = None
+        state.leg = None
+        state.last_firing_s = 0.0
+    if inputs.heard.odometry is not None:
+        state.odometry = inputs.heard.odometry
+    new_segments = 0
+    for firing in inputs.heard.firings:
+        new_segments += state.perception.observe(firing)
+        state.last_firing_s = firing.t_s
+    return new_segments
+
+
+def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
+    """Go through modes and schemas and return what the base is told."""
+    flags = Flags.NONE if state.odometry is None else state.odometry.flags
+    before = state.mode
+    situation = Situation(
+        inputs.now_s, inputs.line, inputs.trouble, flags, inputs.heard.rebooted, inputs.request
+    )  # fmt: skip
+    state.mode = advance(before, situation)
+    if state.mode.mode is Mode.DRIVE:
+        decision = _drive(state, settings)
+        if isinstance(decision, Drive):
+            return decision.twist
+        state.mode = state.mode.enter(Mode.SAFE_STOP, inputs.now_s, decision.reason)
+    if state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT} and state.mode.mode is not before.mode:
+        return Order.HALT
+    if state.mode.arming_s is not None and before.arming_s is None:
+        return Order.RELEASE
+    return STANDSTILL if state.mode.mode is Mode.READY else None
+
+
+def _drive(state: State, settings: Settings) -> Drive | Stop:
+    """Ask the schemas and the arbiter."""
+    odometry, behaviors = state.odometry, settings.behaviors
+    if odometry is None:
+        return Stop("no odometry has arrived: check that the base reports it, then re-arm")
+    silence = odometry.t_s - state.last_firing_s
+    patience = behaviors.avoid_static_obstacle.echo_age_max_s
+    if silence > patience:
+        return Stop(f"the ring has not reported for {silence:.1f} s: check the ring's power and cable, then re-arm")
+    if state.leg is None:
+        state.leg = Leg.starting_at(odometry.pose)
+    percept = Percept(odometry.pose, state.perception.obstacles(odometry.t_s, patience))
+    ahead, state.leg = move_ahead(percept, state.leg, behaviors.move_ahead)
+    away = avoid_static_obstacle(percept, settings.body.radius_m, behaviors.avoid_static_obstacle)
+    expected = ("move_ahead", "avoid_static_obstacle")
+    return arbitrate((ahead, away), percept, settings.body, behaviors.arbiter, expected)
+
+
+def _refine(perception: Perception, may_refine: Callable[[int], bool]) -> tuple[int, int, StopCause]:
+    """Refine quantum by quantum; return quanta, iterations, and why it ended."""
+    quanta = iterations = 0
+    while perception.pending:
+        if not may_refine(quanta):
+            return quanta, iterations, "budget"
+        iterations += perception.refine()
+        quanta += 1
+    return quanta, iterations, "converged" if quanta else "nothing"

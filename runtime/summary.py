@@ -1,0 +1,83 @@
+"""What a run has to show at its end, in the JSON forms of the public surface."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TypedDict
+
+import orjson
+
+from perception.pipeline import SeenObject
+from runtime.books import Quantiles
+from runtime.complaint import FAILED, Complaint
+
+
+class ObjectRow(TypedDict):
+    """One object: metres and radians, in the odometry's frame."""
+
+    model: str
+    x: float
+    y: float
+    theta: float
+    sigma: float
+    support: int
+    score: float
+
+
+class LinkRow(TypedDict):
+    """Frames heard, frames that were no frames, frames that never came."""
+
+    frames: int
+    bad: int
+    lost: int
+
+
+class RunSummary(TypedDict):
+    """Summary of ``echolocate run``."""
+
+    objects: list[ObjectRow]
+    cycles: int
+    cycle_us: Quantiles
+    late: int
+    missed: int
+    lag_us: Quantiles
+    link: LinkRow
+    mode: str
+    stop_reasons: list[str]
+
+
+class ReplaySummary(TypedDict):
+    """Summary of ``echolocate replay``."""
+
+    objects: list[ObjectRow]
+    segments: int
+    clusters: int
+    cycles: int
+    cycle_us: Quantiles
+
+
+def object_row(seen: SeenObject) -> ObjectRow:
+    """Return an object in its JSON form."""
+    return {
+        "model": seen.model,
+        "x": seen.x,
+        "y": seen.y,
+        "theta": seen.theta,
+        "sigma": seen.sigma,
+        "support": seen.support,
+        "score": seen.score,
+    }
+
+
+def write_json(path: str, summary: object) -> None:
+    """Write a summary where ``--json`` says.
+
+    Raises
+    ------
+    Complaint
+        The file cannot be written.
+    """
+    try:
+        Path(path).write_bytes(orjson.dumps(summary, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE))
+    except OSError as error:
+        raise Complaint(f"--json {path}: cannot be written: {error.strerror}; choose another file", FAILED) from error

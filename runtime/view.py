@@ -1,0 +1,202 @@
+"""The live terminal view: mode and reason, the plan, objects, ring, line and timing.
+
+A terminal can be slow or held by Ctrl-S, so the loop only leaves the latest picture's ingredients in a slot; a
+thread draws them. Keys go the other way: a arms, space halts, q quits.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import sys
+import termios
+import threading
+import tty
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from rich.console import Console, Group
+from rich.live import Live
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from config.settings import Settings
+from drivers.driver import RobotDriver
+from drivers.messages import Floats, LinkCounts, Pose
+from perception.pipeline import SeenObject
+from runtime.books import Books, Quantiles
+from runtime.modes import ModeState, Request
+from runtime.plan import draw_plan
+from runtime.step import CycleRecord, State
+from runtime.summary import object_row
+from runtime.tables import Units, objects_table
+
+EVERY_CYCLES: Final = 5
+"""Draw every fifth cycle: 4 Hz at 20 Hz."""
+TRAIL: Final = 400
+SWITCH_INTERVAL_S: Final = 0.0005
+"""While a thread draws, the loop waits for the interpreter this long at most."""
+STYLES: Final = MappingProxyType(
+    {"DRIVE": "bold white on green", "SAFE_STOP": "bold white on red", "FAULT": "bold white on red"}
+)
+BARS: Final = " ▁▂▃▄▅▆▇█"
+KEYS: Final = MappingProxyType({" ": Request.HALT, "h": Request.HALT, "a": Request.ARM})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """What one picture is made from; nothing in it changes any more."""
+
+    mode: ModeState
+    pose: Pose | None
+    trail: list[tuple[float, float]]
+    segments: Floats
+    clusters: int
+    objects: tuple[SeenObject, ...]
+    ranges: Floats
+    counts: LinkCounts
+    cycles: int
+    late: int
+    cycle_us: Quantiles
+    lag_us: Quantiles
+
+
+class View:
+    """Draws the run on a terminal.
+
+    Parameters
+    ----------
+    settings : Settings
+        For the ring's reach and the models' sizes.
+    console : Console
+        The terminal.
+    units : {"m", "ft"}
+        For the list of objects.
+    """
+
+    def __init__(self, settings: Settings, console: Console, units: Units) -> None:
+        self._console = console
+        self._units: Units = units
+        self._reach_m = settings.ring.range_max_m
+        self._size_m = {
+            m.name: m.arc_radius_m or max(float(np.hypot(x, y)) for x, y in m.vertices_m) for m in settings.models
+        }
+        self._ranges = np.full(len(settings.ring.mounts), np.nan)
+        self._trail: deque[tuple[float, float]] = deque(maxlen=TRAIL)
+        self._slot: Snapshot | None = None
+        self._wake = threading.Event()
+        self._done = False
+
+    def on_cycle(self, record: CycleRecord, state: State, books: Books, driver: RobotDriver) -> None:
+        """Leave the ingredients of the next picture in the slot."""
+        for firing in record.inputs.heard.firings:
+            fired = ~np.isnan(firing.ranges_m)
+            self._ranges[fired] = firing.ranges_m[fired]
+        if record.cycle % EVERY_CYCLES:
+            return
+        pose = None if state.odometry is None else state.odometry.pose
+        if pose is not None:
+            self._trail.append((pose.x, pose.y))
+        outline = state.perception.outline
+        self._slot = Snapshot(
+            record.mode, pose, list(self._trail), outline.segments[outline.alive == 1], record.clusters,
+            state.perception.objects(), self._ranges.copy(), driver.counts,
+            books.cycles, books.late, books.cycle_us(), books.lag_us(),
+        )  # fmt: skip
+        self._wake.set()
+
+    @contextlib.contextmanager
+    def shown(self) -> Iterator[None]:
+        """Own the terminal while the run lasts."""
+        interval_s = sys.getswitchinterval()
+        sys.setswitchinterval(SWITCH_INTERVAL_S)
+        painter = threading.Thread(target=self._paint, name="view", daemon=True)
+        painter.start()
+        try:
+            yield
+        finally:
+            self._done = True
+            self._wake.set()
+            painter.join(timeout=1.0)
+            sys.setswitchinterval(interval_s)
+
+    def _paint(self) -> None:
+        with Live(console=self._console, auto_refresh=False, screen=False) as live:
+            while not self._done:
+                self._wake.wait()
+                self._wake.clear()
+                snapshot, self._slot = self._slot, None
+                if snapshot is not None:
+                    live.update(self.picture(snapshot), refresh=True)
+
+    def picture(self, snapshot: Snapshot) -> Group:
+        """Return the picture of one moment."""
+        mode = snapshot.mode
+        head = Text.assemble((f" {mode.mode.value} ", STYLES.get(mode.mode.value, "bold black on yellow")))
+        head.append(f"  {mode.reason or ''}")
+        columns = max(20, min(self._console.width - 4, 100))
+        plan: Text | str = "waiting for odometry"
+        if snapshot.pose is not None:
+            plan = draw_plan(
+                snapshot.pose, snapshot.trail, snapshot.segments, snapshot.objects, self._size_m, columns, 18
+            )
+        rows = [object_row(seen) for seen in snapshot.objects]
+        legend = "→ robot   • outline segments   o objects   a arm   space halt   q quit"
+        return Group(head, Panel(plan, subtitle=legend), objects_table(rows, self._units), self._numbers(snapshot))
+
+    def _numbers(self, snapshot: Snapshot) -> Table:
+        grid = Table.grid(padding=(0, 2))
+        grid.add_row("ring", self._ring(snapshot.ranges))
+        grid.add_row("map", f"{len(snapshot.segments)} segments, {snapshot.clusters} clusters")
+        counts = snapshot.counts
+        grid.add_row("line", f"{counts.frames} frames, {counts.bad} bad, {counts.lost} lost")
+        took, lag = snapshot.cycle_us, snapshot.lag_us
+        grid.add_row(
+            "cycle",
+            f"{snapshot.cycles}, {snapshot.late} late; takes {millis(took)}; begins {millis(lag)} after its deadline",
+        )
+        return grid
+
+    def _ring(self, ranges: Floats) -> str:
+        """Return a bar a sensor: the nearer the echo the higher; a dot heard nothing."""
+        bars = []
+        for r in ranges:
+            near = 0.0 if not np.isfinite(r) else 1.0 - min(float(r) / self._reach_m, 1.0)
+            bars.append("·" if not np.isfinite(r) else BARS[max(1, round(near * (len(BARS) - 1)))])
+        return "".join(bars)
+
+
+def millis(quantiles: Quantiles) -> str:
+    """Return median and 99th percentile as text."""
+    return f"{quantiles['p50'] / 1e3:.2f} ms (p99 {quantiles['p99'] / 1e3:.2f})"
+
+
+@contextlib.contextmanager
+def keys(on_request: Callable[[Request], None], on_quit: Callable[[], None]) -> Iterator[None]:
+    """Read single keys from the terminal while the run lasts; without a terminal there are none."""
+    if not sys.stdin.isatty():
+        yield
+        return
+    fd = sys.stdin.fileno()
+    before = termios.tcgetattr(fd)
+    loop = asyncio.get_running_loop()
+
+    def read() -> None:
+        for key in sys.stdin.read(1):
+            if key in KEYS:
+                on_request(KEYS[key])
+            elif key == "q":
+                on_quit()
+
+    tty.setcbreak(fd)
+    loop.add_reader(fd, read)
+    try:
+        yield
+    finally:
+        loop.remove_reader(fd)
+        termios.tcsetattr(fd, termios.TCSADRAIN, before)

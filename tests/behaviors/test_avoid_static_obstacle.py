@@ -1,0 +1,154 @@
+"""Avoid-static-obstacle: Arkin's equation by hand and against a slow oracle, and how pushes add up."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from behaviors.avoid_static_obstacle import SCHEMA, UNBOUNDED, avoid_static_obstacle, repulsions
+from config.settings import AvoidStaticObstacleConfig
+from perception.percept import Percept, Pose
+
+RADIUS = 0.5
+SUM = AvoidStaticObstacleConfig(
+    avoid_obstacle_gain=2.0, avoid_obstacle_sphere_m=1.0, avoid_obstacle_safety_margin_m=0.2, summing="sum"
+)
+LARGEST = SUM.model_copy(update={"summing": "largest"})
+BOTH = pytest.mark.parametrize("config", [SUM, LARGEST], ids=["sum", "largest"])
+
+
+def seen(*points: tuple[float, float], pose: Pose | None = None) -> Percept:
+    return Percept(pose or Pose(0.0, 0.0, 0.0), np.array(points, dtype=np.float64).reshape(-1, 2))
+
+
+def vector(percept: Percept, config: AvoidStaticObstacleConfig) -> tuple[float, float]:
+    response = avoid_static_obstacle(percept, RADIUS, config)
+    assert response.schema == SCHEMA
+    return response.x, response.y
+
+
+def naive(percept: Percept, config: AvoidStaticObstacleConfig) -> tuple[float, float]:
+    """The equation, echo by echo."""
+    pushes = []
+    for ox, oy in percept.obstacles.tolist():
+        away_x, away_y = percept.pose.x - ox, percept.pose.y - oy
+        length = math.hypot(away_x, away_y)
+        d = length - RADIUS
+        s, r = config.avoid_obstacle_sphere_m, config.avoid_obstacle_safety_margin_m
+        magnitude = 0.0 if d > s else UNBOUNDED if d <= r else (s - d) / (s - r)
+        magnitude *= config.avoid_obstacle_gain
+        pushes.append((magnitude * away_x / length, magnitude * away_y / length))
+    x, y = sum(p[0] for p in pushes), sum(p[1] for p in pushes)
+    total = math.hypot(x, y)
+    if config.summing == "sum" or total == 0.0:
+        return x, y
+    ux, uy = x / total, y / total
+    kept = min(total, max(px * ux + py * uy for px, py in pushes))
+    return kept * ux, kept * uy
+
+
+@pytest.mark.parametrize(
+    ("gap", "magnitude"),
+    [(50.0, 0.0), (1.001, 0.0), (1.0, 0.0), (0.9, 0.25), (0.6, 1.0), (0.4, 1.5), (0.2001, 1.99975)],
+)
+@BOTH
+def test_magnitude_by_hand(gap: float, magnitude: float, config: AvoidStaticObstacleConfig) -> None:
+    """(S − d)/(S − R)·G with S 1, R 0.2, G 2; d counts from the rim."""
+    assert vector(seen((RADIUS + gap, 0.0)), config) == pytest.approx((-magnitude, 0.0), abs=1e-12)
+
+
+@pytest.mark.parametrize("gap", [0.1999, 0.0, -0.3])
+@BOTH
+def test_inside_the_margin_it_outweighs_every_other_schema(gap: float, config: AvoidStaticObstacleConfig) -> None:
+    x, y = vector(seen((0.0, RADIUS + gap)), config)
+    assert x == pytest.approx(0.0)
+    assert -math.inf < y <= -UNBOUNDED
+
+
+def test_at_the_margin_itself() -> None:
+    assert repulsions(np.array([SUM.avoid_obstacle_safety_margin_m]), SUM)[0] == 2.0 * UNBOUNDED
+
+
+def test_a_gain_of_zero_switches_it_off_altogether() -> None:
+    off = SUM.model_copy(update={"avoid_obstacle_gain": 0.0})
+    assert vector(seen((0.6, 0.0), (1.0, 0.3)), off) == (0.0, 0.0)
+
+
+@BOTH
+def test_nothing_near_is_no_push(config: AvoidStaticObstacleConfig) -> None:
+    assert vector(seen(), config) == (0.0, 0.0)
+    assert vector(seen((30.0, 0.0), (0.0, -30.0)), config) == (0.0, 0.0)
+
+
+@BOTH
+def test_away_means_away_from_the_echo_in_the_odometrys_frame(config: AvoidStaticObstacleConfig) -> None:
+    x, y = vector(seen((10.0 + 0.6, -4.0 + 0.8), pose=Pose(10.0, -4.0, 2.2)), config)
+    assert (x, y) == pytest.approx((-1.25 * 0.6, -1.25 * 0.8))
+
+
+def test_ten_echoes_of_one_wall_push_ten_times_or_once() -> None:
+    wall = seen(*[(1.0, 0.01 * i) for i in range(-5, 5)])
+    assert vector(wall, SUM)[0] == pytest.approx(-12.5, rel=5e-3)
+    assert vector(wall, LARGEST)[0] == pytest.approx(-1.25, rel=1e-3)
+
+
+@BOTH
+@pytest.mark.parametrize("gap", [0.5, 0.1, 0.0])
+def test_opposite_walls_cancel(gap: float, config: AvoidStaticObstacleConfig) -> None:
+    y = RADIUS + gap
+    assert vector(seen((0.0, y), (0.0, -y)), config) == pytest.approx((0.0, 0.0), abs=1e-6)
+
+
+def test_nearly_balanced_walls_push_nearly_nothing() -> None:
+    """The largest push alone would jump from nothing to its full strength as a robot leaves a corridor's middle."""
+    x, y = vector(seen((0.0, 1.0), (0.0, -1.01)), LARGEST)
+    assert abs(x) < 1e-12
+    assert y == pytest.approx(vector(seen((0.0, 1.0), (0.0, -1.01)), SUM)[1])
+    assert abs(y) < 0.03
+
+
+@BOTH
+def test_an_echo_in_the_very_centre_pushes_backwards(config: AvoidStaticObstacleConfig) -> None:
+    x, y = vector(seen((3.0, 3.0), pose=Pose(3.0, 3.0, math.pi / 2.0)), config)
+    assert abs(x) < 1e-6 * abs(y)
+    assert y <= -UNBOUNDED
+
+
+@BOTH
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_an_echo_that_is_no_point_is_not_smoothed_over(bad: float, config: AvoidStaticObstacleConfig) -> None:
+    with np.errstate(invalid="ignore"):
+        x, y = vector(seen((1.0, 0.0), (bad, 0.0)), config)
+    assert not (math.isfinite(x) and math.isfinite(y))
+
+
+@BOTH
+def test_agrees_with_the_oracle(config: AvoidStaticObstacleConfig) -> None:
+    rng = np.random.default_rng(89)
+    for _ in range(2000):
+        pose = Pose(float(rng.uniform(-5.0, 5.0)), float(rng.uniform(-5.0, 5.0)), 0.0)
+        angle, far = rng.uniform(-math.pi, math.pi, (2, rng.integers(1, 40)))
+        far = np.abs(far)
+        points = np.column_stack((pose.x + far * np.cos(angle), pose.y + far * np.sin(angle)))
+        percept = Percept(pose, points)
+        expected = naive(percept, config)
+        assert vector(percept, config) == pytest.approx(expected, rel=1e-9, abs=1e-6)
+
+
+def test_largest_never_pushes_harder_than_the_sum_nor_elsewhere() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(500):
+        percept = seen(*rng.uniform(-1.5, 1.5, (8, 2)).tolist())
+        (sx, sy), (lx, ly) = vector(percept, SUM), vector(percept, LARGEST)
+        assert math.hypot(lx, ly) <= math.hypot(sx, sy) * (1.0 + 1e-12)
+        assert abs(sx * ly - sy * lx) <= 1e-9 * (1.0 + math.hypot(sx, sy) ** 2)
+
+
+@BOTH
+def test_is_pure(config: AvoidStaticObstacleConfig) -> None:
+    percept = seen((1.0, 0.2), (0.0, 0.0))
+    before = percept.obstacles.copy()
+    assert avoid_static_obstacle(percept, RADIUS, config) == avoid_static_obstacle(percept, RADIUS, config)
+    np.testing.assert_array_equal(percept.obstacles, before)

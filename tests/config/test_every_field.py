@@ -1,0 +1,209 @@
+"""Every field there is, read off the schema: missing, of a wrong type, out of bounds, misspelt.
+
+The cases come from the pydantic models, so a new setting is tested the day it is added; what the message must
+say is worked out here, apart from the code that words it.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin
+
+import annotated_types
+import pytest
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from config.load import ConfigError, load_model, load_robot, load_settings, load_world
+from config.model import ModelConfig
+from config.robot import RobotConfig
+from config.settings import Settings
+from config.world import WorldConfig
+from tests.config.toml_text import MODEL, ROBOT, RUN, WORLD, document, irregular, toml
+
+ROOTS: dict[str, tuple[type[BaseModel], dict[str, Any], Callable[[Path], BaseModel]]] = {
+    "run": (Settings, RUN, load_settings),
+    "run, ring listed": (Settings, irregular(RUN), load_settings),
+    "robot": (RobotConfig, ROBOT, load_robot),
+    "world": (WorldConfig, WORLD, load_world),
+    "model": (ModelConfig, MODEL, load_model),
+}
+BESIDE = {"text": "oddly", "flag": True, "list": [1.5], "table": {"a": 1}, "number": 1.5, "integer": 7}
+WRONG: dict[Any, tuple[str, ...]] = {
+    float: ("text", "flag", "list", "table"),
+    int: ("text", "flag", "list", "table", "number"),
+    bool: ("text", "list", "table", "number", "integer"),
+    str: ("flag", "list", "table", "number", "integer"),
+    "list": ("text", "flag", "table", "number", "integer"),
+    "table": ("flag", "list", "number", "integer"),  # no text: it may name a preset
+    "name": ("text", "flag", "list", "table", "number"),
+}
+WANTED = {
+    float: "must be a number",
+    int: "must be an integer",
+    bool: "must be true or false",
+    str: "must be a string",
+    "list": "must be a list",
+    "table": "must be a table",
+    "name": "must be one of",
+}
+
+
+@dataclass(frozen=True)
+class Setting:
+    root: str
+    location: tuple[str | int, ...]
+    field: FieldInfo
+    kind: Any
+
+    @property
+    def path(self) -> str:
+        return ".".join(map(str, self.location))
+
+    def __str__(self) -> str:
+        return f"{self.root}: {self.path}"
+
+
+def inner(annotation: Any) -> Any:
+    """Return the annotation without its None and its wrappers."""
+    while True:
+        arguments = [a for a in get_args(annotation) if a is not type(None)]
+        if get_origin(annotation) in (tuple, Literal) or not arguments:
+            return annotation
+        annotation = arguments[0]
+
+
+def settings_of(root: str, model: type[BaseModel], table: Any, at: tuple[str | int, ...] = ()) -> Iterator[Setting]:
+    for key, field in model.model_fields.items():
+        annotation = inner(field.annotation)
+        location = (*at, key)
+        if get_origin(annotation) is tuple:
+            yield Setting(root, location, field, "list")
+            item = inner(get_args(annotation)[0])
+            if isinstance(item, type) and issubclass(item, BaseModel) and key in table:
+                yield from settings_of(root, item, table[key][0], (*location, 0))
+        elif get_origin(annotation) is Literal:
+            yield Setting(root, location, field, "name")
+        elif issubclass(annotation, BaseModel):
+            yield Setting(root, location, field, "table")
+            yield from settings_of(root, annotation, table.get(key, {}), location)
+        else:
+            yield Setting(root, location, field, annotation)
+
+
+SETTINGS = [s for root, (model, table, _) in ROOTS.items() for s in settings_of(root, model, table)]
+NAMES_FILES = (("models",), ("world",))
+"""Settings of a run that may also be names, and have defaults: see test_load."""
+
+
+def holder(table: Any, location: tuple[str | int, ...]) -> Any:
+    for key in location[:-1]:
+        table = table[key] if isinstance(key, int) else table.setdefault(key, {})
+    return table
+
+
+def refused(setting: Setting, table: dict[str, Any], folder: Path) -> list[str]:
+    path = folder / "mine.toml"
+    path.write_text(document(table), encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        ROOTS[setting.root][2](path)
+    lines = str(caught.value).splitlines()
+    assert all(line.startswith(f"{path}: ") for line in lines)
+    return [line.removeprefix(f"{path}: ") for line in lines]
+
+
+def test_the_walk_reaches_everything() -> None:
+    paths = {s.path for s in SETTINGS if s.root.startswith("run")}
+    assert {"ring.count", "ring.sensors.0.angle_deg", "ring.firing.sets", "body.synchro", "link.tries"} <= paths
+    assert {"world.drum.0.x_m", "world.polygon.0.vertices_m", "models.0.arc_radius_m", "log.level"} <= paths
+    assert {"perception.relaxation.gamma", "behaviors.arbiter.turn_gain_per_s", "cycle.rate_hz"} <= paths
+    assert len(paths) > 90
+
+
+@pytest.mark.parametrize("root", ROOTS)
+def test_the_unharmed_table_is_good(root: str, tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(document(ROOTS[root][1]), encoding="utf-8")
+    ROOTS[root][2](tmp_path / "mine.toml")
+
+
+@pytest.mark.parametrize("setting", [s for s in SETTINGS if s.location not in NAMES_FILES], ids=str)
+def test_wrong_type(setting: Setting, tmp_path: Path) -> None:
+    for given in WRONG[setting.kind]:
+        table = copy.deepcopy(ROOTS[setting.root][1])
+        holder(table, setting.location)[setting.location[-1]] = BESIDE[given]
+        lines = refused(setting, table, tmp_path)
+        shown = "{…}" if given == "table" else toml(BESIDE[given])
+        assert len(lines) == 1
+        assert lines[0].startswith(f"{setting.path} = {shown}: {WANTED[setting.kind]}")
+
+
+REQUIRED = [s for s in SETTINGS if s.field.is_required() and s.location not in NAMES_FILES]
+
+
+@pytest.mark.parametrize("setting", REQUIRED, ids=str)
+def test_missing(setting: Setting, tmp_path: Path) -> None:
+    table = copy.deepcopy(ROOTS[setting.root][1])
+    del holder(table, setting.location)[setting.location[-1]]
+    assert refused(setting, table, tmp_path) == [f"{setting.path}: missing"]
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_misspelt(setting: Setting, tmp_path: Path) -> None:
+    table = copy.deepcopy(ROOTS[setting.root][1])
+    key = str(setting.location[-1])
+    misspelt = f"{key[:-1]}q{key[-1]}"
+    holder(table, setting.location)[misspelt] = 1
+    path = ".".join(map(str, (*setting.location[:-1], misspelt)))
+    assert refused(setting, table, tmp_path) == [f"{path}: unknown key; did you mean {key}?"]
+
+
+def bounds() -> Iterator[tuple[Setting, float, str]]:
+    for setting in SETTINGS:
+        step = 1 if setting.kind is int else 0.001
+        for bound in setting.field.metadata if setting.kind in (int, float) else ():
+            constraint: Any = bound
+            match bound:
+                case annotated_types.Gt():
+                    yield setting, constraint.gt, f"must be above {constraint.gt:g}"
+                case annotated_types.Ge():
+                    yield setting, constraint.ge - step, "must be at least "
+                case annotated_types.Lt():
+                    yield setting, constraint.lt, f"must be below {constraint.lt:g}"
+                case annotated_types.Le():
+                    yield setting, constraint.le + step, "must be at most "
+
+
+@pytest.mark.parametrize(("setting", "value", "wanted"), list(bounds()), ids=str)
+def test_out_of_bounds(setting: Setting, value: float, wanted: str, tmp_path: Path) -> None:
+    table = copy.deepcopy(ROOTS[setting.root][1])
+    holder(table, setting.location)[setting.location[-1]] = value
+    lines = refused(setting, table, tmp_path)
+    assert len(lines) == 1
+    assert lines[0].startswith(f"{setting.path} = {value}: {wanted}")
+
+
+@pytest.mark.parametrize("setting", [s for s in SETTINGS if s.kind is float], ids=str)
+def test_neither_infinite_nor_nan(setting: Setting, tmp_path: Path) -> None:
+    for value in (float("inf"), float("-inf"), float("nan")):
+        table = copy.deepcopy(ROOTS[setting.root][1])
+        holder(table, setting.location)[setting.location[-1]] = value
+        lines = refused(setting, table, tmp_path)
+        assert len(lines) == 1
+        assert lines[0].startswith(f"{setting.path} = {value}: must be ")
+
+
+@pytest.mark.parametrize("setting", [s for s in SETTINGS if s.kind is float], ids=str)
+def test_a_number_may_be_written_without_a_fraction(setting: Setting, tmp_path: Path) -> None:
+    good = [0, 1, 2, 10, 45]
+    table = copy.deepcopy(ROOTS[setting.root][1])
+    path = tmp_path / "mine.toml"
+    for value in good:
+        holder(table, setting.location)[setting.location[-1]] = value
+        path.write_text(document(table), encoding="utf-8")
+        try:
+            ROOTS[setting.root][2](path)
+        except ConfigError as error:
+            assert "must be a number" not in str(error)  # noqa: PT017 - other rules may refuse a value

@@ -1,0 +1,91 @@
+"""TOML as text from a table, and one table that gives every setting a good value."""
+
+from __future__ import annotations
+
+import copy
+import datetime
+import math
+from typing import Any
+
+REGULAR_RING = {
+    "count": 24,
+    "radius_m": 0.381,
+    "beam_half_angle_deg": 12.0,
+    "resolution_m": 0.03048,
+    "range_min_m": 0.1524,
+    "range_max_m": 7.7724,
+    "firing": {"preset": "octets", "rotations": 1, "step_period_s": 0.05, "window_m": 7.0},
+}
+BODY = {
+    "radius_m": 0.4,
+    "speed_max_m_s": 0.5,
+    "turn_max_rad_s": 1.0,
+    "acceleration_max_m_s2": 0.5,
+    "turn_acceleration_max_rad_s2": 2.0,
+    "synchro": True,
+}
+ROBOT: dict[str, Any] = {"ring": REGULAR_RING, "body": BODY, "link": {"port": "/dev/ttyS0", "baud": 9600}}
+MODEL: dict[str, Any] = {
+    "name": "corner",
+    "vertices_m": [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]],
+    "closed": False,
+    "arc_radius_m": 1.0,
+}
+WORLD: dict[str, Any] = {
+    "drum": [{"x_m": 1.0, "y_m": 2.0, "radius_m": 0.3}],
+    "wall": [{"x1_m": 0.0, "y1_m": 3.0, "x2_m": 5.0, "y2_m": 3.0}],
+    "box": [{"x_m": -2.0, "y_m": 2.0, "width_m": 1.0, "depth_m": 0.5, "angle_deg": 30.0}],
+    "polygon": [{"vertices_m": [[5.0, 5.0], [6.0, 5.0], [6.0, 6.0]]}],
+    "start": {"x_m": -2.0, "y_m": 0.0, "heading_deg": 0.0},
+    "acoustics": {"model": "cone", "noise_relative": 0.01},
+    "odometry": {"scale": 1.0},
+}
+RUN: dict[str, Any] = {
+    **ROBOT,
+    "models": [MODEL],
+    "world": WORLD,
+    "cycle": {},
+    "perception": {"segments": {}, "map": {}, "clusters": {}, "relaxation": {}, "recognition": {}},
+    "behaviors": {"move_ahead": {}, "avoid_static_obstacle": {}, "arbiter": {}},
+    "log": {},
+}
+"""A run file that names no other file."""
+
+
+def irregular(robot: dict[str, Any]) -> dict[str, Any]:
+    """Return the table with its ring and firing sets listed one by one."""
+    table = copy.deepcopy(robot)
+    del table["ring"]["count"], table["ring"]["radius_m"], table["ring"]["firing"]["preset"]
+    table["ring"]["sensors"] = [
+        {"x_m": 0.1, "y_m": 0.1, "angle_deg": 90.0},
+        {"x_m": 0.1, "y_m": -0.1, "angle_deg": 0.0},
+    ]
+    table["ring"]["firing"]["sets"] = [[0], [1]]
+    return table
+
+
+def toml(value: Any) -> str:
+    """Return a value as TOML, tables inline."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return quoted(value)
+    if isinstance(value, float):
+        return repr(value) if math.isfinite(value) else str(value)
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, datetime.date):
+        return value.isoformat()
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{quoted(k)} = {toml(v)}" for k, v in value.items()) + "}"
+    return "[" + ", ".join(toml(v) for v in value) + "]"
+
+
+def document(table: dict[str, Any]) -> str:
+    """Return a table as a TOML file."""
+    return "".join(f"{quoted(key)} = {toml(value)}\n" for key, value in table.items())
+
+
+def quoted(text: str) -> str:
+    escaped = (f"\\u{ord(c):04x}" if ord(c) < 0x20 or c in '"\\\x7f' else c for c in text)
+    return '"' + "".join(escaped) + '"'

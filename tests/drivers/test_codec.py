@@ -1,0 +1,216 @@
+"""The codec: every example both ways, any chunking, any bytes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.denning.codec import FRAME_MAX, Decoder, crc, encode
+from drivers.denning.frames import Ack, Drive, Echo, Frame, Halt, Hello, Ident, NakCode, Odom, Pattern
+from tests.drivers.vectors import BAD, GOOD, Side
+
+U8 = st.integers(0, 255)
+I16 = st.integers(-(2**15), 2**15 - 1)
+I32 = st.integers(-(2**31), 2**31 - 1)
+SIDES: tuple[Side, ...] = ("host", "robot")
+
+
+@st.composite
+def echoes(draw: st.DrawFn) -> Echo:
+    mask = draw(st.integers(0, 2**24 - 1))
+    tenth = st.one_of(st.just(0), st.integers(5, 255))
+    tenths = draw(st.lists(tenth, min_size=mask.bit_count(), max_size=mask.bit_count()))
+    return Echo(draw(U8), draw(st.integers(0, 2**32 - 1)), draw(U8), mask, tuple(tenths))
+
+
+odoms = st.builds(Odom, U8, st.integers(0, 2**32 - 1), I32, I32, I32, I32, I16, I16, U8, U8)
+patterns = st.builds(
+    Pattern,
+    U8,
+    st.integers(0, 2**16 - 1),
+    st.integers(5, 255),
+    st.lists(st.integers(0, 2**24 - 1), max_size=24).map(tuple),
+)
+
+
+def stuffed(body: bytes) -> bytes:
+    """Return a whole frame around `body`, checksum and all, by hand."""
+    raw = body + crc(body).to_bytes(2, "little")
+    out = bytearray()
+    for block in raw.split(b"\0"):
+        assert len(block) < 254
+        out += bytes((len(block) + 1,)) + block
+    return bytes(out) + b"\0"
+
+
+@pytest.mark.parametrize(("side", "frame", "wire"), GOOD)
+def test_good_frames_both_ways(side: Side, frame: Frame, wire: str) -> None:
+    assert encode(frame).hex() == wire
+    decoder = Decoder(side)
+    assert decoder.feed(bytes.fromhex(wire)) == [frame]
+    assert (decoder.frames, decoder.bad, decoder.lost, decoder.rejected) == (1, 0, 0, [])
+
+
+@pytest.mark.parametrize(("side", "frame", "wire"), GOOD)
+def test_frames_of_the_other_side_are_unknown(side: Side, frame: Frame, wire: str) -> None:
+    decoder = Decoder("robot" if side == "host" else "host")
+    assert decoder.feed(bytes.fromhex(wire)) == []
+    assert decoder.bad == 1
+    assert decoder.take_rejected() == [(frame.seq, NakCode.UNKNOWN_TYPE)]
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize(("why", "wire"), BAD)
+def test_bad_frames_are_dropped_counted_and_passed_over(side: Side, why: str, wire: str) -> None:
+    decoder = Decoder(side)
+    assert decoder.feed(bytes.fromhex(wire)) == [], why
+    assert (decoder.frames, decoder.bad) == (0, 1)
+    good_side = [(frame, bytes.fromhex(good)) for which, frame, good in GOOD if which == side]
+    assert decoder.feed(b"".join(good for _, good in good_side)) == [frame for frame, _ in good_side]
+    assert decoder.bad == 1
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_byte_by_byte_is_the_same_as_whole(side: Side) -> None:
+    data = b"".join(bytes.fromhex(wire) for _, wire in BAD)
+    data += b"\0\0" + b"".join(bytes.fromhex(wire) for which, _, wire in GOOD if which == side) + data
+    whole, single = Decoder(side), Decoder(side)
+    frames = whole.feed(data)
+    assert [f for i in range(len(data)) for f in single.feed(data[i : i + 1])] == frames
+    assert frames == [frame for which, frame, _ in GOOD if which == side]
+    assert (single.frames, single.bad, single.lost) == (whole.frames, whole.bad, whole.lost)
+    assert single.rejected == whole.rejected
+
+
+def test_what_the_device_must_refuse_can_be_told_apart() -> None:
+    decoder = Decoder("host")
+    for body in (
+        bytes((0x7F, 10)),
+        bytes((0x10, 11, 1, 2, 3)),
+        bytes((0x11, 12, 0)),
+        bytes((0x02, 13)),
+        bytes((0x02, 14, 2, 50, 0, 255, 1, 1, 1)),
+        bytes((0x02, 15, 25, 50, 0, 255)) + b"\1" * 75,
+        bytes((0x02, 16, 1, 50, 0, 4, 1, 1, 1)),
+    ):
+        assert decoder.feed(stuffed(body)) == []
+    assert decoder.take_rejected() == [
+        (10, NakCode.UNKNOWN_TYPE),
+        (11, NakCode.WRONG_LENGTH),
+        (12, NakCode.WRONG_LENGTH),
+        (13, NakCode.WRONG_LENGTH),
+        (14, NakCode.WRONG_LENGTH),
+        (15, NakCode.VALUE_OUT_OF_RANGE),
+        (16, NakCode.VALUE_OUT_OF_RANGE),
+    ]
+    assert decoder.take_rejected() == []
+    assert (decoder.frames, decoder.bad, decoder.lost) == (0, 7, 0)
+
+
+def test_a_name_that_is_no_text_is_no_identity() -> None:
+    good = encode(Ident(0, 1, 24, 381, 500, 20, 7, "x" * 16))
+    assert len(Decoder("robot").feed(good)) == 1
+    head = bytes((0x81, 0, 1, 24, 125, 1, 244, 1, 20, 0, 7, 0, 0, 0))
+    for name in (b"\xff".ljust(16, b"\0"), b"a\0b".ljust(16, b"\0")):
+        decoder = Decoder("robot")
+        assert decoder.feed(stuffed(head + name)) == []
+        assert decoder.rejected == [(0, NakCode.VALUE_OUT_OF_RANGE)]
+
+
+def test_gaps_in_the_sequence_are_counted_across_the_wrap() -> None:
+    decoder = Decoder("host")
+    for seq in (250, 251, 255, 0, 2, 2):
+        decoder.feed(encode(Halt(seq)))
+    assert (decoder.frames, decoder.lost) == (6, 3 + 1)
+
+
+def test_an_overlong_frame_is_bad_once_and_holds_nothing() -> None:
+    decoder = Decoder("robot")
+    for _ in range(100):
+        assert decoder.feed(b"\x55" * 100) == []
+        assert decoder.pending <= FRAME_MAX + 1
+    assert decoder.bad == 1
+    assert decoder.feed(b"\0" + encode(Ack(0, 0))) == [Ack(0, 0)]
+    assert decoder.bad == 1
+
+
+def test_the_longest_frame_passes_and_one_byte_more_does_not() -> None:
+    decoder = Decoder("robot")
+    decoder.feed(stuffed(b"\x7f" * (FRAME_MAX - 2)))
+    assert decoder.take_rejected() == [(0x7F, NakCode.UNKNOWN_TYPE)]
+    decoder.feed(stuffed(b"\x7f" * (FRAME_MAX - 1)))
+    assert (decoder.take_rejected(), decoder.bad) == ([], 2)
+
+
+def test_refusals_nobody_takes_do_not_pile_up() -> None:
+    decoder = Decoder("host")
+    for seq in range(256):
+        decoder.feed(stuffed(bytes((0x7F, seq))))
+    assert [seq for seq, _ in decoder.rejected] == list(range(192, 256))
+
+
+@given(st.lists(st.binary(max_size=400), max_size=12), st.sampled_from(SIDES))
+def test_any_bytes_are_survived(chunks: list[bytes], side: Side) -> None:
+    decoder, whole = Decoder(side), Decoder(side)
+    frames = []
+    for chunk in chunks:
+        frames += decoder.feed(chunk)
+        assert decoder.pending <= FRAME_MAX + 1
+    assert frames == whole.feed(b"".join(chunks))
+    last = Halt(1) if side == "host" else Ack(1, 1)
+    assert decoder.feed(b"\0" + encode(last)) == [last]
+
+
+@given(st.sampled_from([0x01, 0x02, 0x10, 0x11, 0x12, 0x81, 0x82, 0x83, 0x90, 0x91]), st.binary(max_size=124))
+def test_any_payload_is_a_frame_that_encodes_to_itself_or_refused(kind: int, payload: bytes) -> None:
+    wire = stuffed(bytes((kind, 9)) + payload)
+    decoder = Decoder("host" if kind < 0x80 else "robot")
+    frames = decoder.feed(wire)
+    assert len(frames) + len(decoder.rejected) == 1
+    assert all(encode(frame) == wire for frame in frames)
+
+
+@given(st.one_of(odoms, echoes(), patterns))
+def test_any_frame_comes_back(frame: Frame) -> None:
+    decoder = Decoder("host" if isinstance(frame, Pattern) else "robot")
+    assert decoder.feed(encode(frame)) == [frame]
+
+
+@given(st.lists(odoms, min_size=1, max_size=4), st.data())
+def test_one_flipped_bit_never_passes_as_another_frame(frames: list[Odom], data: st.DataObject) -> None:
+    wire = bytearray(b"".join(encode(frame) for frame in frames))
+    wire[data.draw(st.integers(0, len(wire) - 1))] ^= 1 << data.draw(st.integers(0, 7))
+    assert [f for f in Decoder("robot").feed(bytes(wire)) if f not in frames] == []
+
+
+ODOM = Odom(0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("frame", "field", "limits"),
+    [
+        (Halt(256), "Halt.seq", "0 to 255"),
+        (Hello(0, -1), "Hello.version", "0 to 255"),
+        (Drive(0, 32768, 0), "Drive.v_mm_s", "-32768 to 32767"),
+        (Drive(0, 0, 0.5), "Drive.w_mrad_s", "whole number"),  # type: ignore[arg-type]
+        (Pattern(0, 65536, 255, ()), "Pattern.step_period_ms", "0 to 65535"),
+        (Pattern(0, 50, 4, ()), "Pattern.window", "5 to 255"),
+        (Pattern(0, 50, 256, ()), "Pattern.window", "5 to 255"),
+        (Pattern(0, 50, 255, (1,) * 25), "Pattern.masks", "0 to 24"),
+        (Pattern(0, 50, 255, (1, 1 << 24)), "Pattern.masks[1]", "0 to 16777215"),
+        (replace(ODOM, t_us=2**32), "Odom.t_us", "0 to 4294967295"),
+        (replace(ODOM, x_0p1mm=2**31), "Odom.x_0p1mm", "-2147483648 to 2147483647"),
+        (Echo(0, 0, 0, 1 << 24, (9,)), "Echo.mask", "0 to 16777215"),
+        (Echo(0, 0, 0, 3, (9,)), "Echo.tenths_ft", "asks for 2"),
+        (Echo(0, 0, 0, 3, (9, 4)), "Echo.tenths_ft[1]", "5 to 255"),
+        (Ident(0, 1, 24, 1, 1, 1, 1, "x" * 17), "Ident.name", "16 bytes"),
+    ],
+)
+def test_what_does_not_fit_is_refused_by_name(frame: Frame, field: str, limits: str) -> None:
+    with pytest.raises(ValueError, match=r"must be|asks for") as caught:
+        encode(frame)
+    assert field in str(caught.value)
+    assert limits in str(caught.value)

@@ -1,0 +1,345 @@
+"""The serial line over real ptys: what goes well, and everything that ends a line."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import threading
+import tty
+from collections.abc import AsyncIterator, Callable, Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+import serial
+
+from config.robot import LinkConfig
+from drivers.link import Link, LinkError
+
+PATIENCE_S = 5.0
+T = TypeVar("T")
+
+
+class Ends:
+    """A pty whose slave is found under `path`, as an unplugged and replugged device is."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.master = -1
+        self._slave = -1
+        self.plug()
+
+    def plug(self) -> None:
+        self.master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self.master, False)
+        self.path.symlink_to(os.ttyname(self._slave))
+
+    def unplug(self) -> None:
+        if self.master >= 0:
+            self.path.unlink()
+            os.close(self.master)
+            os.close(self._slave)
+            self.master = -1
+
+    async def read(self, count: int) -> bytes:
+        loop, got, full = asyncio.get_running_loop(), bytearray(), asyncio.Event()
+
+        def ready() -> None:
+            got.extend(os.read(self.master, 4096))
+            if len(got) >= count:
+                full.set()
+
+        loop.add_reader(self.master, ready)
+        try:
+            await asyncio.wait_for(full.wait(), PATIENCE_S)
+        finally:
+            loop.remove_reader(self.master)
+        return bytes(got)
+
+
+class Host:
+    """The handlers of a link, each telling a queue."""
+
+    def __init__(self) -> None:
+        self.opened: asyncio.Queue[None] = asyncio.Queue()
+        self.data: asyncio.Queue[bytes] = asyncio.Queue()
+        self.closed: asyncio.Queue[str] = asyncio.Queue()
+
+    def link(self, path: Path | None, **options: Callable[[LinkConfig], serial.Serial] | float) -> Link:
+        config = LinkConfig(port=None if path is None else str(path), reopen_first_s=0.005, reopen_max_s=0.02)
+        return Link(
+            config,
+            lambda: self.opened.put_nowait(None),
+            self.data.put_nowait,
+            self.closed.put_nowait,
+            **options,  # type: ignore[arg-type]
+        )
+
+
+async def soon(queue: asyncio.Queue[T]) -> T:
+    return await asyncio.wait_for(queue.get(), PATIENCE_S)
+
+
+@contextlib.asynccontextmanager
+async def running(link: Link) -> AsyncIterator[asyncio.Task[None]]:
+    task = asyncio.create_task(link.run())
+    try:
+        yield task
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await asyncio.wait_for(task, PATIENCE_S)
+        assert not link.is_open
+
+
+@pytest.fixture
+def ends(tmp_path: Path) -> Iterator[Ends]:
+    pty = Ends(tmp_path / "robot")
+    yield pty
+    pty.unplug()
+
+
+@pytest.fixture(autouse=True)
+async def loop_complaints() -> AsyncIterator[None]:
+    """Fail on whatever would reach a user as a traceback from the loop."""
+    complaints: list[object] = []
+    asyncio.get_running_loop().set_exception_handler(lambda _, context: complaints.append(context))
+    yield
+    assert complaints == []
+
+
+async def test_bytes_go_both_ways(ends: Ends) -> None:
+    host = Host()
+    link = host.link(ends.path)
+    assert not link.send(b"too early")
+    await link.open_once()
+    await soon(host.opened)
+    async with running(link):
+        assert link.is_open
+        assert link.writable
+        assert link.last_error is None
+        assert link.send(bytes(range(256)))
+        assert await ends.read(256) == bytes(range(256))
+        os.write(ends.master, b"\0\x11\x13\n\r\xff")
+        got = bytearray()
+        while len(got) < 6:
+            chunk = await soon(host.data)
+            got += chunk
+        assert got == b"\0\x11\x13\n\r\xff"
+    assert await soon(host.closed) == "it was closed at this end"
+    assert host.opened.empty()
+
+
+async def test_what_was_sent_last_leaves_before_the_line_is_closed(ends: Ends) -> None:
+    host = Host()
+    link = host.link(ends.path)
+    async with running(link):
+        await soon(host.opened)
+        link.send(b"halt")
+    assert os.read(ends.master, 100) == b"halt"
+
+
+async def test_unplugged_and_plugged_again(ends: Ends) -> None:
+    host = Host()
+    link = host.link(ends.path)
+    async with running(link):
+        for _ in range(3):
+            await soon(host.opened)
+            link.send(b"under way")
+            ends.unplug()
+            reason = await soon(host.closed)
+            assert "was lost" in reason
+            assert "plug it in again" in reason
+            assert not link.is_open
+            assert not link.writable
+            assert not link.send(b"gone")
+            ends.plug()
+        await soon(host.opened)
+        assert link.last_error is None
+        os.write(ends.master, b"back")
+        got = await soon(host.data)
+        assert got == b"back"
+
+
+async def test_attempts_to_reopen_are_spaced_out(ends: Ends) -> None:
+    host = Host()
+    attempts: asyncio.Queue[float] = asyncio.Queue()
+    loop = asyncio.get_running_loop()
+
+    def opener(config: LinkConfig) -> serial.Serial:
+        loop.call_soon_threadsafe(attempts.put_nowait, loop.time())
+        raise serial.SerialException(2, f"could not open port {config.port}")
+
+    link = host.link(ends.path, opener=opener)
+    async with running(link):
+        times = [await soon(attempts) for _ in range(6)]
+    gaps = [after - before for before, after in pairwise(times)]
+    # The waits are at least 5, 10, 20, 20, 20 ms; the opening itself comes on top.
+    assert all(gap >= wait for gap, wait in zip(gaps, (0.004, 0.009, 0.019, 0.019, 0.019), strict=True)), gaps
+    assert "no such port" in (link.last_error or "")
+
+
+@pytest.mark.parametrize("name", ["missing", "missing/deeper", "file", "folder", "file/below"])
+async def test_a_wrong_path_says_so_in_one_line(tmp_path: Path, name: str) -> None:
+    (tmp_path / "file").write_text("not a port")
+    (tmp_path / "folder").mkdir()
+    link = Host().link(tmp_path / name)
+    with pytest.raises(LinkError) as caught:
+        await link.open_once()
+    text = str(caught.value)
+    expected = "is not a serial port" if name in ("file", "folder") else "no such port"
+    assert expected in text
+    assert str(tmp_path / name) in text
+    assert "\n" not in text
+    assert link.last_error == text
+    assert not link.is_open
+
+
+async def test_no_port_at_all_says_so() -> None:
+    with pytest.raises(LinkError, match="no serial port is named; give it as --port"):
+        await Host().link(None).open_once()
+
+
+async def test_a_port_in_use_says_so(ends: Ends) -> None:
+    host = Host()
+    first, second = host.link(ends.path), Host().link(ends.path)
+    async with running(first):
+        await soon(host.opened)
+        with pytest.raises(LinkError, match="in use by another program; find it with `fuser"):
+            await second.open_once()
+
+
+@pytest.mark.parametrize(
+    ("error", "text"),
+    [
+        (serial.SerialException(13, "could not open port"), r"no permission .*\(dialout on"),
+        (ValueError("Invalid baud rate: 7"), "cannot be set to 115200 baud .*; correct link.baud"),
+        (serial.SerialException("something new"), r"cannot open .* \(something new\); check the cable"),
+    ],
+)
+async def test_other_reasons_have_their_line(ends: Ends, error: Exception, text: str) -> None:
+    def opener(_: LinkConfig) -> serial.Serial:
+        raise error
+
+    with pytest.raises(LinkError, match=text):
+        await Host().link(ends.path, opener=opener).open_once()
+
+
+async def test_a_port_that_never_opens_does_not_hold_the_loop(ends: Ends) -> None:
+    host, release, closed = Host(), threading.Event(), threading.Event()
+
+    class Late(serial.Serial):
+        def close(self) -> None:
+            super().close()
+            closed.set()
+
+    late = Late()  # kept here, or the garbage collector would close it
+
+    def opener(_: LinkConfig) -> serial.Serial:
+        release.wait(PATIENCE_S)
+        return late
+
+    with pytest.raises(LinkError, match="does not come to an end"):
+        await asyncio.wait_for(host.link(ends.path, opener=opener, open_timeout_s=0.02).open_once(), PATIENCE_S)
+    release.set()
+    assert await asyncio.to_thread(closed.wait, PATIENCE_S), "what opens too late is closed again"
+
+
+async def test_a_peer_that_stops_reading_fills_no_memory_and_holds_up_nothing(ends: Ends) -> None:
+    host = Host()
+    link = host.link(ends.path)
+    async with running(link):
+        await soon(host.opened)
+        sent = 0
+        was_writable = False
+        for _ in range(100_000):
+            was_writable = was_writable or link.writable
+            if not link.send(b"x" * 64):
+                break
+            sent += 64
+            await asyncio.sleep(0)
+        assert was_writable
+        assert not link.writable
+        assert not link.send(b"x" * 64)
+        assert sent < 200_000
+        assert link.send(b""), "nothing always fits"
+        begun = asyncio.get_running_loop().time()
+    assert asyncio.get_running_loop().time() - begun < 2.0, "stopping is bounded"
+    assert await soon(host.closed) == "it was closed at this end"
+
+
+async def test_unplugged_while_bytes_wait_is_told_at_once_and_without_a_traceback(ends: Ends) -> None:
+    host = Host()
+    link = host.link(ends.path)
+    async with running(link):
+        await soon(host.opened)
+        while link.send(b"x" * 64):
+            await asyncio.sleep(0)
+        ends.unplug()
+        assert "was lost" in await soon(host.closed)
+        assert not link.is_open
+
+
+async def test_not_writable_yet_leaves_room_for_a_halt(ends: Ends) -> None:
+    host = Host()
+    link = host.link(ends.path)
+    async with running(link):
+        await soon(host.opened)
+        assert link.send(b"x" * 257), "nothing has left yet: the loop has not run"
+        assert not link.writable
+        assert link.send(b"halt")
+        assert not link.send(b"x" * 4000), "a frame is taken whole or not at all"
+        assert (await ends.read(261))[257:] == b"halt"
+        assert link.writable
+
+
+async def test_what_a_handler_raises_ends_the_line_and_names_the_culprit(ends: Ends) -> None:
+    host = Host()
+
+    def careless(data: bytes) -> None:
+        raise KeyError(data.decode())
+
+    link = Link(
+        LinkConfig(port=str(ends.path), reopen_first_s=0.001),
+        lambda: host.opened.put_nowait(None),
+        careless,
+        host.closed.put_nowait,
+    )
+    async with running(link):
+        await soon(host.opened)
+        os.write(ends.master, b"boom")
+        reason = await soon(host.closed)
+        assert "the handler of received data failed with KeyError: 'boom'" in reason
+        assert "test_link.py" in reason
+        assert "careless" in reason
+        await soon(host.opened)
+
+
+async def test_handlers_of_opening_and_closing_may_fail_too(ends: Ends) -> None:
+    opened: asyncio.Queue[None] = asyncio.Queue()
+    times = iter(range(2))
+
+    def on_opened() -> None:
+        opened.put_nowait(None)
+        if next(times) == 0:
+            raise ZeroDivisionError("at opening")
+
+    def on_closed(_: str) -> None:
+        raise ZeroDivisionError("at closing")
+
+    link = Link(LinkConfig(port=str(ends.path), reopen_first_s=0.001), on_opened, lambda _: None, on_closed)
+    async with running(link):
+        await soon(opened)
+        assert not link.is_open
+        await soon(opened)
+        assert link.send(b"well")
+    assert "closing failed with ZeroDivisionError: at closing" in (link.last_error or "")
+
+
+async def test_stop_without_a_line_is_nothing() -> None:
+    link = Host().link(None)
+    await link.stop()
+    assert not link.is_open

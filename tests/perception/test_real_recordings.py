@@ -1,0 +1,72 @@
+"""Perception on sonar of real robots: a corridor with odometry, and a ring of 24 without a pose."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.load import load_settings
+from config.settings import Settings
+from drivers.messages import Firing
+from perception.kernel import Floats
+from perception.segments import SegmentExtractor
+from runtime.replay import replay
+from runtime.ringlog import read_ring_log
+from tests import recordings
+
+SIDES = (0, 7)
+
+
+def corridor(tmp_path: Path) -> tuple[Settings, list[Firing]]:
+    recordings.udacity_ring_log(tmp_path / "corridor.csv")
+    (tmp_path / "robot.toml").write_text(recordings.udacity_robot())
+    return load_settings(robot=str(tmp_path / "robot.toml")), list(read_ring_log(tmp_path / "corridor.csv", 8))
+
+
+def test_the_corridor_gives_at_least_300_outline_segments(tmp_path: Path) -> None:
+    chosen, firings = corridor(tmp_path)
+    assert replay(chosen, firings)["segments"] >= 300
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_the_corridors_walls_are_straight_lines(tmp_path: Path, side: int) -> None:
+    """Of a side sensor's segments in the first 10 m, 80 % lie within 0.15 m and 15° of one straight line."""
+    chosen, firings = corridor(tmp_path)
+    extractor = SegmentExtractor(chosen.ring, chosen.perception.segments)
+    path_m, before, rows = 0.0, firings[0].pose, []
+    for firing in firings:
+        path_m += math.dist((firing.pose.x, firing.pose.y), (before.x, before.y))
+        before = firing.pose
+        if path_m > 10.0:
+            break
+        alone = np.full(8, np.nan)
+        alone[side] = firing.ranges_m[side]
+        rows += [row.copy() for row in extractor.extract(Firing(firing.t_s, firing.pose, firing.ring_yaw, alone))]
+    assert len(rows) >= 20
+    assert best_line_share(np.array(rows)) >= 0.8
+
+
+def best_line_share(segments: Floats) -> float:
+    """The largest share of segments on a line through two of their centres."""
+    centres = 0.5 * (segments[:, 0:2] + segments[:, 2:4])
+    best = 0.0
+    for i in range(len(segments)):
+        for j in range(i):
+            along = centres[j] - centres[i]
+            if np.hypot(*along) < 1.0:
+                continue
+            normal = np.array([-along[1], along[0]]) / np.hypot(*along)
+            turned = np.abs((segments[:, 4] - math.atan2(normal[1], normal[0]) + math.pi / 2) % math.pi - math.pi / 2)
+            near = np.abs((centres - centres[i]) @ normal) <= 0.15
+            best = max(best, float(np.mean(near & (turned <= math.radians(15.0)))))
+    return best
+
+
+def test_the_ring_of_24_runs_through_at_its_full_length(tmp_path: Path) -> None:
+    recordings.scitos_ring_log(tmp_path / "ring.csv")
+    (tmp_path / "robot.toml").write_text(recordings.scitos_robot())
+    chosen = load_settings(robot=str(tmp_path / "robot.toml"))
+    assert replay(chosen, read_ring_log(tmp_path / "ring.csv", 24))["cycles"] == 5456
