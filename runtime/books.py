@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final, TypedDict
 
 import numpy as np
@@ -16,6 +17,15 @@ class Quantiles(TypedDict):
     p50: float
     p99: float
     max: float
+
+
+def worst_of(runs: Sequence[Quantiles]) -> Quantiles:
+    """Return the largest of each figure over several runs."""
+    return {
+        "p50": max(run["p50"] for run in runs),
+        "p99": max(run["p99"] for run in runs),
+        "max": max(run["max"] for run in runs),
+    }
 
 
 class Books:

@@ -6,10 +6,12 @@ its cache is before it is loaded.
 
 from __future__ import annotations
 
+import os
 import sys
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError, Parameter, Token
 
 from runtime import VERSION
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
@@ -34,6 +36,17 @@ UnitsOption = Annotated[Literal["m", "ft"], Parameter(help="Units of what is pri
 Flag = Parameter(negative="")
 
 
+def _whole(_type: type, tokens: Sequence[Token]) -> int:
+    """Return a whole number, none below zero; left alone, cyclopts takes 1.5 for 1."""
+    text = tokens[0].value
+    if not (text.isascii() and text.isdigit()):
+        raise ValueError(f"{text!r} must be a whole number, 0 or above.")
+    return int(text)
+
+
+Seed = Annotated[int, Parameter(converter=_whole)]
+
+
 @app.command
 def run(
     config: str | None = None,
@@ -46,7 +59,7 @@ def run(
     record: str | None = None,
     json: JsonFile = None,
     world: str | None = None,
-    seed: int = 0,
+    seed: Seed = 0,
     trace: str | None = None,
     faults: str | None = None,
     units: UnitsOption = "m",
@@ -92,7 +105,7 @@ def emulate(
     world: str | None = None,
     link: str | None = None,
     faults: str | None = None,
-    seed: int = 0,
+    seed: Seed = 0,
     robot: str | None = None,
     trace: str | None = None,
     config: str | None = None,
@@ -160,7 +173,7 @@ def experiment(
     *,
     method: Literal["paper"] = "paper",
     world: str | None = None,
-    seeds: int = 1,
+    seeds: Seed = 1,
     json: JsonFile = None,
     units: UnitsOption = "ft",
     sets: Sets = (),
@@ -207,7 +220,14 @@ def complain(text: str) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with 0 done, 1 the work failed, 2 the call or configuration was wrong."""
-    sys.exit(call(sys.argv[1:] if arguments is None else arguments))
+    try:
+        code = call(sys.argv[1:] if arguments is None else arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Whoever read has left, as `head` does. Python flushes once more at the end, so that must lead somewhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = FAILED
+    sys.exit(code)
 
 
 def call(arguments: list[str]) -> int:

@@ -12,7 +12,7 @@ from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
 from typing import Final
 
-from runtime.complaint import FAILED, Complaint
+from runtime.complaint import FAILED, WRONG_CALL, Complaint
 
 READY_WORD: Final = "ready"
 """First word of the one line the emulator prints."""
@@ -63,21 +63,24 @@ async def _wait_until_ready(process: asyncio.subprocess.Process) -> None:
     except TimeoutError:
         line = b""
     if not line.startswith(READY_WORD.encode()):
-        if process.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
+        _signal(process, signal.SIGKILL)
         words = (await err.read()).decode(errors="replace").strip()
         why = words.removeprefix("echolocate: ") or f"no answer within {START_MAX_S:.0f} s"
-        raise Complaint(f"the emulator did not start: {why}", FAILED)
+        wrong_call = await process.wait() == WRONG_CALL
+        raise Complaint(f"the emulator did not start: {why}", WRONG_CALL if wrong_call else FAILED)
 
 
 async def _end(process: asyncio.subprocess.Process) -> None:
+    _signal(process, signal.SIGTERM)
+    try:
+        await asyncio.wait_for(process.wait(), END_MAX_S)
+    except TimeoutError:
+        _signal(process, signal.SIGKILL)
+        await process.wait()
+
+
+def _signal(process: asyncio.subprocess.Process, number: signal.Signals) -> None:
+    """Send a signal past asyncio, whose own way may reap the child first and then complains that it is unknown."""
     if process.returncode is None:
         with contextlib.suppress(ProcessLookupError):
-            process.send_signal(signal.SIGTERM)
-        try:
-            await asyncio.wait_for(process.wait(), END_MAX_S)
-        except TimeoutError:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-            await process.wait()
+            os.kill(process.pid, number)

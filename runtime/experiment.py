@@ -9,6 +9,7 @@ from typing import Final, TypedDict
 from config.settings import Settings
 from config.world import WorldConfig
 from drivers.messages import Pose
+from runtime.books import Quantiles, worst_of
 from runtime.complaint import FAILED, Complaint
 from runtime.modes import Mode
 from runtime.simulate import Simulated, simulate
@@ -35,6 +36,7 @@ class Outcome(TypedDict):
     mean_error: float | None
     max_error: float | None
     times_real_time: float
+    cycle_us: Quantiles
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +48,7 @@ class SeedOutcome:
     false: int
     virtual_s: float
     wall_s: float
+    cycle_us: Quantiles
 
 
 def run_seed(settings: Settings, world: WorldConfig, seed: int) -> SeedOutcome:
@@ -70,7 +73,7 @@ def run_seed(settings: Settings, world: WorldConfig, seed: int) -> SeedOutcome:
             FAILED,
         )
     rows, false = against_truth(world, estimates(run))
-    return SeedOutcome(seed, rows, false, run.virtual_s, run.wall_s)
+    return SeedOutcome(seed, rows, false, run.virtual_s, run.wall_s, run.books.cycle_us())
 
 
 def estimates(run: Simulated) -> list[tuple[float, float]]:
@@ -106,4 +109,5 @@ def summarise(outcomes: list[SeedOutcome]) -> Outcome:
         "mean_error": sum(errors) / len(errors) if errors else None,
         "max_error": max(errors, default=None),
         "times_real_time": sum(outcome.virtual_s for outcome in outcomes) / wall_s if wall_s else 0.0,
+        "cycle_us": worst_of([outcome.cycle_us for outcome in outcomes]),
     }

@@ -30,7 +30,8 @@ WARM: Final = "warm"
 
 def cache_folder() -> Path:
     """Return the folder for the kernels of these very sources, Python and numba; made if it can be."""
-    digest = hashlib.sha256(f"{sys.version}{version('numba')}{version('numpy')}".encode())
+    checked = os.environ.get("NUMBA_BOUNDSCHECK", "")  # numba's own key does not hold it
+    digest = hashlib.sha256(f"{sys.version}{version('numba')}{version('numpy')}{checked}".encode())
     for package in PACKAGES:
         spec = find_spec(package)
         for place in spec.submodule_search_locations or () if spec else ():

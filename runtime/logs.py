@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import sys
@@ -14,7 +15,7 @@ import structlog
 from runtime.complaint import WRONG_CALL, Complaint
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, MutableMapping
+    from collections.abc import Iterator, Mapping, MutableMapping
 
     from structlog.typing import FilteringBoundLogger
 
@@ -42,8 +43,9 @@ class _Tee:
         raise structlog.DropEvent
 
 
-def open_log(config: LogConfig, *, terminal: bool) -> FilteringBoundLogger:
-    """Return the run's logger.
+@contextlib.contextmanager
+def open_log(config: LogConfig, *, terminal: bool) -> Iterator[FilteringBoundLogger]:
+    """Give the run's logger; its file is closed at the end.
 
     Parameters
     ----------
@@ -70,7 +72,11 @@ def open_log(config: LogConfig, *, terminal: bool) -> FilteringBoundLogger:
     )
     if lost is not None:
         log.warning("no log file is kept", reason=lost)
-    return log
+    try:
+        yield log
+    finally:
+        if file is not None:
+            file.close()
 
 
 def _open_file(config: LogConfig) -> tuple[TextIO | None, str | None]:

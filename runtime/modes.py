@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from types import MappingProxyType
 from typing import Final
 
 from drivers.driver import LineState
@@ -22,6 +23,20 @@ ARMING_MAX_S: Final = 1.0
 
 DEADMAN_GRACE_S: Final = 0.5
 """How long the deadman's flag may still tell of the time before the first DRIVE."""
+
+
+LINE_REASONS: Final = MappingProxyType(
+    {
+        LineState.CLOSED: "the line to the robot is gone: check cable and power, then re-arm",
+        LineState.GREETING: "the robot's clock or odometry jumped, as after a restart: check the robot, then re-arm",
+        LineState.DOWN: "the robot does not answer: check its power and cable, then re-arm",
+    }
+)
+
+GAP_MAX_S: Final = 0.45
+"""Commands farther apart than this find a base that its deadman (0.5 s) has stopped or is about to."""
+
+HELD_UP: Final = "the program was held up for {:.1f} s, so commands came too late: check the load, then re-arm"
 
 
 class Mode(Enum):
@@ -54,6 +69,10 @@ class ModeState:
         """Return the state of having just entered `mode`."""
         return ModeState(mode, now_s, reason)
 
+    def entered_since(self, before: ModeState) -> bool:
+        """Say whether a mode was entered since `before`, be it the same one again."""
+        return (self.mode, self.since_s) != (before.mode, before.since_s)
+
 
 @dataclass(frozen=True, slots=True)
 class Situation:
@@ -65,6 +84,8 @@ class Situation:
     flags: Flags
     rebooted: bool
     request: Request | None
+    gap_s: float = 0.0
+    """Time since the cycle before."""
 
 
 def advance(state: ModeState, seen: Situation) -> ModeState:
@@ -98,7 +119,10 @@ def why_stop(state: ModeState, seen: Situation) -> str | None:
     if seen.request is Request.HALT:
         return "halted by the operator; re-arm to go on"
     if seen.line is not LineState.READY:
-        return seen.trouble or "the line to the robot is gone: check cable and power, then re-arm"
+        return seen.trouble or LINE_REASONS[seen.line]
+    if seen.gap_s > GAP_MAX_S:
+        # What has been heard may be from before: the next command would set a base in motion that stopped by itself.
+        return HELD_UP.format(seen.gap_s)
     if seen.rebooted:
         return "the robot restarted, so its odometry began anew: check why, then re-arm"
     if seen.flags & Flags.BUMPER:
@@ -118,6 +142,8 @@ def _arm(state: ModeState, seen: Situation) -> ModeState:
         return replace(state, arming_s=seen.now_s)
     if state.arming_s is None:
         return state
+    if seen.gap_s > GAP_MAX_S:
+        return state.enter(Mode.SAFE_STOP, seen.now_s, HELD_UP.format(seen.gap_s))
     waited = seen.now_s - state.arming_s
     if waited >= ARMING_MIN_S and not seen.flags & Flags.LATCHED:
         return state.enter(Mode.DRIVE, seen.now_s)

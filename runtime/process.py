@@ -17,12 +17,12 @@ from config.settings import Settings
 from drivers.denning.robot import DenningRobot
 from drivers.driver import LineState, RobotDriver
 from drivers.link import Link, LinkError
-from drivers.messages import Firing, Flags
+from drivers.messages import Firing, Flags, Twist
 from perception.pipeline import Perception
 from runtime.books import Books
 from runtime.commanding import gather, give
 from runtime.complaint import FAILED, WRONG_CALL, Complaint
-from runtime.modes import Mode, Request
+from runtime.modes import GAP_MAX_S, Mode, Request
 from runtime.pacing import Pacer
 from runtime.step import Command, CycleRecord, State, step
 from runtime.summary import RunSummary, object_row
@@ -38,6 +38,11 @@ HALT_MAX_S: Final = 0.5
 
 LATE_SHARE: Final = 0.1
 """A cycle that begins later than this share of its period is late."""
+
+
+COLLECT_EVERY: Final = 20
+COLLECT_SLACK_S: Final = 0.01
+"""Young garbage is collected once in so many cycles, and only with so much time to spare; the old is frozen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +145,8 @@ class RobotProcess:
                 await self._link.stop()
                 raise Complaint(lost or self._driver.trouble or self._nobody(), FAILED)
             await asyncio.sleep(0.005)
-        self._log.info("robot ready", port=self._settings.link.port, robot=self._driver.identity)
+        name = None if self._driver.identity is None else self._driver.identity.name
+        self._log.info("robot ready", port=self._settings.link.port, robot=name)
 
     def _nobody(self) -> str:
         return f"nothing on {self._settings.link.port} answers like the robot: check its power and link.baud"
@@ -167,17 +173,23 @@ class RobotProcess:
             self.books.enter(self._clock() - start_s, start_s - pacer.deadline_s)
             deadline_s = pacer.advance(self._clock())
             self._missed = pacer.missed
+            if self.books.cycles % COLLECT_EVERY == 0 and deadline_s - self._clock() > COLLECT_SLACK_S:
+                gc.collect(1)
             await asyncio.sleep(max(0.0, deadline_s - self._clock()))
 
     def _one_cycle(self, start_s: float) -> None:
         request, self._request = self._request, None
         inputs = gather(self._driver, start_s, request)
         budget_s = self._settings.cycle.perception_budget_s
-        mode = self._state.mode.mode
+        before = self._state.mode
         record = step(
-            self._state, inputs, self._settings, self._carry_out, lambda _done: self._clock() - start_s < budget_s
+            self._state,
+            inputs,
+            self._settings,
+            lambda command: self._carry_out(command, start_s),
+            lambda _done: self._clock() - start_s < budget_s,
         )
-        if self._state.mode.mode is not mode:
+        if self._state.mode.entered_since(before):
             self._note_mode()
         if self._observers.on_firing is not None:
             for firing in inputs.heard.firings:
@@ -191,7 +203,10 @@ class RobotProcess:
             self._stop_reasons.append(state.reason)
         self._log.info("mode", mode=state.mode.value, reason=state.reason, cycle=self._state.cycle)
 
-    def _carry_out(self, command: Command) -> None:
+    def _carry_out(self, command: Command, start_s: float) -> None:
+        """Put the command on the line, but no velocity decided too long ago; the next cycle stops for such a gap."""
+        if isinstance(command, Twist) and self._clock() - start_s > GAP_MAX_S:
+            return
         give(self._driver, command)
         self._send()
 

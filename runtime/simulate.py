@@ -6,6 +6,7 @@ place of a time budget.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from drivers.emulator.device import EmulatedRobot, Truth
 from drivers.emulator.memory import MemoryLine
 from drivers.messages import Pose
 from perception.pipeline import Perception
+from runtime.books import Books
 from runtime.commanding import gather, give
 from runtime.modes import Mode, Request
 from runtime.step import CycleRecord, State, step
@@ -39,6 +41,8 @@ class Simulated:
     truth: Truth
     virtual_s: float
     wall_s: float
+    books: Books
+    """What the cycles took."""
 
 
 def enough_quanta(done: int) -> bool:
@@ -74,15 +78,18 @@ def simulate(
     state = State(Perception(settings.ring, settings.models, settings.perception))
     start = robot.truth.pose
     began = time.perf_counter()
-    until, now, cycles = seconds_max, 0.0, 0
+    books = Books(late_after_s=math.inf)
+    until, now = seconds_max, 0.0
     while now < until:
-        cycles += 1
-        now = cycles / settings.cycle.rate_hz
+        now = (books.cycles + 1) / settings.cycle.rate_hz
         line.exchange(now)
         request = Request.ARM if state.mode.mode is Mode.READY else None
-        record = step(state, gather(driver, now, request), settings, lambda c: give(driver, c), enough_quanta)
+        inputs = gather(driver, now, request)
+        step_s = time.perf_counter()
+        record = step(state, inputs, settings, lambda c: give(driver, c), enough_quanta)
+        books.enter(time.perf_counter() - step_s)
         if on_cycle is not None:
             on_cycle(record, robot.truth)
         if state.mode.mode is Mode.SAFE_STOP or (state.leg is not None and state.leg.done):
             until = min(until, now + SETTLING_S)
-    return Simulated(state, start, robot.truth, now, time.perf_counter() - began)
+    return Simulated(state, start, robot.truth, now, time.perf_counter() - began, books)

@@ -56,6 +56,7 @@ class State:
     leg: Leg | None = None
     odometry: Odometry | None = None
     last_firing_s: float = 0.0
+    now_s: float | None = None
     cycle: int = 0
 
 
@@ -133,8 +134,10 @@ def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
     """Go through modes and schemas and return what the base is told."""
     flags = Flags.NONE if state.odometry is None else state.odometry.flags
     before = state.mode
+    gap_s = 0.0 if state.now_s is None else inputs.now_s - state.now_s
+    state.now_s = inputs.now_s
     situation = Situation(
-        inputs.now_s, inputs.line, inputs.trouble, flags, inputs.heard.rebooted, inputs.request
+        inputs.now_s, inputs.line, inputs.trouble, flags, inputs.heard.rebooted, inputs.request, gap_s
     )  # fmt: skip
     state.mode = advance(before, situation)
     if state.mode.mode is Mode.DRIVE:
@@ -142,7 +145,7 @@ def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
         if isinstance(decision, Drive):
             return decision.twist
         state.mode = state.mode.enter(Mode.SAFE_STOP, inputs.now_s, decision.reason)
-    if state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT} and state.mode.mode is not before.mode:
+    if state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT} and state.mode.entered_since(before):
         return Order.HALT
     if state.mode.arming_s is not None and before.arming_s is None:
         return Order.RELEASE

@@ -49,7 +49,8 @@ def verdict(outcome: Outcome, units: Units) -> str:
     )  # fmt: skip
     return (
         f"{found} of {len(outcome['drums'])} drums found, {outcome['false']} false{errors}; "
-        f"{outcome['times_real_time']:.0f} times real time"
+        f"{outcome['times_real_time']:.0f} times real time; a cycle takes {outcome['cycle_us']['p50'] / 1e3:.2f} ms, "
+        f"p99 {outcome['cycle_us']['p99'] / 1e3:.2f} ms"
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import sys
 import termios
 import threading
@@ -45,6 +46,7 @@ STYLES: Final = MappingProxyType(
     {"DRIVE": "bold white on green", "SAFE_STOP": "bold white on red", "FAULT": "bold white on red"}
 )
 BARS: Final = " ▁▂▃▄▅▆▇█"
+KEYS_MAX: Final = 64
 KEYS: Final = MappingProxyType({" ": Request.HALT, "h": Request.HALT, "a": Request.ARM})
 
 
@@ -187,7 +189,8 @@ def keys(on_request: Callable[[Request], None], on_quit: Callable[[], None]) -> 
     loop = asyncio.get_running_loop()
 
     def read() -> None:
-        for key in sys.stdin.read(1):
+        # Not through sys.stdin: what that keeps in its buffer wakes nobody.
+        for key in os.read(fd, KEYS_MAX).decode(errors="replace"):
             if key in KEYS:
                 on_request(KEYS[key])
             elif key == "q":

@@ -210,6 +210,9 @@ class Decoder:
     ----------
     direction
         The side the frames come from.
+    midway
+        The first bytes may be the end of a frame whose beginning went by before the line was opened: up to the first
+        0x00 such a piece is dropped without being counted.
 
     Attributes
     ----------
@@ -219,13 +222,14 @@ class Decoder:
         Frames that gaps in the sender's sequence numbers tell of; one that came but was unreadable is among them.
     """
 
-    def __init__(self, direction: Literal["host", "robot"]) -> None:
+    def __init__(self, direction: Literal["host", "robot"], *, midway: bool = False) -> None:
         self.frames = 0
         self.bad = 0
         self.lost = 0
         self._layouts = _BY_TYPE[direction]
         self._pending = bytearray()
         self._skipping = False
+        self._midway = midway
         self._seq: int | None = None
         self._rejected: deque[tuple[int, NakCode]] = deque(maxlen=_REJECTED_MAX)
 
@@ -257,7 +261,7 @@ class Decoder:
                 if frame is not None:
                     found.append(frame)
             self._pending.clear()
-            self._skipping = False
+            self._skipping = self._midway = False
         self._gather(data, start, len(data))
         return found
 
@@ -275,10 +279,10 @@ class Decoder:
         try:
             body = cobs.decode(stuffed)
         except cobs.DecodeError:
-            self.bad += 1
+            self.bad += not self._midway
             return None
         if len(body) < _OVERHEAD or crc(body[:-2]) != int.from_bytes(body[-2:], "little"):
-            self.bad += 1
+            self.bad += not self._midway
             return None
         self._count_gap(body[1])
         frame = self._parse(body[0], body[1], body[2:-2])

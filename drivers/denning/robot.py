@@ -51,7 +51,7 @@ class DenningRobot:
         self._trouble: str | None = None
         self._identity: Identity | None = None
         self._jump: Jump | None = None
-        self._decoder = Decoder("robot")
+        self._decoder = Decoder("robot", midway=True)
         self._earlier = LinkCounts()
         self._now_s = 0.0
         self._odometry_s = 0.0
@@ -101,7 +101,7 @@ class DenningRobot:
     def closed(self) -> None:
         """Forget what was under way; only a HALT not yet answered is kept for the next line."""
         self._earlier = self.counts
-        self._decoder = Decoder("robot")
+        self._decoder = Decoder("robot", midway=True)
         self._state = LineState.CLOSED
         self._abandon()
 

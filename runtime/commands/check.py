@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from config.load import load_any
 from config.settings import Settings
+from runtime.advice import advice
 from runtime.commands.firing import refuse_impossible_firing
 from runtime.complaint import DONE
 
@@ -24,5 +25,7 @@ def check_config(config: str, sets: Sequence[str]) -> int:
     settings = load_any(config, sets)
     if isinstance(settings, Settings):
         refuse_impossible_firing(settings.ring)
+        for text in advice(settings):
+            sys.stdout.write(f"{config}: {text}\n")
     sys.stdout.write(f"{config}: good\n")
     return DONE

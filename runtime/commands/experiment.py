@@ -46,7 +46,7 @@ def run_experiment(
     out = Console()
     if seeds <= SEEDS_SHOWN:
         out.print(table_2(outcome, units))
-    out.print(verdict(outcome, units))
+    out.print(verdict(outcome, units), soft_wrap=True)
     return DONE
 
 

@@ -17,6 +17,7 @@ from rich.console import Console
 from config.load import load_settings
 from config.settings import Settings
 from runtime import VERSION
+from runtime.advice import advice
 from runtime.commands.firing import refuse_impossible_firing
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
 from runtime.kernels import ready_kernels
@@ -24,6 +25,8 @@ from runtime.logs import open_log
 from runtime.tables import Units, objects_table
 
 if TYPE_CHECKING:
+    from structlog.typing import FilteringBoundLogger
+
     from drivers.messages import Firing
     from runtime.process import RobotProcess
     from runtime.summary import RunSummary
@@ -72,12 +75,15 @@ def run_robot(
     port = port if port is not None else settings.link.port
     if port is not None:
         settings = on_port(settings, port)
+    refuse_unwritable({"--record": record, "--json": json_file})
     console = Console(stderr=True)
     ready_kernels(settings, console)
     live = not headless and console.is_terminal
-    log = open_log(settings.log, terminal=not live)
-    log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
     with contextlib.ExitStack() as stack:
+        log = stack.enter_context(open_log(settings.log, terminal=not live))
+        log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
+        for text in advice(settings):
+            log.warning(text)
         on_firing = None if record is None else stack.enter_context(recording(record))
 
         async def whole() -> RunSummary:
@@ -103,6 +109,18 @@ def run_robot(
     return FAILED if summary["mode"] == "FAULT" else DONE
 
 
+def refuse_unwritable(files: dict[str, str | None]) -> None:
+    """Complain before the robot moves about a file that could not be written when it is done."""
+    for option, path in files.items():
+        try:
+            if path is not None:
+                Path(path).open("ab").close()
+        except OSError as error:
+            raise Complaint(
+                f"{option} {path}: cannot be written: {error.strerror}; choose another file", FAILED
+            ) from error
+
+
 def on_port(settings: Settings, port: str) -> Settings:
     """Return the settings with the serial port replaced."""
     return settings.model_copy(update={"link": settings.link.model_copy(update={"port": port})})
@@ -110,7 +128,7 @@ def on_port(settings: Settings, port: str) -> Settings:
 
 async def watch(
     settings: Settings,
-    log: object,
+    log: FilteringBoundLogger,
     console: Console,
     *,
     live: bool,
@@ -126,7 +144,7 @@ async def watch(
     with contextlib.ExitStack() as stack:
         view = View(settings, console, units) if live else None
         observers = Observers(None if view is None else view.on_cycle, on_firing)
-        process = RobotProcess(settings, log, observers)  # type: ignore[arg-type]
+        process = RobotProcess(settings, log, observers)
         stack.enter_context(stopping_on_signals(process))
         if view is not None:
             stack.enter_context(view.shown())

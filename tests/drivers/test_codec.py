@@ -214,3 +214,17 @@ def test_what_does_not_fit_is_refused_by_name(frame: Frame, field: str, limits: 
         encode(frame)
     assert field in str(caught.value)
     assert limits in str(caught.value)
+
+
+@pytest.mark.parametrize("midway", [True, False])
+def test_the_end_of_a_frame_that_was_under_way_when_the_line_opened_is_no_bad_frame(midway: bool) -> None:
+    whole = encode(Ack(3, 7))
+    for cut in range(1, len(whole) - 1):
+        decoder = Decoder("robot", midway=midway)
+        assert decoder.feed(whole[cut:] + encode(Ack(4, 8))) == [Ack(4, 8)]
+        assert (decoder.frames, decoder.bad, decoder.lost) == (1, 0 if midway else 1, 0)
+        decoder.feed(whole[cut:])
+        assert decoder.bad == (1 if midway else 2), "later pieces count"
+    decoder = Decoder("robot", midway=midway)
+    decoder.feed(b"\xff" * 1000 + b"\0")
+    assert decoder.bad == 1, "no frame is as long as that"

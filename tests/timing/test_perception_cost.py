@@ -1,0 +1,153 @@
+"""What perception costs a ring reading, kernels warm, and that its budget holds to one quantum.
+
+CPU time of this thread, not the wall clock: other programs on the machine cost nothing here.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from config.load import load_settings
+from drivers.messages import Firing
+from perception.pipeline import Perception
+from runtime.simulate import enough_quanta, simulate
+from runtime.step import CycleRecord, State, step
+
+pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
+
+SETTINGS = load_settings("hallway")
+MEDIAN_MS, P99_MS = 1.0, 5.0
+"""The figures that perception is held to."""
+
+
+@pytest.fixture(scope="module")
+def records() -> list[CycleRecord]:
+    """Return a drive down the hallway, about 24 s of it."""
+    assert SETTINGS.world is not None
+    kept: list[CycleRecord] = []
+    simulate(SETTINGS, SETTINGS.world, 0, 24.0, lambda record, _truth: kept.append(record))
+    return kept
+
+
+def fresh() -> Perception:
+    return Perception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
+
+
+def cost_ms(perception: Perception, firing: Firing) -> float:
+    """Take in one reading and refine to rest or for as many quanta as a cycle has; return the CPU time."""
+    begin_ns = time.thread_time_ns()
+    perception.observe(firing)
+    done = 0
+    while perception.pending and enough_quanta(done):
+        perception.refine()
+        done += 1
+    return 1e-6 * (time.thread_time_ns() - begin_ns)
+
+
+def control_ms(scratch: np.typing.NDArray[np.float64]) -> float:
+    """Do a fixed piece of interpreter and array work: how fast this machine is just now."""
+    begin_ns = time.thread_time_ns()
+    total = 0.0
+    for k in range(1000):
+        total += k * 0.5
+    np.sort(scratch)
+    return 1e-6 * (time.thread_time_ns() - begin_ns) + 0.0 * total
+
+
+def test_cost_of_a_ring_reading(records: list[CycleRecord]) -> None:
+    firings = [firing for record in records for firing in record.inputs.heard.firings]
+    assert len(firings) > 300
+    scratch = np.random.default_rng(1).random(4096)
+    perception, costs, controls = fresh(), [], []
+    for firing in firings:
+        costs.append(cost_ms(perception, firing))
+        controls.append(control_ms(scratch))
+    assert len(perception.objects()) == 6
+    median, p99 = np.quantile(costs, [0.5, 0.99])
+    ratio = median / np.median(controls)
+    figures = {"median_ms": median, "p99_ms": p99, "max_ms": max(costs), "ratio": ratio}
+    logging.getLogger(__name__).info("%s", figures)
+    assert median <= MEDIAN_MS, figures
+    assert p99 <= P99_MS, figures
+    # Compiled a reading takes half as long as the control, in the interpreter nearly ten times as long.
+    assert ratio <= 2.0, figures
+
+
+def test_the_cost_does_not_grow_with_the_way(records: list[CycleRecord]) -> None:
+    """Old segments leave, so that the third lap past the same drums costs what the first did."""
+    firings = [firing for record in records for firing in record.inputs.heard.firings]
+    lap_s = firings[-1].t_s - firings[0].t_s + 1.0
+    perception, medians = fresh(), []
+    for lap in range(4):
+        costs = [
+            cost_ms(perception, Firing(f.t_s + lap * 10.0 * lap_s, f.pose, f.ring_yaw, f.ranges_m)) for f in firings
+        ]
+        medians.append(float(np.median(costs)))
+    assert max(medians) <= MEDIAN_MS, medians
+    assert medians[-1] <= 3.0 * medians[0] + 0.2, medians
+
+
+class VirtualClock:
+    """A clock that only quanta move."""
+
+    def __init__(self, quantum_s: float) -> None:
+        self.now_s, self.quantum_s = 0.0, quantum_s
+
+
+class Clocked(Perception):
+    """Perception whose every quantum takes the same time."""
+
+    clock: VirtualClock
+
+    def refine(self) -> int:
+        self.clock.now_s += self.clock.quantum_s
+        return super().refine()
+
+
+def budgeted(records: list[CycleRecord], budget_s: float, quantum_s: float) -> Iterator[tuple[CycleRecord, float]]:
+    """Play the drive as `runtime.process` does; yield each record and how long refinement took."""
+    perception = Clocked(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
+    clock = perception.clock = VirtualClock(quantum_s)
+    state = State(perception)
+    for record in records:
+        begin_s = clock.now_s
+
+        def may_refine(_done: int, begin_s: float = begin_s) -> bool:
+            return clock.now_s - begin_s < budget_s
+
+        yield step(state, record.inputs, SETTINGS, lambda _c: None, may_refine), clock.now_s - begin_s
+
+
+@pytest.mark.parametrize("budget_s", [0.0001, 0.001, 0.0015, 0.0025])
+def test_the_budget_is_overdrawn_by_less_than_one_quantum(records: list[CycleRecord], budget_s: float) -> None:
+    quantum_s = 0.001
+    causes = []
+    for record, spent_s in budgeted(records, budget_s, quantum_s):
+        assert spent_s < budget_s + quantum_s
+        if record.refinement == "budget":
+            assert spent_s >= budget_s, "it stopped although there was time"
+        causes.append(record.refinement)
+    assert {"budget", "nothing"} <= set(causes)
+
+
+def test_without_a_budget_there_is_no_refinement_and_no_object(records: list[CycleRecord]) -> None:
+    """A budget of zero turns refinement off: the robot drives and avoids, and recognises nothing."""
+    for record, spent_s in budgeted(records, 0.0, 0.001):
+        assert (record.quanta, spent_s) == (0, 0.0)
+        assert record.refinement in {"budget", "nothing"}
+
+
+def test_the_least_budget_makes_progress(records: list[CycleRecord]) -> None:
+    """One quantum a cycle, and the drums are found all the same."""
+    perception = Clocked(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
+    perception.clock = VirtualClock(1.0)
+    state = State(perception)
+    once: Callable[[int], bool] = lambda done: done < 1  # noqa: E731
+    for record in records:
+        assert step(state, record.inputs, SETTINGS, lambda _c: None, once).quanta <= 1
+    assert len(perception.objects()) == 6
