@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from drivers.driver import RobotDriver
 from drivers.messages import Twist
-from runtime.modes import Request
+from runtime.modes import GAP_MAX_S, GAP_SHARE, Request
 from runtime.step import Command, Inputs, Order
 
 
@@ -22,4 +22,6 @@ def give(driver: RobotDriver, command: Command) -> None:
 def gather(driver: RobotDriver, now_s: float, request: Request | None) -> Inputs:
     """Return everything a cycle that begins at `now_s` is told."""
     driver.tick(now_s)
-    return Inputs(now_s, driver.state, driver.trouble, driver.take(), request)
+    identity = driver.identity
+    gap_max_s = GAP_MAX_S if identity is None else GAP_SHARE * identity.deadman_s
+    return Inputs(now_s, driver.state, driver.trouble, driver.take(), request, gap_max_s)

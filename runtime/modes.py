@@ -33,8 +33,11 @@ LINE_REASONS: Final = MappingProxyType(
     }
 )
 
-GAP_MAX_S: Final = 0.45
-"""Commands farther apart than this find a base that its deadman (0.5 s) has stopped or is about to."""
+GAP_SHARE: Final = 0.9
+"""Commands farther apart than this share of the deadman find a base that it has stopped or is about to."""
+
+GAP_MAX_S: Final = GAP_SHARE * 0.5
+"""That gap for the protocol's usual deadman, used until the robot has said its own."""
 
 HELD_UP: Final = "the program was held up for {:.1f} s, so commands came too late: check the load, then re-arm"
 
@@ -86,6 +89,8 @@ class Situation:
     request: Request | None
     gap_s: float = 0.0
     """Time since the cycle before."""
+    gap_max_s: float = GAP_MAX_S
+    """Longest such time after which driving may go on."""
 
 
 def advance(state: ModeState, seen: Situation) -> ModeState:
@@ -120,7 +125,7 @@ def why_stop(state: ModeState, seen: Situation) -> str | None:
         return "halted by the operator; re-arm to go on"
     if seen.line is not LineState.READY:
         return seen.trouble or LINE_REASONS[seen.line]
-    if seen.gap_s > GAP_MAX_S:
+    if seen.gap_s > seen.gap_max_s:
         # What has been heard may be from before: the next command would set a base in motion that stopped by itself.
         return HELD_UP.format(seen.gap_s)
     if seen.rebooted:
@@ -142,7 +147,7 @@ def _arm(state: ModeState, seen: Situation) -> ModeState:
         return replace(state, arming_s=seen.now_s)
     if state.arming_s is None:
         return state
-    if seen.gap_s > GAP_MAX_S:
+    if seen.gap_s > seen.gap_max_s:
         return state.enter(Mode.SAFE_STOP, seen.now_s, HELD_UP.format(seen.gap_s))
     waited = seen.now_s - state.arming_s
     if waited >= ARMING_MIN_S and not seen.flags & Flags.LATCHED:

@@ -22,9 +22,9 @@ from perception.pipeline import Perception
 from runtime.books import Books
 from runtime.commanding import gather, give
 from runtime.complaint import FAILED, WRONG_CALL, Complaint
-from runtime.modes import GAP_MAX_S, Mode, Request
+from runtime.modes import Mode, Request
 from runtime.pacing import Pacer
-from runtime.step import Command, CycleRecord, State, step
+from runtime.step import STANDSTILL, Command, CycleRecord, State, step
 from runtime.summary import RunSummary, object_row
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ CONNECT_MAX_S: Final = 5.0
 """A robot that has not answered properly by then will not without help."""
 
 HALT_MAX_S: Final = 0.5
-"""How long the end of a run waits for the base to confirm the HALT."""
+"""How long the end of a run waits for the base to confirm that it stands."""
 
 LATE_SHARE: Final = 0.1
 """A cycle that begins later than this share of its period is late."""
@@ -111,7 +111,7 @@ class RobotProcess:
         Raises
         ------
         Complaint
-            The port cannot be opened, the robot does not answer as it should, or the program itself failed.
+            The port cannot be opened, or the robot does not answer as it should.
         """
         await self._connect()
         keeper = asyncio.create_task(self._link.run(), name="link")
@@ -161,21 +161,24 @@ class RobotProcess:
                 return
             try:
                 self._one_cycle(start_s)
-            except Exception as error:
-                self._driver.halt()
-                self._send()
-                self._log.exception("the cycle failed")
-                raise Complaint(
-                    f"the cycle failed ({type(error).__name__}: {error}) and the robot is halted: this is a fault "
-                    "of the program; the log has the details",
-                    FAILED,
-                ) from error
+            except Exception as error:  # noqa: BLE001 - whatever it is, the robot must stand still first
+                self._fail(error)
+                return
             self.books.enter(self._clock() - start_s, start_s - pacer.deadline_s)
             deadline_s = pacer.advance(self._clock())
             self._missed = pacer.missed
             if self.books.cycles % COLLECT_EVERY == 0 and deadline_s - self._clock() > COLLECT_SLACK_S:
                 gc.collect(1)
             await asyncio.sleep(max(0.0, deadline_s - self._clock()))
+
+    def _fail(self, error: Exception) -> None:
+        """Halt before anything else, then say what happened; FAULT is not left."""
+        self._driver.halt()
+        self._send()
+        reason = f"the cycle failed ({type(error).__name__}: {error}): a fault of this program, see the log"
+        self._state.mode = self._state.mode.enter(Mode.FAULT, self._clock(), reason)
+        self._note_mode()
+        self._log.error("the cycle failed", exc_info=error)
 
     def _one_cycle(self, start_s: float) -> None:
         request, self._request = self._request, None
@@ -186,7 +189,7 @@ class RobotProcess:
             self._state,
             inputs,
             self._settings,
-            lambda command: self._carry_out(command, start_s),
+            lambda command: self._carry_out(command, start_s + inputs.gap_max_s),
             lambda _done: self._clock() - start_s < budget_s,
         )
         if self._state.mode.entered_since(before):
@@ -199,13 +202,13 @@ class RobotProcess:
 
     def _note_mode(self) -> None:
         state = self._state.mode
-        if state.mode is Mode.SAFE_STOP and state.reason is not None:
+        if state.mode in {Mode.SAFE_STOP, Mode.FAULT} and state.reason is not None:
             self._stop_reasons.append(state.reason)
         self._log.info("mode", mode=state.mode.value, reason=state.reason, cycle=self._state.cycle)
 
-    def _carry_out(self, command: Command, start_s: float) -> None:
+    def _carry_out(self, command: Command, stale_s: float) -> None:
         """Put the command on the line, but no velocity decided too long ago; the next cycle stops for such a gap."""
-        if isinstance(command, Twist) and self._clock() - start_s > GAP_MAX_S:
+        if isinstance(command, Twist) and self._clock() > stale_s:
             return
         give(self._driver, command)
         self._send()
@@ -226,7 +229,7 @@ class RobotProcess:
             self._log.warning("line lost", reason=reason)
 
     async def _shut_down(self, keeper: asyncio.Task[None]) -> None:
-        """Halt the base and wait until it says so; then close the line."""
+        """Halt the base and wait until it stands still; then close the line."""
         self._stop.set()
         self._driver.halt()
         give_up_s = self._clock() + HALT_MAX_S
@@ -236,7 +239,7 @@ class RobotProcess:
             self._send()
             await asyncio.sleep(0.005)
             odometry = self._driver.take().odometry
-            halted = odometry is not None and bool(odometry.flags & Flags.LATCHED)
+            halted = odometry is not None and Flags.LATCHED in odometry.flags and odometry.twist == STANDSTILL
         if not halted:
             self._log.warning("the base did not confirm the halt; its deadman stops it")
         keeper.cancel()

@@ -20,7 +20,7 @@ from drivers.driver import Heard, LineState
 from drivers.messages import Flags, Odometry, Twist
 from perception.percept import Percept
 from perception.pipeline import Perception
-from runtime.modes import Mode, ModeState, Request, Situation, advance
+from runtime.modes import GAP_MAX_S, Mode, ModeState, Request, Situation, advance
 
 STANDSTILL = Twist(0.0, 0.0)
 
@@ -45,6 +45,8 @@ class Inputs:
     trouble: str | None
     heard: Heard
     request: Request | None = None
+    gap_max_s: float = GAP_MAX_S
+    """Cycles farther apart than this come too late for the base's deadman."""
 
 
 @dataclass(slots=True)
@@ -137,7 +139,8 @@ def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
     gap_s = 0.0 if state.now_s is None else inputs.now_s - state.now_s
     state.now_s = inputs.now_s
     situation = Situation(
-        inputs.now_s, inputs.line, inputs.trouble, flags, inputs.heard.rebooted, inputs.request, gap_s
+        inputs.now_s, inputs.line, inputs.trouble, flags, inputs.heard.rebooted, inputs.request,
+        gap_s, inputs.gap_max_s,
     )  # fmt: skip
     state.mode = advance(before, situation)
     if state.mode.mode is Mode.DRIVE:

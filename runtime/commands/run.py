@@ -106,7 +106,9 @@ def run_robot(
         write_json(json_file, summary)
     out = Console()
     out.print(objects_table(summary["objects"], units))
-    return FAILED if summary["mode"] == "FAULT" else DONE
+    if summary["mode"] == "FAULT":
+        raise Complaint(summary["stop_reasons"][-1], FAILED)
+    return DONE
 
 
 def refuse_unwritable(files: dict[str, str | None]) -> None:

@@ -1,0 +1,39 @@
+"""A failure of the program itself: the base is halted first, the mode is FAULT, and the reason names the culprit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from config.load import load_settings
+from config.settings import LogConfig
+from drivers.driver import RobotDriver
+from runtime.books import Books
+from runtime.commands.run import on_port
+from runtime.emulated import emulator
+from runtime.logs import open_log
+from runtime.process import Observers, RobotProcess
+from runtime.step import CycleRecord, State
+from tests.hil.running import rows
+
+
+@pytest.mark.realtime
+@pytest.mark.usefixtures("warm_kernels")
+async def test_a_cycle_that_fails_halts_the_base_and_ends_in_fault(tmp_path: Path) -> None:
+    def fail(record: CycleRecord, *_: State | Books | RobotDriver) -> None:
+        if record.cycle == 40:
+            raise ZeroDivisionError("planted")
+
+    trace = tmp_path / "trace.csv"
+    async with emulator(["--trace", str(trace)]) as port:
+        with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
+            process = RobotProcess(on_port(load_settings("hallway"), port), log, Observers(on_cycle=fail))
+            summary = await process.run(arm=True, seconds=20.0)
+    assert summary["mode"] == "FAULT"
+    assert summary["cycles"] == 39
+    assert "ZeroDivisionError: planted" in summary["stop_reasons"][-1]
+    seen = rows(trace)
+    assert max(row.v for row in seen) > 0.1
+    assert seen[-1].still
+    assert "planted" in (tmp_path / "log.jsonl").read_text()
