@@ -27,7 +27,7 @@ boundscheck: $(VENV)/test.stamp
 
 # Coverage sees into kernels only where they are not compiled.
 coverage: $(VENV)/test.stamp
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest -q -m "not realtime and not compiled"
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest -q -m "not realtime"
 	$(BIN)/python -m coverage report --skip-covered --fail-under=90
 
 clean:
