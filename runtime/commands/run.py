@@ -78,7 +78,7 @@ def run_robot(
     refuse_unwritable({"--record": record, "--json": json_file})
     console = Console(stderr=True)
     ready_kernels(settings, console)
-    live = not headless and console.is_terminal
+    live = not headless and console.is_terminal and not console.is_dumb_terminal
     with contextlib.ExitStack() as stack:
         log = stack.enter_context(open_log(settings.log, terminal=not live))
         log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))

@@ -145,7 +145,8 @@ def until(done: Callable[[], bool]) -> None:
         time.sleep(0.005)
 
 
-def test_a_drive_is_drawn_by_the_thread_and_the_loop_never_waits_for_it() -> None:
+def test_a_drive_is_drawn_by_the_thread_and_the_loop_never_waits_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
     assert SETTINGS.world is not None
     records: list[CycleRecord] = []
     run = simulate(SETTINGS, SETTINGS.world, 0, 8.0, lambda record, _truth: records.append(record))
