@@ -1,11 +1,12 @@
 # Two commands matter: `make run` starts the robot in the emulator, `make test` proves that it works.
+# `make bench` measures it against what one would use instead.
 
 PYTHON ?= python3.11
 VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: run test lint tests boundscheck coverage clean
+.PHONY: run test lint tests boundscheck coverage bench clean
 
 run: $(VENV)/run.stamp
 	@$(BIN)/echolocate run
@@ -22,13 +23,17 @@ tests: $(VENV)/test.stamp
 
 # Compiled code reads beyond an array in silence; this run does not let it.
 boundscheck: $(VENV)/test.stamp
-	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(BIN)/python -m pytest -q -m "not realtime" \
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(BIN)/python -m pytest -q -m "not realtime and not compiled" \
 		tests/perception tests/drivers/test_acoustics.py tests/drivers/test_emulator.py
 
 # Coverage sees into kernels only where they are not compiled.
 coverage: $(VENV)/test.stamp
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest -q -m "not realtime"
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest -q -m "not realtime and not compiled"
 	$(BIN)/python -m coverage report --skip-covered --fail-under=90
+
+# Ours against the libraries one would use instead; BENCH=--quick for a small run.
+bench: $(VENV)/bench.stamp
+	@$(BIN)/python -m tests.bench $(BENCH)
 
 clean:
 	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage
@@ -45,4 +50,8 @@ $(VENV)/run.stamp: pyproject.toml | $(VENV)/bin/python
 
 $(VENV)/test.stamp: pyproject.toml | $(VENV)/bin/python
 	$(PIP) --editable ".[dev]"
+	@touch $@
+
+$(VENV)/bench.stamp: pyproject.toml | $(VENV)/bin/python
+	$(PIP) --editable ".[bench]"
 	@touch $@

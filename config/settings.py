@@ -91,11 +91,27 @@ class RecognitionConfig(Strict):
     """Share of the model's outline whose sides have support, at least."""
 
 
-class PerceptionConfig(Strict):
-    """Perception: the paper's steps and their constants."""
+class FullConfig(Strict):
+    """The full method: raw ranges held against every explanation there is."""
 
-    method: Literal["paper"] = "paper"
-    """How objects are recognised."""
+    report_probability: float = Field(default=0.95, gt=0.0, lt=1.0)
+    """A model is reported from this probability on."""
+    tracks_max: int = Field(default=48, ge=1, le=1000)
+    """Round things held in mind at a time, models or not."""
+    attempts_per_firing: int = Field(default=3, ge=0, le=64)
+    """Unexplained outline segments looked at for new objects, a firing."""
+    fresh_share: float = Field(default=0.08, gt=0.0, le=1.0)
+    """An object is refined once this share of its readings is new."""
+    quanta_per_firing: int = Field(default=1, ge=1, le=1000)
+    """Refinements a firing, at most; what is left waits for the next one."""
+
+
+class PerceptionConfig(Strict):
+    """Perception: the method and its constants; the sections below `full` are the paper's steps."""
+
+    method: Literal["paper", "full"] = "full"
+    """How objects are recognised: as the paper does it, or exactly."""
+    full: FullConfig = FullConfig()
 
     segments: SegmentsConfig = SegmentsConfig()
     map: MapConfig = MapConfig()

@@ -63,6 +63,8 @@ class AcousticsConfig(Strict):
     """Probability that a reading that should have echoed hears nothing."""
     outliers: float = Field(default=0.0, ge=0.0, le=1.0)
     """Probability that a reading is a uniformly random range inside the window."""
+    outlier_max_m: float | None = Field(default=None, gt=0.0, le=100.0)
+    """Such a range is at most this; the window's end where it is not given or beyond."""
     crosstalk: float = Field(default=0.0, ge=0.0, le=1.0)
     """Probability that a sensor hears a neighbour's echo of the same firing where that comes first."""
     sound_speed_scale: float = Field(default=1.0, ge=0.8, le=1.2)

@@ -6,10 +6,32 @@ maximum range leaves no obstacle behind, and neighbours do not erase each other'
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.messages import Firing
-from perception.kernel import Floats
+from perception.kernel import Floats, kernel
+
+
+@kernel
+def take_in(
+    ranges: Floats, mounts: Floats, x: float, y: float, yaw: float, t: float, points: Floats, times: Floats,
+    heard: NDArray[np.bool_],
+) -> None:  # fmt: skip
+    """Enter a firing into `points` (n, 2), `times` (n,) and `heard` (n,); `ranges` as in a `Firing`, m and rad."""
+    c = math.cos(yaw)
+    s = math.sin(yaw)
+    for i in range(ranges.shape[0]):
+        r = ranges[i]
+        if math.isnan(r):
+            continue
+        times[i] = t
+        heard[i] = math.isfinite(r)
+        if heard[i]:
+            points[i, 0] = x + c * mounts[i, 0] - s * mounts[i, 1] + r * math.cos(yaw + mounts[i, 2])
+            points[i, 1] = y + s * mounts[i, 0] + c * mounts[i, 1] + r * math.sin(yaw + mounts[i, 2])
 
 
 class FreshEchoes:
@@ -29,16 +51,11 @@ class FreshEchoes:
 
     def update(self, firing: Firing) -> None:
         """Take in one firing."""
-        fired = ~np.isnan(firing.ranges_m)
-        heard = np.isfinite(firing.ranges_m)
-        axis = firing.ring_yaw + self._mounts[heard, 2]
-        c, s = np.cos(firing.ring_yaw), np.sin(firing.ring_yaw)
-        x, y = self._mounts[heard, 0], self._mounts[heard, 1]
-        reach = firing.ranges_m[heard]
-        self._points[heard, 0] = firing.pose.x + c * x - s * y + reach * np.cos(axis)
-        self._points[heard, 1] = firing.pose.y + s * x + c * y + reach * np.sin(axis)
-        self._times[fired] = firing.t_s
-        self._heard[fired] = heard[fired]
+        pose = firing.pose
+        take_in(
+            firing.ranges_m, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), float(firing.t_s),
+            self._points, self._times, self._heard,
+        )  # fmt: skip
 
     def points(self, t: float, age_max_s: float) -> Floats:
         """Return the echoes not older than `age_max_s` at time `t`: shape (k, 2), m, a copy."""

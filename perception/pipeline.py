@@ -1,53 +1,86 @@
 """Perception as an anytime stage: the part that always runs, and refinement in quanta of bounded work.
 
-`observe` takes in one firing: segments, ageing, contradictions, clusters (paper §3.1 to §3.3). `refine` relaxes one
-candidate by one quantum (§3.4); the caller decides how many quanta it can afford, and what is unfinished goes on
-next time from where it stood.
+`observe` takes in one firing. `refine` does one quantum; the caller decides how many it can afford, and what is
+unfinished goes on next time from where it stood. How objects are recognised is a method's affair: the paper's, or the
+full one.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-
-import numpy as np
+from typing import Protocol
 
 from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import PerceptionConfig
 from drivers.messages import Firing
-from perception.candidates import Candidates
-from perception.clusters import Clusters
 from perception.echoes import FreshEchoes
+from perception.full.method import FullPerception
 from perception.kernel import Floats
-from perception.model import ObjectModel
-from perception.outline_map import OutlineMap
-from perception.recognition import goodness_of_fit
-from perception.segments import SegmentExtractor, mounts_array
+from perception.paper import PaperPerception
+from perception.seen import SeenObject
+from perception.segments import mounts_array
+
+__all__ = ["Method", "Perception", "SeenObject", "method_of"]
 
 
-@dataclass(frozen=True, slots=True)
-class SeenObject:
-    """An object recognised and located, in the odometry's frame."""
+class Method(Protocol):
+    """A way to recognise objects."""
 
-    model: str
-    x: float
-    """m"""
-    y: float
-    """m"""
-    theta: float
-    """rad"""
-    sigma: float
-    """Standard error of the position as the residuals have it, m."""
-    support: int
-    """Outline segments that lie on the model."""
-    score: float
-    """Share of the cluster's segments that support the model, times the share of the outline they cover: 0 to 1."""
+    @property
+    def pending(self) -> bool:
+        """Whether refinement has anything left to improve."""
+        ...
+
+    @property
+    def living(self) -> int:
+        """Outline segments in the map."""
+        ...
+
+    @property
+    def total(self) -> int:
+        """Outline segments ever made."""
+        ...
+
+    @property
+    def hypotheses(self) -> int:
+        """Where something is thought to be: clusters, or tracks."""
+        ...
+
+    def observe(self, firing: Firing) -> int:
+        """Take in one firing and return how many outline segments it completed."""
+        ...
+
+    def refine(self) -> int:
+        """Do one quantum of refinement and return its iterations, zero where nothing is left to improve."""
+        ...
+
+    def objects(self) -> tuple[SeenObject, ...]:
+        """Return the models recognised now, best first."""
+        ...
+
+    def things(self) -> tuple[SeenObject, ...]:
+        """Return everything that has a name, models or not."""
+        ...
+
+    def segments_now(self) -> Floats:
+        """Return the outline segments in the map: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""
+        ...
+
+    def forget(self) -> None:
+        """Begin anew, as after the odometry did."""
+        ...
+
+
+def method_of(ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> Method:
+    """Return the method that the configuration names."""
+    if config.method == "paper":
+        return PaperPerception(ring, models, config)
+    return FullPerception(ring, models, config.full)
 
 
 class Perception:
-    """Echoes to objects, by the paper's method.
+    """Echoes to objects and obstacles.
 
     Parameters
     ----------
@@ -56,85 +89,68 @@ class Perception:
     models : sequence of ModelConfig
         What is looked for.
     config : PerceptionConfig
-        The constants of each step.
+        The method and its constants.
     """
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> None:
-        mounts = mounts_array(ring.mounts)
-        self._config = config
-        self._models = tuple(ObjectModel.from_config(m) for m in models)
-        self._scratch = np.zeros(max(len(m.sides) for m in self._models), dtype=np.int64)
-        self._extractor = SegmentExtractor(ring, config.segments)
-        self.outline = OutlineMap(config.map, mounts, math.radians(ring.beam_half_angle_deg))
-        self.clusters = Clusters(config.clusters, config.map.capacity)
-        self.candidates = Candidates(
-            self._models, config.relaxation, config.clusters.clusters_max,
-            config.clusters.segments_min, config.clusters.threshold_m,
-        )  # fmt: skip
-        self._echoes = FreshEchoes(mounts)
+        self.method = method_of(ring, models, config)
+        self._echoes = FreshEchoes(mounts_array(ring.mounts))
+        self._sensors = len(ring.mounts)
 
     @property
     def pending(self) -> bool:
         """Whether refinement has anything left to improve."""
-        return self.candidates.pending
+        return self.method.pending
+
+    @property
+    def living(self) -> int:
+        """Outline segments in the map."""
+        return self.method.living
+
+    @property
+    def total(self) -> int:
+        """Outline segments ever made."""
+        return self.method.total
+
+    @property
+    def hypotheses(self) -> int:
+        """Where something is thought to be: clusters, or tracks."""
+        return self.method.hypotheses
 
     def observe(self, firing: Firing) -> int:
-        """Take in one firing and return how many outline segments it completed."""
+        """Take in one firing and return how many outline segments it completed.
+
+        Raises
+        ------
+        ValueError
+            The firing is not this ring's; compiled code would read beyond its arrays.
+        """
+        if len(firing.ranges_m) != self._sensors:
+            raise ValueError(f"a firing of {len(firing.ranges_m)} ranges came to a ring of {self._sensors} sensors")
         self._echoes.update(firing)
-        segments = self._extractor.extract(firing)
-        living = self.outline.count
-        erased = self.outline.contradict(firing)
-        self.outline.age(firing.t_s)
-        changed = erased > 0 or len(segments) > 0 or self.outline.count != living
-        self.outline.add(segments, firing.t_s)
-        if changed:
-            self.clusters.update(self.outline)
-            self.candidates.follow(self.clusters, self.outline)
-        return len(segments)
+        return self.method.observe(firing)
 
     def refine(self) -> int:
         """Do one quantum of refinement and return its iterations, zero where nothing is left to improve."""
-        return self.candidates.refine(self.clusters, self.outline)
+        return self.method.refine()
+
+    def objects(self) -> tuple[SeenObject, ...]:
+        """Return the models recognised now, best first."""
+        return self.method.objects()
+
+    def things(self) -> tuple[SeenObject, ...]:
+        """Return everything that has a name, models or not: also walls, corners, posts and what is unknown."""
+        return self.method.things()
+
+    def segments_now(self) -> Floats:
+        """Return the outline segments in the map: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""
+        return self.method.segments_now()
 
     def obstacles(self, t_s: float, age_max_s: float) -> Floats:
         """Return each sensor's last echo not older than that at the robot's time `t_s`: points of shape (k, 2), m."""
         return self._echoes.points(t_s, age_max_s)
 
-    def objects(self) -> tuple[SeenObject, ...]:
-        """Return what is recognised now, best first.
-
-        Candidates that rest on one another explain one object, and the best of them stays: a cluster that Table 1
-        split gives two candidates of one model, and a cluster gives a candidate for each model.
-        """
-        many = range(len(self._models))
-        judged = [s for j in range(self.clusters.count) for m in many if (s := self._judge(j, m)) is not None]
-        seen: list[SeenObject] = []
-        for candidate in sorted(judged, key=lambda s: s.score, reverse=True):
-            apart = self._config.recognition.separation_m
-            if all(math.hypot(candidate.x - s.x, candidate.y - s.y) >= apart for s in seen):
-                seen.append(candidate)
-        return tuple(seen)
-
     def forget(self) -> None:
         """Begin anew, as after the odometry did."""
-        self._extractor.forget()
-        self.outline.clear()
-        self.clusters.update(self.outline)
-        self.candidates.clear()
+        self.method.forget()
         self._echoes.clear()
-
-    def _judge(self, cluster: int, m: int) -> SeenObject | None:
-        """Return the candidate as an object if it fits well enough."""
-        if not self.candidates.rested[cluster, m]:
-            return None
-        limits = self._config.recognition
-        x, y, theta = (float(v) for v in self.candidates.poses[cluster, m])
-        support, residual, coverage = goodness_of_fit(
-            self._models[m].sides, self.outline.segments, self.clusters.members(cluster), x, y, theta,
-            limits.tolerance_m, math.radians(limits.tolerance_deg), self._scratch,
-        )  # fmt: skip
-        share = support / int(self.clusters.sizes[cluster])
-        if share < limits.support_min or coverage < limits.coverage_min:
-            return None
-        theta = (theta + math.pi) % (2.0 * math.pi) - math.pi
-        return SeenObject(self._models[m].name, x, y, theta, residual / math.sqrt(support), support, share * coverage)

@@ -45,6 +45,8 @@ class Books:
         self._worst_lag_s = 0.0
         self.cycles = 0
         self.late = 0
+        self.total_s = 0.0
+        """All cycles together."""
 
     def enter(self, took_s: float, lag_s: float = 0.0) -> None:
         """Book one cycle: how long it took and how long after its deadline it began."""
@@ -52,6 +54,7 @@ class Books:
         self._lag_s[self.cycles % KEPT] = lag_s
         self._worst_s = max(self._worst_s, took_s)
         self._worst_lag_s = max(self._worst_lag_s, lag_s)
+        self.total_s += took_s
         self.cycles += 1
         self.late += lag_s > self._late_after_s
 

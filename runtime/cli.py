@@ -15,6 +15,7 @@ from cyclopts import App, CycloptsError, Parameter, Token
 
 from runtime import VERSION
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
+from runtime.scene_names import SceneName
 
 app = App(
     name="echolocate",
@@ -171,8 +172,10 @@ def experiment(
     name: Literal["hallway", "irregular"],
     /,
     *,
-    method: Literal["paper"] = "paper",
+    method: Literal["paper", "full"] = "full",
+    scene: SceneName | None = None,
     world: str | None = None,
+    model: Annotated[tuple[str, ...], Parameter(negative="")] = (),
     seeds: Seed = 1,
     json: JsonFile = None,
     units: UnitsOption = "ft",
@@ -186,16 +189,23 @@ def experiment(
         The simulated hallway, or the irregular one of the real run.
     method
         How objects are recognised.
+    scene
+        Instead of driving the robot, give perception alone a scene's readings at exact poses.
     world
         Another world, a file or a name.
+    model
+        Object model to look for: a file or a name; may be repeated.
     seeds
         Repeat with this many seeds, from 0 on.
     """
-    from runtime.commands.experiment import run_experiment
+    from runtime.commands.experiment import run_experiment, run_scenes
 
-    return run_experiment(
-        name, (*sets, f"perception.method={method}"), world=world, seeds=seeds, json_file=json, units=units
-    )
+    sets = (*sets, f"perception.method={method}")
+    if scene is not None:
+        if name != "hallway" or world is not None:
+            raise Complaint("--scene is a hallway of its own: call `experiment hallway`, without --world", WRONG_CALL)
+        return run_scenes(scene, sets, models=model, seeds=seeds, json_file=json, units=units)
+    return run_experiment(name, sets, world=world, models=model, seeds=seeds, json_file=json, units=units)
 
 
 @app.command

@@ -85,17 +85,23 @@ def estimates(run: Simulated) -> list[tuple[float, float]]:
 def against_truth(world: WorldConfig, seen: list[tuple[float, float]]) -> tuple[list[DrumRow], int]:
     """Pair drums with estimates, nearest pairs first and each at most once; return the rows and the false ones."""
     drums = [(d.x_m, d.y_m) for d in world.drum]
-    pairs = sorted((math.dist(d, e), i, j) for i, d in enumerate(drums) for j, e in enumerate(seen))
-    match: dict[int, int] = {}
-    for distance, i, j in pairs:
-        if distance <= GATE_M and i not in match and j not in match.values():
-            match[i] = j
+    match = nearest_pairs(drums, seen)
     rows: list[DrumRow] = []
     for i, drum in enumerate(drums):
         estimate = seen[match[i]] if i in match else None
         error = None if estimate is None else math.dist(drum, estimate)
         rows.append({"truth": drum, "estimate": estimate, "error": error})
     return rows, len(seen) - len(match)
+
+
+def nearest_pairs(truth: list[tuple[float, float]], seen: list[tuple[float, float]]) -> dict[int, int]:
+    """Return which seen place belongs to which true one: nearest pairs first, each once, none beyond the gate."""
+    pairs = sorted((math.dist(t, e), i, j) for i, t in enumerate(truth) for j, e in enumerate(seen))
+    match: dict[int, int] = {}
+    for distance, i, j in pairs:
+        if distance <= GATE_M and i not in match and j not in match.values():
+            match[i] = j
+    return match
 
 
 def summarise(outcomes: list[SeedOutcome]) -> Outcome:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from config.settings import Settings
 
-PACKAGES: Final = ("perception", "drivers.emulator")
+PACKAGES: Final = ("perception", "perception.full", "drivers.emulator")
 """Where kernels live."""
 
 WARM: Final = "warm"
@@ -61,7 +61,7 @@ def is_warm(folder: Path) -> bool:
 
 
 def warm_up(settings: Settings) -> None:
-    """Run every kernel once, on a robot that drives past a wall, so that none is compiled later.
+    """Run every kernel of both methods once, on a robot that drives past a wall, so that none is compiled later.
 
     Parameters
     ----------
@@ -70,19 +70,21 @@ def warm_up(settings: Settings) -> None:
     """
     import numpy as np
 
+    from config.model import ModelConfig
     from drivers.messages import Firing, Pose
     from perception.pipeline import Perception
 
-    eager = settings.perception.model_copy(
-        update={"clusters": settings.perception.clusters.model_copy(update={"segments_min": 1})}
-    )
-    perception = Perception(settings.ring, settings.models, eager)
-    for k in range(24):
-        ranges = np.full(len(settings.ring.mounts), 2.0)
-        perception.observe(Firing(0.1 * k, Pose(0.1 * k, 0.0, 0.0), 0.0, ranges))
-        while perception.pending:
-            perception.refine()
-    perception.objects()
+    square = ModelConfig(name="warm-up", closed=True, vertices_m=((1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)))
+    eager = settings.perception.clusters.model_copy(update={"segments_min": 1})
+    for method in ("paper", "full"):
+        config = settings.perception.model_copy(update={"clusters": eager, "method": method})
+        perception = Perception(settings.ring, (*settings.models, square), config)
+        for k in range(24):
+            ranges = np.full(len(settings.ring.mounts), 2.0)
+            perception.observe(Firing(0.1 * k, Pose(0.1 * k, 0.0, 0.0), 0.0, ranges))
+            while perception.pending:
+                perception.refine()
+        perception.things()
 
 
 def ready_kernels(settings: Settings, console: Console) -> None:

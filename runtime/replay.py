@@ -41,8 +41,8 @@ def replay(
             on_firing(firing, perception)
     return {
         "objects": [object_row(seen) for seen in perception.objects()],
-        "segments": perception.outline.total,
-        "clusters": perception.clusters.count,
+        "segments": perception.total,
+        "clusters": perception.hypotheses,
         "cycles": books.cycles,
         "cycle_us": books.cycle_us(),
     }

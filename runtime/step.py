@@ -111,8 +111,8 @@ def step(
     quanta, iterations, refinement = _refine(state.perception, may_refine)
     state.cycle += 1
     return CycleRecord(
-        state.cycle, inputs, state.mode, command, new_segments, state.perception.outline.living,
-        state.perception.clusters.count, quanta, iterations, refinement,
+        state.cycle, inputs, state.mode, command, new_segments, state.perception.living,
+        state.perception.hypotheses, quanta, iterations, refinement,
     )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TypedDict
+from typing import NotRequired, TypedDict
 
 import orjson
 
@@ -22,6 +22,10 @@ class ObjectRow(TypedDict):
     sigma: float
     support: int
     score: float
+    probability: NotRequired[float]
+    """That it is this model."""
+    covariance: NotRequired[tuple[float, float, float]]
+    """xx, xy, yy of the position, m²."""
 
 
 class LinkRow(TypedDict):
@@ -58,7 +62,7 @@ class ReplaySummary(TypedDict):
 
 def object_row(seen: SeenObject) -> ObjectRow:
     """Return an object in its JSON form."""
-    return {
+    row: ObjectRow = {
         "model": seen.model,
         "x": seen.x,
         "y": seen.y,
@@ -67,6 +71,11 @@ def object_row(seen: SeenObject) -> ObjectRow:
         "support": seen.support,
         "score": seen.score,
     }
+    if seen.probability is not None:
+        row["probability"] = seen.probability
+    if seen.covariance is not None:
+        row["covariance"] = seen.covariance
+    return row
 
 
 def write_json(path: str, summary: object) -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Final, Literal, TypeAlias
 
 from rich.table import Table
 
-from runtime.experiment import Outcome
+from runtime.experiment import DrumRow, Outcome
+from runtime.open_loop import BoxRow, SceneOutcome
 from runtime.summary import ObjectRow
 
 Units: TypeAlias = Literal["m", "ft"]
@@ -40,24 +43,60 @@ def table_2(outcome: Outcome, units: Units) -> Table:
     return table
 
 
+def boxes_table(outcome: SceneOutcome, units: Units) -> Table:
+    """Return truth, estimate and errors of each box."""
+    table = Table(title="Boxes in world coordinates", title_justify="left")
+    for heading in ("box", f"truth ({units})", f"estimate ({units})", f"error ({units})", "angle error (°)"):
+        table.add_column(heading, justify="right")
+    for number, row in enumerate(outcome["boxes"], 1):
+        estimate, error, angle = row["estimate"], row["error"], row["angle_error"]
+        table.add_row(
+            str(number),
+            place(*row["truth"], units),
+            "not found" if estimate is None else place(*estimate, units),
+            "" if error is None else length(error, units, 3),
+            "" if angle is None else f"{math.degrees(angle):.1f}",
+        )
+    return table
+
+
 def verdict(outcome: Outcome, units: Units) -> str:
     """Return the experiment in one line."""
-    found = sum(row["estimate"] is not None for row in outcome["drums"])
+    return _verdict(_found("drums", outcome["drums"]), outcome, units)
+
+
+def scene_verdict(outcome: SceneOutcome, units: Units) -> str:
+    """Return a scene's outcome in one line."""
+    drums, boxes = outcome["drums"], outcome["boxes"]
+    parts = [_found(what, rows) for what, rows in (("drums", drums), ("boxes", boxes)) if rows]
+    line = f"{outcome['scene']}: {_verdict(', '.join(parts) or 'nothing to be found', outcome, units)}"
+    if outcome["inside_95"] is not None:
+        line += f"; {outcome['inside_95']:.1%} of the drums found stand in their 95 % ellipse"
+    if outcome["scene"] == "halls" and drums:
+        recall = sum(row["estimate"] is not None for row in drums) / len(drums)
+        line += f"; recall {recall:.3f}, {outcome['false'] / outcome['halls']:.3f} false a hall"
+    return line
+
+
+def _found(what: str, rows: Sequence[DrumRow | BoxRow]) -> str:
+    return f"{sum(row['estimate'] is not None for row in rows)} of {len(rows)} {what} found"
+
+
+def _verdict(found: str, outcome: Outcome, units: Units) -> str:
     mean, worst = outcome["mean_error"], outcome["max_error"]
     errors = "" if mean is None or worst is None else (
         f", mean error {length(mean, units, 3)} {units}, max {length(worst, units, 3)} {units}"
     )  # fmt: skip
     return (
-        f"{found} of {len(outcome['drums'])} drums found, {outcome['false']} false{errors}; "
-        f"{outcome['times_real_time']:.0f} times real time; a cycle takes {outcome['cycle_us']['p50'] / 1e3:.2f} ms, "
-        f"p99 {outcome['cycle_us']['p99'] / 1e3:.2f} ms"
+        f"{found}, {outcome['false']} false{errors}; {outcome['times_real_time']:.0f} times real time; "
+        f"a cycle takes {outcome['cycle_us']['p50'] / 1e3:.2f} ms, p99 {outcome['cycle_us']['p99'] / 1e3:.2f} ms"
     )
 
 
 def objects_table(objects: list[ObjectRow], units: Units) -> Table:
     """Return what was seen, in the odometry's frame."""
     table = Table(title="objects, in the odometry's frame", title_justify="left")
-    for heading in ("model", f"x ({units})", f"y ({units})", "heading (°)", "segments", "score"):
+    for heading in ("model", f"x ({units})", f"y ({units})", "heading (°)", "support", "score"):
         table.add_column(heading, justify="right")
     for seen in objects:
         table.add_row(

@@ -104,10 +104,9 @@ class View:
         pose = None if state.odometry is None else state.odometry.pose
         if pose is not None:
             self._trail.append((pose.x, pose.y))
-        outline = state.perception.outline
         self._slot = Snapshot(
-            record.mode, pose, list(self._trail), outline.segments[outline.alive == 1], record.clusters,
-            state.perception.objects(), self._ranges.copy(), driver.counts,
+            record.mode, pose, list(self._trail), state.perception.segments_now(), record.clusters,
+            state.perception.things(), self._ranges.copy(), driver.counts,
             books.cycles, books.late, books.cycle_us(), books.lag_us(),
         )  # fmt: skip
         self._wake.set()
@@ -154,7 +153,7 @@ class View:
     def _numbers(self, snapshot: Snapshot) -> Table:
         grid = Table.grid(padding=(0, 2))
         grid.add_row("ring", self._ring(snapshot.ranges))
-        grid.add_row("map", f"{len(snapshot.segments)} segments, {snapshot.clusters} clusters")
+        grid.add_row("map", f"{len(snapshot.segments)} segments, {snapshot.clusters} hypotheses")
         counts = snapshot.counts
         grid.add_row("line", f"{counts.frames} frames, {counts.bad} bad, {counts.lost} lost")
         took, lag = snapshot.cycle_us, snapshot.lag_us

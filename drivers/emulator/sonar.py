@@ -118,8 +118,9 @@ class Sonar:
         spoilt[heard] = ranges[heard] + sigma * noise[heard]
         spoilt[dropout < self._acoustics.dropout] = math.inf
         wild = outlier < self._acoustics.outliers
-        nearest = min(self._ring.range_min_m, window)
-        spoilt[wild] = nearest + anywhere[wild] * (window - nearest)
+        farthest = window if self._acoustics.outlier_max_m is None else min(window, self._acoustics.outlier_max_m)
+        nearest = min(self._ring.range_min_m, farthest)
+        spoilt[wild] = nearest + anywhere[wild] * (farthest - nearest)
         return spoilt
 
     def _mix_in_crosstalk(

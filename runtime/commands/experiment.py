@@ -12,10 +12,12 @@ from config.settings import Settings
 from runtime.commands.firing import refuse_impossible_firing
 from runtime.complaint import DONE, WRONG_CALL, Complaint
 from runtime.kernels import ready_kernels
-from runtime.tables import Units, table_2, verdict
+from runtime.scene_names import SceneName
+from runtime.tables import Units, boxes_table, scene_verdict, table_2, verdict
 
 SEEDS_SHOWN = 2
-"""Tables of more runs than this say nothing to a person."""
+ROWS_SHOWN = 24
+"""Tables of more runs or rows than this say nothing to a person."""
 
 
 def run_experiment(
@@ -23,14 +25,14 @@ def run_experiment(
     sets: Sequence[str],
     *,
     world: str | None,
+    models: Sequence[str] = (),
     seeds: int,
     json_file: str | None,
     units: Units,
 ) -> int:
     """Carry out the command; see `runtime.cli.experiment`."""
-    if seeds < 1:
-        raise Complaint(f"--seeds {seeds}: must be at least 1", WRONG_CALL)
-    settings = one_way(load_settings(name, sets, world=world))
+    _refuse_no_seeds(seeds)
+    settings = one_way(load_settings(name, sets, world=world, models=models))
     if settings.world is None or not settings.world.drum:
         raise Complaint("the world holds no drum: the experiment sets drums seen against drums there", WRONG_CALL)
     refuse_impossible_firing(settings.ring)
@@ -48,6 +50,44 @@ def run_experiment(
         out.print(table_2(outcome, units))
     out.print(verdict(outcome, units), soft_wrap=True)
     return DONE
+
+
+def run_scenes(
+    scene: SceneName,
+    sets: Sequence[str],
+    *,
+    models: Sequence[str],
+    seeds: int,
+    json_file: str | None,
+    units: Units,
+) -> int:
+    """Carry out the command with ``--scene``; see `runtime.cli.experiment`."""
+    _refuse_no_seeds(seeds)
+    settings = load_settings("hallway", sets, models=models)
+    console = Console(stderr=True)
+    ready_kernels(settings, console)
+    from runtime.open_loop import run_scene, summarise_scene
+    from runtime.summary import write_json
+
+    runs = track(range(seeds), "driving", console=console, transient=True, disable=not console.is_terminal)
+    outcome = summarise_scene(
+        scene, [hall for seed in runs for hall in run_scene(settings, scene, seed)], settings.models
+    )
+    if json_file is not None:
+        write_json(json_file, outcome)
+    out = Console()
+    if len(outcome["drums"]) + len(outcome["boxes"]) <= ROWS_SHOWN:
+        if outcome["drums"]:
+            out.print(table_2(outcome, units))
+        if outcome["boxes"]:
+            out.print(boxes_table(outcome, units))
+    out.print(scene_verdict(outcome, units), soft_wrap=True)
+    return DONE
+
+
+def _refuse_no_seeds(seeds: int) -> None:
+    if seeds < 1:
+        raise Complaint(f"--seeds {seeds}: must be at least 1", WRONG_CALL)
 
 
 def one_way(settings: Settings) -> Settings:

@@ -378,8 +378,8 @@ def test_a_disagreement_in_a_world_or_model_file(tmp_path: Path) -> None:
     mine = write(tmp_path / "mine.toml", model)
     with pytest.raises(ConfigError) as caught:
         load_model(mine)
-    assert str(caught.value) == f"{mine}: vertex 1 repeats vertex 0"
-    assert problem(models=[str(mine)]) == f"{mine}: vertex 1 repeats vertex 0"
+    assert str(caught.value) == f"{mine}: vertex 1 [0.0, 0.0] repeats vertex 0"
+    assert problem(models=[str(mine)]) == f"{mine}: vertex 1 [0.0, 0.0] repeats vertex 0"
 
 
 def test_a_section_no_robot_file_may_have(tmp_path: Path) -> None:

@@ -325,6 +325,15 @@ def test_outliers_are_uniform_in_the_window() -> None:
     assert np.quantile(wild, 0.5) == pytest.approx(5.5, abs=0.3)
 
 
+@pytest.mark.parametrize(("farthest_m", "reaches_m"), [(3.0, 3.0), (50.0, 10.0)])
+def test_outliers_reach_no_farther_than_asked(farthest_m: float, reaches_m: float) -> None:
+    world = wall_at(4.0, outliers=0.3, outlier_max_m=farthest_m)
+    got = fire_many(world, 500, sensors=20, range_max_m=10.0, range_min_m=1.0)
+    wild = got[np.abs(got - 4.0) > 1e-9]
+    assert 1.0 <= wild.min() < 1.1
+    assert reaches_m - 0.1 < wild.max() <= reaches_m
+
+
 def test_same_seed_same_ranges_and_another_seed_others() -> None:
     acoustics = AcousticsConfig(noise_m=0.1, dropout=0.2, outliers=0.1, crosstalk=0.5)
     world = WorldConfig(drum=(drum(2, 0.3, 0.4), drum(0, 3, 0.4)), acoustics=acoustics)

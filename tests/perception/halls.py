@@ -18,9 +18,11 @@ FT = 0.3048
 
 
 def settings(**perception: object) -> Settings:
-    """The shipped settings, with parts of perception replaced."""
+    """The shipped settings by the paper's method, with parts of perception replaced."""
     shipped = load_settings("hallway")
-    return shipped.model_copy(update={"perception": shipped.perception.model_copy(update=perception)})
+    return shipped.model_copy(
+        update={"perception": shipped.perception.model_copy(update={"method": "paper", **perception})}
+    )
 
 
 def drums(*places_ft: tuple[float, float]) -> WorldConfig:

@@ -13,6 +13,7 @@ from config.world import WallConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose
+from perception.paper import PaperPerception
 from perception.pipeline import Perception, SeenObject
 from tests.perception.halls import FT, drive, drums, settings
 
@@ -20,11 +21,11 @@ TABLE_2_MEAN_FT = 0.25
 TABLE_2_MAX_FT = 0.35
 
 
-def perceive(chosen: Settings) -> Perception:
-    return Perception(chosen.ring, chosen.models, chosen.perception)
+def perceive(chosen: Settings) -> PaperPerception:
+    return PaperPerception(chosen.ring, chosen.models, chosen.perception)
 
 
-def settle(perception: Perception) -> int:
+def settle(perception: PaperPerception | Perception) -> int:
     """Refine until nothing is left to improve; return the iterations it took."""
     iterations = 0
     while perception.pending:
@@ -197,7 +198,8 @@ def test_a_turning_body_sees_the_same() -> None:
 
 
 def test_forgetting_begins_anew() -> None:
-    perception = perceive(settings())
+    chosen = settings()
+    perception = Perception(chosen.ring, chosen.models, chosen.perception)
     for firing in drive(load_world("hallway"), (-6.0, 5.0)):
         perception.observe(firing)
         settle(perception)
@@ -230,7 +232,8 @@ def test_noise_of_one_percent_leaves_at_least_seven_of_eight(seed: int) -> None:
 
 def test_echoes_are_obstacles_until_the_sensor_fires_again_or_they_age() -> None:
     """A reading at maximum range clears its own obstacle and nobody else's."""
-    perception = perceive(settings())
+    chosen = settings()
+    perception = Perception(chosen.ring, chosen.models, chosen.perception)
     ranges = np.full(24, np.nan)
     ranges[0], ranges[1] = 1.0, 2.0
     perception.observe(Firing(0.0, Pose(1.0, 0.0, 0.0), 0.0, ranges))

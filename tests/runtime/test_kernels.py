@@ -163,6 +163,6 @@ def test_nothing_of_perception_is_compiled_while_the_robot_drives() -> None:
     done = subprocess.run(
         [sys.executable, "-c", COMPILED_LATER], cwd=ROOT, text=True, capture_output=True, timeout=120, check=False
     )
-    sources = "".join(path.read_text("utf-8") for path in (ROOT / "perception").glob("*.py"))
+    sources = "".join(path.read_text("utf-8") for path in (ROOT / "perception").rglob("*.py"))
     late = [name for name in done.stderr.split() if f"def {name}(" in sources]
     assert late == [], done.stderr

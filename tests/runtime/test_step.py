@@ -16,12 +16,14 @@ from config.load import load_settings
 from config.settings import Settings
 from drivers.driver import Heard, LineState
 from drivers.messages import Firing, Flags, Odometry, Pose, Twist
+from perception.paper import PaperPerception
 from perception.pipeline import Perception
 from runtime.modes import Mode, ModeState, Request
 from runtime.simulate import enough_quanta, simulate
 from runtime.step import STANDSTILL, Command, CycleRecord, Inputs, Order, State, step
 
-SETTINGS = load_settings("hallway")
+SETTINGS = load_settings("hallway", ["perception.method=paper"])
+"""The paper's method, whose arrays are compared here."""
 PERIOD_S = 1.0 / SETTINGS.cycle.rate_hz
 NOTHING = Heard((), None, rebooted=False)
 HERE = Pose(0.0, 0.0, 0.0)
@@ -252,8 +254,13 @@ def bits(value: object) -> object:
     return value
 
 
+def paper(state: State) -> PaperPerception:
+    assert isinstance(state.perception.method, PaperPerception)
+    return state.perception.method
+
+
 def left_behind(state: State) -> object:
-    perception = state.perception
+    perception = paper(state)
     arrays = [
         perception.outline.segments, perception.outline.times, perception.outline.alive,
         perception.candidates.poses, perception.candidates.rested, perception.clusters.centres,
@@ -353,7 +360,7 @@ def test_refinement_of_one_cycle_resumes_where_the_last_one_stood(drive: Drive) 
             total += record.iterations
         assert total > 20
         assert (cycles == 1) == (quanta == 10_000)
-        perception = state.perception
+        perception = paper(state)
         rested.append((total, bits(perception.candidates.poses), bits(perception.objects())))
     assert rested[0] == rested[1] == rested[2]
     assert len(rested[0][2]) > 0  # type: ignore[arg-type]

@@ -126,7 +126,7 @@ def test_a_picture_shows_mode_reason_objects_ring_and_numbers() -> None:
     )  # fmt: skip
     text = printed(snapshot)
     for piece in (
-        "SAFE_STOP", "bumper contact: free the robot", "→", "•", "1 segments, 7 clusters",
+        "SAFE_STOP", "bumper contact: free the robot", "→", "•", "1 segments, 7 hypotheses",
         "1832 frames, 3 bad, 2 lost",
         "520, 9 late", "0.48 ms (p99 2.96)", "0.91 ms (p99 5.42)", "semicircle", "1.00", "4.00", "··█▁",
     ):  # fmt: skip

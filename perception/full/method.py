@@ -1,0 +1,143 @@
+"""The full method behind perception's door: firings in, objects out.
+
+What is remembered and what is done with it is in the kernels; here is when they are called. Each call does a bounded
+piece of work: a firing a bounded number of quanta, a quantum one object.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from config.model import ModelConfig
+from config.robot import RingConfig
+from config.settings import FullConfig
+from drivers.messages import Firing
+from perception.full.observe import observe
+from perception.full.polygon_tracks import pquantum
+from perception.full.refine import quantum
+from perception.full.report import POLYGON_PROBABILITY, circle, other_things, polygon, sure_circles, sure_polygons
+from perception.full.settings import circle_models, make_settings
+from perception.full.state import KIND, MODEL, PPROB, PROB, PT, SEGMENTS, ST, clear, make_state
+from perception.kernel import Floats
+from perception.seen import SeenObject
+from perception.segments import mounts_array
+
+DRAWN_M: Final = 0.1
+"""Length at which a mapped segment is shown; the map keeps its middle and normal."""
+
+
+class FullPerception:
+    """Echoes to objects, by raw ranges and all explanations at once.
+
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
+    models : sequence of ModelConfig
+        What is looked for: circles by their radius, open and closed polygons by their outline.
+    config : FullConfig
+        What a user may set.
+    """
+
+    def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: FullConfig) -> None:
+        self._mounts = mounts_array(ring.mounts)
+        self._config = config
+        self.settings = make_settings(ring, models, config)
+        """What kernels are told."""
+        self.memory = make_state(len(self._mounts), self.settings, config.tracks_max)
+        """What they remember."""
+        _, self._round = circle_models(models)
+        self._outlines = [m.name for m in models if m.arc_radius_m is None]
+        self._sure = np.zeros(max(config.tracks_max, PT), np.int64)
+        self._objects: tuple[SeenObject, ...] | None = None
+        self._left = 0
+        self._circles_pending = False
+        self._polygons_pending = False
+
+    @property
+    def pending(self) -> bool:
+        """Whether refinement has anything left to improve before the next firing."""
+        return self._left > 0 and (self._circles_pending or self._polygons_pending)
+
+    @property
+    def living(self) -> int:
+        """Outline segments in the map."""
+        return int(np.minimum(self.memory.fill, self.memory.store.shape[1]).sum())
+
+    @property
+    def total(self) -> int:
+        """Outline segments ever made."""
+        return int(self.memory.g[SEGMENTS])
+
+    @property
+    def hypotheses(self) -> int:
+        """Tracks, established or not."""
+        return int(np.count_nonzero(self.memory.ti[:, ST]) + np.count_nonzero(self.memory.pi[:, ST]))
+
+    def observe(self, firing: Firing) -> int:
+        """Take in one firing and return how many outline segments it completed."""
+        pose = firing.pose
+        made, self._circles_pending = observe(
+            self.memory, self.settings, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw),
+            float(firing.t_s), firing.ranges_m, self._config.fresh_share,
+        )  # fmt: skip
+        self._left = self._config.quanta_per_firing
+        self._polygons_pending = self.settings.polys > 0
+        return made
+
+    def refine(self) -> int:
+        """Refine one object; return 1, or 0 where nothing is left to improve."""
+        if self._left <= 0:
+            return 0
+        self._left -= 1
+        self._objects = None
+        if self._circles_pending:
+            self._circles_pending = quantum(self.memory, self.settings, self._config.fresh_share)
+            return 1
+        if self._polygons_pending:
+            self._polygons_pending = pquantum(self.memory, self.settings, self._config.fresh_share)
+            return int(self._polygons_pending)
+        return 0
+
+    def objects(self) -> tuple[SeenObject, ...]:
+        """Return the models that are sure, best first; only refinement changes them."""
+        if self._objects is None:
+            self._objects = self._sure_objects()
+        return self._objects
+
+    def _sure_objects(self) -> tuple[SeenObject, ...]:
+        s, p = self.memory, self.settings
+        least = self._config.report_probability
+        n = sure_circles(s.ti, s.tf, s.comp, p.models, least, self._sure)
+        seen = [circle(s, p, t, self._round[s.ti[t, KIND]], float(s.tf[t, PROB])) for t in self._sure[:n].tolist()]
+        if p.polys > 0:
+            least = min(least, POLYGON_PROBABILITY)
+            n = sure_polygons(s.pi, s.pf, s.pbn, s.pbins, least, self._sure)
+            seen += [
+                polygon(s, p, t, self._outlines[s.pi[t, MODEL]], float(s.pf[t, PPROB]))
+                for t in self._sure[:n].tolist()
+            ]
+        return tuple(sorted(seen, key=lambda o: o.score, reverse=True))
+
+    def things(self) -> tuple[SeenObject, ...]:
+        """Return the objects, then everything else that has a name."""
+        called = self.objects()
+        return (*called, *other_things(self.memory, self.settings, self._config.report_probability, called))
+
+    def segments_now(self) -> Floats:
+        """Return the mapped segments: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""
+        s = self.memory
+        used = np.arange(s.store.shape[1]) < s.fill[:, None]
+        rows = s.store[used]
+        along = 0.5 * DRAWN_M * np.column_stack([-rows[:, 3], rows[:, 2]])
+        return np.column_stack([rows[:, :2] - along, rows[:, :2] + along, np.arctan2(rows[:, 3], rows[:, 2])])
+
+    def forget(self) -> None:
+        """Begin anew, as after the odometry did."""
+        clear(self.memory)
+        self._objects = ()
+        self._left = 0
+        self._circles_pending = self._polygons_pending = False

@@ -1,0 +1,218 @@
+"""Tracks to objects: what is sure enough to be called by a model's name, and what everything else is called.
+
+A model's name is given late and for good: it must be probable, well placed, and clearly better than "something
+unknown", which would explain any handful of echoes a little. Everything else is still somewhere, and keeps a name
+that says what is known of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from perception.full.contact import FAR
+from perception.full.state import (
+    C00,
+    C01,
+    C11,
+    ESTABLISHED,
+    FREE,
+    HITS,
+    KIND,
+    LC,
+    LHI,
+    LLO,
+    LLOG,
+    LLR,
+    LN,
+    LNX,
+    LNY,
+    LOX,
+    LOY,
+    LP00,
+    LP11,
+    MODEL,
+    PCAP,
+    PCX,
+    PCY,
+    PHITS,
+    PPROB,
+    PROB,
+    PTH,
+    PX,
+    PY,
+    ST,
+    TRHO,
+    TX,
+    TY,
+    UNK,
+    Settings,
+    State,
+)  # fmt: skip
+from perception.kernel import Floats, Ints, kernel
+from perception.seen import SeenObject
+
+FOOT_M: Final = 0.3048
+OVER_UNKNOWN: Final = 1.25
+OVER_UNKNOWN_ALONE: Final = 1.1
+"""Evidence over that of an unknown thing: a share of it, less where every rival is far behind."""
+ALONE: Final = -20.0
+SIGMA_MAX_M: Final = 0.2 * FOOT_M
+POLYGON_PROBABILITY: Final = 0.9
+POLYGON_NEAR_M: Final = 6.5 * FOOT_M
+POLYGON_SPREAD: Final = 0.02
+POLYGON_HITS: Final = 20.0
+"""A polygon is seen from near and from more than one direction: one face, square on from afar, may be any wall's."""
+WALL_ECHOES_MIN: Final = 10.0
+WALL_M: Final = 2.0 * FOOT_M
+CORNER_M: Final = 1.0 * FOOT_M
+"""A point this near to a long wall's line is a corner of the room, not an edge of a thing."""
+POST_M: Final = 1.0 * FOOT_M
+"""A round rival thinner than this is a post, a thicker one a barrel."""
+UNKNOWN_HITS: Final = 5.0
+
+
+@kernel
+def sure_circles(ti: Ints, tf: Floats, comp: Floats, models: int, least: float, out: Ints) -> int:
+    """Write the tracks that are sure to be models to `out` and return how many.
+
+    Parameters
+    ----------
+    ti, tf, comp
+        As in `State`.
+    models : int
+        Kinds below this are models.
+    least : float
+        Probability.
+    out : (tracks,) int
+        Out.
+    """
+    n = 0
+    for t in range(ti.shape[0]):
+        if ti[t, ST] != ESTABLISHED or ti[t, KIND] >= models or tf[t, PROB] < least:
+            continue
+        rival = -1e300
+        for k in range(comp.shape[1]):
+            if k != ti[t, KIND]:
+                rival = max(rival, comp[t, k])
+        over = OVER_UNKNOWN_ALONE if rival < ALONE else OVER_UNKNOWN
+        if tf[t, LLR] > over * tf[t, UNK] and max(tf[t, C00], tf[t, C11]) < SIGMA_MAX_M**2:
+            out[n] = t
+            n += 1
+    return n
+
+
+@kernel
+def sure_polygons(pi: Ints, pf: Floats, pbn: Ints, pbins: Floats, least: float, out: Ints) -> int:
+    """Write the polygon tracks that are sure to `out` and return how many; arguments as for `sure_circles`."""
+    n = 0
+    for t in range(pi.shape[0]):
+        if pi[t, ST] != ESTABLISHED or pf[t, PPROB] < least or pf[t, PHITS] < POLYGON_HITS:
+            continue
+        nearest = FAR
+        heard = 0
+        x = 0.0
+        y = 0.0
+        for b in range(pbn.shape[1]):
+            for k in range(min(pbn[t, b], PCAP)):
+                if pbins[t, b, k, 4] < FAR:
+                    nearest = min(nearest, pbins[t, b, k, 4])
+                    x += pbins[t, b, k, 2]
+                    y += pbins[t, b, k, 3]
+                    heard += 1
+        if heard > 0 and nearest <= POLYGON_NEAR_M and 1.0 - math.hypot(x, y) / heard > POLYGON_SPREAD:
+            out[n] = t
+            n += 1
+    return n
+
+
+def worst_sigma(xx: float, xy: float, yy: float) -> float:
+    """Return the standard deviation along the worst axis of a covariance."""
+    middle = 0.5 * (xx + yy)
+    return math.sqrt(max(0.0, middle + math.hypot(0.5 * (xx - yy), xy)))
+
+
+def circle(s: State, p: Settings, t: int, label: str, probability: float) -> SeenObject:
+    """Return a circle's track as an object; a circle has no heading."""
+    track = s.tf[t].tolist()
+    xx, xy, yy = p.inflate * track[C00], p.inflate * track[C01], p.inflate * track[C11]
+    return SeenObject(
+        label,
+        track[TX],
+        track[TY],
+        0.0,
+        worst_sigma(xx, xy, yy),
+        int(track[HITS]),
+        probability,
+        probability,
+        (xx, xy, yy),
+    )
+
+
+def polygon(s: State, p: Settings, t: int, label: str, probability: float) -> SeenObject:
+    """Return a polygon's track as an object; of the headings at which it looks alike the least one from −π on."""
+    track = s.pf[t]
+    theta = float(track[PTH])
+    c, sn = math.cos(theta), math.sin(theta)
+    along, across = float(track[PCX]), float(track[PCY])
+    xx, yy = c * c * along + sn * sn * across, sn * sn * along + c * c * across
+    xy = c * sn * (along - across)
+    period = 2.0 * math.pi / int(p.sym[s.pi[t, MODEL]])
+    return SeenObject(
+        label, float(track[PX]), float(track[PY]), (theta + 0.5 * period) % period - 0.5 * period,
+        worst_sigma(xx, xy, yy), int(track[PHITS]), probability, probability, (xx, xy, yy),
+    )  # fmt: skip
+
+
+def wall(line: Floats) -> SeenObject:
+    """Return a line as an object: the middle of what was seen of it, and its direction."""
+    nx, ny, middle = float(line[LNX]), float(line[LNY]), 0.5 * float(line[LLO] + line[LHI])
+    across, length = float(line[LP11] + line[LP00] * middle**2), float(line[LHI] - line[LLO])
+    along = length * length / 12.0
+    xx, yy = nx * nx * across + ny * ny * along, ny * ny * across + nx * nx * along
+    xy = nx * ny * (across - along)
+    probability = 1.0 / (1.0 + math.exp(-float(line[LLOG])))
+    return SeenObject(
+        "wall", float(line[LOX] + line[LC] * nx) - ny * middle, float(line[LOY] + line[LC] * ny) + nx * middle,
+        math.atan2(nx, -ny), worst_sigma(xx, xy, yy), int(line[LN]), probability, probability, (xx, xy, yy),
+    )  # fmt: skip
+
+
+def is_wall(line: Floats) -> bool:
+    """Tell whether a line is long and heard often enough to be called a wall."""
+    return bool(line[LN] > WALL_ECHOES_MIN and line[LHI] - line[LLO] > WALL_M)
+
+
+def rival_label(s: State, t: int) -> str:
+    """Return what a track that is no model looks like."""
+    x, y, rho = (float(v) for v in s.tf[t, [TX, TY, TRHO]])
+    if rho > 0.0:
+        return "post" if rho < POST_M else "barrel"
+    for line in s.lines:
+        if is_wall(line):
+            dx, dy = x - line[LOX], y - line[LOY]
+            along = -line[LNY] * dx + line[LNX] * dy
+            beside = line[LLO] - CORNER_M < along < line[LHI] + CORNER_M
+            if beside and abs(line[LNX] * dx + line[LNY] * dy - line[LC]) < CORNER_M:
+                return "inside corner"
+    return "edge"
+
+
+def other_things(s: State, p: Settings, least: float, called: Sequence[SeenObject]) -> list[SeenObject]:
+    """Return what has no model's name: walls, corners, edges, posts, barrels, and what is unknown."""
+    found = [wall(line) for line in s.lines if is_wall(line)]
+    for t in np.flatnonzero(s.ti[:, ST] != FREE):
+        place, track = (float(s.tf[t, TX]), float(s.tf[t, TY])), s.tf[t]
+        if track[HITS] < UNKNOWN_HITS or any(math.dist(place, (o.x, o.y)) < p.merge for o in called):
+            continue
+        is_rival = s.ti[t, ST] == ESTABLISHED and s.ti[t, KIND] >= p.models and track[PROB] >= least
+        probability = float(track[PROB])
+        found.append(
+            circle(s, p, int(t), rival_label(s, int(t)), probability)
+            if is_rival
+            else circle(s, p, int(t), "unknown", 1.0 - probability)
+        )
+    return found

@@ -1,0 +1,358 @@
+"""Slow, readable oracles of how the full method keeps its tracks, its walls and its noise: plain Python, in metres.
+
+Nothing here is called by the product, and nothing of the product is called here; constants are said once more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tests import naive_full
+from tests.naive_full import Noise
+
+Array = NDArray[Any]
+FT = 0.3048
+SILENT = 1e6
+
+
+def rows(readings: Iterable[Sequence[float] | Array]) -> list[tuple[float, ...]]:
+    """Return readings as sorted tuples: what is kept matters, not in which order."""
+    return sorted(tuple(float(v) for v in row) for row in readings)
+
+
+class Reservoir:
+    """The newest readings of each direction, seen from an object."""
+
+    def __init__(self, bins: int, capacity: int) -> None:
+        self.kept = [deque[tuple[float, ...]](maxlen=capacity) for _ in range(bins)]
+
+    def put(self, centre: Array, q: Array) -> None:
+        bearing = math.atan2(q[1] - centre[1], q[0] - centre[0])
+        sector = math.floor((bearing + math.pi) / (2 * math.pi) * len(self.kept)) % len(self.kept)
+        self.kept[sector].append(tuple(float(v) for v in q[:5]))
+
+
+def off_axis(q: Array, place: Array) -> tuple[float, float]:
+    """Return distance of a place and how far it lies along a reading's axis."""
+    to = place - q[:2]
+    return float(np.hypot(*to)), float(to @ q[2:4])
+
+
+def gather(memory: Iterable[Array], centre: Array, rho: float, opt: float, reach: float) -> list[tuple[float, ...]]:
+    """Return the remembered readings that look towards a circle within reach."""
+    found = []
+    for q in memory:
+        d, ahead = off_axis(q, centre)
+        if ahead > 0 and ahead >= opt * d - 0.02 * FT and d - rho <= reach:
+            found.append(q[:5])
+    return rows(found)
+
+
+def towards(w: Array, centre: Array, rho: float, gate: float) -> Array:
+    """Return the mean unit direction to a circle's centre from those that hear it."""
+    seen = naive_full.look(w, centre)
+    total = seen.u[np.abs(w[:, 4] - (seen.d - rho)) < gate].sum(0)
+    return np.asarray(total / np.hypot(*total)) if total.any() else np.zeros(2)
+
+
+@dataclass
+class Line:
+    """A wall: n·(q − origin) = c, covariance of (angle, c), extent, log odds, echoes."""
+
+    normal: Array
+    c: float
+    origin: Array
+    cov: Array
+    low: float
+    high: float
+    log: float
+    echoes: float
+
+    @property
+    def along(self) -> Array:
+        return np.array([-self.normal[1], self.normal[0]])
+
+    def off(self, place: Array) -> float:
+        """How far a place lies before the line."""
+        return self.c - float(self.normal @ (place - self.origin))
+
+    def foot(self, place: Array) -> float:
+        return float(self.along @ (place - self.origin))
+
+    def row(self) -> list[float]:
+        p = self.cov
+        return [
+            *self.normal,
+            self.c,
+            *self.origin,
+            p[0, 0],
+            p[0, 1],
+            p[1, 1],
+            self.low,
+            self.high,
+            self.log,
+            self.echoes,
+        ]
+
+    def follow(self, place: Array, e: float, var: float) -> None:
+        """Correct by one range whose prediction is c − n·q: the textbook's extended Kalman filter."""
+        self.cov = self.cov + np.diag([1e-8, 1e-6 * FT**2])
+        h = np.array([-float(self.along @ (place - self.origin)), 1.0])
+        gain = self.cov @ h / (h @ self.cov @ h + var)
+        self.cov = (np.eye(2) - np.outer(gain, h)) @ self.cov
+        turn = math.atan(gain[0] * e)  # the turn is to first order and the normal made a unit again
+        c, s = math.cos(turn), math.sin(turn)
+        self.normal = np.array([[c, -s], [s, c]]) @ self.normal
+        self.c += gain[1] * e
+
+
+def same_line(known: Line, new: Line) -> bool:
+    """Tell whether a new line is a known one: parallel, near, and beginning about where that one ends."""
+    place = new.origin + new.c * new.normal
+    return (
+        float(known.normal @ new.normal) > 0.98
+        and abs(known.off(place)) < 0.4 * FT
+        and known.low - FT < known.foot(place) < known.high + FT
+    )
+
+
+def update_line(
+    line: Line, k: int, cur: Array, owner: list[int], sigma: tuple[float, float], half_box: float, half_angle: float,
+    cosines: tuple[float, float, float], gate: float, claim: float,
+) -> Line | None:  # fmt: skip
+    """Let line k hear readings, claim them and follow; None where it is given up."""
+    opt, half, inside = cosines
+    for i, q in enumerate(cur):
+        cos, d, r = float(line.normal @ q[2:4]), line.off(q[:2]), float(q[4])
+        if cos < 0.8 or d <= 0:
+            continue
+        foot, claims = line.foot(q[:2]), line.high - line.low > claim
+        pure = sigma[0] ** 2 + 1e-6 * FT**2 + (sigma[1] * d) ** 2
+        tight = half_box + 0.02 * FT + 3 * math.sqrt(pure)
+        if cos >= opt:
+            if abs(r - d) < tight and line.low - 0.5 * FT < foot < line.high + 0.5 * FT:
+                if owner[i] == -1 and claims:
+                    owner[i] = -2 - k
+                line.low, line.high = min(line.low, foot), max(line.high, foot)
+                line.log, line.echoes = min(line.log + 0.5, 6.0), line.echoes + 1
+                line.follow(q[:2], r - d, pure + half_box**2 / 3)
+            elif r - d > gate and cos >= inside and line.low + 0.2 * FT < foot < line.high - 0.2 * FT:
+                line.log -= 1
+                if line.log < 0:
+                    return None
+        elif r < SILENT:
+            axis = math.atan2(q[3], q[2]) - math.atan2(line.normal[1], line.normal[0])
+            axis = (axis + math.pi) % (2 * math.pi) - math.pi
+            edge = math.copysign(abs(axis) - half_angle, axis)  # the beam's edge nearer to the normal
+            at = foot + d * math.tan(edge)
+            if abs(r - d / math.cos(edge)) < tight + 0.05 * FT and line.low - 0.7 * FT < at < line.high + 0.7 * FT:
+                if owner[i] == -1 and claims:
+                    owner[i] = -2 - k
+                if cos >= half - 0.1:
+                    line.low, line.high = min(line.low, at), max(line.high, at)
+    return line
+
+
+def stands_in_wall(lines: Iterable[Line], place: Array, rho: float) -> bool:
+    """Tell whether a body's centre would lie in a long wall that was heard often, or its near part."""
+    return any(
+        line.echoes > 10
+        and line.high - line.low > 2 * FT
+        and -0.85 * rho < line.off(place) < 0.7 * rho
+        and line.low - 8 * FT < line.foot(place) < line.high + 8 * FT
+        for line in lines
+    )
+
+
+def roughness(
+    a: Array, b: Array, c: Array, now: float, gap: float, half_box: float, noises: Array, heard: Array
+) -> Array:  # fmt: skip
+    """Return what is heard of each noise after three readings: the middle one against the chord of the outer two."""
+    way = np.cumsum([0.0, math.dist(c[:2], b[:2]), math.dist(b[:2], a[:2])])
+    if max(b[4], c[4]) >= SILENT or now - c[5] > gap or not 0 < way[2] <= FT:
+        return heard
+    e = b[4] - np.interp(way[1], way[[0, 2]], [c[4], a[4]])
+    shares = np.array([way[1], way[2] - way[1]]) / way[2]
+    var = (1 + shares @ shares) * (noises[:, 0] ** 2 + (noises[:, 1] * b[4]) ** 2 + half_box**2 / 3) + 1e-4 * FT**2
+    bell = np.exp(-(e**2) / (2 * var)) / np.sqrt(2 * math.pi * var)
+    return np.asarray(0.997 * heard + np.log(0.8 * bell + 0.02 / FT))
+
+
+def likeliest_noise(rough: Array, residual: Array, gate: float) -> int:
+    """Return the first of the likeliest noises that roughness leaves possible."""
+    return int(np.argmax(np.where(rough > rough.max() - gate, rough + residual, -np.inf)))
+
+
+def residual_evidence(
+    w: Array, centre: Array, rho: float, half: float, gate: float, noises: Sequence[Noise]
+) -> list[float]:  # fmt: skip
+    """Return what an object's residuals say of each noise."""
+    seen = naive_full.look(w, centre)
+    e = w[:, 4] - (seen.d - rho)
+    use = (np.abs(e) < gate) & (seen.cos >= half)
+    return [float(naive_full.evidence(noise, w[use, 4], e[use]).sum()) for noise in noises]
+
+
+def place_readings(
+    last: dict[int, Array], mounts: Array, pose: tuple[float, float, float], ranges: Array, reach: float,
+    half_box: float,
+) -> list[tuple[float, ...]]:  # fmt: skip
+    """Return this firing's readings in the odometry's frame: x, y, axis, range, sensor; what is new."""
+    turn = np.array([[math.cos(pose[2]), -math.sin(pose[2])], [math.sin(pose[2]), math.cos(pose[2])]])
+    new = []
+    for i, (mount, r) in enumerate(zip(mounts, ranges, strict=True)):
+        if not r >= 0:
+            continue
+        q = np.array([
+            *(np.array(pose[:2]) + turn @ mount[:2]), *(turn @ [math.cos(mount[2]), math.sin(mount[2])]),
+            2 * SILENT if r >= reach else r,
+        ])  # fmt: skip
+        old = last.get(i)
+        if (
+            old is not None
+            and math.dist(q[:2], old[:2]) < 0.05 * FT
+            and q[2:4] @ old[2:4] > 0.9998
+            and abs(q[4] - old[4]) <= half_box
+        ):
+            continue
+        last[i] = q
+        new.append((*q, float(i)))
+    return new
+
+
+def partners(
+    i: int, cur: Array, memories: Sequence[list[Array]], now: float, gap: float
+) -> list[Array]:  # fmt: skip
+    """Return what reading i is paired with: its own sensor's past at three baselines, then its neighbours."""
+    q, sensor, found = cur[i], int(cur[i][5]), []
+    wanted = [0.5 * FT, 1.0 * FT, 2.0 * FT]
+    for old in reversed(memories[sensor]):
+        base = math.dist(q[:2], old[:2])
+        if now - old[5] > gap or not wanted or (base > 2.6 * FT):
+            break
+        if base >= wanted[0]:
+            found.append(old)
+            wanted.pop(0)
+    for neighbour in ((sensor - 1) % len(memories), (sensor + 1) % len(memories)):
+        if not memories[neighbour]:
+            continue
+        together = [other for other in cur if int(other[5]) == neighbour]
+        if together:
+            if neighbour == (sensor + 1) % len(memories):
+                found.append(together[0])
+            continue
+        old = memories[neighbour][-1]
+        if now - old[5] < gap and 0.3 * FT < math.dist(q[:2], old[:2]) < 1.0 * FT:
+            found.append(old)
+    return [other for other in found if other[4] < SILENT]
+
+
+def remembered(memory: list[Array], q: Array, now: float, spacing: float, gap: float, room: int) -> list[Array]:
+    """Return a sensor's memory after a reading: spaced out in place unless time has passed; the newest `room`."""
+    if memory and math.dist(memory[-1][:2], q[:2]) < spacing and now - memory[-1][5] < gap:
+        return memory
+    return [*memory, np.array([*q[:5], now])][-room:]
+
+
+def bears_on(
+    q: Array, centre: Array, rho: float, free: bool, ours: bool, opt: float, inside: float, gate: float, reach: float
+) -> bool:  # fmt: skip
+    """Tell whether a reading is for a circle (a hit of its own), or against (through it, or free and short of it)."""
+    d, ahead = off_axis(q, centre)
+    if ahead <= 0 or ahead < opt * d - 0.01 * FT:
+        return False
+    e = q[4] - (d - rho)
+    if abs(e) <= gate:
+        return ours
+    return ahead >= inside * d and (d <= reach if e > 0 else free)
+
+
+def claimed_by(q: Array, tracks: Iterable[tuple[int, Array, float, float]], opt: float, half_box: float,
+               sigma: tuple[float, float]) -> int:  # fmt: skip
+    """Return which of the tracks (number, centre, radius, σ) explains a reading best; −1 none."""
+    fits = []
+    for t, centre, rho, root in tracks:
+        d, ahead = off_axis(q, centre)
+        e = abs(q[4] - (d - rho))
+        noise = math.sqrt(sigma[0] ** 2 + half_box**2 / 3 + 1e-6 * FT**2 + (sigma[1] * d) ** 2)
+        if ahead > 0 and ahead >= opt * d - 0.004 * FT and e < half_box + 3 * noise + 2 * root:
+            fits.append((e, t))
+    return min(fits)[1] if fits and q[4] < SILENT else -1
+
+
+def after_merging(t: int, live: Array, place: Array, rho: Array, llr: Array, merge: float) -> Array:
+    """Return which tracks live once t has met the others in turn: of two in one place the one with more evidence."""
+    live = live.copy()
+    for k in np.flatnonzero(live):
+        if k != t and math.dist(place[k], place[t]) < max(merge, 0.8 * max(rho[k], rho[t])):
+            loser = t if llr[k] > llr[t] else k
+            live[loser] = False
+            if loser == t:
+                break
+    return live
+
+
+def most_urgent(
+    live: Array, fresh: Array, kept: Array, sigma: Array, quiet: Array, polish: Array, patience: int, threshold: float
+) -> int:  # fmt: skip
+    """Return the track with most unseen readings for its size, fourfold where unsure, raised where work is owed."""
+    urgency = fresh / (kept + 8.0) * np.where(sigma > 0.03 * FT, 4.0, 1.0)
+    urgency = urgency + np.where((quiet > patience) & (polish > 0), threshold + 1e-6, 0.0)
+    urgency = np.where(live, urgency, -np.inf)
+    return int(np.argmax(urgency)) if urgency.max() > threshold else -1
+
+
+def probability(
+    own: float, known: bool, prior: float, general: float, unknown: float, leads: dict[int, float], models: int,
+    line: int, in_wall: bool,
+) -> float:  # fmt: skip
+    """Return a track's share among all explanations, each as good as its evidence and its prior (soft maximum)."""
+
+    def weight(nat: float) -> float:
+        return math.exp(float(np.clip(nat, -60.0, 60.0)))
+
+    bonus = (prior if known else 0.0) + (-8.0 if known and in_wall else 0.0)
+    total = 1.0 + weight(-own - bonus) + weight(unknown + general - own - bonus)
+    for k, lead in leads.items():
+        theirs = prior if k < models else general + 1.0 if k == line else 0.0
+        total += weight(lead + theirs - bonus)
+    return 1.0 / total
+
+
+def fate(
+    state: int, llr: float, unknown: float, probability: float, hits: float, dispersion: float, sigma: float,
+    spread: float,
+) -> int:  # fmt: skip
+    """Return what becomes of a track: 0 forgotten, 1 tentative, 2 established."""
+    if llr < 0 or llr < unknown - 6:
+        return 0
+    if state == 1:
+        sure = probability > 0.7 and hits >= 8 and dispersion >= spread and sigma < 0.25 * FT
+        return 2 if sure else 1
+    return 1 if probability < 0.2 or dispersion < 0.5 * spread else 2
+
+
+def is_sure_circle(
+    established: bool, known: bool, probability: float, least: float, rivals: Sequence[float], llr: float,
+    unknown: float, variances: Sequence[float],
+) -> bool:  # fmt: skip
+    """Tell whether a circle may be called by a model's name."""
+    share = 1.1 if max(rivals) < -20 else 1.25
+    placed = max(variances) < (0.2 * FT) ** 2
+    return established and known and probability >= least and llr > share * unknown and placed
+
+
+def is_sure_polygon(established: bool, probability: float, least: float, hits: float, kept: Array) -> bool:
+    """Tell whether a polygon may be called by its name: seen from near, and from more than one direction."""
+    heard = kept[kept[:, 4] < SILENT]
+    if not len(heard) or heard[:, 4].min() > 6.5 * FT:
+        return False
+    spread = 1 - float(np.hypot(*heard[:, 2:4].mean(0)))
+    return established and probability >= least and hits >= 20 and spread > 0.02
