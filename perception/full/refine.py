@@ -211,7 +211,7 @@ def ask_rivals(s: State, p: Settings, t: int, n: int, prior: float) -> bool:
                 return False
         else:
             v = wedge(
-                s.w, s.w2, n, track[TX], track[TY], track[TRHO], p.cos_opt, p.cos_half, p.gate, var0, rel2,
+                s.w, s.w2, n, track[TX], track[TY], track[TRHO], p.cos_opt, p.gate, var0, rel2,
                 p.levels[int(s.g[NOISE])], p.per_metre, p.table, p.inv_step, s.fit, s.stats,
             )  # fmt: skip
             s.comp[t, k] = v + THROUGH_SHARE * p.miss * track[THRU] - track[LLR]

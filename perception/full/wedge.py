@@ -186,7 +186,6 @@ def wedge(
     cy: float,
     rho: float,
     cos_opt: float,
-    cos_half: float,  # noqa: ARG001 - every explanation is called alike
     gate: float,
     var0: float,
     rel2: float,
@@ -212,8 +211,8 @@ def wedge(
         Readings in use.
     cx, cy, rho : float
         The circle, m.
-    cos_opt, cos_half : float
-        Cosines of the angles off the axis: may answer, nominal half opening.
+    cos_opt : float
+        Cosine of the angle off the axis within which a reading may be answered.
     gate : float
         How far off the circle's a range may be to take part, m.
     var0, rel2 : float

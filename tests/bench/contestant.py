@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
@@ -37,7 +38,7 @@ class Peer:
     """Whether twenty passes would take it longer than anyone waits."""
 
 
-class Tracks:
+class Tracks(ABC):
     """What estimators that follow tracks one by one have in common."""
 
     def __init__(self) -> None:
@@ -49,9 +50,9 @@ class Tracks:
         self.update(evidence)
         self._confirmed = evidence.confirmed
 
+    @abstractmethod
     def update(self, evidence: Evidence) -> None:
         """Bring `places` up to date with `evidence`."""
-        raise NotImplementedError
 
     def believed(self) -> Mapping[int, Place]:
         """Return where each track is thought to be."""

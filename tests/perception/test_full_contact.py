@@ -221,7 +221,7 @@ def test_the_wedge_equals_its_oracle() -> None:
     for case in cases(700, 6, ("circle", "edge"), least=12):
         fit, stats = np.zeros(3), np.zeros(8)
         got = wedge(
-            case.w, np.zeros_like(case.w), case.n, *case.place, case.rho, OPT, HALF, GATE, case.var0, case.rel2,
+            case.w, np.zeros_like(case.w), case.n, *case.place, case.rho, OPT, GATE, case.var0, case.rel2,
             case.noise.levels, case.noise.per_metre, case.noise.table, case.noise.inv_step, fit, stats,
         )  # fmt: skip
         want = naive_full.wedge(case.used, case.centre, case.rho, OPT, GATE, case.var0, case.rel2, case.noise)
