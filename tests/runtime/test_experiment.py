@@ -19,6 +19,8 @@ from runtime.commands.experiment import one_way
 from runtime.complaint import DONE, FAILED, Complaint
 from runtime.experiment import run_seed, summarise
 
+pytestmark = pytest.mark.compiled
+
 FT = 0.3048
 TABLE_2 = [(1.0, 4.0), (4.0, 4.0), (7.0, 4.0), (1.0, -4.0), (4.0, -4.0), (7.0, -4.0)]
 
