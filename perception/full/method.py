@@ -54,13 +54,14 @@ class FullPerception:
         self._sure = np.zeros(max(config.tracks_max, PT), np.int64)
         self._objects: tuple[SeenObject, ...] | None = None
         self._left = 0
+        self._polygons_left = 0
         self._circles_pending = False
         self._polygons_pending = False
 
     @property
     def pending(self) -> bool:
         """Whether refinement has anything left to improve before the next firing."""
-        return self._left > 0 and (self._circles_pending or self._polygons_pending)
+        return (self._circles_pending and self._left > 0) or (self._polygons_pending and self._polygons_left > 0)
 
     @property
     def living(self) -> int:
@@ -85,19 +86,20 @@ class FullPerception:
             float(firing.t_s), firing.ranges_m, self._config.fresh_share,
         )  # fmt: skip
         self._left = self._config.quanta_per_firing
+        self._polygons_left = self._config.polygon_quanta_per_firing
         self._polygons_pending = self.settings.polys > 0
         return made
 
     def refine(self) -> int:
         """Refine one object; return 1, or 0 where nothing is left to improve."""
-        if self._left <= 0:
-            return 0
-        self._left -= 1
-        self._objects = None
-        if self._circles_pending:
+        if self._circles_pending and self._left > 0:
+            self._left -= 1
+            self._objects = None
             self._circles_pending = quantum(self.memory, self.settings, self._config.fresh_share)
             return 1
-        if self._polygons_pending:
+        if self._polygons_pending and self._polygons_left > 0:
+            self._polygons_left -= 1
+            self._objects = None
             self._polygons_pending = pquantum(self.memory, self.settings, self._config.fresh_share)
             return int(self._polygons_pending)
         return 0
@@ -140,4 +142,5 @@ class FullPerception:
         clear(self.memory)
         self._objects = ()
         self._left = 0
+        self._polygons_left = 0
         self._circles_pending = self._polygons_pending = False
