@@ -145,7 +145,6 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: FullC
         far=6.0 * FOOT_M,
         far_price=2.0 / FOOT_M,
         rough_gate=20.0,
-        range_min=ring.range_min_m,
         range_max=ring.range_max_m,
         pair_max=12.0 * FOOT_M,
         spacing=0.2 * FOOT_M,

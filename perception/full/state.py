@@ -91,7 +91,6 @@ class Settings(NamedTuple):
     """By so much for each metre, nat."""
     rough_gate: float
     """Noises less likely than the best by this, by roughness, are ruled out, nat."""
-    range_min: float
     range_max: float
     pair_max: float
     """Segments farther than this start no hypotheses, and silence from farther says nothing."""
