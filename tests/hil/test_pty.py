@@ -305,7 +305,9 @@ def test_truth_is_told_while_it_runs(link: Path, tmp_path: Path) -> None:
         assert now - 5.0 < told[-1]["host_s"] <= now
         shift = [row["host_s"] - row["t_s"] for row in told]
         rounding = 2e-6  # each column is told to the microsecond
-        assert all(b >= a - rounding for a, b in itertools.pairwise(shift)), "the robot's clock never gains on the host's"
+        assert all(b >= a - rounding for a, b in itertools.pairwise(shift)), (
+            "the robot's clock never gains on the host's"
+        )
 
 
 def test_unwritable_trace_is_one_clear_line(link: Path, tmp_path: Path) -> None:
