@@ -22,6 +22,8 @@ class CycleConfig(Strict):
     rate_hz: float = Field(default=20.0, ge=1.0, le=200.0)
     perception_budget_s: float = Field(default=0.005, ge=0.0, le=1.0)
     """Time perception may take in a cycle; refinement stops there and resumes in the next."""
+    overruns_max: int = Field(default=10, ge=1, le=10_000)
+    """After so many cycles in a row that left no time for the next one the robot stops and says whose fault it is."""
 
 
 class SegmentsConfig(Strict):
