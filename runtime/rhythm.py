@@ -24,9 +24,7 @@ LATE_SHARE: Final = 0.1
 PATIENCE_SHARE: Final = 0.5
 """An echo is waited for no longer than this share of the time between commands that the base's deadman allows."""
 
-OVERRUN: Final = (
-    "{} cycles in a row left no time for the next one, the last through {}: take load off it, then re-arm"
-)
+OVERRUN: Final = "{} cycles in a row left no time for the next one, mostly through {}: take load off it, then re-arm"
 
 
 class Rhythm:

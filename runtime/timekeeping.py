@@ -110,16 +110,18 @@ class Timekeeper:
         """Overruns so far."""
         self.in_a_row = 0
         """Overruns since the last cycle that kept its time."""
-        self.culprit = ""
-        """Who was to blame the last time."""
+        self._row: dict[str, int] = {}
 
     def begin(self, now: Reading, begun: Begun, period_s: float, *, is_following: bool) -> None:
         """Begin a cycle and judge what came before it."""
         is_late = begun.late_s > self._books.late_after_s
         is_overrun = self._begin is not None and (begun.missed > 0 or self._busy_s >= period_s)
+        if not is_overrun:
+            self._row.clear()
         if is_late or is_overrun:
-            self.culprit = self._judge(now, begun)
-            self._books.blame(self.culprit)
+            culprit = self._judge(now, begun)
+            self._books.blame(culprit)
+            self._row[culprit] = self._row.get(culprit, 0) + is_overrun
         self._books.missed += begun.missed
         self.overruns += is_overrun
         self.in_a_row = self.in_a_row + 1 if is_overrun else 0
@@ -164,6 +166,11 @@ class Timekeeper:
     def held_since_s(self) -> float:
         """Since when the loop has been busy without a pause, s: nobody looked at the line since then."""
         return self._held_since_s
+
+    @property
+    def culprit(self) -> str:
+        """Who is most often to blame for the overruns in a row; nobody where there are none."""
+        return max(self._row, key=lambda name: self._row[name], default="")
 
     def timing(self) -> Timing:
         """Return the books."""

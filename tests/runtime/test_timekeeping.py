@@ -193,7 +193,12 @@ def test_overruns_in_a_row_are_counted_until_a_cycle_keeps_its_time() -> None:
         run.slot(Delay("refine", us, Machine.work, "refine"))
         rows.append(run.keeper.in_a_row)
     assert rows == [1, 2, 3, 0, 1]
-    assert run.keeper.culprit == "refine"
+    for culprit in ("perceive", "perceive"):
+        assert run.keeper.culprit == "refine"
+        run.slot(Delay(culprit, 60_000, Machine.work, culprit))
+    assert run.keeper.culprit == "perceive", "the most frequent one of the row"
+    run.slot(Delay("nowhere", 0, Machine.work, ""))
+    assert (run.keeper.in_a_row, run.keeper.culprit) == (0, "")
 
 
 def test_what_the_watch_saw_has_a_name() -> None:
@@ -206,7 +211,7 @@ def test_what_the_watch_saw_has_a_name() -> None:
     assert run.books.faults == {"callback Recorder.flush": 2}
     sights.pop(0)
     run.slot(Delay("observers", 70_000, Machine.work, ""))
-    assert run.keeper.culprit == "observers (in View.on_cycle)"
+    assert run.books.faults["observers (in View.on_cycle)"] == 1
 
 
 def test_names_are_bounded() -> None:
