@@ -5,7 +5,6 @@ Pacer, alarm, timekeeper and watch know nothing of each other; here they are one
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Final
@@ -95,5 +94,5 @@ class Rhythm:
 
     def _started(self) -> Pacer:
         if self._pacer is None:
-            self._pacer = Pacer(self._read().wall_s, self._period_s, self._step_s, math.inf)
+            raise RuntimeError("the rhythm was asked before it was started: a fault of this program")
         return self._pacer
