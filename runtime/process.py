@@ -7,7 +7,6 @@ Everything that waits, reads a clock or touches a port is here or below in drive
 from __future__ import annotations
 
 import asyncio
-import gc
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,10 +21,14 @@ from perception.pipeline import Perception
 from runtime.books import Books
 from runtime.commanding import gather, give
 from runtime.complaint import FAILED, WRONG_CALL, Complaint
+from runtime.footprint import Footprint, FootprintRow
+from runtime.memory import MemoryPolicy
 from runtime.modes import Mode, Request
 from runtime.pacing import Pacer
+from runtime.realtime import ask
 from runtime.step import STANDSTILL, Command, CycleRecord, State, step
 from runtime.summary import RunSummary, object_row
+from runtime.wake import Waker
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
@@ -38,11 +41,6 @@ HALT_MAX_S: Final = 0.5
 
 LATE_SHARE: Final = 0.1
 """A cycle that begins later than this share of its period is late."""
-
-
-COLLECT_EVERY: Final = 20
-COLLECT_SLACK_S: Final = 0.01
-"""Young garbage is collected once in so many cycles, and only with so much time to spare; the old is frozen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +83,7 @@ class RobotProcess:
         self._period_s = 1.0 / settings.cycle.rate_hz
         self.books = Books(LATE_SHARE * self._period_s)
         self._missed = 0
+        self._memory = MemoryPolicy()
         self._stop_reasons: list[str] = []
         self._request: Request | None = None
         self._stop = asyncio.Event()
@@ -115,18 +114,20 @@ class RobotProcess:
         """
         await self._connect()
         keeper = asyncio.create_task(self._link.run(), name="link")
-        gc.collect()
-        gc.freeze()
-        gc.disable()
+        for refusal in ask(self._settings.realtime):
+            self._log.warning(refusal)
+        waker = Waker()
+        footprint = Footprint(self._memory)
         try:
             if arm:
                 self.request(Request.ARM)
-            await self._cycle(seconds)
+            with self._memory.driving():
+                await self._cycle(seconds, waker)
         finally:
-            gc.enable()
-            gc.unfreeze()
+            cost = footprint.close()
+            waker.close()
             await self._shut_down(keeper)
-        return self._summary()
+        return self._summary(cost)
 
     async def _connect(self) -> None:
         """Open the port and wait until the robot is ready."""
@@ -151,7 +152,7 @@ class RobotProcess:
     def _nobody(self) -> str:
         return f"nothing on {self._settings.link.port} answers like the robot: check its power and link.baud"
 
-    async def _cycle(self, seconds: float | None) -> None:
+    async def _cycle(self, seconds: float | None, waker: Waker) -> None:
         """Run cycles on their grid of deadlines until the run ends."""
         pacer = Pacer(self._clock(), self._period_s)
         began_s = pacer.deadline_s
@@ -167,9 +168,8 @@ class RobotProcess:
             self.books.enter(self._clock() - start_s, start_s - pacer.deadline_s)
             deadline_s = pacer.advance(self._clock())
             self._missed = pacer.missed
-            if self.books.cycles % COLLECT_EVERY == 0 and deadline_s - self._clock() > COLLECT_SLACK_S:
-                gc.collect(1)
-            await asyncio.sleep(max(0.0, deadline_s - self._clock()))
+            self._memory.cycle_done(deadline_s - self._clock())
+            await waker.until(deadline_s)
 
     def _fail(self, error: Exception) -> None:
         """Halt before anything else, then say what happened; FAULT is not left."""
@@ -245,7 +245,7 @@ class RobotProcess:
         keeper.cancel()
         await asyncio.gather(keeper, return_exceptions=True)
 
-    def _summary(self) -> RunSummary:
+    def _summary(self, cost: FootprintRow) -> RunSummary:
         counts = self._driver.counts
         return {
             "objects": [object_row(seen) for seen in self._state.perception.objects()],
@@ -255,6 +255,7 @@ class RobotProcess:
             "missed": self._missed,
             "lag_us": self.books.lag_us(),
             "link": {"frames": counts.frames, "bad": counts.bad, "lost": counts.lost},
+            "process": cost,
             "mode": self._state.mode.mode.value,
             "stop_reasons": self._stop_reasons,
         }

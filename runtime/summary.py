@@ -10,6 +10,7 @@ import orjson
 from perception.pipeline import SeenObject
 from runtime.books import Quantiles
 from runtime.complaint import FAILED, Complaint
+from runtime.footprint import FootprintRow
 
 
 class ObjectRow(TypedDict):
@@ -46,6 +47,7 @@ class RunSummary(TypedDict):
     missed: int
     lag_us: Quantiles
     link: LinkRow
+    process: FootprintRow
     mode: str
     stop_reasons: list[str]
 
