@@ -6,7 +6,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: run test lint tests boundscheck coverage bench clean
+.PHONY: run test lint tests boundscheck coverage bench soak clean
 
 run: $(VENV)/run.stamp
 	@$(BIN)/echolocate run
@@ -37,6 +37,10 @@ bench: $(VENV)/bench.stamp
 	@$(BIN)/python -m tests.bench $(BENCH)
 	@$(BIN)/python -m tests.bench timing $(TIMING)
 	@$(BIN)/python -m tests.bench waking
+
+# An hour and a half of driving in virtual time: does anything grow, compile late, or collect all garbage?
+soak: $(VENV)/test.stamp
+	@$(BIN)/python -m tests.timing.growth $(SOAK)
 
 clean:
 	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage

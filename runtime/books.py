@@ -39,8 +39,9 @@ class Books:
 
     def __init__(self, late_after_s: float) -> None:
         self._late_after_s = late_after_s
-        self._took_s = np.zeros(KEPT)
-        self._lag_s = np.zeros(KEPT)
+        # Written at once: pages of zeros would be taken from the system one by one while the robot drives.
+        self._took_s = np.full(KEPT, 0.0)
+        self._lag_s = np.full(KEPT, 0.0)
         self._worst_s = 0.0
         self._worst_lag_s = 0.0
         self.cycles = 0
