@@ -116,7 +116,7 @@ class RobotProcess:
         keeper = asyncio.create_task(self._link.run(), name="link")
         for refusal in ask(self._settings.realtime):
             self._log.warning(refusal)
-        waker = Waker()
+        waker = Waker(self._clock)
         footprint = Footprint(self._memory)
         try:
             if arm:

@@ -2,21 +2,19 @@
 
 asyncio hands its timeouts to epoll in whole milliseconds, rounded up, and the kernel may add its timer slack on top:
 a cycle that sleeps that way begins 0.7 ms late at the median. A timerfd is a timer that the loop waits for as for any
-other file: it is told an absolute moment in nanoseconds and gets no slack. `tests/bench/waking.py` measures it
-against what else there is.
+other file: it counts nanoseconds and gets no slack. `tests/bench/waking.py` measures it against what else there is.
 """
 
 from __future__ import annotations
 
 import asyncio
 import ctypes
+import math
 import os
 import time
 from collections.abc import Callable
 from typing import Final, Protocol
 
-_ABSOLUTE: Final = 1
-"""TFD_TIMER_ABSTIME."""
 _COUNT_BYTES: Final = 8
 """What is read from a timerfd: how often it fired."""
 _TURNS: Final = 2
@@ -32,10 +30,10 @@ class _TimerSpec(ctypes.Structure):
 
 
 class Alarm(Protocol):
-    """Calls back once, at a moment of the monotonic clock; setting it again forgets the earlier moment."""
+    """Calls back once, after a while; setting it again forgets the earlier moment."""
 
-    def set(self, deadline_s: float) -> None:
-        """Be due at `deadline_s`."""
+    def set(self, left_s: float) -> None:
+        """Be due in `left_s`."""
 
     def close(self) -> None:
         """Never call again."""
@@ -69,12 +67,12 @@ class TimerFd:
             raise OSError(ctypes.get_errno(), "no timer could be made")
         self._loop.add_reader(self._fd, self._due)
 
-    def set(self, deadline_s: float) -> None:
-        """Be due at `deadline_s`; at once where that has passed."""
+    def set(self, left_s: float) -> None:
+        """Be due in `left_s`; at once where that is negative."""
         value = self._spec.value
-        # The zero moment would switch it off.
-        value.seconds, value.nanoseconds = divmod(max(1, round(deadline_s * 1e9)), 1_000_000_000)
-        self._settime(self._fd, _ABSOLUTE, ctypes.byref(self._spec), None)
+        # Zero would switch it off.
+        value.seconds, value.nanoseconds = divmod(max(1, math.ceil(left_s * 1e9)), 1_000_000_000)
+        self._settime(self._fd, 0, ctypes.byref(self._spec), None)
 
     def close(self) -> None:
         """Give the timer back."""
@@ -97,10 +95,10 @@ class LoopTimer:
         self._loop = asyncio.get_running_loop()
         self._handle: asyncio.TimerHandle | None = None
 
-    def set(self, deadline_s: float) -> None:
-        """Be due at `deadline_s`."""
+    def set(self, left_s: float) -> None:
+        """Be due in `left_s`."""
         self.close()
-        self._handle = self._loop.call_later(deadline_s - time.monotonic(), self._ring)
+        self._handle = self._loop.call_later(left_s, self._ring)
 
     def close(self) -> None:
         """Give the timer back."""
@@ -116,12 +114,20 @@ class Waker:
 
     Parameters
     ----------
+    clock : callable
+        The clock that deadlines are given in, s.
     alarm : callable, optional
-        Makes the alarm; a timerfd where there is one.
+        Makes the alarm, in the loop of the first sleep; a timerfd where there is one.
     """
 
-    def __init__(self, alarm: Callable[[Callable[[], None]], Alarm] | None = None) -> None:
-        self._alarm = best_alarm(self._end) if alarm is None else alarm(self._end)
+    def __init__(
+        self,
+        clock: Callable[[], float] = time.monotonic,
+        alarm: Callable[[Callable[[], None]], Alarm] | None = None,
+    ) -> None:
+        self._clock = clock
+        self._make_alarm = best_alarm if alarm is None else alarm
+        self._alarm: Alarm | None = None
         self._sleep: asyncio.Future[None] | None = None
         self._woken = False
 
@@ -131,17 +137,20 @@ class Waker:
         self._end()
 
     async def until(self, deadline_s: float) -> bool:
-        """Sleep until `deadline_s` of `time.monotonic`, and return whether `wake` ended the sleep before.
+        """Sleep until `deadline_s` of the clock, and return whether `wake` ended the sleep before.
 
         The loop has taken in what had arrived before this returns, also where the deadline has passed long ago: a
         cycle after an overrun begins with what waited meanwhile.
         """
-        if self._woken or deadline_s <= time.monotonic():
+        left_s = deadline_s - self._clock()
+        if self._woken or left_s <= 0.0:
             for _ in range(_TURNS):
                 await asyncio.sleep(0.0)
         else:
+            if self._alarm is None:
+                self._alarm = self._make_alarm(self._end)
             self._sleep = asyncio.get_running_loop().create_future()
-            self._alarm.set(deadline_s)
+            self._alarm.set(left_s)
             try:
                 await self._sleep
             finally:
@@ -151,7 +160,9 @@ class Waker:
 
     def close(self) -> None:
         """Give the timer back; nobody may sleep any more."""
-        self._alarm.close()
+        if self._alarm is not None:
+            self._alarm.close()
+            self._alarm = None
 
     def _end(self) -> None:
         if self._sleep is not None and not self._sleep.done():

@@ -293,7 +293,8 @@ def _exchange(
     elif device.plugged and not port.is_open:
         port.open()
     heard = port.read()
-    heard_s = clock()
+    if heard and latency is not None:
+        latency.heard(heard, clock())
     # With no host on the line bytes go nowhere: the pty would keep them for the next one to open it.
     if heard is not None and left:
         sent_s = clock()
@@ -301,8 +302,6 @@ def _exchange(
         if latency is not None:
             latency.sent(left, sent_s)
     if heard:
-        if latency is not None:
-            latency.heard(heard, heard_s)
         device.receive(heard)
 
 
