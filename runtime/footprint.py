@@ -29,8 +29,8 @@ class FootprintRow(TypedDict):
     rss_mb: float | None
     """Memory at the end, 10⁶ bytes."""
     rss_peak_mb: float | None
-    rss_growth_mb: float | None
-    """Since the first cycle."""
+    growth_mb: float | None
+    """Of the process's own memory since the first cycle."""
     compilations: int
     """Kernels compiled or loaded since the first cycle."""
     collections: list[int]
@@ -50,7 +50,7 @@ class Footprint:
         self._memory = memory
         self._start_s = age_s()
         self._signatures = compiled_signatures()
-        self._rss_mb = rss_mb()
+        self._own_mb = own_mb()
         self._wall_s = time.monotonic()
         self._cpu_s = time.process_time()
 
@@ -58,13 +58,13 @@ class Footprint:
         """Return what the run cost up to now."""
         wall_s = time.monotonic() - self._wall_s
         cpu_s = time.process_time() - self._cpu_s
-        now_mb, before_mb = rss_mb(), self._rss_mb
+        now_mb, before_mb = own_mb(), self._own_mb
         return {
             "start_s": _rounded(self._start_s, 2),
             "cpu_share": round(cpu_s / wall_s, 4) if wall_s > 0.0 else 0.0,
-            "rss_mb": _rounded(now_mb, 1),
+            "rss_mb": _rounded(rss_mb(), 1),
             "rss_peak_mb": _rounded(peak_mb(), 1),
-            "rss_growth_mb": None if now_mb is None or before_mb is None else round(now_mb - before_mb, 2),
+            "growth_mb": None if now_mb is None or before_mb is None else round(now_mb - before_mb, 2),
             "compilations": compiled_signatures() - self._signatures,
             "collections": list(self._memory.collections),
         }
@@ -87,6 +87,12 @@ def rss_mb() -> float | None:
 def peak_mb() -> float | None:
     """Return the most it ever had."""
     return _status_mb("VmHWM:")
+
+
+def own_mb() -> float | None:
+    """Return the memory it has filled itself, swapped out or not: pages of files come and go as the system likes."""
+    filled, swapped = _status_mb("RssAnon:"), _status_mb("VmSwap:")
+    return rss_mb() if filled is None else filled + (swapped or 0.0)
 
 
 def _status_mb(name: str) -> float | None:

@@ -18,7 +18,7 @@ from rich.console import Console
 from config.load import load_settings
 from drivers.emulator.device import Truth
 from runtime.complaint import DONE, FAILED
-from runtime.footprint import rss_mb
+from runtime.footprint import own_mb
 from runtime.kernels import compiled_signatures, ready_kernels
 from runtime.memory import MemoryPolicy
 from runtime.modes import Mode
@@ -47,7 +47,7 @@ class Left:
         """Keep the memory policy as a run on a line does."""
         self.memory.cycle_done(SLACK_S)
         if record.cycle == SETTLED_CYCLES:
-            self.before_mb = rss_mb() or math.nan
+            self.before_mb = own_mb() or math.nan
             self.signatures = compiled_signatures()
             self.modes.clear()
         self.modes.add(record.mode.mode)
@@ -64,7 +64,7 @@ def grow(cycles: Annotated[int, Parameter(help="Cycles after the first thousand.
     left = Left(memory)
     with memory.driving():
         simulate(settings, settings.world, 0, (SETTLED_CYCLES + cycles) / settings.cycle.rate_hz, left.on_cycle)
-        after_mb, signatures = rss_mb() or math.nan, compiled_signatures()
+        after_mb, signatures = own_mb() or math.nan, compiled_signatures()
     growth_mb, compilations = round(after_mb - left.before_mb, 3), signatures - left.signatures
     figures: dict[str, Any] = {
         "cycles": cycles,
