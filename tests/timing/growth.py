@@ -39,7 +39,10 @@ class Left:
     """Looks on from the moment when everything is settled."""
 
     memory: MemoryPolicy
+    last: int
+    """The cycle after which the account is drawn up, while everything is still there."""
     before_mb: float = math.nan
+    after_mb: float = math.nan
     signatures: int = 0
     modes: set[Mode] = field(default_factory=set)
 
@@ -51,6 +54,8 @@ class Left:
             self.signatures = compiled_signatures()
             self.modes.clear()
         self.modes.add(record.mode.mode)
+        if record.cycle == self.last:
+            self.after_mb = own_mb() or math.nan
 
 
 @app.default
@@ -61,11 +66,12 @@ def grow(cycles: Annotated[int, Parameter(help="Cycles after the first thousand.
     if settings.world is None:
         return FAILED
     memory = MemoryPolicy()
-    left = Left(memory)
+    last = SETTLED_CYCLES + cycles
+    left = Left(memory, last)
     with memory.driving():
-        simulate(settings, settings.world, 0, (SETTLED_CYCLES + cycles) / settings.cycle.rate_hz, left.on_cycle)
-        after_mb, signatures = own_mb() or math.nan, compiled_signatures()
-    growth_mb, compilations = round(after_mb - left.before_mb, 3), signatures - left.signatures
+        simulate(settings, settings.world, 0, last / settings.cycle.rate_hz, left.on_cycle)
+    signatures = compiled_signatures()
+    growth_mb, compilations = round(left.after_mb - left.before_mb, 3), signatures - left.signatures
     figures: dict[str, Any] = {
         "cycles": cycles,
         "growth_mb": growth_mb,
