@@ -7,7 +7,6 @@ Everything that waits, reads a clock or touches a port is here or below in drive
 from __future__ import annotations
 
 import asyncio
-import gc
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,9 +21,12 @@ from perception.pipeline import Perception
 from runtime.books import Books
 from runtime.commanding import gap_max, gather, give
 from runtime.complaint import FAILED, WRONG_CALL, Complaint
+from runtime.footprint import Footprint, FootprintRow
+from runtime.memory import MemoryPolicy, collect_young
 from runtime.meter import Reading
 from runtime.modes import Mode, Request
 from runtime.phases import Phase
+from runtime.realtime import ask
 from runtime.rhythm import Rhythm
 from runtime.step import STANDSTILL, Command, CycleRecord, State, step
 from runtime.summary import RunSummary, run_summary
@@ -44,10 +46,6 @@ LINE_LOST: Final = "line lost"
 COLLECTION: Final = "garbage collection"
 CALLBACKS: Final = (LINE_OPENED, LINK_RECEIVE, LINE_LOST, COLLECTION)
 """What of ours the loop calls between two cycles."""
-
-COLLECT_EVERY: Final = 20
-COLLECT_SLACK_S: Final = 0.01
-"""Young garbage is collected once in so many cycles, and only with so much time to spare; the old is frozen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +92,7 @@ class RobotProcess:
             timed(LINK_RECEIVE, self._received),
             timed(LINE_LOST, self._closed),
         )
-        self._collect = timed(COLLECTION, lambda: gc.collect(1))
+        self._memory = MemoryPolicy(timed(COLLECTION, collect_young))
         self._stop_reasons: list[str] = []
         self._request: Request | None = None
         self._stop = asyncio.Event()
@@ -126,18 +124,19 @@ class RobotProcess:
         """
         await self._connect()
         keeper = asyncio.create_task(self._link.run(), name="link")
-        gc.collect()
-        gc.freeze()
-        gc.disable()
+        for refusal in ask(self._settings.realtime):
+            self._log.warning(refusal)
+        footprint = Footprint(self._memory)
         try:
             if arm:
                 self.request(Request.ARM)
-            await self._cycle(seconds)
+            with self._memory.driving():
+                await self._cycle(seconds)
         finally:
-            gc.enable()
-            gc.unfreeze()
+            cost = footprint.close()
+            self._rhythm.close()
             await self._shut_down(keeper)
-        return self._summary()
+        return self._summary(cost)
 
     async def _connect(self) -> None:
         """Open the port and wait until the robot is ready."""
@@ -178,8 +177,7 @@ class RobotProcess:
                     self._fail(error)
                     return
                 left_s = rhythm.end(self._clock())
-                if rhythm.books.cycles % COLLECT_EVERY == 0 and left_s > COLLECT_SLACK_S:
-                    self._collect()
+                self._memory.cycle_done(left_s)
 
     def _fail(self, error: Exception) -> None:
         """Halt before anything else, then say what happened; FAULT is not left."""
@@ -264,5 +262,6 @@ class RobotProcess:
         keeper.cancel()
         await asyncio.gather(keeper, return_exceptions=True)
 
-    def _summary(self) -> RunSummary:
-        return run_summary(self._state, self._rhythm.books, self._rhythm.keeper, self._driver, self._stop_reasons)
+    def _summary(self, cost: FootprintRow) -> RunSummary:
+        rhythm = self._rhythm
+        return run_summary(self._state, rhythm.books, rhythm.keeper, self._driver, cost, self._stop_reasons)

@@ -1,6 +1,6 @@
 """The beat of the main process: it waits for the next cycle, and keeps the books of how that went.
 
-Pacer, alarm, timekeeper and watch know nothing of each other; here they are one thing that the process can ask.
+Pacer, waker, timekeeper and watch know nothing of each other; here they are one thing that the process can ask.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from contextlib import AbstractContextManager
 from typing import Final
 
 from config.settings import Settings
-from runtime.alarm import Alarm
 from runtime.books import Books
 from runtime.meter import Meter, Reading
 from runtime.pacing import Begun, Pacer
 from runtime.timekeeping import Timekeeper
+from runtime.wake import Waker
 from runtime.watch import Watch
 
 LATE_SHARE: Final = 0.1
@@ -44,7 +44,7 @@ class Rhythm:
         self._step_s = settings.ring.firing.step_period_s
         self._overruns_max = settings.cycle.overruns_max
         self._read = Meter(clock).read
-        self._alarm = Alarm(clock)
+        self._waker = Waker(clock)
         self._watch = Watch()
         self._pacer: Pacer | None = None
         self.books = Books(LATE_SHARE * self._period_s, is_touched=True)
@@ -59,16 +59,16 @@ class Rhythm:
         """Take note that an echo has just been read from the line."""
         if self._pacer is not None:
             self._pacer.hear(now_s, self.keeper.held_since_s)
-            self._alarm.ring()
+            self._waker.wake()
 
     def wake(self) -> None:
         """End the wait before its time."""
-        self._alarm.ring()
+        self._waker.wake()
 
     async def wait(self) -> Reading | None:
         """Sleep until the next cycle is due and return what the clocks show; None where it was woken before."""
         pacer = self._started()
-        await self._alarm.until(pacer.deadline_s)
+        await self._waker.until(pacer.deadline_s)
         now = self._read()
         return now if now.wall_s >= pacer.deadline_s else None
 
@@ -85,6 +85,10 @@ class Rhythm:
         """End the cycle at `now_s`; return how long the next one leaves, s."""
         self.keeper.end()
         return self._started().advance(now_s) - now_s
+
+    def close(self) -> None:
+        """Give the timer back; there is no further cycle."""
+        self._waker.close()
 
     @property
     def overrun(self) -> str | None:

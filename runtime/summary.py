@@ -11,6 +11,7 @@ from drivers.driver import RobotDriver
 from perception.pipeline import SeenObject
 from runtime.books import Books, Quantiles
 from runtime.complaint import FAILED, Complaint
+from runtime.footprint import FootprintRow
 from runtime.step import State
 from runtime.timekeeping import Timekeeper, Timing
 
@@ -49,6 +50,7 @@ class RunSummary(TypedDict):
     missed: int
     lag_us: Quantiles
     link: LinkRow
+    process: FootprintRow
     mode: str
     stop_reasons: list[str]
     timing: Timing
@@ -83,7 +85,7 @@ def object_row(seen: SeenObject) -> ObjectRow:
 
 
 def run_summary(
-    state: State, books: Books, keeper: Timekeeper, driver: RobotDriver, stop_reasons: list[str]
+    state: State, books: Books, keeper: Timekeeper, driver: RobotDriver, cost: FootprintRow, stop_reasons: list[str]
 ) -> RunSummary:
     """Return the summary of a run that ends in `state`."""
     counts = driver.counts
@@ -95,6 +97,7 @@ def run_summary(
         "missed": books.missed,
         "lag_us": books.lag_us(),
         "link": {"frames": counts.frames, "bad": counts.bad, "lost": counts.lost},
+        "process": cost,
         "mode": state.mode.mode.value,
         "stop_reasons": stop_reasons,
         "timing": keeper.timing(),

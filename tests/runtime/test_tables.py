@@ -10,6 +10,7 @@ from rich.table import Table
 
 from runtime.books import Spread
 from runtime.experiment import Outcome
+from runtime.footprint import FootprintRow
 from runtime.summary import ObjectRow, RunSummary
 from runtime.tables import Units, length, objects_table, place, table_2, timing_table, timing_verdict, verdict
 from runtime.timekeeping import Timing
@@ -78,8 +79,12 @@ def test_where_the_time_went_and_by_whose_fault() -> None:
         "callbacks": {"link receive": spread}, "overruns": 2, "missed": 1,
         "faults": {"outside the process": 6, "callback Recorder.flush": 1},
     }  # fmt: skip
+    cost: FootprintRow = {
+        "start_s": 0.9, "cpu_share": 0.03, "rss_mb": 190.0, "rss_peak_mb": 195.0, "growth_mb": 0.0, "compilations": 0,
+        "collections": [0, 12, 0],
+    }  # fmt: skip
     summary: RunSummary = {
-        "objects": [], "cycles": 240, "cycle_us": spread, "late": 7, "missed": 1, "lag_us": spread,
+        "objects": [], "cycles": 240, "process": cost, "cycle_us": spread, "late": 7, "missed": 1, "lag_us": spread,
         "link": {"frames": 0, "bad": 0, "lost": 0}, "mode": "DRIVE", "stop_reasons": [], "timing": timing,
     }  # fmt: skip
     console = Console(record=True, width=110, file=io.StringIO(), color_system=None)
