@@ -19,6 +19,7 @@ from drivers.emulator.device import EmulatedRobot, Truth
 from drivers.emulator.memory import MemoryLine
 from drivers.messages import Pose
 from perception.pipeline import Perception
+from runtime.allowance import Allowance, Quanta
 from runtime.books import Books
 from runtime.commanding import gather, give
 from runtime.modes import Mode, Request
@@ -56,6 +57,9 @@ def simulate(
     seed: int,
     seconds_max: float,
     on_cycle: Callable[[CycleRecord, Truth], None] | None = None,
+    *,
+    allowance: Allowance | None = None,
+    on_state: Callable[[State, Pose], None] | None = None,
 ) -> Simulated:
     """Drive through `world` until the leg is done, the robot stops for a reason, or the time is up.
 
@@ -71,7 +75,12 @@ def simulate(
         Virtual time after which the run ends.
     on_cycle : callable, optional
         Gets every record, and the truth of that moment.
+    allowance : Allowance, optional
+        How much refinement a cycle may do; `QUANTA_PER_CYCLE` where not given.
+    on_state : callable, optional
+        Gets the state after every cycle, and where the odometry began.
     """
+    allowance = Quanta(QUANTA_PER_CYCLE) if allowance is None else allowance
     robot = EmulatedRobot(settings, world, seed)
     driver = DenningRobot(settings)
     line = MemoryLine(driver, robot)
@@ -86,10 +95,13 @@ def simulate(
         request = Request.ARM if state.mode.mode is Mode.READY else None
         inputs = gather(driver, now, request)
         step_s = time.perf_counter()
-        record = step(state, inputs, settings, lambda c: give(driver, c), enough_quanta)
+        allowance.begin()
+        record = step(state, inputs, settings, lambda c: give(driver, c), allowance)
         books.enter(time.perf_counter() - step_s)
         if on_cycle is not None:
             on_cycle(record, robot.truth)
+        if on_state is not None:
+            on_state(state, start)
         if state.mode.mode is Mode.SAFE_STOP or (state.leg is not None and state.leg.done):
             until = min(until, now + SETTLING_S)
     return Simulated(state, start, robot.truth, now, time.perf_counter() - began, books)

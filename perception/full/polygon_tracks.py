@@ -14,7 +14,8 @@ from perception.full.contact import HITS as HIT
 from perception.full.contact import NEAR as NEARBY
 from perception.full.polygon import ACROSS, ALONG, MISS, SURE, TURN, moved, predict
 from perception.full.polygon_births import WHOLE, bears, pflatten, pput, prestat, pscore
-from perception.full.refine import SIZE, bounded_exp
+from perception.full.refine import bounded_exp
+from perception.full.selection import choose_polygon
 from perception.full.state import (
     DIRTY,
     ESTABLISHED,
@@ -320,7 +321,7 @@ def prefine(s: State, p: Settings, t: int) -> None:
 
 @kernel
 def pquantum(s: State, p: Settings, threshold: float) -> bool:
-    """Refine the polygon with the most unseen evidence for its size, and return whether there was one.
+    """Refine the polygon whose turn it is, and return whether there was one.
 
     Parameters
     ----------
@@ -329,14 +330,7 @@ def pquantum(s: State, p: Settings, threshold: float) -> bool:
     threshold : float
         Less than this share of unseen evidence is not worth the work.
     """
-    best = threshold
-    chosen = -1
-    for t in range(s.pi.shape[0]):
-        if s.pi[t, ST] != FREE and s.pi[t, DIRTY] > 0:
-            v = s.pi[t, DIRTY] / (s.pi[t, NRES] + SIZE)
-            if v > best:
-                best = v
-                chosen = t
+    chosen = choose_polygon(s, threshold)
     if chosen < 0:
         return False
     prefine(s, p, chosen)
