@@ -18,7 +18,7 @@ class Allowance(Protocol):
         """Begin a cycle."""
         ...
 
-    def __call__(self, done: int) -> bool:
+    def __call__(self, done: int, /) -> bool:
         """Say whether there may be another quantum after `done` in this cycle."""
         ...
 

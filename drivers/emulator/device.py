@@ -19,6 +19,7 @@ from config.world import WorldConfig
 from drivers.denning import frames
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Drive, Halt, Hello, NakCode, Pattern, Release, RobotFrame
+from drivers.denning.wire import echo_byte
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.body import BRAKE_S, RAMP_S, Body
 from drivers.emulator.faults import (
@@ -46,8 +47,7 @@ ODOMETRY_PERIOD_MS = 20
 TICK_US = 5_000
 """The body moves in steps of at most this length."""
 NAME = "denning"
-_LATCHED, _DEADMAN = int(Flags.LATCHED), int(Flags.DEADMAN)
-"""As plain numbers: the flags are asked at every event, and an enumeration takes its time to answer."""
+_LATCHED, _DEADMAN = int(Flags.LATCHED), int(Flags.DEADMAN)  # asked at every event: an enumeration is slow
 _STILL = Twist(0.0, 0.0)
 
 
@@ -123,10 +123,8 @@ class EmulatedRobot:
         self._sonar = Sonar(robot.ring, scene, world.acoustics, of_sonar)
         self._uart = Uart(robot.link.baud)
         self._outbox = bytearray()
-        self._now_us = 0
-        self._moved_us = 0
-        self._ahead_us: int | None = None
-        """The next event as it was last looked for; unknown where something has happened since."""
+        self._now_us = self._moved_us = 0
+        self._ahead_us: int | None = None  # the next event, until something happens
         self._faults = FaultSchedule(faults)
         self._boot_id = self._new_boot_id() if boot_id is None else boot_id
         self._boot(clock_start_us)
@@ -313,7 +311,7 @@ class EmulatedRobot:
         fired = [i for i in range(self._sensors) if mask >> i & 1]
         ranges = self._sonar.fire(self._body.pose, self._body.ring_yaw, fired, window_m)
         stuck = {fault.sensor: fault.range_m for fault in self._faults.all(StuckSensor)}
-        return tuple(_echo_byte(stuck[i] if i in stuck else float(ranges[i])) for i in fired)
+        return tuple(echo_byte(stuck[i] if i in stuck else float(ranges[i])) for i in fired)
 
     def _report_odometry(self) -> None:
         body = self._body
@@ -400,11 +398,3 @@ class EmulatedRobot:
         left = self._uart.take(self._now_us)
         if left and self.plugged:
             self._outbox += left
-
-
-def _echo_byte(range_m: float | None) -> int:
-    if range_m is None:
-        return frames.FAULT
-    if not math.isfinite(range_m):
-        return frames.NO_ECHO
-    return min(frames.NO_ECHO, max(frames.TENTHS_MIN, round(range_m / frames.TENTH_FT_M)))
