@@ -38,9 +38,11 @@ bench: $(VENV)/bench.stamp
 	@$(BIN)/python -m tests.bench timing $(TIMING)
 	@$(BIN)/python -m tests.bench waking
 
-# An hour and a half of driving in virtual time: does anything grow, compile late, or collect all garbage?
+# An hour and a half of driving in virtual time: does anything grow, compile late, or collect all garbage, and does any
+# cycle take more than its budget and a quantum?
 soak: $(VENV)/test.stamp
 	@$(BIN)/python -m tests.timing.growth $(SOAK)
+	@$(BIN)/python -m tests.timing.budget $(SOAK)
 
 clean:
 	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage

@@ -330,7 +330,7 @@ def pquantum(s: State, p: Settings, threshold: float) -> bool:
     threshold : float
         Less than this share of unseen evidence is not worth the work.
     """
-    chosen = choose_polygon(s, threshold)
+    chosen = choose_polygon(s, p, threshold)
     if chosen < 0:
         return False
     prefine(s, p, chosen)

@@ -40,8 +40,6 @@ SIZE: Final = 8.0
 """A small object's readings are taken for so many more."""
 OWED: Final = 1e-6
 """By so much what is worked off to the end is above the threshold by itself."""
-NEAR_M: Final = 3.0
-"""An object as far as this from the robot counts half as much as one beside it."""
 PATIENCE: Final = 60
 """Quanta that may go to others; then an object goes before all that are not passed over as often."""
 OVERDUE: Final = 1e9
@@ -73,11 +71,14 @@ def worth_polygon(s: State, t: int) -> float:
 
 
 @kernel
-def rank(s: State, v: float, x: float, y: float, passed: int) -> float:
-    """Return the place in the row of something of worth `v` at (x, y), passed over so often: the largest is next."""
+def rank(s: State, p: Settings, v: float, x: float, y: float, passed: int) -> float:
+    """Return the place in the row of something of worth `v` at (x, y), passed over so often: the largest is next.
+
+    At the end of the ring's reach it counts half as much as beside the robot.
+    """
     if passed > PATIENCE:
         return OVERDUE + passed
-    return v * NEAR_M / (NEAR_M + math.hypot(x - s.g[HERE_X], y - s.g[HERE_Y]))
+    return v * p.range_max / (p.range_max + math.hypot(x - s.g[HERE_X], y - s.g[HERE_Y]))
 
 
 @kernel
@@ -97,7 +98,7 @@ def choose(s: State, p: Settings, threshold: float) -> int:
     for t in range(s.ti.shape[0]):
         v = worth(s, p, t, threshold)
         if v > threshold:
-            v = rank(s, v, s.tf[t, TX], s.tf[t, TY], s.ti[t, PASSED])
+            v = rank(s, p, v, s.tf[t, TX], s.tf[t, TY], s.ti[t, PASSED])
             s.ti[t, PASSED] += 1
             if v > best:
                 best = v
@@ -108,14 +109,14 @@ def choose(s: State, p: Settings, threshold: float) -> int:
 
 
 @kernel
-def choose_polygon(s: State, threshold: float) -> int:
+def choose_polygon(s: State, p: Settings, threshold: float) -> int:
     """Return the polygon whose turn it is, as `choose` does the circle."""
     best = -1.0
     chosen = -1
     for t in range(s.pi.shape[0]):
         v = worth_polygon(s, t)
         if v > threshold:
-            v = rank(s, v, s.pf[t, PX], s.pf[t, PY], s.pi[t, PASSED])
+            v = rank(s, p, v, s.pf[t, PX], s.pf[t, PY], s.pi[t, PASSED])
             s.pi[t, PASSED] += 1
             if v > best:
                 best = v

@@ -67,7 +67,7 @@ def test_the_rule_against_its_oracle() -> None:
         want, waits = naive_tracks.next_in_turn(
             i[:, ST] != FREE, i[:, DIRTY], i[:, NRES], f[:, [R00, R11]].max(axis=1),
             (i[:, QUIET] > P.quiet) & (i[:, POLISH] > 0), np.hypot(*(f[:, [TX, TY]] - s.g[[HERE_X, HERE_Y]]).T),
-            passed, THRESHOLD,
+            passed, THRESHOLD, P.range_max,
         )  # fmt: skip
         assert selection.is_waiting(s, P, THRESHOLD) == waits.any()
         assert selection.choose(s, P, THRESHOLD) == want
@@ -96,11 +96,11 @@ def test_polygons_are_chosen_by_the_same_rule() -> None:
     s = shared()
     s.pi[:TRACKS, ST], s.pi[:TRACKS, NRES], s.pi[:TRACKS, DIRTY] = ESTABLISHED, 100, 10
     s.pf[2, [PX, PY]] = s.g[[HERE_X, HERE_Y]] = (4.0, 4.0)
-    assert selection.choose_polygon(s, THRESHOLD) == 2
+    assert selection.choose_polygon(s, P, THRESHOLD) == 2
     s.pi[7, PASSED] = selection.PATIENCE + 1
-    assert selection.choose_polygon(s, THRESHOLD) == 7
+    assert selection.choose_polygon(s, P, THRESHOLD) == 7
     s.pi[:, DIRTY] = 0
-    assert selection.choose_polygon(s, THRESHOLD) == -1
+    assert selection.choose_polygon(s, P, THRESHOLD) == -1
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 30.0))
