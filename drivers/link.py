@@ -82,6 +82,11 @@ class Link:
         return self._line is not None and self._line.up and self._line.waiting <= _WRITABLE_MAX
 
     @property
+    def waiting(self) -> int:
+        """Bytes sent that have not left this process; never more than 4 KiB."""
+        return 0 if self._line is None else self._line.waiting
+
+    @property
     def last_error(self) -> str | None:
         """Why the line was lost or could not be opened the last time, in one line; None while all is well."""
         return self._last_error
