@@ -202,7 +202,8 @@ class DenningRobot:
     def _listen(self) -> None:
         """Notice a robot that has fallen silent, one that no longer hears, and a ring that does not fire."""
         silence_max_s = self._config.link.silence_max_s
-        silent_s, untaken_s = self._now_s - self._odometry_s, self._watch.untaken_s(self._now_s)
+        silent_s = self._now_s - self._odometry_s
+        untaken_s = self._watch.untaken_s(self._odometry_s)  # what came after it, it cannot tell of
         if silent_s > silence_max_s:
             self._go_down(troubles.silence(silent_s, others=self._now_s - self._frame_s <= silence_max_s))
         elif untaken_s > _UNTAKEN_SHARE * silence_max_s:

@@ -44,9 +44,9 @@ class DriveWatch:
         """Wait no more for what has been sent: it was refused, or given up."""
         self._sent.clear()
 
-    def untaken_s(self, now_s: float) -> float:
-        """Return since when DRIVEs have gone on the line of which none was taken; 0 where all is well."""
-        return now_s - self._sent[0][1] if self._follows and self._sent else 0.0
+    def untaken_s(self, heard_s: float) -> float:
+        """Return for how long DRIVEs have gone and none was taken, as odometry that came at `heard_s` tells it."""
+        return max(0.0, heard_s - self._sent[0][1]) if self._follows and self._sent else 0.0
 
 
 class RingWatch:

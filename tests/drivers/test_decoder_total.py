@@ -108,8 +108,8 @@ def count_false(corrupt: int, seed: int, count: int) -> int:
     """Spoil `count` odometry frames by overwriting `corrupt` bytes in a row, and count those that still pass."""
     rng = np.random.default_rng(seed)
     values = rng.integers(-(2**15), 2**15, (256, 6)).tolist()
-    good = [encode(Odom(k, 1000 * k, *row, 0, 0))[:-1] for k, row in enumerate(values)]
-    bodies = [cobs.decode(wire) for wire in good]
+    good = [Odom(k, 1000 * k, x, y, a, b, v, w, 0, 0) for k, (x, y, a, b, v, w) in enumerate(values)]
+    bodies = [cobs.decode(encode(odom)[:-1]) for odom in good]
     starts = rng.integers(0, len(bodies[0]) - corrupt + 1, count).tolist()
     noise = rng.bytes(count * corrupt)
     decoder, false = Decoder("robot"), 0
