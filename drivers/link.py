@@ -309,9 +309,17 @@ async def _open_off_loop(config: LinkConfig, opener: OpenPort, timeout_s: float)
                 port.close()
 
     threading.Thread(target=work, name=f"open {config.port}", daemon=True).start()
+    taken = False
     try:
-        return await asyncio.wait_for(opened, timeout_s)
+        # Not `wait_for`: before Python 3.12 it swallows a cancellation that comes together with the result.
+        async with asyncio.timeout(timeout_s):
+            port = await opened
+        taken = True
     except TimeoutError as e:
         raise LinkError(explain(config, TimeoutError(f"{timeout_s:g} s so far"))) from e
     except OPENING_ERRORS as e:
         raise LinkError(explain(config, e)) from e
+    finally:
+        if not taken and opened.done() and not opened.cancelled() and opened.exception() is None:
+            opened.result().close()
+    return port

@@ -10,9 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule, run_state_machine_as_test
 
 from config.robot import LinkConfig
 from drivers.link import Link
@@ -192,7 +192,18 @@ class LinkMachine(RuleBasedStateMachine):
             self.loop.close()
 
 
-LinkMachine.TestCase.settings = settings(
-    max_examples=25, stateful_step_count=25, deadline=None, suppress_health_check=list(HealthCheck)
+QUICK = settings(
+    max_examples=25,
+    stateful_step_count=25,
+    deadline=None,
+    derandomize=True,  # `make soak` looks further
+    phases=(Phase.generate,),  # each step takes real time, and one that fails its whole patience
+    suppress_health_check=list(HealthCheck),
 )
+LinkMachine.TestCase.settings = QUICK
 TestLink = LinkMachine.TestCase
+
+
+@pytest.mark.soak
+def test_the_link_for_longer() -> None:
+    run_state_machine_as_test(LinkMachine, settings=settings(QUICK, max_examples=3000, derandomize=False))

@@ -127,6 +127,32 @@ async def test_opening_blocks(ends: Ends) -> None:
     await link.stop()
 
 
+@pytest.mark.parametrize("opens", [True, False])
+async def test_wait_for_swallows_a_cancellation_that_comes_with_the_result(ends: Ends, opens: bool) -> None:
+    """Ours ends when it is told to, also in the very turn of the loop in which the port opens, and closes it."""
+    host, release, ports = Host(), threading.Event(), list[serial.Serial]()
+
+    def opener(config: LinkConfig) -> serial.Serial:
+        release.wait(PATIENCE_S)
+        if not opens:
+            raise serial.SerialException(2, "no such port")
+        ports.append(open_port(config))
+        return ports[-1]
+
+    link = host.link(ends.path, opener=opener)
+    task = asyncio.create_task(link.run())
+    await asyncio.sleep(0)
+    (thread,) = [one for one in threading.enumerate() if one.name == f"open {ends.path}"]
+    release.set()
+    thread.join()  # what it has to say waits for the loop's next turn; so does the cancellation behind it
+    asyncio.get_running_loop().call_soon(task.cancel)
+    done, _ = await asyncio.wait([task], timeout=PATIENCE_S)
+    assert done, "it was told to end and goes on for ever"
+    assert task.cancelled()
+    assert not any(port.is_open for port in ports)
+    assert not link.is_open
+
+
 async def test_the_fast_fork_freezes_the_loop_on_a_peer_that_stops_reading(ends: Ends) -> None:
     """Ours never waits for the port: with the line full every call returns, and the loop turns."""
     host = Host()
