@@ -60,11 +60,19 @@ class _Clerk:
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         self._config.stash[promises.LEDGER].take_report(report)
 
-    def pytest_sessionfinish(self) -> None:
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
         page = self._config.getoption("promises")
-        if page is not None:
-            soak = Path(page).name == promises.SOAK_PAGE.name
-            promises.write(self._config.stash[promises.LEDGER], Path(page), soak=soak)
+        if page is None:
+            return
+        ledger, soak = (
+            self._config.stash.get(promises.LEDGER, promises.Ledger()),
+            Path(page).name == promises.SOAK_PAGE.name,
+        )
+        try:
+            Path(page).write_text(promises.render(ledger, soak=soak), encoding="utf-8")
+        except ValueError as error:
+            self._config.get_terminal_writer().line(f"\n{page} is left as it is: {error}", red=True)
+            session.exitstatus = pytest.ExitCode.USAGE_ERROR
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -192,18 +192,3 @@ def render(ledger: Ledger, *, soak: bool) -> str:
     lines += ["", "| promise | test | measured |", "|---|---|---|"]
     lines += [f"| {one} | `{test}` | {'<br>'.join(ledger.results[test]) or 'passed'} |" for one, test in rows]
     return "\n".join(lines) + "\n"
-
-
-def write(ledger: Ledger, path: Path, *, soak: bool) -> None:
-    """Write the page to `path`.
-
-    Raises
-    ------
-    pytest.UsageError
-        There is nothing complete to write; the page that is there is left as it is.
-    """
-    try:
-        page = render(ledger, soak=soak)
-    except ValueError as error:
-        raise pytest.UsageError(f"{path} is left as it is: {error}") from error
-    path.write_text(page, encoding="utf-8")

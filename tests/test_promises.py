@@ -72,7 +72,8 @@ def test_a_run_writes_what_its_tests_measured_and_nothing_where_one_fails(tmp_pa
         assert written.count("found 1<br>found 7 |") == 2
         assert PROMISES["P4"].figure in written
         assert PROMISES["P5"].figure not in written
-    assert "is left as it is: did not pass: " in done.stderr
+    assert "is left as it is: did not pass: " in done.stdout
+    assert "assert 7 in (1, 8)" in done.stdout, "and what failed is told as ever"
 
 
 def test_a_promise_that_only_a_soak_test_carries_is_not_kept() -> None:

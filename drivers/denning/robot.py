@@ -205,7 +205,9 @@ class DenningRobot:
         silent_s = self._now_s - self._odometry_s
         untaken_s = self._watch.untaken_s(self._odometry_s)  # what came after it, it cannot tell of
         if silent_s > silence_max_s:
-            self._go_down(troubles.silence(silent_s, others=self._now_s - self._frame_s <= silence_max_s))
+            # An echo may well come right after the last odometry of all.
+            others = self._frame_s - self._odometry_s > 0.5 * silence_max_s
+            self._go_down(troubles.silence(silent_s, others=others))
         elif untaken_s > _UNTAKEN_SHARE * silence_max_s:
             self._go_down(troubles.deafness(untaken_s))
         elif self._ring.should_ask(self._now_s):

@@ -652,6 +652,15 @@ def test_missing_odometry_alone_is_down_too(bench: Bench) -> None:
     assert "no odometry" in (bench.robot.trouble or "")
 
 
+def test_an_echo_just_after_the_last_odometry_does_not_make_it_a_robot_that_talks(bench: Bench) -> None:
+    t_us = bench.run(0.2, t_us=0)
+    bench.pass_time(0.01)
+    bench.say(Echo(0, t_us, 0, 1, (10,)))
+    bench.pass_time(0.4)
+    assert bench.state() is LineState.DOWN
+    assert "nothing heard" in (bench.robot.trouble or "")
+
+
 def test_a_restart_between_two_lines_is_noticed(bench: Bench) -> None:
     bench.odom(5_000_000)
     bench.say(Echo(0, 5_000_000, 0, 1, (10,)))

@@ -114,9 +114,6 @@ class ModesMachine(RuleBasedStateMachine):
         state, seen = self.state, self.seen
         if state.mode is Mode.DRIVE:
             assert seen.line is LineState.READY
-            assert (
-                not seen.flags & (Flags.LATCHED | Flags.BUMPER | Flags.MOTOR_FAULT) or self.entries[-1] is Mode.DRIVE
-            )
             assert state.reason is None
             assert state.arming_s is None
         if state.mode is Mode.SAFE_STOP:
