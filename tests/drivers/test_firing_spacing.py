@@ -34,6 +34,7 @@ def patterns(rng: np.random.Generator) -> list[Pattern]:
     return found
 
 
+@pytest.mark.compiled
 def test_a_million_firings_through_reconnects(measured: Callable[[str], None]) -> None:
     """Each reconnect sets a pattern, the same or another, at any moment; none fires into another's window."""
     rng = np.random.default_rng(11)

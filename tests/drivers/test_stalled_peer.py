@@ -227,7 +227,7 @@ HOWS = ("mute", "not reading", "mute and not reading")
 @pytest.mark.realtime
 @pytest.mark.parametrize("how", HOWS)
 async def test_a_stalled_peer_is_harmless(tmp_path: Path, how: str, measured: Callable[[str], None]) -> None:
-    measured(await survive(tmp_path / "robot", how, 5.0 if how == "mute and not reading" else 2.0))
+    measured(await survive(tmp_path / "robot", how, 5.0))
 
 
 @pytest.mark.soak
