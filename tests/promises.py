@@ -2,7 +2,7 @@
 
 A test carries a promise by `@pytest.mark.promise("P4")` and tells what it measured by the fixture `measured`. The
 hooks in `conftest.py` call in here: an unknown ID ends every run before it begins, an ID that no test carries ends a
-run of the whole suite, and `--promises PAGE` writes the page of what was promised and what was measured.
+run of the whole suite, and `--promises=PAGE` writes the page of what was promised and what was measured.
 
 To add a promise, add its entry to `PROMISES` and mark a test with its ID.
 """
