@@ -125,10 +125,10 @@ class LinkConfig(Strict):
     """A command unanswered for this long is sent again."""
     tries: int = Field(default=3, ge=1, le=100)
     """After this many unanswered tries the link is down."""
-    silence_max_s: float = Field(default=0.5, ge=0.05, le=60.0)
-    """With nothing heard for this long the link is down; odometry comes also when still."""
+    silence_max_s: float = Field(default=0.4, ge=0.05, le=60.0)
+    """With no odometry for this long the link is down; it comes also when still. Noticed by the next cycle."""
     reopen_first_s: float = Field(default=0.05, gt=0.0, le=60.0)
-    reopen_max_s: float = Field(default=1.0, gt=0.0, le=600.0)
+    reopen_max_s: float = Field(default=0.5, gt=0.0, le=600.0)
     """First and longest wait between attempts to open the port; it doubles in between."""
 
 

@@ -8,12 +8,15 @@ tests marked `realtime` say nothing there and are skipped.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from rich.console import Console
 
 from config.load import load_settings
 from runtime.kernels import ready_kernels, use_cache
+from tests import promises
 
 use_cache()
 
@@ -26,7 +29,13 @@ def slowed_down() -> str | None:
     return None
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--promises", metavar="PAGE", help="write what was measured, see tests/promises.py")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    promises.collect(config, items)
     slow = slowed_down()
     if slow is None:
         return
@@ -34,6 +43,46 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.get_closest_marker("realtime") is not None:
             item.add_marker(skip)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if item.get_closest_marker(promises.CARRIES) is not None:
+        item.user_properties.append((promises.CARRIES, ""))
+
+
+class _Clerk:
+    """Enters what tests report into the ledger, and writes the page at the end."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        self._config = config
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        self._config.stash[promises.LEDGER].take_report(report)
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        page = self._config.getoption("promises")
+        if page is None:
+            return
+        ledger, soak = (
+            self._config.stash.get(promises.LEDGER, promises.Ledger()),
+            Path(page).name == promises.SOAK_PAGE.name,
+        )
+        try:
+            Path(page).write_text(promises.render(ledger, soak=soak), encoding="utf-8")
+        except ValueError as error:
+            self._config.get_terminal_writer().line(f"\n{page} is left as it is: {error}", red=True)
+            session.exitstatus = pytest.ExitCode.USAGE_ERROR
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.pluginmanager.register(_Clerk(config), "promises")
+
+
+@pytest.fixture
+def measured(request: pytest.FixtureRequest) -> Callable[[str], None]:
+    """Tell what a test measured, for the page of promises."""
+    return lambda text: request.node.user_properties.append((promises.MEASURED, text))
 
 
 @pytest.fixture(scope="session", autouse=True)

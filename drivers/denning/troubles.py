@@ -73,6 +73,14 @@ def silence(silent_s: float, *, others: bool) -> str:
     )
 
 
+def deafness(untaken_s: float) -> str:
+    """Return what to make of DRIVEs that the odometry does not name."""
+    return (
+        f"the robot can be heard and has not taken a DRIVE for {untaken_s:.2f} s; the line to it is broken or its "
+        f"receiver hangs: check the cable, then restart the robot"
+    )
+
+
 def refusal(command: str, code: int) -> str:
     """Return what to make of a NAK."""
     meaning = _MEANINGS.get(NakCode(code), "") if code in list(NakCode) else "for a reason this program does not know"

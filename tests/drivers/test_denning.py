@@ -55,6 +55,7 @@ class Bench:
         self.robot = DenningRobot(config)
         self.now = 100.0
         self.ident = IDENT
+        self.last_drive = 0
         self._ears = Decoder("host")
         self._seq = 0
 
@@ -264,7 +265,7 @@ def test_a_refused_pattern_is_trouble(code: int, text: str) -> None:
         raise AssertionError(bench.robot.trouble)
 
 
-def test_the_newest_drive_wins_and_is_saturated(bench: Bench) -> None:
+def test_the_newest_drive_wins_and_is_held_to_the_limits_of_the_body(bench: Bench) -> None:
     bench.robot.drive(Twist(0.1, 0.2))
     bench.robot.drive(Twist(0.3054, -0.25))
     (drive,) = bench.heard()
@@ -274,7 +275,18 @@ def test_the_newest_drive_wins_and_is_saturated(bench: Bench) -> None:
     bench.robot.drive(Twist(1e9, -1e9))
     (drive,) = bench.heard()
     assert isinstance(drive, Drive)
-    assert (drive.v_mm_s, drive.w_mrad_s) == (32767, -32768)
+    assert (drive.v_mm_s, drive.w_mrad_s) == (600, -1000)
+
+
+def test_a_limit_is_not_passed_by_rounding() -> None:
+    body = CONFIG.body.model_copy(update={"speed_max_m_s": 0.3057, "turn_max_rad_s": 40.0})
+    bench = Bench(CONFIG.model_copy(update={"body": body}))
+    bench.open()
+    bench.greet()
+    bench.robot.drive(Twist(0.3057, 39.0))
+    (drive,) = bench.heard()
+    assert isinstance(drive, Drive)
+    assert (drive.v_mm_s, drive.w_mrad_s) == (305, 32767)
 
 
 @pytest.mark.parametrize("twist", [Twist(math.nan, 0.0), Twist(0.0, math.inf)])
@@ -541,16 +553,95 @@ def test_silence_is_down_and_motion_does_not_resume_by_itself(bench: Bench) -> N
     t_us = bench.run(1.0, t_us=0)
     assert bench.state() is LineState.READY
     bench.robot.drive(Twist(0.1, 0.0))
-    bench.pass_time(0.49)
+    bench.pass_time(0.39)
     assert bench.state() is LineState.READY
     bench.robot.release()
     bench.pass_time(0.02)
     assert bench.state() is LineState.DOWN
-    assert "nothing heard for 0.51 s" in (bench.robot.trouble or "")
+    assert "nothing heard for 0.41 s" in (bench.robot.trouble or "")
     assert bench.heard() == []
     bench.run(1.0, t_us=t_us + 600_000)
     assert bench.state() is LineState.READY
     assert only(bench.heard(), Drive) == []
+
+
+def drive_on(bench: Bench, seconds: float, t_us: int, *, deaf: bool = False, flags: int = 0) -> int:
+    """Drive at 20 Hz with a robot that names the DRIVE it took last, but for the time that it is deaf."""
+    last = bench.last_drive
+    for _ in range(round(seconds / 0.05)):
+        bench.robot.drive(Twist(0.1, 0.0))
+        taken = [frame.seq for frame in bench.answer() if isinstance(frame, Drive)]
+        last = last if deaf else taken[-1] if taken else last
+        bench.now += 0.05
+        t_us += 50_000
+        bench.odom(t_us, last_drive_seq=last, flags=flags)
+        bench.say(Echo(0, t_us, 0, 1, (10,)))
+        bench.robot.tick(bench.now)
+    bench.last_drive = last
+    return t_us
+
+
+def test_a_robot_that_talks_on_but_takes_no_drive_is_down(bench: Bench) -> None:
+    t_us = drive_on(bench, 1.0, 0)
+    assert bench.state() is LineState.READY
+    drive_on(bench, 0.3, t_us, deaf=True)
+    assert bench.state() is LineState.READY
+    drive_on(bench, 0.1, t_us + 300_000, deaf=True)
+    assert bench.state() is LineState.DOWN
+    assert "can be heard and has not taken a DRIVE for 0.35 s" in (bench.robot.trouble or "")
+    assert "check the cable" in (bench.robot.trouble or "")
+
+
+def test_a_robot_that_never_names_the_drive_it_took_is_not_held_to_it(bench: Bench) -> None:
+    drive_on(bench, 30.0, 0, deaf=True)
+    assert bench.state() is LineState.READY
+
+
+def test_a_latched_robot_takes_no_drive_and_that_is_no_trouble(bench: Bench) -> None:
+    t_us = drive_on(bench, 1.0, 0)
+    drive_on(bench, 2.0, t_us, deaf=True, flags=1)
+    assert bench.state() is LineState.READY
+
+
+def test_lost_frames_are_no_deafness(bench: Bench) -> None:
+    t_us = drive_on(bench, 1.0, 0)
+    for _ in range(20):
+        t_us = drive_on(bench, 0.25, t_us, deaf=True)
+        t_us = drive_on(bench, 0.05, t_us)
+    assert bench.state() is LineState.READY
+
+
+@pytest.mark.parametrize("boot_id", [IDENT.boot_id, 0xB002])
+def test_a_robot_whose_ring_has_fallen_silent_is_asked_who_it_is(bench: Bench, boot_id: int) -> None:
+    """A restart just as the clock wraps shows in nothing but that: the pattern is gone, and the odometry goes on."""
+    t_us = bench.run(0.45, t_us=2**32 - 500_000)
+    bench.robot.take()
+    bench.ident = replace(IDENT, boot_id=boot_id)
+    heard: list[Frame] = []
+    for _ in range(10):
+        t_us += PERIOD_US
+        bench.now += 0.02
+        bench.odom(t_us)
+        bench.robot.tick(bench.now)
+        heard += bench.answer()
+    heard += bench.answer()
+    restarted = boot_id != IDENT.boot_id
+    assert [type(frame) for frame in heard] == ([Hello, Pattern] if restarted else [Hello])
+    assert bench.robot.take().rebooted == restarted
+    assert bench.state() is LineState.READY
+    assert bench.robot.trouble is None
+
+
+def test_a_silent_ring_is_asked_about_at_a_modest_pace(bench: Bench) -> None:
+    hellos, t_us = 0, 0
+    for _ in range(500):
+        t_us += PERIOD_US
+        bench.now += 0.02
+        bench.odom(t_us)
+        bench.robot.tick(bench.now)
+        hellos += len(only(bench.heard(), Hello))
+    assert bench.state() is LineState.READY, "nobody need answer"
+    assert 15 <= hellos <= 20
 
 
 def test_missing_odometry_alone_is_down_too(bench: Bench) -> None:
@@ -559,6 +650,15 @@ def test_missing_odometry_alone_is_down_too(bench: Bench) -> None:
         bench.say(Echo(0, 5, 0, 1, (10,)))
     assert bench.state() is LineState.DOWN
     assert "no odometry" in (bench.robot.trouble or "")
+
+
+def test_an_echo_just_after_the_last_odometry_does_not_make_it_a_robot_that_talks(bench: Bench) -> None:
+    t_us = bench.run(0.2, t_us=0)
+    bench.pass_time(0.01)
+    bench.say(Echo(0, t_us, 0, 1, (10,)))
+    bench.pass_time(0.4)
+    assert bench.state() is LineState.DOWN
+    assert "nothing heard" in (bench.robot.trouble or "")
 
 
 def test_a_restart_between_two_lines_is_noticed(bench: Bench) -> None:

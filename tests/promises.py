@@ -1,0 +1,194 @@
+"""The promises this program makes, and the machinery that ties each to the tests that carry it.
+
+A test carries a promise by `@pytest.mark.promise("P4")` and tells what it measured by the fixture `measured`. The
+hooks in `conftest.py` call in here: an unknown ID ends every run before it begins, an ID that no test carries ends a
+run of the whole suite, and `--promises=PAGE` writes the page of what was promised and what was measured.
+
+To add a promise, add its entry to `PROMISES` and mark a test with its ID.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "promises.md"
+"""What `make promises` writes."""
+SOAK_PAGE = ROOT / "docs" / "promises-soak.md"
+"""What `make soak` writes."""
+MEASURED, CARRIES = "measured", "promise"
+"""Names of the properties that a test's report carries."""
+
+
+class Promise(NamedTuple):
+    """What is promised, and by which figure it is kept."""
+
+    text: str
+    figure: str
+
+
+PROMISES: Mapping[str, Promise] = MappingProxyType(
+    {
+        "P3": Promise(
+            "No bad command leaves",
+            "10⁶ random schema outputs with NaN, ±Inf, 1e308: not one non-finite or over-limit DRIVE; a missing axis "
+            "is Stop(reason)",
+        ),
+        "P4": Promise(
+            "The decoder is total",
+            "10⁷ fuzzed bytes (soak: 10⁹): no exception, buffer ≤ 1 KiB, in step again after two good frames, any "
+            "chunking equals the whole; false accepts counted against what CRC-16 predicts",
+        ),
+        "P5": Promise(
+            "Unplug anywhere",
+            "the line cut before every byte of handshake and one full pattern, both directions: echoes again ≤ 1 s "
+            "after replug; 1,000 cycles with flat file descriptors, tasks and memory",
+        ),
+        "P6": Promise(
+            "A stalled peer is harmless",
+            "mute, or not reading, for 5 s (soak: 60 s): the loop's worst gap ≤ paired control + 5 ms, unsent bytes "
+            "≤ 4 KiB, newest command wins, link called dead ≤ 500 ms",
+        ),
+        "P7": Promise(
+            "A robot reboot is seen",
+            "new boot_id mid-run: pattern sent again, clock and odometry re-based without a jump in the map, "
+            "SAFE_STOP until re-armed",
+        ),
+        "P16": Promise("Traceable", "this table is generated from the tests that ran"),
+    }
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Carrier:
+    """One test function that carries promises; parameters of one function are one carrier."""
+
+    test: str
+    ids: tuple[str, ...]
+    soak: bool
+
+
+@dataclass
+class Ledger:
+    """Who carries what in this run, and what was measured.
+
+    Attributes
+    ----------
+    carriers
+        Of everything collected, before any of it was deselected.
+    whole
+        True where the whole suite was collected.
+    """
+
+    carriers: tuple[Carrier, ...] = ()
+    whole: bool = False
+    results: dict[str, list[str]] = field(default_factory=dict)
+    failed: set[str] = field(default_factory=set)
+
+    def take_report(self, report: pytest.TestReport) -> None:
+        """Enter what one phase of one test tells."""
+        properties = [(key, str(value)) for key, value in report.user_properties]
+        if not any(key == CARRIES for key, _ in properties):
+            return
+        test = report.nodeid.split("[")[0]
+        if report.failed:
+            self.failed.add(test)
+        elif report.when == "call" and report.passed:
+            told = self.results.setdefault(test, [])
+            told += [value for key, value in properties if key == MEASURED and value not in told]
+
+
+LEDGER = pytest.StashKey[Ledger]()
+
+
+def carriers_of(items: Iterable[pytest.Item]) -> tuple[Carrier, ...]:
+    """Return who carries which promises, in the order of collection.
+
+    Raises
+    ------
+    pytest.UsageError
+        A marker names no ID, or one that is not in `PROMISES`.
+    """
+    found: dict[str, Carrier] = {}
+    for item in items:
+        ids = tuple(dict.fromkeys(one for mark in item.iter_markers(CARRIES) for one in mark.args))
+        unknown = [one for one in ids if one not in PROMISES]
+        if unknown or (not ids and item.get_closest_marker(CARRIES) is not None):
+            named = ", ".join(map(repr, unknown)) or "no ID"
+            raise pytest.UsageError(
+                f"{item.nodeid}: @pytest.mark.promise names {named}; known are {', '.join(PROMISES)}: "
+                f"correct the ID, or add it to tests/promises.py"
+            )
+        if ids:
+            test = item.nodeid.split("[")[0]
+            soak = item.get_closest_marker("soak") is not None
+            found[test] = Carrier(test, ids, soak and found.get(test, Carrier("", (), soak=True)).soak)
+    return tuple(found.values())
+
+
+def broken(carriers: Sequence[Carrier]) -> list[str]:
+    """Return the IDs that no test of every run carries; a soak test alone is run too seldom."""
+    kept = {one for carrier in carriers if not carrier.soak for one in carrier.ids}
+    return [one for one in PROMISES if one not in kept]
+
+
+def collect(config: pytest.Config, items: Sequence[pytest.Item]) -> None:
+    """Open the ledger of a run whose tests have been collected and not yet selected among.
+
+    Raises
+    ------
+    pytest.UsageError
+        A test carries an unknown ID; or, where the whole suite was collected, an ID has no test.
+    """
+    whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
+    ledger = Ledger(carriers_of(items), whole)
+    config.stash[LEDGER] = ledger
+    if whole and (without := broken(ledger.carriers)):
+        raise pytest.UsageError(
+            f"no test carries {', '.join(without)}: mark one with @pytest.mark.promise, or take the promise back in "
+            f"tests/promises.py"
+        )
+
+
+def rows_of(carriers: Iterable[Carrier], *, soak: bool) -> list[tuple[str, str]]:
+    """Return (ID, test) as the page lists them, by ID and then in the order of collection."""
+    mine = [carrier for carrier in carriers if carrier.soak == soak]
+    return [(one, carrier.test) for one in PROMISES for carrier in mine if one in carrier.ids]
+
+
+def listed_in(page: str) -> list[tuple[str, str]]:
+    """Return the (ID, test) that a written page lists."""
+    rows = [[cell.strip() for cell in line.split("|")] for line in page.splitlines() if line.startswith("| P")]
+    return [(row[1], row[2].strip("`")) for row in rows]
+
+
+def render(ledger: Ledger, *, soak: bool) -> str:
+    """Return the page: what is promised, then which test measured what.
+
+    Raises
+    ------
+    ValueError
+        A test that carries a promise failed, or did not run to its end.
+    """
+    rows = rows_of(ledger.carriers, soak=soak)
+    tests = {test for _, test in rows}
+    if missing := sorted(tests & ledger.failed | tests - ledger.results.keys()):
+        raise ValueError(f"did not pass: {', '.join(missing)}")
+    command, other = ("make soak", "make promises") if soak else ("make promises", "make soak")
+    lines = [
+        "# What is promised, and what was measured",
+        "",
+        f"Written by `{command}` from the tests that ran; the {'short' if soak else 'long'} forms: `{other}`.",
+        "",
+    ]
+    kept = dict.fromkeys(one for one, _ in rows)
+    lines += [f"- **{one}: {PROMISES[one].text}.** {PROMISES[one].figure}." for one in kept]
+    lines += ["", "| promise | test | measured |", "|---|---|---|"]
+    lines += [f"| {one} | `{test}` | {'<br>'.join(ledger.results[test]) or 'passed'} |" for one, test in rows]
+    return "\n".join(lines) + "\n"
