@@ -23,12 +23,12 @@ tests: $(VENV)/test.stamp
 
 # Compiled code reads beyond an array in silence; this run does not let it.
 boundscheck: $(VENV)/test.stamp
-	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(BIN)/python -m pytest -q -m "not realtime and not compiled" \
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(BIN)/python -m pytest -q -m "not realtime and not compiled and not soak" \
 		tests/perception tests/drivers/test_acoustics.py tests/drivers/test_emulator.py
 
 # Coverage sees into kernels only where they are not compiled.
 coverage: $(VENV)/test.stamp
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest -q -m "not realtime and not compiled"
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest -q -m "not realtime and not compiled and not soak"
 	$(BIN)/python -m coverage report --skip-covered --fail-under=90
 
 # Ours against the libraries one would use instead; BENCH=--quick for a small run.

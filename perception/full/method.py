@@ -13,7 +13,7 @@ import numpy as np
 
 from config.model import ModelConfig
 from config.robot import RingConfig
-from config.settings import FullConfig
+from config.settings import FullConfig, PerceptionConfig
 from drivers.messages import Firing
 from perception.full.observe import observe
 from perception.full.polygon_tracks import pquantum
@@ -144,3 +144,9 @@ class FullPerception:
         self._left = 0
         self._polygons_left = 0
         self._circles_pending = self._polygons_pending = False
+
+    def adopt(self, config: PerceptionConfig) -> None:
+        """Go on with other constants; the number of tracks stays."""
+        self._config = config.full
+        self.settings = self.settings._replace(attempts=config.full.attempts_per_firing)
+        self._objects = None
