@@ -20,7 +20,7 @@ from config.layers import Source
 Kind: TypeAlias = Literal["robots", "worlds", "models", "runs"]
 """What a file is about, and the folder the shipped ones of that kind lie in."""
 
-SIZE_MAX = 1 << 20
+SIZE_MAX = 1 << 18
 """Bytes. Nothing a person writes comes near; /dev/zero and a recording given by mistake go far beyond."""
 
 PIPE_WAIT_S = 5.0
@@ -115,7 +115,7 @@ def parse_document(data: bytes, shown: str) -> dict[str, Any]:
         Where they are too many, not UTF-8 or not TOML, with line and column.
     """
     if len(data) > SIZE_MAX:
-        raise ConfigError(f"{shown}: larger than {SIZE_MAX >> 20} MiB, so not a settings file")
+        raise ConfigError(f"{shown}: larger than {SIZE_MAX >> 10} KiB, so not a settings file")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

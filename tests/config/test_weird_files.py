@@ -45,7 +45,7 @@ def complaint(path: str | Path) -> str:
         (b"a = " + b"9" * 6000, "holds a number with far too many digits"),
         (b"[ring]\ncount = 0x" + b"f" * 60, "ring.count: an integer beyond 64 bits"),
         (b"[ring]\ncount = 9223372036854775808", "ring.count: an integer beyond 64 bits"),
-        (b"#" * (SIZE_MAX + 1), "larger than 1 MiB, so not a settings file"),
+        (b"#" * (SIZE_MAX + 1), "larger than 256 KiB, so not a settings file"),
     ],
 )
 def test_not_settings(data: bytes, wanted: str, tmp_path: Path) -> None:
