@@ -6,7 +6,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: run test lint tests boundscheck coverage bench clean
+.PHONY: run test lint tests boundscheck coverage mutants bench clean
 
 run: $(VENV)/run.stamp
 	@$(BIN)/echolocate run
@@ -30,6 +30,10 @@ boundscheck: $(VENV)/test.stamp
 coverage: $(VENV)/test.stamp
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest -q -m "not realtime and not compiled and not soak"
 	$(BIN)/python -m coverage report --skip-covered --fail-under=90
+
+# Small lies put into the code, and whether the tests notice: writes docs/mutants.md.
+mutants: $(VENV)/test.stamp
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m tests.mutation.campaign
 
 # Ours against the libraries one would use instead; BENCH=--quick for a small run.
 bench: $(VENV)/bench.stamp
