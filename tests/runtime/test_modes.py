@@ -164,3 +164,35 @@ def test_motion_never_resumes_by_itself(steps: list[Situation], begin: ModeState
             armed = False
         if before.arming_s is not None and state.mode is Mode.SAFE_STOP and state.since_s == now_s:
             armed = False
+
+
+@pytest.mark.parametrize(
+    ("before", "seen", "mode"),
+    [
+        (replace(READY, arming_s=0.0), replace(QUIET, now_s=ARMING_MIN_S), Mode.DRIVE),
+        (replace(READY, arming_s=0.0), replace(flags(Flags.LATCHED), now_s=ARMING_MAX_S), Mode.READY),
+        (replace(READY, arming_s=0.0), replace(QUIET, now_s=1.0, gap_s=GAP_MAX_S), Mode.DRIVE),
+        (replace(DRIVE, since_s=0.0), replace(flags(Flags.DEADMAN), now_s=DEADMAN_GRACE_S), Mode.DRIVE),
+    ],
+    ids=["waited just long enough", "the latch has its whole second", "a gap as long as may be", "grace to its end"],
+)
+def test_to_the_very_end_of_a_patience(before: ModeState, seen: Situation, mode: Mode) -> None:
+    assert advance(before, seen).mode is mode
+
+
+def test_patience_in_seconds() -> None:
+    """The protocol sends odometry every 20 ms and its deadman is half a second; an operator waits for one."""
+    assert (ARMING_MIN_S, ARMING_MAX_S, DEADMAN_GRACE_S, GAP_MAX_S) == (0.1, 1.0, 0.5, 0.45)
+
+
+def test_modes_and_requests_are_called_what_logs_and_summaries_call_them() -> None:
+    assert [mode.value for mode in Mode] == ["CONNECTING", "READY", "DRIVE", "SAFE_STOP", "FAULT"]
+    assert [request.value for request in Request] == ["arm", "halt"]
+
+
+def test_a_mode_entered_again_is_entered() -> None:
+    assert (CONNECTING.mode, CONNECTING.since_s) == (Mode.CONNECTING, 0.0)
+    assert not DRIVE.entered_since(DRIVE)
+    assert not replace(DRIVE, arming_s=1.0, reason="another").entered_since(DRIVE)
+    assert DRIVE.enter(Mode.DRIVE, NOW).entered_since(DRIVE)
+    assert STOPPED.entered_since(DRIVE)
