@@ -6,7 +6,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: run test lint tests boundscheck coverage promises soak bench clean
+.PHONY: run test lint tests boundscheck coverage promises mutants soak bench clean
 
 run: $(VENV)/run.stamp
 	@$(BIN)/echolocate run
@@ -40,6 +40,10 @@ promises: $(VENV)/test.stamp
 soak: $(VENV)/soak.stamp
 	$(BIN)/python -m pytest -m soak --promises=docs/promises-soak.md
 	@$(BIN)/python -m tests.timing.growth $(SOAK)
+
+# Small lies put into the code, and whether the tests notice: writes docs/mutants.md.
+mutants: $(VENV)/test.stamp
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m tests.mutation.campaign
 
 # Ours against the libraries one would use instead, and against the clock; BENCH=--quick for a small run of the first,
 # TIMING="--against earlier.json" for a comparison.

@@ -50,7 +50,7 @@ class MapConfig(Strict):
 
     capacity: int = Field(default=4096, ge=16, le=4_000_000)
     """Segments held at most; the oldest leaves for a new one."""
-    age_max_s: float = Field(default=120.0, gt=0.0)
+    age_max_s: float = Field(default=120.0, gt=0.0, le=1e6)
     """Segments leave the map at this age."""
     contradiction_margin_m: float = Field(default=0.2, ge=0.0, le=10.0)
     """A segment leaves when a sensor that faces it hears an echo from this much behind it."""
@@ -61,7 +61,7 @@ class ClustersConfig(Strict):
 
     threshold_m: float = Field(default=0.4572, gt=0.0, le=100.0)
     """T: a segment farther than this from every cluster's centre founds a new cluster."""
-    segments_min: int = Field(default=8, ge=1)
+    segments_min: int = Field(default=8, ge=1, le=10_000)
     """Clusters of fewer segments get no model."""
     clusters_max: int = Field(default=128, ge=1, le=4096)
 
@@ -71,8 +71,8 @@ class RelaxationConfig(Strict):
 
     gamma: float = Field(default=2.0, gt=0.0, le=100.0)
     """γ: sphere_i = γ times the length of model segment i."""
-    negligible_m: float = Field(default=3e-4, gt=0.0)
-    negligible_rad: float = Field(default=1e-3, gt=0.0)
+    negligible_m: float = Field(default=3e-4, gt=0.0, le=1.0)
+    negligible_rad: float = Field(default=1e-3, gt=0.0, le=1.0)
     """The process stops when the total increment is below both."""
     iterations_max: int = Field(default=500, ge=1, le=1_000_000)
     """A model that has not settled by then is left as it is until new evidence comes."""
@@ -82,12 +82,12 @@ class RelaxationConfig(Strict):
 class RecognitionConfig(Strict):
     """When a relaxed model counts as an object seen."""
 
-    tolerance_m: float = Field(default=0.1, gt=0.0)
+    tolerance_m: float = Field(default=0.1, gt=0.0, le=10.0)
     tolerance_deg: float = Field(default=30.0, gt=0.0, le=90.0)
     """A segment supports the model where it lies this near to a side and this parallel to it."""
     support_min: float = Field(default=0.5, ge=0.0, le=1.0)
     """Share of the cluster's segments that support the model, at least."""
-    separation_m: float = Field(default=0.3, ge=0.0)
+    separation_m: float = Field(default=0.3, ge=0.0, le=100.0)
     """Two candidates that rest nearer to one another than this are one object."""
     coverage_min: float = Field(default=0.35, ge=0.0, le=1.0)
     """Share of the model's outline whose sides have support, at least."""
@@ -129,7 +129,7 @@ class MoveAheadConfig(Strict):
 
     move_ahead_gain: float = Field(default=1.0, ge=0.0, le=100.0)
     move_ahead_direction_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
-    distance_m: float | None = Field(default=None, gt=0.0)
+    distance_m: float | None = Field(default=None, gt=0.0, le=1e6)
     """How far to go from where the drive began; without end where it is not given."""
     at_end: Literal["stop", "turn_back"] = "stop"
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
+from config.robot import RingConfig
 from drivers.messages import Firing, Identity, LinkCounts, Odometry, Twist
 
 
@@ -80,6 +81,9 @@ class RobotDriver(Protocol):
 
     def release(self) -> None:
         """Clear the latch, so that DRIVE is obeyed again."""
+
+    def set_firing(self, ring: RingConfig) -> None:
+        """Fire the pattern of this ring from now on; nothing happens where it is the one under way."""
 
     def outgoing(self, *, writable: bool) -> bytes:
         """Return what should go on the line now; only HALT while the line is not `writable`."""

@@ -119,6 +119,11 @@ class PaperPerception:
         self.clusters.update(self.outline)
         self.candidates.clear()
 
+    def adopt(self, config: PerceptionConfig) -> None:
+        """Go on with other limits of recognition and ageing; what sizes an array stays."""
+        self._config = config
+        self.outline.adopt(config.map)
+
     def _judge(self, cluster: int, m: int) -> SeenObject | None:
         """Return the candidate as an object if it fits well enough."""
         if not self.candidates.rested[cluster, m]:

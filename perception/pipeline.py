@@ -71,6 +71,10 @@ class Method(Protocol):
         """Begin anew, as after the odometry did."""
         ...
 
+    def adopt(self, config: PerceptionConfig) -> None:
+        """Go on with other constants, of those that a running process follows (`config.reload.LIVE`)."""
+        ...
+
 
 def method_of(ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> Method:
     """Return the method that the configuration names."""
@@ -154,3 +158,7 @@ class Perception:
         """Begin anew, as after the odometry did."""
         self.method.forget()
         self._echoes.clear()
+
+    def adopt(self, config: PerceptionConfig) -> None:
+        """Go on with other constants, of those that a running process follows (`config.reload.LIVE`)."""
+        self.method.adopt(config)

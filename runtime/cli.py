@@ -68,6 +68,8 @@ def run(
 ) -> int:
     """Run the robot's main process; without a port, on the emulator in the paper's hall.
 
+    SIGUSR1 arms it, SIGHUP has it read the run file again, SIGINT and SIGTERM end it.
+
     Parameters
     ----------
     config

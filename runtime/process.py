@@ -96,11 +96,16 @@ class RobotProcess:
         self._stop_reasons: list[str] = []
         self._request: Request | None = None
         self._stop = asyncio.Event()
+        self._next_settings: Settings | None = None
 
     def request(self, request: Request) -> None:
         """Take an operator's request into the next cycle; a HALT is not overruled by an ARM in the same one."""
         if self._request is not Request.HALT:
             self._request = request
+
+    def reconfigure(self, settings: Settings) -> None:
+        """Go on with other settings from the next cycle on; only such as `config.reload` lets through."""
+        self._next_settings = settings
 
     def stop(self) -> None:
         """End the run in good order: halt the base, then close the line."""
@@ -189,6 +194,10 @@ class RobotProcess:
         self._log.error("the cycle failed", exc_info=error)
 
     def _one_cycle(self, now: Reading) -> None:
+        if self._next_settings is not None:
+            self._settings, self._next_settings = self._next_settings, None
+            self._driver.set_firing(self._settings.ring)
+            self._state.perception.adopt(self._settings.perception)
         rhythm, start_s = self._rhythm, now.wall_s
         mark = rhythm.keeper.mark
         request, self._request = self._request, None

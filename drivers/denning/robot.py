@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from config.robot import RobotConfig
+from config.robot import RingConfig, RobotConfig
 from drivers.denning import troubles
 from drivers.denning.clock import Jump
 from drivers.denning.codec import Decoder, encode
@@ -167,6 +167,23 @@ class DenningRobot:
         if self._state is LineState.READY:
             self._commands.pop("HALT", None)
             self._ask("RELEASE")
+
+    def set_firing(self, ring: RingConfig) -> None:
+        """Fire the pattern of this ring from now on; nothing happens where it is the one under way.
+
+        Until the robot has taken it, the echoes of the one before still count: an echo names its own sensors.
+
+        Raises
+        ------
+        drivers.firing.FiringError
+            The ring cannot carry it out, or the protocol cannot say it; the pattern stays as it was.
+        """
+        pattern = wire_pattern(ring)
+        if pattern == self._pattern:
+            return
+        self._pattern = pattern
+        if self._state is LineState.READY or "PATTERN" in self._commands:
+            self._ask("PATTERN")
 
     def outgoing(self, *, writable: bool) -> bytes:
         """Return what should go on the line now; only HALT while the line is not `writable`."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from config.model import ModelConfig
 from config.robot import RingConfig
-from config.settings import FullConfig
+from config.settings import FullConfig, PerceptionConfig
 from drivers.messages import Firing
 from perception.full.entry import hold, observe, pquantum, quantum, sure_circles
 from perception.full.report import POLYGON_PROBABILITY, circle, other_things, polygon, sure_polygons
@@ -152,3 +152,9 @@ class FullPerception:
         self._left = 0
         self._polygons_left = 0
         self._circles_pending = self._polygons_pending = False
+
+    def adopt(self, config: PerceptionConfig) -> None:
+        """Go on with other constants; the number of tracks stays."""
+        self._config = config.full
+        self.settings = self.settings._replace(attempts=config.full.attempts_per_firing)
+        self._objects = None

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from config.load import load_settings
+from config.load import ConfigError, load_settings
 from config.settings import Settings
 from runtime import VERSION
 from runtime.advice import advice
@@ -22,6 +22,7 @@ from runtime.commands.firing import refuse_impossible_firing
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
 from runtime.kernels import ready_kernels
 from runtime.logs import open_log
+from runtime.ownership import owned
 from runtime.tables import Units, objects_table, timing_table, timing_verdict
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
     from drivers.messages import Firing
     from runtime.process import RobotProcess
+    from runtime.reload import Reloader
     from runtime.summary import RunSummary
 
 
@@ -72,7 +74,7 @@ def run_robot(
     refuse_impossible_firing(settings.ring)
     if seconds is not None and not seconds > 0.0:
         raise Complaint(f"--seconds {seconds}: must be above 0", WRONG_CALL)
-    port = port if port is not None else settings.link.port
+    given, port = port, port if port is not None else settings.link.port
     if port is not None:
         settings = on_port(settings, port)
     refuse_unwritable({"--record": record, "--json": json_file})
@@ -80,6 +82,8 @@ def run_robot(
     ready_kernels(settings, console)
     live = not headless and console.is_terminal and not console.is_dumb_terminal
     with contextlib.ExitStack() as stack:
+        if record is not None:
+            stack.enter_context(owned(Path(record), f"--record {record}"))
         log = stack.enter_context(open_log(settings.log, terminal=not live))
         log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
         for text in advice(settings):
@@ -97,6 +101,9 @@ def run_robot(
                 return await watch(
                     chosen, log, console, live=live, units=units, on_firing=on_firing,
                     arm=arm or port is None, seconds=seconds,
+                    propose=lambda: proposed(
+                        config, sets, emulation.world, given, None if port else chosen.link.port
+                    ),
                 )  # fmt: skip
 
         summary = asyncio.run(whole())
@@ -130,6 +137,25 @@ def on_port(settings: Settings, port: str) -> Settings:
     return settings.model_copy(update={"link": settings.link.model_copy(update={"port": port})})
 
 
+def proposed(
+    config: str | None, sets: Sequence[str], world: str | None, given: str | None, emulated: str | None
+) -> Settings:
+    """Return the settings as the files hold them now, for a run on a port that was given, or is the emulator's.
+
+    Raises
+    ------
+    ConfigError
+        What is wrong with them, a firing pattern that the ring cannot carry out included.
+    """
+    settings = load_settings(config, sets, world=world)
+    try:
+        refuse_impossible_firing(settings.ring)
+    except Complaint as complaint:
+        raise ConfigError(str(complaint)) from complaint
+    port = given or settings.link.port or emulated
+    return settings if port is None else on_port(settings, port)
+
+
 async def watch(
     settings: Settings,
     log: FilteringBoundLogger,
@@ -140,9 +166,11 @@ async def watch(
     on_firing: Callable[[Firing], None] | None,
     arm: bool,
     seconds: float | None,
+    propose: Callable[[], Settings],
 ) -> RunSummary:
-    """Run the process under the eyes of the live view, and end it on SIGINT or SIGTERM."""
+    """Run the process under the eyes of the live view, end it on SIGINT or SIGTERM, reconfigure it on SIGHUP."""
     from runtime.process import Observers, RobotProcess
+    from runtime.reload import Reloader
     from runtime.view import View, keys
 
     with contextlib.ExitStack() as stack:
@@ -150,6 +178,7 @@ async def watch(
         observers = Observers(None if view is None else view.on_cycle, on_firing)
         process = RobotProcess(settings, log, observers)
         stack.enter_context(stopping_on_signals(process))
+        stack.enter_context(reloading_on_signal(Reloader(settings, propose, process.reconfigure, log)))
         if view is not None:
             stack.enter_context(view.shown())
             stack.enter_context(keys(process.request, process.stop))
@@ -170,6 +199,18 @@ def stopping_on_signals(process: RobotProcess) -> Iterator[None]:
     finally:
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1):
             loop.remove_signal_handler(number)
+
+
+@contextlib.contextmanager
+def reloading_on_signal(reloader: Reloader) -> Iterator[None]:
+    """Read the configuration again on SIGHUP; what is wrong with it is told in the log and the last good one kept."""
+    loop = asyncio.get_running_loop()
+    loop.add_signal_handler(signal.SIGHUP, reloader.ask)
+    try:
+        yield
+    finally:
+        loop.remove_signal_handler(signal.SIGHUP)
+        reloader.cancel()
 
 
 @contextlib.contextmanager

@@ -27,6 +27,7 @@ from drivers.denning.frames import (
 )
 from drivers.denning.robot import DenningRobot
 from drivers.driver import LineState, RobotDriver
+from drivers.firing import FiringError
 from drivers.messages import Flags, LinkCounts, Pose, Twist
 from tests.drivers.vectors import OCTETS
 
@@ -773,3 +774,40 @@ def test_firings_nobody_takes_do_not_pile_up(bench: Bench) -> None:
     firings = bench.robot.take().firings
     assert len(firings) == 1024
     assert firings[-1].t_s == pytest.approx(1099 * 0.02)
+
+
+def test_another_firing_pattern_while_it_drives(bench: Bench) -> None:
+    ring = CONFIG.ring.model_copy(update={"firing": FiringConfig(preset="quadrants", step_period_s=0.06)})
+    bench.robot.set_firing(CONFIG.ring)
+    assert bench.heard() == [], "the one under way is not said again"
+    bench.robot.set_firing(ring)
+    (pattern,) = only(bench.answer(), Pattern)
+    assert isinstance(pattern, Pattern)
+    assert (len(pattern.masks), pattern.step_period_ms) == (6, 60)
+    assert bench.state() is LineState.READY
+    bench.robot.closed()
+    bench.open()
+    (again,) = only([*bench.answer(), *bench.answer()], Pattern)
+    assert replace(again, seq=pattern.seq) == pattern, "kept for the next line"
+
+
+def test_another_firing_pattern_before_the_first_is_taken() -> None:
+    """An answer to the first must not pass for one to the second."""
+    bench = Bench()
+    bench.open()
+    bench.answer()
+    (first,) = only(bench.heard(), Pattern)
+    ring = CONFIG.ring.model_copy(update={"firing": FiringConfig(preset="quadrants", step_period_s=0.06)})
+    bench.robot.set_firing(ring)
+    bench.say(Ack(0, first.seq))
+    assert bench.state() is LineState.GREETING
+    assert len(only(bench.answer(), Pattern)) == 1
+    assert bench.state() is LineState.READY
+
+
+def test_a_firing_pattern_that_cannot_be(bench: Bench) -> None:
+    ring = CONFIG.ring.model_copy(update={"firing": FiringConfig(sets=((40,),))})
+    with pytest.raises(FiringError):
+        bench.robot.set_firing(ring)
+    assert bench.heard() == []
+    assert bench.state() is LineState.READY

@@ -691,6 +691,8 @@ class PlainDriver:
 
     def release(self) -> None: ...
 
+    def set_firing(self, ring: RingConfig) -> None: ...
+
     def outgoing(self, *, writable: bool) -> bytes:
         assert writable
         out, self._out = self._out, b""

@@ -92,6 +92,7 @@ def test_a_port_that_says_nothing(tmp_path: Path) -> None:
         assert len(stranger.heard) > 0, "it was asked"
 
 
+@pytest.mark.promise("P13")
 def test_a_port_in_use(tmp_path: Path) -> None:
     """Both ways to say so: the lock that this program takes, too, and a terminal opened for one alone."""
     with Stranger() as stranger:
@@ -104,6 +105,7 @@ def test_a_port_in_use(tmp_path: Path) -> None:
             os.close(fd)
 
 
+@pytest.mark.promise("P13")
 def test_a_robot_that_another_run_drives(tmp_path: Path) -> None:
     with emulated(tmp_path) as robot:
         (tmp_path / "other").mkdir()
@@ -112,6 +114,35 @@ def test_a_robot_that_another_run_drives(tmp_path: Path) -> None:
             with run_on(tmp_path, robot.port) as second:
                 check(second, FAILED, robot.port, "in use")
             assert is_driving(robot.trace), "the first one's drive is not disturbed"
+            assert first.process.poll() is None
+
+
+@pytest.mark.promise("P13")
+def test_a_robot_whose_first_run_was_killed(tmp_path: Path) -> None:
+    """A lock that outlived its owner would keep the robot from everybody; here it ends with the process."""
+    with emulated(tmp_path) as robot:
+        for name in ("first", "second"):
+            (tmp_path / name).mkdir()
+            with running(tmp_path / name, "run", "run", "--port", robot.port, "--arm") as run:
+                wait_for(lambda: is_driving(robot.trace), f"the {name} drives")
+                run.process.kill()
+                run.process.wait()
+            wait_for(lambda: not is_driving(robot.trace), "the deadman")
+
+
+@pytest.mark.promise("P13")
+def test_a_record_that_another_run_writes(tmp_path: Path) -> None:
+    record = str(tmp_path / "run.csv")
+    with emulated(tmp_path) as robot:
+        (tmp_path / "other").mkdir()
+        with running(tmp_path / "other", "run", "run", "--port", robot.port, "--arm", "--record", record) as first:
+            wait_for(lambda: is_driving(robot.trace), "driving")
+            with (
+                Stranger() as stranger,
+                running(tmp_path, "run", "run", "--port", stranger.path, "--record", record) as second,
+            ):
+                check(second, FAILED, f"--record {record}", "another process writes to this file")
+                assert not stranger.heard, "it is refused before anything is said to a robot"
             assert first.process.poll() is None
 
 
