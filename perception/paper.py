@@ -119,6 +119,9 @@ class PaperPerception:
         self.clusters.update(self.outline)
         self.candidates.clear()
 
+    def restored(self) -> None:
+        """Drop what was worked out before the memory was put back from a snapshot: here nothing."""
+
     def _judge(self, cluster: int, m: int) -> SeenObject | None:
         """Return the candidate as an object if it fits well enough."""
         if not self.candidates.rested[cluster, m]:

@@ -20,6 +20,7 @@ from perception.kernel import Floats
 from perception.paper import PaperPerception
 from perception.seen import SeenObject
 from perception.segments import mounts_array
+from perception.snapshot import Snapshot, put_back, snapshot_of
 
 __all__ = ["Method", "Perception", "SeenObject", "method_of"]
 
@@ -69,6 +70,10 @@ class Method(Protocol):
 
     def forget(self) -> None:
         """Begin anew, as after the odometry did."""
+        ...
+
+    def restored(self) -> None:
+        """Drop what was worked out before the memory was put back from a snapshot."""
         ...
 
 
@@ -154,3 +159,18 @@ class Perception:
         """Begin anew, as after the odometry did."""
         self.method.forget()
         self._echoes.clear()
+
+    def snapshot(self) -> Snapshot:
+        """Return copies of everything remembered, from which `restore` goes on to the bit."""
+        return snapshot_of(self)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot that perception of the same settings gave.
+
+        Raises
+        ------
+        ValueError
+            The snapshot is of other settings.
+        """
+        put_back(self, snapshot)
+        self.method.restored()

@@ -58,6 +58,7 @@ def run(
     seconds: float | None = None,
     headless: Annotated[bool, Flag] = False,
     record: str | None = None,
+    no_record: Annotated[bool, Flag] = False,
     json: JsonFile = None,
     world: str | None = None,
     seed: Seed = 0,
@@ -81,7 +82,9 @@ def run(
     headless
         No live view: log lines instead.
     record
-        Write every firing to this ring log.
+        Record the run into this file, instead of into the folder of recordings; a name in .csv gives a ring log.
+    no_record
+        Leave no recording.
     world
         World of the emulator, a file or a name.
     seed
@@ -95,8 +98,8 @@ def run(
 
     emulation = Emulation(world=world, seed=seed, trace=trace, faults=faults)
     return run_robot(
-        config, sets, port=port, arm=arm, seconds=seconds, headless=headless, record=record, json_file=json,
-        emulation=emulation, units=units,
+        config, sets, port=port, arm=arm, seconds=seconds, headless=headless, record=record,
+        no_record=no_record, json_file=json, emulation=emulation, units=units,
     )  # fmt: skip
 
 

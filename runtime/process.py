@@ -11,7 +11,7 @@ import gc
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from config.settings import Settings
 from drivers.denning.robot import DenningRobot
@@ -40,6 +40,8 @@ LATE_SHARE: Final = 0.1
 """A cycle that begins later than this share of its period is late."""
 
 
+Way: TypeAlias = Literal["in", "out"]
+
 COLLECT_EVERY: Final = 20
 COLLECT_SLACK_S: Final = 0.01
 """Young garbage is collected once in so many cycles, and only with so much time to spare; the old is frozen."""
@@ -51,6 +53,8 @@ class Observers:
 
     on_cycle: Callable[[CycleRecord, State, Books, RobotDriver], None] | None = None
     on_firing: Callable[[Firing], None] | None = None
+    on_bytes: Callable[[Way, float, bytes], None] | None = None
+    """Gets what goes over the line, either way, and when, by the host's clock."""
 
 
 class RobotProcess:
@@ -215,13 +219,17 @@ class RobotProcess:
 
     def _send(self) -> None:
         if self._link.is_open and (data := self._driver.outgoing(writable=self._link.writable)):
-            self._link.send(data)
+            if self._link.send(data) and self._observers.on_bytes is not None:
+                self._observers.on_bytes("out", self._clock(), data)
 
     def _opened(self) -> None:
         self._driver.opened(self._clock())
 
     def _received(self, data: bytes) -> None:
-        self._driver.receive(data, self._clock())
+        now_s = self._clock()
+        self._driver.receive(data, now_s)
+        if self._observers.on_bytes is not None:
+            self._observers.on_bytes("in", now_s, data)
 
     def _closed(self, reason: str) -> None:
         self._driver.closed()

@@ -36,6 +36,17 @@ class LinkRow(TypedDict):
     lost: int
 
 
+class RecordingRow(TypedDict):
+    """The recording that a run left: the newest of its files, bytes in all of them, messages that are missing."""
+
+    file: str | None
+    files: int
+    bytes: int
+    dropped: int
+    trouble: str | None
+    sync_max_s: float
+
+
 class RunSummary(TypedDict):
     """Summary of ``echolocate run``."""
 
@@ -48,6 +59,7 @@ class RunSummary(TypedDict):
     link: LinkRow
     mode: str
     stop_reasons: list[str]
+    recording: NotRequired[RecordingRow]
 
 
 class ReplaySummary(TypedDict):

@@ -144,3 +144,7 @@ class FullPerception:
         self._left = 0
         self._polygons_left = 0
         self._circles_pending = self._polygons_pending = False
+
+    def restored(self) -> None:
+        """Drop what was worked out before the memory was put back from a snapshot."""
+        self._objects = None
