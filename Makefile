@@ -6,7 +6,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: run test lint tests boundscheck coverage bench clean
+.PHONY: run test lint tests boundscheck coverage soak bench clean
 
 run: $(VENV)/run.stamp
 	@$(BIN)/echolocate run
@@ -30,6 +30,10 @@ boundscheck: $(VENV)/test.stamp
 coverage: $(VENV)/test.stamp
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest -q -m "not realtime and not compiled"
 	$(BIN)/python -m coverage report --skip-covered --fail-under=90
+
+# What takes too long for every day: ten minutes of a recorded run, a hundred that are killed.
+soak: $(VENV)/test.stamp
+	$(BIN)/python -m pytest -m soak
 
 # Ours against the libraries one would use instead; BENCH=--quick for a small run.
 bench: $(VENV)/bench.stamp

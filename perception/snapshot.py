@@ -1,7 +1,8 @@
 """Everything a perception method remembers, as named arrays, and back: what lets a replay begin in the middle.
 
 The walk is over the objects themselves, so that a field added to a method is remembered here the same day. What a
-method is told and never changes (its configuration, its models, `settings`) is left out.
+method is told and never changes (its configuration, its models, `settings`) is left out, and so is what its class
+lists as `SCRATCH`: that is written anew before each use, also by those who only look on.
 """
 
 from __future__ import annotations
@@ -39,7 +40,9 @@ def put_back(thing: object, snapshot: Snapshot) -> None:
         raise ValueError(f"the snapshot is of another method or version: {', '.join(strange[:3])}")
     for name, array in mine.items():
         if array.shape != snapshot[name].shape or array.dtype != snapshot[name].dtype:
-            raise ValueError(f"the snapshot is of other settings: {name} is {snapshot[name].shape}, not {array.shape}")
+            raise ValueError(
+                f"the snapshot is of other settings: {name} is {snapshot[name].shape}, not {array.shape}"
+            )
     _put(thing, "", snapshot)
 
 
@@ -69,10 +72,11 @@ def _parts(thing: object) -> list[tuple[str, object]]:
         named: dict[str, object] = dict(zip(getattr(thing, "_fields", ()), thing, strict=False))
     else:
         named = vars(thing)
+    left_out = (TOLD, *getattr(type(thing), "SCRATCH", ()))
     return [
         (name, value)
         for name, value in named.items()
-        if name != TOLD and (isinstance(value, np.ndarray | bool | int | float) or _is_ours(value))
+        if name not in left_out and (isinstance(value, np.ndarray | bool | int | float) or _is_ours(value))
     ]
 
 

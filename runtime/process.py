@@ -219,7 +219,8 @@ class RobotProcess:
 
     def _send(self) -> None:
         if self._link.is_open and (data := self._driver.outgoing(writable=self._link.writable)):
-            if self._link.send(data) and self._observers.on_bytes is not None:
+            taken = self._link.send(data)
+            if taken and self._observers.on_bytes is not None:
                 self._observers.on_bytes("out", self._clock(), data)
 
     def _opened(self) -> None:

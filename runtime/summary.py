@@ -62,8 +62,24 @@ class RunSummary(TypedDict):
     recording: NotRequired[RecordingRow]
 
 
+class VerifyRow(TypedDict):
+    """What the replay of a recording found: see `runtime.recording.rerun.Verdict`."""
+
+    differences: int
+    first: str | None
+    first_cycle: int | None
+    keyframes: int
+    skipped: int
+    missing: list[tuple[int, int]]
+    refinement: dict[str, int]
+    times_real_time: float
+    damage: list[str]
+
+
 class ReplaySummary(TypedDict):
     """Summary of ``echolocate replay``."""
+
+    verify: NotRequired[VerifyRow]
 
     objects: list[ObjectRow]
     segments: int

@@ -2,7 +2,7 @@
 
 Numba reads its settings when it is imported, so the cache is named here, before any test module is. A run with
 `NUMBA_DISABLE_JIT=1` (coverage sees inside kernels) or `NUMBA_BOUNDSCHECK=1` is slower than real time on purpose:
-tests marked `realtime` say nothing there and are skipped.
+tests marked `realtime` say nothing there and are skipped. Those marked `soak` run only where they are asked for.
 """
 
 from __future__ import annotations
@@ -26,7 +26,11 @@ def slowed_down() -> str | None:
     return None
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if "soak" not in config.getoption("markexpr"):
+        long = [item for item in items if item.get_closest_marker("soak") is not None]
+        config.hook.pytest_deselected(items=long)
+        items[:] = [item for item in items if item.get_closest_marker("soak") is None]
     slow = slowed_down()
     if slow is None:
         return

@@ -42,6 +42,9 @@ class FullPerception:
         What a user may set.
     """
 
+    SCRATCH: Final = ("_sure",)
+    """Only for reporting, and no memory."""
+
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: FullConfig) -> None:
         self._mounts = mounts_array(ring.mounts)
         self._config = config

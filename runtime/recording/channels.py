@@ -1,7 +1,8 @@
-"""The channels of a recording: topic by topic what its messages are, their schemas, and messages to bytes and back."""
+"""The channels of a recording: what the messages of each topic are, their schemas, and to bytes and back."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final, NamedTuple, TypeVar
 
@@ -29,7 +30,7 @@ SERIAL: Final = MappingProxyType({"in": "/serial/in", "out": "/serial/out"})
 LOG: Final = "/log"
 KEYFRAME: Final = "/keyframe"
 
-CHANNELS: Final = MappingProxyType(
+CHANNELS: Final[Mapping[str, type[Form]]] = MappingProxyType(
     {
         ABOUT: About,
         CYCLE: Cycle,

@@ -32,7 +32,7 @@ class Place(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class OneFile:
-    """A file by name, and beside it what follows on trouble with the disk: `hall.mcap`, `hall-2.mcap`, …"""
+    """A file by name, and beside it the next ones after trouble with the disk: `hall-2.mcap` and so on."""
 
     first: Path
 

@@ -111,7 +111,7 @@ class ObjectsSeen(Form):
 
 
 _HINTS: Final = get_type_hints(State)
-StateLeft: type[BaseModel] = create_model(  # type: ignore[call-overload]  # mypy sees no field definitions here
+StateLeft: Any = create_model(  # type: ignore[call-overload]  # mypy sees no field definitions here
     "StateLeft",
     __base__=Form,
     __doc__="What a cycle leaves to the next one besides perception's memory.",
@@ -131,7 +131,7 @@ class Keyframe(Form):
     """The whole state after a cycle: a replay can begin here."""
 
     cycle: int
-    left: StateLeft  # type: ignore[valid-type]  # made above, from the fields of State
+    left: StateLeft  # of the fields of `State`
     arrays: list[ArrayForm]
     memory: bytes
     """The arrays' bytes, little-endian, compressed by zstd."""
@@ -150,7 +150,10 @@ def keyframe(cycle: int, left: Left, snapshot: Snapshot) -> Keyframe:
     arrays = [ArrayForm(name=name, dtype=a.dtype.str, shape=list(a.shape)) for name, a in snapshot.items()]
     memory = zstandard.compress(b"".join(a.tobytes() for a in snapshot.values()))
     return Keyframe.model_construct(
-        cycle=cycle, left=StateLeft.model_construct(**left), arrays=arrays, memory=memory
+        cycle=cycle,
+        left=StateLeft.model_construct(**left),  # type: ignore[arg-type]
+        arrays=arrays,
+        memory=memory,
     )
 
 

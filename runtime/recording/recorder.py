@@ -15,7 +15,7 @@ from importlib.metadata import version
 from types import TracebackType
 from typing import Any, Final
 
-import llvmlite.binding
+from llvmlite.binding import get_host_cpu_name
 
 from config.settings import Settings
 from runtime import VERSION
@@ -39,7 +39,7 @@ def made_by() -> dict[str, str]:
         "numba": version("numba"),
         "kernels": kernels_key(),
         "compiled": "no" if os.environ.get("NUMBA_DISABLE_JIT", "0") not in {"", "0"} else "yes",
-        "processor": f"{platform.machine()} {llvmlite.binding.get_host_cpu_name()}",
+        "processor": f"{platform.machine()} {get_host_cpu_name()}",
     }
 
 

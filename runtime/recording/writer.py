@@ -21,7 +21,17 @@ from drivers.messages import Floats
 from runtime.modes import ModeState
 from runtime.recording.channels import ABOUT, CYCLE, KEYFRAME, MODE, OBJECTS, SEGMENTS, encode
 from runtime.recording.folder import Place
-from runtime.recording.forms import About, Cycle, Form, Left, MapChange, ModeChange, ObjectsSeen, SerialBytes, keyframe
+from runtime.recording.forms import (
+    About,
+    Cycle,
+    Form,
+    Left,
+    MapChange,
+    ModeChange,
+    ObjectsSeen,
+    SerialBytes,
+    keyframe,
+)
 from runtime.recording.part import Part
 from runtime.step import CycleRecord
 from runtime.summary import object_row
