@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
@@ -37,6 +38,9 @@ class PaperPerception:
     config : PerceptionConfig
         The constants of each step.
     """
+
+    SCRATCH: Final = ("_scratch",)
+    """Only for reporting, and no memory."""
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> None:
         mounts = mounts_array(ring.mounts)

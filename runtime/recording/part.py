@@ -46,9 +46,16 @@ class Part:
             self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD, index_types=INDEX,
             enable_crcs=True, enable_data_crcs=True,
         )  # fmt: skip
-        self._writer.start(profile=f"{PROFILE}/{FORMAT}", library=f"echolocate {VERSION}")
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
+        try:
+            self._begin(about, log_ns)
+        except OSError:
+            self.abandon()
+            raise
+
+    def _begin(self, about: bytes, log_ns: int) -> None:
+        self._writer.start(profile=f"{PROFILE}/{FORMAT}", library=f"echolocate {VERSION}")
         for topic, form in CHANNELS.items():
             self.channel(topic, form.__name__, schema_of(form))
         self.add(ABOUT, about, log_ns)

@@ -91,18 +91,19 @@ def mapped(path: Path) -> Iterator[memoryview]:
     """
     try:
         with path.open("rb") as file:
-            if path.stat().st_size == 0:
-                raise RecordingError(
-                    f"{path}: is empty; the run ended before anything was written, or the disk was full"
-                )
-            with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-                view = memoryview(data)
-                try:
-                    yield view
-                finally:
-                    view.release()
+            empty = path.stat().st_size == 0
+            data = None if empty else mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}; check the path") from error
+    if data is None:
+        raise RecordingError(f"{path}: is empty; the run ended before anything was written, or the disk was full")
+    view = memoryview(data)
+    try:
+        yield view
+    finally:
+        with contextlib.suppress(BufferError):  # who was stopped by an error may still hold a piece of it
+            view.release()
+            data.close()
 
 
 def refuse_strangers(path: Path, salvage: Salvage) -> None:

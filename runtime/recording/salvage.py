@@ -86,25 +86,23 @@ class Salvage:
         at, size = 8, len(self._data)
         while at < size:
             head = self._head(at)
-            if head is None:
-                chunk, at = self._find(at)
-                if chunk is not None:
-                    yield chunk
-                continue
-            code, length = head
-            if code == Opcode.CHUNK:
-                entries = self._chunk(at, length)
-                if entries is None:
-                    self.damage.append(Damage(at, f"a chunk of {length} bytes is damaged"))
-                    chunk, at = self._find(at + 1)
-                    if chunk is not None:
-                        yield chunk
-                    continue
-                yield entries
-            elif code == Opcode.DATA_END:
-                self._check_end(at, length)
+            if head is not None and head[0] == Opcode.DATA_END:
+                self._check_end(at, head[1])
                 return
-            at += HEAD + length
+            if head is None or self._looks_like_chunk(at):
+                entries = None if head is None or head[0] != Opcode.CHUNK else self._chunk(at, head[1])
+                if entries is None:
+                    entries, at = self._find(at)
+                else:
+                    at += HEAD + head[1] if head is not None else 0
+                if entries is not None:
+                    yield entries
+            else:
+                at += HEAD + head[1]
+
+    def _looks_like_chunk(self, at: int) -> bool:
+        """Say whether a chunk begins here, whatever its first byte says."""
+        return self._data[at] == Opcode.CHUNK or bytes(self._data[at + ZSTD_AT : at + ZSTD_AT + len(ZSTD)]) == ZSTD
 
     def _head(self, at: int) -> tuple[int, int] | None:
         """Return what the record at a byte says it is, None where it cannot be one."""
@@ -126,10 +124,8 @@ class Salvage:
             (length,) = struct.unpack_from("<Q", data, found + len(ZSTD))
             whole = ZSTD_AT - HEAD + len(ZSTD) + 8 + length
             if start + HEAD + whole <= len(data) and (entries := self._chunk(at + start, whole)) is not None:
-                if start:
-                    self.damage.append(Damage(at, f"{start} bytes are no record"))
-                else:
-                    self.damage.append(Damage(at, "a record's kind or length is wrong"))
+                lost = f"{start} bytes cannot be read" if start else "a chunk's kind or length is wrong; it is whole"
+                self.damage.append(Damage(at, lost))
                 return entries, at + start + HEAD + whole
         if not self._torn(at):
             self.damage.append(Damage(at, f"nothing can be read from here to the end, {len(data)} bytes"))
@@ -146,6 +142,8 @@ class Salvage:
         """Return the messages of the chunk at a byte, None where it is damaged."""
         try:
             chunk = Chunk.read(_stream(self._data[at + HEAD : at + HEAD + length]))
+            if len(chunk.data) + len(ZSTD) + 8 + ZSTD_AT - HEAD != length:
+                return None
             if chunk.compression != "zstd" or not 0 < chunk.uncompressed_size < CONTENT_MAX:
                 return None
             if zstandard.frame_content_size(chunk.data) != chunk.uncompressed_size:

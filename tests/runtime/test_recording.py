@@ -146,6 +146,7 @@ def test_everything_that_happened_is_in_it(run: Path) -> None:
     assert (line.level, line.event, line.fields) == ("info", "start", {"why": "None"})
     with open_recording(run) as recording:
         assert recording.settings == hall()
+        assert len(list(recording.entries())) == len(entries)
         assert recording.finished
 
 
@@ -241,7 +242,7 @@ def test_the_loop_only_hands_over() -> None:
 class Full(OneFile):
     """A disk that is full, and stays so."""
 
-    def path(self, part: int) -> Path:
+    def path(self, part: int) -> Path:  # noqa: ARG002 - always this one
         return Path("/dev/full")
 
 
