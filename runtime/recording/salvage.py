@@ -30,6 +30,7 @@ ZSTD_AT: Final = HEAD + 8 + 8 + 8 + 4
 """Where in a chunk the name of its compression stands."""
 CONTENT_MAX: Final = 1 << 30
 """No chunk of ours is a thousandth as large; a damaged length may claim anything."""
+HEADER_MAX: Final = 4096
 KNOWN: Final = frozenset(int(code) for code in Opcode)
 UNREADABLE: Final = (McapError, zstandard.ZstdError, ValueError, struct.error, OverflowError, MemoryError)
 """What reading damaged bytes may end in."""
@@ -136,7 +137,8 @@ class Salvage:
         if at + HEAD > len(self._data):
             return True
         code, length = struct.unpack_from("<BQ", self._data, at)
-        return code in KNOWN and length < CONTENT_MAX and at + HEAD + length > len(self._data)
+        longest = {Opcode.CHUNK: CONTENT_MAX, Opcode.HEADER: HEADER_MAX, Opcode.DATA_END: 4}.get(code, 0)
+        return length <= longest and at + HEAD + length > len(self._data)
 
     def _chunk(self, at: int, length: int) -> list[Entry] | None:
         """Return the messages of the chunk at a byte, None where it is damaged."""

@@ -16,7 +16,6 @@ from runtime.complaint import DONE, FAILED
 from runtime.recording.channels import CYCLE, KEYFRAME, LOG, SERIAL, decode
 from runtime.recording.forms import About, Cycle, LogLine, SerialBytes
 from runtime.recording.reading import open_recording
-from runtime.recording.recover import recover
 from tests.hil.running import running
 from tests.recorded import entries_of
 
@@ -103,7 +102,7 @@ def killed(folder: Path, name: str, after_s: float) -> tuple[Path, float]:
 
 def check_killed(folder: Path, number: int, rng: random.Random) -> float:
     """Kill a run, restore its recording, replay it; return how much was lost, s."""
-    path, killed_s = killed(folder, f"run{number}", rng.uniform(0.0, 4.0))
+    path, killed_s = killed(folder, f"run{number}", rng.uniform(1.0, 5.0))
     restored = path.with_name(f"{path.stem}-recovered.mcap")
     assert call(["recover", str(path)]) == DONE
     got = verify(restored)
