@@ -1,7 +1,8 @@
 """The loop's side of a recording: what happened is handed over as it is, and the loop goes on.
 
 Handing over is an append to a queue. Only now and then is more asked of the loop: once a second a copy of the map,
-and once in a while, as a keyframe, a copy of everything that is remembered; both after the command has been sent.
+half a second later the objects, and once in a while, as a keyframe, a copy of everything that is remembered; all of
+it after the command has been sent.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from llvmlite.binding import get_host_cpu_name
 from config.settings import Settings
 from runtime import VERSION
 from runtime.kernels import kernels_key
-from runtime.recording.channels import CYCLE, KEYFRAME, LOG, SEGMENTS, SERIAL
+from runtime.recording.channels import CYCLE, KEYFRAME, LOG, OBJECTS, SEGMENTS, SERIAL
 from runtime.recording.folder import Place
 from runtime.recording.forms import FORMAT, About, LogLine, left_by
 from runtime.recording.writer import QUEUE_MAX, Item, Moment, RecordingWriter, Standing
@@ -110,14 +111,13 @@ class Recorder:
         if due and room:
             self._gap = self._writer.wants_keyframe = False
             self._last_keyframe_s = now_s
-            self._hand(KEYFRAME, now_s, self._moment(record.cycle, state, whole=True))
+            seen = state.perception
+            whole = Moment(record.cycle, seen.segments_now(), seen.objects(), left_by(state), seen.snapshot())
+            self._hand(KEYFRAME, now_s, whole)
         elif record.cycle % self._moment_cycles == 0:
-            self._hand(SEGMENTS, now_s, self._moment(record.cycle, state, whole=False))
-
-    def _moment(self, cycle: int, state: State, *, whole: bool) -> Moment:
-        perception = state.perception
-        now = Moment(cycle, perception.segments_now(), perception.objects())
-        return now._replace(left=left_by(state), memory=perception.snapshot()) if whole else now
+            self._hand(SEGMENTS, now_s, Moment(record.cycle, segments=state.perception.segments_now()))
+        elif record.cycle % self._moment_cycles == self._moment_cycles // 2:
+            self._hand(OBJECTS, now_s, Moment(record.cycle, objects=state.perception.objects()))
 
     def on_bytes(self, way: str, host_s: float, data: bytes) -> None:
         """Take bytes that came or went over the line."""

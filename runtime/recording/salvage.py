@@ -138,7 +138,7 @@ class Salvage:
             return True
         code, length = struct.unpack_from("<BQ", self._data, at)
         longest = {Opcode.CHUNK: CONTENT_MAX, Opcode.HEADER: HEADER_MAX, Opcode.DATA_END: 4}.get(code, 0)
-        return length <= longest and at + HEAD + length > len(self._data)
+        return bool(length <= longest) and at + HEAD + length > len(self._data)
 
     def _chunk(self, at: int, length: int) -> list[Entry] | None:
         """Return the messages of the chunk at a byte, None where it is damaged."""

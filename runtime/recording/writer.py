@@ -65,11 +65,11 @@ class Item(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """The map and the objects as a cycle left them; for a keyframe also everything else."""
+    """The map, or the objects, as a cycle left them; for a keyframe both and everything else."""
 
     cycle: int
-    segments: Floats
-    objects: tuple[Any, ...]
+    segments: Floats | None = None
+    objects: tuple[Any, ...] | None = None
     left: Left | None = None
     memory: dict[str, Any] | None = None
 
@@ -264,16 +264,18 @@ class RecordingWriter:
         if moment.left is not None and moment.memory is not None:
             self._add(ABOUT, self._about, log_ns)
             self._add(KEYFRAME, keyframe(moment.cycle, moment.left, moment.memory), log_ns, moment.cycle)
-        self._add(SEGMENTS, self._map_change(moment), log_ns)
-        rows = [_rounded(dict(object_row(seen))) for seen in moment.objects]
-        self._add(OBJECTS, ObjectsSeen.model_construct(cycle=moment.cycle, objects=rows), log_ns)
+        if moment.segments is not None:
+            self._add(SEGMENTS, self._map_change(moment, moment.segments), log_ns)
+        if moment.objects is not None:
+            rows = [_rounded(dict(object_row(seen))) for seen in moment.objects]
+            self._add(OBJECTS, ObjectsSeen.model_construct(cycle=moment.cycle, objects=rows), log_ns)
 
-    def _map_change(self, moment: Moment) -> MapChange:
+    def _map_change(self, moment: Moment, segments: Floats) -> MapChange:
         """Return what has come and gone since the last moment; a keyframe tells the whole map."""
         whole = moment.memory is not None
         if whole:
             self._map = {}
-        rows = np.round(moment.segments, DIGITS)
+        rows = np.round(segments, DIGITS)
         now = {row.tobytes(): row for row in rows}
         removed = [self._map.pop(key) for key in [key for key in self._map if key not in now]]
         fresh = [key for key in now if key not in self._map]

@@ -76,7 +76,7 @@ def test_the_account_of_chunks_is_right(small: bytes) -> None:
 
 def test_cut_off_anywhere_every_complete_chunk_is_read(small: bytes) -> None:
     ends = [end for _, end in chunks_at(small)]
-    for cut in range(len(small)):
+    for cut in [*range(ends[-1] + 50), *range(ends[-1] + 50, len(small), 37)]:  # beyond is the index
         chunks, salvage = salvaged(small[:cut])
         assert len(chunks) == sum(end <= cut for end in ends), cut
         assert not salvage.finished
@@ -88,7 +88,9 @@ def test_cut_off_anywhere_every_complete_chunk_is_read(small: bytes) -> None:
 def test_one_flipped_bit_costs_a_chunk_at_most_and_is_told(small: bytes) -> None:
     whole, _ = salvaged(small)
     rng = random.Random(0)
-    for at in range(len(small)):
+    heads = {at + k for begin, end in chunks_at(small) for at in (begin, end) for k in range(-8, 60)}
+    index = chunks_at(small)[-1][1] + 60
+    for at in sorted(heads | {*range(60), *range(60, index, 3), *range(index, len(small), 23)}):
         data = bytearray(small)
         data[at] ^= 1 << rng.randrange(8)
         chunks, salvage = salvaged(bytes(data))
