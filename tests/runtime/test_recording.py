@@ -27,9 +27,8 @@ from runtime.recording.rerun import Verdict, fresh_state, replay
 from runtime.simulate import simulate
 from tests.recorded import entries_of, hall, record, rewrite
 
-pytestmark = pytest.mark.compiled
 ROOT = Path(__file__).parents[2]
-SECONDS = 15.0
+SECONDS = 12.0
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +47,7 @@ def verdict_of(path: Path, **span: float) -> Verdict:
     return verdict
 
 
+@pytest.mark.compiled
 def test_a_replay_is_the_run_to_the_bit(run: Path) -> None:
     verdict = verdict_of(run)
     assert verdict.first is None, str(verdict.first)
@@ -56,10 +56,11 @@ def test_a_replay_is_the_run_to_the_bit(run: Path) -> None:
     assert verdict.keyframes >= SECONDS / 2.0 - 2
     assert verdict.missing == []
     assert verdict.state is not None
-    assert len(verdict.state.perception.objects()) >= 5
+    assert len(verdict.state.perception.objects()) >= 3
 
 
-@pytest.mark.parametrize("since_s", [2.0, 4.5, 7.9, 13.0])
+@pytest.mark.compiled
+@pytest.mark.parametrize("since_s", [2.0, 4.5, 7.9, 11.0])
 def test_so_is_one_from_a_keyframe(run: Path, since_s: float) -> None:
     whole, part = verdict_of(run), verdict_of(run, since_s=since_s)
     assert part.first is None, str(part.first)
@@ -73,6 +74,7 @@ def test_so_is_one_from_a_keyframe(run: Path, since_s: float) -> None:
     assert {name: array.tobytes() for name, array in one.items()} == {n: a.tobytes() for n, a in other.items()}
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("since", ["0", "9"])
 def test_so_is_one_in_a_process_of_its_own(run: Path, since: str, tmp_path: Path) -> None:
     summary = tmp_path / "summary.json"
@@ -87,6 +89,7 @@ def test_so_is_one_in_a_process_of_its_own(run: Path, since: str, tmp_path: Path
     assert told["cycles"] >= 20 * (SECONDS - float(since))
 
 
+@pytest.mark.compiled
 def test_the_papers_method_too(tmp_path: Path) -> None:
     path = tmp_path / "paper.mcap"
     record(hall("perception.method=paper"), path, 10.0)
@@ -97,6 +100,7 @@ def test_the_papers_method_too(tmp_path: Path) -> None:
         assert set(verdict.refinement) == {"budget", "converged", "nothing"}
 
 
+@pytest.mark.compiled
 def test_the_first_difference_is_named(run: Path, tmp_path: Path) -> None:
     entries = entries_of(run)
     for i, entry in enumerate(entries):
@@ -111,6 +115,7 @@ def test_the_first_difference_is_named(run: Path, tmp_path: Path) -> None:
     assert verdict.first.recorded == int(str(verdict.first.replayed)) + 1
 
 
+@pytest.mark.compiled
 def test_a_memory_that_differs_is_named(run: Path, tmp_path: Path) -> None:
     """The map of a keyframe holds what no record tells: one bit of it is a difference."""
     entries = entries_of(run)
@@ -150,6 +155,7 @@ def test_everything_that_happened_is_in_it(run: Path) -> None:
         assert recording.finished
 
 
+@pytest.mark.compiled
 def test_segments_go_in_as_changes_and_add_up(run: Path) -> None:
     entries = [decode(MapChange, e.data) for e in entries_of(run) if e.topic == SEGMENTS]
     held: dict[int, tuple[float, ...]] = {}
@@ -160,7 +166,7 @@ def test_segments_go_in_as_changes_and_add_up(run: Path) -> None:
             del held[number]
         held |= {change.first + i: row for i, row in enumerate(change.added)}
         at_keyframes += change.whole and len(before) > 0
-    assert at_keyframes >= 5
+    assert at_keyframes >= 4
     state = verdict_of(run).state
     assert state is not None
     assert len(held) == pytest.approx(len(state.perception.segments_now()), abs=3)
@@ -220,6 +226,7 @@ def test_what_does_not_fit_is_dropped_counted_and_got_over(tmp_path: Path) -> No
     assert verdict.skipped <= 2, "a keyframe follows at once"
 
 
+@pytest.mark.compiled
 def test_the_loop_only_hands_over() -> None:
     """What the loop does a cycle is less than encoding the record would be."""
     settings = hall("recording.keyframe_period_s=3600.0")
@@ -309,6 +316,10 @@ def test_other_settings_tell_what_would_have_been(run: Path, capsys: pytest.Capt
     assert out.index("as it was") < out.index("with the other settings")
     assert out.count("of 6 drums") == 2
     assert "0 with another command" in out
+
+
+@pytest.mark.compiled
+def test_other_settings_may_drive_otherwise(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     avoid = "behaviors.avoid_static_obstacle.avoid_obstacle_sphere_m=2.0"
     assert call(["replay", str(run), "--set", avoid]) == DONE
     assert " 0 with another command" not in capsys.readouterr().out
@@ -321,7 +332,7 @@ def test_a_state_that_is_put_back_is_whole(run: Path) -> None:
         state = fresh_state(recording.settings)
         assert state.perception.objects() == ()
         state.perception.restore(snapshot_in(frames[-1]))
-        assert len(state.perception.objects()) >= 5
+        assert len(state.perception.objects()) >= 3
         other = fresh_state(hall("perception.full.tracks_max=7"))
         with pytest.raises(ValueError, match="of other settings"):
             other.perception.restore(snapshot_in(frames[-1]))
@@ -380,9 +391,10 @@ def test_calls_that_make_no_sense(run: Path, tmp_path: Path, capsys: pytest.Capt
     assert "ring log" in complaint(["replay", str(tmp_path / "x.csv"), "--verify"], capsys, WRONG_CALL)
 
 
+@pytest.mark.compiled
 def test_a_replay_to_watch_keeps_its_pace(run: Path) -> None:
     began_s = time.monotonic()
-    assert call(["replay", str(run), "--verify", "--speed", "5", "--from", "10", "--to", "13"]) == DONE
+    assert call(["replay", str(run), "--verify", "--speed", "5", "--from", "8", "--to", "11"]) == DONE
     assert time.monotonic() - began_s > 0.5
 
 

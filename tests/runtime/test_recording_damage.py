@@ -23,8 +23,6 @@ from runtime.recording.rerun import replay
 from runtime.recording.salvage import Salvage
 from tests.recorded import entries_of, hall, record, rewrite
 
-pytestmark = pytest.mark.compiled
-
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
