@@ -42,8 +42,8 @@ class FullPerception:
         What a user may set.
     """
 
-    SCRATCH: Final = ("_sure",)
-    """Only for reporting, and no memory."""
+    SCRATCH: Final = ("_sure", "_told", "_handle")
+    """No memory: what reporting works with, and another way to the memory."""
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: FullConfig) -> None:
         self._mounts = mounts_array(ring.mounts)
