@@ -6,7 +6,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: run test lint tests boundscheck coverage soak bench clean
+.PHONY: run test lint tests boundscheck coverage bench soak clean
 
 run: $(VENV)/run.stamp
 	@$(BIN)/echolocate run
@@ -31,13 +31,18 @@ coverage: $(VENV)/test.stamp
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest -q -m "not realtime and not compiled"
 	$(BIN)/python -m coverage report --skip-covered --fail-under=90
 
-# What takes too long for every day: ten minutes of a recorded run, a hundred that are killed.
-soak: $(VENV)/test.stamp
-	$(BIN)/python -m pytest -m soak
-
-# Ours against the libraries one would use instead; BENCH=--quick for a small run.
+# Ours against the libraries one would use instead, and against the clock; BENCH=--quick for a small run of the first,
+# TIMING="--against earlier.json" for a comparison.
 bench: $(VENV)/bench.stamp
 	@$(BIN)/python -m tests.bench $(BENCH)
+	@$(BIN)/python -m tests.bench timing $(TIMING)
+	@$(BIN)/python -m tests.bench waking
+
+# An hour and a half of driving in virtual time: does anything grow, compile late, or collect all garbage? Then ten
+# minutes of a recorded run, and a hundred that are killed.
+soak: $(VENV)/test.stamp
+	@$(BIN)/python -m tests.timing.growth $(SOAK)
+	$(BIN)/python -m pytest -m soak
 
 clean:
 	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage

@@ -22,6 +22,8 @@ class CycleConfig(Strict):
     rate_hz: float = Field(default=20.0, ge=1.0, le=200.0)
     perception_budget_s: float = Field(default=0.005, ge=0.0, le=1.0)
     """Time perception may take in a cycle; refinement stops there and resumes in the next."""
+    overruns_max: int = Field(default=10, ge=1, le=10_000)
+    """After so many cycles in a row that left no time for the next one the robot stops and says whose fault it is."""
 
 
 class SegmentsConfig(Strict):
@@ -176,6 +178,19 @@ class BehaviorsConfig(Strict):
     arbiter: ArbiterConfig = ArbiterConfig()
 
 
+class RealtimeConfig(Strict):
+    """What the operating system is asked for, so that cycles begin on time; what it refuses is told, not fatal."""
+
+    slice_s: float | None = Field(default=0.0001, ge=0.0001, le=0.1)
+    """Turns of the processor this short let a waking cycle in before programs that want it all (from Linux 6.12)."""
+    priority: int | None = Field(default=None, ge=1, le=99)
+    """Run under SCHED_FIFO at this priority: before everything that is not real-time."""
+    core: int | None = Field(default=None, ge=0)
+    """Stay on this core."""
+    lock_memory: bool = False
+    """Never let memory be swapped out."""
+
+
 class LogConfig(Strict):
     """Where the log goes and how much of it."""
 
@@ -208,6 +223,7 @@ class Settings(RobotConfig):
     cycle: CycleConfig = CycleConfig()
     perception: PerceptionConfig = PerceptionConfig()
     behaviors: BehaviorsConfig = BehaviorsConfig()
+    realtime: RealtimeConfig = RealtimeConfig()
     log: LogConfig = LogConfig()
     recording: RecordingConfig = RecordingConfig()
 

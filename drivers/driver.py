@@ -56,6 +56,10 @@ class RobotDriver(Protocol):
     def counts(self) -> LinkCounts:
         """Frames over the line so far."""
 
+    @property
+    def waiting(self) -> int:
+        """Firings that `take` has ready."""
+
     def opened(self, now_s: float) -> None:
         """Begin (again) on a line just opened: greet the robot and set its firing pattern."""
 

@@ -12,13 +12,13 @@ import numpy as np
 
 from config.settings import RelaxationConfig
 from perception.clusters import Clusters
-from perception.kernel import Floats, Ints, kernel
+from perception.kernel import Floats, Ints, owning_kernel
 from perception.model import ObjectModel
 from perception.outline_map import OutlineMap
 from perception.relaxation import relax
 
 
-@kernel
+@owning_kernel
 def follow_clusters(old: Floats, new: Floats, reach: float, heir: Ints) -> None:
     """Say which old cluster each new one continues: the nearest, each at most once, the nearest pairs first.
 

@@ -1,4 +1,4 @@
-"""The timing books: how long cycles took and how late they began, in memory that never grows."""
+"""The timing books: how long cycles took, how late they began and by whose fault, in memory that never grows."""
 
 from __future__ import annotations
 
@@ -10,6 +10,10 @@ import numpy as np
 KEPT: Final = 65_536
 """Cycles over which quantiles are taken: 55 minutes at 20 Hz."""
 
+CULPRITS_MAX: Final = 32
+OTHERS: Final = "others"
+"""More names than that are one."""
+
 
 class Quantiles(TypedDict):
     """Microseconds."""
@@ -17,6 +21,12 @@ class Quantiles(TypedDict):
     p50: float
     p99: float
     max: float
+
+
+class Spread(Quantiles):
+    """Microseconds, with the tail that a deadline is about."""
+
+    p999: float
 
 
 def worst_of(runs: Sequence[Quantiles]) -> Quantiles:
@@ -28,6 +38,42 @@ def worst_of(runs: Sequence[Quantiles]) -> Quantiles:
     }
 
 
+class Series:
+    """The newest `KEPT` of a row of times, and the largest of all.
+
+    Parameters
+    ----------
+    is_touched : bool
+        Have the memory now rather than page by page as it is used.
+    """
+
+    def __init__(self, *, is_touched: bool = False) -> None:
+        self._values_s = np.full(KEPT, 0.0) if is_touched else np.zeros(KEPT)
+        self.count = 0
+        self.worst_s = 0.0
+        self.total_s = 0.0
+
+    def add(self, value_s: float) -> None:
+        """Book a time."""
+        self._values_s[self.count % KEPT] = value_s
+        self.count += 1
+        self.worst_s = max(self.worst_s, value_s)
+        self.total_s += value_s
+
+    def spread(self) -> Spread:
+        """Return median, tail and worst."""
+        if not self.count:
+            return {"p50": 0.0, "p99": 0.0, "p999": 0.0, "max": 0.0}
+        values = self._values_s[: min(self.count, KEPT)]
+        p50, p99, p999 = (round(float(q), 1) for q in 1e6 * np.quantile(values, [0.5, 0.99, 0.999]))
+        return {"p50": p50, "p99": p99, "p999": p999, "max": round(1e6 * self.worst_s, 1)}
+
+    def quantiles(self) -> Quantiles:
+        """Return the same in the form of the public surface."""
+        spread = self.spread()
+        return {"p50": spread["p50"], "p99": spread["p99"], "max": spread["max"]}
+
+
 class Books:
     """Durations and lateness of cycles.
 
@@ -35,39 +81,46 @@ class Books:
     ----------
     late_after_s : float
         A cycle that begins later than this after its deadline is late.
+    is_touched : bool
+        Have all memory now.
     """
 
-    def __init__(self, late_after_s: float) -> None:
-        self._late_after_s = late_after_s
-        self._took_s = np.zeros(KEPT)
-        self._lag_s = np.zeros(KEPT)
-        self._worst_s = 0.0
-        self._worst_lag_s = 0.0
-        self.cycles = 0
+    def __init__(self, late_after_s: float, *, is_touched: bool = False) -> None:
+        self.late_after_s = late_after_s
+        self.took = Series(is_touched=is_touched)
+        self.lag = Series(is_touched=is_touched)
         self.late = 0
-        self.total_s = 0.0
+        self.missed = 0
+        """Cycles that should have been and were not."""
+        self.faults: dict[str, int] = {}
+        """Late and overrun cycles by culprit."""
+
+    @property
+    def cycles(self) -> int:
+        """Cycles booked."""
+        return self.took.count
+
+    @property
+    def total_s(self) -> float:
         """All cycles together."""
+        return self.took.total_s
 
     def enter(self, took_s: float, lag_s: float = 0.0) -> None:
         """Book one cycle: how long it took and how long after its deadline it began."""
-        self._took_s[self.cycles % KEPT] = took_s
-        self._lag_s[self.cycles % KEPT] = lag_s
-        self._worst_s = max(self._worst_s, took_s)
-        self._worst_lag_s = max(self._worst_lag_s, lag_s)
-        self.total_s += took_s
-        self.cycles += 1
-        self.late += lag_s > self._late_after_s
+        self.took.add(took_s)
+        self.lag.add(lag_s)
+        self.late += lag_s > self.late_after_s
+
+    def blame(self, culprit: str) -> None:
+        """Book by whose fault a cycle was late or the one before it overran."""
+        known = culprit in self.faults or len(self.faults) < CULPRITS_MAX
+        name = culprit if known else OTHERS
+        self.faults[name] = self.faults.get(name, 0) + 1
 
     def cycle_us(self) -> Quantiles:
         """Return how long cycles took."""
-        return self._quantiles(self._took_s, self._worst_s)
+        return self.took.quantiles()
 
     def lag_us(self) -> Quantiles:
         """Return how long after their deadlines cycles began."""
-        return self._quantiles(self._lag_s, self._worst_lag_s)
-
-    def _quantiles(self, values_s: np.typing.NDArray[np.float64], worst_s: float) -> Quantiles:
-        if not self.cycles:
-            return {"p50": 0.0, "p99": 0.0, "max": 0.0}
-        p50, p99 = 1e6 * np.quantile(values_s[: min(self.cycles, KEPT)], [0.5, 0.99])
-        return {"p50": round(float(p50), 1), "p99": round(float(p99), 1), "max": round(1e6 * worst_s, 1)}
+        return self.lag.quantiles()

@@ -112,6 +112,7 @@ def emulate(
     seed: Seed = 0,
     robot: str | None = None,
     trace: str | None = None,
+    latency: str | None = None,
     config: str | None = None,
     sets: Sets = (),
     end_with_parent: Annotated[bool, Parameter(negative="", show=False)] = False,
@@ -132,6 +133,8 @@ def emulate(
         Robot file, or the name of a shipped one.
     trace
         Write the truth to this CSV file, a hundred rows a second.
+    latency
+        Write to this CSV file when each echo had left and when each drive command came.
     config
         Run file to take robot and world from.
     """
@@ -139,7 +142,7 @@ def emulate(
 
     return emulate_robot(
         config, sets, world=world, robot=robot, link=link, faults=faults, seed=seed, trace=trace,
-        end_with_parent=end_with_parent,
+        latency=latency, end_with_parent=end_with_parent,
     )  # fmt: skip
 
 

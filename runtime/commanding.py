@@ -19,9 +19,21 @@ def give(driver: RobotDriver, command: Command) -> None:
             driver.release()
 
 
-def gather(driver: RobotDriver, now_s: float, request: Request | None) -> Inputs:
+def gather(
+    driver: RobotDriver,
+    now_s: float,
+    request: Request | None,
+    *,
+    echo_age_s: float | None = None,
+    overrun: str | None = None,
+) -> Inputs:
     """Return everything a cycle that begins at `now_s` is told."""
     driver.tick(now_s)
+    gap_max_s = gap_max(driver)
+    return Inputs(now_s, driver.state, driver.trouble, driver.take(), request, gap_max_s, echo_age_s, overrun)
+
+
+def gap_max(driver: RobotDriver) -> float:
+    """Return the longest time between two commands that the base's deadman allows, s."""
     identity = driver.identity
-    gap_max_s = GAP_MAX_S if identity is None else GAP_SHARE * identity.deadman_s
-    return Inputs(now_s, driver.state, driver.trouble, driver.take(), request, gap_max_s)
+    return GAP_MAX_S if identity is None else GAP_SHARE * identity.deadman_s

@@ -93,6 +93,22 @@ def warm_up(settings: Settings) -> None:
         perception.things()
 
 
+def compiled_signatures() -> int:
+    """Return how many signatures of our kernels are compiled or loaded by now: a drive must not add to them."""
+    dispatchers = sys.modules.get("numba.core.dispatcher")
+    if dispatchers is None:
+        return 0
+    # One kernel imported by several modules is the same object in all of them.
+    kernels = {
+        id(value): value
+        for name, module in list(sys.modules.items())
+        if name.rpartition(".")[0] in PACKAGES
+        for value in vars(module).values()
+        if isinstance(value, dispatchers.Dispatcher)
+    }
+    return sum(len(kernel.overloads) for kernel in kernels.values())
+
+
 def ready_kernels(settings: Settings, console: Console) -> None:
     """Have every kernel compiled, or say that it takes a while and compile it.
 

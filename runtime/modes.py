@@ -91,6 +91,8 @@ class Situation:
     """Time since the cycle before."""
     gap_max_s: float = GAP_MAX_S
     """Longest such time after which driving may go on."""
+    overrun: str | None = None
+    """Why the cycle cannot keep its time any more; None while it can."""
 
 
 def advance(state: ModeState, seen: Situation) -> ModeState:
@@ -128,6 +130,8 @@ def why_stop(state: ModeState, seen: Situation) -> str | None:
     if seen.gap_s > seen.gap_max_s:
         # What has been heard may be from before: the next command would set a base in motion that stopped by itself.
         return HELD_UP.format(seen.gap_s)
+    if seen.overrun is not None:
+        return seen.overrun
     if seen.rebooted:
         return "the robot restarted, so its odometry began anew: check why, then re-arm"
     if seen.flags & Flags.BUMPER:
@@ -149,6 +153,8 @@ def _arm(state: ModeState, seen: Situation) -> ModeState:
         return state
     if seen.gap_s > seen.gap_max_s:
         return state.enter(Mode.SAFE_STOP, seen.now_s, HELD_UP.format(seen.gap_s))
+    if seen.overrun is not None:
+        return state.enter(Mode.SAFE_STOP, seen.now_s, seen.overrun)
     waited = seen.now_s - state.arming_s
     if waited >= ARMING_MIN_S and not seen.flags & Flags.LATCHED:
         return state.enter(Mode.DRIVE, seen.now_s)

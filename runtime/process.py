@@ -7,7 +7,6 @@ Everything that waits, reads a clock or touches a port is here or below in drive
 from __future__ import annotations
 
 import asyncio
-import gc
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,12 +19,17 @@ from drivers.link import Link, LinkError
 from drivers.messages import Firing, Flags, Twist
 from perception.pipeline import Perception
 from runtime.books import Books
-from runtime.commanding import gather, give
+from runtime.commanding import gap_max, gather, give
 from runtime.complaint import FAILED, WRONG_CALL, Complaint
+from runtime.footprint import Footprint, FootprintRow
+from runtime.memory import MemoryPolicy, collect_young
+from runtime.meter import Reading
 from runtime.modes import Mode, Request
-from runtime.pacing import Pacer
+from runtime.phases import Phase
+from runtime.realtime import ask
+from runtime.rhythm import Rhythm
 from runtime.step import STANDSTILL, Command, CycleRecord, State, step
-from runtime.summary import RunSummary, object_row
+from runtime.summary import RunSummary, run_summary
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
@@ -36,15 +40,14 @@ CONNECT_MAX_S: Final = 5.0
 HALT_MAX_S: Final = 0.5
 """How long the end of a run waits for the base to confirm that it stands."""
 
-LATE_SHARE: Final = 0.1
-"""A cycle that begins later than this share of its period is late."""
-
-
 Way: TypeAlias = Literal["in", "out"]
 
-COLLECT_EVERY: Final = 20
-COLLECT_SLACK_S: Final = 0.01
-"""Young garbage is collected once in so many cycles, and only with so much time to spare; the old is frozen."""
+LINE_OPENED: Final = "line opened"
+LINK_RECEIVE: Final = "link receive"
+LINE_LOST: Final = "line lost"
+COLLECTION: Final = "garbage collection"
+CALLBACKS: Final = (LINE_OPENED, LINK_RECEIVE, LINE_LOST, COLLECTION)
+"""What of ours the loop calls between two cycles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,11 +87,16 @@ class RobotProcess:
         self._observers = observers
         self._clock = clock
         self._driver = DenningRobot(settings)
-        self._link = Link(settings.link, self._opened, self._received, self._closed)
         self._state = State(Perception(settings.ring, settings.models, settings.perception))
-        self._period_s = 1.0 / settings.cycle.rate_hz
-        self.books = Books(LATE_SHARE * self._period_s)
-        self._missed = 0
+        self._rhythm = Rhythm(settings, clock, CALLBACKS)
+        timed = self._rhythm.keeper.timed
+        self._link = Link(
+            settings.link,
+            timed(LINE_OPENED, self._opened),
+            timed(LINK_RECEIVE, self._received),
+            timed(LINE_LOST, self._closed),
+        )
+        self._memory = MemoryPolicy(timed(COLLECTION, collect_young))
         self._stop_reasons: list[str] = []
         self._request: Request | None = None
         self._stop = asyncio.Event()
@@ -101,6 +109,7 @@ class RobotProcess:
     def stop(self) -> None:
         """End the run in good order: halt the base, then close the line."""
         self._stop.set()
+        self._rhythm.wake()
 
     async def run(self, *, arm: bool, seconds: float | None) -> RunSummary:
         """Run until told to stop or `seconds` have passed, and return the summary.
@@ -119,18 +128,19 @@ class RobotProcess:
         """
         await self._connect()
         keeper = asyncio.create_task(self._link.run(), name="link")
-        gc.collect()
-        gc.freeze()
-        gc.disable()
+        for refusal in ask(self._settings.realtime):
+            self._log.warning(refusal)
+        footprint = Footprint(self._memory)
         try:
             if arm:
                 self.request(Request.ARM)
-            await self._cycle(seconds)
+            with self._memory.driving():
+                await self._cycle(seconds)
         finally:
-            gc.enable()
-            gc.unfreeze()
+            cost = footprint.close()
+            self._rhythm.close()
             await self._shut_down(keeper)
-        return self._summary()
+        return self._summary(cost)
 
     async def _connect(self) -> None:
         """Open the port and wait until the robot is ready."""
@@ -156,24 +166,22 @@ class RobotProcess:
         return f"nothing on {self._settings.link.port} answers like the robot: check its power and link.baud"
 
     async def _cycle(self, seconds: float | None) -> None:
-        """Run cycles on their grid of deadlines until the run ends."""
-        pacer = Pacer(self._clock(), self._period_s)
-        began_s = pacer.deadline_s
-        while not self._stop.is_set():
-            start_s = self._clock()
-            if seconds is not None and start_s - began_s >= seconds:
-                return
-            try:
-                self._one_cycle(start_s)
-            except Exception as error:  # noqa: BLE001 - whatever it is, the robot must stand still first
-                self._fail(error)
-                return
-            self.books.enter(self._clock() - start_s, start_s - pacer.deadline_s)
-            deadline_s = pacer.advance(self._clock())
-            self._missed = pacer.missed
-            if self.books.cycles % COLLECT_EVERY == 0 and deadline_s - self._clock() > COLLECT_SLACK_S:
-                gc.collect(1)
-            await asyncio.sleep(max(0.0, deadline_s - self._clock()))
+        """Run cycles in their rhythm until the run ends."""
+        began_s, rhythm = self._clock(), self._rhythm
+        with rhythm.start(began_s, gap_max(self._driver)):
+            while not self._stop.is_set():
+                now = await rhythm.wait()
+                if now is None:
+                    continue
+                if seconds is not None and now.wall_s - began_s >= seconds:
+                    return
+                try:
+                    self._one_cycle(now)
+                except Exception as error:  # noqa: BLE001 - whatever it is, the robot must stand still first
+                    self._fail(error)
+                    return
+                left_s = rhythm.end(self._clock())
+                self._memory.cycle_done(left_s)
 
     def _fail(self, error: Exception) -> None:
         """Halt before anything else, then say what happened; FAULT is not left."""
@@ -184,9 +192,13 @@ class RobotProcess:
         self._note_mode()
         self._log.error("the cycle failed", exc_info=error)
 
-    def _one_cycle(self, start_s: float) -> None:
+    def _one_cycle(self, now: Reading) -> None:
+        rhythm, start_s = self._rhythm, now.wall_s
+        mark = rhythm.keeper.mark
         request, self._request = self._request, None
-        inputs = gather(self._driver, start_s, request)
+        begun = rhythm.begin(now)
+        inputs = gather(self._driver, start_s, request, echo_age_s=begun.echo_age_s, overrun=rhythm.overrun)
+        mark(Phase.GATHER)
         budget_s = self._settings.cycle.perception_budget_s
         before = self._state.mode
         record = step(
@@ -195,6 +207,7 @@ class RobotProcess:
             self._settings,
             lambda command: self._carry_out(command, start_s + inputs.gap_max_s),
             lambda _done: self._clock() - start_s < budget_s,
+            mark,
         )
         if self._state.mode.entered_since(before):
             self._note_mode()
@@ -202,7 +215,8 @@ class RobotProcess:
             for firing in inputs.heard.firings:
                 self._observers.on_firing(firing)
         if self._observers.on_cycle is not None:
-            self._observers.on_cycle(record, self._state, self.books, self._driver)
+            self._observers.on_cycle(record, self._state, rhythm.books, self._driver)
+        mark(Phase.OBSERVERS)
 
     def _note_mode(self) -> None:
         state = self._state.mode
@@ -227,8 +241,10 @@ class RobotProcess:
         self._driver.opened(self._clock())
 
     def _received(self, data: bytes) -> None:
-        now_s = self._clock()
+        now_s, waiting = self._clock(), self._driver.waiting
         self._driver.receive(data, now_s)
+        if self._driver.waiting > waiting:
+            self._rhythm.hear(now_s)
         if self._observers.on_bytes is not None:
             self._observers.on_bytes("in", now_s, data)
 
@@ -254,16 +270,6 @@ class RobotProcess:
         keeper.cancel()
         await asyncio.gather(keeper, return_exceptions=True)
 
-    def _summary(self) -> RunSummary:
-        counts = self._driver.counts
-        return {
-            "objects": [object_row(seen) for seen in self._state.perception.objects()],
-            "cycles": self.books.cycles,
-            "cycle_us": self.books.cycle_us(),
-            "late": self.books.late,
-            "missed": self._missed,
-            "lag_us": self.books.lag_us(),
-            "link": {"frames": counts.frames, "bad": counts.bad, "lost": counts.lost},
-            "mode": self._state.mode.mode.value,
-            "stop_reasons": self._stop_reasons,
-        }
+    def _summary(self, cost: FootprintRow) -> RunSummary:
+        rhythm = self._rhythm
+        return run_summary(self._state, rhythm.books, rhythm.keeper, self._driver, cost, self._stop_reasons)

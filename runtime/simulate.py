@@ -84,7 +84,7 @@ def simulate(
     state = State(Perception(settings.ring, settings.models, settings.perception))
     start = robot.truth.pose
     began = time.perf_counter()
-    books = Books(late_after_s=math.inf)
+    books = Books(late_after_s=math.inf, is_touched=True)
     until, now = seconds_max, 0.0
     while now < until:
         now = (books.cycles + 1) / settings.cycle.rate_hz

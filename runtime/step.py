@@ -1,8 +1,8 @@
 """One perception-action cycle: the pure heart of the program.
 
-`step` gets every input as an argument and reaches the world through two callables only: one that carries out the
-command, one that says whether refinement may go on. Handing it the same inputs and the same answers gives the same
-record again, to the bit; that is what a replay is.
+`step` gets every input as an argument and reaches the world through three callables only: one that carries out the
+command, one that says whether refinement may go on, one that is told which phase has ended. Handing it the same
+inputs and the same answers gives the same record again, to the bit; that is what a replay is.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from drivers.messages import Flags, Odometry, Twist
 from perception.percept import Percept
 from perception.pipeline import Perception
 from runtime.modes import GAP_MAX_S, Mode, ModeState, Request, Situation, advance
+from runtime.phases import Phase, unmarked
 
 STANDSTILL = Twist(0.0, 0.0)
 
@@ -47,6 +48,10 @@ class Inputs:
     request: Request | None = None
     gap_max_s: float = GAP_MAX_S
     """Cycles farther apart than this come too late for the base's deadman."""
+    echo_age_s: float | None = None
+    """How long the oldest of these firings has waited for this cycle; None where none came or nobody asks."""
+    overrun: str | None = None
+    """Why the cycle cannot keep its time any more; None while it can."""
 
 
 @dataclass(slots=True)
@@ -84,6 +89,7 @@ def step(
     settings: Settings,
     carry_out: Callable[[Command], None],
     may_refine: Callable[[int], bool],
+    mark: Callable[[Phase], None] = unmarked,
 ) -> CycleRecord:
     """Run one cycle: perceive, decide, command, and then refine for as long as it may.
 
@@ -99,6 +105,8 @@ def step(
         Gets the command before refinement begins, so that no refinement ever delays a stop.
     may_refine : callable
         Asked with the number of quanta done before each further one.
+    mark : callable
+        Told of each phase that has ended; nothing in here depends on what it does.
 
     Returns
     -------
@@ -106,9 +114,13 @@ def step(
         The whole cycle.
     """
     new_segments = _perceive(state, inputs)
+    mark(Phase.PERCEIVE)
     command = _decide(state, inputs, settings)
+    mark(Phase.DECIDE)
     carry_out(command)
+    mark(Phase.COMMAND)
     quanta, iterations, refinement = _refine(state.perception, may_refine)
+    mark(Phase.REFINE)
     state.cycle += 1
     return CycleRecord(
         state.cycle, inputs, state.mode, command, new_segments, state.perception.living,
@@ -140,7 +152,7 @@ def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
     state.now_s = inputs.now_s
     situation = Situation(
         inputs.now_s, inputs.line, inputs.trouble, flags, inputs.heard.rebooted, inputs.request,
-        gap_s, inputs.gap_max_s,
+        gap_s, inputs.gap_max_s, inputs.overrun,
     )  # fmt: skip
     state.mode = advance(before, situation)
     if state.mode.mode is Mode.DRIVE:

@@ -7,9 +7,13 @@ from typing import NotRequired, TypedDict
 
 import orjson
 
+from drivers.driver import RobotDriver
 from perception.pipeline import SeenObject
-from runtime.books import Quantiles
+from runtime.books import Books, Quantiles
 from runtime.complaint import FAILED, Complaint
+from runtime.footprint import FootprintRow
+from runtime.step import State
+from runtime.timekeeping import Timekeeper, Timing
 
 
 class ObjectRow(TypedDict):
@@ -57,8 +61,10 @@ class RunSummary(TypedDict):
     missed: int
     lag_us: Quantiles
     link: LinkRow
+    process: FootprintRow
     mode: str
     stop_reasons: list[str]
+    timing: Timing
     recording: NotRequired[RecordingRow]
 
 
@@ -104,6 +110,26 @@ def object_row(seen: SeenObject) -> ObjectRow:
     if seen.covariance is not None:
         row["covariance"] = seen.covariance
     return row
+
+
+def run_summary(
+    state: State, books: Books, keeper: Timekeeper, driver: RobotDriver, cost: FootprintRow, stop_reasons: list[str]
+) -> RunSummary:
+    """Return the summary of a run that ends in `state`."""
+    counts = driver.counts
+    return {
+        "objects": [object_row(seen) for seen in state.perception.objects()],
+        "cycles": books.cycles,
+        "cycle_us": books.cycle_us(),
+        "late": books.late,
+        "missed": books.missed,
+        "lag_us": books.lag_us(),
+        "link": {"frames": counts.frames, "bad": counts.bad, "lost": counts.lost},
+        "process": cost,
+        "mode": state.mode.mode.value,
+        "stop_reasons": stop_reasons,
+        "timing": keeper.timing(),
+    }
 
 
 def write_json(path: str, summary: object) -> None:

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from runtime.experiment import DrumRow, Outcome
 from runtime.open_loop import BoxRow, SceneOutcome
-from runtime.summary import ObjectRow
+from runtime.summary import ObjectRow, RunSummary
 
 Units: TypeAlias = Literal["m", "ft"]
 
@@ -108,3 +108,32 @@ def objects_table(objects: list[ObjectRow], units: Units) -> Table:
             f"{seen['score']:.2f}",
         )
     return table
+
+
+def timing_table(summary: RunSummary) -> Table:
+    """Return where a run's time went, ms: each phase and callback, lateness, and how long echoes waited."""
+    timing = summary["timing"]
+    table = Table(title="where the time went (ms)", title_justify="left")
+    for heading in ("what", "median", "p99", "p99.9", "worst"):
+        table.add_column(heading, justify="left" if heading == "what" else "right")
+    rows = {
+        **timing["phases"],
+        **{f"between cycles: {name}": spread for name, spread in timing["callbacks"].items()},
+        "a cycle begins after it is due by": timing["late"],
+        "an echo waits for its cycle": timing["echo_wait"],
+    }
+    for name, spread in rows.items():
+        figures = (spread["p50"], spread["p99"], spread["p999"], spread["max"])
+        table.add_row(name, *(f"{figure / 1e3:.2f}" for figure in figures))
+    return table
+
+
+def timing_verdict(summary: RunSummary) -> str:
+    """Return how well a run kept its time, and by whose fault it did not, in one line."""
+    timing = summary["timing"]
+    line = (
+        f"{summary['cycles']} cycles, {timing['following']:.0%} of them with the ring; {summary['late']} late, "
+        f"{timing['missed']} missed, {timing['overruns']} overruns"
+    )
+    by = ", ".join(f"{culprit} ({count})" for culprit, count in timing["faults"].items())
+    return f"{line}; by fault of: {by}" if by else line

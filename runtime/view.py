@@ -46,6 +46,7 @@ STYLES: Final = MappingProxyType(
     {"DRIVE": "bold white on green", "SAFE_STOP": "bold white on red", "FAULT": "bold white on red"}
 )
 BARS: Final = " ▁▂▃▄▅▆▇█"
+FAULTS_SHOWN: Final = 3
 KEYS_MAX: Final = 64
 KEYS: Final = MappingProxyType({" ": Request.HALT, "h": Request.HALT, "a": Request.ARM})
 
@@ -66,6 +67,9 @@ class Snapshot:
     late: int
     cycle_us: Quantiles
     lag_us: Quantiles
+    missed: int = 0
+    faults: tuple[tuple[str, int], ...] = ()
+    """Culprits of late and overrun cycles, and how many each."""
 
 
 class View:
@@ -107,7 +111,7 @@ class View:
         self._slot = Snapshot(
             record.mode, pose, list(self._trail), state.perception.segments_now(), record.clusters,
             state.perception.things(), self._ranges.copy(), driver.counts,
-            books.cycles, books.late, books.cycle_us(), books.lag_us(),
+            books.cycles, books.late, books.cycle_us(), books.lag_us(), books.missed, tuple(books.faults.items()),
         )  # fmt: skip
         self._wake.set()
 
@@ -159,8 +163,12 @@ class View:
         took, lag = snapshot.cycle_us, snapshot.lag_us
         grid.add_row(
             "cycle",
-            f"{snapshot.cycles}, {snapshot.late} late; takes {millis(took)}; begins {millis(lag)} after its deadline",
+            f"{snapshot.cycles}, {snapshot.late} late, {snapshot.missed} missed; takes {millis(took)}; "
+            f"begins {millis(lag)} after it is due",
         )
+        if snapshot.faults:
+            worst = sorted(snapshot.faults, key=lambda fault: -fault[1])[:FAULTS_SHOWN]
+            grid.add_row("late by", ", ".join(f"{culprit}: {count}" for culprit, count in worst))
         return grid
 
     def _ring(self, ranges: Floats) -> str:

@@ -87,6 +87,11 @@ class DenningRobot:
         return LinkCounts(before.frames + now.frames, before.bad + now.bad, before.lost + now.lost)
 
     @property
+    def waiting(self) -> int:
+        """Firings that `take` has ready."""
+        return len(self._firings)
+
+    @property
     def late_echoes(self) -> int:
         """Firings dropped because no odometry tells where they took place."""
         return self._stamper.late_echoes

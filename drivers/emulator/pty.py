@@ -16,11 +16,13 @@ import time
 import tty
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import TextIO
 
 from config.robot import RobotConfig
 from config.world import WorldConfig
 from drivers.emulator.device import EmulatedRobot
 from drivers.emulator.faults import Fault
+from drivers.emulator.latency import LatencyTrace
 from drivers.emulator.trace import TruthTrace
 
 PERIOD_S = 0.002
@@ -132,6 +134,22 @@ class PtyPort:
                     raise
         self.dropped += len(data) - written
 
+    async def wait(self, timeout_s: float) -> None:
+        """Wait until the host has written something, for `timeout_s` at most."""
+        master = self._master
+        if master is None or not self._has_host:  # a pty without a host is readable all the time
+            await asyncio.sleep(timeout_s)
+            return
+        loop = asyncio.get_running_loop()
+        over = asyncio.Event()
+        timer = loop.call_later(timeout_s, over.set)
+        loop.add_reader(master, over.set)
+        try:
+            await over.wait()
+        finally:
+            loop.remove_reader(master)
+            timer.cancel()
+
     def _forget_unread(self) -> None:
         """Throw away what the last host left unread: a pty keeps it for the next one, a serial port does not."""
         with contextlib.suppress(OSError, termios.error):
@@ -201,6 +219,7 @@ async def serve(
     seed: int,
     trace_path: str | None,
     ready: Callable[[str], None],
+    latency_path: str | None = None,
     exit_with_parent: bool = False,
     clock: Callable[[], float] = time.monotonic,
 ) -> None:
@@ -214,6 +233,8 @@ async def serve(
         Where to put a symbolic link to the pty; it is removed at the end.
     trace_path
         Where to write the truth, see `TruthTrace`.
+    latency_path
+        Where to write when echoes left and commands came, see `LatencyTrace`.
     ready
         Called once, with the path to open, when a host can open it.
     exit_with_parent
@@ -237,7 +258,8 @@ async def serve(
         for number in (signal.SIGTERM, signal.SIGINT):
             stack.callback(loop.remove_signal_handler, number)
         device = EmulatedRobot(robot, world, seed, faults=faults)
-        trace = _open_trace(trace_path, stack)
+        trace = None if trace_path is None else TruthTrace(_open_trace(trace_path, stack))
+        latency = None if latency_path is None else LatencyTrace(_open_trace(latency_path, stack))
         port = PtyPort(link_path)
         stack.callback(port.close)
         ready(port.path)
@@ -246,7 +268,7 @@ async def serve(
         while not stop.is_set():
             now_s = clock()
             for robot_s in timeline.strides(now_s):
-                _exchange(device, port, robot_s)
+                _exchange(device, port, robot_s, latency, clock)
                 if trace is not None:
                     truth = device.truth
                     trace.write(truth, timeline.host_s(truth.t_s))
@@ -254,10 +276,16 @@ async def serve(
                 orphaned_s = now_s
             if orphaned_s is not None and now_s - orphaned_s > LINGER_S:
                 return
-            await asyncio.sleep(PERIOD_S)
+            await port.wait(PERIOD_S)
 
 
-def _exchange(device: EmulatedRobot, port: PtyPort, robot_s: float) -> None:
+def _exchange(
+    device: EmulatedRobot,
+    port: PtyPort,
+    robot_s: float,
+    latency: LatencyTrace | None,
+    clock: Callable[[], float],
+) -> None:
     """Advance the robot and move bytes both ways."""
     left = device.advance(robot_s)
     if port.is_open and not device.plugged:
@@ -265,18 +293,20 @@ def _exchange(device: EmulatedRobot, port: PtyPort, robot_s: float) -> None:
     elif device.plugged and not port.is_open:
         port.open()
     heard = port.read()
+    if heard and latency is not None:
+        latency.heard(heard, clock())
     # With no host on the line bytes go nowhere: the pty would keep them for the next one to open it.
     if heard is not None and left:
+        sent_s = clock()
         port.write(left)
+        if latency is not None:
+            latency.sent(left, sent_s)
     if heard:
         device.receive(heard)
 
 
-def _open_trace(trace_path: str | None, stack: contextlib.ExitStack) -> TruthTrace | None:
-    if trace_path is None:
-        return None
+def _open_trace(trace_path: str, stack: contextlib.ExitStack) -> TextIO:
     try:
-        file = stack.enter_context(Path(trace_path).open("w", encoding="ascii"))  # noqa: SIM115 - the stack closes it
+        return stack.enter_context(Path(trace_path).open("w", encoding="ascii"))
     except OSError as error:
         raise EmulatorError(f"cannot write the trace {trace_path}: {os.strerror(error.errno or 0)}") from error
-    return TruthTrace(file)

@@ -16,8 +16,11 @@ from perception.kernel import Floats, Ints, kernel
 LEVELS: Final = 24
 """Noise levels of the table, spaced geometrically: 32 % apart over .001 to .6 ft, finer than a σ can be told."""
 
-BINS: Final = 128
-"""Bins of |e| of each level, from 0 to half the box + `REACH` σ, interpolated linearly."""
+BINS: Final = 129
+"""Bins of |e| of each level, from 0 to half the box + `REACH` σ, interpolated linearly.
+
+The last bin is there twice, so that an error beyond it is cut off and interpolated like any other, without a branch.
+"""
 
 REACH: Final = 6.0
 """σ beyond the box where only outliers are left."""
@@ -44,7 +47,7 @@ def build_table(
 
         L(e) = log((1 − ε) · [Φ((e + h)/σ) − Φ((e − h)/σ)] / (2 h u0) + ε)
 
-    which for h → 0 becomes the Gaussian's own density. Beyond the last bin L = log ε.
+    which for h → 0 becomes the Gaussian's own density. From the last bin but one on L = log ε.
 
     Parameters
     ----------
@@ -67,8 +70,8 @@ def build_table(
     for k in range(LEVELS):
         sigma = sigma_lo * math.exp(ratio * k)
         sigmas[k] = sigma
-        inv_step[k] = (BINS - 1) / (half_box + REACH * sigma)
-        for b in range(BINS - 1):
+        inv_step[k] = (BINS - 2) / (half_box + REACH * sigma)
+        for b in range(BINS - 2):
             e = b / inv_step[k]
             if half_box > SHARP * sigma:
                 root = sigma * math.sqrt(2.0)
@@ -76,6 +79,7 @@ def build_table(
             else:
                 p = math.exp(-0.5 * (e / sigma) ** 2) / (sigma * math.sqrt(2.0 * math.pi))
             table[k, b] = math.log((1.0 - eps) * max(p, 0.0) / u0 + eps)
+        table[k, BINS - 2] = math.log(eps)
         table[k, BINS - 1] = math.log(eps)
 
 
@@ -97,13 +101,9 @@ def loglik(table: Floats, inv_step: Floats, k: int, e: float) -> float:
     float
         Nat.
     """
-    last = table.shape[1] - 1
-    t = abs(e) * inv_step[k]
-    if t >= last:
-        return float(table[k, last])
+    t = min(abs(e) * inv_step[k], float(table.shape[1] - 2))
     b = int(t)
-    f = t - b
-    return float(table[k, b] + f * (table[k, b + 1] - table[k, b]))
+    return float(table[k, b] + (t - b) * (table[k, b + 1] - table[k, b]))
 
 
 @kernel

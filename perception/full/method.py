@@ -7,6 +7,7 @@ piece of work: a firing a bounded number of quanta, a quantum one object.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import Final
 
 import numpy as np
@@ -15,10 +16,8 @@ from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import FullConfig
 from drivers.messages import Firing
-from perception.full.observe import observe
-from perception.full.polygon_tracks import pquantum
-from perception.full.refine import quantum
-from perception.full.report import POLYGON_PROBABILITY, circle, other_things, polygon, sure_circles, sure_polygons
+from perception.full.entry import hold, observe, pquantum, quantum, sure_circles
+from perception.full.report import POLYGON_PROBABILITY, circle, other_things, polygon, sure_polygons
 from perception.full.settings import circle_models, make_settings
 from perception.full.state import KIND, MODEL, PPROB, PROB, PT, SEGMENTS, ST, clear, make_state
 from perception.kernel import Floats
@@ -52,9 +51,12 @@ class FullPerception:
         """What kernels are told."""
         self.memory = make_state(len(self._mounts), self.settings, config.tracks_max)
         """What they remember."""
+        self._handle = hold(self.memory, self.settings)
         _, self._round = circle_models(models)
         self._outlines = [m.name for m in models if m.arc_radius_m is None]
         self._sure = np.zeros(max(config.tracks_max, PT), np.int64)
+        self._told = np.full((config.tracks_max, 8), np.nan)
+        self._circles: dict[int, SeenObject] = {}
         self._objects: tuple[SeenObject, ...] | None = None
         self._left = 0
         self._polygons_left = 0
@@ -85,8 +87,8 @@ class FullPerception:
         """Take in one firing and return how many outline segments it completed."""
         pose = firing.pose
         made, self._circles_pending = observe(
-            self.memory, self.settings, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw),
-            float(firing.t_s), firing.ranges_m, self._config.fresh_share,
+            self._handle, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), float(firing.t_s),
+            firing.ranges_m, self._config.fresh_share,
         )  # fmt: skip
         self._left = self._config.quanta_per_firing
         self._polygons_left = self._config.polygon_quanta_per_firing
@@ -98,12 +100,12 @@ class FullPerception:
         if self._circles_pending and self._left > 0:
             self._left -= 1
             self._objects = None
-            self._circles_pending = quantum(self.memory, self.settings, self._config.fresh_share)
+            self._circles_pending = quantum(self._handle, self._config.fresh_share)
             return 1
         if self._polygons_pending and self._polygons_left > 0:
             self._polygons_left -= 1
             self._objects = None
-            self._polygons_pending = pquantum(self.memory, self.settings, self._config.fresh_share)
+            self._polygons_pending = pquantum(self._handle, self._config.fresh_share)
             return int(self._polygons_pending)
         return 0
 
@@ -116,8 +118,8 @@ class FullPerception:
     def _sure_objects(self) -> tuple[SeenObject, ...]:
         s, p = self.memory, self.settings
         least = self._config.report_probability
-        n = sure_circles(s.ti, s.tf, s.comp, p.models, least, self._sure)
-        seen = [circle(s, p, t, self._round[s.ti[t, KIND]], float(s.tf[t, PROB])) for t in self._sure[:n].tolist()]
+        n = sure_circles(self._handle, least, self._told, self._sure)
+        seen = [self._circles[t] if t >= 0 else self._tell_circle(~t) for t in self._sure[:n].tolist()]
         if p.polys > 0:
             least = min(least, POLYGON_PROBABILITY)
             n = sure_polygons(s.pi, s.pf, s.pbn, s.pbins, least, self._sure)
@@ -125,7 +127,13 @@ class FullPerception:
                 polygon(s, p, t, self._outlines[s.pi[t, MODEL]], float(s.pf[t, PPROB]))
                 for t in self._sure[:n].tolist()
             ]
-        return tuple(sorted(seen, key=lambda o: o.score, reverse=True))
+        return tuple(sorted(seen, key=attrgetter("score"), reverse=True))
+
+    def _tell_circle(self, t: int) -> SeenObject:
+        s = self.memory
+        told = circle(s, self.settings, t, self._round[s.ti[t, KIND]], float(s.tf[t, PROB]))
+        self._circles[t] = told
+        return told
 
     def things(self) -> tuple[SeenObject, ...]:
         """Return the objects, then everything else that has a name."""

@@ -92,7 +92,8 @@ def place_readings(
         s.cur[m, 2] = ux
         s.cur[m, 3] = uy
         s.cur[m, 4] = r
-        s.last[i] = s.cur[m, :5]
+        for z in range(5):
+            s.last[i, z] = s.cur[m, z]
         s.cur[m, 5] = float(i)
         s.owner[m] = -1
         m += 1

@@ -12,6 +12,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
+import numpy as np
+
 from perception.full.contact import level_of
 from perception.kernel import Floats, Ints, kernel
 
@@ -100,6 +102,14 @@ def linearise(
 
 
 @kernel
+def interpolated(row: Floats, last: float, t: float) -> float:
+    """Return a level's log likelihood ratio at bin `t`, as `likelihood.loglik`: the method spends its time here."""
+    t = min(t, last)
+    b = np.uintp(int(t))  # an index without a sign is not asked whether it counts from the end
+    return float(row[b] + (t - int(t)) * (row[np.uintp(int(t) + 1)] - row[b]))
+
+
+@kernel
 def weigh_cells(m: int, table: Floats, work: Floats, wlev: Ints) -> tuple[int, float]:
     """Add up the log likelihood of each cell of the grid.
 
@@ -118,25 +128,28 @@ def weigh_cells(m: int, table: Floats, work: Floats, wlev: Ints) -> tuple[int, f
     (int, float)
         Best cell and its log likelihood.
     """
-    last = table.shape[1] - 1
+    last = float(table.shape[1] - 2)
     base = work.shape[0] - CELLS
+    for i in range(SIDE):
+        a = float(i - SIDE // 2)
+        s0 = s1 = s2 = s3 = s4 = s5 = s6 = 0.0
+        for j in range(m):  # seven sums at a time: one alone would wait for each addition before it began the next
+            e, across, step, row = work[j, 0] - a * work[j, 1], work[j, 2], work[j, 3], table[wlev[j]]
+            s0 += interpolated(row, last, abs(e + 3.0 * across) * step)
+            s1 += interpolated(row, last, abs(e + 2.0 * across) * step)
+            s2 += interpolated(row, last, abs(e + across) * step)
+            s3 += interpolated(row, last, abs(e) * step)
+            s4 += interpolated(row, last, abs(e - across) * step)
+            s5 += interpolated(row, last, abs(e - 2.0 * across) * step)
+            s6 += interpolated(row, last, abs(e - 3.0 * across) * step)
+        cell = base + SIDE * i
+        work[cell, 4], work[cell + 1, 4], work[cell + 2, 4], work[cell + 3, 4] = s0, s1, s2, s3
+        work[cell + 4, 4], work[cell + 5, 4], work[cell + 6, 4] = s4, s5, s6
     best = -math.inf
     at = 0
     for cell in range(CELLS):
-        a = float(cell // SIDE - SIDE // 2)
-        b = float(cell % SIDE - SIDE // 2)
-        s = 0.0
-        for j in range(m):  # `likelihood.loglik`, spelled out: this is where the method spends its time
-            t = abs(work[j, 0] - a * work[j, 1] - b * work[j, 2]) * work[j, 3]
-            k = wlev[j]
-            if t >= last:
-                s += table[k, last]
-            else:
-                q = int(t)
-                s += table[k, q] + (t - q) * (table[k, q + 1] - table[k, q])
-        work[base + cell, 4] = s
-        if s > best:
-            best = s
+        if work[base + cell, 4] > best:
+            best = work[base + cell, 4]
             at = cell
     return at, best
 

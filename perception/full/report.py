@@ -106,6 +106,30 @@ def sure_circles(ti: Ints, tf: Floats, comp: Floats, models: int, least: float, 
 
 
 @kernel
+def mark_changed(ti: Ints, tf: Floats, told: Floats, n: int, sure: Ints) -> None:
+    """Turn the number t of each sure track that is not as it was told last to ~t, and note what is told now.
+
+    Parameters
+    ----------
+    ti, tf
+        As in `State`.
+    told : (tracks, 8) float
+        What `circle` made an object from. Updated.
+    n : int
+        Tracks in `sure`.
+    sure : (tracks,) int
+        From `sure_circles`. Updated.
+    """
+    for i in range(n):
+        t = sure[i]
+        now = (tf[t, TX], tf[t, TY], tf[t, C00], tf[t, C01], tf[t, C11], tf[t, HITS], tf[t, PROB], float(ti[t, KIND]))
+        for k in range(8):
+            if told[t, k] != now[k]:
+                told[t, k] = now[k]
+                sure[i] = ~t
+
+
+@kernel
 def sure_polygons(pi: Ints, pf: Floats, pbn: Ints, pbins: Floats, least: float, out: Ints) -> int:
     """Write the polygon tracks that are sure to `out` and return how many; arguments as for `sure_circles`."""
     n = 0

@@ -1,7 +1,8 @@
 """The full method's whole memory: arrays made once, and the settings they are read with, as named tuples.
 
 Compiled kernels take named tuples of arrays as they are, so one argument carries everything that is remembered and
-one everything that was set; nothing here is ever resized. Kernels call them `s` and `p`. Lengths are metres.
+one everything that was set; nothing here is ever resized. Kernels call them `s` and `p`. Python, to which such a call
+is dear, goes by `perception.full.entry`. Lengths are metres.
 """
 
 from __future__ import annotations

@@ -20,6 +20,7 @@ def emulate_robot(
     faults: str | None,
     seed: int,
     trace: str | None,
+    latency: str | None,
     end_with_parent: bool,
 ) -> int:
     """Carry out the command; see `runtime.cli.emulate`."""
@@ -39,7 +40,7 @@ def emulate_robot(
         asyncio.run(
             serve(
                 settings, settings.world, link_path=link, faults=script, seed=seed, trace_path=trace,
-                ready=ready, exit_with_parent=end_with_parent,
+                latency_path=latency, ready=ready, exit_with_parent=end_with_parent,
             )
         )  # fmt: skip
     except EmulatorError as error:

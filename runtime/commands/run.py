@@ -21,7 +21,7 @@ from runtime.commands.keeping import Keeping, kept
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
 from runtime.kernels import ready_kernels
 from runtime.logs import open_log
-from runtime.tables import Units, objects_table
+from runtime.tables import Units, objects_table, timing_table, timing_verdict
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
@@ -107,6 +107,8 @@ def run_robot(
         write_json(json_file, summary)
     out = Console()
     out.print(objects_table(summary["objects"], units))
+    out.print(timing_table(summary))
+    out.print(timing_verdict(summary))
     if summary["mode"] == "FAULT":
         raise Complaint(summary["stop_reasons"][-1], FAILED)
     keeping.complain()

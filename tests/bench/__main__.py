@@ -15,6 +15,10 @@ from tests.bench.contestant import Peer
 from tests.bench.measure import Plan, measure
 from tests.bench.runners import Method, contestants
 from tests.bench.table import results_table
+from tests.bench.timing import TimingPlan, measure_timing
+from tests.bench.timing_table import figures_table, quantiles_table, read_earlier
+from tests.bench.waking import figures, waking_table
+from tests.bench.waking import measure as measure_waking
 
 OURS: Final = (
     Method("echolocate, full", ("perception.method=full",)),
@@ -24,6 +28,9 @@ OURS: Final = (
 
 FULL: Final = Plan(repetitions=3, halls_max=10, passes=20)
 QUICK: Final = Plan(repetitions=1, halls_max=2, passes=4)
+
+TIMING: Final = TimingPlan(seconds=20.0, rounds=3, busy=0)
+WAKING_TURNS: Final = 10
 
 app = App(help="Measure our methods and the libraries that one would use instead, on the same readings.")
 
@@ -52,7 +59,7 @@ def bench(
     use_cache()
     from runtime.summary import write_json
 
-    console, out = Console(stderr=True), Console()
+    console = Console(stderr=True)
     plan = QUICK if quick else FULL
     if repetitions is not None:
         plan = Plan(max(1, repetitions), plan.halls_max, plan.passes)
@@ -69,9 +76,90 @@ def bench(
     except Complaint as complaint:
         console.print(f"bench: {complaint}", markup=False)
         return complaint.exit_code
-    wide = out if out.is_terminal else Console(width=180)
-    wide.print(results_table(results, plan))
+    _wide().print(results_table(results, plan))
     return 0
+
+
+@app.command
+def timing(
+    *,
+    json: str = "timing.json",
+    against: str | None = None,
+    seconds: float = TIMING.seconds,
+    rounds: int = TIMING.rounds,
+    busy: int = TIMING.busy,
+    sets: Annotated[tuple[str, ...], Parameter(name="--set", negative="", allow_leading_hyphen=False)] = (),
+) -> int:
+    """Measure how a run keeps its time over the pty, in turns with bare controls.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    against
+        JSON of an earlier run to compare with.
+    seconds
+        How long ours and the control run, each round.
+    rounds
+        How often.
+    busy
+        Processes beside that never rest.
+    sets
+        Override one setting, as in cycle.rate_hz=10.
+    """
+    use_cache()
+    from runtime.summary import write_json
+
+    console = Console(stderr=True)
+    try:
+        earlier = None if against is None else read_earlier(against)
+        ready_kernels(load_settings("hallway"), console)
+        plan = TimingPlan(max(1.0, seconds), max(1, rounds), max(0, busy))
+        with console.status("bench") as status:
+            result = measure_timing(plan, sets, status.update)
+        write_json(json, result.as_json())
+    except Complaint as complaint:
+        console.print(f"bench: {complaint}", markup=False)
+        return complaint.exit_code
+    wide = _wide()
+    wide.print(quantiles_table(result, earlier))
+    wide.print(figures_table(result, earlier))
+    return 0
+
+
+@app.command
+def waking(*, json: str = "waking.json", turns: int = WAKING_TURNS, busy: int = 2) -> int:
+    """Measure ways of sleeping until a deadline: idle, and beside processes that never rest.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    turns
+        How often each way has its turn of two seconds.
+    busy
+        Processes beside that never rest.
+    """
+    from runtime.summary import write_json
+
+    console = Console(stderr=True)
+    with console.status("bench") as status:
+        by_load = {
+            f"{beside} busy": figures(measure_waking(max(1, turns), beside, status.update)) for beside in (0, busy)
+        }
+    try:
+        write_json(json, by_load)
+    except Complaint as complaint:
+        console.print(f"bench: {complaint}", markup=False)
+        return complaint.exit_code
+    _wide().print(waking_table(by_load))
+    return 0
+
+
+def _wide() -> Console:
+    """Return the terminal, or where there is none one wide enough for every table."""
+    out = Console()
+    return out if out.is_terminal else Console(width=180)
 
 
 def load_peers() -> tuple[Peer, ...]:

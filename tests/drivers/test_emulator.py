@@ -696,6 +696,10 @@ class PlainDriver:
         out, self._out = self._out, b""
         return out
 
+    @property
+    def waiting(self) -> int:
+        return 0
+
     def take(self) -> Heard:
         return Heard((), None, rebooted=False)
 

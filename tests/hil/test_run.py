@@ -17,7 +17,7 @@ from config.load import load_settings
 from drivers.messages import Flags
 from runtime.books import Books
 from runtime.pacing import Pacer
-from runtime.process import LATE_SHARE
+from runtime.rhythm import LATE_SHARE
 from tests.hil.running import Emulated, Running, emulated, is_driving, reaches, rows, running, wait_for
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]

@@ -20,6 +20,8 @@ def test_quantiles_are_numpys_in_microseconds() -> None:
     books = Books(0.005)
     for pair in zip(took.tolist(), lag.tolist(), strict=True):
         books.enter(*pair)
+    spread = books.lag.spread()
+    assert spread["p999"] == pytest.approx(1e6 * np.quantile(lag, 0.999), abs=0.051)
     for got, values in ((books.cycle_us(), took), (books.lag_us(), lag)):
         p50, p99 = 1e6 * np.quantile(values, [0.5, 0.99])
         assert (got["p50"], got["p99"], got["max"]) == pytest.approx((p50, p99, 1e6 * values.max()), abs=0.051)

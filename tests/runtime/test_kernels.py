@@ -166,3 +166,29 @@ def test_nothing_of_perception_is_compiled_while_the_robot_drives() -> None:
     sources = "".join(path.read_text("utf-8") for path in (ROOT / "perception").rglob("*.py"))
     late = [name for name in done.stderr.split() if f"def {name}(" in sources]
     assert late == [], done.stderr
+
+
+@pytest.mark.realtime
+@pytest.mark.usefixtures("warm_kernels")
+def test_a_kernel_that_comes_to_life_is_counted_once() -> None:
+    """Kernels are imported from file to file; each signature counts once, and one more argument type is one more."""
+    import numpy as np
+
+    from perception import kernel as decorator
+    from perception import relaxation
+
+    before = kernels.compiled_signatures()
+    assert before > 10
+
+    def doubled(values: decorator.Floats) -> float:
+        return 2.0 * float(values[0])
+
+    relaxation.doubled = compiled = decorator.numba.njit(doubled)  # type: ignore[attr-defined]
+    try:
+        assert kernels.compiled_signatures() == before
+        compiled(np.ones(1))
+        assert kernels.compiled_signatures() == before + 1
+        compiled(np.ones(1, dtype=np.float32))
+        assert kernels.compiled_signatures() == before + 2
+    finally:
+        del relaxation.doubled  # type: ignore[attr-defined]

@@ -164,3 +164,14 @@ def test_motion_never_resumes_by_itself(steps: list[Situation], begin: ModeState
             armed = False
         if before.arming_s is not None and state.mode is Mode.SAFE_STOP and state.since_s == now_s:
             armed = False
+
+
+def test_cycles_that_overrun_too_often_stop_a_drive_and_end_an_arming() -> None:
+    reason = "10 cycles in a row left no time"
+    seen = replace(QUIET, overrun=reason)
+    stopped = advance(ModeState(Mode.DRIVE, NOW - 5.0), seen)
+    assert (stopped.mode, stopped.reason) == (Mode.SAFE_STOP, reason)
+    arming = advance(ModeState(Mode.READY, NOW - 5.0, arming_s=NOW - 0.2), seen)
+    assert (arming.mode, arming.reason) == (Mode.SAFE_STOP, reason)
+    assert advance(ModeState(Mode.READY, NOW - 5.0), seen).mode is Mode.READY
+    assert advance(ModeState(Mode.DRIVE, NOW - 5.0), replace(seen, request=Request.HALT)).reason != reason

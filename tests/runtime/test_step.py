@@ -410,3 +410,14 @@ def test_after_a_reboot_it_perceives_as_on_the_first_day(drive: Drive) -> None:
         one, other = (step(s, record.inputs, SETTINGS, lambda _c: None, enough_quanta) for s in (used, new))
         assert bits(one.new_segments) == bits(other.new_segments)
     assert bits(used.perception.objects()) == bits(new.perception.objects())
+
+
+def test_without_a_budget_the_record_says_so_exactly_where_something_was_left_to_do(drive: Drive) -> None:
+    state = fresh()
+    causes = set()
+    for record in drive.records:
+        got = step(state, record.inputs, SETTINGS, lambda _c: None, lambda _done: False)
+        assert (got.quanta, got.iterations) == (0, 0)
+        assert got.refinement == ("budget" if state.perception.pending else "nothing")
+        causes.add(got.refinement)
+    assert causes == {"budget", "nothing"}

@@ -19,7 +19,7 @@ SEEN = SeenObject("semicircle", 1.0, -2.0, 0.1 + 0.2, 1e-17, 39, 2.0 / 3.0)
 
 def test_the_forms_are_those_of_the_public_surface() -> None:
     assert list(get_type_hints(ObjectRow))[:7] == ["model", "x", "y", "theta", "sigma", "support", "score"]
-    assert {"objects", "cycles", "cycle_us", "late", "link", "mode", "stop_reasons"} <= set(
+    assert {"objects", "cycles", "cycle_us", "late", "link", "mode", "stop_reasons", "timing"} <= set(
         get_type_hints(RunSummary)
     )
     assert set(get_type_hints(LinkRow)) == {"frames", "bad", "lost"}

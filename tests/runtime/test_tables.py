@@ -8,9 +8,12 @@ import pytest
 from rich.console import Console
 from rich.table import Table
 
+from runtime.books import Spread
 from runtime.experiment import Outcome
-from runtime.summary import ObjectRow
-from runtime.tables import Units, length, objects_table, place, table_2, verdict
+from runtime.footprint import FootprintRow
+from runtime.summary import ObjectRow, RunSummary
+from runtime.tables import Units, length, objects_table, place, table_2, timing_table, timing_verdict, verdict
+from runtime.timekeeping import Timing
 
 OUTCOME: Outcome = {
     "drums": [
@@ -67,3 +70,32 @@ def test_objects() -> None:
     (line,) = (line for line in shown(objects_table([row], "ft")) if "semicircle" in line)
     assert [cell.strip() for cell in line.split("│")[1:-1]] == ["semicircle", "1.00", "-2.00", "-90", "39", "0.95"]
     assert any("x (m)" in line for line in shown(objects_table([], "m")))
+
+
+def test_where_the_time_went_and_by_whose_fault() -> None:
+    spread: Spread = {"p50": 170.0, "p99": 1250.0, "p999": 8004.0, "max": 49_653.0}
+    timing: Timing = {
+        "period": 50_000.0, "following": 0.9958, "late": spread, "echo_wait": spread, "phases": {"refine": spread},
+        "callbacks": {"link receive": spread}, "overruns": 2, "missed": 1,
+        "faults": {"outside the process": 6, "callback Recorder.flush": 1},
+    }  # fmt: skip
+    cost: FootprintRow = {
+        "start_s": 0.9, "cpu_share": 0.03, "rss_mb": 190.0, "rss_peak_mb": 195.0, "growth_mb": 0.0, "compilations": 0,
+        "collections": [0, 12, 0],
+    }  # fmt: skip
+    summary: RunSummary = {
+        "objects": [], "cycles": 240, "process": cost, "cycle_us": spread, "late": 7, "missed": 1, "lag_us": spread,
+        "link": {"frames": 0, "bad": 0, "lost": 0}, "mode": "DRIVE", "stop_reasons": [], "timing": timing,
+    }  # fmt: skip
+    console = Console(record=True, width=110, file=io.StringIO(), color_system=None)
+    console.print(timing_table(summary))
+    text = console.export_text()
+    for piece in ("refine", "between cycles: link receive", "an echo waits for its cycle", "p99.9"):
+        assert piece in text, piece
+    assert text.count("0.17") == text.count("1.25") == text.count("8.00") == text.count("49.65") == 4
+    assert timing_verdict(summary) == (
+        "240 cycles, 100% of them with the ring; 7 late, 1 missed, 2 overruns; "
+        "by fault of: outside the process (6), callback Recorder.flush (1)"
+    )
+    timing["faults"] = {}
+    assert timing_verdict(summary).endswith("2 overruns")

@@ -123,12 +123,14 @@ def test_a_picture_shows_mode_reason_objects_ring_and_numbers() -> None:
         ranges=np.array([np.nan, np.inf, 0.0, SETTINGS.ring.range_max_m] + [1.0] * 20),
         counts=LinkCounts(1832, 3, 2), cycles=520, late=9,
         cycle_us={"p50": 478.0, "p99": 2961.0, "max": 5958.0}, lag_us={"p50": 907.0, "p99": 5415.0, "max": 8954.0},
+        missed=4, faults=(("refine", 2), ("outside the process", 7)),
     )  # fmt: skip
     text = printed(snapshot)
     for piece in (
         "SAFE_STOP", "bumper contact: free the robot", "→", "•", "1 segments, 7 hypotheses",
         "1832 frames, 3 bad, 2 lost",
-        "520, 9 late", "0.48 ms (p99 2.96)", "0.91 ms (p99 5.42)", "semicircle", "1.00", "4.00", "··█▁",
+        "520, 9 late, 4 missed", "outside the process: 7, refine: 2",
+        "0.48 ms (p99 2.96)", "0.91 ms (p99 5.42)", "semicircle", "1.00", "4.00", "··█▁",
     ):  # fmt: skip
         assert piece in text, piece
 

@@ -1,0 +1,107 @@
+"""What the process costs its machine: start-up, memory, processor time, and kernels compiled too late.
+
+A run opens these books when the robot is ready and closes them at its end; what they say goes into the summary, so
+that a drive that compiled, grew or hurried says so by itself.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import Final, TypedDict
+
+from runtime.kernels import compiled_signatures
+from runtime.memory import MemoryPolicy
+
+_MEGA: Final = 1e6
+_START_FIELD: Final = 19
+"""Place of `starttime` in /proc/self/stat after the name, which is the only field that may hold a blank."""
+
+
+class FootprintRow(TypedDict):
+    """What a run cost its machine; None where this system does not tell."""
+
+    start_s: float | None
+    """From the start of the process until the robot was ready for the first cycle."""
+    cpu_share: float
+    """Processor time of all threads while driving, as a share of one core."""
+    rss_mb: float | None
+    """Memory at the end, 10⁶ bytes."""
+    rss_peak_mb: float | None
+    growth_mb: float | None
+    """Of the process's own memory since the first cycle."""
+    compilations: int
+    """Kernels compiled or loaded since the first cycle."""
+    collections: list[int]
+    """Garbage collections while driving, of each generation."""
+
+
+class Footprint:
+    """Books on this process, opened when the first cycle is about to begin.
+
+    Parameters
+    ----------
+    memory : MemoryPolicy
+        Counts the collections.
+    """
+
+    def __init__(self, memory: MemoryPolicy) -> None:
+        self._memory = memory
+        self._start_s = age_s()
+        self._signatures = compiled_signatures()
+        self._own_mb = own_mb()
+        self._wall_s = time.monotonic()
+        self._cpu_s = time.process_time()
+
+    def close(self) -> FootprintRow:
+        """Return what the run cost up to now."""
+        wall_s = time.monotonic() - self._wall_s
+        cpu_s = time.process_time() - self._cpu_s
+        now_mb, before_mb = own_mb(), self._own_mb
+        return {
+            "start_s": _rounded(self._start_s, 2),
+            "cpu_share": round(cpu_s / wall_s, 4) if wall_s > 0.0 else 0.0,
+            "rss_mb": _rounded(rss_mb(), 1),
+            "rss_peak_mb": _rounded(peak_mb(), 1),
+            "growth_mb": None if now_mb is None or before_mb is None else round(now_mb - before_mb, 2),
+            "compilations": compiled_signatures() - self._signatures,
+            "collections": list(self._memory.collections),
+        }
+
+
+def age_s() -> float | None:
+    """Return how long ago this process was started, to a hundredth of a second; None where nobody tells."""
+    try:
+        fields = Path("/proc/self/stat").read_text("ascii", errors="replace").rpartition(")")[2].split()
+        return time.clock_gettime(time.CLOCK_BOOTTIME) - int(fields[_START_FIELD]) / os.sysconf("SC_CLK_TCK")
+    except (OSError, AttributeError):
+        return None
+
+
+def rss_mb() -> float | None:
+    """Return the memory this process has in RAM, 10⁶ bytes; None where nobody tells."""
+    return _status_mb("VmRSS:")
+
+
+def peak_mb() -> float | None:
+    """Return the most it ever had."""
+    return _status_mb("VmHWM:")
+
+
+def own_mb() -> float | None:
+    """Return the memory it has filled itself, swapped out or not: pages of files come and go as the system likes."""
+    filled, swapped = _status_mb("RssAnon:"), _status_mb("VmSwap:")
+    return rss_mb() if filled is None else filled + (swapped or 0.0)
+
+
+def _status_mb(name: str) -> float | None:
+    try:
+        lines = Path("/proc/self/status").read_text("ascii", errors="replace").splitlines()
+    except OSError:
+        return None
+    return next((int(line.split()[1]) * 1024 / _MEGA for line in lines if line.startswith(name)), None)
+
+
+def _rounded(value: float | None, digits: int) -> float | None:
+    return None if value is None else round(value, digits)

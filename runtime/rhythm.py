@@ -1,0 +1,102 @@
+"""The beat of the main process: it waits for the next cycle, and keeps the books of how that went.
+
+Pacer, waker, timekeeper and watch know nothing of each other; here they are one thing that the process can ask.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import Final
+
+from config.settings import Settings
+from runtime.books import Books
+from runtime.meter import Meter, Reading
+from runtime.pacing import Begun, Pacer
+from runtime.timekeeping import Timekeeper
+from runtime.wake import Waker
+from runtime.watch import Watch
+
+LATE_SHARE: Final = 0.1
+"""A cycle that begins later than this share of its period is late."""
+
+PATIENCE_SHARE: Final = 0.5
+"""An echo is waited for no longer than this share of the time between commands that the base's deadman allows."""
+
+OVERRUN: Final = "{} cycles in a row left no time for the next one, mostly through {}: take load off it, then re-arm"
+
+
+class Rhythm:
+    """When cycles begin, and what came of it.
+
+    Parameters
+    ----------
+    settings : Settings
+        Rate, firing step, and the limit on overruns.
+    clock : callable
+        Monotonic, s.
+    callbacks : tuple of str
+        Names of the callbacks that the keeper will time.
+    """
+
+    def __init__(self, settings: Settings, clock: Callable[[], float], callbacks: tuple[str, ...] = ()) -> None:
+        self._period_s = 1.0 / settings.cycle.rate_hz
+        self._step_s = settings.ring.firing.step_period_s
+        self._overruns_max = settings.cycle.overruns_max
+        self._read = Meter(clock).read
+        self._waker = Waker(clock)
+        self._watch = Watch()
+        self._pacer: Pacer | None = None
+        self.books = Books(LATE_SHARE * self._period_s, is_touched=True)
+        self.keeper = Timekeeper(self.books, self._read, lambda: self._watch.seen, callbacks)
+
+    def start(self, now_s: float, gap_max_s: float) -> AbstractContextManager[None]:
+        """Have the first cycle due at `now_s`, commands being `gap_max_s` apart at most; watch while inside."""
+        self._pacer = Pacer(now_s, self._period_s, self._step_s, PATIENCE_SHARE * gap_max_s)
+        return self._watch.on_duty()
+
+    def hear(self, now_s: float) -> None:
+        """Take note that an echo has just been read from the line."""
+        if self._pacer is not None:
+            self._pacer.hear(now_s, self.keeper.held_since_s)
+            self._waker.wake()
+
+    def wake(self) -> None:
+        """End the wait before its time."""
+        self._waker.wake()
+
+    async def wait(self) -> Reading | None:
+        """Sleep until the next cycle is due and return what the clocks show; None where it was woken before."""
+        pacer = self._started()
+        await self._waker.until(pacer.deadline_s)
+        now = self._read()
+        return now if now.wall_s >= pacer.deadline_s else None
+
+    def begin(self, now: Reading) -> Begun:
+        """Begin a cycle."""
+        pacer = self._started()
+        period_s, is_following = pacer.period_s, pacer.is_locked
+        begun = pacer.begin(now.wall_s)
+        self.keeper.begin(now, begun, period_s, is_following=is_following)
+        self._watch.expect(pacer.due_s + self.books.late_after_s - now.wall_s)
+        return begun
+
+    def end(self, now_s: float) -> float:
+        """End the cycle at `now_s`; return how long the next one leaves, s."""
+        self.keeper.end()
+        return self._started().advance(now_s) - now_s
+
+    def close(self) -> None:
+        """Give the timer back; there is no further cycle."""
+        self._waker.close()
+
+    @property
+    def overrun(self) -> str | None:
+        """Why the cycle cannot keep its time any more, None while it can."""
+        row = self.keeper.in_a_row
+        return OVERRUN.format(row, self.keeper.culprit) if row >= self._overruns_max else None
+
+    def _started(self) -> Pacer:
+        if self._pacer is None:
+            raise RuntimeError("the rhythm was asked before it was started: a fault of this program")
+        return self._pacer

@@ -1,0 +1,89 @@
+"""What a long drive leaves behind: memory, late compilations, full collections. `make soak` drives 100,000 cycles.
+
+A program of its own, so that nothing but the drive is in the figures. Virtual time, the emulated robot in the same
+process: whatever that one leaves behind counts as well.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Final
+
+import orjson
+from cyclopts import App, Parameter
+from rich.console import Console
+
+from config.load import load_settings
+from drivers.emulator.device import Truth
+from runtime.complaint import DONE, FAILED
+from runtime.footprint import own_mb
+from runtime.kernels import compiled_signatures, ready_kernels
+from runtime.memory import MemoryPolicy
+from runtime.modes import Mode
+from runtime.simulate import simulate
+from runtime.step import CycleRecord
+
+SETTLED_CYCLES: Final = 1000
+"""A minute: once down the hall, by when everything that is allocated at first need has been."""
+GROWTH_MAX_MB: Final = 1.0
+SLACK_S: Final = 0.04
+"""What is left of a cycle's period; virtual time has no slack of its own."""
+
+app = App(help="Drive for many cycles in virtual time and say what is left behind.")
+
+
+@dataclass
+class Left:
+    """Looks on from the moment when everything is settled."""
+
+    memory: MemoryPolicy
+    last: int
+    """The cycle after which the account is drawn up, while everything is still there."""
+    before_mb: float = math.nan
+    after_mb: float = math.nan
+    signatures: int = 0
+    modes: set[Mode] = field(default_factory=set)
+
+    def on_cycle(self, record: CycleRecord, _truth: Truth) -> None:
+        """Keep the memory policy as a run on a line does."""
+        self.memory.cycle_done(SLACK_S)
+        if record.cycle == SETTLED_CYCLES:
+            self.before_mb = own_mb() or math.nan
+            self.signatures = compiled_signatures()
+            self.modes.clear()
+        self.modes.add(record.mode.mode)
+        if record.cycle == self.last:
+            self.after_mb = own_mb() or math.nan
+
+
+@app.default
+def grow(cycles: Annotated[int, Parameter(help="Cycles after the first thousand.")] = 100_000, /) -> int:
+    """Print the figures as JSON; fail where the drive left more behind than it may."""
+    settings = load_settings("hallway", ["behaviors.move_ahead.at_end=turn_back"])
+    ready_kernels(settings, Console(stderr=True))
+    if settings.world is None:
+        return FAILED
+    memory = MemoryPolicy()
+    last = SETTLED_CYCLES + cycles
+    left = Left(memory, last)
+    with memory.driving():
+        simulate(settings, settings.world, 0, last / settings.cycle.rate_hz, left.on_cycle)
+    signatures = compiled_signatures()
+    growth_mb, compilations = round(left.after_mb - left.before_mb, 3), signatures - left.signatures
+    figures: dict[str, Any] = {
+        "cycles": cycles,
+        "growth_mb": growth_mb,
+        "compilations": compilations,
+        "signatures": signatures,
+        "collections": memory.collections,
+        "modes": sorted(mode.value for mode in left.modes),
+    }
+    sys.stdout.write(orjson.dumps(figures).decode() + "\n")
+    kept = growth_mb < GROWTH_MAX_MB and not compilations and not memory.collections[-1]
+    return DONE if kept and left.modes == {Mode.DRIVE} else FAILED
+
+
+if __name__ == "__main__":
+    sys.exit(app(result_action="return_value"))
