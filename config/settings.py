@@ -199,6 +199,21 @@ class LogConfig(Strict):
     level: Literal["debug", "info", "warning", "error"] = "info"
 
 
+class RecordingConfig(Strict):
+    """The recording that every run leaves behind, in a folder where the oldest make room for the newest."""
+
+    enabled: bool = True
+    """Keep one where ``--record`` names no file."""
+    folder: str | None = None
+    """Where it is not given, echolocate/runs in the user's state folder."""
+    cap_mb: float = Field(default=1000.0, ge=1.0, le=1e7)
+    """All recordings in the folder together, megabytes; an hour takes about 30."""
+    keep: int = Field(default=100, ge=1, le=100_000)
+    """Files in the folder, at most."""
+    keyframe_period_s: float = Field(default=40.0, ge=0.1, le=3600.0)
+    """So often the whole state is recorded: a replay can begin there."""
+
+
 class Settings(RobotConfig):
     """All settings of one run: the robot's sections at the top, then what it recognises and does."""
 
@@ -210,6 +225,7 @@ class Settings(RobotConfig):
     behaviors: BehaviorsConfig = BehaviorsConfig()
     realtime: RealtimeConfig = RealtimeConfig()
     log: LogConfig = LogConfig()
+    recording: RecordingConfig = RecordingConfig()
 
     @model_validator(mode="after")
     def _distinct_models(self) -> Settings:

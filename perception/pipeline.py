@@ -20,6 +20,7 @@ from perception.kernel import Floats
 from perception.paper import PaperPerception
 from perception.seen import SeenObject
 from perception.segments import mounts_array
+from perception.snapshot import Snapshot, put_back, snapshot_of
 
 __all__ = ["Method", "Perception", "SeenObject", "method_of"]
 
@@ -73,6 +74,10 @@ class Method(Protocol):
 
     def adopt(self, config: PerceptionConfig) -> None:
         """Go on with other constants, of those that a running process follows (`config.reload.LIVE`)."""
+        ...
+
+    def restored(self) -> None:
+        """Drop what was worked out before the memory was put back from a snapshot."""
         ...
 
 
@@ -162,3 +167,18 @@ class Perception:
     def adopt(self, config: PerceptionConfig) -> None:
         """Go on with other constants, of those that a running process follows (`config.reload.LIVE`)."""
         self.method.adopt(config)
+
+    def snapshot(self) -> Snapshot:
+        """Return copies of everything remembered, from which `restore` goes on to the bit."""
+        return snapshot_of(self)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot that perception of the same settings gave.
+
+        Raises
+        ------
+        ValueError
+            The snapshot is of other settings.
+        """
+        put_back(self, snapshot)
+        self.method.restored()

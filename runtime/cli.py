@@ -58,6 +58,7 @@ def run(
     seconds: float | None = None,
     headless: Annotated[bool, Flag] = False,
     record: str | None = None,
+    no_record: Annotated[bool, Flag] = False,
     json: JsonFile = None,
     world: str | None = None,
     seed: Seed = 0,
@@ -83,7 +84,9 @@ def run(
     headless
         No live view: log lines instead.
     record
-        Write every firing to this ring log.
+        Record the run into this file, instead of into the folder of recordings; a name in .csv gives a ring log.
+    no_record
+        Leave no recording.
     world
         World of the emulator, a file or a name.
     seed
@@ -97,8 +100,8 @@ def run(
 
     emulation = Emulation(world=world, seed=seed, trace=trace, faults=faults)
     return run_robot(
-        config, sets, port=port, arm=arm, seconds=seconds, headless=headless, record=record, json_file=json,
-        emulation=emulation, units=units,
+        config, sets, port=port, arm=arm, seconds=seconds, headless=headless, record=record,
+        no_record=no_record, json_file=json, emulation=emulation, units=units,
     )  # fmt: skip
 
 
@@ -150,26 +153,72 @@ def replay(
     log: str,
     /,
     *,
+    verify: Annotated[bool, Flag] = False,
+    other: Annotated[str | None, Parameter(name="--with")] = None,
+    since: Annotated[float, Parameter(name="--from")] = 0.0,
+    until: Annotated[float | None, Parameter(name="--to")] = None,
+    speed: float | None = None,
     robot: str | None = None,
     model: Annotated[tuple[str, ...], Parameter(negative="")] = (),
     json: JsonFile = None,
     units: UnitsOption = "m",
     sets: Sets = (),
 ) -> int:
-    """Run perception over a ring log.
+    """Run the program again over a recording of a run, or perception over a ring log.
 
     Parameters
     ----------
     log
-        CSV with the header t,x,y,theta[,ring_yaw],r00,r01,…
+        A recording (MCAP), or a CSV with the header t,x,y,theta[,ring_yaw],r00,r01,…
+    verify
+        Fail unless every cycle comes out as it was recorded, to the bit.
+    other
+        Run file with other settings: say what would have been seen otherwise. So does --set.
+    since
+        Begin this many seconds after the recording's first cycle.
+    until
+        End this many seconds after it.
+    speed
+        This many times as fast as it was, in the live view; as fast as possible where it is not given.
     robot
         Robot file, or the name of a shipped one.
     model
         Object model to look for: a file or a name; may be repeated.
     """
-    from runtime.commands.replay import replay_log
+    from pathlib import Path
 
+    from runtime.commands.replay import replay_log
+    from runtime.recording.reading import is_recording
+
+    if is_recording(Path(log)):
+        from runtime.commands.rerun import Span, replay_recording
+
+        return replay_recording(
+            log, sets, span=Span(since, until, speed), verify=verify, other=other, robot=robot, models=model,
+            json_file=json, units=units,
+        )  # fmt: skip
+    if verify or other is not None or since or until is not None or speed is not None:
+        raise Complaint(
+            f"{log}: is a ring log; --verify, --with, --from, --to and --speed are for recordings of a run (MCAP)",
+            WRONG_CALL,
+        )
     return replay_log(log, sets, robot=robot, models=model, json_file=json, units=units)
+
+
+@app.command
+def recover(recording: str, /, *, out: str | None = None) -> int:
+    """Restore what can be read of a recording that was cut off or damaged.
+
+    Parameters
+    ----------
+    recording
+        The damaged file; it is left as it is.
+    out
+        Where the restored one goes; where it is not given, beside it, as NAME-recovered.mcap.
+    """
+    from runtime.commands.recover import recover_recording
+
+    return recover_recording(recording, out)
 
 
 @app.command

@@ -15,19 +15,22 @@ import structlog
 from runtime.complaint import WRONG_CALL, Complaint
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, MutableMapping
+    from collections.abc import Callable, Iterator, Mapping, MutableMapping
 
     from structlog.typing import FilteringBoundLogger
 
     from config.settings import LogConfig
 
+    Tap = Callable[[Mapping[str, Any]], None]
+
 
 class _Tee:
     """The last processor: one line to the file, one to the terminal where it is wanted."""
 
-    def __init__(self, file: TextIO | None, terminal: TextIO | None) -> None:
+    def __init__(self, file: TextIO | None, terminal: TextIO | None, tap: Tap | None) -> None:
         self._file = file
         self._terminal = terminal
+        self._tap = tap
         colors = terminal is not None and terminal.isatty()
         self._render = structlog.dev.ConsoleRenderer(colors=colors, pad_event_to=0)
 
@@ -38,13 +41,15 @@ class _Tee:
         if self._file is not None:
             self._file.write(orjson.dumps(dict(event), default=str).decode() + "\n")
             self._file.flush()
+        if self._tap is not None:
+            self._tap(dict(event))
         if self._terminal is not None:
             self._terminal.write(str(self._render(logger, name, dict(event))) + "\n")
         raise structlog.DropEvent
 
 
 @contextlib.contextmanager
-def open_log(config: LogConfig, *, terminal: bool) -> Iterator[FilteringBoundLogger]:
+def open_log(config: LogConfig, *, terminal: bool, tap: Tap | None = None) -> Iterator[FilteringBoundLogger]:
     """Give the run's logger; its file is closed at the end.
 
     Parameters
@@ -53,6 +58,8 @@ def open_log(config: LogConfig, *, terminal: bool) -> Iterator[FilteringBoundLog
         File and level.
     terminal : bool
         Whether lines also go to stderr; not while a live view owns the screen.
+    tap : callable, optional
+        Gets every line, too: a recording.
 
     Raises
     ------
@@ -66,7 +73,7 @@ def open_log(config: LogConfig, *, terminal: bool) -> Iterator[FilteringBoundLog
             structlog.processors.add_log_level,
             structlog.processors.TimeStamper(fmt="iso", utc=True),
             structlog.processors.format_exc_info,
-            _Tee(file, sys.stderr if terminal else None),
+            _Tee(file, sys.stderr if terminal else None, tap),
         ],
         wrapper_class=structlog.make_filtering_bound_logger(getattr(logging, config.level.upper())),
     )

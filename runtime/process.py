@@ -10,7 +10,7 @@ import asyncio
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from config.settings import Settings
 from drivers.denning.robot import DenningRobot
@@ -40,6 +40,8 @@ CONNECT_MAX_S: Final = 5.0
 HALT_MAX_S: Final = 0.5
 """How long the end of a run waits for the base to confirm that it stands."""
 
+Way: TypeAlias = Literal["in", "out"]
+
 LINE_OPENED: Final = "line opened"
 LINK_RECEIVE: Final = "link receive"
 LINE_LOST: Final = "line lost"
@@ -54,6 +56,8 @@ class Observers:
 
     on_cycle: Callable[[CycleRecord, State, Books, RobotDriver], None] | None = None
     on_firing: Callable[[Firing], None] | None = None
+    on_bytes: Callable[[Way, float, bytes], None] | None = None
+    """Gets what goes over the line, either way, and when, by the host's clock."""
 
 
 class RobotProcess:
@@ -238,7 +242,9 @@ class RobotProcess:
 
     def _send(self) -> None:
         if self._link.is_open and (data := self._driver.outgoing(writable=self._link.writable)):
-            self._link.send(data)
+            taken = self._link.send(data)
+            if taken and self._observers.on_bytes is not None:
+                self._observers.on_bytes("out", self._clock(), data)
 
     def _opened(self) -> None:
         self._driver.opened(self._clock())
@@ -248,6 +254,8 @@ class RobotProcess:
         self._driver.receive(data, now_s)
         if self._driver.waiting > waiting:
             self._rhythm.hear(now_s)
+        if self._observers.on_bytes is not None:
+            self._observers.on_bytes("in", now_s, data)
 
     def _closed(self, reason: str) -> None:
         self._driver.closed()

@@ -56,6 +56,8 @@ def simulate(
     seed: int,
     seconds_max: float,
     on_cycle: Callable[[CycleRecord, Truth], None] | None = None,
+    on_state: Callable[[CycleRecord, State], None] | None = None,
+    may_refine: Callable[[int], bool] = enough_quanta,
 ) -> Simulated:
     """Drive through `world` until the leg is done, the robot stops for a reason, or the time is up.
 
@@ -71,6 +73,10 @@ def simulate(
         Virtual time after which the run ends.
     on_cycle : callable, optional
         Gets every record, and the truth of that moment.
+    on_state : callable, optional
+        Gets every record, and the state it left: a recorder.
+    may_refine : callable
+        In place of a clock, as in `step`.
     """
     robot = EmulatedRobot(settings, world, seed)
     driver = DenningRobot(settings)
@@ -86,10 +92,12 @@ def simulate(
         request = Request.ARM if state.mode.mode is Mode.READY else None
         inputs = gather(driver, now, request)
         step_s = time.perf_counter()
-        record = step(state, inputs, settings, lambda c: give(driver, c), enough_quanta)
+        record = step(state, inputs, settings, lambda c: give(driver, c), may_refine)
         books.enter(time.perf_counter() - step_s)
         if on_cycle is not None:
             on_cycle(record, robot.truth)
+        if on_state is not None:
+            on_state(record, state)
         if state.mode.mode is Mode.SAFE_STOP or (state.leg is not None and state.leg.done):
             until = min(until, now + SETTLING_S)
     return Simulated(state, start, robot.truth, now, time.perf_counter() - began, books)

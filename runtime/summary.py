@@ -40,6 +40,17 @@ class LinkRow(TypedDict):
     lost: int
 
 
+class RecordingRow(TypedDict):
+    """The recording that a run left: the newest of its files, bytes in all of them, messages that are missing."""
+
+    file: str | None
+    files: int
+    bytes: int
+    dropped: int
+    trouble: str | None
+    sync_max_s: float
+
+
 class RunSummary(TypedDict):
     """Summary of ``echolocate run``."""
 
@@ -54,10 +65,27 @@ class RunSummary(TypedDict):
     mode: str
     stop_reasons: list[str]
     timing: Timing
+    recording: NotRequired[RecordingRow]
+
+
+class VerifyRow(TypedDict):
+    """What the replay of a recording found: see `runtime.recording.rerun.Verdict`."""
+
+    differences: int
+    first: str | None
+    first_cycle: int | None
+    keyframes: int
+    skipped: int
+    missing: list[tuple[int, int]]
+    refinement: dict[str, int]
+    times_real_time: float
+    damage: list[str]
 
 
 class ReplaySummary(TypedDict):
     """Summary of ``echolocate replay``."""
+
+    verify: NotRequired[VerifyRow]
 
     objects: list[ObjectRow]
     segments: int

@@ -2,7 +2,7 @@
 
 Numba reads its settings when it is imported, so the cache is named here, before any test module is. A run with
 `NUMBA_DISABLE_JIT=1` (coverage sees inside kernels) or `NUMBA_BOUNDSCHECK=1` is slower than real time on purpose:
-tests marked `realtime` say nothing there and are skipped.
+tests marked `realtime` say nothing there and are skipped. Those marked `soak` run only where they are asked for.
 """
 
 from __future__ import annotations

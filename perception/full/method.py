@@ -41,6 +41,9 @@ class FullPerception:
         What a user may set.
     """
 
+    SCRATCH: Final = ("_sure", "_told", "_handle")
+    """No memory: what reporting works with, and another way to the memory."""
+
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: FullConfig) -> None:
         self._mounts = mounts_array(ring.mounts)
         self._config = config
@@ -157,4 +160,9 @@ class FullPerception:
         """Go on with other constants; the number of tracks stays."""
         self._config = config.full
         self.settings = self.settings._replace(attempts=config.full.attempts_per_firing)
+        self._handle = hold(self.memory, self.settings)
+        self._objects = None
+
+    def restored(self) -> None:
+        """Drop what was worked out before the memory was put back from a snapshot."""
         self._objects = None

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import queue
 import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +17,7 @@ from config.settings import Settings
 from runtime import VERSION
 from runtime.advice import advice
 from runtime.commands.firing import refuse_impossible_firing
+from runtime.commands.keeping import Keeping, kept
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
 from runtime.kernels import ready_kernels
 from runtime.logs import open_log
@@ -28,7 +27,6 @@ from runtime.tables import Units, objects_table, timing_table, timing_verdict
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
-    from drivers.messages import Firing
     from runtime.process import RobotProcess
     from runtime.reload import Reloader
     from runtime.summary import RunSummary
@@ -65,6 +63,7 @@ def run_robot(
     seconds: float | None,
     headless: bool,
     record: str | None,
+    no_record: bool,
     json_file: str | None,
     emulation: Emulation,
     units: Units,
@@ -84,11 +83,11 @@ def run_robot(
     with contextlib.ExitStack() as stack:
         if record is not None:
             stack.enter_context(owned(Path(record), f"--record {record}"))
-        log = stack.enter_context(open_log(settings.log, terminal=not live))
+        keeping = stack.enter_context(kept(settings, record, no_record=no_record))
+        log = stack.enter_context(open_log(settings.log, terminal=not live, tap=keeping.on_log))
         log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
         for text in advice(settings):
             log.warning(text)
-        on_firing = None if record is None else stack.enter_context(recording(record))
 
         async def whole() -> RunSummary:
             from runtime.emulated import emulator
@@ -99,7 +98,7 @@ def run_robot(
                     emulated = await running.enter_async_context(emulator(emulation.arguments(config, sets)))
                     chosen = on_port(settings, emulated)
                 return await watch(
-                    chosen, log, console, live=live, units=units, on_firing=on_firing,
+                    chosen, log, console, live=live, units=units, keeping=keeping,
                     arm=arm or port is None, seconds=seconds,
                     propose=lambda: proposed(
                         config, sets, emulation.world, given, None if port else chosen.link.port
@@ -107,6 +106,8 @@ def run_robot(
                 )  # fmt: skip
 
         summary = asyncio.run(whole())
+    if keeping.standing is not None:
+        summary["recording"] = keeping.standing
     if json_file is not None:
         from runtime.summary import write_json
 
@@ -117,6 +118,7 @@ def run_robot(
     out.print(timing_verdict(summary))
     if summary["mode"] == "FAULT":
         raise Complaint(summary["stop_reasons"][-1], FAILED)
+    keeping.complain()
     return DONE
 
 
@@ -163,19 +165,19 @@ async def watch(
     *,
     live: bool,
     units: Units,
-    on_firing: Callable[[Firing], None] | None,
+    keeping: Keeping,
     arm: bool,
     seconds: float | None,
     propose: Callable[[], Settings],
 ) -> RunSummary:
     """Run the process under the eyes of the live view, end it on SIGINT or SIGTERM, reconfigure it on SIGHUP."""
-    from runtime.process import Observers, RobotProcess
+    from runtime.process import RobotProcess
     from runtime.reload import Reloader
     from runtime.view import View, keys
 
     with contextlib.ExitStack() as stack:
         view = View(settings, console, units) if live else None
-        observers = Observers(None if view is None else view.on_cycle, on_firing)
+        observers = keeping.observers(None if view is None else view.on_cycle, log)
         process = RobotProcess(settings, log, observers)
         stack.enter_context(stopping_on_signals(process))
         stack.enter_context(reloading_on_signal(Reloader(settings, propose, process.reconfigure, log)))
@@ -211,34 +213,3 @@ def reloading_on_signal(reloader: Reloader) -> Iterator[None]:
     finally:
         loop.remove_signal_handler(signal.SIGHUP)
         reloader.cancel()
-
-
-@contextlib.contextmanager
-def recording(path: str) -> Iterator[Callable[[Firing], None]]:
-    """Write the run's firings to a ring log, in a thread: a slow disk delays no cycle.
-
-    Raises
-    ------
-    Complaint
-        The file cannot be written.
-    """
-    from runtime.ringlog import RingLogError, write_ring_log
-
-    waiting: queue.SimpleQueue[Firing | None] = queue.SimpleQueue()
-    failures: list[RingLogError] = []
-
-    def work() -> None:
-        try:
-            write_ring_log(Path(path), iter(waiting.get, None))
-        except RingLogError as error:
-            failures.append(error)
-
-    writer = threading.Thread(target=work, name="ring log")
-    writer.start()
-    try:
-        yield waiting.put
-    finally:
-        waiting.put(None)
-        writer.join()
-    if failures:
-        raise Complaint(str(failures[0]), FAILED)
