@@ -113,7 +113,7 @@ class FullPerception:
     def _sure_objects(self) -> tuple[SeenObject, ...]:
         s, p = self.memory, self.settings
         least = self._config.report_probability
-        n = sure_circles(s.ti, s.tf, s.comp, p.models, least, self._sure)
+        n = sure_circles(s.ti, self._sure)
         seen = [circle(s, p, t, self._round[s.ti[t, KIND]], float(s.tf[t, PROB])) for t in self._sure[:n].tolist()]
         if p.polys > 0:
             least = min(least, POLYGON_PROBABILITY)

@@ -172,6 +172,8 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: FullC
         bound=bound,
         psides=sides,
         inflate=1.1,
+        report=config.report_probability,
+        report_near=min(config.report_probability, config.report_probability_near),
         quiet=12,
         polish=6,
     )
