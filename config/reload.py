@@ -27,6 +27,7 @@ LIVE: Final = frozenset(
         "perception.full.polygon_quanta_per_firing",
         "perception.full.quanta_per_firing",
         "perception.full.report_probability",
+        "perception.full.report_probability_near",
         "perception.map.age_max_s",
         "perception.map.contradiction_margin_m",
         "perception.recognition",

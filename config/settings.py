@@ -98,13 +98,15 @@ class FullConfig(Strict):
 
     report_probability: float = Field(default=0.95, gt=0.0, lt=1.0)
     """A model is reported from this probability on."""
+    report_probability_near: float = Field(default=0.8, gt=0.0, lt=1.0)
+    """The same for what was heard from within 6 ft; farther away are explanations that nobody thought of."""
     tracks_max: int = Field(default=48, ge=1, le=1000)
     """Round things held in mind at a time, models or not."""
     attempts_per_firing: int = Field(default=3, ge=0, le=64)
     """Unexplained outline segments looked at for new objects, a firing."""
     fresh_share: float = Field(default=0.08, gt=0.0, le=1.0)
     """An object is refined once this share of its readings is new."""
-    quanta_per_firing: int = Field(default=1, ge=1, le=1000)
+    quanta_per_firing: int = Field(default=2, ge=1, le=1000)
     """Refinements a firing, at most; what is left waits for the next one."""
     polygon_quanta_per_firing: int = Field(default=2, ge=1, le=1000)
     """The same for polygons, so that drums in view do not starve the boxes beside them."""

@@ -99,6 +99,7 @@ class RobotProcess:
         self._memory = MemoryPolicy(timed(COLLECTION, collect_young))
         self._stop_reasons: list[str] = []
         self._request: Request | None = None
+        self._arm_when_ready = False
         self._stop = asyncio.Event()
         self._next_settings: Settings | None = None
 
@@ -137,8 +138,7 @@ class RobotProcess:
             self._log.warning(refusal)
         footprint = Footprint(self._memory)
         try:
-            if arm:
-                self.request(Request.ARM)
+            self._arm_when_ready = arm
             with self._memory.driving():
                 await self._cycle(seconds)
         finally:
@@ -202,6 +202,9 @@ class RobotProcess:
             self._settings, self._next_settings = self._next_settings, None
             self._driver.set_firing(self._settings.ring)
             self._state.perception.adopt(self._settings.perception)
+        if self._arm_when_ready and self._state.mode.mode is Mode.READY:
+            self._arm_when_ready = False
+            self.request(Request.ARM)
         rhythm, start_s = self._rhythm, now.wall_s
         mark = rhythm.keeper.mark
         request, self._request = self._request, None

@@ -9,6 +9,7 @@ from typing import Final, Literal, TypeAlias
 from rich.table import Table
 
 from runtime.experiment import DrumRow, Outcome
+from runtime.first_fix import ASKED_M
 from runtime.open_loop import BoxRow, SceneOutcome
 from runtime.summary import ObjectRow, RunSummary
 
@@ -72,6 +73,12 @@ def scene_verdict(outcome: SceneOutcome, units: Units) -> str:
     line = f"{outcome['scene']}: {_verdict(', '.join(parts) or 'nothing to be found', outcome, units)}"
     if outcome["inside_95"] is not None:
         line += f"; {outcome['inside_95']:.1%} of the drums found stand in their 95 % ellipse"
+    if (fix := outcome["first_fix"]) is not None:
+        least = "a drum never" if fix["least"] is None else f"{length(fix['least'], units)} {units}"
+        line += (
+            f"; first sure fix before passing: least {least}, median {length(fix['median'], units)} {units}, "
+            f"{fix['share']:.0%} by {length(ASKED_M, units)} {units}"
+        )
     if outcome["scene"] == "halls" and drums:
         recall = sum(row["estimate"] is not None for row in drums) / len(drums)
         line += f"; recall {recall:.3f}, {outcome['false'] / outcome['halls']:.3f} false a hall"

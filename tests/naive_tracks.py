@@ -300,10 +300,11 @@ def after_merging(t: int, live: Array, place: Array, rho: Array, llr: Array, mer
 
 
 def most_urgent(
-    live: Array, fresh: Array, kept: Array, sigma: Array, quiet: Array, polish: Array, patience: int, threshold: float
+    live: Array, fresh: Array, kept: Array, sigma: Array, likely: Array, quiet: Array, polish: Array, patience: int,
+    threshold: float,
 ) -> int:  # fmt: skip
     """Return the track with most unseen readings for its size, fourfold where unsure, raised where work is owed."""
-    urgency = fresh / (kept + 8.0) * np.where(sigma > 0.03 * FT, 4.0, 1.0)
+    urgency = fresh / (kept + 8.0) * np.where((sigma > 0.03 * FT) | (likely < 0.95), 4.0, 1.0)
     urgency = urgency + np.where((quiet > patience) & (polish > 0), threshold + 1e-6, 0.0)
     urgency = np.where(live, urgency, -np.inf)
     return int(np.argmax(urgency)) if urgency.max() > threshold else -1
@@ -339,14 +340,16 @@ def fate(
     return 1 if probability < 0.2 or dispersion < 0.5 * spread else 2
 
 
-def is_sure_circle(
-    established: bool, known: bool, probability: float, least: float, rivals: Sequence[float], llr: float,
-    unknown: float, variances: Sequence[float],
+def is_called(
+    called: bool, established: bool, known: bool, probability: float, sure: float, near: float,
+    rivals: Sequence[float], wall: float, dispersion: float, llr: float, unknown: float, variances: Sequence[float],
 ) -> bool:  # fmt: skip
-    """Tell whether a circle may be called by a model's name."""
+    """Tell whether a circle is called by a model's name: given when sure, kept while likely and well placed."""
     share = 1.1 if max(rivals) < -20 else 1.25
-    placed = max(variances) < (0.2 * FT) ** 2
-    return established and known and probability >= least and llr > share * unknown and placed
+    seen_round = dispersion >= 0.008
+    possible = established and known and seen_round and llr > share * unknown and max(variances) < (0.17 * FT) ** 2
+    needed = near if wall != 0 and wall <= -4 else sure
+    return possible and (probability >= needed or (called and probability >= min(needed, 0.5)))
 
 
 def is_sure_polygon(established: bool, probability: float, least: float, hits: float, kept: Array) -> bool:

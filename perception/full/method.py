@@ -18,7 +18,7 @@ from config.settings import FullConfig, PerceptionConfig
 from drivers.messages import Firing
 from perception.full.entry import hold, observe, pquantum, quantum, sure_circles
 from perception.full.report import POLYGON_PROBABILITY, circle, other_things, polygon, sure_polygons
-from perception.full.settings import circle_models, make_settings
+from perception.full.settings import circle_models, make_settings, tuned
 from perception.full.state import KIND, MODEL, PPROB, PROB, PT, SEGMENTS, ST, clear, make_state
 from perception.kernel import Floats
 from perception.seen import SeenObject
@@ -118,7 +118,7 @@ class FullPerception:
     def _sure_objects(self) -> tuple[SeenObject, ...]:
         s, p = self.memory, self.settings
         least = self._config.report_probability
-        n = sure_circles(self._handle, least, self._told, self._sure)
+        n = sure_circles(self._handle, self._told, self._sure)
         seen = [self._circles[t] if t >= 0 else self._tell_circle(~t) for t in self._sure[:n].tolist()]
         if p.polys > 0:
             least = min(least, POLYGON_PROBABILITY)
@@ -159,7 +159,7 @@ class FullPerception:
     def adopt(self, config: PerceptionConfig) -> None:
         """Go on with other constants; the number of tracks stays."""
         self._config = config.full
-        self.settings = self.settings._replace(attempts=config.full.attempts_per_firing)
+        self.settings = tuned(self.settings, config.full)
         self._handle = hold(self.memory, self.settings)
         self._objects = None
 

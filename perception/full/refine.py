@@ -10,12 +10,15 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.full.basin import ACROSS_M, seek
 from perception.full.births import LINE_M, SWITCH, VARIANCE_MAX_M2
 from perception.full.contact import CLOSEST, DISPERSION, HIGH, LOW, THROUGHS, fit_circle
 from perception.full.contact import HITS as HIT
 from perception.full.contact import NEAR as NEARBY
+from perception.full.hearing import audible
 from perception.full.noise_choice import hear_residuals, noise_variance
 from perception.full.posterior import posterior_circle
+from perception.full.report import call_or_not
 from perception.full.reservoir import flatten
 from perception.full.rivals import SOFT, compete_circle, compete_line, score
 from perception.full.state import (
@@ -69,6 +72,10 @@ READINGS_MIN: Final = 3
 BASIN: Final = 6.0
 """A robust fit this many σ² off (and the first two refinements) takes the pose over."""
 YOUNG: Final = 2
+UNSURE_ROOT_M: Final = 0.03 * FOOT_M
+"""A centre known worse than this may still be in the wrong place altogether."""
+LOST: Final = 2.0
+"""A mean this much worse than where it was looked for has left the beams that heard it, nat."""
 CORRELATION_MAX: Final = 0.9
 ROOT_MIN_M2: Final = 1e-6 * FOOT_M * FOOT_M
 SWITCH_ROOT_M: Final = 0.02 * FOOT_M
@@ -124,8 +131,13 @@ def locate(s: State, p: Settings, t: int, n: int) -> None:
             track[R00] = math.sqrt(c00)
             track[R10] = min(limit, max(-limit, -h01 / det)) / track[R00]
             track[R11] = math.sqrt(max(c11 - track[R10] ** 2, ROOT_MIN_M2))
-    s.pose[0] = track[TX]
-    s.pose[1] = track[TY]
+    if max(track[R00], track[R11]) > UNSURE_ROOT_M and seek(s, p, t, n):
+        track[R00] = max(track[R00], ACROSS_M)
+        track[R11] = max(track[R11], ACROSS_M)
+    x = track[TX]
+    y = track[TY]
+    s.pose[0] = x
+    s.pose[1] = y
     s.root[0] = track[R00]
     s.root[1] = track[R10]
     s.root[2] = track[R11]
@@ -141,6 +153,10 @@ def locate(s: State, p: Settings, t: int, n: int) -> None:
     track[C00] = s.cov[0]
     track[C01] = s.cov[1]
     track[C11] = s.cov[2]
+    unsure = max(track[R00], track[R11]) > UNSURE_ROOT_M
+    if unsure and score(s, p, n, x, y, rho) > score(s, p, n, track[TX], track[TY], rho) + LOST:
+        track[TX] = x
+        track[TY] = y
 
 
 @kernel
@@ -254,8 +270,8 @@ def probability(s: State, p: Settings, t: int, prior: float) -> float:
 @kernel
 def refine(s: State, p: Settings, t: int) -> None:
     """Refine track `t`: pose, evidence, rivals, noise, probability, and what becomes of it."""
-    n = flatten(s, t, s.w)
     track = s.tf[t]
+    n = audible(s, p, flatten(s, t, s.w), track[TX], track[TY], track[TRHO], t)
     s.ti[t, NRES] = n
     s.ti[t, DIRTY] = 0
     s.ti[t, REFS] += 1
@@ -279,6 +295,7 @@ def refine(s: State, p: Settings, t: int) -> None:
             s.ti[t, ST] = ESTABLISHED
     elif s.ti[t, ST] == ESTABLISHED and (track[PROB] < DOUBT or track[SPAN] < 0.5 * p.spread):
         s.ti[t, ST] = TENTATIVE
+    call_or_not(s.ti, s.tf, s.comp, p.models, p.report, p.report_near if prior >= p.prior else p.report, t)
     merge_duplicates(s, p, t)
 
 
@@ -296,7 +313,6 @@ def merge_duplicates(s: State, p: Settings, t: int) -> None:
 
 
 UNSURE: Final = 4.0
-UNSURE_ROOT_M: Final = 0.03 * FOOT_M
 SIZE: Final = 8.0
 OWED: Final = 1e-6
 
@@ -313,7 +329,7 @@ def urgent(s: State, p: Settings, threshold: float) -> int:
         if s.ti[t, ST] == FREE:
             continue
         v = s.ti[t, DIRTY] / (s.ti[t, NRES] + SIZE)
-        if max(s.tf[t, R00], s.tf[t, R11]) > UNSURE_ROOT_M:
+        if max(s.tf[t, R00], s.tf[t, R11]) > UNSURE_ROOT_M or s.tf[t, PROB] < CERTAIN:
             v *= UNSURE
         if s.ti[t, QUIET] > p.quiet and s.ti[t, POLISH] > 0:
             v += threshold + OWED

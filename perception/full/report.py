@@ -18,6 +18,7 @@ from perception.full.state import (
     C00,
     C01,
     C11,
+    CALLED,
     ESTABLISHED,
     FREE,
     HITS,
@@ -44,6 +45,7 @@ from perception.full.state import (
     PTH,
     PX,
     PY,
+    SPAN,
     ST,
     TRHO,
     TX,
@@ -60,7 +62,13 @@ OVER_UNKNOWN: Final = 1.25
 OVER_UNKNOWN_ALONE: Final = 1.1
 """Evidence over that of an unknown thing: a share of it, less where every rival is far behind."""
 ALONE: Final = -20.0
-SIGMA_MAX_M: Final = 0.2 * FOOT_M
+NO_WALL: Final = -4.0
+"""A wall this far behind is none, nat. Walls are what there is most of, and the rival that is met most often."""
+ASPECTS: Final = 0.008
+"""Dispersion of the axes from which on a thing has been seen from two sides: what lies straight ahead has not."""
+KEPT: Final = 0.5
+"""A name once given is kept while it is likelier than everything else together."""
+SIGMA_MAX_M: Final = 0.17 * FOOT_M
 POLYGON_PROBABILITY: Final = 0.9
 POLYGON_NEAR_M: Final = 6.5 * FOOT_M
 POLYGON_SPREAD: Final = 0.02
@@ -76,30 +84,45 @@ UNKNOWN_HITS: Final = 5.0
 
 
 @kernel
-def sure_circles(ti: Ints, tf: Floats, comp: Floats, models: int, least: float, out: Ints) -> int:
-    """Write the tracks that are sure to be models to `out` and return how many.
+def call_or_not(ti: Ints, tf: Floats, comp: Floats, models: int, sure: float, least: float, t: int) -> None:
+    """Give track `t` a model's name once that is sure, and take it away once it is not even likely any more.
+
+    A name that came and went with every rival's turn would be worth nothing to whoever steers by it.
 
     Parameters
     ----------
     ti, tf, comp
-        As in `State`.
+        As in `State`; `ti` is updated.
     models : int
         Kinds below this are models.
-    least : float
-        Probability.
-    out : (tracks,) int
-        Out.
+    sure, least : float
+        Probability from which on a name is given; and from which on where a wall is out of the question.
+    t : int
+        Track.
     """
+    wall = comp[t, comp.shape[1] - 2]
+    if wall == 0.0 or wall > NO_WALL:
+        least = sure
+    if ti[t, ST] != ESTABLISHED or ti[t, KIND] >= models or tf[t, PROB] < min(least, KEPT):
+        ti[t, CALLED] = 0
+        return
+    rival = -1e300
+    for k in range(comp.shape[1]):
+        if k != ti[t, KIND]:
+            rival = max(rival, comp[t, k])
+    over = OVER_UNKNOWN_ALONE if rival < ALONE else OVER_UNKNOWN
+    if tf[t, LLR] <= over * tf[t, UNK] or tf[t, SPAN] < ASPECTS or max(tf[t, C00], tf[t, C11]) >= SIGMA_MAX_M**2:
+        ti[t, CALLED] = 0
+    elif tf[t, PROB] >= least:
+        ti[t, CALLED] = 1
+
+
+@kernel
+def sure_circles(ti: Ints, out: Ints) -> int:
+    """Write the tracks that have a round model's name to `out`, shape (tracks,), and return how many."""
     n = 0
     for t in range(ti.shape[0]):
-        if ti[t, ST] != ESTABLISHED or ti[t, KIND] >= models or tf[t, PROB] < least:
-            continue
-        rival = -1e300
-        for k in range(comp.shape[1]):
-            if k != ti[t, KIND]:
-                rival = max(rival, comp[t, k])
-        over = OVER_UNKNOWN_ALONE if rival < ALONE else OVER_UNKNOWN
-        if tf[t, LLR] > over * tf[t, UNK] and max(tf[t, C00], tf[t, C11]) < SIGMA_MAX_M**2:
+        if ti[t, ST] == ESTABLISHED and ti[t, CALLED] == 1:
             out[n] = t
             n += 1
     return n
@@ -131,7 +154,7 @@ def mark_changed(ti: Ints, tf: Floats, told: Floats, n: int, sure: Ints) -> None
 
 @kernel
 def sure_polygons(pi: Ints, pf: Floats, pbn: Ints, pbins: Floats, least: float, out: Ints) -> int:
-    """Write the polygon tracks that are sure to `out` and return how many; arguments as for `sure_circles`."""
+    """Write the polygon tracks that are sure to `out` and return how many; arguments as in `State`."""
     n = 0
     for t in range(pi.shape[0]):
         if pi[t, ST] != ESTABLISHED or pf[t, PPROB] < least or pf[t, PHITS] < POLYGON_HITS:

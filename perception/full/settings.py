@@ -102,6 +102,15 @@ def _polygons(models: Sequence[ModelConfig]) -> tuple[Floats, Ints, Ints, Ints, 
     return vertices, count, closed, symmetry, inner, bound, sides
 
 
+def tuned(p: Settings, config: FullConfig) -> Settings:
+    """Return the kernels' settings with what a running process may change taken from `config`."""
+    return p._replace(
+        attempts=config.attempts_per_firing,
+        report=config.report_probability,
+        report_near=min(config.report_probability, config.report_probability_near),
+    )
+
+
 def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: FullConfig) -> Settings:
     """Return the kernels' settings.
 
@@ -129,7 +138,7 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: FullC
     radii = np.array([*known, *rivals])
     outlines = [m for m in models if m.arc_radius_m is None]
     vertices, count, closed, symmetry, inner, bound, sides = _polygons(outlines)
-    return Settings(
+    untuned = Settings(
         half_angle=half_angle,
         cos_half=math.cos(half_angle),
         cos_opt=math.cos(may),
@@ -153,7 +162,7 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: FullC
         merge=0.9 * float(radii[0]),
         all_until=80,
         claim=4.0 * FOOT_M,
-        attempts=config.attempts_per_firing,
+        attempts=0,
         hyp_sigma=0.7 * FOOT_M,
         radii=radii,
         models=len(known),
@@ -172,6 +181,9 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: FullC
         bound=bound,
         psides=sides,
         inflate=1.1,
+        report=0.0,
+        report_near=0.0,
         quiet=12,
         polish=6,
     )
+    return tuned(untuned, config)

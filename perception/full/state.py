@@ -45,9 +45,9 @@ TX, TY, TTH, TRHO, R00, R10, R11, C00, C01, C11, LLR, HITS, THRU, NEAR, PROB, SP
 )
 NTF: Final = 24
 # Columns of `State.ti` and `State.pi`. ST: 0 free, 1 tentative, 2 established. KIND: index into `Settings.radii`.
-# QUIET: firings without evidence; POLISH: refinements still owed once it is quiet.
-ST, KIND, DIRTY, CYC, NRES, MODEL, REFS, QUIET, POLISH = range(9)
-NTI: Final = 9
+# QUIET: firings without evidence; POLISH: refinements still owed once it is quiet; CALLED: 1 while it has its name.
+ST, KIND, DIRTY, CYC, NRES, MODEL, REFS, QUIET, POLISH, CALLED = range(10)
+NTI: Final = 10
 # Columns of `State.lines`: normal, distance along it from an origin on the spot, that origin, covariance of angle and
 # distance, extent along the line, log odds of being there still, echoes that it explained (0: free).
 LNX, LNY, LC, LOX, LOY, LP00, LP01, LP11, LLO, LHI, LLOG, LN = range(12)
@@ -136,6 +136,10 @@ class Settings(NamedTuple):
     """(M, V, 4) sides for the relaxation."""
     inflate: float
     """What the posterior's covariance is multiplied with when it is reported."""
+    report: float
+    """A model is called by its name from this probability on."""
+    report_near: float
+    """The same where it was heard from within `far`."""
     quiet: int
     """Firings without evidence after which what is left is worked off."""
     polish: int

@@ -45,7 +45,7 @@ def test_what_goes_in_by_the_handle_comes_to_the_same() -> None:
 def afresh(perception: FullPerception) -> list[SeenObject]:
     """Tell every sure circle from its track, as if for the first time."""
     s, p, sure = perception.memory, perception.settings, np.zeros(len(perception.memory.ti), np.int64)
-    n = report.sure_circles(s.ti, s.tf, s.comp, p.models, SETTINGS.perception.full.report_probability, sure)
+    n = report.sure_circles(s.ti, sure)
     name = SETTINGS.models[0].name
     told = [report.circle(s, p, t, name, float(s.tf[t, PROB])) for t in sure[:n].tolist()]
     return sorted(told, key=lambda o: o.score, reverse=True)

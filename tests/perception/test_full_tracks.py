@@ -20,6 +20,7 @@ from perception.full.state import (
     BORN,
     C00,
     C11,
+    CALLED,
     CAP,
     CYC,
     DIRTY,
@@ -436,7 +437,8 @@ def test_the_most_urgent_track_and_the_next_free_one() -> None:
         s.ti[:, [DIRTY, POLISH]] *= rng.integers(2)
         i, f = s.ti, s.tf
         want = naive_tracks.most_urgent(
-            i[:, ST] != FREE, i[:, DIRTY], i[:, NRES], np.maximum(f[:, R00], f[:, R11]), i[:, QUIET], i[:, POLISH],
+            i[:, ST] != FREE, i[:, DIRTY], i[:, NRES], np.maximum(f[:, R00], f[:, R11]), f[:, PROB],
+                i[:, QUIET], i[:, POLISH],
             P.quiet, 0.08,
         )  # fmt: skip
         assert refine.urgent(s, P, 0.08) == want
@@ -528,22 +530,28 @@ def test_what_is_sure_is_reported() -> None:
         for t in range(TRACKS):
             random_track(rng, s, t)
         s.ti[:, KIND] = rng.integers(0, 2, TRACKS)
-        s.tf[:, PROB] = rng.uniform(0.9, 1, TRACKS)
+        s.tf[:, PROB] = rng.uniform(0.4, 1, TRACKS)
         s.tf[:, UNK] = s.tf[:, LLR] / rng.uniform(1, 1.4, TRACKS)
         s.tf[:, [C00, C11]] = rng.uniform(0, 0.07, (TRACKS, 2)) ** 2
         s.comp[...] = rng.uniform(-60, -15, s.comp.shape)
+        s.comp[:, -2] = rng.choice([0.0, -3.9, -4.1, -30.0], TRACKS)
+        s.tf[:, SPAN] = rng.uniform(0.004, 0.03, TRACKS)
+        s.ti[:, CALLED] = rng.integers(0, 2, TRACKS)
         want = [
             t for t in range(TRACKS)
-            if naive_tracks.is_sure_circle(
-                s.ti[t, ST] == ESTABLISHED, s.ti[t, KIND] < P.models, s.tf[t, PROB], 0.92,
-                np.delete(s.comp[t], s.ti[t, KIND]).tolist(), s.tf[t, LLR], s.tf[t, UNK],
+            if naive_tracks.is_called(
+                s.ti[t, CALLED] == 1, s.ti[t, ST] == ESTABLISHED, s.ti[t, KIND] < P.models, s.tf[t, PROB], 0.92, 0.7,
+                np.delete(s.comp[t], s.ti[t, KIND]).tolist(), s.comp[t, -2], s.tf[t, SPAN], s.tf[t, LLR],
+                s.tf[t, UNK],
                 s.tf[t, [C00, C11]].tolist(),
             )
         ]  # fmt: skip
-        n = report.sure_circles(s.ti, s.tf, s.comp, P.models, 0.92, out)
+        for t in range(TRACKS):
+            report.call_or_not(s.ti, s.tf, s.comp, P.models, 0.92, 0.7, t)
+        n = report.sure_circles(s.ti, out)
         assert out[:n].tolist() == want
         sure += n
-    assert sure > 500
+    assert sure > 200
 
 
 def test_polygons_are_sure_when_seen_from_near_and_from_two_sides() -> None:
