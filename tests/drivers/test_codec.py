@@ -121,6 +121,30 @@ def test_a_name_that_is_no_text_is_no_identity() -> None:
         assert decoder.rejected == [(0, NakCode.VALUE_OUT_OF_RANGE)]
 
 
+def test_an_identity_with_another_length_of_name_is_none() -> None:
+    body = bytes((0x81, 0, 1, 24, 125, 1, 244, 1, 20, 0, 7, 0, 0, 0))
+    for name in (b"", b"x" * 15, b"x" * 17):
+        decoder = Decoder("robot")
+        assert decoder.feed(stuffed(body + name)) == []
+        assert decoder.rejected == [(0, NakCode.WRONG_LENGTH)]
+
+
+def test_a_name_keeps_its_last_letter_and_what_cannot_be_sent_becomes_a_question() -> None:
+    for name, heard in (("BOX", "BOX"), ("", ""), ("\ud800", "?")):
+        (ident,) = Decoder("robot").feed(encode(Ident(0, 1, 24, 381, 500, 20, 7, name)))
+        assert isinstance(ident, Ident)
+        assert ident.name == heard
+
+
+def test_the_longest_pattern_and_the_nearest_echo() -> None:
+    longest = Pattern(0, 50, 255, tuple(range(1, 25)))
+    assert Decoder("host").feed(encode(longest)) == [longest]
+    for tenths in range(1, 5):
+        decoder = Decoder("robot")
+        assert decoder.feed(stuffed(bytes((0x91, 0, 0, 0, 0, 0, 0, 1, 0, 0, tenths)))) == []
+        assert decoder.rejected == [(0, NakCode.VALUE_OUT_OF_RANGE)]
+
+
 def test_gaps_in_the_sequence_are_counted_across_the_wrap() -> None:
     decoder = Decoder("host")
     for seq in (250, 251, 255, 0, 2, 2):
@@ -208,6 +232,7 @@ ODOM = Odom(0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
         (Echo(0, 0, 0, 3, (9,)), "Echo.tenths_ft", "asks for 2"),
         (Echo(0, 0, 0, 3, (9, 4)), "Echo.tenths_ft[1]", "5 to 255"),
         (Ident(0, 1, 24, 1, 1, 1, 1, "x" * 17), "Ident.name", "16 bytes"),
+        (Ident(0, 1, 24, 1, 1, 1, 1, "a\0b"), "Ident.name", "without a zero"),
     ],
 )
 def test_what_does_not_fit_is_refused_by_name(frame: Frame, field: str, limits: str) -> None:
@@ -240,3 +265,4 @@ def test_the_numbers_of_the_protocol() -> None:
     assert (frames.WINDOW_MIN, frames.WINDOW_MAX) == (5, 255)
     assert (frames.FAULT, frames.TENTHS_MIN, frames.TENTHS_MAX, frames.NO_ECHO) == (0, 5, 254, 255)
     assert frames.TENTH_FT_M == 0.03048
+    assert FRAME_MAX == 128
