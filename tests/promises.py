@@ -60,6 +60,21 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "new boot_id mid-run: pattern sent again, clock and odometry re-based without a jump in the map, "
             "SAFE_STOP until re-armed",
         ),
+        "P11": Promise(
+            "Configuration cannot half-apply",
+            "every field × {missing, wrong type, low, high, typo}: message with path, value, range, nearest name; 10⁴ "
+            "random live reloads are atomic, the last good one kept; restart-only fields say so",
+        ),
+        "P13": Promise(
+            "One owner",
+            "a second process on the same port or the same record file is refused with a clear line; a stale lock is "
+            "recognised",
+        ),
+        "P14": Promise(
+            "Input files cannot hurt",
+            "10⁵ mutated ring logs, worlds, models, robot files (here a share of them, in `make soak` all): clear "
+            "error or right result, no traceback, no hang, memory ≤ 500 MB",
+        ),
         "P16": Promise("Traceable", "this table is generated from the tests that ran"),
     }
 )  # fmt: skip
