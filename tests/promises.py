@@ -62,8 +62,8 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         ),
         "P11": Promise(
             "Configuration cannot half-apply",
-            "every field × {missing, wrong type, low, high, typo}: message with path, value, range, nearest name; 10⁴ "
-            "random live reloads are atomic, the last good one kept; restart-only fields say so",
+            "every field × {missing, wrong type, low, high, typo}: message with path, value, range, nearest name; "
+            "10⁴ random live reloads are atomic, the last good one kept; restart-only fields say so",
         ),
         "P13": Promise(
             "One owner",

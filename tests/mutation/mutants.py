@@ -29,7 +29,17 @@ class Mutant:
     line: int
     before: str
     after: str
-    source: str
+    module: ast.Module
+    number: int
+    variant: int
+
+    @property
+    def source(self) -> str:
+        """The whole module with the change in it."""
+        changed = copy.deepcopy(self.module)
+        twin = next(node for k, (node, _) in enumerate(_places(changed, ())) if k == self.number)
+        _replace(changed, twin, list(_variants(twin))[self.variant])
+        return ast.unparse(ast.fix_missing_locations(changed))
 
     @property
     def key(self) -> str:
@@ -42,9 +52,6 @@ def mutants(source: str) -> Iterator[Mutant]:
     counts: dict[str, int] = {}
     for number, (node, where) in enumerate(_places(tree, ())):
         for variant, after in enumerate(_variants(node)):
-            changed = copy.deepcopy(tree)
-            twin = _nth(changed, number)
-            _replace(changed, twin, list(_variants(twin))[variant])
             before_text, after_text = _shown(node), _shown(after)
             name = f"{'.'.join(where) or 'module'}: {before_text} → {after_text}"
             counts[name] = counts.get(name, 0) + 1
@@ -52,12 +59,8 @@ def mutants(source: str) -> Iterator[Mutant]:
             line = int(getattr(node, "lineno", 0))
             yield Mutant(
                 ".".join(where) + suffix if where else "module" + suffix, line, before_text, after_text,
-                ast.unparse(ast.fix_missing_locations(changed)),
+                tree, number, variant,
             )  # fmt: skip
-
-
-def _nth(tree: ast.Module, number: int) -> ast.AST:
-    return next(node for k, (node, _) in enumerate(_places(tree, ())) if k == number)
 
 
 def _places(node: ast.AST, where: tuple[str, ...]) -> Iterator[tuple[ast.AST, tuple[str, ...]]]:
