@@ -187,7 +187,7 @@ class RealtimeConfig(Strict):
     """Turns of the processor this short let a waking cycle in before programs that want it all (from Linux 6.12)."""
     priority: int | None = Field(default=None, ge=1, le=99)
     """Run under SCHED_FIFO at this priority: before everything that is not real-time."""
-    core: int | None = Field(default=None, ge=0)
+    core: int | None = Field(default=None, ge=0, le=4095)
     """Stay on this core."""
     lock_memory: bool = False
     """Never let memory be swapped out."""
