@@ -39,7 +39,9 @@ bench: $(VENV)/bench.stamp
 	@$(BIN)/python -m tests.bench waking
 
 # An hour and a half of driving in virtual time: does anything grow, compile late, or collect all garbage?
+# And generated examples that no run had before; `make tests` has the same ones every time.
 soak: $(VENV)/test.stamp
+	$(BIN)/python -m pytest -q -m hypothesis --hypothesis-profile=explore
 	@$(BIN)/python -m tests.timing.growth $(SOAK)
 
 clean:
