@@ -36,8 +36,9 @@ promises: $(VENV)/test.stamp
 	$(BIN)/python -m pytest -q -m "promise and not soak" --promises=docs/promises.md
 
 # The long forms, the fuzzers, and an hour and a half of driving in virtual time: does anything grow, compile late, or
-# collect all garbage?
+# collect all garbage? And generated examples that no run had before; `make tests` has the same ones every time.
 soak: $(VENV)/soak.stamp
+	$(BIN)/python -m pytest -q -m hypothesis --hypothesis-profile=explore
 	$(BIN)/python -m pytest -m soak --promises=docs/promises-soak.md
 	@$(BIN)/python -m tests.timing.growth $(SOAK)
 

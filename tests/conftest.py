@@ -3,6 +3,9 @@
 Numba reads its settings when it is imported, so the cache is named here, before any test module is. A run with
 `NUMBA_DISABLE_JIT=1` (coverage sees inside kernels) or `NUMBA_BOUNDSCHECK=1` is slower than real time on purpose:
 tests marked `realtime` say nothing there and are skipped. Those marked `soak` run only where they are asked for.
+
+What a run of the tests says must depend on nothing but the sources: so generated examples are the same in every run
+(`make soak` looks for new ones), and what the user's terminal is like is forgotten.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 from rich.console import Console
 
 from config.load import load_settings
@@ -19,6 +23,21 @@ from runtime.kernels import ready_kernels, use_cache
 from tests import promises
 
 use_cache()
+
+TERMINAL = ("COLUMNS", "LINES", "FORCE_COLOR", "NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE", "TTY_COMPATIBLE",
+            "TTY_INTERACTIVE", "PY_COLORS", "JUPYTER_COLUMNS", "JUPYTER_LINES")  # fmt: skip
+"""What decides how wide and how colourful output is; CI systems like to set it."""
+
+for _name in TERMINAL:
+    os.environ.pop(_name, None)
+
+# How long an example takes says something about the machine only.
+_SLOW = [HealthCheck.too_slow]
+settings.register_profile("reproducible", deadline=None, derandomize=True, suppress_health_check=_SLOW)
+settings.register_profile(
+    "explore", deadline=None, max_examples=1000, print_blob=True, database=None, suppress_health_check=_SLOW
+)
+settings.load_profile("reproducible")
 
 
 def slowed_down() -> str | None:

@@ -16,7 +16,8 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from config.robot import LinkConfig
 from drivers.link import Link
-from tests.drivers.test_link import PATIENCE_S, Ends
+from tests.drivers.test_link import Ends
+from tests.hil.machine import PATIENCE_S
 
 WAITING_MAX = 4096
 

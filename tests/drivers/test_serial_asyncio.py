@@ -15,7 +15,8 @@ import serial
 from config.robot import LinkConfig
 from drivers.link import Link, LinkError
 from drivers.port import open_port
-from tests.drivers.test_link import PATIENCE_S, Ends, Host, running, soon
+from tests.drivers.test_link import Ends, Host, running, soon
+from tests.hil.machine import PATIENCE_S
 
 
 @pytest.fixture

@@ -17,11 +17,15 @@ from pathlib import Path
 import pytest
 
 from runtime.complaint import FAILED, WRONG_CALL
+from runtime.process import CONNECT_MAX_S
+from tests.hil.machine import BareStarts, stalls_excused
 from tests.hil.running import Running, emulated, is_driving, running, wait_for
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
-SOON_S = 8.0
+STARTS_MAX = 12
+"""So many bare starts of Python with numba, each as slow as the slowest beside it, may go by until it has its ports;
+on an idle machine it takes four."""
 
 
 class Stranger:
@@ -65,11 +69,15 @@ class Stranger:
 
 
 @contextlib.contextmanager
-def run_on(folder: Path, port: str) -> Iterator[Running]:
-    begun_s = time.monotonic()
-    with running(folder, "run", "run", "--port", port, "--arm", "--seconds", "60") as run:
-        yield run
-        assert time.monotonic() - begun_s < SOON_S
+def run_on(folder: Path, port: str, patience_s: float = 0.0) -> Iterator[Running]:
+    """Run on a port with which it must have come to an end after its start and `patience_s`."""
+    with BareStarts() as bare:
+        begun_s = time.monotonic()
+        with running(folder, "run", "run", "--port", port, "--arm", "--seconds", "600") as run:
+            yield run
+            took_s = time.monotonic() - begun_s
+    # A second for what is neither: taking Python down again, and looking whether it has ended.
+    assert took_s < patience_s + 1.0 + STARTS_MAX * bare.longest_s
 
 
 def check(run: Running, code: int, *pieces: str) -> None:
@@ -80,19 +88,22 @@ def check(run: Running, code: int, *pieces: str) -> None:
         assert piece in line, line
 
 
+@stalls_excused
 def test_a_port_that_answers_garbage(tmp_path: Path) -> None:
-    with Stranger(bytes_per_s=5000) as stranger, run_on(tmp_path, stranger.path) as run:
+    with Stranger(bytes_per_s=5000) as stranger, run_on(tmp_path, stranger.path, CONNECT_MAX_S) as run:
         check(run, FAILED, "baud")
         assert len(stranger.heard) > 0, "it was asked"
 
 
+@stalls_excused
 def test_a_port_that_says_nothing(tmp_path: Path) -> None:
-    with Stranger() as stranger, run_on(tmp_path, stranger.path) as run:
+    with Stranger() as stranger, run_on(tmp_path, stranger.path, CONNECT_MAX_S) as run:
         check(run, FAILED, "HELLO", "nothing comes from it")
         assert len(stranger.heard) > 0, "it was asked"
 
 
 @pytest.mark.promise("P13")
+@stalls_excused
 def test_a_port_in_use(tmp_path: Path) -> None:
     """Both ways to say so: the lock that this program takes, too, and a terminal opened for one alone."""
     with Stranger() as stranger:
@@ -106,6 +117,7 @@ def test_a_port_in_use(tmp_path: Path) -> None:
 
 
 @pytest.mark.promise("P13")
+@stalls_excused
 def test_a_robot_that_another_run_drives(tmp_path: Path) -> None:
     with emulated(tmp_path) as robot:
         (tmp_path / "other").mkdir()
@@ -113,8 +125,9 @@ def test_a_robot_that_another_run_drives(tmp_path: Path) -> None:
             wait_for(lambda: is_driving(robot.trace), "driving")
             with run_on(tmp_path, robot.port) as second:
                 check(second, FAILED, robot.port, "in use")
-            assert is_driving(robot.trace), "the first one's drive is not disturbed"
             assert first.process.poll() is None
+            assert first.modes() == ["READY", "DRIVE"], "the first one's drive is not disturbed"
+            assert is_driving(robot.trace)
 
 
 @pytest.mark.promise("P13")
@@ -146,6 +159,7 @@ def test_a_record_that_another_run_writes(tmp_path: Path) -> None:
             assert first.process.poll() is None
 
 
+@stalls_excused
 def test_a_port_that_goes_away_before_the_handshake(tmp_path: Path) -> None:
     with Stranger() as stranger, run_on(tmp_path, stranger.path) as run:
         wait_for(lambda: len(stranger.heard) > 0, "HELLO")
@@ -156,13 +170,18 @@ def test_a_port_that_goes_away_before_the_handshake(tmp_path: Path) -> None:
         check(run, FAILED, stranger.path)
 
 
+@stalls_excused
 def test_a_robot_that_is_deaf(tmp_path: Path) -> None:
     """It can be heard and does not answer."""
-    (tmp_path / "faults.toml").write_text("[[fault]]\nat_s = 0.0\nduration_s = 60.0\nkind = 'deaf'\n")
-    with emulated(tmp_path, "--faults", str(tmp_path / "faults.toml")) as robot, run_on(tmp_path, robot.port) as run:
+    (tmp_path / "faults.toml").write_text("[[fault]]\nat_s = 0.0\nduration_s = 600.0\nkind = 'deaf'\n")
+    with (
+        emulated(tmp_path, "--faults", str(tmp_path / "faults.toml")) as robot,
+        run_on(tmp_path, robot.port, CONNECT_MAX_S) as run,
+    ):
         check(run, FAILED, "HELLO", "although it can be heard")
 
 
+@stalls_excused
 @pytest.mark.parametrize("kind", ["missing", "file", "folder", "fifo", "null", "dangling link"])
 def test_what_is_no_serial_port(tmp_path: Path, kind: str) -> None:
     path = tmp_path / "port"
