@@ -50,13 +50,14 @@ while True:
 class Witness:
     """Notes, on each core, for how long a program that asks for nothing was kept from running."""
 
-    def __init__(self, stall_s: float = STALL_S) -> None:
-        self._notes = tempfile.TemporaryFile("w+")  # noqa: SIM115 - closed by __exit__
+    def __init__(self) -> None:
+        # Appended to by several processes, and read from its beginning here.
+        self._notes = tempfile.TemporaryFile("a+")  # noqa: SIM115 - closed by __exit__
         cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else [0]
         # Isolated and without site packages: it starts at once.
         command = [sys.executable, "-I", "-S", "-c", WITNESS]
         self._processes = [
-            subprocess.Popen([*command, str(core), str(stall_s)], stdin=subprocess.DEVNULL, stdout=self._notes)
+            subprocess.Popen([*command, str(core), str(STALL_S)], stdin=subprocess.DEVNULL, stdout=self._notes)
             for core in cores[:4]
         ]
 
