@@ -12,9 +12,11 @@ from typing import Final
 
 from perception.full.contact import HITS as HIT
 from perception.full.contact import NEAR as NEARBY
-from perception.full.polygon import ACROSS, ALONG, MISS, SURE, TURN, moved, predict
+from perception.full.noise_choice import noise_variance
+from perception.full.polygon import ACROSS, ALONG, SURE, TURN, least_miss, moved, predict
 from perception.full.polygon_births import WHOLE, bears, pflatten, pput, prestat, pscore
-from perception.full.refine import SIZE, bounded_exp
+from perception.full.polygon_posterior import centre_polygon
+from perception.full.refine import OWED, SIZE, bounded_exp
 from perception.full.state import (
     DIRTY,
     ESTABLISHED,
@@ -31,15 +33,16 @@ from perception.full.state import (
     LOY,
     MODEL,
     NRES,
-    PCX,
     PHITS,
     PLLR,
     PNEAR,
+    POLISH,
     PPROB,
     PSURE,
     PTH,
     PX,
     PY,
+    QUIET,
     REFS,
     ST,
     TENTATIVE,
@@ -48,7 +51,7 @@ from perception.full.state import (
     Settings,
     State,
 )  # fmt: skip
-from perception.kernel import kernel
+from perception.kernel import Floats, kernel
 
 FOOT_M: Final = 0.3048
 POLYGON: Final = 1000
@@ -72,18 +75,6 @@ THROW_ROUNDS: Final = 5
 THROW_GAIN: Final = 1.0
 """Another summit must be higher by this, nat."""
 
-PLATEAU_STEPS: Final = 12
-PLATEAU_STEP_M: Final = 0.02 * FOOT_M
-PLATEAU_STEP_RAD: Final = 0.01
-"""The plateau is looked at so often each way: a quarter of a foot, 7°."""
-PLATEAU_DEPTH: Final = -8.0
-"""It ends where the log ratio has fallen by this, nat."""
-PLATEAU_RISE: Final = 5.0
-"""What is higher than the pose found counts as higher by this at most, nat."""
-VARIANCE_MIN_M2: Final = 1e-4 * FOOT_M * FOOT_M
-VARIANCE_MIN_RAD2: Final = 0.25e-4
-"""Half the step of the plateau, squared: nothing is seen finer."""
-
 WALL_ECHOES_MIN: Final = 12.0
 WALL_SIZE: Final = 3.0
 """A wall is longer than so many inner radii."""
@@ -101,11 +92,31 @@ UNKNOWN_LEAD: Final = 8.0
 """Evidence below the first, or behind an unknown thing's by the second, is the end, nat."""
 ESTABLISH: Final = 0.9
 ESTABLISH_HITS: Final = 16.0
+ESTABLISH_SURE: Final = 4.0
+"""A track is established by so many hits, and so many that had to be: corners alone fit anywhere."""
 DOUBT: Final = 0.3
 DOUBT_SHARE: Final = 0.75
+SIGMAS: Final = 3.0
+"""An echo this near to what is expected is explained."""
 TWIN: Final = 0.4
 OVERLAP: Final = 1.8
 """Two bodies whose centres are nearer than this, in inner radii, are one; or cannot both be there."""
+
+
+@kernel
+def miss_of(s: State, p: Settings, t: int, q: Floats) -> float:
+    """Return by how much a reading misses what polygon track `t` would answer, m; `s.stats` is scratch."""
+    model = s.pi[t, MODEL]
+    dx = q[0] - s.pf[t, PX]
+    dy = q[1] - s.pf[t, PY]
+    c = math.cos(s.pf[t, PTH])
+    sn = math.sin(s.pf[t, PTH])
+    predict(
+        c * dx + sn * dy, -sn * dx + c * dy, c * q[2] + sn * q[3], -sn * q[2] + c * q[3], p.verts[model],
+        p.nv[model], p.closed[model] > 0, p.cos_opt, p.cos_in, p.cos_half, math.sin(p.half_angle),
+        math.sqrt(1.0 - p.cos_in**2), s.stats,
+    )  # fmt: skip
+    return least_miss(s.stats, q[4])
 
 
 @kernel
@@ -121,19 +132,14 @@ def poly_claims(s: State, p: Settings, m: int, tight: float) -> None:
     tight : float
         How far off an explained range is at most, m.
     """
-    sin_half = math.sin(p.half_angle)
     for t in range(s.pi.shape[0]):
         if s.pi[t, ST] == FREE:
             continue
+        s.pi[t, QUIET] += 1
         model = s.pi[t, MODEL]
         x = s.pf[t, PX]
         y = s.pf[t, PY]
-        c = math.cos(s.pf[t, PTH])
-        sn = math.sin(s.pf[t, PTH])
         bound = p.bound[model]
-        vertices = p.verts[model]
-        count = p.nv[model]
-        closed = p.closed[model] > 0
         may_claim = s.pi[t, ST] == ESTABLISHED and s.pf[t, PHITS] > WHOLE * s.pf[t, PNEAR]
         for i in range(m):
             q = s.cur[i]
@@ -144,15 +150,54 @@ def poly_claims(s: State, p: Settings, m: int, tight: float) -> None:
                 continue
             pput(s.pbins, s.pbn, t, x, y, q)
             s.pi[t, DIRTY] += 1
-            if may_claim:
-                dx = q[0] - x
-                dy = q[1] - y
-                predict(
-                    c * dx + sn * dy, -sn * dx + c * dy, c * q[2] + sn * q[3], -sn * q[2] + c * q[3], q[4], vertices,
-                    count, closed, p.cos_opt, p.cos_in, p.cos_half, sin_half, s.stats,
-                )  # fmt: skip
-                if abs(s.stats[MISS]) < tight:
-                    s.owner[i] = POLYGON + t
+            s.pi[t, QUIET] = 0
+            s.pi[t, POLISH] = p.polish
+            if may_claim and miss_of(s, p, t, q) < tight:
+                s.owner[i] = POLYGON + t
+
+
+@kernel
+def hides(s: State, p: Settings, u: int, t: int, q: Floats) -> bool:
+    """Tell whether the body of track `u` stands between the place of a reading and that of track `t`."""
+    dx = s.pf[t, PX] - q[0]
+    dy = s.pf[t, PY] - q[1]
+    ex = s.pf[u, PX] - q[0]
+    ey = s.pf[u, PY] - q[1]
+    d = math.hypot(dx, dy)
+    if d == 0.0:
+        return False
+    ahead = (dx * ex + dy * ey) / d
+    aside = abs(dx * ey - dy * ex) / d
+    return 0.0 < ahead < d and bool(aside < p.inner[s.pi[u, MODEL]] + 0.5 * p.inner[s.pi[t, MODEL]])
+
+
+@kernel
+def leave_to_neighbours(s: State, p: Settings, t: int, n: int) -> int:
+    """Drop from the first `n` readings in `s.w` what an established neighbour explains better; return how many stay.
+
+    Where bodies all but touch, the echo of one's corner is an outlier to the other, and a dozen are a force; so
+    is the silence of what stands in the shade.
+    """
+    var0, _ = noise_variance(s, p)
+    tight = p.half_box + SIGMAS * math.sqrt(var0)
+    reach = p.bound[s.pi[t, MODEL]] + p.gate
+    for u in range(s.pi.shape[0]):
+        if u == t or s.pi[u, ST] != ESTABLISHED:
+            continue
+        apart = math.hypot(s.pf[u, PX] - s.pf[t, PX], s.pf[u, PY] - s.pf[t, PY])
+        if apart > reach + p.bound[s.pi[u, MODEL]] or apart < OVERLAP * p.inner[s.pi[t, MODEL]]:
+            continue
+        kept = 0
+        for j in range(n):
+            own = miss_of(s, p, t, s.w[j])
+            e = miss_of(s, p, u, s.w[j])
+            if (e < tight and e < own) or (own > p.gate and hides(s, p, u, t, s.w[j])):
+                continue
+            for z in range(5):
+                s.w[kept, z] = s.w[j, z]
+            kept += 1
+        n = kept
+    return n
 
 
 @kernel
@@ -205,33 +250,6 @@ def locate_polygon(s: State, p: Settings, t: int, n: int) -> None:
 
 
 @kernel
-def centre_on_plateau(s: State, p: Settings, t: int, n: int) -> None:
-    """Move track `t` from `s.pose` to the middle of the plateau, axis by axis, and take its spread as variance."""
-    model = s.pi[t, MODEL]
-    track = s.pf[t]
-    for axis in range(3):
-        unit = PLATEAU_STEP_RAD if axis == TURN else PLATEAU_STEP_M
-        least = VARIANCE_MIN_RAD2 if axis == TURN else VARIANCE_MIN_M2
-        weight = 1.0
-        first = 0.0
-        second = 0.0
-        for sign in (-1.0, 1.0):
-            for k in range(1, PLATEAU_STEPS + 1):
-                step = sign * unit * k
-                s.root[0], s.root[1], s.root[2] = moved(s.pose[0], s.pose[1], s.pose[2], axis, step)
-                v = prestat(s, p, model, n, s.root) - track[PLLR]
-                if v < PLATEAU_DEPTH:
-                    break
-                share = math.exp(min(v, PLATEAU_RISE))
-                weight += share
-                first += share * step
-                second += share * step * step
-        mean = first / weight
-        track[PCX + axis] = max(second / weight - mean * mean, least)
-        track[PX], track[PY], track[PTH] = moved(track[PX], track[PY], track[PTH], axis, mean)
-
-
-@kernel
 def is_wall(s: State, x: float, y: float, inner: float, claim: float) -> bool:
     """Tell whether a body of inner radius `inner` (m) at (x, y) is a stretch of a wall longer than `claim` (m)."""
     for k in range(s.lines.shape[0]):
@@ -275,7 +293,8 @@ def judge(s: State, p: Settings, t: int) -> None:
         s.pi[t, ST] = FREE
     elif s.pi[t, ST] == TENTATIVE:
         is_fitting = track[PHITS] > FITTING * track[PNEAR]
-        if track[PPROB] > ESTABLISH and is_fitting and track[PHITS] >= ESTABLISH_HITS:
+        is_heard = track[PHITS] >= ESTABLISH_HITS and track[PSURE] >= ESTABLISH_SURE
+        if track[PPROB] > ESTABLISH and is_fitting and is_heard:
             s.pi[t, ST] = ESTABLISHED
     elif track[PPROB] < DOUBT or track[PHITS] < DOUBT_SHARE * track[PNEAR]:
         s.pi[t, ST] = TENTATIVE
@@ -303,17 +322,18 @@ def merge_polygons(s: State, p: Settings, t: int) -> None:
 @kernel
 def prefine(s: State, p: Settings, t: int) -> None:
     """Refine polygon track `t`: pose, spread, evidence, probability, and what becomes of it."""
-    n = pflatten(s, t, s.w)
+    n = leave_to_neighbours(s, p, t, pflatten(s, t, s.w))
     s.pi[t, NRES] = n
     s.pi[t, DIRTY] = 0
     s.pi[t, REFS] += 1
     locate_polygon(s, p, t, n)
-    centre_on_plateau(s, p, t, n)
     if is_wall(s, s.pf[t, PX], s.pf[t, PY], p.inner[s.pi[t, MODEL]], p.claim):
         s.pi[t, ST] = FREE
         return
     compare_circles(s, p, t)
     judge(s, p, t)
+    if s.pi[t, ST] == ESTABLISHED:
+        centre_polygon(s, p, t, n)
     if s.pi[t, ST] != FREE:
         merge_polygons(s, p, t)
 
@@ -332,12 +352,17 @@ def pquantum(s: State, p: Settings, threshold: float) -> bool:
     best = threshold
     chosen = -1
     for t in range(s.pi.shape[0]):
-        if s.pi[t, ST] != FREE and s.pi[t, DIRTY] > 0:
-            v = s.pi[t, DIRTY] / (s.pi[t, NRES] + SIZE)
-            if v > best:
-                best = v
-                chosen = t
+        if s.pi[t, ST] == FREE:
+            continue
+        v = s.pi[t, DIRTY] / (s.pi[t, NRES] + SIZE)
+        if s.pi[t, QUIET] > p.quiet and s.pi[t, POLISH] > 0:
+            v += threshold + OWED
+        if v > best:
+            best = v
+            chosen = t
     if chosen < 0:
         return False
+    if s.pi[chosen, QUIET] > p.quiet:
+        s.pi[chosen, POLISH] -= 1
     prefine(s, p, chosen)
     return True

@@ -36,14 +36,15 @@ from perception.full.state import (
     LP11,
     MODEL,
     PCAP,
-    PCX,
-    PCY,
     PHITS,
     PPROB,
     PROB,
     PTH,
     PX,
+    PXX,
+    PXY,
     PY,
+    PYY,
     ST,
     TRHO,
     TX,
@@ -66,6 +67,8 @@ POLYGON_NEAR_M: Final = 6.5 * FOOT_M
 POLYGON_SPREAD: Final = 0.02
 POLYGON_HITS: Final = 20.0
 """A polygon is seen from near and from more than one direction: one face, square on from afar, may be any wall's."""
+POLYGON_INFLATE: Final = 1.2
+"""What a polygon's covariance is multiplied with when it is reported: what its neighbours do to it is no noise."""
 WALL_ECHOES_MIN: Final = 10.0
 WALL_M: Final = 2.0 * FOOT_M
 CORNER_M: Final = 1.0 * FOOT_M
@@ -156,10 +159,7 @@ def polygon(s: State, p: Settings, t: int, label: str, probability: float) -> Se
     """Return a polygon's track as an object; of the headings at which it looks alike the least one from −π on."""
     track = s.pf[t]
     theta = float(track[PTH])
-    c, sn = math.cos(theta), math.sin(theta)
-    along, across = float(track[PCX]), float(track[PCY])
-    xx, yy = c * c * along + sn * sn * across, sn * sn * along + c * c * across
-    xy = c * sn * (along - across)
+    xx, xy, yy = (POLYGON_INFLATE * float(track[k]) for k in (PXX, PXY, PYY))
     period = 2.0 * math.pi / int(p.sym[s.pi[t, MODEL]])
     return SeenObject(
         label, float(track[PX]), float(track[PY]), (theta + 0.5 * period) % period - 0.5 * period,

@@ -50,8 +50,10 @@ NTI: Final = 9
 # Columns of `State.lines`: normal, distance along it from an origin on the spot, that origin, covariance of angle and
 # distance, extent along the line, log odds of being there still, echoes that it explained (0: free).
 LNX, LNY, LC, LOX, LOY, LP00, LP01, LP11, LLO, LHI, LLOG, LN = range(12)
-# Columns of `State.pf`, a polygon's track: pose, log ratio, counts, probability, must-answer hits, variances.
-PX, PY, PTH, PLLR, PHITS, PNEAR, PPROB, PSURE, PCX, PCY, PCT = range(11)
+# Columns of `State.pf`, a polygon's track: pose, log ratio, counts, probability, must-answer hits, covariance of x, y
+# and heading.
+PX, PY, PTH, PLLR, PHITS, PNEAR, PPROB, PSURE, PXX, PXY, PYY, PXT, PYT, PTT = range(14)
+NPF: Final = 16
 # Cells of `State.g`.
 NOISE, SEGMENTS, BIRTHS, REFINEMENTS = range(4)
 
@@ -208,7 +210,7 @@ def make_state(sensors: int, p: Settings, tracks: int = NT, slots: int = BUCKETS
         ddl=z(noises), ntot=z(noises), nll=z((tracks, noises)), bins=z((tracks, NB, CAP, 5)), bn=z((tracks, NB), n),
         lines=z((NL, 12)), g=z(8), w=z((WORK, 5)), w2=z((WORK, 5)), wl=z(WORK, n), cur=z((sensors, 6)),
         owner=z(sensors, n), fit=z(12), stats=z(12), segs=z((8 * sensors, 8)), near=z((32, 4)),
-        pi=z((PT, NTI), n), pf=z((PT, 12)), pbins=z((PT, PB, PCAP, 5)), pbn=z((PT, PB), n), stats2=z(12),
+        pi=z((PT, NTI), n), pf=z((PT, NPF)), pbins=z((PT, PB, PCAP, 5)), pbn=z((PT, PB), n), stats2=z(12),
         pose=z(3), root=z(3), cov=z(3), pull=z((PULLING, 5)), all_pull=np.arange(PULLING), last=z((sensors, 5)),
     )  # fmt: skip
     clear(s)
