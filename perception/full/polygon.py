@@ -10,21 +10,13 @@ there is always a pose at which a dozen accidents happen to help.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 from perception.full.contact import DROP_PRICE, DROP_SHARE, HITS, LLR, NEAR, THROUGHS, level_of
 from perception.full.likelihood import loglik
 from perception.kernel import Floats, Ints, kernel
 
 FOOT_M: Final = 0.3048
-
-MIRROR: Final = 0
-MIRROR_MUST: Final = 1
-CONE: Final = 2
-CONE_MUST: Final = 3
-MIRROR_PRICE: Final = 4
-"""Columns of a prediction: range by either rule (m, `NOTHING` where none), and 1 where it must be heard; and what a
-mirror's answer costs (nat)."""
 
 CORNER_PRICE: Final = 0.7
 """What an answer costs that a mirror may give or not, nat: about log 2. At a side's end or the beam's edge it costs
@@ -41,10 +33,32 @@ MARGIN_M: Final = 0.12 * FOOT_M
 GRAZING_COS: Final = 0.05
 """An edge of the beam that is more parallel to a side than this does not hear it."""
 
+
+class Ear(NamedTuple):
+    """How a sensor hears: its beam, and what its readings are held against."""
+
+    cos_opt: float
+    """Cosines of the angles off the axis up to which a thing may answer, …"""
+    cos_in: float
+    """… must answer, …"""
+    cos_half: float
+    """… and nominally does; and the sines of the last two."""
+    sin_half: float
+    sin_in: float
+    gate: float
+    """As in `Settings`, as are the next three."""
+    miss: float
+    short: float
+    per_metre: float
+
+
 ALONG, ACROSS, TURN = range(3)
 """What a pose may do: move along the body's own axes, turn."""
 TURN_PER_M: Final = 0.7 / FOOT_M
 """A search turns by this for each metre that it moves, rad/m: what moves the side of a body of 1.4 ft as far."""
+AXES: Final = 3
+SHRINK: Final = 0.5
+"""What a step is multiplied with where no way gains."""
 GAIN_MIN: Final = 1e-6
 """A step that gains less than this is none, nat."""
 FINEST_M: Final = 0.005 * FOOT_M
@@ -52,116 +66,9 @@ FINEST_M: Final = 0.005 * FOOT_M
 
 
 @kernel
-def side_seen(
-    vertices: Floats, k: int, count: int, closed: bool, sx: float, sy: float
-) -> tuple[float, float, float, float, float]:
-    """Return side `k` as a place sees it.
-
-    Returns
-    -------
-    (float, float, float, float, float)
-        Distance to its line (m), negative where a closed outline turns its inside; how far along the side the foot of
-        the perpendicular lies (m), and the side's length (m); its direction as a unit vector.
-    """
-    ax = vertices[k, 0]
-    ay = vertices[k, 1]
-    after = (k + 1) % count
-    tx = vertices[after, 0] - ax
-    ty = vertices[after, 1] - ay
-    length = math.sqrt(tx * tx + ty * ty)
-    tx /= length
-    ty /= length
-    height = (sx - ax) * ty - (sy - ay) * tx
-    along = (sx - ax) * tx + (sy - ay) * ty
-    if height < 0.0 and not closed:
-        height = -height
-    return height, along, length, tx, ty
-
-
-@kernel
-def where_met(height: float, along: float, length: float, ahead: float, aside: float) -> float:
-    """Return how far a ray goes to a side, `NOTHING` where it passes by.
-
-    Parameters
-    ----------
-    height, along, length
-        From `side_seen`.
-    ahead, aside : float
-        The ray's components towards the side's line and along the side.
-    """
-    if ahead <= GRAZING_COS:
-        return NOTHING
-    d = height / ahead
-    return d if 0.0 <= along + d * aside <= length else NOTHING
-
-
-@kernel
-def feet(
-    sx: float, sy: float, ux: float, uy: float, vertices: Floats, count: int, closed: bool, cos_opt: float,
-    cos_in: float,
-) -> tuple[float, bool]:  # fmt: skip
-    """Return the nearest foot of a perpendicular in the beam (m), and whether it must be heard."""
-    nearest = NOTHING
-    must = False
-    for k in range(count if closed else count - 1):
-        height, along, length, tx, ty = side_seen(vertices, k, count, closed, sx, sy)
-        if not 0.0 <= height < nearest or not 0.0 <= along <= length:
-            continue
-        # The way to the foot is along − (place − vertex), of length height.
-        fx = vertices[k, 0] + along * tx - sx
-        fy = vertices[k, 1] + along * ty - sy
-        ahead = fx * ux + fy * uy
-        if ahead >= cos_opt * height:
-            nearest = height
-            must = ahead >= cos_in * height and MARGIN_M < along < length - MARGIN_M
-    return nearest, must
-
-
-@kernel
-def corners(
-    sx: float, sy: float, ux: float, uy: float, vertices: Floats, count: int, closed: bool, least_cos: float,
-    below: float,
-) -> float:  # fmt: skip
-    """Return the nearest corner of the sides one faces within an angle off the axis, `below` if none is nearer; m."""
-    nearest = below
-    for k in range(count if closed else count - 1):
-        height, _, _, _, _ = side_seen(vertices, k, count, closed, sx, sy)
-        if not 0.0 <= height < nearest:
-            continue
-        for end in range(2):
-            dx = vertices[(k + end) % count, 0] - sx
-            dy = vertices[(k + end) % count, 1] - sy
-            d = math.sqrt(dx * dx + dy * dy)
-            if d < nearest and dx * ux + dy * uy >= least_cos * d:
-                nearest = d
-    return nearest
-
-
-@kernel
-def edges(
-    sx: float, sy: float, ux: float, uy: float, vertices: Floats, count: int, closed: bool, cos_half: float,
-    sin_half: float, below: float,
-) -> float:  # fmt: skip
-    """Return where the beam's two edges meet a side first, `below` if no nearer; m."""
-    nearest = below
-    for k in range(count if closed else count - 1):
-        height, along, length, tx, ty = side_seen(vertices, k, count, closed, sx, sy)
-        if not 0.0 <= height < nearest:
-            continue
-        away = 1.0 if (sx - vertices[k, 0]) * ty - (sy - vertices[k, 1]) * tx >= 0.0 else -1.0
-        for hand in (-1.0, 1.0):
-            ex = ux * cos_half - hand * uy * sin_half
-            ey = uy * cos_half + hand * ux * sin_half
-            d = where_met(height, along, length, away * (ey * tx - ex * ty), ex * tx + ey * ty)
-            nearest = min(nearest, d)
-    return nearest
-
-
-@kernel
 def predict(
-    sx: float, sy: float, ux: float, uy: float, vertices: Floats, count: int, closed: bool, cos_opt: float,
-    cos_in: float, cos_half: float, sin_half: float, sin_in: float, out: Floats,
-) -> None:  # fmt: skip
+    sx: float, sy: float, ux: float, uy: float, faces: Floats, closed: bool, ear: Ear
+) -> tuple[float, bool, float, float, bool]:  # fmt: skip
     """Predict what a polygon answers, as a mirror and as a cone.
 
     =======  ========================================================  ===========================================
@@ -172,88 +79,110 @@ def predict(
     cone     nearest point in the beam: foot, corner or beam's edge    something lies well in the beam
     =======  ========================================================  ===========================================
 
+    Sides that a closed outline turns its inside to do not answer; a side of an open one answers to both its faces.
+
     Parameters
     ----------
     sx, sy, ux, uy : float
         A sensor's place (m) and axis (unit vector) in the polygon's frame.
-    vertices : (≥ count, 2) float
-        Vertices, m; of a closed outline counter-clockwise.
-    count : int
-        How many there are.
+    faces : (sides, 5) float
+        From `Settings.faces`: where a side begins x, y (m), its unit direction, its length (m); counter-clockwise.
     closed : bool
-        Whether the last one joins the first; a side of an open outline answers to both of its faces.
-    cos_opt, cos_in, cos_half, sin_half, sin_in : float
-        Cosines of the angles off the axis: may answer, must answer, nominal half opening; sines of the latter and of
-        what must answer.
-    out : (≥ 5,) float
-        Out: columns above.
+        Whether the last side joins the first.
+    ear : Ear
+        The beam.
+
+    Returns
+    -------
+    (float, bool, float, float, bool)
+        Range of a mirror (m, `NOTHING` where none), whether it must be heard, what its answer costs (nat); range of a
+        cone, whether it must be heard.
     """
-    foot, must = feet(sx, sy, ux, uy, vertices, count, closed, cos_opt, cos_in)
-    out[MIRROR_MUST] = 1.0 if must else 0.0
-    out[MIRROR_PRICE] = 0.0
-    nearest = corners(sx, sy, ux, uy, vertices, count, closed, cos_opt, foot)
-    out[MIRROR] = foot
-    if foot == NOTHING:
-        out[MIRROR] = nearest
-        out[MIRROR_PRICE] = CORNER_PRICE
-    nearest = edges(sx, sy, ux, uy, vertices, count, closed, cos_half, sin_half, nearest)
-    out[CONE] = nearest
-    if nearest < NOTHING and not must:
-        must = corners(sx, sy, ux, uy, vertices, count, closed, cos_in, NOTHING) < NOTHING
-        must = must or edges(sx, sy, ux, uy, vertices, count, closed, cos_in, sin_in, NOTHING) < NOTHING
-    out[CONE_MUST] = 1.0 if must else 0.0
+    foot = NOTHING
+    foot_must = False
+    corner2 = NOTHING * NOTHING
+    edge = NOTHING
+    must = False
+    for k in range(faces.shape[0]):
+        tx = faces[k, 2]
+        ty = faces[k, 3]
+        length = faces[k, 4]
+        px = sx - faces[k, 0]
+        py = sy - faces[k, 1]
+        height = px * ty - py * tx
+        ahead = uy * tx - ux * ty
+        if height < 0.0:
+            if closed:
+                continue
+            height = -height
+            ahead = -ahead
+        along = px * tx + py * ty
+        aside = ux * tx + uy * ty
+        if 0.0 <= along <= length and height < foot and ahead >= ear.cos_opt:
+            foot = height
+            foot_must = ahead >= ear.cos_in and MARGIN_M < along < length - MARGIN_M
+        for end in range(2):
+            across = end * length - along
+            dot = height * ahead + across * aside
+            if dot > 0.0:
+                d2 = height * height + across * across
+                if d2 < corner2 and dot * dot >= ear.cos_opt * ear.cos_opt * d2:
+                    corner2 = d2
+                must = must or dot * dot >= ear.cos_in * ear.cos_in * d2
+        for hand in (-1.0, 1.0):
+            towards = ahead * ear.cos_half - hand * aside * ear.sin_half
+            if towards > GRAZING_COS:
+                sideways = aside * ear.cos_half + hand * ahead * ear.sin_half
+                if 0.0 <= along * towards + height * sideways <= length * towards:
+                    edge = min(edge, height / towards)
+            if not must:
+                towards = ahead * ear.cos_in - hand * aside * ear.sin_in
+                if towards > GRAZING_COS:
+                    sideways = aside * ear.cos_in + hand * ahead * ear.sin_in
+                    must = 0.0 <= along * towards + height * sideways <= length * towards
+    corner = math.sqrt(corner2)
+    nearest = min(foot, corner, edge)
+    must = foot_must or (must and nearest < NOTHING)
+    if foot < NOTHING:
+        return foot, foot_must, 0.0, nearest, must
+    return corner, False, CORNER_PRICE, nearest, must
 
 
 @kernel
-def least_miss(out: Floats, r: float) -> float:
-    """Return by how much a range misses the nearer of the predicted ones, m."""
-    return float(min(abs(r - out[MIRROR]), abs(r - out[CONE])))
-
-
-@kernel
-def worth(r: float, expected: float, must: bool, gate: float, miss: float, short: float, v: float) -> float:
-    """Return what a reading counts, nat.
-
-    ==========================  ===================================================
-    r within the gate, must     v, the table's
-    r within the gate, may      v where that is for it, else nothing
-    r beyond, must              `miss`: a drop-out
-    r before, must              `short`: something unseen stands in front
-    else                        nothing
-    ==========================  ===================================================
-    """
-    if abs(r - expected) < gate:
-        return v if must else max(v, 0.0)
-    if not must:
-        return 0.0
-    return miss if r > expected else short
+def surplus(throughs: float, hits: float) -> float:
+    """Return what drop-outs beyond `DROP_SHARE` (and one) cost, nat."""
+    return max(0.0, DROP_PRICE * (throughs - DROP_SHARE * (hits + throughs) - 1.0))
 
 
 @kernel
 def score_poly(
-    w: Floats, n: int, x: float, y: float, theta: float, vertices: Floats, count: int, closed: bool, cos_opt: float,
-    cos_in: float, cos_half: float, sin_half: float, gate: float, miss: float, short: float, lev: Ints,
-    per_metre: float, table: Floats, inv_step: Floats, out: Floats, stats: Floats,
+    w: Floats, n: int, every: int, x: float, y: float, theta: float, faces: Floats, closed: bool, ear: Ear,
+    lev: Ints, table: Floats, inv_step: Floats, stats: Floats,
 ) -> float:  # fmt: skip
     """Weigh what readings say of a polygon at a pose: a log ratio to the background.
 
-    Each reading counts as `worth` says under either rule; of what must be heard, drop-outs beyond `DROP_SHARE` (and
+    ==========================  ===================================================
+    range within the gate       the table's evidence; where it need not be heard never less than nothing
+    beyond, must be heard       `miss`: a drop-out
+    before, must be heard       `short`: something unseen stands in front
+    else                        nothing
+    ==========================  ===================================================
+
+    So each reading counts under either rule; of what must be heard, drop-outs beyond `DROP_SHARE` (and
     one) cost `DROP_PRICE` more each. The evidence is log((exp M + exp C) / 2) of the two sums.
 
     Parameters
     ----------
     w : (capacity, 5) float
         Readings: place x, y (m), unit axis, range (m).
-    n : int
-        Readings in use.
+    n, every : int
+        Readings in use, and the step from one that is weighed to the next.
     x, y, theta : float
         The polygon's pose: m, rad.
-    vertices, count, closed, cos_opt, cos_in, cos_half, sin_half
+    faces, closed, ear
         As for `predict`.
-    gate, miss, short, lev, per_metre, table, inv_step
+    lev, table, inv_step
         As for `contact.score_circle`.
-    out : (≥ 8,) float
-        Scratch.
     stats : (≥ 5,) float
         Out: columns `LLR`, `HITS`, `THROUGHS`, `NEAR` of `contact`, and `SURE`; the counts by the likelier rule.
 
@@ -264,7 +193,6 @@ def score_poly(
     """
     c = math.cos(theta)
     s = math.sin(theta)
-    sin_in = math.sqrt(1.0 - cos_in * cos_in)
     mirror = 0.0
     cone = 0.0
     mirror_hits = 0.0
@@ -275,43 +203,48 @@ def score_poly(
     cone_throughs = 0.0
     cone_near = 0.0
     cone_sure = 0.0
-    for j in range(n):
+    for j in range(0, n, every):
         dx = w[j, 0] - x
         dy = w[j, 1] - y
         r = w[j, 4]
-        predict(
-            c * dx + s * dy, -s * dx + c * dy, c * w[j, 2] + s * w[j, 3], -s * w[j, 2] + c * w[j, 3], vertices,
-            count, closed, cos_opt, cos_in, cos_half, sin_half, sin_in, out,
+        at, must, price, at_cone, must_cone = predict(
+            c * dx + s * dy, -s * dx + c * dy, c * w[j, 2] + s * w[j, 3], -s * w[j, 2] + c * w[j, 3], faces, closed,
+            ear,
         )  # fmt: skip
-        k = level_of(lev, r, per_metre)
-        must = out[MIRROR_MUST] > 0.0
-        v = loglik(table, inv_step, k, r - out[MIRROR]) - out[MIRROR_PRICE]
-        v = worth(r, out[MIRROR], must, gate, miss, short, v)
-        mirror += v
-        if abs(r - out[MIRROR]) < gate:
+        k = level_of(lev, r, ear.per_metre)
+        v = 0.0
+        if abs(r - at) < ear.gate:
+            v = loglik(table, inv_step, k, r - at) - price
+            v = v if must else max(v, 0.0)
             mirror_near += 1.0
             if v > 0.0:
                 mirror_hits += 1.0
-                mirror_sure += out[MIRROR_MUST]
-        elif must and r > out[MIRROR]:
-            mirror_throughs += 1.0
-        must = out[CONE_MUST] > 0.0
-        if out[CONE] != out[MIRROR] or out[CONE_MUST] != out[MIRROR_MUST] or out[MIRROR_PRICE] > 0.0:
-            v = worth(r, out[CONE], must, gate, miss, short, loglik(table, inv_step, k, r - out[CONE]))
+                if must:
+                    mirror_sure += 1.0
+        elif must:
+            v = ear.short
+            if r > at:
+                v = ear.miss
+                mirror_throughs += 1.0
+        mirror += v
+        if at_cone != at or must_cone != must or price > 0.0:
+            v = 0.0
+            if abs(r - at_cone) < ear.gate:
+                v = loglik(table, inv_step, k, r - at_cone)
+                v = v if must_cone else max(v, 0.0)
+            elif must_cone:
+                v = ear.miss if r > at_cone else ear.short
         cone += v
-        if abs(r - out[CONE]) < gate:
+        if abs(r - at_cone) < ear.gate:
             cone_near += 1.0
             if v > 0.0:
                 cone_hits += 1.0
-                cone_sure += out[CONE_MUST]
-        elif must and r > out[CONE]:
+                if must_cone:
+                    cone_sure += 1.0
+        elif must_cone and r > at_cone:
             cone_throughs += 1.0
-    extra = mirror_throughs - DROP_SHARE * (mirror_hits + mirror_throughs)
-    if extra > 1.0:
-        mirror -= DROP_PRICE * (extra - 1.0)
-    extra = cone_throughs - DROP_SHARE * (cone_hits + cone_throughs)
-    if extra > 1.0:
-        cone -= DROP_PRICE * (extra - 1.0)
+    mirror -= surplus(mirror_throughs, mirror_hits)
+    cone -= surplus(cone_throughs, cone_hits)
     llr = max(mirror, cone) + math.log(0.5 + 0.5 * math.exp(-abs(mirror - cone)))
     stats[LLR] = llr
     stats[HITS] = mirror_hits if mirror >= cone else cone_hits
@@ -331,63 +264,90 @@ def moved(x: float, y: float, theta: float, axis: int, step: float) -> tuple[flo
     return x, y, theta + step
 
 
-@kernel
-def search(
-    w: Floats, n: int, pose: Floats, step: float, shrink: float, rounds: int, vertices: Floats, count: int,
-    closed: bool, cos_opt: float, cos_in: float, cos_half: float, sin_half: float, gate: float, miss: float,
-    short: float, lev: Ints, per_metre: float, table: Floats, inv_step: Floats, out: Floats, stats: Floats,
-) -> float:  # fmt: skip
-    """Search for the pose of greatest likelihood, along the body's own axes.
+X, Y, THETA, BEST, STEP = range(5)
+"""Cells of a search's numbers: where it is, what the readings say there (nat), how far it steps (m)."""
+AT, LEFT, GAINED = range(3)
+"""Cells of its counts: what it tries next (−1: nothing has been weighed yet), rounds it may still make, whether this
+round gained."""
 
-    The likelihood has steps where sides begin and cease to answer, so nothing is differentiated: each axis is tried
-    both ways, and where none gains the steps shrink.
+
+@kernel
+def begin_search(f: Floats, z: Ints, x: float, y: float, theta: float, step: float, rounds: int) -> None:
+    """Set out for a search.
 
     Parameters
     ----------
-    w, n
-        As for `score_poly`.
-    pose : (3,) float
-        x, y (m), theta (rad): from where, updated.
+    f, z : (≥ 5,) float, (≥ 3,) int
+        Out: the search, as above.
+    x, y, theta : float
+        From where, m, rad.
     step : float
         First step, m; turns go with it, by `TURN_PER_M`.
-    shrink : float
-        What a step is multiplied with where none of them gains.
     rounds : int
         Rounds at most: the bound on the work.
-    vertices, count, closed, cos_opt, cos_in, cos_half, sin_half, gate, miss, short, lev, per_metre, table, inv_step
+    """
+    f[X] = x
+    f[Y] = y
+    f[THETA] = theta
+    f[BEST] = 0.0
+    f[STEP] = step
+    z[AT] = -1
+    z[LEFT] = rounds
+    z[GAINED] = 0
+
+
+@kernel
+def search(
+    w: Floats, n: int, every: int, f: Floats, z: Ints, allowed: int, faces: Floats, closed: bool, ear: Ear,
+    lev: Ints, table: Floats, inv_step: Floats, stats: Floats,
+) -> int:  # fmt: skip
+    """Go on searching for the pose of greatest likelihood, along the body's own axes.
+
+    The likelihood has steps where sides begin and cease to answer, so nothing is differentiated: each axis is tried
+    both ways, and where none gains the steps shrink. A search stops where it stands when its allowance is spent, and
+    goes on from there; it is over when no round is left.
+
+    Parameters
+    ----------
+    w, n, every
         As for `score_poly`.
-    out, stats
-        As for `score_poly`, scratch.
+    f, z
+        The search, from `begin_search`; updated.
+    allowed : int
+        Poses to weigh at most.
+    faces, closed, ear, lev, table, inv_step, stats
+        As for `score_poly`; `stats` is scratch.
 
     Returns
     -------
-    float
-        The log ratio at the pose, nat; never less than where it began.
+    int
+        Poses weighed.
     """
-    best = score_poly(
-        w, n, pose[0], pose[1], pose[2], vertices, count, closed, cos_opt, cos_in, cos_half, sin_half, gate, miss,
-        short, lev, per_metre, table, inv_step, out, stats,
-    )  # fmt: skip
-    turn = step * TURN_PER_M
-    for _ in range(rounds):
-        is_better = False
-        for axis in range(3):
-            for sign in (-1.0, 1.0):
-                x, y, theta = moved(pose[0], pose[1], pose[2], axis, sign * (turn if axis == TURN else step))
-                v = score_poly(
-                    w, n, x, y, theta, vertices, count, closed, cos_opt, cos_in, cos_half, sin_half, gate, miss,
-                    short, lev, per_metre, table, inv_step, out, stats,
-                )  # fmt: skip
-                if v > best + GAIN_MIN:
-                    best = v
-                    pose[0] = x
-                    pose[1] = y
-                    pose[2] = theta
-                    is_better = True
-                    break
-        if not is_better:
-            step *= shrink
-            turn *= shrink
-            if step < FINEST_M:
-                break
-    return best
+    weighed = 0
+    while weighed < allowed and z[LEFT] > 0:
+        weighed += 1
+        if z[AT] < 0:
+            f[BEST] = score_poly(w, n, every, f[X], f[Y], f[THETA], faces, closed, ear, lev, table, inv_step, stats)
+            z[AT] = 0
+            continue
+        axis = z[AT] // 2
+        step = f[STEP] * (TURN_PER_M if axis == TURN else 1.0) * (1.0 if z[AT] % 2 == 1 else -1.0)
+        x, y, theta = moved(f[X], f[Y], f[THETA], axis, step)
+        v = score_poly(w, n, every, x, y, theta, faces, closed, ear, lev, table, inv_step, stats)
+        z[AT] += 1
+        if v > f[BEST] + GAIN_MIN:
+            f[X] = x
+            f[Y] = y
+            f[THETA] = theta
+            f[BEST] = v
+            z[GAINED] = 1
+            z[AT] = 2 * (axis + 1)
+        if z[AT] == 2 * AXES:
+            z[AT] = 0
+            z[LEFT] -= 1
+            if z[GAINED] == 0:
+                f[STEP] *= SHRINK
+                if f[STEP] < FINEST_M:
+                    z[LEFT] = 0
+            z[GAINED] = 0
+    return weighed

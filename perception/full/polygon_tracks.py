@@ -13,9 +13,46 @@ from typing import Final
 from perception.full.contact import HITS as HIT
 from perception.full.contact import NEAR as NEARBY
 from perception.full.noise_choice import noise_variance
-from perception.full.polygon import ACROSS, ALONG, SURE, TURN, least_miss, moved, predict
-from perception.full.polygon_births import WHOLE, bears, pflatten, pput, prestat, pscore
-from perception.full.polygon_posterior import centre_polygon
+from perception.full.polygon import (
+    ACROSS,
+    ALONG,
+    BEST,
+    SURE,
+    THETA,
+    TURN,
+    Ear,
+    X,
+    Y,
+    moved,
+    predict,
+)
+from perception.full.polygon_births import WHOLE, bears, next_birth, pflatten, pput, try_polygon
+from perception.full.polygon_job import (
+    BY_TURNS,
+    COV,
+    FOUND,
+    FOUND_LLR,
+    HEARD,
+    HISS,
+    JOB,
+    LAID,
+    MIDDLE,
+    NEXT,
+    NO_JOB,
+    QUANTUM,
+    STAGE,
+    TRACK,
+    WHO,
+    cost,
+    ear_of,
+    end_job,
+    faces_of,
+    seek,
+    seek_on,
+    sought,
+    weigh_pose,
+)
+from perception.full.polygon_posterior import ATTEMPTS, begin_lattice, lattice_on
 from perception.full.refine import OWED, SIZE, bounded_exp
 from perception.full.state import (
     DIRTY,
@@ -32,6 +69,7 @@ from perception.full.state import (
     LOX,
     LOY,
     MODEL,
+    NOISE,
     NRES,
     PHITS,
     PLLR,
@@ -40,7 +78,9 @@ from perception.full.state import (
     PPROB,
     PSURE,
     PTH,
+    PTT,
     PX,
+    PXX,
     PY,
     QUIET,
     REFS,
@@ -57,6 +97,12 @@ FOOT_M: Final = 0.3048
 POLYGON: Final = 1000
 """What polygon t explains belongs to this plus t in `State.owner`."""
 
+DEAL, LOOK_WIDE, THROW, LOOK_NEAR, JUDGE, SPREAD = range(6)
+"""Stages of a refinement."""
+COARSE: Final = 96
+"""A wide search weighs this many readings at most."""
+LOOK_AGAIN: Final = 4
+"""A pose whose spread is known and that explains its readings is looked for in every so many refinements only."""
 YOUNG: Final = 4
 AGAIN: Final = 8
 """The search is wide in fewer refinements than the first, in each of so many after, …"""
@@ -104,19 +150,26 @@ OVERLAP: Final = 1.8
 
 
 @kernel
-def miss_of(s: State, p: Settings, t: int, q: Floats) -> float:
-    """Return by how much a reading misses what polygon track `t` would answer, m; `s.stats` is scratch."""
-    model = s.pi[t, MODEL]
-    dx = q[0] - s.pf[t, PX]
-    dy = q[1] - s.pf[t, PY]
-    c = math.cos(s.pf[t, PTH])
-    sn = math.sin(s.pf[t, PTH])
-    predict(
-        c * dx + sn * dy, -sn * dx + c * dy, c * q[2] + sn * q[3], -sn * q[2] + c * q[3], p.verts[model],
-        p.nv[model], p.closed[model] > 0, p.cos_opt, p.cos_in, p.cos_half, math.sin(p.half_angle),
-        math.sqrt(1.0 - p.cos_in**2), s.stats,
-    )  # fmt: skip
-    return least_miss(s.stats, q[4])
+def miss_of(q: Floats, track: Floats, faces: Floats, closed: bool, ear: Ear) -> float:
+    """Return by how much a reading misses the nearer of what a body would answer by either rule, m.
+
+    Parameters
+    ----------
+    q : (≥ 5,) float
+        The reading: place (m), unit axis, range (m).
+    track : (≥ 3,) float
+        A row of `State.pf`: pose, m, rad.
+    faces, closed, ear
+        As for `polygon.predict`.
+    """
+    dx = q[0] - track[PX]
+    dy = q[1] - track[PY]
+    c = math.cos(track[PTH])
+    sn = math.sin(track[PTH])
+    mirror, _, _, cone, _ = predict(
+        c * dx + sn * dy, -sn * dx + c * dy, c * q[2] + sn * q[3], -sn * q[2] + c * q[3], faces, closed, ear
+    )
+    return float(min(abs(q[4] - mirror), abs(q[4] - cone)))
 
 
 @kernel
@@ -132,6 +185,7 @@ def poly_claims(s: State, p: Settings, m: int, tight: float) -> None:
     tight : float
         How far off an explained range is at most, m.
     """
+    ear = ear_of(p)
     for t in range(s.pi.shape[0]):
         if s.pi[t, ST] == FREE:
             continue
@@ -140,10 +194,11 @@ def poly_claims(s: State, p: Settings, m: int, tight: float) -> None:
         x = s.pf[t, PX]
         y = s.pf[t, PY]
         bound = p.bound[model]
+        faces = faces_of(p, model)
         may_claim = s.pi[t, ST] == ESTABLISHED and s.pf[t, PHITS] > WHOLE * s.pf[t, PNEAR]
         for i in range(m):
             q = s.cur[i]
-            if not bears(q[0], q[1], q[2], q[3], q[4], x, y, bound, p.half_angle, p.gate, p.pair_max):
+            if not bears(q[0], q[1], q[2], q[3], q[4], x, y, bound, ear.cos_half, ear.sin_half, p.gate, p.pair_max):
                 continue
             owner = s.owner[i]
             if 0 <= owner < POLYGON and s.ti[owner, KIND] < p.models:
@@ -152,101 +207,114 @@ def poly_claims(s: State, p: Settings, m: int, tight: float) -> None:
             s.pi[t, DIRTY] += 1
             s.pi[t, QUIET] = 0
             s.pi[t, POLISH] = p.polish
-            if may_claim and miss_of(s, p, t, q) < tight:
+            if may_claim and miss_of(q, s.pf[t], faces, p.closed[model] > 0, ear) < tight:
                 s.owner[i] = POLYGON + t
 
 
 @kernel
-def hides(s: State, p: Settings, u: int, t: int, q: Floats) -> bool:
-    """Tell whether the body of track `u` stands between the place of a reading and that of track `t`."""
-    dx = s.pf[t, PX] - q[0]
-    dy = s.pf[t, PY] - q[1]
-    ex = s.pf[u, PX] - q[0]
-    ey = s.pf[u, PY] - q[1]
+def hides(q: Floats, x: float, y: float, inner: float, ux: float, uy: float, u_inner: float) -> bool:
+    """Tell whether a body at (ux, uy) stands between the place of a reading and one at (x, y)."""
+    dx = x - q[0]
+    dy = y - q[1]
+    ex = ux - q[0]
+    ey = uy - q[1]
     d = math.hypot(dx, dy)
     if d == 0.0:
         return False
     ahead = (dx * ex + dy * ey) / d
     aside = abs(dx * ey - dy * ex) / d
-    return 0.0 < ahead < d and bool(aside < p.inner[s.pi[u, MODEL]] + 0.5 * p.inner[s.pi[t, MODEL]])
+    return 0.0 < ahead < d and bool(aside < u_inner + 0.5 * inner)
 
 
 @kernel
-def leave_to_neighbours(s: State, p: Settings, t: int, n: int) -> int:
-    """Drop from the first `n` readings in `s.w` what an established neighbour explains better; return how many stay.
+def leave_to_next_neighbour(s: State, p: Settings, t: int) -> int:
+    """Drop from the job's readings what the next established neighbour explains better; return what that cost.
 
     Where bodies all but touch, the echo of one's corner is an outlier to the other, and a dozen are a force; so
     is the silence of what stands in the shade.
     """
+    u = s.job[NEXT]
+    s.job[NEXT] += 1
+    n = s.job[HEARD]
+    if u == t or s.pi[u, ST] != ESTABLISHED:
+        return 1
+    own = s.pf[t]
+    other = s.pf[u]
+    model = s.pi[t, MODEL]
+    u_model = s.pi[u, MODEL]
+    apart = math.hypot(other[PX] - own[PX], other[PY] - own[PY])
+    if apart > p.bound[model] + p.gate + p.bound[u_model] or apart < OVERLAP * p.inner[model]:
+        return 1
     var0, _ = noise_variance(s, p)
     tight = p.half_box + SIGMAS * math.sqrt(var0)
-    reach = p.bound[s.pi[t, MODEL]] + p.gate
-    for u in range(s.pi.shape[0]):
-        if u == t or s.pi[u, ST] != ESTABLISHED:
+    ear = ear_of(p)
+    faces = faces_of(p, model)
+    u_faces = faces_of(p, u_model)
+    kept = 0
+    for j in range(n):
+        q = s.pw[j]
+        ours = miss_of(q, own, faces, p.closed[model] > 0, ear)
+        theirs = miss_of(q, other, u_faces, p.closed[u_model] > 0, ear)
+        if theirs < tight and theirs < ours:
             continue
-        apart = math.hypot(s.pf[u, PX] - s.pf[t, PX], s.pf[u, PY] - s.pf[t, PY])
-        if apart > reach + p.bound[s.pi[u, MODEL]] or apart < OVERLAP * p.inner[s.pi[t, MODEL]]:
+        if ours > p.gate and hides(q, own[PX], own[PY], p.inner[model], other[PX], other[PY], p.inner[u_model]):
             continue
-        kept = 0
-        for j in range(n):
-            own = miss_of(s, p, t, s.w[j])
-            e = miss_of(s, p, u, s.w[j])
-            if (e < tight and e < own) or (own > p.gate and hides(s, p, u, t, s.w[j])):
-                continue
-            for z in range(5):
-                s.w[kept, z] = s.w[j, z]
-            kept += 1
-        n = kept
-    return n
+        for z in range(5):
+            s.pw[kept, z] = q[z]
+        kept += 1
+    s.job[HEARD] = kept
+    return cost(n, 1, faces.shape[0] + u_faces.shape[0])
 
 
 @kernel
-def throw(s: State, p: Settings, model: int, n: int) -> None:
-    """Look for a higher summit around `s.pose`, updated."""
-    best = prestat(s, p, model, n, s.pose)
-    x = s.pose[0]
-    y = s.pose[1]
-    theta = s.pose[2]
-    for k in range(2 * len(THROWS) + len(THROW_TURNS)):
-        if k < 2 * len(THROWS):
-            # both ways along, then both ways across, first near, then far
-            far = 2 * (k // 4)
-            axis = ALONG if k % 4 < 2 else ACROSS
-            step = THROWS[far + k % 2] * p.inner[model]
-        else:
-            axis = TURN
-            step = THROW_TURNS[k - 2 * len(THROWS)] * math.pi / p.sym[model]
-        s.root[0], s.root[1], s.root[2] = moved(x, y, theta, axis, step)
-        v = pscore(s, p, model, n, s.root, THROW_STEP_M, THROW_ROUNDS)
-        if v > best + THROW_GAIN:
-            best = v
-            s.pose[0] = s.root[0]
-            s.pose[1] = s.root[1]
-            s.pose[2] = s.root[2]
-
-
-@kernel
-def locate_polygon(s: State, p: Settings, t: int, n: int) -> None:
-    """Search for the pose of track `t` and enter it, with what its `n` readings say there."""
-    model = s.pi[t, MODEL]
+def search_first(s: State, t: int) -> None:
+    """Set out for the pose: widely while little is known or explained, else near by, or not at all."""
     track = s.pf[t]
     refs = s.pi[t, REFS]
-    s.pose[0] = track[PX]
-    s.pose[1] = track[PY]
-    s.pose[2] = track[PTH]
     is_fitting = track[PHITS] >= FITTING * track[PNEAR]
+    s.work[FOUND : FOUND + 3] = track[PX : PTH + 1]
     if refs < YOUNG or refs % AGAIN == 0 or (not is_fitting and refs % 2 == 0):
-        pscore(s, p, model, n, s.pose, WIDE_STEP_M, WIDE_ROUNDS)
-        throw(s, p, model, n)
+        seek(s, track[PX], track[PY], track[PTH], WIDE_STEP_M, WIDE_ROUNDS, COARSE)
+        s.job[STAGE] = LOOK_WIDE
+    elif track[PXX] > 0.0 and is_fitting and refs % LOOK_AGAIN != 0:
+        s.job[STAGE] = JUDGE  # the lattice follows the pose by itself
     else:
-        pscore(s, p, model, n, s.pose, NARROW_STEP_M, NARROW_ROUNDS)
-    track[PLLR] = prestat(s, p, model, n, s.pose)
-    track[PX] = s.pose[0]
-    track[PY] = s.pose[1]
-    track[PTH] = s.pose[2]
-    track[PHITS] = s.stats[HIT]
-    track[PNEAR] = s.stats[NEARBY]
-    track[PSURE] = s.stats[SURE]
+        search_near(s)
+
+
+@kernel
+def search_near(s: State) -> None:
+    """Set out from what has been found, on all readings."""
+    seek(s, s.work[FOUND], s.work[FOUND + 1], s.work[FOUND + 2], NARROW_STEP_M, NARROW_ROUNDS, s.pw.shape[0])
+    s.job[STAGE] = LOOK_NEAR
+
+
+@kernel
+def keep_found(s: State) -> None:
+    """Enter the search's pose as the best."""
+    s.work[FOUND] = s.work[X]
+    s.work[FOUND + 1] = s.work[Y]
+    s.work[FOUND + 2] = s.work[THETA]
+    s.work[FOUND_LLR] = s.work[BEST]
+
+
+@kernel
+def throw_next(s: State, p: Settings, model: int) -> None:
+    """Set out for the next of the other summits around the first that was found, if one is left."""
+    k = s.job[NEXT]
+    s.job[NEXT] += 1
+    if k == 2 * len(THROWS) + len(THROW_TURNS):
+        search_near(s)
+        return
+    if k < 2 * len(THROWS):
+        # both ways along, then both ways across, first near, then far
+        axis = ALONG if k % 4 < 2 else ACROSS
+        step = THROWS[2 * (k // 4) + k % 2] * p.inner[model]
+    else:
+        axis = TURN
+        step = THROW_TURNS[k - 2 * len(THROWS)] * math.pi / p.sym[model]
+    x, y, theta = moved(s.work[MIDDLE], s.work[MIDDLE + 1], s.work[MIDDLE + 2], axis, step)
+    seek(s, x, y, theta, THROW_STEP_M, THROW_ROUNDS, COARSE)
 
 
 @kernel
@@ -320,27 +388,8 @@ def merge_polygons(s: State, p: Settings, t: int) -> None:
 
 
 @kernel
-def prefine(s: State, p: Settings, t: int) -> None:
-    """Refine polygon track `t`: pose, spread, evidence, probability, and what becomes of it."""
-    n = leave_to_neighbours(s, p, t, pflatten(s, t, s.w))
-    s.pi[t, NRES] = n
-    s.pi[t, DIRTY] = 0
-    s.pi[t, REFS] += 1
-    locate_polygon(s, p, t, n)
-    if is_wall(s, s.pf[t, PX], s.pf[t, PY], p.inner[s.pi[t, MODEL]], p.claim):
-        s.pi[t, ST] = FREE
-        return
-    compare_circles(s, p, t)
-    judge(s, p, t)
-    if s.pi[t, ST] == ESTABLISHED:
-        centre_polygon(s, p, t, n)
-    if s.pi[t, ST] != FREE:
-        merge_polygons(s, p, t)
-
-
-@kernel
-def pquantum(s: State, p: Settings, threshold: float) -> bool:
-    """Refine the polygon with the most unseen evidence for its size, and return whether there was one.
+def next_track(s: State, p: Settings, threshold: float) -> bool:
+    """Begin with the polygon with the most unseen evidence for its size; return whether there is one.
 
     Parameters
     ----------
@@ -364,5 +413,106 @@ def pquantum(s: State, p: Settings, threshold: float) -> bool:
         return False
     if s.pi[chosen, QUIET] > p.quiet:
         s.pi[chosen, POLISH] -= 1
-    prefine(s, p, chosen)
+    s.pi[chosen, DIRTY] = 0
+    s.pi[chosen, REFS] += 1
+    s.job[JOB] = TRACK
+    s.job[STAGE] = DEAL
+    s.job[WHO] = chosen
+    s.job[NEXT] = 0
+    s.job[HISS] = int(s.g[NOISE])
+    s.job[HEARD] = pflatten(s.pbins, s.pbn, chosen, s.pw)
+    return True
+
+
+@kernel
+def judge_found(s: State, p: Settings, t: int) -> None:
+    """Enter the pose that was found, with what the readings say there, and what becomes of the track."""
+    track = s.pf[t]
+    model = s.pi[t, MODEL]
+    x, y, theta = s.work[FOUND], s.work[FOUND + 1], s.work[FOUND + 2]
+    track[PLLR] = weigh_pose(s, p, model, x, y, theta)
+    track[PX] = x
+    track[PY] = y
+    track[PTH] = theta
+    track[PHITS] = s.stats[HIT]
+    track[PNEAR] = s.stats[NEARBY]
+    track[PSURE] = s.stats[SURE]
+    if is_wall(s, x, y, p.inner[model], p.claim):
+        s.pi[t, ST] = FREE
+        return
+    compare_circles(s, p, t)
+    judge(s, p, t)
+    if s.pi[t, ST] != FREE:
+        merge_polygons(s, p, t)
+
+
+@kernel
+def refine_polygon(s: State, p: Settings, left: int) -> int:
+    """Go on with a track for what is left of a quantum; return what that cost.
+
+    Its readings are dealt out between it and its neighbours; its pose is looked for, widely and then near by; what
+    the readings say there decides what becomes of it; how well it is known is found last.
+    """
+    t = s.job[WHO]
+    model = s.pi[t, MODEL]
+    stage = s.job[STAGE]
+    if stage == DEAL:
+        if s.job[NEXT] < s.pi.shape[0]:
+            return int(leave_to_next_neighbour(s, p, t))
+        s.pi[t, NRES] = s.job[HEARD]
+        search_first(s, t)
+        return 1
+    if stage in (LOOK_WIDE, THROW, LOOK_NEAR):
+        spent = seek_on(s, p, model, left)
+        if sought(s):
+            if stage == LOOK_NEAR:
+                keep_found(s)
+                s.job[STAGE] = JUDGE
+                return int(spent)
+            if stage == LOOK_WIDE:
+                keep_found(s)
+                s.work[MIDDLE : MIDDLE + 3] = s.work[FOUND : FOUND + 3]
+                s.job[STAGE] = THROW
+                s.job[NEXT] = 0
+            elif s.work[BEST] > s.work[FOUND_LLR] + THROW_GAIN:
+                keep_found(s)
+            throw_next(s, p, model)
+        return int(spent)
+    if stage == JUDGE:
+        judge_found(s, p, t)
+        if s.pi[t, ST] == ESTABLISHED:
+            begin_lattice(s, p, model, s.pf[t, PX : PTH + 1], s.pf[t, PXX : PTT + 1])
+            s.job[STAGE] = SPREAD
+        else:
+            end_job(s)
+        return cost(2 * s.job[HEARD], 1, faces_of(p, model).shape[0])
+    spent = lattice_on(s, p, model, left)
+    if s.job[LAID] == ATTEMPTS:
+        s.pf[t, PX : PTH + 1] = s.work[MIDDLE : MIDDLE + 3]
+        s.pf[t, PXX : PTT + 1] = s.work[COV : COV + 6]
+        end_job(s)
+    return int(spent)
+
+
+@kernel
+def pquantum(s: State, p: Settings, threshold: float) -> bool:
+    """Go on with the job at hand for a quantum, or else with the next one; return whether there was one.
+
+    Tracks and births take turns where both wait.
+
+    Parameters
+    ----------
+    s, p, threshold
+        As for `next_track`.
+    """
+    if s.job[JOB] == NO_JOB:
+        s.job[BY_TURNS] = 1 - s.job[BY_TURNS]
+        if s.job[BY_TURNS] == 1:
+            if not next_track(s, p, threshold) and not next_birth(s):
+                return False
+        elif not next_birth(s) and not next_track(s, p, threshold):
+            return False
+    left = QUANTUM
+    while left > 0 and s.job[JOB] != NO_JOB:
+        left -= refine_polygon(s, p, left) if s.job[JOB] == TRACK else try_polygon(s, p, left)
     return True

@@ -37,6 +37,9 @@ PB: Final = 24
 PCAP: Final = 12
 """Readings in such a bin."""
 
+ASKED: Final = 32
+"""Segments that wait for a polygon to be tried behind them, and of late did."""
+
 # Columns of `State.tf`, a circle's track: centre, heading (none), radius, lower root of the covariance that the next
 # grid starts from, covariance, log ratio to the background, counts, probability, dispersion of the axes, birth.
 TX, TY, TTH, TRHO, R00, R10, R11, C00, C01, C11, LLR, HITS, THRU, NEAR, PROB, SPAN, BORN, LXX, LXY, LYY, UNK, SEEN = (
@@ -130,11 +133,13 @@ class Settings(NamedTuple):
     sym: Ints
     """Order of each polygon's rotational symmetry."""
     inner: Floats
-    """Distance of the nearest side from the origin."""
+    """Distance of the nearest side from the origin, and at least half the outline's least width."""
     bound: Floats
     """Distance of the farthest vertex from the origin."""
     psides: Floats
     """(M, V, 4) sides for the relaxation."""
+    faces: Floats
+    """(M, V, 5) the same for contact: where each begins, its unit direction, its length."""
     inflate: float
     """What the posterior's covariance is multiplied with when it is reported."""
     quiet: int
@@ -198,6 +203,14 @@ class State(NamedTuple):
     """(PULLING,) 0, 1, 2, …"""
     last: Floats
     """(S, 5) each sensor's last reading that said anything new."""
+    job: Ints
+    """(24,) what is being done about which polygon, and how far that has come; see `polygon_job`."""
+    work: Floats
+    """(56,) the numbers of that job."""
+    pw: Floats
+    """(PT's reservoir, 5) its readings."""
+    asked: Floats
+    """(ASKED, 6) where polygons shall be tried: model, segment's middle and normal, whether it has been tried."""
 
 
 def make_state(sensors: int, p: Settings, tracks: int = NT, slots: int = BUCKETS) -> State:
@@ -212,6 +225,7 @@ def make_state(sensors: int, p: Settings, tracks: int = NT, slots: int = BUCKETS
         owner=z(sensors, n), fit=z(12), stats=z(12), segs=z((8 * sensors, 8)), near=z((32, 4)),
         pi=z((PT, NTI), n), pf=z((PT, NPF)), pbins=z((PT, PB, PCAP, 5)), pbn=z((PT, PB), n), stats2=z(12),
         pose=z(3), root=z(3), cov=z(3), pull=z((PULLING, 5)), all_pull=np.arange(PULLING), last=z((sensors, 5)),
+        job=z(24, n), work=z(56), pw=z((PB * PCAP, 5)), asked=z((ASKED, 6)),
     )  # fmt: skip
     clear(s)
     return s
