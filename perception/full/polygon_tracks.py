@@ -355,7 +355,7 @@ def compare_circles(s: State, p: Settings, t: int) -> None:
 
 @kernel
 def judge(s: State, p: Settings, t: int) -> None:
-    """Establish track `t`, doubt it or end it."""
+    """Establish track `t`, doubt it or end it; what is not placed yet is established once it is."""
     track = s.pf[t]
     if track[PLLR] < EVIDENCE_MIN or track[PLLR] < p.unknown_poly * track[PNEAR] - UNKNOWN_LEAD:
         s.pi[t, ST] = FREE
@@ -363,9 +363,13 @@ def judge(s: State, p: Settings, t: int) -> None:
         is_fitting = track[PHITS] > FITTING * track[PNEAR]
         is_heard = track[PHITS] >= ESTABLISH_HITS and track[PSURE] >= ESTABLISH_SURE
         if track[PPROB] > ESTABLISH and is_fitting and is_heard:
-            s.pi[t, ST] = ESTABLISHED
+            s.job[STAGE] = SPREAD
+            if track[PXX] > 0.0:
+                s.pi[t, ST] = ESTABLISHED
     elif track[PPROB] < DOUBT or track[PHITS] < DOUBT_SHARE * track[PNEAR]:
         s.pi[t, ST] = TENTATIVE
+    else:
+        s.job[STAGE] = SPREAD
 
 
 @kernel
@@ -480,9 +484,8 @@ def refine_polygon(s: State, p: Settings, left: int) -> int:
         return int(spent)
     if stage == JUDGE:
         judge_found(s, p, t)
-        if s.pi[t, ST] == ESTABLISHED:
+        if s.pi[t, ST] != FREE and s.job[STAGE] == SPREAD:
             begin_lattice(s, p, model, s.pf[t, PX : PTH + 1], s.pf[t, PXX : PTT + 1])
-            s.job[STAGE] = SPREAD
         else:
             end_job(s)
         return cost(2 * s.job[HEARD], 1, faces_of(p, model).shape[0])
@@ -490,6 +493,7 @@ def refine_polygon(s: State, p: Settings, left: int) -> int:
     if s.job[LAID] == ATTEMPTS:
         s.pf[t, PX : PTH + 1] = s.work[MIDDLE : MIDDLE + 3]
         s.pf[t, PXX : PTT + 1] = s.work[COV : COV + 6]
+        s.pi[t, ST] = ESTABLISHED
         end_job(s)
     return int(spent)
 
