@@ -137,9 +137,10 @@ EVIDENCE_MIN: Final = 5.0
 UNKNOWN_LEAD: Final = 8.0
 """Evidence below the first, or behind an unknown thing's by the second, is the end, nat."""
 ESTABLISH: Final = 0.9
-ESTABLISH_HITS: Final = 16.0
+ESTABLISH_HITS: Final = 14.0
 ESTABLISH_SURE: Final = 4.0
-"""A track is established by so many hits, and so many that had to be: corners alone fit anywhere."""
+ESTABLISH_HITS_ALONE: Final = 20.0
+"""A track is established by so many hits, and so many that had to be, or one among many: corners alone fit anywhere."""
 DOUBT: Final = 0.3
 DOUBT_SHARE: Final = 0.75
 SIGMAS: Final = 3.0
@@ -361,7 +362,8 @@ def judge(s: State, p: Settings, t: int) -> None:
         s.pi[t, ST] = FREE
     elif s.pi[t, ST] == TENTATIVE:
         is_fitting = track[PHITS] > FITTING * track[PNEAR]
-        is_heard = track[PHITS] >= ESTABLISH_HITS and track[PSURE] >= ESTABLISH_SURE
+        sure = ESTABLISH_SURE if track[PHITS] < ESTABLISH_HITS_ALONE else 1.0
+        is_heard = track[PHITS] >= ESTABLISH_HITS and track[PSURE] >= sure
         if track[PPROB] > ESTABLISH and is_fitting and is_heard:
             s.job[STAGE] = SPREAD
             if track[PXX] > 0.0:
