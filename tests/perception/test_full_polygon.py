@@ -11,30 +11,24 @@ import pytest
 from config.load import load_model, load_settings
 from perception.full.contact import FAR, HITS, LLR, NEAR, THROUGHS, level_of
 from perception.full.likelihood import loglik
-from perception.full.polygon import (
-    CONE,
-    CONE_MUST,
-    MIRROR,
-    MIRROR_MUST,
-    MIRROR_PRICE,
-    NOTHING,
-    SURE,
-    predict,
-    score_poly,
-    search,
-)
-from perception.full.polygon_births import pscore
+from perception.full.polygon import BEST, LEFT, NOTHING, SURE, THETA, X, Y, begin_search, predict, score_poly, search
+from perception.full.polygon_job import COV, HEARD, HISS, LAID, MIDDLE, ear_of, faces_of
 from perception.full.polygon_posterior import (
+    ATTEMPTS,
     CORRELATED,
-    CUT,
+    CUT_OFF,
+    LATTICE,
+    PITCH,
     THINNEST,
+    begin_lattice,
+    centre_moments,
+    lattice_on,
     leave_frame,
     lower_root,
-    posterior_polygon,
     weigh_lattice,
 )
 from perception.full.settings import make_settings
-from perception.full.state import NOISE, make_state
+from perception.full.state import State, make_state
 from perception.kernel import Floats, Ints
 from tests import naive_polygon
 from tests.naive_polygon import Rule
@@ -46,6 +40,17 @@ NOISE_M = 0.03 * 0.3048
 BOXES = 300
 CLOSED = True
 BOX = np.array(load_model("box").vertices_m)
+EAR = ear_of(P)
+FACES = faces_of(P, 0)
+LEVEL = 9
+"""The noise that is believed: σ = 0.03 ft, 0.5 %."""
+
+
+def faces_between(outline: Floats, closed: bool) -> Floats:
+    along = np.roll(outline, -1, axis=0) - outline
+    length = np.hypot(along[:, 0], along[:, 1])
+    faces: Floats = np.column_stack([outline, along / length[:, None], length])
+    return faces if closed else np.ascontiguousarray(faces[:-1])
 
 
 def random_outline(rng: np.random.Generator) -> Floats:
@@ -80,10 +85,9 @@ def heard(rng: np.random.Generator, pose: Floats, n: int, noise_m: float, rule: 
     return np.array(rows)
 
 
-def score(w: Floats, pose: Floats, stats: Floats, level: Ints = P.levels[9]) -> float:
+def score(w: Floats, pose: Floats, stats: Floats, level: Ints = P.levels[LEVEL], every: int = 1) -> float:
     return score_poly(
-        w, len(w), pose[0], pose[1], pose[2], BOX, 4, CLOSED, P.cos_opt, P.cos_in, P.cos_half, math.sin(HALF),
-        P.gate, P.miss, P.short, level, P.per_metre, P.table, P.inv_step, np.zeros(12), stats,
+        w, len(w), every, pose[0], pose[1], pose[2], FACES, CLOSED, EAR, level, P.table, P.inv_step, stats
     )  # fmt: skip
 
 
@@ -97,15 +101,13 @@ def test_a_prediction_equals_its_oracle() -> None:
         axis_angle = math.atan2(-sensor.imag, -sensor.real) + rng.uniform(-0.6, 0.6)
         axis = complex(math.cos(axis_angle), math.sin(axis_angle))
         mirror, cone = rules(sensor, axis, np.zeros(3), outline, closed)
-        out = np.zeros(12)
-        predict(
-            sensor.real, sensor.imag, axis.real, axis.imag, outline, len(outline), closed, P.cos_opt, P.cos_in,
-            P.cos_half, math.sin(HALF), math.sin(IN), out,
+        at, must, price, at_cone, must_cone = predict(
+            sensor.real, sensor.imag, axis.real, axis.imag, faces_between(outline, closed), closed, EAR
         )  # fmt: skip
-        for expected, told, must in ((mirror, MIRROR, MIRROR_MUST), (cone, CONE, CONE_MUST)):
-            assert out[told] == pytest.approx(NOTHING if expected.expected is None else expected.expected, abs=1e-12)
-            assert bool(out[must]) == expected.must
-        assert out[MIRROR_PRICE] == mirror.price
+        for expected, told, told_must in ((mirror, at, must), (cone, at_cone, must_cone)):
+            assert told == pytest.approx(NOTHING if expected.expected is None else expected.expected, abs=1e-12)
+            assert told_must == expected.must
+        assert (price if at < NOTHING else mirror.price) == mirror.price
         differ = cone.expected is not None and cone.expected != mirror.expected
         seen += (mirror.must, cone.must and not mirror.must, mirror.price > 0.0, differ, cone.expected is None)
     assert seen.min() > 300
@@ -123,7 +125,7 @@ def test_a_score_equals_its_oracle() -> None:
         readings = []
         for x, y, ux, uy, r in w:
             mirror, cone = rules(complex(x, y), complex(ux, uy), pose, BOX, closed=True)
-            level = level_of(P.levels[9], r, P.per_metre)
+            level = level_of(P.levels[LEVEL], r, P.per_metre)
             evidence = [
                 0.0 if told.expected is None else loglik(P.table, P.inv_step, level, r - told.expected)
                 for told in (mirror, cone)
@@ -152,20 +154,30 @@ def test_the_truth_is_worth_more_than_a_pose_beside_it() -> None:
         assert score(w, truth, np.zeros(12)) > score(w, beside, np.zeros(12))
 
 
-def test_a_search_never_loses_and_finds_the_pose() -> None:
+def test_a_search_never_loses_and_finds_the_pose_however_often_it_is_interrupted() -> None:
     """From 3 cm and 3° beside it, to a third of the ranges' step; the rounding leaves a plateau of that width."""
     rng = np.random.default_rng(4)
     offs = []
     for _ in range(150):
         truth = np.array([rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-math.pi, math.pi)])
         w = heard(rng, truth, 80, 0.0)
-        pose = truth + np.array([*rng.normal(0.0, 0.03, 2), rng.normal(0.0, 0.05)])
-        before = score(w, pose, np.zeros(12))
-        after = search(
-            w, len(w), pose, 0.05, 0.5, 40, BOX, 4, CLOSED, P.cos_opt, P.cos_in, P.cos_half, math.sin(HALF),
-            P.gate, P.miss, P.short, P.levels[9], P.per_metre, P.table, P.inv_step, np.zeros(12), np.zeros(12),
-        )  # fmt: skip
-        assert after >= before
+        start = truth + np.array([*rng.normal(0.0, 0.03, 2), rng.normal(0.0, 0.05)])
+        found = []
+        for allowed in (1_000, int(rng.integers(1, 10))):
+            f, z, stats, weighed, calls = np.zeros(5), np.zeros(3, np.int64), np.zeros(12), 0, 0
+            begin_search(f, z, start[0], start[1], start[2], 0.05, 40)
+            while z[LEFT] > 0:
+                once = search(
+                    w, len(w), 1, f, z, allowed, FACES, CLOSED, EAR, P.levels[LEVEL], P.table, P.inv_step, stats
+                )  # fmt: skip
+                assert 0 < once <= allowed
+                weighed, calls = weighed + once, calls + 1
+            assert weighed <= 1 + 6 * 40
+            assert calls == math.ceil(weighed / allowed)
+            found.append((*f, weighed))
+        assert found[0] == found[1]
+        pose, after = np.array([f[X], f[Y], f[THETA]]), f[BEST]
+        assert after >= score(w, start, np.zeros(12))
         assert after == pytest.approx(score(w, pose, np.zeros(12)), abs=1e-9)
         offs.append((math.hypot(pose[0] - truth[0], pose[1] - truth[1]), abs(pose[2] - truth[2])))
     assert np.median([d for d, _ in offs]) < 0.01
@@ -173,28 +185,45 @@ def test_a_search_never_loses_and_finds_the_pose() -> None:
     assert np.median([a for _, a in offs]) < math.radians(2.0)
 
 
+def test_every_other_reading_is_every_other_reading() -> None:
+    rng = np.random.default_rng(8)
+    truth = np.array([0.3, -0.2, 0.4])
+    w = heard(rng, truth, 41, 0.01)
+    for every in (1, 2, 3, 50):
+        told, wanted = np.zeros(12), np.zeros(12)
+        assert score(w, truth, told, every=every) == score(np.ascontiguousarray(w[::every]), truth, wanted)
+        assert told.tolist() == wanted.tolist()
+
+
 def test_the_moments_of_a_lattice_equal_numpys() -> None:
     rng = np.random.default_rng(5)
-    state = make_state(24, P)
-    ball = [z for z in itertools.product(range(-3, 4), repeat=3) if z[0] ** 2 + z[1] ** 2 + z[2] ** 2 <= 9]
-    assert len(ball) == 123
+    ball = [z for z in itertools.product(range(-3, 4), repeat=3) if z[0] ** 2 + z[1] ** 2 + z[2] ** 2 <= 6]
+    assert LATTICE.tolist() == [list(z) for z in ball]
+    normal = np.exp(-0.5 * PITCH**2 * np.sum(np.square(ball), axis=1))
+    assert pytest.approx(PITCH**2 * np.average(LATTICE[:, 0] ** 2, weights=normal)) == CUT_OFF
     for _ in range(40):
         truth = np.array([rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-math.pi, math.pi)])
         w = heard(rng, truth, 40, 0.01)
-        state.w[:40] = w
         pose = truth + rng.normal(0.0, 0.002, 3)
         lower = np.tril(rng.normal(0.0, 0.001, (3, 3)) + np.diag([0.004, 0.004, 0.01]))
         covariance = lower @ lower.T
         cov = covariance[np.tril_indices(3)]
-        root, moments = np.zeros(6), np.zeros(9)
+        root, sums = np.zeros(6), np.zeros(10)
         lower_root(cov, root)
-        assert root == pytest.approx(np.linalg.cholesky(covariance)[np.tril_indices(3)], abs=1e-12)
-        weigh_lattice(state, P, 0, 40, pose, root, moments)
+        assert root == pytest.approx(PITCH * np.linalg.cholesky(covariance)[np.tril_indices(3)], abs=1e-12)
+        level = P.levels[LEVEL]
+        top = score(w, pose, np.zeros(12), level)
+        half = int(rng.integers(0, len(ball)))
+        for begin, end in ((0, half), (half, len(ball))):
+            weigh_lattice(
+                w, len(w), FACES, CLOSED, EAR, level, P.table, P.inv_step, np.zeros(12), pose, root, top, begin, end,
+                sums,
+            )  # fmt: skip
+        centre_moments(sums)
+        moments = sums[1:]
         lower = np.zeros((3, 3))
         lower[np.tril_indices(3)] = root
         points = np.array(ball, dtype=np.float64)
-        level = P.levels[int(state.g[NOISE])]
-        top = score(w, pose, np.zeros(12), level)
         weights = np.exp([min(40.0, score(w, pose + lower @ z, np.zeros(12), level) - top) for z in points])
         mean = np.average(points, axis=0, weights=weights)
         spread = np.cov(points.T, aweights=weights, ddof=0)
@@ -204,7 +233,19 @@ def test_the_moments_of_a_lattice_equal_numpys() -> None:
         assert pose == pytest.approx(before + lower @ mean, abs=1e-12)
         shrunk = CORRELATED * spread + (1.0 - CORRELATED) * np.diag(np.diag(spread))
         np.fill_diagonal(shrunk, np.maximum(np.diag(spread), THINNEST))
-        assert cov == pytest.approx((lower @ shrunk @ lower.T / CUT)[np.tril_indices(3)], abs=1e-15)
+        assert cov == pytest.approx((lower @ shrunk @ lower.T / CUT_OFF)[np.tril_indices(3)], abs=1e-15)
+
+
+def spread_of(state: State, w: Floats, pose: Floats, left: int) -> tuple[Floats, Floats]:
+    """Mean and covariance, worked out `left` at a time."""
+    state.pw[: len(w)] = w
+    state.job[HEARD] = len(w)
+    begin_lattice(state, P, 0, pose, np.zeros(6))
+    while state.job[LAID] < ATTEMPTS:
+        lattice_on(state, P, 0, left)
+    c = np.zeros((3, 3))
+    c[np.tril_indices(3)] = state.work[COV : COV + 6]
+    return state.work[MIDDLE : MIDDLE + 3].copy(), c + np.tril(c, -1).T
 
 
 @pytest.mark.compiled
@@ -213,7 +254,8 @@ def test_the_covariance_is_honest(rule: int) -> None:
     """95 % of true poses lie in the 95 % ellipse, of the place and of the whole pose, on noisy boxes."""
     rng = np.random.default_rng(6)
     state = make_state(24, P)
-    state.g[NOISE] = P.noises.tolist().index([NOISE_M, 0.0])
+    state.job[HISS] = P.noises.tolist().index([NOISE_M, 0.0])
+    level = P.levels[state.job[HISS]]
     place, whole = [], []
     for _ in range(BOXES):
         truth = np.array([rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-math.pi, math.pi)])
@@ -221,19 +263,25 @@ def test_the_covariance_is_honest(rule: int) -> None:
         w[rng.uniform(size=120) < 0.05, 4] = 2.0 * FAR
         stray = rng.uniform(size=120) < 0.01
         w[stray, 4] = rng.uniform(0.2, 4.5, int(stray.sum()))
-        state.w[:120] = w
         pose = truth + np.array([*rng.normal(0.0, 0.01, 2), rng.normal(0.0, 0.02)])
-        for step in (0.03, 0.005):
-            pscore(state, P, 0, 120, pose, step, 14)
-        cov = np.zeros(6)
-        posterior_polygon(state, P, 0, 120, pose, cov)
-        posterior_polygon(state, P, 0, 120, pose, cov)
-        c = np.zeros((3, 3))
-        c[np.tril_indices(3)] = cov
-        c = c + np.tril(c, -1).T
+        f, z = np.zeros(5), np.zeros(3, np.int64)
+        begin_search(f, z, pose[0], pose[1], pose[2], 0.03, 20)
+        search(w, 120, 1, f, z, 1_000, FACES, CLOSED, EAR, level, P.table, P.inv_step, np.zeros(12))
+        mean, c = spread_of(state, w, f[:3], 1_000_000)
         assert np.linalg.eigvalsh(c).min() > 0.0
-        e = pose - truth
+        e = mean - truth
         place.append(e[:2] @ np.linalg.solve(c[:2, :2], e[:2]) < 5.991)
         whole.append(e @ np.linalg.solve(c, e) < 7.815)
     assert np.mean(place) == pytest.approx(0.95, abs=0.03)
     assert np.mean(whole) == pytest.approx(0.95, abs=0.03)
+
+
+def test_a_lattice_is_the_same_however_often_it_is_interrupted() -> None:
+    rng = np.random.default_rng(7)
+    state = make_state(24, P)
+    state.job[HISS] = LEVEL
+    for left in (1, 3_000, 20_000):
+        w = heard(rng, np.zeros(3), 60, NOISE_M)
+        whole, interrupted = (spread_of(state, w, np.zeros(3), many) for many in (10_000_000, left))
+        assert np.array_equal(whole[0], interrupted[0])
+        assert np.array_equal(whole[1], interrupted[1])
