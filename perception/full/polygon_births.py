@@ -34,6 +34,9 @@ from perception.full.polygon_job import (
     weigh_pose,
 )
 from perception.full.state import (
+    CTH,
+    CX,
+    CY,
     DIRTY,
     ESTABLISHED,
     FREE,
@@ -49,6 +52,7 @@ from perception.full.state import (
     PULLING,
     PX,
     PY,
+    RIVAL,
     ST,
     TENTATIVE,
     Settings,
@@ -90,6 +94,8 @@ WHOLE: Final = 0.9
 APART_WHOLE: Final = 1.5
 APART: Final = 0.5
 """… and nothing like it is begun this near, in inner radii; any other one gives way sooner."""
+CHALLENGE_DIRTY: Final = 8
+"""A challenger is worth so many unseen readings."""
 
 
 @kernel
@@ -182,15 +188,15 @@ def pgather(s: State, p: Settings, model: int, cx: float, cy: float) -> int:
 
 
 @kernel
-def is_taken(s: State, p: Settings, model: int, x: float, y: float) -> bool:
-    """Tell whether a track of the same model stands at (x, y) already."""
+def taken_by(s: State, p: Settings, model: int, x: float, y: float) -> int:
+    """Return which track of the same model stands at (x, y) already, −1 if none does."""
     for t in range(s.pi.shape[0]):
         if s.pi[t, ST] != FREE and s.pi[t, MODEL] == model:
             is_whole = s.pi[t, ST] == ESTABLISHED and s.pf[t, PHITS] > WHOLE * s.pf[t, PNEAR]
             apart = (APART_WHOLE if is_whole else APART) * p.inner[model]
             if math.hypot(x - s.pf[t, PX], y - s.pf[t, PY]) < apart:
-                return True
-    return False
+                return t
+    return -1
 
 
 @kernel
@@ -260,6 +266,16 @@ def begin_polygon(s: State, model: int, x: float, y: float, theta: float, llr: f
     s.pf[t, PLLR] = llr
     for j in range(s.job[HEARD]):
         pput(s.pbins, s.pbn, t, x, y, s.pw[j])
+
+
+@kernel
+def challenge(s: State, t: int, x: float, y: float, theta: float) -> None:
+    """Have track `t` try a pose on its own readings: its place is right, and its pose perhaps is not."""
+    s.pi[t, RIVAL] = 1
+    s.pi[t, DIRTY] += CHALLENGE_DIRTY
+    s.pf[t, CX] = x
+    s.pf[t, CY] = y
+    s.pf[t, CTH] = theta
 
 
 @kernel
@@ -336,9 +352,6 @@ def lay_next(s: State, p: Settings) -> int:
     hand = 1.0 if k < sides else -1.0
     lay_side(s, p, model, k % sides, shift, seg[0], seg[1], hand * seg[2], hand * seg[3])
     s.job[NEXT] += 1
-    if is_taken(s, p, model, s.pose[0], s.pose[1]):
-        end_job(s)
-        return 1
     if shift == 0.0:
         relax_polygon(s, p, model, sides)
     s.job[HEARD] = pgather(s, p, model, s.pose[0], s.pose[1])
@@ -370,7 +383,11 @@ def try_polygon(s: State, p: Settings, left: int) -> int:
     theta = s.work[THETA]
     llr = weigh_pose(s, p, model, x, y, theta)
     enough = llr >= p.unknown * s.stats[NEARBY] and s.stats[HIT] >= HITS_MIN
-    if enough and not is_taken(s, p, model, x, y):
-        begin_polygon(s, model, x, y, theta, llr)
+    if enough:
+        t = taken_by(s, p, model, x, y)
+        if t < 0:
+            begin_polygon(s, model, x, y, theta, llr)
+        else:
+            challenge(s, t, x, y, theta)
     end_job(s)
     return int(spent)

@@ -19,14 +19,22 @@ from perception.full.polygon import (
     BEST,
     SURE,
     THETA,
-    TURN,
     Ear,
     X,
     Y,
     moved,
     predict,
 )
-from perception.full.polygon_births import WHOLE, bears, next_birth, pflatten, pput, try_polygon
+from perception.full.polygon_births import (
+    WHOLE,
+    bears,
+    lay_side,
+    next_birth,
+    pflatten,
+    pput,
+    try_polygon,
+    ways_to_lie,
+)
 from perception.full.polygon_job import (
     BY_TURNS,
     COV,
@@ -55,6 +63,9 @@ from perception.full.polygon_job import (
 from perception.full.polygon_posterior import ATTEMPTS, begin_lattice, lattice_on
 from perception.full.refine import OWED, SIZE, bounded_exp
 from perception.full.state import (
+    CTH,
+    CX,
+    CY,
     DIRTY,
     ESTABLISHED,
     FREE,
@@ -84,6 +95,7 @@ from perception.full.state import (
     PY,
     QUIET,
     REFS,
+    RIVAL,
     ST,
     TENTATIVE,
     TX,
@@ -115,7 +127,9 @@ NARROW_ROUNDS: Final = 6
 THROWS: Final = (0.5, -0.5, 1.0, -1.0)
 """A young track is thrown along and across by so many inner radii, …"""
 THROW_TURNS: Final = (-0.5, 0.5)
-"""… and turned by so many times π over the order of its symmetry."""
+"""… turned by so many times π over the order of its symmetry, …"""
+ROLLS_MAX: Final = 12
+"""… and rolled onto so many of its other sides at most."""
 THROW_STEP_M: Final = 0.1 * FOOT_M
 THROW_ROUNDS: Final = 5
 THROW_GAIN: Final = 1.0
@@ -274,7 +288,7 @@ def search_first(s: State, t: int) -> None:
     refs = s.pi[t, REFS]
     is_fitting = track[PHITS] >= FITTING * track[PNEAR]
     s.work[FOUND : FOUND + 3] = track[PX : PTH + 1]
-    if refs < YOUNG or refs % AGAIN == 0 or (not is_fitting and refs % 2 == 0):
+    if refs < YOUNG or refs % AGAIN == 0 or s.pi[t, RIVAL] > 0 or (not is_fitting and refs % 2 == 0):
         seek(s, track[PX], track[PY], track[PTH], WIDE_STEP_M, WIDE_ROUNDS, COARSE)
         s.job[STAGE] = LOOK_WIDE
     elif track[PXX] > 0.0 and is_fitting and refs % LOOK_AGAIN != 0:
@@ -300,21 +314,89 @@ def keep_found(s: State) -> None:
 
 
 @kernel
-def throw_next(s: State, p: Settings, model: int) -> None:
-    """Set out for the next of the other summits around the first that was found, if one is left."""
+def facing(s: State, faces: Floats, closed: bool) -> tuple[int, float]:
+    """Return which side looks most at where the job's readings are from, as the pose at `MIDDLE` has it, and its hand.
+
+    The hand is −1 where they are on the inner side of an open outline.
+    """
+    x = 0.0
+    y = 0.0
+    for j in range(s.job[HEARD]):
+        x += s.pw[j, 0] / s.job[HEARD]
+        y += s.pw[j, 1] / s.job[HEARD]
+    dx = x - s.work[MIDDLE]
+    dy = y - s.work[MIDDLE + 1]
+    c = math.cos(s.work[MIDDLE + 2])
+    sn = math.sin(s.work[MIDDLE + 2])
+    bx = c * dx + sn * dy
+    by = -sn * dx + c * dy
+    best = -math.inf
+    side = 0
+    hand = 1.0
+    for k in range(faces.shape[0]):
+        mx = bx - faces[k, 0] - 0.5 * faces[k, 4] * faces[k, 2]
+        my = by - faces[k, 1] - 0.5 * faces[k, 4] * faces[k, 3]
+        v = (mx * faces[k, 3] - my * faces[k, 2]) / math.hypot(mx, my)
+        if (v if closed else abs(v)) > best:
+            best = v if closed else abs(v)
+            side = k
+            hand = 1.0 if v >= 0.0 else -1.0
+    return side, hand
+
+
+@kernel
+def roll(s: State, p: Settings, model: int, k: int) -> bool:
+    """Set `s.pose` to the one at `MIDDLE` rolled on: the `k`-th other side lies where one was; return if there is."""
+    faces = faces_of(p, model)
+    closed = p.closed[model] > 0
+    ways = ways_to_lie(p, model)
+    if k >= min(ways, ROLLS_MAX + 1):
+        return False
+    side, hand = facing(s, faces, closed)
+    c = math.cos(s.work[MIDDLE + 2])
+    sn = math.sin(s.work[MIDDLE + 2])
+    f = faces[side]
+    x = f[0] + 0.5 * f[4] * f[2]
+    y = f[1] + 0.5 * f[4] * f[3]
+    nx = -hand * f[3]
+    ny = hand * f[2]
+    # alternately the sides before and after
+    turned = ((k + 1) // 2 if k % 2 == 1 else ways - k // 2) + (side if hand > 0.0 else side + faces.shape[0])
+    turned %= ways
+    flip = 1.0 if turned < faces.shape[0] else -1.0
+    lay_side(
+        s, p, model, turned % faces.shape[0], 0.0, s.work[MIDDLE] + c * x - sn * y, s.work[MIDDLE + 1] + sn * x + c * y,
+        flip * (c * nx - sn * ny), flip * (sn * nx + c * ny),
+    )  # fmt: skip
+    return True
+
+
+@kernel
+def throw_next(s: State, p: Settings, t: int) -> None:
+    """Set out for the next of the other summits around the first that was found, if one is left.
+
+    They are the pose thrown along, across and turned, rolled onto its other sides, and a challenger's.
+    """
+    model = s.pi[t, MODEL]
     k = s.job[NEXT]
     s.job[NEXT] += 1
-    if k == 2 * len(THROWS) + len(THROW_TURNS):
+    shifts = 2 * len(THROWS)
+    turns = shifts + len(THROW_TURNS)
+    x, y, theta = s.work[MIDDLE], s.work[MIDDLE + 1], s.work[MIDDLE + 2]
+    if k < shifts:
+        # both ways along, then both ways across, first near, then far
+        step = THROWS[2 * (k // 4) + k % 2] * p.inner[model]
+        x, y, theta = moved(x, y, theta, ALONG if k % 4 < 2 else ACROSS, step)
+    elif k < turns:
+        theta += THROW_TURNS[k - shifts] * math.pi / p.sym[model]
+    elif roll(s, p, model, k - turns + 1):
+        x, y, theta = s.pose[0], s.pose[1], s.pose[2]
+    elif s.pi[t, RIVAL] > 0:
+        s.pi[t, RIVAL] = 0
+        x, y, theta = s.pf[t, CX], s.pf[t, CY], s.pf[t, CTH]
+    else:
         search_near(s)
         return
-    if k < 2 * len(THROWS):
-        # both ways along, then both ways across, first near, then far
-        axis = ALONG if k % 4 < 2 else ACROSS
-        step = THROWS[2 * (k // 4) + k % 2] * p.inner[model]
-    else:
-        axis = TURN
-        step = THROW_TURNS[k - 2 * len(THROWS)] * math.pi / p.sym[model]
-    x, y, theta = moved(s.work[MIDDLE], s.work[MIDDLE + 1], s.work[MIDDLE + 2], axis, step)
     seek(s, x, y, theta, THROW_STEP_M, THROW_ROUNDS, COARSE)
 
 
@@ -482,7 +564,7 @@ def refine_polygon(s: State, p: Settings, left: int) -> int:
                 s.job[NEXT] = 0
             elif s.work[BEST] > s.work[FOUND_LLR] + THROW_GAIN:
                 keep_found(s)
-            throw_next(s, p, model)
+            throw_next(s, p, t)
         return int(spent)
     if stage == JUDGE:
         judge_found(s, p, t)
