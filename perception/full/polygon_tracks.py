@@ -11,7 +11,9 @@ import math
 from typing import Final
 
 from perception.full.contact import HITS as HIT
+from perception.full.contact import LLR as CIRCLE_LLR
 from perception.full.contact import NEAR as NEARBY
+from perception.full.contact import fit_circle, score_circle
 from perception.full.noise_choice import noise_variance
 from perception.full.polygon import (
     ACROSS,
@@ -62,6 +64,7 @@ from perception.full.polygon_job import (
 )
 from perception.full.polygon_posterior import ATTEMPTS, begin_lattice, lattice_on
 from perception.full.refine import OWED, SIZE, bounded_exp
+from perception.full.rivals import SOFT
 from perception.full.state import (
     CTH,
     CX,
@@ -147,14 +150,16 @@ CIRCLE_NEAR_M: Final = 0.3 * FOOT_M
 """Circles whose centres lie no farther than this off the farthest vertex stand in the same place."""
 LEAD: Final = 6.0
 """An established polygon that leads a circle in its place by this removes it, nat."""
+FIT_STEPS: Final = 4
 EVIDENCE_MIN: Final = 5.0
 UNKNOWN_LEAD: Final = 8.0
 """Evidence below the first, or behind an unknown thing's by the second, is the end, nat."""
 ESTABLISH: Final = 0.9
 ESTABLISH_HITS: Final = 14.0
 ESTABLISH_SURE: Final = 4.0
-ESTABLISH_HITS_ALONE: Final = 20.0
-"""A track is established by so many hits, and so many that had to be, or one among many: corners alone fit anywhere."""
+MANY_HITS: Final = 20.0
+MANY_SURE: Final = 3.0
+"""A track is established by so many hits, and so many that had to be: corners alone fit anywhere."""
 DOUBT: Final = 0.3
 DOUBT_SHARE: Final = 0.75
 SIGMAS: Final = 3.0
@@ -315,7 +320,7 @@ def keep_found(s: State) -> None:
 
 @kernel
 def facing(s: State, faces: Floats, closed: bool) -> tuple[int, float]:
-    """Return which side looks most at where the job's readings are from, as the pose at `MIDDLE` has it, and its hand.
+    """Return which side of the pose at `MIDDLE` looks most at where the job's readings are from, and its hand.
 
     The hand is −1 where they are on the inner side of an open outline.
     """
@@ -365,8 +370,8 @@ def roll(s: State, p: Settings, model: int, k: int) -> bool:
     turned %= ways
     flip = 1.0 if turned < faces.shape[0] else -1.0
     lay_side(
-        s, p, model, turned % faces.shape[0], 0.0, s.work[MIDDLE] + c * x - sn * y, s.work[MIDDLE + 1] + sn * x + c * y,
-        flip * (c * nx - sn * ny), flip * (sn * nx + c * ny),
+        s, p, model, turned % faces.shape[0], 0.0, s.work[MIDDLE] + c * x - sn * y,
+        s.work[MIDDLE + 1] + sn * x + c * y, flip * (c * nx - sn * ny), flip * (sn * nx + c * ny),
     )  # fmt: skip
     return True
 
@@ -417,6 +422,47 @@ def is_wall(s: State, x: float, y: float, inner: float, claim: float) -> bool:
 
 
 @kernel
+def best_circle(s: State, p: Settings, t: int) -> float:
+    """Return the log ratio of the circle that best explains the job's readings, prior and all; nat.
+
+    An edge, a post or a drum heard from a few places looks like a body's corner, and the circle that stood there may
+    have given way; so it is asked on the very readings that speak for the body.
+    """
+    x = s.pf[t, PX]
+    y = s.pf[t, PY]
+    model = s.pi[t, MODEL]
+    ux = 0.0
+    uy = 0.0
+    for j in range(s.job[HEARD]):
+        q = s.pw[j]
+        dx = x - q[0]
+        dy = y - q[1]
+        d = math.hypot(dx, dy)
+        if d > 0.0 and abs(q[4] - d) < p.bound[model]:
+            ux += dx / d
+            uy += dy / d
+    length = math.hypot(ux, uy)
+    if length == 0.0:
+        return -math.inf
+    lev = p.levels[s.job[HISS]]
+    var0, rel2 = noise_variance(s, p)
+    best = -math.inf
+    for k in range(p.radii.shape[0]):
+        rho = p.radii[k]
+        behind = (rho - p.inner[model]) / length
+        if fit_circle(
+            s.pw, s.job[HEARD], x + behind * ux, y + behind * uy, rho, p.cos_opt, p.gate, SOFT, var0, rel2, FIT_STEPS,
+            s.fit,
+        ):  # fmt: skip
+            score_circle(
+                s.pw, s.job[HEARD], s.fit[0], s.fit[1], rho, p.cos_opt, p.cos_half, p.cos_in, p.gate, p.miss, p.short,
+                lev, p.per_metre, p.table, p.inv_step, s.stats,
+            )  # fmt: skip
+            best = max(best, s.stats[CIRCLE_LLR] + (p.prior if k < p.models else 0.0))
+    return best
+
+
+@kernel
 def compare_circles(s: State, p: Settings, t: int) -> None:
     """Enter the probability of track `t` against nothing, an unknown thing and the circles that stand in its place.
 
@@ -426,6 +472,7 @@ def compare_circles(s: State, p: Settings, t: int) -> None:
     own = track[PLLR] + p.prior
     around = p.bound[s.pi[t, MODEL]] + CIRCLE_NEAR_M
     total = 1.0 + bounded_exp(-own) + bounded_exp(p.unknown_poly * track[PNEAR] + p.prior - own)
+    total += bounded_exp(best_circle(s, p, t) - own)
     for k in range(s.ti.shape[0]):
         if s.ti[k, ST] != FREE and math.hypot(s.tf[k, TX] - track[PX], s.tf[k, TY] - track[PY]) < around:
             v = s.tf[k, LLR] + (p.prior if s.ti[k, KIND] < p.models else 0.0)
@@ -444,7 +491,7 @@ def judge(s: State, p: Settings, t: int) -> None:
         s.pi[t, ST] = FREE
     elif s.pi[t, ST] == TENTATIVE:
         is_fitting = track[PHITS] > FITTING * track[PNEAR]
-        sure = ESTABLISH_SURE if track[PHITS] < ESTABLISH_HITS_ALONE else 1.0
+        sure = ESTABLISH_SURE if track[PHITS] < MANY_HITS else MANY_SURE
         is_heard = track[PHITS] >= ESTABLISH_HITS and track[PSURE] >= sure
         if track[PPROB] > ESTABLISH and is_fitting and is_heard:
             s.job[STAGE] = SPREAD
@@ -572,7 +619,7 @@ def refine_polygon(s: State, p: Settings, left: int) -> int:
             begin_lattice(s, p, model, s.pf[t, PX : PTH + 1], s.pf[t, PXX : PTT + 1])
         else:
             end_job(s)
-        return cost(2 * s.job[HEARD], 1, faces_of(p, model).shape[0])
+        return cost((1 + p.radii.shape[0]) * s.job[HEARD], 1, faces_of(p, model).shape[0])
     spent = lattice_on(s, p, model, left)
     if s.job[LAID] == ATTEMPTS:
         s.pf[t, PX : PTH + 1] = s.work[MIDDLE : MIDDLE + 3]
