@@ -144,6 +144,8 @@ WALL_SIZE: Final = 3.0
 WALL_BEHIND: Final = -1.15
 WALL_FRONT: Final = 0.7
 """A body whose centre is so many inner radii behind a wall's face, or before it, is the wall."""
+WALL_SHARE: Final = 0.6
+"""… and explains so many of its readings for each of its hits. (Bodies in a row have a line in common.)"""
 WALL_BEYOND_M: Final = 2.0 * FOOT_M
 
 CIRCLE_NEAR_M: Final = 0.3 * FOOT_M
@@ -406,18 +408,34 @@ def throw_next(s: State, p: Settings, t: int) -> None:
 
 
 @kernel
-def is_wall(s: State, x: float, y: float, inner: float, claim: float) -> bool:
-    """Tell whether a body of inner radius `inner` (m) at (x, y) is a stretch of a wall longer than `claim` (m)."""
+def on_line(w: Floats, n: int, line: Floats, cos_opt: float, tight: float) -> int:
+    """Return how many of `n` readings a line explains: a row of `State.lines`."""
+    explained = 0
+    for j in range(n):
+        ahead = line[LC] - line[LNX] * (w[j, 0] - line[LOX]) - line[LNY] * (w[j, 1] - line[LOY])
+        facing_it = line[LNX] * w[j, 2] + line[LNY] * w[j, 3]
+        if abs(facing_it) >= cos_opt and facing_it * ahead > 0.0 and abs(w[j, 4] - abs(ahead)) < tight:
+            explained += 1
+    return explained
+
+
+@kernel
+def is_wall(s: State, p: Settings, t: int) -> bool:
+    """Tell whether the body of track `t` is a stretch of a wall: lies in one that explains its readings as well."""
+    inner = p.inner[s.pi[t, MODEL]]
+    var0, rel2 = noise_variance(s, p)
     for k in range(s.lines.shape[0]):
         line = s.lines[k]
-        if line[LN] > WALL_ECHOES_MIN and line[LHI] - line[LLO] > max(claim, WALL_SIZE * inner):
-            dx = x - line[LOX]
-            dy = y - line[LOY]
+        if line[LN] > WALL_ECHOES_MIN and line[LHI] - line[LLO] > max(p.claim, WALL_SIZE * inner):
+            dx = s.pf[t, PX] - line[LOX]
+            dy = s.pf[t, PY] - line[LOY]
             off = line[LC] - line[LNX] * dx - line[LNY] * dy
             along = -line[LNY] * dx + line[LNX] * dy
             beside = line[LLO] - WALL_BEYOND_M < along < line[LHI] + WALL_BEYOND_M
             if beside and WALL_BEHIND * inner < off < WALL_FRONT * inner:
-                return True
+                tight = p.half_box + SIGMAS * math.sqrt(var0 + rel2 * off * off)
+                if on_line(s.pw, s.job[HEARD], line, p.cos_opt, tight) >= WALL_SHARE * s.pf[t, PHITS]:
+                    return True
     return False
 
 
@@ -572,7 +590,7 @@ def judge_found(s: State, p: Settings, t: int) -> None:
     track[PHITS] = s.stats[HIT]
     track[PNEAR] = s.stats[NEARBY]
     track[PSURE] = s.stats[SURE]
-    if is_wall(s, x, y, p.inner[model], p.claim):
+    if is_wall(s, p, t):
         s.pi[t, ST] = FREE
         return
     compare_circles(s, p, t)

@@ -70,7 +70,7 @@ POLYGON_HITS: Final = 20.0
 POLYGON_HITS_SWEPT: Final = 14.0
 POLYGON_SWEPT: Final = 80
 """It answers so often; or less often, where so many readings bear on it, silences and all, and it explains them."""
-POLYGON_INFLATE: Final = 1.2
+POLYGON_INFLATE: Final = 1.15
 """What a polygon's covariance is multiplied with when it is reported: what its neighbours do to it is no noise."""
 WALL_ECHOES_MIN: Final = 10.0
 WALL_M: Final = 2.0 * FOOT_M
