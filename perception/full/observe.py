@@ -14,7 +14,7 @@ from perception.full.contact import FAR
 from perception.full.noise_choice import choose_noise, noise_variance, roughness
 from perception.full.pairs import map_add, tangent
 from perception.full.polygon_births import ask_for_polygon
-from perception.full.polygon_tracks import poly_claims
+from perception.full.polygon_claims import poly_claims
 from perception.full.refine import urgent
 from perception.full.reservoir import put
 from perception.full.state import (

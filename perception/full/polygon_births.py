@@ -184,7 +184,7 @@ def pgather(s: State, p: Settings, model: int, cx: float, cy: float) -> int:
     for j in range(kept):
         for z in range(5):
             s.pw[j, z] = s.w[j * n // kept, z]
-    return kept
+    return int(kept)
 
 
 @kernel
@@ -195,7 +195,7 @@ def taken_by(s: State, p: Settings, model: int, x: float, y: float) -> int:
             is_whole = s.pi[t, ST] == ESTABLISHED and s.pf[t, PHITS] > WHOLE * s.pf[t, PNEAR]
             apart = (APART_WHOLE if is_whole else APART) * p.inner[model]
             if math.hypot(x - s.pf[t, PX], y - s.pf[t, PY]) < apart:
-                return t
+                return int(t)
     return -1
 
 

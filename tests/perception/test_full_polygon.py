@@ -154,6 +154,7 @@ def test_the_truth_is_worth_more_than_a_pose_beside_it() -> None:
         assert score(w, truth, np.zeros(12)) > score(w, beside, np.zeros(12))
 
 
+@pytest.mark.compiled
 def test_a_search_never_loses_and_finds_the_pose_however_often_it_is_interrupted() -> None:
     """From 3 cm and 3° beside it, to a third of the ranges' step; the rounding leaves a plateau of that width."""
     rng = np.random.default_rng(4)
@@ -201,7 +202,7 @@ def test_the_moments_of_a_lattice_equal_numpys() -> None:
     assert LATTICE.tolist() == [list(z) for z in ball]
     normal = np.exp(-0.5 * PITCH**2 * np.sum(np.square(ball), axis=1))
     assert pytest.approx(PITCH**2 * np.average(LATTICE[:, 0] ** 2, weights=normal)) == CUT_OFF
-    for _ in range(40):
+    for _ in range(10):
         truth = np.array([rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-math.pi, math.pi)])
         w = heard(rng, truth, 40, 0.01)
         pose = truth + rng.normal(0.0, 0.002, 3)

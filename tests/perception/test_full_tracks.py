@@ -39,10 +39,10 @@ from perception.full.state import (
     PHITS,
     POLISH,
     PPROB,
-    PXX,
-    PYY,
     PROB,
     PT,
+    PXX,
+    PYY,
     QUIET,
     R00,
     R11,
@@ -567,7 +567,7 @@ def test_polygons_are_sure_when_seen_from_near_and_from_two_sides() -> None:
         want = [
             t for t in range(PT)
             if naive_tracks.is_sure_polygon(
-                s.pi[t, ST] == ESTABLISHED, s.pf[t, PPROB], 0.9, s.pf[t, PHITS], s.pf[t, [PXX, PYY]], kept[t]
+                s.pi[t, ST] == ESTABLISHED, s.pf[t, PPROB], 0.9, s.pf[t, PHITS], s.pf[t, [PXX, PYY]].tolist(), kept[t]
             )
         ]  # fmt: skip
         n = report.sure_polygons(s.pi, s.pf, s.pbn, s.pbins, 0.9, out)
