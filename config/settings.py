@@ -108,7 +108,7 @@ class FullConfig(Strict):
     """An object is refined once this share of its readings is new."""
     quanta_per_firing: int = Field(default=2, ge=1, le=1000)
     """Refinements a firing, at most; what is left waits for the next one."""
-    polygon_quanta_per_firing: int = Field(default=2, ge=1, le=1000)
+    polygon_quanta_per_firing: int = Field(default=12, ge=1, le=1000)
     """The same for polygons, so that drums in view do not starve the boxes beside them."""
 
 

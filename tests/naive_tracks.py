@@ -352,10 +352,14 @@ def is_called(
     return possible and (probability >= needed or (called and probability >= min(needed, 0.5)))
 
 
-def is_sure_polygon(established: bool, probability: float, least: float, hits: float, kept: Array) -> bool:
+def is_sure_polygon(
+    established: bool, probability: float, least: float, hits: float, variances: Sequence[float], kept: Array
+) -> bool:  # fmt: skip
     """Tell whether a polygon may be called by its name: seen from near, and from more than one direction."""
     heard = kept[kept[:, 4] < SILENT]
     if not len(heard) or heard[:, 4].min() > 6.5 * FT:
         return False
     spread = 1 - float(np.hypot(*heard[:, 2:4].mean(0)))
-    return established and probability >= least and hits >= 20 and spread > 0.02
+    is_heard = hits >= (14 if len(kept) >= 80 else 20)
+    placed = max(variances) <= (0.2 * FT) ** 2
+    return established and probability >= least and is_heard and placed and spread > 0.02

@@ -37,14 +37,15 @@ from perception.full.state import (
     LP11,
     MODEL,
     PCAP,
-    PCX,
-    PCY,
     PHITS,
     PPROB,
     PROB,
     PTH,
     PX,
+    PXX,
+    PXY,
     PY,
+    PYY,
     SPAN,
     ST,
     TRHO,
@@ -72,8 +73,13 @@ SIGMA_MAX_M: Final = 0.17 * FOOT_M
 POLYGON_PROBABILITY: Final = 0.9
 POLYGON_NEAR_M: Final = 6.5 * FOOT_M
 POLYGON_SPREAD: Final = 0.02
-POLYGON_HITS: Final = 20.0
 """A polygon is seen from near and from more than one direction: one face, square on from afar, may be any wall's."""
+POLYGON_HITS: Final = 20.0
+POLYGON_HITS_SWEPT: Final = 14.0
+POLYGON_SWEPT: Final = 80
+"""It answers so often; or less often, where so many readings bear on it, silences and all, and it explains them."""
+POLYGON_INFLATE: Final = 1.15
+"""What a polygon's covariance is multiplied with when it is reported: what its neighbours do to it is no noise."""
 WALL_ECHOES_MIN: Final = 10.0
 WALL_M: Final = 2.0 * FOOT_M
 CORNER_M: Final = 1.0 * FOOT_M
@@ -157,19 +163,23 @@ def sure_polygons(pi: Ints, pf: Floats, pbn: Ints, pbins: Floats, least: float, 
     """Write the polygon tracks that are sure to `out` and return how many; arguments as in `State`."""
     n = 0
     for t in range(pi.shape[0]):
-        if pi[t, ST] != ESTABLISHED or pf[t, PPROB] < least or pf[t, PHITS] < POLYGON_HITS:
+        if pi[t, ST] != ESTABLISHED or pf[t, PPROB] < least or max(pf[t, PXX], pf[t, PYY]) > SIGMA_MAX_M**2:
             continue
+        swept = 0
         nearest = FAR
         heard = 0
         x = 0.0
         y = 0.0
         for b in range(pbn.shape[1]):
+            swept += min(pbn[t, b], PCAP)
             for k in range(min(pbn[t, b], PCAP)):
                 if pbins[t, b, k, 4] < FAR:
                     nearest = min(nearest, pbins[t, b, k, 4])
                     x += pbins[t, b, k, 2]
                     y += pbins[t, b, k, 3]
                     heard += 1
+        if pf[t, PHITS] < (POLYGON_HITS_SWEPT if swept >= POLYGON_SWEPT else POLYGON_HITS):
+            continue
         if heard > 0 and nearest <= POLYGON_NEAR_M and 1.0 - math.hypot(x, y) / heard > POLYGON_SPREAD:
             out[n] = t
             n += 1
@@ -203,10 +213,7 @@ def polygon(s: State, p: Settings, t: int, label: str, probability: float) -> Se
     """Return a polygon's track as an object; of the headings at which it looks alike the least one from −π on."""
     track = s.pf[t]
     theta = float(track[PTH])
-    c, sn = math.cos(theta), math.sin(theta)
-    along, across = float(track[PCX]), float(track[PCY])
-    xx, yy = c * c * along + sn * sn * across, sn * sn * along + c * c * across
-    xy = c * sn * (along - across)
+    xx, xy, yy = (POLYGON_INFLATE * float(track[k]) for k in (PXX, PXY, PYY))
     period = 2.0 * math.pi / int(p.sym[s.pi[t, MODEL]])
     return SeenObject(
         label, float(track[PX]), float(track[PY]), (theta + 0.5 * period) % period - 0.5 * period,

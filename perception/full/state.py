@@ -38,6 +38,9 @@ PB: Final = 24
 PCAP: Final = 12
 """Readings in such a bin."""
 
+ASKED: Final = 32
+"""Segments that wait for a polygon to be tried behind them, and of late did."""
+
 # Columns of `State.tf`, a circle's track: centre, heading (none), radius, lower root of the covariance that the next
 # grid starts from, covariance, log ratio to the background, counts, probability, dispersion of the axes, birth.
 TX, TY, TTH, TRHO, R00, R10, R11, C00, C01, C11, LLR, HITS, THRU, NEAR, PROB, SPAN, BORN, LXX, LXY, LYY, UNK, SEEN = (
@@ -46,13 +49,16 @@ TX, TY, TTH, TRHO, R00, R10, R11, C00, C01, C11, LLR, HITS, THRU, NEAR, PROB, SP
 NTF: Final = 24
 # Columns of `State.ti` and `State.pi`. ST: 0 free, 1 tentative, 2 established. KIND: index into `Settings.radii`.
 # QUIET: firings without evidence; POLISH: refinements still owed once it is quiet; CALLED: 1 while it has its name.
-ST, KIND, DIRTY, CYC, NRES, MODEL, REFS, QUIET, POLISH, CALLED = range(10)
-NTI: Final = 10
+# RIVAL: of a polygon, whether it has a challenger.
+ST, KIND, DIRTY, CYC, NRES, MODEL, REFS, QUIET, POLISH, CALLED, RIVAL = range(11)
+NTI: Final = 11
 # Columns of `State.lines`: normal, distance along it from an origin on the spot, that origin, covariance of angle and
 # distance, extent along the line, log odds of being there still, echoes that it explained (0: free).
 LNX, LNY, LC, LOX, LOY, LP00, LP01, LP11, LLO, LHI, LLOG, LN = range(12)
-# Columns of `State.pf`, a polygon's track: pose, log ratio, counts, probability, must-answer hits, variances.
-PX, PY, PTH, PLLR, PHITS, PNEAR, PPROB, PSURE, PCX, PCY, PCT = range(11)
+# Columns of `State.pf`, a polygon's track: pose, log ratio, counts, probability, must-answer hits, covariance of x, y
+# and heading, pose of a challenger.
+PX, PY, PTH, PLLR, PHITS, PNEAR, PPROB, PSURE, PXX, PXY, PYY, PXT, PYT, PTT, CX, CY, CTH = range(17)
+NPF: Final = 17
 # Cells of `State.g`.
 NOISE, SEGMENTS, BIRTHS, REFINEMENTS = range(4)
 
@@ -129,11 +135,13 @@ class Settings(NamedTuple):
     sym: Ints
     """Order of each polygon's rotational symmetry."""
     inner: Floats
-    """Distance of the nearest side from the origin."""
+    """Distance of the nearest side from the origin, and at least half the outline's least width."""
     bound: Floats
     """Distance of the farthest vertex from the origin."""
     psides: Floats
     """(M, V, 4) sides for the relaxation."""
+    faces: Floats
+    """(M, V, 5) the same for contact: where each begins, its unit direction, its length."""
     inflate: float
     """What the posterior's covariance is multiplied with when it is reported."""
     report: float
@@ -201,6 +209,14 @@ class State(NamedTuple):
     """(PULLING,) 0, 1, 2, …"""
     last: Floats
     """(S, 5) each sensor's last reading that said anything new."""
+    job: Ints
+    """(24,) what is being done about which polygon, and how far that has come; see `polygon_job`."""
+    work: Floats
+    """(56,) the numbers of that job."""
+    pw: Floats
+    """(PT's reservoir, 5) its readings."""
+    asked: Floats
+    """(ASKED, 6) where polygons shall be tried: model, segment's middle and normal, whether it has been tried."""
 
 
 def make_state(sensors: int, p: Settings, tracks: int = NT, slots: int = BUCKETS) -> State:
@@ -213,8 +229,9 @@ def make_state(sensors: int, p: Settings, tracks: int = NT, slots: int = BUCKETS
         ddl=z(noises), ntot=z(noises), nll=z((tracks, noises)), bins=z((tracks, NB, CAP, 5)), bn=z((tracks, NB), n),
         lines=z((NL, 12)), g=z(8), w=z((WORK, 5)), w2=z((WORK, 5)), wl=z(WORK, n), cur=z((sensors, 6)),
         owner=z(sensors, n), fit=z(12), stats=z(12), segs=z((8 * sensors, 8)), near=z((32, 4)),
-        pi=z((PT, NTI), n), pf=z((PT, 12)), pbins=z((PT, PB, PCAP, 5)), pbn=z((PT, PB), n), stats2=z(12),
+        pi=z((PT, NTI), n), pf=z((PT, NPF)), pbins=z((PT, PB, PCAP, 5)), pbn=z((PT, PB), n), stats2=z(12),
         pose=z(3), root=z(3), cov=z(3), pull=z((PULLING, 5)), all_pull=np.arange(PULLING), last=z((sensors, 5)),
+        job=z(24, n), work=z(56), pw=z((PB * PCAP, 5)), asked=z((ASKED, 6)),
     )  # fmt: skip
     clear(s)
     return s

@@ -42,6 +42,8 @@ from perception.full.state import (
     PPROB,
     PROB,
     PT,
+    PXX,
+    PYY,
     QUIET,
     R00,
     R11,
@@ -561,17 +563,20 @@ def test_polygons_are_sure_when_seen_from_near_and_from_two_sides() -> None:
         kept = []
         for t in range(PT):
             s.pi[t, ST] = rng.choice([TENTATIVE, ESTABLISHED])
-            s.pf[t, PPROB], s.pf[t, PHITS] = rng.uniform(0.85, 1), rng.uniform(15, 60)
-            w = around(rng, int(rng.integers(0, 30)), np.zeros(2), 0.2)
+            s.pf[t, PPROB], s.pf[t, PHITS] = rng.uniform(0.85, 1), rng.uniform(10, 40)
+            s.pf[t, PXX], s.pf[t, PYY] = rng.uniform(0, 0.005, 2)
+            w = around(rng, int(rng.integers(0, 120)), np.zeros(2), 0.2)
             w[:, 4] += rng.choice([0.0, 1.8])
             w[:, 2:4] = unit(rng.uniform(0, 7) + rng.normal(0, rng.uniform(0, 0.5), len(w)))
             for i, q in enumerate(w):
-                s.pbins[t, i % 3, s.pbn[t, i % 3] % PCAP] = q
-                s.pbn[t, i % 3] += 1
+                s.pbins[t, i % 10, s.pbn[t, i % 10] % PCAP] = q
+                s.pbn[t, i % 10] += 1
             kept.append(w)
         want = [
             t for t in range(PT)
-            if naive_tracks.is_sure_polygon(s.pi[t, ST] == ESTABLISHED, s.pf[t, PPROB], 0.9, s.pf[t, PHITS], kept[t])
+            if naive_tracks.is_sure_polygon(
+                s.pi[t, ST] == ESTABLISHED, s.pf[t, PPROB], 0.9, s.pf[t, PHITS], s.pf[t, [PXX, PYY]].tolist(), kept[t]
+            )
         ]  # fmt: skip
         n = report.sure_polygons(s.pi, s.pf, s.pbn, s.pbins, 0.9, out)
         assert out[:n].tolist() == want
