@@ -128,6 +128,16 @@ def test_what_is_gone_is_forgotten_within_three_passes_and_what_moved_is_followe
         assert all(min(math.dist((d.x_m, d.y_m), o) for o in seen) < 0.12 * FT for d in after.drum)
 
 
+def with_a_map_of(segments: int, rng: np.random.Generator) -> Perception:
+    """Return perception whose map holds so many segments already."""
+    perception = Perception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
+    assert isinstance(perception.method, FullPerception)
+    memory = perception.method.memory
+    for x, y in rng.uniform(-60.0, 60.0, (segments, 2)):
+        map_add(np.array([x, y, 1.0, 0.0, 0.15, 0.01, 0.1]), FT, memory.tags, memory.fill, memory.store)
+    return perception
+
+
 @pytest.mark.realtime
 @pytest.mark.usefixtures("warm_kernels")
 def test_the_cost_does_not_grow_with_the_mission() -> None:
@@ -143,20 +153,17 @@ def test_the_cost_does_not_grow_with_the_mission() -> None:
     assert passes[19] <= 1.1 * passes[0], passes
 
     rng = np.random.default_rng(0)
-    medians = []
-    for segments in (1_000, 1_000_000):
-        perception = Perception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
-        assert isinstance(perception.method, FullPerception)
-        memory = perception.method.memory
-        for x, y in rng.uniform(-60.0, 60.0, (segments, 2)):
-            map_add(np.array([x, y, 1.0, 0.0, 0.15, 0.01, 0.1]), FT, memory.tags, memory.fill, memory.store)
-        spent = []
-        for firing in readings(SETTINGS.ring, hall, 0, passes=3):
-            begin = time.thread_time_ns()
-            perceive(perception, firing)
-            spent.append(1e-6 * (time.thread_time_ns() - begin))
-        medians.append(float(np.median(spent)))
-    assert medians[1] <= 1.2 * medians[0], medians
+    small, large = (with_a_map_of(segments, rng) for segments in (1_000, 1_000_000))
+    spent: list[tuple[int, int]] = []
+    for firing in readings(SETTINGS.ring, hall, 0, passes=3):  # in turns: a machine's speed changes
+        begin = time.thread_time_ns()
+        perceive(small, firing)
+        between = time.thread_time_ns()
+        perceive(large, firing)
+        spent.append((between - begin, time.thread_time_ns() - between))
+    medians = np.median(spent, axis=0)
+    # Measured is 0.85; what others on this machine leave of its cache is not ours. A search through all would be 100.
+    assert medians[1] <= 2.0 * medians[0], medians
 
 
 def test_everything_has_a_name() -> None:
