@@ -60,6 +60,11 @@ class PaperPerception:
         """Whether refinement has anything left to improve."""
         return self.candidates.pending
 
+    @property
+    def waiting(self) -> bool:
+        """Whether refinement has anything left to improve."""
+        return self.candidates.pending
+
     def observe(self, firing: Firing) -> int:
         """Take in one firing and return how many outline segments it completed."""
         segments = self._extractor.extract(firing)

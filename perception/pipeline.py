@@ -30,7 +30,12 @@ class Method(Protocol):
 
     @property
     def pending(self) -> bool:
-        """Whether refinement has anything left to improve."""
+        """Whether refinement has anything left to improve now."""
+        ...
+
+    @property
+    def waiting(self) -> bool:
+        """Whether anything may wait for refinement, be it for the next firing."""
         ...
 
     @property
@@ -108,8 +113,13 @@ class Perception:
 
     @property
     def pending(self) -> bool:
-        """Whether refinement has anything left to improve."""
+        """Whether refinement has anything left to improve now."""
         return self.method.pending
+
+    @property
+    def waiting(self) -> bool:
+        """Whether anything may wait for refinement, be it for the next firing."""
+        return self.method.waiting
 
     @property
     def living(self) -> int:

@@ -223,13 +223,21 @@ def recover(recording: str, /, *, out: str | None = None) -> int:
 
 @app.command
 def experiment(
-    name: Literal["hallway", "irregular"],
+    name: Literal["hallway", "irregular", "budget"],
     /,
     *,
     method: Literal["paper", "full"] = "full",
     scene: SceneName | None = None,
     world: str | None = None,
     model: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    budget_ms: Annotated[tuple[float, ...], Parameter(negative="", consume_multiple=True)] = (
+        0.2,
+        0.5,
+        1.0,
+        2.0,
+        5.0,
+    ),
+    quanta: Annotated[tuple[float, ...], Parameter(negative="", consume_multiple=True)] = (),
     seeds: Seed = 1,
     json: JsonFile = None,
     units: UnitsOption = "ft",
@@ -240,7 +248,7 @@ def experiment(
     Parameters
     ----------
     name
-        The simulated hallway, or the irregular one of the real run.
+        The simulated hallway, the irregular one of the real run, or what smaller budgets cost in a hall of 40 drums.
     method
         How objects are recognised.
     scene
@@ -249,12 +257,24 @@ def experiment(
         Another world, a file or a name.
     model
         Object model to look for: a file or a name; may be repeated.
+    budget_ms
+        For `budget`: processor time that perception has in a cycle, ms.
+    quanta
+        For `budget`: so many quanta a cycle instead, which makes the table repeatable; 0.1 is one in ten cycles.
     seeds
         Repeat with this many seeds, from 0 on.
     """
     from runtime.commands.experiment import run_experiment, run_scenes
 
     sets = (*sets, f"perception.method={method}")
+    if name == "budget":
+        from runtime.commands.budget import run_budgets
+
+        if scene is not None or world is not None:
+            raise Complaint("experiment budget has a hall of its own: leave out --scene and --world", WRONG_CALL)
+        return run_budgets(
+            sets, budgets_ms=budget_ms, quanta=quanta, models=model, seeds=seeds, json_file=json, units=units
+        )
     if scene is not None:
         if name != "hallway" or world is not None:
             raise Complaint("--scene is a hallway of its own: call `experiment hallway`, without --world", WRONG_CALL)

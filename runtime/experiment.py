@@ -60,6 +60,19 @@ def run_seed(settings: Settings, world: WorldConfig, seed: int) -> SeedOutcome:
         The robot stopped for a reason, touched something, or did not get through in `SECONDS_MAX`.
     """
     run = simulate(settings, world, seed, SECONDS_MAX)
+    refuse_unfinished(run, seed, SECONDS_MAX)
+    rows, false = against_truth(world, estimates(run))
+    return SeedOutcome(seed, rows, false, run.virtual_s, run.wall_s, run.books.cycle_us())
+
+
+def refuse_unfinished(run: Simulated, seed: int, seconds_max: float) -> None:
+    """Refuse a drive that did not come through.
+
+    Raises
+    ------
+    Complaint
+        The robot stopped for a reason, touched something, or did not get through in `seconds_max`.
+    """
     if run.state.mode.mode is Mode.SAFE_STOP:
         raise Complaint(
             f"seed {seed}: the robot stopped after {run.virtual_s:.1f} s: {run.state.mode.reason}", FAILED
@@ -68,12 +81,10 @@ def run_seed(settings: Settings, world: WorldConfig, seed: int) -> SeedOutcome:
         raise Complaint(f"seed {seed}: the robot touched something", FAILED)
     if run.state.leg is None or not run.state.leg.done:
         raise Complaint(
-            f"seed {seed}: the robot did not get through in {SECONDS_MAX:.0f} s: look for a way that is too narrow "
+            f"seed {seed}: the robot did not get through in {seconds_max:.0f} s: look for a way that is too narrow "
             "for its radius and safety margin",
             FAILED,
         )
-    rows, false = against_truth(world, estimates(run))
-    return SeedOutcome(seed, rows, false, run.virtual_s, run.wall_s, run.books.cycle_us())
 
 
 def estimates(run: Simulated) -> list[tuple[float, float]]:

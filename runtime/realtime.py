@@ -33,7 +33,7 @@ def ask(config: RealtimeConfig) -> list[str]:
         A line for each thing refused: what, why, and what to do about it.
     """
     wanted: list[tuple[bool, Callable[[], str | None]]] = [
-        (config.slice_s is not None, lambda: _slice(config.slice_s or 0.0)),
+        (config.slice_s is not None, lambda: ask_slice(config.slice_s or 0.0)),
         (config.core is not None, lambda: _pin(config.core or 0)),
         (config.lock_memory, _lock),
         (config.priority is not None, lambda: _priority(config.priority or 0)),
@@ -42,8 +42,10 @@ def ask(config: RealtimeConfig) -> list[str]:
     return [refusal for refusal in answers if refusal is not None]
 
 
-def _slice(slice_s: float) -> str | None:
+def ask_slice(slice_s: float) -> str | None:
     """Ask for short turns: a thread that wants little at a time is let in before those that want much.
+
+    A slice of 0 gives the system's own back. Returns what is refused, as `ask` does.
 
     Since Linux 6.12 (EEVDF) a thread's virtual deadline follows from the slice it asks for; before, nothing happens.
     """

@@ -19,13 +19,11 @@ from drivers.emulator.device import EmulatedRobot, Truth
 from drivers.emulator.memory import MemoryLine
 from drivers.messages import Pose
 from perception.pipeline import Perception
+from runtime.allowance import QUANTA_PER_CYCLE, Allowance, Quanta
 from runtime.books import Books
 from runtime.commanding import gather, give
 from runtime.modes import Mode, Request
 from runtime.step import CycleRecord, State, step
-
-QUANTA_PER_CYCLE: Final = 50
-"""What the default budget affords on a slow machine; virtual time needs a number instead of a clock."""
 
 SETTLING_S: Final = 1.0
 """How long a robot that has arrived still listens, so that the last echoes count."""
@@ -45,19 +43,15 @@ class Simulated:
     """What the cycles took."""
 
 
-def enough_quanta(done: int) -> bool:
-    """Say whether refinement may go on after `done` quanta."""
-    return done < QUANTA_PER_CYCLE
-
-
 def simulate(
     settings: Settings,
     world: WorldConfig,
     seed: int,
     seconds_max: float,
     on_cycle: Callable[[CycleRecord, Truth], None] | None = None,
-    on_state: Callable[[CycleRecord, State], None] | None = None,
-    may_refine: Callable[[int], bool] = enough_quanta,
+    *,
+    allowance: Allowance | None = None,
+    on_state: Callable[[CycleRecord, State, Pose], None] | None = None,
 ) -> Simulated:
     """Drive through `world` until the leg is done, the robot stops for a reason, or the time is up.
 
@@ -73,11 +67,12 @@ def simulate(
         Virtual time after which the run ends.
     on_cycle : callable, optional
         Gets every record, and the truth of that moment.
+    allowance : Allowance, optional
+        How much refinement a cycle may do; `QUANTA_PER_CYCLE` where not given.
     on_state : callable, optional
-        Gets every record, and the state it left: a recorder.
-    may_refine : callable
-        In place of a clock, as in `step`.
+        Gets every record, the state it left, and where the odometry began.
     """
+    allowance = Quanta(QUANTA_PER_CYCLE) if allowance is None else allowance
     robot = EmulatedRobot(settings, world, seed)
     driver = DenningRobot(settings)
     line = MemoryLine(driver, robot)
@@ -92,12 +87,13 @@ def simulate(
         request = Request.ARM if state.mode.mode is Mode.READY else None
         inputs = gather(driver, now, request)
         step_s = time.perf_counter()
-        record = step(state, inputs, settings, lambda c: give(driver, c), may_refine)
+        allowance.begin()
+        record = step(state, inputs, settings, lambda c: give(driver, c), allowance)
         books.enter(time.perf_counter() - step_s)
         if on_cycle is not None:
             on_cycle(record, robot.truth)
         if on_state is not None:
-            on_state(record, state)
+            on_state(record, state, start)
         if state.mode.mode is Mode.SAFE_STOP or (state.leg is not None and state.leg.done):
             until = min(until, now + SETTLING_S)
     return Simulated(state, start, robot.truth, now, time.perf_counter() - began, books)

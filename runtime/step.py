@@ -34,7 +34,8 @@ class Order(Enum):
 
 
 Command: TypeAlias = Twist | Order | None
-StopCause: TypeAlias = Literal["budget", "converged", "nothing"]
+StopCause: TypeAlias = Literal["budget", "quota", "converged", "nothing"]
+"""Why refinement ended: no time left, no quanta left for these firings, all improved, nothing there to improve."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,4 +194,6 @@ def _refine(perception: Perception, may_refine: Callable[[int], bool]) -> tuple[
             return quanta, iterations, "budget"
         iterations += perception.refine()
         quanta += 1
-    return quanta, iterations, "converged" if quanta else "nothing"
+    if quanta == 0:
+        return quanta, iterations, "nothing"
+    return quanta, iterations, "quota" if perception.waiting else "converged"

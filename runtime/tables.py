@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, Literal, TypeAlias
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from rich.table import Table
 
-from runtime.experiment import DrumRow, Outcome
 from runtime.first_fix import ASKED_M
-from runtime.open_loop import BoxRow, SceneOutcome
-from runtime.summary import ObjectRow, RunSummary
+
+if TYPE_CHECKING:
+    # The robot's own process has tables too, and shall not load the emulator for them.
+    from runtime.budgets import BudgetRow
+    from runtime.experiment import DrumRow, Outcome
+    from runtime.open_loop import BoxRow, SceneOutcome
+    from runtime.summary import ObjectRow, RunSummary
 
 Units: TypeAlias = Literal["m", "ft"]
 
@@ -113,6 +117,28 @@ def objects_table(objects: list[ObjectRow], units: Units) -> Table:
             f"{seen['theta'] * 57.29578:.0f}",
             str(seen["support"]),
             f"{seen['score']:.2f}",
+        )
+    return table
+
+
+def budget_table(rows: Sequence[BudgetRow], unit: str, units: Units) -> Table:
+    """Return when the answers came under each budget, and what they were in the end."""
+    title = "a hall of 40 drums: when the answers come, and what they are in the end"
+    caption = "first: until a drum was reported; way: the robot's until each was; mean, max: error"
+    table = Table(title=title, title_justify="left", caption=caption, caption_justify="left")
+    for heading, of in zip(
+        ("budget", "quanta", "cut", "first", "way", "found", "false", "mean", "max"),
+        (unit, "a cycle", "short", "s", units, "", "", units, units), strict=True,
+    ):  # fmt: skip
+        table.add_column(f"{heading}\n{of}", justify="right", no_wrap=True)
+    for row in rows:
+        first_s, lengths = row["first_s"], ((row["way_m"], 2), (row["mean_error"], 4), (row["max_error"], 4))
+        way, mean, worst = ("" if v is None else length(v, units, digits) for v, digits in lengths)
+        first = "" if first_s is None else f"{first_s:.2f}"
+        found = f"{row['found']}/{row['drums']}"
+        cut = f"{row['cut_short']:.1%}"
+        table.add_row(
+            f"{row['budget']:g}", f"{row['quanta']:.2f}", cut, first, way, found, str(row["false"]), mean, worst
         )
     return table
 

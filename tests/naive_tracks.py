@@ -299,15 +299,23 @@ def after_merging(t: int, live: Array, place: Array, rho: Array, llr: Array, mer
     return live
 
 
-def most_urgent(
-    live: Array, fresh: Array, kept: Array, sigma: Array, likely: Array, quiet: Array, polish: Array, patience: int,
+def next_in_turn(
+    live: Array, fresh: Array, kept: Array, sigma: Array, likely: Array, owed: Array, away: Array, passed: Array,
     threshold: float,
-) -> int:  # fmt: skip
-    """Return the track with most unseen readings for its size, fourfold where unsure, raised where work is owed."""
-    urgency = fresh / (kept + 8.0) * np.where((sigma > 0.03 * FT) | (likely < 0.95), 4.0, 1.0)
-    urgency = urgency + np.where((quiet > patience) & (polish > 0), threshold + 1e-6, 0.0)
-    urgency = np.where(live, urgency, -np.inf)
-    return int(np.argmax(urgency)) if urgency.max() > threshold else -1
+) -> tuple[int, Array]:  # fmt: skip
+    """Return whose turn it is, −1 nobody's, and who waits.
+
+    Worth is unseen readings for an object's size, fourfold where unsure, raised above the threshold where work is
+    owed; the nearer to the robot the better. Whoever was passed over more than sixty times comes first.
+    """
+    worth = fresh / (kept + 8.0) * np.where((sigma > 0.03 * FT) | (likely < 0.95), 4.0, 1.0) + owed * (
+        threshold + 1e-6
+    )
+    waits = live & (worth > threshold)
+    if not waits.any():
+        return -1, waits
+    order = np.where(passed > 60, 1e9 + passed, worth * 3.0 / (3.0 + away))
+    return int(np.argmax(np.where(waits, order, -np.inf))), waits
 
 
 def probability(

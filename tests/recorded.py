@@ -35,24 +35,37 @@ def until(done: Callable[[], bool], what: str) -> None:
         time.sleep(0.001)
 
 
+class FiveInSix:
+    """Refuses every sixth quantum, at random."""
+
+    def __init__(self, seed: int) -> None:
+        self._rng = np.random.default_rng(seed)
+
+    def begin(self) -> None:
+        """Begin a cycle."""
+
+    def __call__(self, _done: int) -> bool:
+        """Say whether there may be another quantum."""
+        return bool(self._rng.random() > 1.0 / 6.0)
+
+
 def record(settings: Settings, path: Path | Place, seconds: float, seed: int = 0, queue_max: int = 8192) -> Standing:
     """Record a run in virtual time in which every sixth quantum of refinement is refused for want of time."""
     world = settings.world
     assert world is not None
-    rng = np.random.default_rng(seed)
     now = [0.0]
     place = OneFile(path) if isinstance(path, Path) else path
     with Recorder(settings, place, clock=lambda: now[0], queue_max=queue_max) as recorder:
         until(lambda: recorder.standing.file is not None or recorder.standing.trouble is not None, "a file")
 
-        def on_state(record: object, state: object) -> None:
+        def on_state(record: object, state: object, _start: object) -> None:
             recorder.on_cycle(record, state)  # type: ignore[arg-type]
             for way in ("in", "out"):
                 recorder.on_bytes(way, now[0], b"\x00bytes\xff")
             now[0] += 0.05
 
         recorder.on_log({"level": "info", "event": "start", "timestamp": "now", "why": None})
-        simulate(settings, world, seed, seconds, on_state=on_state, may_refine=lambda _done: rng.random() > 1.0 / 6.0)
+        simulate(settings, world, seed, seconds, on_state=on_state, allowance=FiveInSix(seed))
     return recorder.standing
 
 

@@ -64,30 +64,31 @@ class _Layout(NamedTuple):
     make: Callable[..., Frame]
     codes: str
     fields: tuple[str, ...]
+    fixed: struct.Struct
+    """What packs the fixed fields."""
 
-    @property
-    def size(self) -> int:
-        """Bytes of the fixed fields."""
-        return struct.calcsize("<" + self.codes)
+
+def _layout(kind: int, make: Callable[..., Frame], codes: str, fields: tuple[str, ...]) -> _Layout:
+    return _Layout(kind, make, codes, fields, struct.Struct("<" + codes))
 
 
 _HOST = (
-    _Layout(0x01, Hello, "B", ("version",)),
-    _Layout(0x02, Pattern, "", ()),
-    _Layout(0x10, Drive, "hh", ("v_mm_s", "w_mrad_s")),
-    _Layout(0x11, Halt, "", ()),
-    _Layout(0x12, Release, "", ()),
+    _layout(0x01, Hello, "B", ("version",)),
+    _layout(0x02, Pattern, "", ()),
+    _layout(0x10, Drive, "hh", ("v_mm_s", "w_mrad_s")),
+    _layout(0x11, Halt, "", ()),
+    _layout(0x12, Release, "", ()),
 )
 _ROBOT = (
-    _Layout(
+    _layout(
         0x81,
         Ident,
         "BBHHHI",
         ("version", "sensors", "ring_radius_mm", "deadman_ms", "odometry_period_ms", "boot_id"),
     ),
-    _Layout(0x82, Ack, "B", ("of",)),
-    _Layout(0x83, Nak, "BB", ("of", "code")),
-    _Layout(
+    _layout(0x82, Ack, "B", ("of",)),
+    _layout(0x83, Nak, "BB", ("of", "code")),
+    _layout(
         0x90,
         Odom,
         "IiiiihhBB",
@@ -103,7 +104,7 @@ _ROBOT = (
             "last_drive_seq",
         ),
     ),
-    _Layout(0x91, Echo, "IB", ("t_us", "step")),
+    _layout(0x91, Echo, "IB", ("t_us", "step")),
 )
 _BY_CLASS = MappingProxyType({layout.make: layout for layout in (*_HOST, *_ROBOT)})
 _BY_TYPE = MappingProxyType(
@@ -119,8 +120,15 @@ def crc(data: bytes) -> int:
     return binascii.crc_hqx(data, 0xFFFF)
 
 
-def encode(frame: Frame) -> bytes:
+def encode(frame: Frame, seq: int | None = None) -> bytes:
     """Return `frame` as it goes on the line, the closing zero included.
+
+    Parameters
+    ----------
+    frame
+        What to say.
+    seq
+        Its sequence number; the frame's own where not given.
 
     Raises
     ------
@@ -128,11 +136,13 @@ def encode(frame: Frame) -> bytes:
         A field does not fit; the message names the field, its value and its range.
     """
     layout = _BY_CLASS[type(frame)]
-    body = bytes((layout.type, _checked(frame, "seq", frame.seq, 0, 0xFF)))
-    values = []
-    for field, code in zip(layout.fields, layout.codes, strict=True):
-        values.append(_checked(frame, field, getattr(frame, field), *_RANGES[code]))
-    body += struct.pack("<" + layout.codes, *values) + _encode_tail(frame)
+    body = bytes((layout.type, _checked(frame, "seq", frame.seq if seq is None else seq, 0, 0xFF)))
+    values = [getattr(frame, field) for field in layout.fields]
+    for field, code, value in zip(layout.fields, layout.codes, values, strict=True):
+        low, high = _RANGES[code]
+        if type(value) is not int or not low <= value <= high:
+            _checked(frame, field, value, low, high)
+    body += layout.fixed.pack(*values) + _encode_tail(frame)
     stuffed: bytes = cobs.encode(body + struct.pack("<H", crc(body)))
     return stuffed + b"\0"
 
@@ -302,9 +312,9 @@ class Decoder:
         layout = self._layouts.get(kind)
         if layout is None:
             return NakCode.UNKNOWN_TYPE
-        if len(payload) < layout.size:
+        if len(payload) < layout.fixed.size:
             return NakCode.WRONG_LENGTH
-        tail = _decode_tail(layout, payload[layout.size :])
+        tail = _decode_tail(layout, payload[layout.fixed.size :])
         if isinstance(tail, NakCode):
             return tail
-        return layout.make(seq, *struct.unpack_from("<" + layout.codes, payload), *tail)
+        return layout.make(seq, *layout.fixed.unpack_from(payload), *tail)

@@ -132,7 +132,8 @@ class DenningRobot:
         self._now_s = now_s
         if self._state is LineState.CLOSED:
             return
-        given_up = [name for name in _ORDER if name in self._commands and self._commands[name].tick(now_s)]
+        commands = self._commands
+        given_up = [name for name in _ORDER if name in commands and commands[name].tick(now_s)] if commands else ()
         if given_up:
             name = given_up[0]
             heard, tries = self._decoder, self._commands[name].tries
@@ -189,6 +190,8 @@ class DenningRobot:
         """Return what should go on the line now; only HALT while the line is not `writable`."""
         if self._state is LineState.CLOSED:
             self._drive = None
+            return b""
+        if self._drive is None and not self._commands:
             return b""
         out = bytearray()
         for name in _ORDER if writable else _ORDER[:1]:

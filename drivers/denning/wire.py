@@ -14,6 +14,7 @@ from drivers.denning.frames import (
     NO_ECHO,
     SENSORS_MAX,
     TENTH_FT_M,
+    TENTHS_MIN,
     WINDOW_MAX,
     WINDOW_MIN,
     Echo,
@@ -111,3 +112,12 @@ def ranges_of(echo: Echo, count: int) -> Floats:
         if sensor < count and tenths != FAULT:
             ranges[sensor] = math.inf if tenths == NO_ECHO else tenths * TENTH_FT_M
     return ranges
+
+
+def echo_byte(range_m: float | None) -> int:
+    """Return how an ECHO says the range of a sensor that fired, metres: +inf nothing heard, None a fault."""
+    if range_m is None:
+        return FAULT
+    if not math.isfinite(range_m):
+        return NO_ECHO
+    return min(NO_ECHO, max(TENTHS_MIN, round(range_m / TENTH_FT_M)))

@@ -81,6 +81,8 @@ class Body:
         self.believed_ring_yaw = 0.0
         self.twist = Twist(0.0, 0.0)
         self.contacts = 0
+        self._known: tuple[Pose, float] | None = None
+        """The last pose that was asked about and its clearance, m: one step ends where the next one begins."""
 
     @property
     def clearance_m(self) -> float:
@@ -114,14 +116,14 @@ class Body:
         goal_w = min(limits.turn_max_rad_s, max(-limits.turn_max_rad_s, target.w))
         v, distance = _approach(self.twist.v, goal_v, rate, dt_s)
         w, turn = _approach(self.twist.w, goal_w, turn_rate, dt_s)
-        self.twist = Twist(v, w)
+        if (v, w) != (self.twist.v, self.twist.w):
+            self.twist = Twist(v, w)
         if distance == 0.0 and turn == 0.0:
             return False
         # In pieces that no thin wall can slip through.
         pieces = max(1, math.ceil(abs(distance) / (0.5 * limits.radius_m)))
         for _ in range(pieces):
-            share = self._free_share(distance / pieces, turn / pieces)
-            self._move(share * distance / pieces, share * turn / pieces)
+            share = self._move(distance / pieces, turn / pieces)
             if share < 1.0:
                 self.twist = Twist(0.0, 0.0)
                 self.contacts += 1
@@ -129,13 +131,17 @@ class Body:
         return False
 
     def _clearance(self, pose: Pose) -> float:
-        return clearance(pose.x, pose.y, self._scene.circles, self._scene.segments) - self._config.radius_m
+        if self._known is not None and self._known[0] is pose:
+            return self._known[1]
+        here_m = clearance(pose.x, pose.y, self._scene.circles, self._scene.segments) - self._config.radius_m
+        self._known = (pose, here_m)
+        return here_m
 
-    def _free_share(self, distance: float, turn: float) -> float:
-        """Return how much of the arc can be driven, 0 to 1, before the rim touches."""
+    def _free_share(self, end: Pose, distance: float, turn: float) -> float:
+        """Return how much of the arc to `end` can be driven, 0 to 1, before the rim touches."""
         if distance == 0.0:
             return 1.0
-        before, after = self._clearance(self.pose), self._clearance(arc(self.pose, distance, turn))
+        before, after = self._clearance(self.pose), self._clearance(end)
         if after >= min(0.0, before):
             return 1.0
         free, blocked = 0.0, 1.0
@@ -147,11 +153,18 @@ class Body:
                 blocked = middle
         return free
 
-    def _move(self, distance: float, turn: float) -> None:
-        self.pose = arc(self.pose, distance, turn)
+    def _move(self, distance: float, turn: float) -> float:
+        """Move along the arc as far as it is free; return how much of it that is."""
+        end = arc(self.pose, distance, turn)
+        share = self._free_share(end, distance, turn)
+        if share < 1.0:
+            distance, turn = share * distance, share * turn
+            end = arc(self.pose, distance, turn)
+        self.pose = end
         drift = self._odometry.heading_rad_per_sqrt_m
         wander = drift * math.sqrt(abs(distance)) * self._rng.standard_normal() if drift > 0.0 else 0.0
         self.believed = arc(self.believed, self._odometry.scale * distance, turn + wander)
         if not self._config.synchro:
             self.ring_yaw += turn
             self.believed_ring_yaw += turn + wander
+        return share

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from config.world import WorldConfig
 from drivers.denning import frames
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Drive, Halt, Hello, NakCode, Pattern, Release, RobotFrame
+from drivers.denning.wire import echo_byte
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.body import BRAKE_S, RAMP_S, Body
 from drivers.emulator.faults import (
@@ -46,6 +47,7 @@ ODOMETRY_PERIOD_MS = 20
 TICK_US = 5_000
 """The body moves in steps of at most this length."""
 NAME = "denning"
+_LATCHED, _DEADMAN = int(Flags.LATCHED), int(Flags.DEADMAN)  # asked at every event: an enumeration is slow
 _STILL = Twist(0.0, 0.0)
 
 
@@ -121,8 +123,8 @@ class EmulatedRobot:
         self._sonar = Sonar(robot.ring, scene, world.acoustics, of_sonar)
         self._uart = Uart(robot.link.baud)
         self._outbox = bytearray()
-        self._now_us = 0
-        self._moved_us = 0
+        self._now_us = self._moved_us = 0
+        self._ahead_us: int | None = None  # the next event, until something happens
         self._faults = FaultSchedule(faults)
         self._boot_id = self._new_boot_id() if boot_id is None else boot_id
         self._boot(clock_start_us)
@@ -168,14 +170,16 @@ class EmulatedRobot:
     def advance(self, to_s: float) -> bytes:
         """Live until `to_s`, seconds after the start, and return the bytes that have left the robot by then."""
         to_us = round(to_s * 1e6)
-        while (at_us := self._next_us()) <= to_us:
-            self._now_us = at_us
+        while (at_us := self._next_us() if self._ahead_us is None else self._ahead_us) <= to_us:
+            self._now_us, self._ahead_us = at_us, None
             self._move()
             self._meet_faults()
             if not self._faults.has(Reboot):
                 self._do_what_is_due()
-        self._now_us = max(self._now_us, to_us)
+        self._now_us, self._ahead_us = max(self._now_us, to_us), at_us
         self._collect()
+        if not self._outbox:
+            return b""
         left = bytes(self._outbox)
         self._outbox.clear()
         return left
@@ -184,6 +188,7 @@ class EmulatedRobot:
         """Take bytes from the host, at the moment to which the robot has advanced."""
         if not data or not self.plugged or self._faults.has(Deaf) or self._faults.has(Reboot):
             return
+        self._ahead_us = None
         for bit_errors in self._faults.all(BitErrors):
             data = flip_bits(data, bit_errors.rate, self._input_noise)
         for frame in self._decoder.feed(data):
@@ -251,34 +256,40 @@ class EmulatedRobot:
     # What the robot does by itself.
 
     def _next_us(self) -> int:
-        due = [self._moved_us // TICK_US * TICK_US + TICK_US]
-        if self._faults.next_us is not None:
-            due.append(self._faults.next_us)
+        next_us = self._moved_us // TICK_US * TICK_US + TICK_US
+        fault_us = self._faults.next_us
+        if fault_us is not None and fault_us < next_us:
+            next_us = fault_us
         if not self._faults.has(Reboot):
-            due.append(self._odometry_us)
-            if Flags.DEADMAN not in self._flags:
-                due.append(self._deadman_us)
-            if self._rotation.next_us is not None:
-                due.append(self._rotation.next_us)
-            if self._echoes:
-                due.append(self._echoes[0][0])
-        return max(self._now_us, min(due))
+            if self._odometry_us < next_us:
+                next_us = self._odometry_us
+            if self._deadman_us < next_us and not self._flags.value & _DEADMAN:
+                next_us = self._deadman_us
+            firing_us = self._rotation.next_us
+            if firing_us is not None and firing_us < next_us:
+                next_us = firing_us
+            if self._echoes and self._echoes[0][0] < next_us:
+                next_us = self._echoes[0][0]
+        return max(self._now_us, next_us)
 
     def _move(self) -> None:
         """Move the body up to now."""
         target, within_s = self._target, None
-        if Flags.LATCHED in self._flags or self._faults.has(Reboot):
-            target, within_s = _STILL, BRAKE_S
-        elif Flags.DEADMAN in self._flags:
-            target, within_s = _STILL, RAMP_S
         dt_s = (self._now_us - self._moved_us) * 1e-6
-        if dt_s > 0.0 and self._body.step(dt_s, target, within_s=within_s):
+        if dt_s <= 0.0:
+            return
+        flags = self._flags.value
+        if flags & _LATCHED or self._faults.has(Reboot):
+            target, within_s = _STILL, BRAKE_S
+        elif flags & _DEADMAN:
+            target, within_s = _STILL, RAMP_S
+        if self._body.step(dt_s, target, within_s=within_s):
             self._latch(Flags.BUMPER)
         self._moved_us = self._now_us
 
     def _do_what_is_due(self) -> None:
         now = self._now_us
-        if now >= self._deadman_us and Flags.DEADMAN not in self._flags:
+        if now >= self._deadman_us and not self._flags.value & _DEADMAN:
             self._flags |= Flags.DEADMAN
             self._target = _STILL
         while self._echoes and self._echoes[0][0] <= now:
@@ -300,7 +311,7 @@ class EmulatedRobot:
         fired = [i for i in range(self._sensors) if mask >> i & 1]
         ranges = self._sonar.fire(self._body.pose, self._body.ring_yaw, fired, window_m)
         stuck = {fault.sensor: fault.range_m for fault in self._faults.all(StuckSensor)}
-        return tuple(_echo_byte(stuck[i] if i in stuck else float(ranges[i])) for i in fired)
+        return tuple(echo_byte(stuck[i] if i in stuck else float(ranges[i])) for i in fired)
 
     def _report_odometry(self) -> None:
         body = self._body
@@ -323,6 +334,8 @@ class EmulatedRobot:
 
     def _meet_faults(self) -> None:
         """Let faults begin and end whose time has come."""
+        if self._faults.next_us is None:
+            return
         for begins, fault in self._faults.due(self._now_us):
             self._collect()
             self._faults.turn(fault, on=begins)
@@ -369,9 +382,8 @@ class EmulatedRobot:
 
     def _send(self, frame: RobotFrame) -> None:
         """Queue `frame` under the robot's next sequence number, which is spent even if the frame is lost."""
-        numbered = replace(frame, seq=self._seq)
+        data = encode(frame, self._seq)
         self._seq = (self._seq + 1) % 256
-        data = encode(numbered)
         for bit_errors in self._faults.all(BitErrors):
             data = flip_bits(data, bit_errors.rate, self._output_noise)
         self._transmit(data)
@@ -384,13 +396,5 @@ class EmulatedRobot:
     def _collect(self) -> None:
         """Take what has left the transmitter; into an unplugged line it leaves for nowhere."""
         left = self._uart.take(self._now_us)
-        if self.plugged:
+        if left and self.plugged:
             self._outbox += left
-
-
-def _echo_byte(range_m: float | None) -> int:
-    if range_m is None:
-        return frames.FAULT
-    if not math.isfinite(range_m):
-        return frames.NO_ECHO
-    return min(frames.NO_ECHO, max(frames.TENTHS_MIN, round(range_m / frames.TENTH_FT_M)))

@@ -43,12 +43,13 @@ class MemoryLine:
     def _exchange_at(self, t_s: float) -> None:
         now_s = self._start_s + t_s
         data = self._robot.advance(t_s)
-        if self._robot.plugged and not self._open:
+        plugged = self._robot.plugged
+        if plugged and not self._open:
             self._driver.opened(now_s)
-        elif self._open and not self._robot.plugged:
+        elif self._open and not plugged:
             self._driver.closed()
-        self._open = self._robot.plugged
-        if not self._open:
+        self._open = plugged
+        if not plugged:
             return
         if data:
             self._driver.receive(data, now_s)

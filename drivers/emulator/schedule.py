@@ -44,11 +44,12 @@ class FaultSchedule:
 
     def has(self, kind: type[Fault]) -> bool:
         """Tell whether a fault of this kind is on."""
-        return any(isinstance(fault, kind) for fault in self._active)
+        # Asked at every event; mostly there is none.
+        return bool(self._active) and any(isinstance(fault, kind) for fault in self._active)
 
     def all(self, kind: type[F]) -> list[F]:
         """Return the faults of this kind that are on."""
-        return [fault for fault in self._active if isinstance(fault, kind)]
+        return [fault for fault in self._active if isinstance(fault, kind)] if self._active else []
 
 
 def flip_bits(data: bytes, rate: float, rng: np.random.Generator) -> bytes:

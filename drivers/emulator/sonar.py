@@ -47,6 +47,9 @@ class Sonar:
         self._rng = rng
         self._mounts: Floats = np.array(ring.mounts, dtype=np.float64).reshape(-1, 3)
         self._half_angle = math.radians(ring.beam_half_angle_deg)
+        self._is_clean = not (
+            acoustics.noise_relative or acoustics.noise_m or acoustics.dropout or acoustics.outliers
+        )
         self._echoes: Floats = np.empty((len(self._mounts), 3))
 
     def fire(
@@ -112,6 +115,8 @@ class Sonar:
         count = len(ranges)
         noise = self._rng.standard_normal(count)
         dropout, outlier, anywhere = self._rng.random((3, count))
+        if self._is_clean:
+            return ranges
         heard = np.isfinite(ranges)
         spoilt = np.full(count, math.inf)
         sigma = np.hypot(self._acoustics.noise_relative * ranges[heard], self._acoustics.noise_m)

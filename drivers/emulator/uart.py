@@ -42,6 +42,8 @@ class Uart:
 
     def take(self, now_us: int) -> bytes:
         """Return the bytes that have left completely by `now_us`."""
+        if not self._queue:
+            return b""
         done = max(0, now_us - self._start_us) * self._baud // (BITS_PER_BYTE * _MICRO)
         count = min(len(self._queue), done - self._left)
         if count <= 0:

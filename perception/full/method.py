@@ -62,11 +62,17 @@ class FullPerception:
         self._polygons_left = 0
         self._circles_pending = False
         self._polygons_pending = False
+        self._polygons_turn = False
 
     @property
     def pending(self) -> bool:
         """Whether refinement has anything left to improve before the next firing."""
         return (self._circles_pending and self._left > 0) or (self._polygons_pending and self._polygons_left > 0)
+
+    @property
+    def waiting(self) -> bool:
+        """Whether an object may wait, be it for the next firing."""
+        return self._circles_pending or self._polygons_pending
 
     @property
     def living(self) -> int:
@@ -90,6 +96,8 @@ class FullPerception:
             self._handle, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), float(firing.t_s),
             firing.ranges_m, self._config.fresh_share,
         )  # fmt: skip
+        # Polygons come after the circles, but not where the time was up before it was their turn.
+        self._polygons_turn = self._polygons_pending and self._polygons_left > 0 and not self._polygons_turn
         self._left = self._config.quanta_per_firing
         self._polygons_left = self._config.polygon_quanta_per_firing
         self._polygons_pending = self.settings.polys > 0
@@ -97,12 +105,13 @@ class FullPerception:
 
     def refine(self) -> int:
         """Refine one object; return 1, or 0 where nothing is left to improve."""
-        if self._circles_pending and self._left > 0:
+        polygons = self._polygons_pending and self._polygons_left > 0
+        if self._circles_pending and self._left > 0 and not (polygons and self._polygons_turn):
             self._left -= 1
             self._objects = None
             self._circles_pending = quantum(self._handle, self._config.fresh_share)
             return 1
-        if self._polygons_pending and self._polygons_left > 0:
+        if polygons:
             self._polygons_left -= 1
             self._objects = None
             self._polygons_pending = pquantum(self._handle, self._config.fresh_share)
@@ -154,7 +163,7 @@ class FullPerception:
         self._objects = ()
         self._left = 0
         self._polygons_left = 0
-        self._circles_pending = self._polygons_pending = False
+        self._circles_pending = self._polygons_pending = self._polygons_turn = False
 
     def adopt(self, config: PerceptionConfig) -> None:
         """Go on with other constants; the number of tracks stays."""

@@ -15,12 +15,14 @@ from perception.full.noise_choice import choose_noise, noise_variance, roughness
 from perception.full.pairs import map_add, tangent
 from perception.full.polygon_births import ask_for_polygon
 from perception.full.polygon_claims import poly_claims
-from perception.full.refine import urgent
 from perception.full.reservoir import put
+from perception.full.selection import is_waiting
 from perception.full.state import (
     DIRTY,
     ESTABLISHED,
     FREE,
+    HERE_X,
+    HERE_Y,
     HK,
     KIND,
     POLISH,
@@ -334,7 +336,7 @@ def observe(
     ranges : (n,) float
         m; NaN did not fire, inf heard nothing.
     threshold : float
-        As for `perception.full.refine.quantum`.
+        Unseen evidence for an object's size from which on it waits for refinement.
 
     Returns
     -------
@@ -342,6 +344,8 @@ def observe(
         Outline segments made, and whether an object waits for refinement.
     """
     m = place_readings(s, p, mounts, px, py, yaw, ranges) if math.isfinite(now) else 0
+    if m > 0:
+        s.g[HERE_X], s.g[HERE_Y] = px, py
     claim(s, p, m)
     if p.polys > 0:
         var0, _ = noise_variance(s, p)
@@ -352,4 +356,4 @@ def observe(
     remember(s, p, m, now)
     choose_noise(s, p)
     propose(s, p, made, now)
-    return made, urgent(s, p, threshold) >= 0
+    return made, is_waiting(s, p, threshold)

@@ -53,7 +53,7 @@ from perception.full.polygon_throws import (
     search_first,
     throw_next,
 )
-from perception.full.refine import OWED, SIZE
+from perception.full.selection import choose_polygon
 from perception.full.state import (
     DIRTY,
     ESTABLISHED,
@@ -138,7 +138,7 @@ def merge_polygons(s: State, p: Settings, t: int) -> None:
 
 @kernel
 def next_track(s: State, p: Settings, threshold: float) -> bool:
-    """Begin with the polygon with the most unseen evidence for its size; return whether there is one.
+    """Begin with the polygon whose turn it is; return whether there is one.
 
     Parameters
     ----------
@@ -147,17 +147,7 @@ def next_track(s: State, p: Settings, threshold: float) -> bool:
     threshold : float
         Less than this share of unseen evidence is not worth the work.
     """
-    best = threshold
-    chosen = -1
-    for t in range(s.pi.shape[0]):
-        if s.pi[t, ST] == FREE:
-            continue
-        v = s.pi[t, DIRTY] / (s.pi[t, NRES] + SIZE)
-        if s.pi[t, QUIET] > p.quiet and s.pi[t, POLISH] > 0:
-            v += threshold + OWED
-        if v > best:
-            best = v
-            chosen = t
+    chosen = choose_polygon(s, p, threshold)
     if chosen < 0:
         return False
     if s.pi[chosen, QUIET] > p.quiet:

@@ -1,8 +1,8 @@
 """One object at a time: where it is, what speaks for it, what else it might be, and whether it stays.
 
 A quantum of refinement has a bounded cost: a posterior over at most a reservoir of readings, and one rival (all of
-them while little is known). The object with the most unseen evidence for its size goes first, so what has converged
-is asked less and less, and later passes cost less than the first.
+them while little is known). What has converged is chosen less and less, see `selection`, so later passes cost less
+than the first.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from perception.full.posterior import posterior_circle
 from perception.full.report import call_or_not
 from perception.full.reservoir import flatten
 from perception.full.rivals import SOFT, compete_circle, compete_line, score
+from perception.full.selection import CERTAIN, UNSURE_ROOT_M, choose, is_waiting
 from perception.full.state import (
     C00,
     C01,
@@ -72,8 +73,6 @@ READINGS_MIN: Final = 3
 BASIN: Final = 6.0
 """A robust fit this many σ² off (and the first two refinements) takes the pose over."""
 YOUNG: Final = 2
-UNSURE_ROOT_M: Final = 0.03 * FOOT_M
-"""A centre known worse than this may still be in the wrong place altogether."""
 LOST: Final = 2.0
 """A mean this much worse than where it was looked for has left the beams that heard it, nat."""
 CORRELATION_MAX: Final = 0.9
@@ -82,7 +81,6 @@ SWITCH_ROOT_M: Final = 0.02 * FOOT_M
 """After a change of kind the pose is looked for this far round at least."""
 SWITCH_DIRTY: Final = 4
 LINE_HITS_MIN: Final = 6.0
-CERTAIN: Final = 0.95
 THROUGH_SHARE: Final = 0.5
 """A wedge shares this much of the silences that speak against its rival."""
 WALL_ECHOES_MIN: Final = 10.0
@@ -312,39 +310,12 @@ def merge_duplicates(s: State, p: Settings, t: int) -> None:
                 s.ti[k, ST] = FREE
 
 
-UNSURE: Final = 4.0
-SIZE: Final = 8.0
-OWED: Final = 1e-6
-
-
-@kernel
-def urgent(s: State, p: Settings, threshold: float) -> int:
-    """Return the track with the most unseen evidence for its size, −1 where none has more than `threshold`.
-
-    A track that has had no evidence for a while is worked off to the end: whatever is unseen, and a few rounds more.
-    """
-    best = threshold
-    chosen = -1
-    for t in range(s.ti.shape[0]):
-        if s.ti[t, ST] == FREE:
-            continue
-        v = s.ti[t, DIRTY] / (s.ti[t, NRES] + SIZE)
-        if max(s.tf[t, R00], s.tf[t, R11]) > UNSURE_ROOT_M or s.tf[t, PROB] < CERTAIN:
-            v *= UNSURE
-        if s.ti[t, QUIET] > p.quiet and s.ti[t, POLISH] > 0:
-            v += threshold + OWED
-        if v > best:
-            best = v
-            chosen = t
-    return chosen
-
-
 @kernel
 def quantum(s: State, p: Settings, threshold: float) -> bool:
-    """Refine the most urgent track; return whether another one is waiting."""
-    t = urgent(s, p, threshold)
+    """Refine the circle whose turn it is; return whether another one is waiting."""
+    t = choose(s, p, threshold)
     if t >= 0:
         if s.ti[t, QUIET] > p.quiet:
             s.ti[t, POLISH] -= 1
         refine(s, p, t)
-    return urgent(s, p, threshold) >= 0
+    return is_waiting(s, p, threshold)

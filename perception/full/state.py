@@ -49,9 +49,9 @@ TX, TY, TTH, TRHO, R00, R10, R11, C00, C01, C11, LLR, HITS, THRU, NEAR, PROB, SP
 NTF: Final = 24
 # Columns of `State.ti` and `State.pi`. ST: 0 free, 1 tentative, 2 established. KIND: index into `Settings.radii`.
 # QUIET: firings without evidence; POLISH: refinements still owed once it is quiet; CALLED: 1 while it has its name.
-# RIVAL: of a polygon, whether it has a challenger.
-ST, KIND, DIRTY, CYC, NRES, MODEL, REFS, QUIET, POLISH, CALLED, RIVAL = range(11)
-NTI: Final = 11
+# RIVAL: of a polygon, whether it has a challenger. PASSED: quanta for others since.
+ST, KIND, DIRTY, CYC, NRES, MODEL, REFS, QUIET, POLISH, CALLED, RIVAL, PASSED = range(12)
+NTI: Final = 12
 # Columns of `State.lines`: normal, distance along it from an origin on the spot, that origin, covariance of angle and
 # distance, extent along the line, log odds of being there still, echoes that it explained (0: free).
 LNX, LNY, LC, LOX, LOY, LP00, LP01, LP11, LLO, LHI, LLOG, LN = range(12)
@@ -59,8 +59,8 @@ LNX, LNY, LC, LOX, LOY, LP00, LP01, LP11, LLO, LHI, LLOG, LN = range(12)
 # and heading, pose of a challenger.
 PX, PY, PTH, PLLR, PHITS, PNEAR, PPROB, PSURE, PXX, PXY, PYY, PXT, PYT, PTT, CX, CY, CTH = range(17)
 NPF: Final = 17
-# Cells of `State.g`.
-NOISE, SEGMENTS, BIRTHS, REFINEMENTS = range(4)
+# Cells of `State.g`; HERE is where the ring last fired.
+NOISE, SEGMENTS, BIRTHS, REFINEMENTS, HERE_X, HERE_Y = range(6)
 
 FREE, TENTATIVE, ESTABLISHED = range(3)
 

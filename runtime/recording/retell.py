@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 from config.settings import Settings
 from drivers.messages import Pose
 from perception.pipeline import SeenObject
+from runtime.allowance import enough_quanta
 from runtime.experiment import against_truth
 from runtime.modes import Mode
 from runtime.recording.channels import CYCLE, Entry, decode
 from runtime.recording.forms import Cycle
 from runtime.recording.reading import Recording, RecordingError
 from runtime.recording.rerun import again, fresh_state
-from runtime.simulate import enough_quanta
 from runtime.step import Command, CycleRecord, State, step
 from runtime.summary import ObjectRow, object_row
 

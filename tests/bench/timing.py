@@ -24,10 +24,16 @@ from typing import Any, Final
 import numpy as np
 import orjson
 
+from config.load import load_settings
+from config.robot import SOUND_SPEED_M_S
 from runtime.complaint import FAILED, Complaint
 from tests.bench.waking import PERIOD_S, hogs
 
 ECHO_TO_DRIVE: Final = "echo to drive"
+LATE: Final = "timing: late"
+"""The row of how long after its time a cycle began."""
+WINDOW_USED: Final = "firing window used, p99 share"
+START_CONTROL: Final = "start_s, bare control"
 WAKING: Final = "lag"
 CONTROL: Final = ", bare control"
 PATIENCE_S: Final = 90.0
@@ -85,13 +91,14 @@ def measure_timing(plan: TimingPlan, sets: Sequence[str], told: Callable[[str], 
     samples: dict[str, list[float]] = {
         name: [] for name in (WAKING + CONTROL, ECHO_TO_DRIVE, ECHO_TO_DRIVE + CONTROL)
     }
-    unanswered = 0
+    unanswered, imports_s = 0, []
     with tempfile.TemporaryDirectory(prefix="echolocate-bench-") as name, hogs(plan.busy):
         folder = Path(name)
         for turn in range(1, plan.rounds + 1):
             told(f"timing: ours, {plan.seconds:g} s, turn {turn} of {plan.rounds}, {plan.busy} busy processes beside")
             summary, late_us = _ours(folder, plan.seconds, sets)
             summaries.append(summary)
+            imports_s.append(_import_s())
             samples[WAKING + CONTROL] += late_us
             answers, missing = answers_us(folder / "latency.csv")
             samples[ECHO_TO_DRIVE] += answers
@@ -101,9 +108,18 @@ def measure_timing(plan: TimingPlan, sets: Sequence[str], told: Callable[[str], 
             samples[ECHO_TO_DRIVE + CONTROL] += answers_us(folder / "latency.csv")[0]
     rows = worst_rows(summaries)
     rows |= {name: quantiles_of(taken) for name, taken in samples.items() if taken}
-    return Timing(
-        plan, dict(sorted(rows.items())), worst_figures(summaries) | {"echoes unanswered": float(unanswered)}
-    )
+    figures = worst_figures(summaries) | {
+        WINDOW_USED: round(rows["cycle"]["p99"] / (1e6 * window_s(sets)), 4),
+        START_CONTROL: round(max(imports_s), 2),
+        "echoes unanswered": float(unanswered),
+    }
+    return Timing(plan, dict(sorted(rows.items())), figures)
+
+
+def window_s(sets: Sequence[str]) -> float:
+    """Return how long the ring listens after a firing, s: the time there is for a cycle's work."""
+    ring = load_settings("hallway", sets).ring
+    return 2.0 * ring.window_m / SOUND_SPEED_M_S
 
 
 def answers_us(trace: Path) -> tuple[list[float], int]:
@@ -166,6 +182,7 @@ def worst_figures(summaries: Sequence[Mapping[str, Any]]) -> dict[str, float]:
         plain = {name: value for name, value in process.items() if isinstance(value, int | float)}
         plain |= {"full collections": process["collections"][-1], "link lost": summary["link"]["lost"]}
         plain |= {name: summary[name] for name in ("late", "missed")}
+        plain |= {"stops": len(summary["stop_reasons"]), "gave up driving": summary["mode"] != "DRIVE"}
         for name, value in plain.items():
             figures[name] = max(float(value), figures.get(name, float(value)))
     return figures
@@ -185,6 +202,13 @@ def _ours(folder: Path, seconds: float, sets: Sequence[str]) -> tuple[dict[str, 
             _finish(folder, process, name, seconds + PATIENCE_S)
     found: dict[str, Any] = orjson.loads(summary.read_bytes())
     return found, [float(line) for line in late.read_text().split()]
+
+
+def _import_s() -> float:
+    """Return how long an interpreter takes that imports numba and does nothing: the least a start can take."""
+    begin_s = time.monotonic()
+    subprocess.run([sys.executable, "-c", "import numba"], check=True, timeout=PATIENCE_S)
+    return time.monotonic() - begin_s
 
 
 def _control(folder: Path, seconds: float, sets: Sequence[str]) -> None:

@@ -10,14 +10,16 @@ import orjson
 from rich.table import Table
 
 from runtime.complaint import WRONG_CALL, Complaint
-from tests.bench.timing import CONTROL, ECHO_TO_DRIVE, Timing
+from tests.bench.timing import CONTROL, ECHO_TO_DRIVE, LATE, WAKING, WINDOW_USED, Timing
 
 COLUMNS: Final = ("p50", "p99", "p99.9", "max")
 ANSWER_MAX_US: Final = 3000.0
 """From an echo to the command, beyond what the bare control takes, at p99."""
+LATE_MAX_US: Final = 1000.0
+"""After its time that a cycle begins, beyond what a bare loop's does, at p99.9."""
 LIMITS: Final = {
     "start_s": 2.5, "rss_mb": 250.0, "rss_peak_mb": 250.0, "cpu_share": 0.06,
-    "compilations": 0.0, "full collections": 0.0, "link lost": 0.0,
+    "compilations": 0.0, "full collections": 0.0, "link lost": 0.0, "stops": 0.0, WINDOW_USED: 0.03,
 }  # fmt: skip
 """What each figure may be at most."""
 
@@ -48,6 +50,9 @@ def verdicts(timing: Timing) -> list[tuple[str, float, float]]:
     if ECHO_TO_DRIVE in rows and ECHO_TO_DRIVE + CONTROL in rows:
         limit = ANSWER_MAX_US + rows[ECHO_TO_DRIVE + CONTROL]["p99"]
         asked.append((f"{ECHO_TO_DRIVE}, p99 µs", rows[ECHO_TO_DRIVE]["p99"], limit))
+    if LATE in rows and WAKING + CONTROL in rows:
+        limit = LATE_MAX_US + rows[WAKING + CONTROL]["p99.9"]
+        asked.append(("a cycle begins after its time, p99.9 µs", rows[LATE]["p99.9"], limit))
     return asked
 
 

@@ -20,12 +20,15 @@ from typing import Final, TypeAlias
 import numpy as np
 from rich.table import Table
 
+from runtime.realtime import ask_slice
 from runtime.wake import Waker
 
 PERIOD_S: Final = 0.05
 """The cycle's own."""
 WAKES_A_TURN: Final = 40
 SPIN_S: Final = 0.001
+SLICE_S: Final = 0.0001
+"""The default of realtime.slice_s."""
 CONTROL: Final = "time.sleep, no loop"
 
 Sleep: TypeAlias = Callable[[float], Awaitable[object]]
@@ -73,6 +76,17 @@ def by_waker() -> Iterator[Sleep]:
         waker.close()
 
 
+@contextlib.contextmanager
+def by_waker_in_short_turns() -> Iterator[Sleep]:
+    """Sleep as the cycle does, asking the system for short turns, as a run does."""
+    ask_slice(SLICE_S)
+    try:
+        with by_waker() as sleep:
+            yield sleep
+    finally:
+        ask_slice(0.0)
+
+
 def spinning(
     sleep: Callable[[], contextlib.AbstractContextManager[Sleep]], spin_s: float
 ) -> Callable[[], contextlib.AbstractContextManager[Sleep]]:
@@ -105,6 +119,7 @@ def ways() -> list[Way]:
         Way("asyncio.sleep + 1 ms spin", spinning(by_asyncio, SPIN_S)),
         Way("asyncio.sleep on select()", by_asyncio, select_loop),
         Way("timerfd (runtime/wake.py)", by_waker),
+        Way("timerfd, realtime.slice_s = 0.0001", by_waker_in_short_turns),
         Way("timerfd + 0.2 ms spin", spinning(by_waker, 0.0002)),
     ]
     with contextlib.suppress(ImportError):

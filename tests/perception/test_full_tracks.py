@@ -430,25 +430,15 @@ def test_of_two_tracks_in_one_place_the_one_with_more_evidence_stays() -> None:
     assert merged > 500
 
 
-def test_the_most_urgent_track_and_the_next_free_one() -> None:
-    rng, s, none = np.random.default_rng(12), shared(), 0
-    for _ in range(3000):
+def test_the_next_free_track() -> None:
+    rng, s = np.random.default_rng(12), shared()
+    for _ in range(1000):
         for k in range(TRACKS):
             random_track(rng, s, k, int(rng.choice([FREE, TENTATIVE, ESTABLISHED], p=[0.08, 0.32, 0.6])))
-            s.ti[k, [DIRTY, NRES, QUIET, POLISH]] = rng.integers([12, 300, 30, 3])
-        s.ti[:, [DIRTY, POLISH]] *= rng.integers(2)
         i, f = s.ti, s.tf
-        want = naive_tracks.most_urgent(
-            i[:, ST] != FREE, i[:, DIRTY], i[:, NRES], np.maximum(f[:, R00], f[:, R11]), f[:, PROB],
-                i[:, QUIET], i[:, POLISH],
-            P.quiet, 0.08,
-        )  # fmt: skip
-        assert refine.urgent(s, P, 0.08) == want
-        none += want < 0
         free, tentative = np.flatnonzero(i[:, ST] == FREE), np.flatnonzero(i[:, ST] == TENTATIVE)
         weakest = int(tentative[np.argmin(f[tentative, LLR])]) if len(tentative) else -1
         assert births.free_track(s) == (free[0] if len(free) else weakest)
-    assert none > 10
 
 
 def test_a_segment_of_a_known_body_is_known() -> None:

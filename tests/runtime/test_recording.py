@@ -205,7 +205,7 @@ def test_what_does_not_fit_is_dropped_counted_and_got_over(tmp_path: Path) -> No
     # Nothing takes from the queue until half of the run is over: then a thread does, and the rest gets through.
     count = 0
 
-    def on_state(cycle: Any, state: Any) -> None:
+    def on_state(cycle: Any, state: Any, _start: Any) -> None:
         nonlocal count
         count += 1
         if count == 100:
@@ -234,7 +234,7 @@ def test_the_loop_only_hands_over() -> None:
     handed, encoded = [], []
     recorder = Recorder(settings, OneFile(Path("/nowhere/at/all")), clock=lambda: 0.0)
 
-    def on_state(cycle: Any, state: Any) -> None:
+    def on_state(cycle: Any, state: Any, _start: Any) -> None:
         began = time.perf_counter()
         recorder.on_cycle(cycle, state)
         handed.append(time.perf_counter() - began)

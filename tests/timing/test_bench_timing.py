@@ -12,11 +12,15 @@ from runtime.complaint import Complaint
 from tests.bench.timing import (
     CONTROL,
     ECHO_TO_DRIVE,
+    LATE,
+    WAKING,
+    WINDOW_USED,
     Timing,
     TimingPlan,
     answers_us,
     quantile_rows,
     quantiles_of,
+    window_s,
     worst_figures,
     worst_rows,
 )
@@ -56,10 +60,20 @@ def test_every_row_of_quantiles_in_a_summary_is_found() -> None:
 def test_figures_are_the_worst_of_all_runs() -> None:
     def summary(**process: Any) -> dict[str, Any]:
         defaults = {"start_s": 1.0, "rss_mb": None, "collections": [0, 5, 0]}
-        return {"process": defaults | process, "link": {"lost": 0}, "late": 0, "missed": 2}
+        return {
+            "process": defaults | process,
+            "link": {"lost": 0},
+            "late": 0,
+            "missed": 2,
+            "stop_reasons": [],
+            "mode": "DRIVE",
+        }
 
     figures = worst_figures([summary(), summary(start_s=2.0, collections=[0, 0, 1])])
-    assert figures == {"start_s": 2.0, "full collections": 1.0, "link lost": 0.0, "late": 0.0, "missed": 2.0}
+    assert figures == {
+        "start_s": 2.0, "full collections": 1.0, "link lost": 0.0, "late": 0.0, "missed": 2.0,
+        "stops": 0.0, "gave up driving": 0.0,
+    }  # fmt: skip
 
 
 def timed(p99: float, control: float) -> Timing:
@@ -72,6 +86,18 @@ def test_limits_are_three_milliseconds_beyond_the_control() -> None:
     assert asked[f"{ECHO_TO_DRIVE}, p99 µs"] == pytest.approx((3400.0, 3500.0))
     assert asked["start_s"] == (2.0, 2.5)
     assert asked["cpu_share"] == (0.07, 0.06)
+
+
+def test_cycles_may_begin_a_millisecond_later_than_a_bare_loop_wakes() -> None:
+    rows = {LATE: quantiles_of([1900.0]), WAKING + CONTROL: quantiles_of([1000.0])}
+    assert verdicts(Timing(PLAN, rows, {WINDOW_USED: 0.02})) == [
+        (WINDOW_USED, 0.02, 0.03),
+        ("a cycle begins after its time, p99.9 µs", 1900.0, 2000.0),
+    ]
+
+
+def test_the_window_is_the_way_to_the_farthest_echo_and_back() -> None:
+    assert window_s([]) == pytest.approx(0.0453, abs=1e-4)
 
 
 def test_an_earlier_run_stands_beside_this_one(tmp_path: Path) -> None:

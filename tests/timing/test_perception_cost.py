@@ -17,7 +17,8 @@ from drivers.messages import Firing
 from perception.full import entry, refine
 from perception.full.method import FullPerception
 from perception.pipeline import Perception
-from runtime.simulate import enough_quanta, simulate
+from runtime.allowance import enough_quanta
+from runtime.simulate import simulate
 from runtime.step import CycleRecord, State, step
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]

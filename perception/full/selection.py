@@ -1,0 +1,130 @@
+"""Which object a quantum of refinement goes to: the one that gains most by it, and in the end every one.
+
+Worth is unseen evidence for an object's size, more where its place is unsure; among those worth a quantum the nearer
+to the robot goes first, as it is what the robot meets next. A budget that is spent in every cycle would leave some
+waiting for ever: whoever was passed over too often goes before all others, longest wait first, so that nobody waits
+for more than `PATIENCE` quanta and one for each other object.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from perception.full.state import (
+    DIRTY,
+    FREE,
+    HERE_X,
+    HERE_Y,
+    NRES,
+    PASSED,
+    POLISH,
+    PROB,
+    PX,
+    PY,
+    QUIET,
+    R00,
+    R11,
+    ST,
+    TX,
+    TY,
+    Settings,
+    State,
+)
+from perception.kernel import kernel
+
+FOOT_M: Final = 0.3048
+UNSURE: Final = 4.0
+UNSURE_ROOT_M: Final = 0.03 * FOOT_M
+"""Evidence counts so many times where an object's place is less sure than this, maybe altogether wrong."""
+CERTAIN: Final = 0.95
+"""Or where its name is less sure than this."""
+SIZE: Final = 8.0
+"""A small object's readings are taken for so many more."""
+OWED: Final = 1e-6
+"""By so much what is worked off to the end is above the threshold by itself."""
+NEAR_M: Final = 3.0
+"""An object as far as this from the robot counts half as much as one beside it."""
+PATIENCE: Final = 60
+"""Quanta that may go to others; then an object goes before all that are not passed over as often."""
+OVERDUE: Final = 1e9
+
+
+@kernel
+def worth(s: State, p: Settings, t: int, threshold: float) -> float:
+    """Return what a quantum is worth to circle `t`; it waits for one where that is above `threshold`.
+
+    A track that has had no evidence for a while is worked off to the end: whatever is unseen, and a few rounds more.
+    """
+    if s.ti[t, ST] == FREE:
+        return 0.0
+    v: float = s.ti[t, DIRTY] / (s.ti[t, NRES] + SIZE)
+    if max(s.tf[t, R00], s.tf[t, R11]) > UNSURE_ROOT_M or s.tf[t, PROB] < CERTAIN:
+        v *= UNSURE
+    if s.ti[t, QUIET] > p.quiet and s.ti[t, POLISH] > 0:
+        v += threshold + OWED
+    return v
+
+
+@kernel
+def worth_polygon(s: State, p: Settings, t: int, threshold: float) -> float:
+    """Return the same for polygon `t`."""
+    if s.pi[t, ST] == FREE:
+        return 0.0
+    v: float = s.pi[t, DIRTY] / (s.pi[t, NRES] + SIZE)
+    if s.pi[t, QUIET] > p.quiet and s.pi[t, POLISH] > 0:
+        v += threshold + OWED
+    return v
+
+
+@kernel
+def rank(s: State, v: float, x: float, y: float, passed: int) -> float:
+    """Return the place in the row of something of worth `v` at (x, y), passed over so often: the largest is next."""
+    if passed > PATIENCE:
+        return OVERDUE + passed
+    return v * NEAR_M / (NEAR_M + math.hypot(x - s.g[HERE_X], y - s.g[HERE_Y]))
+
+
+@kernel
+def is_waiting(s: State, p: Settings, threshold: float) -> bool:
+    """Tell whether a circle waits for a quantum."""
+    most = 0.0
+    for t in range(s.ti.shape[0]):
+        most = max(most, worth(s, p, t, threshold))
+    return most > threshold
+
+
+@kernel
+def choose(s: State, p: Settings, threshold: float) -> int:
+    """Return the circle whose turn it is, −1 where none waits; the others that wait have been passed over."""
+    best = -1.0
+    chosen = -1
+    for t in range(s.ti.shape[0]):
+        v = worth(s, p, t, threshold)
+        if v > threshold:
+            v = rank(s, v, s.tf[t, TX], s.tf[t, TY], s.ti[t, PASSED])
+            s.ti[t, PASSED] += 1
+            if v > best:
+                best = v
+                chosen = t
+    if chosen >= 0:
+        s.ti[chosen, PASSED] = 0
+    return chosen
+
+
+@kernel
+def choose_polygon(s: State, p: Settings, threshold: float) -> int:
+    """Return the polygon whose turn it is, as `choose` does the circle."""
+    best = -1.0
+    chosen = -1
+    for t in range(s.pi.shape[0]):
+        v = worth_polygon(s, p, t, threshold)
+        if v > threshold:
+            v = rank(s, v, s.pf[t, PX], s.pf[t, PY], s.pi[t, PASSED])
+            s.pi[t, PASSED] += 1
+            if v > best:
+                best = v
+                chosen = t
+    if chosen >= 0:
+        s.pi[chosen, PASSED] = 0
+    return chosen
