@@ -19,7 +19,7 @@ from drivers.denning.stamping import Stamper
 from drivers.denning.watch import DriveWatch, RingWatch
 from drivers.denning.wire import identity_of, to_wire, wire_pattern
 from drivers.driver import Heard, LineState
-from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Twist
+from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
 
 _GREET_AGAIN_S = 0.5
 """Pace of greeting a robot that does not answer or is the wrong one."""
@@ -50,7 +50,8 @@ class DenningRobot:
     def __init__(self, config: RobotConfig) -> None:
         self._config = config
         self._pattern = wire_pattern(config.ring)
-        self._stamper = Stamper(len(config.ring.mounts))
+        self._stamper = Stamper(len(config.ring.mounts), config.body)
+        self._stamper.set_window(self._pattern.window)
         self._state = LineState.CLOSED
         self._trouble: str | None = None
         self._identity: Identity | None = None
@@ -99,8 +100,18 @@ class DenningRobot:
 
     @property
     def late_echoes(self) -> int:
-        """Firings dropped because no odometry tells where they took place."""
+        """Firings dropped: no odometry tells where they took place, or they came twice, or after a newer one."""
         return self._stamper.late_echoes
+
+    @property
+    def out_of_window(self) -> int:
+        """Ranges dropped that lie beyond the window their firing listened for."""
+        return self._stamper.out_of_window
+
+    @property
+    def frame(self) -> Pose:
+        """The origin of the poses handed up, in the robot's own odometry: another one since that has leapt."""
+        return self._stamper.frame
 
     def opened(self, now_s: float) -> None:
         """Begin (again) on a line just opened: greet the robot and set its firing pattern."""
@@ -181,6 +192,8 @@ class DenningRobot:
         pattern = wire_pattern(ring)
         if pattern == self._pattern:
             return
+        # Until the new one is under way, whose echoes come next cannot be told.
+        self._stamper.set_window(max(self._pattern.window, pattern.window))
         self._pattern = pattern
         if self._state is LineState.READY or "PATTERN" in self._commands:
             self._ask("PATTERN")
@@ -215,7 +228,7 @@ class DenningRobot:
 
     def take(self) -> Heard:
         """Return and forget what arrived since the last call."""
-        heard = Heard(tuple(self._firings), self._odometry, self._rebooted)
+        heard = Heard(tuple(self._firings), self._odometry, self._rebooted, self._stamper.notes())
         self._firings.clear()
         self._odometry = None
         self._rebooted = False
