@@ -98,7 +98,8 @@ def refusal(command: str, code: int) -> str:
 def odometry_jump(off_m: float, turned_rad: float, ring_rad: float) -> str:
     """Return what to make of odometry that leapt by so much, the heading and the ring's direction by so much."""
     return (
-        f"the odometry leapt by {off_m:.2f} m and {math.degrees(turned_rad):+.0f} degrees (the ring's direction by "
-        f"{math.degrees(ring_rad):+.0f}), farther than the wheels could have turned; a wheel slipped, or an encoder or "
-        f"its counter failed: the leap is taken out and the map goes on; check wheels and encoders if it comes again"
+        f"the odometry leapt by {off_m:.2f} m and {math.degrees(turned_rad):+.0f} degrees, the ring's direction by "
+        f"{math.degrees(ring_rad):+.0f}: farther than the wheels could have turned; a wheel slipped, or an "
+        f"encoder or its counter failed: the leap is taken out and the map goes on; if it comes again, check wheels "
+        f"and encoders"
     )
