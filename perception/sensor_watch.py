@@ -116,14 +116,19 @@ def begin_run(i: int, r: float, x: float, y: float, yaw: float, sides: Ints, mem
 
 
 @kernel
-def since(i: int, what: int, sides: Ints, memory: Floats) -> float:
-    """Return how many `what` either neighbour has had since the run of equal readings began; none without both."""
-    if sides[i, 0] < 0:
-        return 0.0
-    k = what - STEPS
-    left = memory[sides[i, 0], what] - memory[i, THEN + k]
-    right = memory[sides[i, 1], what] - memory[i, THEN + 3 + k]
-    return float(min(left, right))
+def since(i: int, what: int, sides: Ints, memory: Floats, deaf: bool) -> float:
+    """Return how many `what` either neighbour has had since the run of equal readings began; none without both.
+
+    Where `deaf`, one that hears nothing now is left out of it.
+    """
+    least = math.inf
+    for side in range(2):
+        k = sides[i, side]
+        if k < 0:
+            return 0.0
+        if not (deaf and math.isinf(memory[k, R1])):
+            least = min(least, memory[k, what] - memory[i, THEN + 3 * side + what - STEPS])
+    return least if math.isfinite(least) else 0.0
 
 
 @kernel
@@ -153,8 +158,12 @@ def is_stuck(
     along = abs(dx * math.cos(axis) + dy * math.sin(axis))
     across = abs(dy * math.cos(axis) - dx * math.sin(axis))
     towards = along * math.cos(half_angle) - across * math.sin(half_angle)
-    came = towards >= TOWARDS_M and c[COUNT] >= READINGS and since(i, STEPS, sides, memory) >= CHANGES
-    passed = math.hypot(dx, dy) >= PAST_M and c[COUNT] >= PAST_READINGS and since(i, LEAPS, sides, memory) >= CHANGES
+    came = towards >= TOWARDS_M and c[COUNT] >= READINGS and since(i, STEPS, sides, memory, deaf=True) >= CHANGES
+    passed = (
+        math.hypot(dx, dy) >= PAST_M
+        and c[COUNT] >= PAST_READINGS
+        and since(i, LEAPS, sides, memory, deaf=False) >= CHANGES
+    )
     return bool((came or passed) and others_changed(i, memory, faults))
 
 
@@ -163,7 +172,7 @@ def is_silent(i: int, x: float, y: float, sides: Ints, memory: Floats) -> bool:
     """Tell whether a sensor should have heard something by now."""
     c = memory[i]
     far = math.hypot(x - c[X], y - c[Y]) >= SILENT_M and c[COUNT] >= PAST_READINGS
-    return bool(far and since(i, ECHOES, sides, memory) >= HEARD_SHARE * c[COUNT])
+    return bool(far and since(i, ECHOES, sides, memory, deaf=False) >= HEARD_SHARE * c[COUNT])
 
 
 @kernel
@@ -366,7 +375,8 @@ class SensorWatch:
     def believe(self, firing: Firing) -> tuple[Firing, Firing]:
         """Take in a firing; return what is to be believed of it, and that with what is in doubt.
 
-        What is in doubt makes no map, and is kept clear of all the same. Ranges that are neither are NaN there, as if the sensor had not fired.
+        What is in doubt makes no map, and is kept clear of all the same. Ranges that are neither are NaN there, as if
+        the sensor had not fired.
         """
         pose, ranges = firing.pose, firing.ranges_m
         believed, possible = self._believed, self._possible

@@ -27,6 +27,8 @@ _UNTAKEN_SHARE = 0.75
 """DRIVEs untaken for this share of the longest silence mean that nobody hears them; they come only once a cycle."""
 _STEPS_MISSED = 2
 """A ring may be silent for this many firings more than the line may be for odometry."""
+_STEPS_SETTLING = 3
+"""So many steps after a new pattern was taken the last echo of the one before has come."""
 _FIRINGS_MAX = 1024
 """Firings kept for one who does not take them; the oldest leave."""
 _ORDER = ("HALT", "HELLO", "PATTERN", "RELEASE")
@@ -67,6 +69,8 @@ class DenningRobot:
         self._drive: Twist | None = None
         self._watch = DriveWatch()
         self._ring = RingWatch(config.link.silence_max_s + _STEPS_MISSED * 1e-3 * self._pattern.step_period_ms)
+        self._pattern_s = 0.0
+        self._settling_s = 0.0
         self._ask_who = False
         self._firings: deque[Firing] = deque(maxlen=_FIRINGS_MAX)
         self._odometry: Odometry | None = None
@@ -151,6 +155,8 @@ class DenningRobot:
             self._go_down(trouble)
         if self._state is LineState.READY:
             self._listen()
+            if "PATTERN" not in self._commands and now_s - self._pattern_s > self._settling_s:
+                self._stamper.set_window(self._pattern.window)
 
     def drive(self, twist: Twist) -> None:
         """Ask for a velocity; replaces one that is not yet on the line, and is held to the limits of the body.
@@ -194,6 +200,7 @@ class DenningRobot:
             return
         # Until the new one is under way, whose echoes come next cannot be told.
         self._stamper.set_window(max(self._pattern.window, pattern.window))
+        self._settling_s = _STEPS_SETTLING * 1e-3 * max(self._pattern.step_period_ms, pattern.step_period_ms)
         self._pattern = pattern
         if self._state is LineState.READY or "PATTERN" in self._commands:
             self._ask("PATTERN")
@@ -341,6 +348,7 @@ class DenningRobot:
             self._state = LineState.READY
             self._odometry_s = self._now_s
             self._ring.heard(self._now_s)
+            self._pattern_s = self._now_s
             if "HALT" in self._commands:
                 self._ask("HALT")  # a robot that answers all else must answer this, within the usual patience
         if self._state is LineState.READY:
