@@ -53,6 +53,8 @@ PAST_READINGS: Final = 40
 CHANGES: Final = 4
 """So often must the reading of either neighbour have changed meanwhile, or, where only passing by is held against a
 sensor, have leapt: a rough wall along the way answers all that look at it with equal readings for ever."""
+PAST_CHANGES: Final = 20
+"""Or have changed so often: nothing that both of them see is a wall along the way."""
 LEAP_M: Final = 0.3
 SHORT_M: Final = 0.15
 """A reading is short where it is by this less than those before and after it,"""
@@ -162,7 +164,10 @@ def is_stuck(
     passed = (
         math.hypot(dx, dy) >= PAST_M
         and c[COUNT] >= PAST_READINGS
-        and since(i, LEAPS, sides, memory, deaf=False) >= CHANGES
+        and (
+            since(i, LEAPS, sides, memory, deaf=False) >= CHANGES
+            or since(i, STEPS, sides, memory, deaf=False) >= PAST_CHANGES
+        )
     )
     return bool((came or passed) and others_changed(i, memory, faults))
 

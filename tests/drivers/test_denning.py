@@ -508,7 +508,8 @@ def test_late_doubled_and_out_of_window_echoes_go_no_further(measured: Callable[
     bench = Bench(CONFIG.model_copy(update={"ring": near}))
     bench.open()
     bench.greet()
-    good, t_us = [], 0
+    good: list[Echo] = []
+    t_us = 0
     bench.odom(t_us)
     for k in range(200):
         t_us += PERIOD_US

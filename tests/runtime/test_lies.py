@@ -34,8 +34,8 @@ def outliers(at_s: float, share: float, duration_s: float) -> Outliers:
 
 
 LIES: dict[str, Callable[[int], tuple[Fault, float]]] = {
-    "20 % outliers from then on": lambda k: (outliers(FROM_S, 0.2, 1e3), FROM_S),
-    "nothing but outliers for 1 s": lambda k: (outliers(FROM_S, 1.0, 1.0), FROM_S + 1.0),
+    "20 % outliers from then on": lambda _: (outliers(FROM_S, 0.2, 1e3), FROM_S),
+    "nothing but outliers for 1 s": lambda _: (outliers(FROM_S, 1.0, 1.0), FROM_S + 1.0),
     "8,000 bytes of garbage in 1 s": lambda k: (
         Garbage(kind="garbage", at_s=FROM_S + 0.013 * k, duration_s=1.0, bytes_per_s=8000.0),
         FROM_S + 0.013 * k + 1.0,
