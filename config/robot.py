@@ -21,7 +21,7 @@ SENSORS_MAX = 255
 SensorSet: TypeAlias = Annotated[Many[Annotated[int, Field(ge=0, lt=SENSORS_MAX)]], Field(max_length=SENSORS_MAX)]
 """Numbers of sensors that fire together."""
 
-Preset = Literal["single", "opposite_pairs", "thirds", "quadrants", "octets"]
+Preset = Literal["single", "opposite_pairs", "thirds", "quadrants", "octets", "alternating"]
 
 
 class Mount(NamedTuple):
@@ -44,7 +44,8 @@ class FiringConfig(Strict):
     """Which sensors fire together, and how often: a preset, or sets of one's own."""
 
     preset: Preset | None = None
-    """A regular pattern by name: how many sensors, equally spaced, fire at a time."""
+    """A regular pattern by name: how many sensors, equally spaced, fire at a time; `alternating` fires octets and
+    thirds in turn, so that no two sensors fire together in both and crosstalk shows."""
     sets: Annotated[Many[SensorSet], Field(max_length=SENSORS_MAX)] | None = None
     """Sets of sensor numbers, fired in turn; instead of a preset."""
     rotations: int = Field(default=1, ge=1, le=255)

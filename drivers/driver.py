@@ -11,7 +11,7 @@ from enum import Enum
 from typing import Protocol
 
 from config.robot import RingConfig
-from drivers.messages import Firing, Identity, LinkCounts, Odometry, Twist
+from drivers.messages import Firing, Identity, LinkCounts, Odometry, Pose, Twist
 
 
 class LineState(Enum):
@@ -36,6 +36,8 @@ class Heard:
     """The newest one, None where none came."""
     rebooted: bool
     """The robot restarted: its clock and odometry began again at zero."""
+    notes: tuple[str, ...] = ()
+    """What an operator should know of it: what happened, likely cause, next action."""
 
 
 class RobotDriver(Protocol):
@@ -56,6 +58,10 @@ class RobotDriver(Protocol):
     @property
     def counts(self) -> LinkCounts:
         """Frames over the line so far."""
+
+    @property
+    def frame(self) -> Pose:
+        """The origin of the poses handed up, in the robot's own odometry: another one since that has leapt."""
 
     @property
     def waiting(self) -> int:

@@ -25,6 +25,7 @@ from runtime.footprint import Footprint, FootprintRow
 from runtime.memory import MemoryPolicy, collect_young
 from runtime.meter import Reading
 from runtime.modes import Mode, Request
+from runtime.notices import Notices
 from runtime.phases import Phase
 from runtime.realtime import ask
 from runtime.rhythm import Rhythm
@@ -98,6 +99,7 @@ class RobotProcess:
         )
         self._memory = MemoryPolicy(timed(COLLECTION, collect_young))
         self._stop_reasons: list[str] = []
+        self._notices = Notices()
         self._request: Request | None = None
         self._arm_when_ready = False
         self._stop = asyncio.Event()
@@ -202,6 +204,7 @@ class RobotProcess:
             self._settings, self._next_settings = self._next_settings, None
             self._driver.set_firing(self._settings.ring)
             self._state.perception.adopt(self._settings.perception)
+            self._state.perception.listen_to(self._settings.ring)
         if self._arm_when_ready and self._state.mode.mode is Mode.READY:
             self._arm_when_ready = False
             self.request(Request.ARM)
@@ -223,6 +226,8 @@ class RobotProcess:
         )
         if self._state.mode.entered_since(before):
             self._note_mode()
+        for line in self._notices.news(inputs.heard, self._state.perception):
+            self._log.warning(line)
         if self._observers.on_firing is not None:
             for firing in inputs.heard.firings:
                 self._observers.on_firing(firing)

@@ -70,6 +70,8 @@ class Snapshot:
     missed: int = 0
     faults: tuple[tuple[str, int], ...] = ()
     """Culprits of late and overrun cycles, and how many each."""
+    sensors: tuple[str, ...] = ()
+    """Why sensors are not believed."""
 
 
 class View:
@@ -112,6 +114,7 @@ class View:
             record.mode, pose, list(self._trail), state.perception.segments_now(), record.clusters,
             state.perception.things(), self._ranges.copy(), driver.counts,
             books.cycles, books.late, books.cycle_us(), books.lag_us(), books.missed, tuple(books.faults.items()),
+            tuple(report.reason for report in state.perception.sensors()),
         )  # fmt: skip
         self._wake.set()
 
@@ -158,6 +161,8 @@ class View:
         grid = Table.grid(padding=(0, 2))
         grid.add_row("ring", self._ring(snapshot.ranges))
         grid.add_row("map", f"{len(snapshot.segments)} segments, {snapshot.clusters} hypotheses")
+        for reason in snapshot.sensors:
+            grid.add_row("masked", reason)
         counts = snapshot.counts
         grid.add_row("line", f"{counts.frames} frames, {counts.bad} bad, {counts.lost} lost")
         took, lag = snapshot.cycle_us, snapshot.lag_us

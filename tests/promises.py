@@ -60,6 +60,16 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "new boot_id mid-run: pattern sent again, clock and odometry re-based without a jump in the map, "
             "SAFE_STOP until re-armed",
         ),
+        "P8": Promise(
+            "Crosstalk, ghosts and stuck sensors are caught",
+            "pattern changes expose crosstalk; a sensor that never changes or always fails is masked and reported; "
+            "late, duplicate and out-of-window echoes never reach perception; no honest sensor masked",
+        ),
+        "P9": Promise(
+            "The map forgets lies",
+            "20 % outliers, a garbage burst, a 1 ft odometry jump: seen from the robot, objects are back within "
+            ".05 ft of truth within 20 readings; no ghost of the old frame and no false object survives 10 s",
+        ),
         "P11": Promise(
             "Configuration cannot half-apply",
             "every field × {missing, wrong type, low, high, typo}: message with path, value, range, nearest name; "

@@ -19,7 +19,7 @@ from drivers.denning.stamping import Stamper
 from drivers.denning.watch import DriveWatch, RingWatch
 from drivers.denning.wire import identity_of, to_wire, wire_pattern
 from drivers.driver import Heard, LineState
-from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Twist
+from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
 
 _GREET_AGAIN_S = 0.5
 """Pace of greeting a robot that does not answer or is the wrong one."""
@@ -27,6 +27,8 @@ _UNTAKEN_SHARE = 0.75
 """DRIVEs untaken for this share of the longest silence mean that nobody hears them; they come only once a cycle."""
 _STEPS_MISSED = 2
 """A ring may be silent for this many firings more than the line may be for odometry."""
+_STEPS_SETTLING = 3
+"""So many steps after a new pattern was taken the last echo of the one before has come."""
 _FIRINGS_MAX = 1024
 """Firings kept for one who does not take them; the oldest leave."""
 _ORDER = ("HALT", "HELLO", "PATTERN", "RELEASE")
@@ -50,7 +52,8 @@ class DenningRobot:
     def __init__(self, config: RobotConfig) -> None:
         self._config = config
         self._pattern = wire_pattern(config.ring)
-        self._stamper = Stamper(len(config.ring.mounts))
+        self._stamper = Stamper(len(config.ring.mounts), config.body)
+        self._stamper.set_window(self._pattern.window)
         self._state = LineState.CLOSED
         self._trouble: str | None = None
         self._identity: Identity | None = None
@@ -66,6 +69,8 @@ class DenningRobot:
         self._drive: Twist | None = None
         self._watch = DriveWatch()
         self._ring = RingWatch(config.link.silence_max_s + _STEPS_MISSED * 1e-3 * self._pattern.step_period_ms)
+        self._pattern_s = 0.0
+        self._settling_s = 0.0
         self._ask_who = False
         self._firings: deque[Firing] = deque(maxlen=_FIRINGS_MAX)
         self._odometry: Odometry | None = None
@@ -99,8 +104,18 @@ class DenningRobot:
 
     @property
     def late_echoes(self) -> int:
-        """Firings dropped because no odometry tells where they took place."""
+        """Firings dropped: no odometry tells where they took place, or they came twice, or after a newer one."""
         return self._stamper.late_echoes
+
+    @property
+    def out_of_window(self) -> int:
+        """Ranges dropped that lie beyond the window their firing listened for."""
+        return self._stamper.out_of_window
+
+    @property
+    def frame(self) -> Pose:
+        """The origin of the poses handed up, in the robot's own odometry: another one since that has leapt."""
+        return self._stamper.frame
 
     def opened(self, now_s: float) -> None:
         """Begin (again) on a line just opened: greet the robot and set its firing pattern."""
@@ -141,6 +156,8 @@ class DenningRobot:
             self._go_down(trouble)
         if self._state is LineState.READY:
             self._listen()
+            if "PATTERN" not in self._commands and now_s - self._pattern_s > self._settling_s:
+                self._stamper.set_window(self._pattern.window)
 
     def drive(self, twist: Twist) -> None:
         """Ask for a velocity; replaces one that is not yet on the line, and is held to the limits of the body.
@@ -182,6 +199,9 @@ class DenningRobot:
         pattern = wire_pattern(ring)
         if pattern == self._pattern:
             return
+        # Until the new one is under way, whose echoes come next cannot be told.
+        self._stamper.set_window(max(self._pattern.window, pattern.window))
+        self._settling_s = _STEPS_SETTLING * 1e-3 * max(self._pattern.step_period_ms, pattern.step_period_ms)
         self._pattern = pattern
         if self._state is LineState.READY or "PATTERN" in self._commands:
             self._ask("PATTERN")
@@ -218,7 +238,7 @@ class DenningRobot:
 
     def take(self) -> Heard:
         """Return and forget what arrived since the last call."""
-        heard = Heard(tuple(self._firings), self._odometry, self._rebooted)
+        heard = Heard(tuple(self._firings), self._odometry, self._rebooted, self._stamper.notes())
         self._firings.clear()
         self._odometry = None
         self._rebooted = False
@@ -331,6 +351,7 @@ class DenningRobot:
             self._state = LineState.READY
             self._odometry_s = self._now_s
             self._ring.heard(self._now_s)
+            self._pattern_s = self._now_s
             if "HALT" in self._commands:
                 self._ask("HALT")  # a robot that answers all else must answer this, within the usual patience
         if self._state is LineState.READY:

@@ -31,6 +31,7 @@ from drivers.emulator.faults import (
     MotorFault,
     Mute,
     OdometryJump,
+    Outliers,
     Reboot,
     StuckSensor,
     Unplug,
@@ -111,10 +112,11 @@ class EmulatedRobot:
             raise ValueError(
                 f"the ring has {len(mounts)} sensors: the protocol's masks have room for {frames.SENSORS_MAX}"
             )
-        of_sonar, of_drift, of_boots, of_output, of_input = map(
-            np.random.default_rng, np.random.SeedSequence(seed).spawn(5)
+        of_sonar, of_drift, of_boots, of_output, of_input, of_outliers = map(
+            np.random.default_rng, np.random.SeedSequence(seed).spawn(6)
         )
         self._boots, self._output_noise, self._input_noise = of_boots, of_output, of_input
+        self._outliers = of_outliers
         self._sensors = len(mounts)
         self._ring_radius_mm = round(1000.0 * max(math.hypot(m.x_m, m.y_m) for m in mounts))
         scene = compile_scene(world)
@@ -310,6 +312,9 @@ class EmulatedRobot:
         """Return the echo byte of each sensor in `mask`, lowest first."""
         fired = [i for i in range(self._sensors) if mask >> i & 1]
         ranges = self._sonar.fire(self._body.pose, self._body.ring_yaw, fired, window_m)
+        for outliers in self._faults.all(Outliers):
+            wild = self._outliers.random(len(ranges)) < outliers.share
+            ranges[wild] = self._outliers.uniform(0.0, window_m, len(ranges))[wild]
         stuck = {fault.sensor: fault.range_m for fault in self._faults.all(StuckSensor)}
         return tuple(echo_byte(stuck[i] if i in stuck else float(ranges[i])) for i in fired)
 

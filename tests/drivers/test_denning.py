@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -495,6 +496,93 @@ def test_an_echo_that_nothing_places_is_dropped_and_counted(bench: Bench) -> Non
     bench.say(Echo(0, 1_100_000, 0, 1, (10,)), Echo(0, 1_090_000, 0, 1, (10,)), Echo(0, 9_000_000, 0, 1, (10,)))
     assert bench.robot.late_echoes == 4, "before the one before it, and from a far future"
     assert [f.t_s for f in bench.robot.take().firings] == pytest.approx([1.1])
+
+
+@pytest.mark.promise("P8")
+def test_late_doubled_and_out_of_window_echoes_go_no_further(measured: Callable[[str], None]) -> None:
+    """Every echo once more, once late, and ranges beyond the window in between."""
+    window = 50
+    near = CONFIG.ring.model_copy(
+        update={"firing": FiringConfig(preset="octets", window_m=window * 0.03048, step_period_s=0.02)}
+    )
+    bench = Bench(CONFIG.model_copy(update={"ring": near}))
+    bench.open()
+    bench.greet()
+    good: list[Echo] = []
+    t_us = 0
+    bench.odom(t_us)
+    for k in range(200):
+        t_us += PERIOD_US
+        mask = OCTETS[k % 3]
+        tenths = tuple(window + 1 + k if (i + k) % 4 == 0 else 255 if i % 3 else window - i for i in range(8))
+        echo = Echo(0, t_us - 5_000, k % 3, mask, tuple(min(t, 254) if t != 255 else 255 for t in tenths))
+        bench.now += 0.02
+        bench.odom(t_us)
+        bench.say(echo, echo)
+        if good:
+            bench.say(good[-1])
+        good.append(echo)
+    firings = bench.robot.take().firings
+    assert [f.t_s for f in firings] == pytest.approx([1e-6 * echo.t_us for echo in good])
+    for firing in firings:
+        heard = firing.ranges_m[np.isfinite(firing.ranges_m)]
+        assert (heard <= window * 0.03048 + 1e-9).all()
+        assert heard.size + np.isinf(firing.ranges_m).sum() == 6, "the others are kept"
+    assert bench.robot.late_echoes == 200 + 199
+    assert bench.robot.out_of_window == (200 + 200 + 199) * 2
+    measured(
+        f"200 firings, each echo twice and once late, a quarter of the ranges beyond the window: {len(firings)} "
+        f"firings and 0 such ranges came through"
+    )
+
+
+def test_a_wider_window_counts_from_the_pattern_on_and_a_narrower_one_after_it(bench: Bench) -> None:
+    t_us = bench.run(0.4, t_us=0)
+    far = Echo(0, t_us - 5_000, 0, OCTETS[0], (200,) * 8)
+    narrow = CONFIG.ring.model_copy(update={"firing": FiringConfig(preset="octets", window_m=2.0)})
+    bench.robot.set_firing(narrow)
+    bench.say(far)
+    assert np.isfinite(bench.robot.take().firings[-1].ranges_m).sum() == 8, "an echo of the pattern before"
+    t_us = bench.run(0.4, t_us=t_us)
+    bench.say(replace(far, t_us=t_us - 5_000))
+    assert np.isnan(bench.robot.take().firings[-1].ranges_m).all()
+
+
+@pytest.mark.promise("P9")
+@pytest.mark.parametrize(("x", "heading"), [(3048, 0), (-3048, 0), (50_000, 0), (0, 5000), (3048, -20_000)])
+def test_a_leap_of_the_odometry_is_taken_out_and_told(bench: Bench, x: int, heading: int) -> None:
+    """Poses go on as the wheels say; the robot's own odometry is `frame` away."""
+    t_us = bench.run(0.4, t_us=0)
+    bench.robot.take()
+    for _ in range(2):  # one that leaps very far is asked who it is, and answers
+        t_us += PERIOD_US
+        bench.pass_time(0.02)
+        bench.odom(t_us, x_0p1mm=x, heading_1em4rad=heading, ring_yaw_1em4rad=heading)
+        bench.answer()
+        bench.answer()
+    heard = bench.robot.take()
+    assert heard.odometry is not None
+    assert heard.odometry.pose == Pose(0.0, 0.0, 0.0)
+    assert heard.odometry.ring_yaw == 0.0
+    (note,) = heard.notes
+    assert "leapt" in note
+    assert "check wheels" in note
+    frame = bench.robot.frame
+    assert (frame.x, frame.y, frame.theta) == pytest.approx((x * 1e-4, 0.0, heading * 1e-4))
+    assert not heard.rebooted
+
+
+def test_a_base_that_moves_in_leaps_is_believed(bench: Bench) -> None:
+    """One whose odometry comes in steps, or that is faster than its file says, does not leap: it moves so."""
+    t_us = 0
+    for k in range(100):
+        t_us += PERIOD_US
+        bench.pass_time(0.02)
+        bench.odom(t_us, x_0p1mm=2000 * (k // 3))
+    heard = bench.robot.take()
+    assert heard.odometry is not None
+    assert heard.odometry.pose.x == pytest.approx(6.6)
+    assert heard.notes == ()
 
 
 def test_echoes_without_odometry_do_not_pile_up(bench: Bench) -> None:

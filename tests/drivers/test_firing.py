@@ -37,6 +37,19 @@ def test_presets_fire_every_sensor_once_equally_spaced(preset: Preset, steps: in
     assert (pattern.step_period_s, pattern.window_m) == (0.05, 7.7724)
 
 
+def test_alternating_gives_every_sensor_other_partners() -> None:
+    masks = [set(sensors(mask)) for mask in firing_pattern(ring(FiringConfig(preset="alternating"))).masks]
+    for i in range(24):
+        (first, second) = (mask - {i} for mask in masks if i in mask)
+        assert first
+        assert second
+        assert not first & second
+    with pytest.raises(
+        FiringError, match="fires 8 or 3 sensors at a time, equally spaced, and 16 sensors do not divide"
+    ):
+        firing_pattern(ring(FiringConfig(preset="alternating"), count=16))
+
+
 def test_presets_are_those_of_the_protocol() -> None:
     assert firing_pattern(ring(FiringConfig(preset="octets"))).masks == OCTETS
     assert firing_pattern(ring(FiringConfig(preset="thirds"))).masks == THIRDS
