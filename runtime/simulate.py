@@ -58,6 +58,7 @@ def simulate(
     on_cycle: Callable[[CycleRecord, Truth], None] | None = None,
     on_state: Callable[[CycleRecord, State], None] | None = None,
     may_refine: Callable[[int], bool] = enough_quanta,
+    clock_start_us: int = 0,
 ) -> Simulated:
     """Drive through `world` until the leg is done, the robot stops for a reason, or the time is up.
 
@@ -77,8 +78,10 @@ def simulate(
         Gets every record, and the state it left: a recorder.
     may_refine : callable
         In place of a clock, as in `step`.
+    clock_start_us : int
+        What the robot's own clock shows at first, µs; it wraps at 2³².
     """
-    robot = EmulatedRobot(settings, world, seed)
+    robot = EmulatedRobot(settings, world, seed, clock_start_us=clock_start_us)
     driver = DenningRobot(settings)
     line = MemoryLine(driver, robot)
     state = State(Perception(settings.ring, settings.models, settings.perception))
