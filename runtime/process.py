@@ -238,10 +238,16 @@ class RobotProcess:
 
     def _carry_out(self, command: Command, stale_s: float) -> None:
         """Put the command on the line, but no velocity decided too long ago; the next cycle stops for such a gap."""
-        if isinstance(command, Twist) and self._clock() > stale_s:
-            return
-        give(self._driver, command)
-        self._send()
+        if not isinstance(command, Twist):
+            give(self._driver, command)
+            self._send()
+        elif self._clock() <= stale_s:
+            give(self._driver, command)
+            self._send()
+            if self._clock() > stale_s:
+                # Held up between the look at the clock and the line: a base that had stopped by itself was set in
+                # motion. The HALT is right behind.
+                self._halt()
 
     def _send(self) -> None:
         if self._link.is_open and (data := self._driver.outgoing(writable=self._link.writable)):
