@@ -138,6 +138,8 @@ class RecordingWriter:
         if self._thread.is_alive():
             why = f"the disk did not take the end of {self.standing.file} within {CLOSE_MAX_S:.0f} s"
             self.standing = replace(self.standing, trouble=why)
+        elif self._part is not None:
+            self._leave(f"{self.standing.file}: its writer failed: {self._thread.failure}")
 
     def probe(self) -> str | None:
         """Say how the thread ended; None while it runs. See `runtime.health`."""

@@ -85,7 +85,7 @@ class MemoryLink:
         return self.is_open
 
     def send(self, data: bytes) -> bool:
-        self._live()
+        self.live()
         self._robot.receive(data)
         return True
 
@@ -121,13 +121,14 @@ class MemoryLink:
         """Plug it in again; it is opened again soon."""
         self.plugged = True
 
-    def _live(self) -> bytes:
+    def live(self) -> bytes:
+        """Let the robot live up to now, and return what it sent."""
         return self._robot.advance(self._loop.time() - self._begin_s)
 
     def _exchange(self) -> None:
         if self.is_open:
             self._turn = self._loop.call_later(STEP_S, self._exchange)
-            if data := self._live():
+            if data := self.live():
                 self._calls[1](data)
 
 
