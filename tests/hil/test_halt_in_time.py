@@ -98,10 +98,10 @@ async def halts(folder: Path, monkeypatch: pytest.MonkeyPatch, trials: int) -> O
 
     def on_bytes(way: str, host_s: float, data: bytes) -> None:
         recorder.on_bytes(way, host_s, data)
-        if way == "out" and any(isinstance(frame, Halt) for frame in ears.feed(data)):
-            if operator.asked_s is not None:
-                operator.asked_s, operator.halted_s = None, host_s
-                operator.halted.set()
+        is_halt = way == "out" and any(isinstance(frame, Halt) for frame in ears.feed(data))
+        if is_halt and operator.asked_s is not None:
+            operator.asked_s, operator.halted_s = None, host_s
+            operator.halted.set()
 
     def on_cycle(record: CycleRecord, state: State, _books: Books, _driver: RobotDriver) -> None:
         recorder.on_cycle(record, state)
@@ -135,9 +135,14 @@ async def halts(folder: Path, monkeypatch: pytest.MonkeyPatch, trials: int) -> O
 def tell(operator: Operator, measured: Callable[[str], None]) -> None:
     assert operator.failure is None, operator.failure
     worst = max(range(len(operator.waits_s)), key=lambda k: operator.waits_s[k])
+    count, wait_ms, control_ms = (
+        len(operator.waits_s),
+        1e3 * operator.waits_s[worst],
+        1e3 * operator.controls_s[worst],
+    )
     measured(
-        f"{len(operator.waits_s)} requests on the pty, cycles busy for {1e3 * BUSY_S:g} ms, a disk that stands still: "
-        f"HALT on the line ≤ {1e3 * operator.waits_s[worst]:.1f} ms later (control {1e3 * operator.controls_s[worst]:.1f})"
+        f"{count} requests on the pty, cycles busy for {1e3 * BUSY_S:g} ms, a disk that stands still: HALT on the line "
+        f"≤ {wait_ms:.1f} ms later (control {control_ms:.1f})"
     )
 
 
