@@ -135,14 +135,10 @@ async def halts(folder: Path, monkeypatch: pytest.MonkeyPatch, trials: int) -> O
 def tell(operator: Operator, measured: Callable[[str], None]) -> None:
     assert operator.failure is None, operator.failure
     worst = max(range(len(operator.waits_s)), key=lambda k: operator.waits_s[k])
-    count, wait_ms, control_ms = (
-        len(operator.waits_s),
-        1e3 * operator.waits_s[worst],
-        1e3 * operator.controls_s[worst],
-    )
+    wait_ms, control_ms = 1e3 * operator.waits_s[worst], 1e3 * operator.controls_s[worst]
     measured(
-        f"{count} requests on the pty, cycles busy for {1e3 * BUSY_S:g} ms, a disk that stands still: HALT on the line "
-        f"≤ {wait_ms:.1f} ms later (control {control_ms:.1f})"
+        f"{len(operator.waits_s)} requests on the pty, cycles busy for {1e3 * BUSY_S:g} ms, the disk at a stand: HALT "
+        f"on the line ≤ {wait_ms:.1f} ms later (control {control_ms:.1f})"
     )
 
 
