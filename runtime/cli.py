@@ -69,7 +69,7 @@ def run(
 ) -> int:
     """Run the robot's main process; without a port, on the emulator in the paper's hall.
 
-    SIGUSR1 arms it, SIGHUP has it read the run file again, SIGINT and SIGTERM end it.
+    SIGUSR1 arms it, SIGUSR2 halts it, SIGHUP has it read the run file again, SIGINT and SIGTERM end it.
 
     Parameters
     ----------
@@ -115,6 +115,7 @@ def emulate(
     robot: str | None = None,
     trace: str | None = None,
     latency: str | None = None,
+    clock: float = 0.0,
     config: str | None = None,
     sets: Sets = (),
     end_with_parent: Annotated[bool, Parameter(negative="", show=False)] = False,
@@ -137,6 +138,8 @@ def emulate(
         Write the truth to this CSV file, a hundred rows a second.
     latency
         Write to this CSV file when each echo had left and when each drive command came.
+    clock
+        What the robot's own clock shows at first, seconds; it wraps at 4294.967296.
     config
         Run file to take robot and world from.
     """
@@ -144,7 +147,7 @@ def emulate(
 
     return emulate_robot(
         config, sets, world=world, robot=robot, link=link, faults=faults, seed=seed, trace=trace,
-        latency=latency, end_with_parent=end_with_parent,
+        latency=latency, clock_s=clock, end_with_parent=end_with_parent,
     )  # fmt: skip
 
 
@@ -294,6 +297,31 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
     from runtime.commands.check import check_config
 
     return check_config(config, sets)
+
+
+@app.command
+def service(
+    config: str | None = None,
+    /,
+    *,
+    port: str | None = None,
+    user: str | None = None,
+    sets: Sets = (),
+) -> int:
+    """Print a systemd unit that runs the robot's main process from boot on; it never arms the robot.
+
+    Parameters
+    ----------
+    config
+        Run file, or the name of a shipped one.
+    port
+        Serial port of the robot, where the run file names none.
+    user
+        Who runs it; where it is not given, a user that systemd makes for it.
+    """
+    from runtime.commands.service import print_service
+
+    return print_service(config, sets, port=port, user=user)
 
 
 def complain(text: str) -> None:

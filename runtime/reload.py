@@ -58,6 +58,11 @@ class Reloader:
         if self._under_way is not None:
             await asyncio.gather(self._under_way, return_exceptions=True)
 
+    def probe(self) -> str | None:
+        """Say how an attempt ended that should have gone on; None where none has. See `runtime.health`."""
+        task = self._under_way
+        return "it was ended from outside" if task is not None and task.cancelled() else None
+
     def cancel(self) -> None:
         """Drop what is under way."""
         if self._under_way is not None:

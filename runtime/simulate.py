@@ -52,6 +52,7 @@ def simulate(
     *,
     allowance: Allowance | None = None,
     on_state: Callable[[CycleRecord, State, Pose], None] | None = None,
+    clock_start_us: int = 0,
 ) -> Simulated:
     """Drive through `world` until the leg is done, the robot stops for a reason, or the time is up.
 
@@ -71,9 +72,11 @@ def simulate(
         How much refinement a cycle may do; `QUANTA_PER_CYCLE` where not given.
     on_state : callable, optional
         Gets every record, the state it left, and where the odometry began.
+    clock_start_us : int
+        What the robot's own clock shows at first, µs; it wraps at 2³².
     """
     allowance = Quanta(QUANTA_PER_CYCLE) if allowance is None else allowance
-    robot = EmulatedRobot(settings, world, seed)
+    robot = EmulatedRobot(settings, world, seed, clock_start_us=clock_start_us)
     driver = DenningRobot(settings)
     line = MemoryLine(driver, robot)
     state = State(Perception(settings.ring, settings.models, settings.perception))

@@ -62,6 +62,13 @@ class RecordingRow(TypedDict):
     sync_max_s: float
 
 
+class LogRow(TypedDict):
+    """Lines of the log that did not get into its file, and why."""
+
+    lost: int
+    trouble: str | None
+
+
 class RunSummary(TypedDict):
     """Summary of ``echolocate run``."""
 
@@ -78,6 +85,7 @@ class RunSummary(TypedDict):
     stop_reasons: list[str]
     timing: Timing
     recording: NotRequired[RecordingRow]
+    log: NotRequired[LogRow]
 
 
 class VerifyRow(TypedDict):

@@ -31,6 +31,7 @@ from drivers.driver import RobotDriver
 from drivers.messages import Floats, LinkCounts, Pose
 from perception.pipeline import SeenObject
 from runtime.books import Books, Quantiles
+from runtime.health import Worker
 from runtime.modes import ModeState, Request
 from runtime.plan import draw_plan
 from runtime.step import CycleRecord, State
@@ -99,6 +100,11 @@ class View:
         self._slot: Snapshot | None = None
         self._wake = threading.Event()
         self._done = False
+        self._painter = Worker("view", self._paint)
+
+    def probe(self) -> str | None:
+        """Say how its thread ended; None while it draws. See `runtime.health`."""
+        return self._painter.probe()
 
     def on_cycle(self, record: CycleRecord, state: State, books: Books, driver: RobotDriver) -> None:
         """Leave the ingredients of the next picture in the slot."""
@@ -123,14 +129,13 @@ class View:
         """Own the terminal while the run lasts."""
         interval_s = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH_INTERVAL_S)
-        painter = threading.Thread(target=self._paint, name="view", daemon=True)
-        painter.start()
+        self._painter.start()
         try:
             yield
         finally:
             self._done = True
             self._wake.set()
-            painter.join(timeout=1.0)
+            self._painter.join(timeout=1.0)
             sys.setswitchinterval(interval_s)
 
     def _paint(self) -> None:
@@ -202,7 +207,15 @@ def keys(on_request: Callable[[Request], None], on_quit: Callable[[], None]) -> 
 
     def read() -> None:
         # Not through sys.stdin: what that keeps in its buffer wakes nobody.
-        for key in os.read(fd, KEYS_MAX).decode(errors="replace"):
+        try:
+            pressed = os.read(fd, KEYS_MAX)
+        except OSError:
+            pressed = b""
+        if not pressed:
+            # The terminal is gone, and with it whoever could have halted the robot.
+            loop.remove_reader(fd)
+            on_quit()
+        for key in pressed.decode(errors="replace"):
             if key in KEYS:
                 on_request(KEYS[key])
             elif key == "q":
@@ -214,4 +227,5 @@ def keys(on_request: Callable[[Request], None], on_quit: Callable[[], None]) -> 
         yield
     finally:
         loop.remove_reader(fd)
-        termios.tcsetattr(fd, termios.TCSADRAIN, before)
+        with contextlib.suppress(termios.error):
+            termios.tcsetattr(fd, termios.TCSADRAIN, before)

@@ -35,6 +35,16 @@ class Promise(NamedTuple):
 
 PROMISES: Mapping[str, Promise] = MappingProxyType(
     {
+        "P1": Promise(
+            "The base stops by itself",
+            "SIGSTOP, SIGKILL, unplug, 10 s busy loop in a callback, at 20 random phases (soak: 200): wheels still "
+            "within deadman + 300 ms on the emulator's clock; motion resumes only after an explicit re-arm",
+        ),
+        "P2": Promise(
+            "Halt is bounded",
+            "request → HALT on the wire ≤ one cycle + 10 ms with perception saturated, the disk stalled, a reconnect "
+            "under way; 1,000 trials in virtual time, 30 in real time (soak: 1,000); one frame stops the whole base",
+        ),
         "P3": Promise(
             "No bad command leaves",
             "10⁶ random schema outputs with NaN, ±Inf, 1e308: not one non-finite or over-limit DRIVE; a missing axis "
@@ -84,6 +94,21 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "Input files cannot hurt",
             "10⁵ mutated ring logs, worlds, models, robot files (here a share of them, in `make soak` all): clear "
             "error or right result, no traceback, no hang, memory ≤ 500 MB",
+        ),
+        "P10": Promise(
+            "No silent death",
+            "any task or thread killed or raising: SAFE_STOP within two cycles, the culprit named; the deadman is "
+            "fed only while all parts report health; never from a thread",
+        ),
+        "P12": Promise(
+            "Disk trouble stays on disk",
+            "full disk, 5 s fsync, read-only folder, a log or terminal that takes nothing: no cycle is late beyond "
+            "the paired control, the loss is counted and reported",
+        ),
+        "P15": Promise(
+            "It runs on",
+            "half an hour in virtual time (soak: 24 h, and 1 h on the pty): memory slope < 1 MB/h, no unretrieved "
+            "task exception, t_us wrap crossed",
         ),
         "P16": Promise("Traceable", "this table is generated from the tests that ran"),
     }

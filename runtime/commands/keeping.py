@@ -76,6 +76,10 @@ class Keeping:
 
         return Observers(on_cycle, self._on_firing, recorder.on_bytes)
 
+    def probe(self) -> str | None:
+        """Say how the recorder ended; None while it runs, or where there is none. See `runtime.health`."""
+        return None if self._recorder is None else self._recorder.probe()
+
     @property
     def standing(self) -> RecordingRow | None:
         """How the recording stands, for the summary; None where there is none."""

@@ -20,7 +20,8 @@ from runtime.commands.firing import refuse_impossible_firing
 from runtime.commands.keeping import Keeping, kept
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
 from runtime.kernels import ready_kernels
-from runtime.logs import open_log
+from runtime.logs import LogStanding, open_log
+from runtime.notify import Notifier
 from runtime.ownership import owned
 from runtime.tables import Units, objects_table, timing_table, timing_verdict
 
@@ -80,11 +81,12 @@ def run_robot(
     console = Console(stderr=True)
     ready_kernels(settings, console)
     live = not headless and console.is_terminal and not console.is_dumb_terminal
+    lines = LogStanding()
     with contextlib.ExitStack() as stack:
         if record is not None:
             stack.enter_context(owned(Path(record), f"--record {record}"))
         keeping = stack.enter_context(kept(settings, record, no_record=no_record))
-        log = stack.enter_context(open_log(settings.log, terminal=not live, tap=keeping.on_log))
+        log = stack.enter_context(open_log(settings.log, terminal=not live, tap=keeping.on_log, standing=lines))
         log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
         for text in advice(settings):
             log.warning(text)
@@ -98,7 +100,7 @@ def run_robot(
                     emulated = await running.enter_async_context(emulator(emulation.arguments(config, sets)))
                     chosen = on_port(settings, emulated)
                 return await watch(
-                    chosen, log, console, live=live, units=units, keeping=keeping,
+                    chosen, log, console, live=live, units=units, keeping=keeping, lines=lines,
                     arm=arm or port is None, seconds=seconds,
                     propose=lambda: proposed(
                         config, sets, emulation.world, given, None if port else chosen.link.port
@@ -108,6 +110,7 @@ def run_robot(
         summary = asyncio.run(whole())
     if keeping.standing is not None:
         summary["recording"] = keeping.standing
+    summary["log"] = {"lost": lines.lost, "trouble": lines.trouble}
     if json_file is not None:
         from runtime.summary import write_json
 
@@ -116,6 +119,8 @@ def run_robot(
     out.print(objects_table(summary["objects"], units))
     out.print(timing_table(summary))
     out.print(timing_verdict(summary))
+    if lines.lost:
+        out.print(f"{lines.lost} lines of the log are missing: {lines.trouble}; make room or choose another log.file")
     if summary["mode"] == "FAULT":
         raise Complaint(summary["stop_reasons"][-1], FAILED)
     keeping.complain()
@@ -166,11 +171,12 @@ async def watch(
     live: bool,
     units: Units,
     keeping: Keeping,
+    lines: LogStanding,
     arm: bool,
     seconds: float | None,
     propose: Callable[[], Settings],
 ) -> RunSummary:
-    """Run the process under the eyes of the live view, end it on SIGINT or SIGTERM, reconfigure it on SIGHUP."""
+    """Run the process under the eyes of the live view; it heeds signals and keys, and its parts are watched."""
     from runtime.process import RobotProcess
     from runtime.reload import Reloader
     from runtime.view import View, keys
@@ -178,38 +184,39 @@ async def watch(
     with contextlib.ExitStack() as stack:
         view = View(settings, console, units) if live else None
         observers = keeping.observers(None if view is None else view.on_cycle, log)
-        process = RobotProcess(settings, log, observers)
-        stack.enter_context(stopping_on_signals(process))
-        stack.enter_context(reloading_on_signal(Reloader(settings, propose, process.reconfigure, log)))
+        process = RobotProcess(settings, log, observers, notifier=stack.enter_context(Notifier.from_environment()))
+        reloader = Reloader(settings, propose, process.reconfigure, log)
+        stack.enter_context(signals(process, reloader))
         if view is not None:
             stack.enter_context(view.shown())
             stack.enter_context(keys(process.request, process.stop))
+            process.health.watch("view", view.probe)
+        for name, probe in {"recorder": keeping.probe, "log": lines.probe, "reload": reloader.probe}.items():
+            process.health.watch(name, probe)
         return await process.run(arm=arm, seconds=seconds)
 
 
 @contextlib.contextmanager
-def stopping_on_signals(process: RobotProcess) -> Iterator[None]:
-    """End the run in good order on SIGINT and SIGTERM; SIGUSR1 arms a robot that has no keyboard."""
+def signals(process: RobotProcess, reloader: Reloader) -> Iterator[None]:
+    """Heed signals: INT and TERM end the run in good order, USR1 arms and USR2 halts a robot without a keyboard.
+
+    HUP has the configuration read again; what is wrong with it is told in the log and the last good one kept.
+    """
     from runtime.modes import Request
 
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, process.stop)
-    loop.add_signal_handler(signal.SIGUSR1, process.request, Request.ARM)
+    calls: dict[signal.Signals, Callable[[], None]] = {
+        signal.SIGINT: process.stop,
+        signal.SIGTERM: process.stop,
+        signal.SIGUSR1: lambda: process.request(Request.ARM),
+        signal.SIGUSR2: lambda: process.request(Request.HALT),
+        signal.SIGHUP: reloader.ask,
+    }
+    for number, call in calls.items():
+        loop.add_signal_handler(number, call)
     try:
         yield
     finally:
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1):
+        for number in calls:
             loop.remove_signal_handler(number)
-
-
-@contextlib.contextmanager
-def reloading_on_signal(reloader: Reloader) -> Iterator[None]:
-    """Read the configuration again on SIGHUP; what is wrong with it is told in the log and the last good one kept."""
-    loop = asyncio.get_running_loop()
-    loop.add_signal_handler(signal.SIGHUP, reloader.ask)
-    try:
-        yield
-    finally:
-        loop.remove_signal_handler(signal.SIGHUP)
         reloader.cancel()

@@ -100,6 +100,10 @@ class Recorder:
         """How the recording stands."""
         return self._writer.standing
 
+    def probe(self) -> str | None:
+        """Say how its thread ended; None while it runs. See `runtime.health`."""
+        return self._writer.probe()
+
     def on_cycle(self, record: CycleRecord, state: State) -> None:
         """Take a cycle, just over."""
         now_s = record.inputs.now_s

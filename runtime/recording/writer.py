@@ -18,6 +18,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from drivers.messages import Floats
+from runtime.health import Worker
 from runtime.modes import ModeState
 from runtime.recording.channels import ABOUT, CYCLE, KEYFRAME, MODE, OBJECTS, SEGMENTS, encode
 from runtime.recording.folder import Place
@@ -121,7 +122,7 @@ class RecordingWriter:
         self._numbered = 0
         self._pieces: dict[str, list[tuple[float, bytes]]] = {}
         self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
+        self._thread = Worker("recorder", self._work)
         self._interval_s = sys.getswitchinterval()
 
     def start(self) -> None:
@@ -137,6 +138,12 @@ class RecordingWriter:
         if self._thread.is_alive():
             why = f"the disk did not take the end of {self.standing.file} within {CLOSE_MAX_S:.0f} s"
             self.standing = replace(self.standing, trouble=why)
+        elif self._part is not None:
+            self._leave(f"{self.standing.file}: its writer failed: {self._thread.failure}")
+
+    def probe(self) -> str | None:
+        """Say how the thread ended; None while it runs. See `runtime.health`."""
+        return self._thread.probe()
 
     def drop(self, count: int = 1) -> None:
         """Count what is not written."""

@@ -117,6 +117,23 @@ def test_transition(before: ModeState, seen: Situation, mode: Mode, reason: str 
         assert after.since_s == NOW
 
 
+def test_a_part_that_has_failed_ends_every_mode_but_a_fault_and_an_arm_changes_nothing() -> None:
+    seen = replace(QUIET, unwell="the part `link` has ended")
+    for before in (CONNECTING, READY, DRIVE, STOPPED, arming(READY, WAITED), arming(STOPPED, WAITED)):
+        after = advance(before, seen)
+        assert (after.mode, after.reason, after.since_s) == (Mode.SAFE_STOP, seen.unwell, NOW)
+        assert after.arming_s is None
+        later = replace(seen, now_s=NOW + 0.05)
+        assert advance(after, later) == after, "it is entered once"
+        armed = advance(after, replace(later, request=Request.ARM))
+        assert armed == ModeState(Mode.SAFE_STOP, NOW + 0.05, seen.unwell), "and told again to whoever arms"
+        lost = replace(later, line=LineState.CLOSED)
+        assert advance(after, lost) == after
+        assert "halted by the operator" in str(advance(after, replace(later, request=Request.HALT)).reason)
+    assert advance(FAULT, seen) == FAULT
+    assert advance(DRIVE, replace(seen, line=LineState.CLOSED)).reason == seen.unwell, "the cause, not what it does"
+
+
 def test_the_table_shows_every_mode_from_every_other_that_leads_there() -> None:
     shown = {(before.mode, mode) for before, _, mode, _, _ in TRANSITIONS}
     everywhere = {
