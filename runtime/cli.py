@@ -221,6 +221,44 @@ def recover(recording: str, /, *, out: str | None = None) -> int:
     return recover_recording(recording, out)
 
 
+Robot = Annotated[str | None, Parameter(help="Ring logs: robot file, or the name of a shipped one.")]
+Models = Annotated[
+    tuple[str, ...],
+    Parameter(name="--model", negative="", help="Ring logs: object model, a file or a name; may be repeated."),
+]
+World = Annotated[str | None, Parameter(help="What stood there, a world file or a name, where FILE does not know.")]
+
+
+@app.command
+def figures(
+    file: str,
+    /,
+    *,
+    out: str,
+    still: Annotated[bool, Flag] = False,
+    world: World = None,
+    robot: Robot = None,
+    models: Models = (),
+    units: UnitsOption = "m",
+    sets: Sets = (),
+) -> int:
+    """Draw a run as the paper does: raw data, segments, clusters, matched models; SVG, PDF, PNG, and a moving overview.
+
+    Parameters
+    ----------
+    file
+        A recording (MCAP) or a ring log (CSV).
+    out
+        Folder for the pictures.
+    still
+        Leave the moving overview out.
+    """
+    from runtime.commands.figures import draw_figures
+    from runtime.trace.sources import Asked
+
+    return draw_figures(Asked(file, sets, robot, models, world), out, moving=not still, units=units)
+
+
 @app.command
 def experiment(
     name: Literal["hallway", "irregular"],

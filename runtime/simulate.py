@@ -16,8 +16,8 @@ from config.settings import Settings
 from config.world import WorldConfig
 from drivers.denning.robot import DenningRobot
 from drivers.emulator.device import EmulatedRobot, Truth
-from drivers.emulator.memory import MemoryLine
-from drivers.messages import Pose
+from drivers.emulator.memory import MemoryLine, OnBytes
+from drivers.messages import LinkCounts, Pose
 from perception.pipeline import Perception
 from runtime.books import Books
 from runtime.commanding import gather, give
@@ -43,6 +43,7 @@ class Simulated:
     wall_s: float
     books: Books
     """What the cycles took."""
+    counts: LinkCounts
 
 
 def enough_quanta(done: int) -> bool:
@@ -58,6 +59,8 @@ def simulate(
     on_cycle: Callable[[CycleRecord, Truth], None] | None = None,
     on_state: Callable[[CycleRecord, State], None] | None = None,
     may_refine: Callable[[int], bool] = enough_quanta,
+    reload: Callable[[int], Settings | None] | None = None,
+    on_bytes: OnBytes | None = None,
 ) -> Simulated:
     """Drive through `world` until the leg is done, the robot stops for a reason, or the time is up.
 
@@ -77,10 +80,14 @@ def simulate(
         Gets every record, and the state it left: a recorder.
     may_refine : callable
         In place of a clock, as in `step`.
+    reload : callable, optional
+        Asked with the number of each cycle for settings to go on with from there, as after a reload.
+    on_bytes : callable, optional
+        Gets what goes over the line, either way, and when.
     """
     robot = EmulatedRobot(settings, world, seed)
     driver = DenningRobot(settings)
-    line = MemoryLine(driver, robot)
+    line = MemoryLine(driver, robot, on_bytes=on_bytes)
     state = State(Perception(settings.ring, settings.models, settings.perception))
     start = robot.truth.pose
     began = time.perf_counter()
@@ -88,6 +95,10 @@ def simulate(
     until, now = seconds_max, 0.0
     while now < until:
         now = (books.cycles + 1) / settings.cycle.rate_hz
+        if reload is not None and (other := reload(books.cycles + 1)) is not None:
+            settings = other
+            driver.set_firing(settings.ring)
+            state.perception.adopt(settings.perception)
         line.exchange(now)
         request = Request.ARM if state.mode.mode is Mode.READY else None
         inputs = gather(driver, now, request)
@@ -100,4 +111,4 @@ def simulate(
             on_state(record, state)
         if state.mode.mode is Mode.SAFE_STOP or (state.leg is not None and state.leg.done):
             until = min(until, now + SETTLING_S)
-    return Simulated(state, start, robot.truth, now, time.perf_counter() - began, books)
+    return Simulated(state, start, robot.truth, now, time.perf_counter() - began, books, driver.counts)

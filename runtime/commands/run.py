@@ -83,7 +83,7 @@ def run_robot(
     with contextlib.ExitStack() as stack:
         if record is not None:
             stack.enter_context(owned(Path(record), f"--record {record}"))
-        keeping = stack.enter_context(kept(settings, record, no_record=no_record))
+        keeping = stack.enter_context(kept(settings, record, no_record=no_record, emulated=port is None))
         log = stack.enter_context(open_log(settings.log, terminal=not live, tap=keeping.on_log))
         log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
         for text in advice(settings):
@@ -106,6 +106,7 @@ def run_robot(
                 )  # fmt: skip
 
         summary = asyncio.run(whole())
+        keeping.on_summary(summary)
     if keeping.standing is not None:
         summary["recording"] = keeping.standing
     if json_file is not None:
