@@ -242,14 +242,14 @@ def figures(
     units: UnitsOption = "m",
     sets: Sets = (),
 ) -> int:
-    """Draw a run as the paper does: raw data, segments, clusters, matched models; SVG, PDF, PNG, and a moving overview.
+    """Draw a run as the paper does: raw data, segments, clusters, matched models, and all of it moving.
 
     Parameters
     ----------
     file
         A recording (MCAP) or a ring log (CSV).
     out
-        Folder for the pictures.
+        Folder for the pictures: SVG, PDF and PNG; GIF, and MP4 where ffmpeg is there.
     still
         Leave the moving overview out.
     """
@@ -257,6 +257,33 @@ def figures(
     from runtime.trace.sources import Asked
 
     return draw_figures(Asked(file, sets, robot, models, world), out, moving=not still, units=units)
+
+
+@app.command
+def report(
+    file: str,
+    /,
+    *,
+    out: str | None = None,
+    world: World = None,
+    robot: Robot = None,
+    models: Models = (),
+    units: UnitsOption = "m",
+    sets: Sets = (),
+) -> int:
+    """Put a run on one page of HTML: Table 2 with errors, pictures, timing, line, stop reasons, settings.
+
+    Parameters
+    ----------
+    file
+        A recording (MCAP) or a ring log (CSV).
+    out
+        The page; where it is not given, beside the file, as NAME.html.
+    """
+    from runtime.commands.report import write_report
+    from runtime.trace.sources import Asked
+
+    return write_report(Asked(file, sets, robot, models, world), out, units=units)
 
 
 @app.command

@@ -71,8 +71,8 @@ def spread_verdict(spread: Spread, units: Units) -> str:
     return (
         f"{spread['seeds']} seeds: mean error {length(spread['mean'], units, 3)} ± "
         f"{length(spread['deviation'], units, 3)} {units} from seed to seed; worst single error "
-        f"{length(spread['worst'], units, 3)} {units} (seed {spread['worst_seed']}); {spread['missed']} drums not found, "
-        f"at most {spread['missed_most']} by one seed; {spread['false']} false"
+        f"{length(spread['worst'], units, 3)} {units} (seed {spread['worst_seed']}); {spread['missed']} drums not "
+        f"found, at most {spread['missed_most']} by one seed; {spread['false']} false"
     )
 
 

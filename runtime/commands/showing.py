@@ -1,4 +1,4 @@
-"""What the commands share that show a run which is over: reading it with a progress bar, and folders to write into."""
+"""What the commands share that show a run which is over: reading it with a progress bar, and where to write."""
 
 from __future__ import annotations
 
@@ -56,7 +56,8 @@ def writing(option: str, path: str | Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise Complaint(
-            f"{option} {path}: cannot be written: {error.strerror or error}; choose another place or make room", FAILED
+            f"{option} {path}: cannot be written: {error.strerror or error}; choose another place or make room",
+            FAILED,
         ) from error
 
 

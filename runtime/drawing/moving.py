@@ -31,6 +31,8 @@ SECONDS: Final = 8.0
 """How long the picture moves, before it rests on the end."""
 REST_S: Final = 2.5
 DPI: Final = 100
+ROOM_IN: Final = 1.45
+"""The legend has everything in it."""
 COLOURS: Final = 64
 ECHOES_SHOWN: Final = 48
 """The newest: two rounds of a ring of 24."""
@@ -44,7 +46,7 @@ def frames(trace: Trace, units: Units) -> Iterator[Pixels]:
     if trace.last is not None and moments[-1] is not trace.last:
         moments.append(trace.last)
     canvas = Canvas(trace, units)
-    figure, axes = canvas.figure()
+    figure, axes = canvas.figure(ROOM_IN)
     painter = FigureCanvasAgg(figure)
     figure.set_dpi(DPI)
     handles = draw_things(axes, trace, canvas.frame)

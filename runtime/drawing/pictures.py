@@ -44,10 +44,10 @@ class Canvas:
         """The plane."""
         return Frame(self.trace.start, METRES_A_FOOT if self.units == "ft" else 1.0)
 
-    def figure(self) -> tuple[Figure, Axes]:
-        """Return an empty picture, as high as the run's shape asks for."""
+    def figure(self, room_in: float = ROOM_IN) -> tuple[Figure, Axes]:
+        """Return an empty picture, as high as the run's shape asks for, with some room around the plane."""
         left, right, bottom, top = window(self.trace, self.frame)
-        height = (WIDTH_IN - 0.7) * (top - bottom) / (right - left) + ROOM_IN
+        height = (WIDTH_IN - 0.7) * (top - bottom) / (right - left) + room_in
         figure = Figure(figsize=(WIDTH_IN, min(max(height, HEIGHT_MIN_IN), HEIGHT_MAX_IN)), layout="constrained")
         axes = figure.add_subplot()
         self.prepare(axes)
@@ -126,4 +126,5 @@ def _picture(canvas: Canvas, title: str, line: str, draw: Callable[[Axes], list[
 
 def legend(figure: Figure, handles: Sequence[Line2D]) -> None:
     """Put the legend below the picture, where it hides nothing."""
-    figure.legend(handles=list(handles), loc="outside lower center", ncols=2 if len(handles) == 4 else min(len(handles), 3))
+    columns = {4: 2, 7: 4}.get(len(handles), min(len(handles), 3))
+    figure.legend(handles=list(handles), loc="outside lower center", ncols=columns)

@@ -81,7 +81,7 @@ def draw_arcs(
                           alpha=alpha, zorder=3)  # fmt: skip
         patch.set_gid(gid)
         axes.add_patch(patch)
-    return [Line2D([], [], color=ECHO, linewidth=1.2, alpha=0.8, label="echo: its arc, as wide as the beam")]
+    return [Line2D([], [], color=ECHO, linewidth=1.2, alpha=0.8, label="echo, its arc")]
 
 
 def draw_segments(
@@ -111,7 +111,7 @@ def draw_clusters(axes: Axes, clusters: Iterable[Cluster], least: int, frame: Fr
         centre = frame.points(np.array([[cluster.x, cluster.y]]))[0]
         axes.plot(*centre, marker="x", color=CLUSTER, markersize=8 if large else 5, zorder=4,
                   markeredgewidth=style["linewidth"], linestyle="", gid=f"cluster-{number}-centre")  # fmt: skip
-        label = "cluster, X its centre" if large else f"cluster of fewer than {least} segments"
+        label = "cluster, X its centre" if large else f"cluster of fewer than {least}"
         handles[label] = Line2D([], [], color=CLUSTER, marker="x", label=label, **style)
     return [handles[label] for label in sorted(handles)]
 

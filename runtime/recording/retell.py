@@ -11,11 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from config.settings import Settings
+from config.world import WorldConfig
 from drivers.messages import Pose
 from perception.pipeline import SeenObject
 from runtime.experiment import against_truth
 from runtime.modes import Mode
-from config.world import WorldConfig
 from runtime.recording.channels import CYCLE, SETTINGS, Entry, decode
 from runtime.recording.forms import Cycle, SettingsChange
 from runtime.recording.reading import Recording, RecordingError, settings_in
