@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from cyclopts import App, CycloptsError, Parameter, Token
+from cyclopts import App, CycloptsError, Parameter
 
 from runtime import VERSION
+from runtime.cli_shown import export, figures, report
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
+from runtime.options import Flag, JsonFile, Seed, Sets, UnitsOption
 from runtime.scene_names import SceneName
 
 app = App(
@@ -22,30 +23,6 @@ app = App(
     help="A robot's main process that recognises and locates objects by sonar alone.",
     version=VERSION,
 )
-
-Sets = Annotated[
-    tuple[str, ...],
-    Parameter(
-        name="--set",
-        negative="",
-        allow_leading_hyphen=False,
-        help="Override one setting, as in ring.firing=quadrants.",
-    ),
-]
-JsonFile = Annotated[str | None, Parameter(name="--json", help="Write the summary to this file.")]
-UnitsOption = Annotated[Literal["m", "ft"], Parameter(help="Units of what is printed.")]
-Flag = Parameter(negative="")
-
-
-def _whole(_type: type, tokens: Sequence[Token]) -> int:
-    """Return a whole number, none below zero; left alone, cyclopts takes 1.5 for 1."""
-    text = tokens[0].value
-    if not (text.isascii() and text.isdigit()):
-        raise ValueError(f"{text!r} must be a whole number, 0 or above.")
-    return int(text)
-
-
-Seed = Annotated[int, Parameter(converter=_whole)]
 
 
 @app.command
@@ -221,71 +198,6 @@ def recover(recording: str, /, *, out: str | None = None) -> int:
     return recover_recording(recording, out)
 
 
-Robot = Annotated[str | None, Parameter(help="Ring logs: robot file, or the name of a shipped one.")]
-Models = Annotated[
-    tuple[str, ...],
-    Parameter(name="--model", negative="", help="Ring logs: object model, a file or a name; may be repeated."),
-]
-World = Annotated[str | None, Parameter(help="What stood there, a world file or a name, where FILE does not know.")]
-
-
-@app.command
-def figures(
-    file: str,
-    /,
-    *,
-    out: str,
-    still: Annotated[bool, Flag] = False,
-    world: World = None,
-    robot: Robot = None,
-    models: Models = (),
-    units: UnitsOption = "m",
-    sets: Sets = (),
-) -> int:
-    """Draw a run as the paper does: raw data, segments, clusters, matched models, and all of it moving.
-
-    Parameters
-    ----------
-    file
-        A recording (MCAP) or a ring log (CSV).
-    out
-        Folder for the pictures: SVG, PDF and PNG; GIF, and MP4 where ffmpeg is there.
-    still
-        Leave the moving overview out.
-    """
-    from runtime.commands.figures import draw_figures
-    from runtime.trace.sources import Asked
-
-    return draw_figures(Asked(file, sets, robot, models, world), out, moving=not still, units=units)
-
-
-@app.command
-def report(
-    file: str,
-    /,
-    *,
-    out: str | None = None,
-    world: World = None,
-    robot: Robot = None,
-    models: Models = (),
-    units: UnitsOption = "m",
-    sets: Sets = (),
-) -> int:
-    """Put a run on one page of HTML: Table 2 with errors, pictures, timing, line, stop reasons, settings.
-
-    Parameters
-    ----------
-    file
-        A recording (MCAP) or a ring log (CSV).
-    out
-        The page; where it is not given, beside the file, as NAME.html.
-    """
-    from runtime.commands.report import write_report
-    from runtime.trace.sources import Asked
-
-    return write_report(Asked(file, sets, robot, models, world), out, units=units)
-
-
 @app.command
 def experiment(
     name: Literal["hallway", "irregular"],
@@ -296,6 +208,7 @@ def experiment(
     world: str | None = None,
     model: Annotated[tuple[str, ...], Parameter(negative="")] = (),
     seeds: Seed = 1,
+    out: str | None = None,
     json: JsonFile = None,
     units: UnitsOption = "ft",
     sets: Sets = (),
@@ -316,15 +229,24 @@ def experiment(
         Object model to look for: a file or a name; may be repeated.
     seeds
         Repeat with this many seeds, from 0 on.
+    out
+        Folder for recording, pictures and report of the run with seed 0.
     """
     from runtime.commands.experiment import run_experiment, run_scenes
 
     sets = (*sets, f"perception.method={method}")
+    if scene is not None and out is not None:
+        raise Complaint("--scene gives perception readings without a run: there is nothing to record in --out",
+                        WRONG_CALL)  # fmt: skip
     if scene is not None:
         if name != "hallway" or world is not None:
             raise Complaint("--scene is a hallway of its own: call `experiment hallway`, without --world", WRONG_CALL)
         return run_scenes(scene, sets, models=model, seeds=seeds, json_file=json, units=units)
-    return run_experiment(name, sets, world=world, models=model, seeds=seeds, json_file=json, units=units)
+    return run_experiment(name, sets, world=world, models=model, seeds=seeds, out=out, json_file=json, units=units)
+
+
+for command in (figures, report, export):
+    app.command(command)
 
 
 @app.command

@@ -173,9 +173,7 @@ def _timing(trace: Trace) -> list[str]:
         heads = ["ms", "median", "p99", "p99.9", "worst"]
         parts.append(table(heads, [[name, *("" if math.isnan(v) else f"{v:.2f}" for v in vs)] for name, vs in rows]))
     else:
-        parts.append(
-            note("The run's own books are not in the file: it was cut off, or this is a ring log.")
-        )
+        parts.append(note("The run's own books are not in the file: it was cut off, or this is a ring log."))
     if trace.gaps_s:
         q = 1e3 * np.quantile(trace.gaps_s, [0.0, 0.5, 0.99, 1.0])
         what = "cycle to cycle" if trace.modes else "firing to firing"
