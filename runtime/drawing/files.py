@@ -21,7 +21,8 @@ TIGHT: Final[MappingProxyType[str, Any]] = MappingProxyType({"bbox_inches": "tig
 @contextlib.contextmanager
 def styled(*, text_as_text: bool = False) -> Iterator[None]:
     """Draw in the house's style; text as paths, which look the same everywhere, or as text, which is small."""
-    with mpl.rc_context({**RC, "svg.fonttype": "none" if text_as_text else "path"}):
+    rc: Any = {**RC, "svg.fonttype": "none" if text_as_text else "path"}
+    with mpl.rc_context(rc):
         yield
 
 

@@ -10,7 +10,7 @@ import shutil
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -33,7 +33,8 @@ REST_S: Final = 2.5
 DPI: Final = 100
 ROOM_IN: Final = 1.45
 """The legend has everything in it."""
-COLOURS: Final = 64
+COLOURS: Final = 128
+NEAR: Final = 8
 ECHOES_SHOWN: Final = 48
 """The newest: two rounds of a ring of 24."""
 
@@ -47,7 +48,7 @@ def frames(trace: Trace, units: Units) -> Iterator[Pixels]:
         moments.append(trace.last)
     canvas = Canvas(trace, units)
     figure, axes = canvas.figure(ROOM_IN)
-    painter = FigureCanvasAgg(figure)
+    painter: Any = FigureCanvasAgg(figure)  # whose methods have no types
     figure.set_dpi(DPI)
     handles = draw_things(axes, trace, canvas.frame)
     _title(axes, trace.last, trace)
@@ -118,13 +119,23 @@ def save_moving(
 
 
 def _gif(shown: list[Pixels], step_s: float, path: Path) -> Path:
-    # One palette for all, from the fullest picture: colours do not flicker, and what stands still costs nothing.
-    palette = Image.fromarray(shown[-1]).quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE)
+    palette = _palette(shown)
     images = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in shown]
     step_ms = round(1000.0 * step_s)
     lasts = [step_ms] * (len(images) - 1) + [step_ms + round(1000.0 * REST_S)]
     images[0].save(path, save_all=True, append_images=images[1:], duration=lasts, loop=0, optimize=True)
     return path
+
+
+def _palette(shown: list[Pixels]) -> Image.Image:
+    """Return one palette for all frames, the colours that cover most of two of them: nothing flickers or shifts."""
+    pixels = np.concatenate([shown[len(shown) // 2].reshape(-1, 3), shown[-1].reshape(-1, 3)])
+    colours, counts = np.unique(pixels, axis=0, return_counts=True)
+    colours = colours[np.argsort(-counts)]
+    _, first = np.unique(colours // NEAR, axis=0, return_index=True)  # pillow does not tell nearer ones apart
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(colours[np.sort(first)[:COLOURS]].astype(np.uint8).tobytes())
+    return palette
 
 
 def _mp4(shown: list[Pixels], step_s: float, path: Path, ffmpeg: str) -> list[Path]:

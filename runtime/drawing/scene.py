@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -104,7 +104,7 @@ def draw_clusters(axes: Axes, clusters: Iterable[Cluster], least: int, frame: Fr
         large = cluster.segments >= least
         corners = np.array([[cluster.left, cluster.bottom], [cluster.right, cluster.bottom],
                             [cluster.right, cluster.top], [cluster.left, cluster.top]])  # fmt: skip
-        style = {"linewidth": 1.7 if large else 1.0, "linestyle": "-" if large else ":"}
+        style: Any = {"linewidth": 1.7 if large else 1.0, "linestyle": "-" if large else ":"}
         box = Polygon(frame.points(corners), closed=True, facecolor="none", edgecolor=CLUSTER, zorder=4, **style)
         box.set_gid(f"cluster-{number}")
         axes.add_patch(box)

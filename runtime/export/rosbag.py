@@ -70,7 +70,7 @@ class _Teller:
         for t_s, tell in sorted(items, key=lambda item: item[0]):
             tell(trace.unix_ns(t_s))
 
-    def _make(self, kind: str, **values: object) -> Any:  # noqa: ANN401 - rosbags makes its types as it goes
+    def _make(self, kind: str, **values: Any) -> Any:  # noqa: ANN401 - rosbags makes its types as it goes
         return self._store.types[kind](**values)
 
     def _write(self, topic: str, kind: str, message: object, at: int) -> None:
