@@ -47,9 +47,8 @@ def test_csv(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
     assert len(read["echoes"]) == len(trace.echoes)
     for row, kept in zip(read["echoes"], trace.echoes.tolist(), strict=True):
         assert float(row["bearing_rad"]) == kept[4], "every digit"
-        assert (row["heard"], row["range_m"] == "") == (
-            ("True", False) if math.isfinite(kept[5]) else ("False", True)
-        )
+        assert row["heard"] == str(math.isfinite(kept[5]))
+        assert row["range_m"] == (str(kept[5]) if math.isfinite(kept[5]) else "")
     last = [row for row in read["objects"] if float(row["t_s"]) == trace.seconds]
     assert [(r["model"], float(r["x_m"]), float(r["y_m"])) for r in last] == [
         (o.model, o.x, o.y) for o in trace.objects
@@ -84,9 +83,8 @@ def test_foxglove(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
     first: dict[str, Any] = {}
     times: list[int] = []
     with path.open("rb") as file:
-        for schema, channel, message, proto in make_reader(
-            file, decoder_factories=[DecoderFactory()]
-        ).iter_decoded_messages():
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        for schema, channel, message, proto in reader.iter_decoded_messages():
             assert schema is not None
             seen[channel.topic, schema.name] += 1
             newest[channel.topic] = proto
@@ -116,10 +114,6 @@ def test_foxglove(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
     assert len(scan.ranges) == 24
     fired = [i for i, r in enumerate(scan.ranges) if not math.isnan(r)]
     assert fired == sorted(int(row[1]) for row in trace.echoes if row[6] == trace.echoes[-1, 6])
-    # An echo's place by the scan is its place by the trace.
-    with_echo = next(k for k in range(len(trace.echoes) - 1, -1, -1) if math.isfinite(trace.echoes[k, 5]))
-    row = trace.echoes[with_echo]
-    assert np.isfinite(row).all()
 
 
 @pytest.mark.compiled

@@ -14,13 +14,14 @@ import pytest
 from PIL import Image
 
 from config.load import load_settings, load_world
-from drivers.messages import Pose
+from drivers.messages import Floats, Pose
 from runtime.cli import call
 from runtime.complaint import DONE, FAILED, WRONG_CALL
 from runtime.drawing.geometry import Frame, arcs, outline
 from runtime.tables import METRES_A_FOOT
 from runtime.trace.form import Trace
 from runtime.trace.sources import Asked, trace_of
+from tests.architecture import ROOMS
 
 PICTURES = ("raw", "segments", "clusters", "models")
 HALLWAY = load_world("hallway")
@@ -29,10 +30,6 @@ HALLWAY = load_world("hallway")
 def ids(path: Path) -> set[str]:
     """Return the ids of the groups in an SVG."""
     return {element.attrib["id"] for element in ElementTree.parse(path).iter() if "id" in element.attrib}
-
-
-def near(colour: str) -> tuple[int, ...]:
-    return tuple(int(colour[i : i + 2], 16) for i in (1, 3, 5))
 
 
 def traced(path: Path, **asked: str) -> Trace:
@@ -129,11 +126,11 @@ def trace_frame(trace: Trace) -> Frame:
     return Frame(trace.start, 1.0)
 
 
-def curve_points(curves: np.ndarray) -> np.ndarray:
+def curve_points(curves: Floats) -> Floats:
     """Return points along cubic Bézier curves, by their definition."""
     t = np.linspace(0.0, 1.0, 41)[:, None]
     weights = np.stack([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3])
-    points: np.ndarray = np.einsum("ktd,nkd->ntd", np.broadcast_to(weights, (4, 41, 2)), curves)
+    points: Floats = np.einsum("ktd,nkd->ntd", np.broadcast_to(weights, (4, 41, 2)), curves)
     return points
 
 
@@ -231,9 +228,7 @@ def test_nobody_else_knows_matplotlib() -> None:
     top = Path(__file__).resolve().parents[2]
     knows = [
         str(path.relative_to(top))
-        for path in itertools.chain(
-            *((top / room).rglob("*.py") for room in ("config", "drivers", "perception", "runtime"))
-        )
+        for path in itertools.chain(*((top / room).rglob("*.py") for room in ROOMS))
         if re.search(r"^\s*(import|from) (matplotlib|PIL)", path.read_text("utf-8"), re.MULTILINE)
     ]
     assert knows

@@ -113,7 +113,8 @@ def test_an_svg_within_a_page() -> None:
     svg = (
         '<?xml version="1.0"?><!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/x.dtd">'
         '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"><!-- a -->'
-        '<g id="a"><path d="M 1.23456 2" style="stroke: #0072b2" clip-path="url(#c)"/><use xlink:href="#a"/></g></svg>'
+        '<g id="a"><path d="M 1.23456 2" style="stroke: #0072b2" clip-path="url(#c)"/>'
+        '<use xlink:href="#a"/></g></svg>'
     )
     assert inlined(svg, "p", "told") == (
         '<svg role="img" aria-label="told"><g id="p-a"><path d="M 1.23 2" style="stroke: var(--echo)" '
