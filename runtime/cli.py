@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from cyclopts import App, CycloptsError, Parameter, Token
+from cyclopts import App, CycloptsError, Parameter
 
 from runtime import VERSION
+from runtime.cli_shown import export, figures, report
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
+from runtime.options import Flag, JsonFile, Seed, Sets, UnitsOption
 from runtime.scene_names import SceneName
 
 app = App(
@@ -22,30 +23,6 @@ app = App(
     help="A robot's main process that recognises and locates objects by sonar alone.",
     version=VERSION,
 )
-
-Sets = Annotated[
-    tuple[str, ...],
-    Parameter(
-        name="--set",
-        negative="",
-        allow_leading_hyphen=False,
-        help="Override one setting, as in ring.firing=quadrants.",
-    ),
-]
-JsonFile = Annotated[str | None, Parameter(name="--json", help="Write the summary to this file.")]
-UnitsOption = Annotated[Literal["m", "ft"], Parameter(help="Units of what is printed.")]
-Flag = Parameter(negative="")
-
-
-def _whole(_type: type, tokens: Sequence[Token]) -> int:
-    """Return a whole number, none below zero; left alone, cyclopts takes 1.5 for 1."""
-    text = tokens[0].value
-    if not (text.isascii() and text.isdigit()):
-        raise ValueError(f"{text!r} must be a whole number, 0 or above.")
-    return int(text)
-
-
-Seed = Annotated[int, Parameter(converter=_whole)]
 
 
 @app.command
@@ -242,6 +219,7 @@ def experiment(
     ),
     quanta: Annotated[tuple[float, ...], Parameter(negative="", consume_multiple=True)] = (),
     seeds: Seed = 1,
+    out: str | None = None,
     json: JsonFile = None,
     units: UnitsOption = "ft",
     sets: Sets = (),
@@ -266,10 +244,15 @@ def experiment(
         For `budget`: so many quanta a cycle instead, which makes the table repeatable; 0.1 is one in ten cycles.
     seeds
         Repeat with this many seeds, from 0 on.
+    out
+        Folder for recording, pictures and report of the run with seed 0.
     """
     from runtime.commands.experiment import run_experiment, run_scenes
 
     sets = (*sets, f"perception.method={method}")
+    if scene is not None and out is not None:
+        raise Complaint("--scene gives perception readings without a run: there is nothing to record in --out",
+                        WRONG_CALL)  # fmt: skip
     if name == "budget":
         from runtime.commands.budget import run_budgets
 
@@ -282,7 +265,11 @@ def experiment(
         if name != "hallway" or world is not None:
             raise Complaint("--scene is a hallway of its own: call `experiment hallway`, without --world", WRONG_CALL)
         return run_scenes(scene, sets, models=model, seeds=seeds, json_file=json, units=units)
-    return run_experiment(name, sets, world=world, models=model, seeds=seeds, json_file=json, units=units)
+    return run_experiment(name, sets, world=world, models=model, seeds=seeds, out=out, json_file=json, units=units)
+
+
+for command in (figures, report, export):
+    app.command(command)
 
 
 @app.command

@@ -55,6 +55,8 @@ class Observers:
     on_firing: Callable[[Firing], None] | None = None
     on_bytes: Callable[[Way, float, bytes], None] | None = None
     """Gets what goes over the line, either way, and when, by the host's clock."""
+    on_settings: Callable[[Settings], None] | None = None
+    """Gets settings taken over while the robot runs, before the first cycle under them."""
 
 
 class RobotProcess:
@@ -199,6 +201,8 @@ class RobotProcess:
             self._driver.set_firing(self._settings.ring)
             self._state.perception.adopt(self._settings.perception)
             self._state.perception.listen_to(self._settings.ring)
+            if self._observers.on_settings is not None:
+                self._observers.on_settings(self._settings)
         if self._arm_when_ready and self._state.mode.mode is Mode.READY:
             self._arm_when_ready = False
             self.request(Request.ARM)

@@ -16,8 +16,8 @@ from config.settings import Settings
 from config.world import WorldConfig
 from drivers.denning.robot import DenningRobot
 from drivers.emulator.device import EmulatedRobot, Truth
-from drivers.emulator.memory import MemoryLine
-from drivers.messages import Pose
+from drivers.emulator.memory import MemoryLine, OnBytes
+from drivers.messages import LinkCounts, Pose
 from perception.pipeline import Perception
 from runtime.allowance import QUANTA_PER_CYCLE, Allowance, Quanta
 from runtime.books import Books
@@ -41,6 +41,7 @@ class Simulated:
     wall_s: float
     books: Books
     """What the cycles took."""
+    counts: LinkCounts
 
 
 def simulate(
@@ -53,6 +54,8 @@ def simulate(
     allowance: Allowance | None = None,
     on_state: Callable[[CycleRecord, State, Pose], None] | None = None,
     clock_start_us: int = 0,
+    reload: Callable[[int], Settings | None] | None = None,
+    on_bytes: OnBytes | None = None,
 ) -> Simulated:
     """Drive through `world` until the leg is done, the robot stops for a reason, or the time is up.
 
@@ -74,11 +77,15 @@ def simulate(
         Gets every record, the state it left, and where the odometry began.
     clock_start_us : int
         What the robot's own clock shows at first, µs; it wraps at 2³².
+    reload : callable, optional
+        Asked with the number of each cycle for settings to go on with from there, as after a reload.
+    on_bytes : callable, optional
+        Gets what goes over the line, either way, and when.
     """
     allowance = Quanta(QUANTA_PER_CYCLE) if allowance is None else allowance
     robot = EmulatedRobot(settings, world, seed, clock_start_us=clock_start_us)
     driver = DenningRobot(settings)
-    line = MemoryLine(driver, robot)
+    line = MemoryLine(driver, robot, on_bytes=on_bytes)
     state = State(Perception(settings.ring, settings.models, settings.perception))
     start = robot.truth.pose
     began = time.perf_counter()
@@ -86,6 +93,10 @@ def simulate(
     until, now = seconds_max, 0.0
     while now < until:
         now = (books.cycles + 1) / settings.cycle.rate_hz
+        if reload is not None and (other := reload(books.cycles + 1)) is not None:
+            settings = other
+            driver.set_firing(settings.ring)
+            state.perception.adopt(settings.perception)
         line.exchange(now)
         request = Request.ARM if state.mode.mode is Mode.READY else None
         inputs = gather(driver, now, request)
@@ -99,4 +110,4 @@ def simulate(
             on_state(record, state, start)
         if state.mode.mode is Mode.SAFE_STOP or (state.leg is not None and state.leg.done):
             until = min(until, now + SETTLING_S)
-    return Simulated(state, start, robot.truth, now, time.perf_counter() - began, books)
+    return Simulated(state, start, robot.truth, now, time.perf_counter() - began, books, driver.counts)

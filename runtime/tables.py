@@ -13,7 +13,7 @@ from runtime.first_fix import ASKED_M
 if TYPE_CHECKING:
     # The robot's own process has tables too, and shall not load the emulator for them.
     from runtime.budgets import BudgetRow
-    from runtime.experiment import DrumRow, Outcome
+    from runtime.experiment import DrumRow, Outcome, Spread
     from runtime.open_loop import BoxRow, SceneOutcome
     from runtime.summary import ObjectRow, RunSummary
 
@@ -68,6 +68,16 @@ def boxes_table(outcome: SceneOutcome, units: Units) -> Table:
 def verdict(outcome: Outcome, units: Units) -> str:
     """Return the experiment in one line."""
     return _verdict(_found("drums", outcome["drums"]), outcome, units)
+
+
+def spread_verdict(spread: Spread, units: Units) -> str:
+    """Return how much the seeds differ, in one line."""
+    return (
+        f"{spread['seeds']} seeds: mean error {length(spread['mean'], units, 3)} ± "
+        f"{length(spread['deviation'], units, 3)} {units} from seed to seed; worst single error "
+        f"{length(spread['worst'], units, 3)} {units} (seed {spread['worst_seed']}); {spread['missed']} drums not "
+        f"found, at most {spread['missed_most']} by one seed; {spread['false']} false"
+    )
 
 
 def scene_verdict(outcome: SceneOutcome, units: Units) -> str:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from mcap.writer import CompressionType, Writer
@@ -49,13 +50,20 @@ class FiveInSix:
         return bool(self._rng.random() > 1.0 / 6.0)
 
 
-def record(settings: Settings, path: Path | Place, seconds: float, seed: int = 0, queue_max: int = 8192) -> Standing:
+def record(
+    settings: Settings,
+    path: Path | Place,
+    seconds: float,
+    seed: int = 0,
+    queue_max: int = 8192,
+    reloads: Mapping[int, Settings] = MappingProxyType({}),
+) -> Standing:
     """Record a run in virtual time in which every sixth quantum of refinement is refused for want of time."""
     world = settings.world
     assert world is not None
     now = [0.0]
     place = OneFile(path) if isinstance(path, Path) else path
-    with Recorder(settings, place, clock=lambda: now[0], queue_max=queue_max) as recorder:
+    with Recorder(settings, place, clock=lambda: now[0], queue_max=queue_max, emulated=True) as recorder:
         until(lambda: recorder.standing.file is not None or recorder.standing.trouble is not None, "a file")
 
         def on_state(record: object, state: object, _start: object) -> None:
@@ -65,7 +73,16 @@ def record(settings: Settings, path: Path | Place, seconds: float, seed: int = 0
             now[0] += 0.05
 
         recorder.on_log({"level": "info", "event": "start", "timestamp": "now", "why": None})
-        simulate(settings, world, seed, seconds, on_state=on_state, allowance=FiveInSix(seed))
+
+        def reload(cycle: int) -> Settings | None:
+            if cycle in reloads:
+                recorder.on_settings(reloads[cycle])
+            return reloads.get(cycle)
+
+        simulate(
+            settings, world, seed, seconds, on_state=on_state, allowance=FiveInSix(seed), reload=reload,
+        )  # fmt: skip
+        recorder.on_summary({"mode": "DRIVE", "cycles": 20 * seconds})
     return recorder.standing
 
 

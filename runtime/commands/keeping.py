@@ -74,7 +74,12 @@ class Keeping:
             if view is not None:
                 view(record, state, books, driver)
 
-        return Observers(on_cycle, self._on_firing, recorder.on_bytes)
+        return Observers(on_cycle, self._on_firing, recorder.on_bytes, recorder.on_settings)
+
+    def on_summary(self, summary: Mapping[str, Any]) -> None:
+        """Take what the run says of itself at its end."""
+        if self._recorder is not None:
+            self._recorder.on_summary(summary)
 
     def probe(self) -> str | None:
         """Say how the recorder ended; None while it runs, or where there is none. See `runtime.health`."""
@@ -113,7 +118,7 @@ class Keeping:
 
 
 @contextlib.contextmanager
-def kept(settings: Settings, record: str | None, *, no_record: bool) -> Iterator[Keeping]:
+def kept(settings: Settings, record: str | None, *, no_record: bool, emulated: bool) -> Iterator[Keeping]:
     """Keep what is to be kept while the run lasts.
 
     Parameters
@@ -124,6 +129,8 @@ def kept(settings: Settings, record: str | None, *, no_record: bool) -> Iterator
         A file by name: a recording, or a ring log where it ends in ``.csv``.
     no_record : bool
         Keep no recording in the folder either.
+    emulated : bool
+        Whether the settings' world is what the robot meets.
 
     Raises
     ------
@@ -146,7 +153,7 @@ def kept(settings: Settings, record: str | None, *, no_record: bool) -> Iterator
             place = OneFile(Path(record))
         else:
             place = Rotating(recordings_folder(settings.recording), run, settings.recording)
-        recorder = stack.enter_context(Recorder(settings, place))
+        recorder = stack.enter_context(Recorder(settings, place, emulated=emulated))
         yield Keeping(recorder, None, asked_for=record is not None)
 
 

@@ -122,8 +122,13 @@ def rerun(
         if span.speed is not None:
             on_cycle, on_entry = stack.enter_context(watching(recording, span, units))
         verdict = replay(recording, since_s=span.since_s, until_s=until_s, on_cycle=on_cycle, on_entry=on_entry)
-    if verdict.cycles == 0 or verdict.state is None:
-        raise Complaint(f"{recording.path}: holds no cycle that can be replayed in this part of it", FAILED)
+    if verdict.cycles == 0:
+        if verdict.skipped or span != Span(0.0, None, span.speed):
+            raise Complaint(f"{recording.path}: holds no cycle that can be replayed in this part of it", FAILED)
+        console.print(f"{recording.path}: holds no cycle yet: the run ended before its first one; nothing differs")
+        if json_file is not None:
+            write_json(json_file, summarise(recording, verdict))
+        return DONE
     summary = summarise(recording, verdict)
     if json_file is not None:
         write_json(json_file, summary)

@@ -85,7 +85,7 @@ def run_robot(
     with contextlib.ExitStack() as stack:
         if record is not None:
             stack.enter_context(owned(Path(record), f"--record {record}"))
-        keeping = stack.enter_context(kept(settings, record, no_record=no_record))
+        keeping = stack.enter_context(kept(settings, record, no_record=no_record, emulated=port is None))
         log = stack.enter_context(open_log(settings.log, terminal=not live, tap=keeping.on_log, standing=lines))
         log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
         for text in advice(settings):
@@ -108,6 +108,7 @@ def run_robot(
                 )  # fmt: skip
 
         summary = asyncio.run(whole())
+        keeping.on_summary(summary)
     if keeping.standing is not None:
         summary["recording"] = keeping.standing
     summary["log"] = {"lost": lines.lost, "trouble": lines.trouble}

@@ -18,7 +18,9 @@ from runtime.recording.forms import (
     MapChange,
     ModeChange,
     ObjectsSeen,
+    RunEnd,
     SerialBytes,
+    SettingsChange,
 )
 
 ABOUT: Final = "/about"
@@ -29,6 +31,8 @@ OBJECTS: Final = "/objects"
 SERIAL: Final = MappingProxyType({"in": "/serial/in", "out": "/serial/out"})
 LOG: Final = "/log"
 KEYFRAME: Final = "/keyframe"
+SETTINGS: Final = "/settings"
+SUMMARY: Final = "/summary"
 
 CHANNELS: Final[Mapping[str, type[Form]]] = MappingProxyType(
     {
@@ -41,6 +45,8 @@ CHANNELS: Final[Mapping[str, type[Form]]] = MappingProxyType(
         SERIAL["out"]: SerialBytes,
         LOG: LogLine,
         KEYFRAME: Keyframe,
+        SETTINGS: SettingsChange,
+        SUMMARY: RunEnd,
     }
 )
 """In the order in which they are numbered in a file, from 1; new ones go to the end."""

@@ -45,6 +45,22 @@ class About(Form):
     """Log times are Unix times: the host's clock plus this."""
     part: int
     """A long run, or one whose disk was full for a while, is kept in several files, numbered from 1."""
+    emulated: bool = False
+    """The settings' world is what stood there; a real robot knows of none."""
+
+
+class SettingsChange(Form):
+    """Other settings, in force from a cycle on: an input of it as much as an echo is."""
+
+    cycle: int
+    settings: dict[str, Any]
+    """Whole, as in `About`, which repeats them from then on."""
+
+
+class RunEnd(Form):
+    """What a run that came to its own end says of itself: its books, line counts and stop reasons."""
+
+    summary: dict[str, Any]
 
 
 class Cycle(Form):

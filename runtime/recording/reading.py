@@ -8,12 +8,13 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import orjson
 from pydantic import ValidationError
 
 from config.settings import Settings
+from config.world import WorldConfig
 from runtime.recording.channels import ABOUT, Entry, decode
 from runtime.recording.forms import FORMAT, About
 from runtime.recording.part import PROFILE
@@ -66,6 +67,11 @@ class Recording:
         """Whether the file was closed in good order; known then, too."""
         return self._salvage.finished
 
+    @property
+    def world(self) -> WorldConfig | None:
+        """What stood there, where that is known: a real robot's settings may name a world, but it is not in it."""
+        return self.settings.world if self.about.emulated else None
+
     def host_s(self, log_ns: int) -> float:
         """Return a log time by the host's clock of the run."""
         return 1e-9 * (log_ns - self.about.unix_minus_host_ns)
@@ -78,6 +84,17 @@ def is_recording(path: Path) -> bool:
             return file.read(len(MAGIC)) == MAGIC or path.suffix == ".mcap"
     except OSError:
         return path.suffix == ".mcap"
+
+
+def settings_in(told: dict[str, Any]) -> Settings:
+    """Return settings from the form in which a recording holds them.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        They are not those of this version.
+    """
+    return Settings.model_validate_json(orjson.dumps(told))
 
 
 @contextlib.contextmanager
@@ -150,7 +167,7 @@ def open_recording(path: Path) -> Iterator[Recording]:
         try:
             told = decode(About, about.data)
             _refuse_newer(path, salvage, told)
-            settings = Settings.model_validate_json(orjson.dumps(told.settings))
+            settings = settings_in(told.settings)
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             where = ".".join(map(str, first["loc"]))

@@ -21,10 +21,10 @@ from llvmlite.binding import get_host_cpu_name
 from config.settings import Settings
 from runtime import VERSION
 from runtime.kernels import kernels_key
-from runtime.recording.channels import CYCLE, KEYFRAME, LOG, OBJECTS, SEGMENTS, SERIAL
+from runtime.recording.channels import CYCLE, KEYFRAME, LOG, OBJECTS, SEGMENTS, SERIAL, SETTINGS, SUMMARY
 from runtime.recording.folder import Place
-from runtime.recording.forms import FORMAT, About, LogLine, left_by
-from runtime.recording.writer import QUEUE_MAX, Item, Moment, RecordingWriter, Standing
+from runtime.recording.forms import FORMAT, About, LogLine, RunEnd, left_by
+from runtime.recording.writer import QUEUE_MAX, Item, Moment, RecordingWriter, Reloaded, Standing
 from runtime.step import CycleRecord, State
 
 MOMENT_S: Final = 1.0
@@ -44,7 +44,7 @@ def made_by() -> dict[str, str]:
     }
 
 
-def about(settings: Settings, clock: Callable[[], float]) -> About:
+def about(settings: Settings, clock: Callable[[], float], *, emulated: bool) -> About:
     """Return what stands at the beginning of a recording that begins now."""
     return About(
         format=FORMAT,
@@ -53,6 +53,7 @@ def about(settings: Settings, clock: Callable[[], float]) -> About:
         started=datetime.now(UTC).isoformat(timespec="seconds"),
         unix_minus_host_ns=time.time_ns() - round(1e9 * clock()),
         part=1,
+        emulated=emulated,
     )
 
 
@@ -69,6 +70,8 @@ class Recorder:
         The host's clock of the run: monotonic, s.
     queue_max : int
         Items that may wait; what does not fit is dropped and counted.
+    emulated : bool
+        Whether the settings' world is what the robot meets.
     """
 
     def __init__(
@@ -77,14 +80,17 @@ class Recorder:
         place: Place,
         clock: Callable[[], float] = time.monotonic,
         queue_max: int = QUEUE_MAX,
+        *,
+        emulated: bool = False,
     ) -> None:
         self._clock = clock
         self._queue_max = queue_max
         self._moment_cycles = max(1, round(MOMENT_S * settings.cycle.rate_hz))
         self._keyframe_s = settings.recording.keyframe_period_s
-        self._writer = RecordingWriter(place, about(settings, clock))
+        self._writer = RecordingWriter(place, about(settings, clock, emulated=emulated))
         self._last_keyframe_s: float | None = None
         self._gap = False
+        self._cycle = 0
 
     def __enter__(self) -> Recorder:
         self._writer.start()
@@ -107,6 +113,7 @@ class Recorder:
     def on_cycle(self, record: CycleRecord, state: State) -> None:
         """Take a cycle, just over."""
         now_s = record.inputs.now_s
+        self._cycle = record.cycle
         self._hand(CYCLE, now_s, record)
         if self._last_keyframe_s is None:
             self._last_keyframe_s = now_s
@@ -126,6 +133,14 @@ class Recorder:
     def on_bytes(self, way: str, host_s: float, data: bytes) -> None:
         """Take bytes that came or went over the line."""
         self._hand(SERIAL[way], host_s, data)
+
+    def on_settings(self, settings: Settings) -> None:
+        """Take settings that are in force from the next cycle on; never dropped, for what follows hangs on them."""
+        self._writer.queue.append(Item(SETTINGS, self._clock(), Reloaded(self._cycle + 1, settings)))
+
+    def on_summary(self, summary: Mapping[str, Any]) -> None:
+        """Take what the run says of itself at its end."""
+        self._writer.queue.append(Item(SUMMARY, self._clock(), RunEnd.model_construct(summary=dict(summary))))
 
     def on_log(self, event: Mapping[str, Any]) -> None:
         """Take a line of the log."""

@@ -18,9 +18,18 @@ import orjson
 from config.settings import Settings
 from perception.pipeline import Perception
 from runtime.books import Books
-from runtime.recording.channels import CYCLE, KEYFRAME, Entry, decode, encode
-from runtime.recording.forms import Cycle, Keyframe, StateLeft, left_by, put_back, snapshot_in
-from runtime.recording.reading import SECOND_NS, Recording
+from runtime.recording.channels import ABOUT, CYCLE, KEYFRAME, SETTINGS, Entry, decode, encode
+from runtime.recording.forms import (
+    About,
+    Cycle,
+    Keyframe,
+    SettingsChange,
+    StateLeft,
+    left_by,
+    put_back,
+    snapshot_in,
+)
+from runtime.recording.reading import SECOND_NS, Recording, settings_in
 from runtime.step import CycleRecord, State, step
 
 OnCycle = Callable[[CycleRecord, State], None]
@@ -116,7 +125,7 @@ def replay(
         Gets every message on the way.
     """
     begin_ns = keyframe_before(recording, since_s) if since_s > 0.0 else None
-    run = _Replay(recording.settings, on_cycle, begun=begin_ns is None)
+    run = _Replay(recording, on_cycle, begun=begin_ns is None)
     first_ns = None
     began_s = time.perf_counter()
     for entry in recording.entries():
@@ -137,10 +146,11 @@ def replay(
 class _Replay:
     """A replay under way."""
 
-    def __init__(self, settings: Settings, on_cycle: OnCycle | None, *, begun: bool) -> None:
+    def __init__(self, recording: Recording, on_cycle: OnCycle | None, *, begun: bool) -> None:
         self.verdict = Verdict()
-        self.state: State | None = fresh_state(settings) if begun else None
-        self._settings = settings
+        self._settings = recording.settings
+        self._told = recording.about.settings
+        self.state: State | None = fresh_state(self._settings) if begun else None
         self._on_cycle = on_cycle
         self._last: tuple[int, float] | None = None
 
@@ -150,6 +160,18 @@ class _Replay:
             self._cycle(decode(Cycle, entry.data).record, entry.data)
         elif entry.topic == KEYFRAME:
             self._keyframe(decode(Keyframe, entry.data))
+        elif entry.topic == SETTINGS:
+            self._adopt(decode(SettingsChange, entry.data).settings)
+        elif entry.topic == ABOUT:  # stands before every keyframe, with what is in force there
+            self._adopt(decode(About, entry.data).settings)
+
+    def _adopt(self, told: dict[str, Any]) -> None:
+        """Go on with other settings, as the process did at this place."""
+        if told == self._told:
+            return
+        self._told, self._settings = told, settings_in(told)
+        if self.state is not None:
+            self.state.perception.adopt(self._settings.perception)
 
     def _cycle(self, record: CycleRecord, data: bytes) -> None:
         verdict, before = self.verdict, self._last

@@ -11,14 +11,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from config.settings import Settings
+from config.world import WorldConfig
 from drivers.messages import Pose
 from perception.pipeline import SeenObject
 from runtime.allowance import enough_quanta
 from runtime.experiment import against_truth
 from runtime.modes import Mode
-from runtime.recording.channels import CYCLE, Entry, decode
-from runtime.recording.forms import Cycle
-from runtime.recording.reading import Recording, RecordingError
+from runtime.recording.channels import CYCLE, SETTINGS, Entry, decode
+from runtime.recording.forms import Cycle, SettingsChange
+from runtime.recording.reading import Recording, RecordingError, settings_in
 from runtime.recording.rerun import again, fresh_state
 from runtime.step import Command, CycleRecord, State, step
 from runtime.summary import ObjectRow, object_row
@@ -66,6 +67,9 @@ def retell(recording: Recording, settings: Settings, on_entry: Callable[[Entry],
     for entry in recording.entries():
         if on_entry is not None:
             on_entry(entry)
+        if entry.topic == SETTINGS:
+            mine = settings_in(decode(SettingsChange, entry.data).settings)
+            was.perception.adopt(mine.perception)
         if entry.topic != CYCLE:
             continue
         record = decode(Cycle, entry.data).record
@@ -79,8 +83,8 @@ def retell(recording: Recording, settings: Settings, on_entry: Callable[[Entry],
         if first.command != second.command:
             told.other_commands += 1
             told.first_other_s = at_s if told.first_other_s is None else told.first_other_s
-    _sum_up(told.was, was, mine)
-    _sum_up(told.would_be, would_be, mine)
+    _sum_up(told.was, was, recording.world)
+    _sum_up(told.would_be, would_be, recording.world)
     return told
 
 
@@ -93,10 +97,9 @@ def _note_stop(story: Story, record: CycleRecord, at_s: float) -> None:
         story.stops.append((at_s, record.mode.reason or ""))
 
 
-def _sum_up(story: Story, state: State, settings: Settings) -> None:
+def _sum_up(story: Story, state: State, world: WorldConfig | None) -> None:
     seen: tuple[SeenObject, ...] = state.perception.objects()
     story.objects = [object_row(one) for one in seen]
-    world = settings.world
     if world is None or not world.drum:
         return
     start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))

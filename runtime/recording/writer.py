@@ -17,10 +17,11 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from config.settings import Settings
 from drivers.messages import Floats
 from runtime.health import Worker
 from runtime.modes import ModeState
-from runtime.recording.channels import ABOUT, CYCLE, KEYFRAME, MODE, OBJECTS, SEGMENTS, encode
+from runtime.recording.channels import ABOUT, CYCLE, KEYFRAME, MODE, OBJECTS, SEGMENTS, SETTINGS, encode
 from runtime.recording.folder import Place
 from runtime.recording.forms import (
     About,
@@ -31,6 +32,7 @@ from runtime.recording.forms import (
     ModeChange,
     ObjectsSeen,
     SerialBytes,
+    SettingsChange,
     keyframe,
 )
 from runtime.recording.part import Part
@@ -63,6 +65,13 @@ class Item(NamedTuple):
     topic: str
     host_s: float
     what: Any
+
+
+class Reloaded(NamedTuple):
+    """Settings that are in force from a cycle on."""
+
+    cycle: int
+    settings: Settings
 
 
 class Moment(NamedTuple):
@@ -233,6 +242,9 @@ class RecordingWriter:
                 self._finish()
             if self._part is None and self._clock() >= self._retry_s:
                 self._open()
+        if item.topic == SETTINGS:
+            settings = item.what.settings.model_dump(mode="json")
+            self._about = self._about.model_copy(update={"settings": settings})
         if self._part is None:
             self.drop()
             return
@@ -242,6 +254,9 @@ class RecordingWriter:
                 self._enter_cycle(item.what, log_ns)
             case Moment():
                 self._enter_moment(item.what, log_ns)
+            case Reloaded(cycle, _):
+                change = SettingsChange.model_construct(cycle=cycle, settings=self._about.settings)
+                self._add(SETTINGS, change, log_ns)
             case bytes():
                 self._pieces.setdefault(item.topic, []).append((item.host_s, item.what))
             case _:

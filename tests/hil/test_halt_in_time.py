@@ -28,7 +28,7 @@ from runtime.process import Observers, RobotProcess
 from runtime.recording.folder import OneFile
 from runtime.recording.recorder import Recorder
 from runtime.step import CycleRecord, State
-from tests.hil.running import PATIENCE_S
+from tests.hil.machine import PATIENCE_S
 from tests.hil.truth import Truth
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels"), pytest.mark.promise("P2")]
@@ -137,7 +137,7 @@ def tell(operator: Operator, measured: Callable[[str], None]) -> None:
     worst = max(range(len(operator.waits_s)), key=lambda k: operator.waits_s[k])
     wait_ms, control_ms = 1e3 * operator.waits_s[worst], 1e3 * operator.controls_s[worst]
     measured(
-        f"{len(operator.waits_s)} requests on the pty, cycles busy for {1e3 * BUSY_S:g} ms, the disk at a stand: HALT "
+        f"{len(operator.waits_s)} requests on the pty, cycles busy for {1e3 * BUSY_S:g} ms, a stalled disk: HALT "
         f"on the line ≤ {wait_ms:.1f} ms later (control {control_ms:.1f})"
     )
 

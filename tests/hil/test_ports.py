@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from runtime.complaint import FAILED, WRONG_CALL
-from runtime.process import CONNECT_MAX_S
+from runtime.ends import CONNECT_MAX_S
 from tests.hil.machine import BareStarts, stalls_excused
 from tests.hil.running import Running, emulated, is_driving, running, wait_for
 

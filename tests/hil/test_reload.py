@@ -8,7 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from runtime.cli import call
+from runtime.complaint import DONE
+from runtime.recording.channels import SETTINGS
+from runtime.recording.reading import open_recording
 from tests.hil.running import Running, emulated, is_driving, rows, running, wait_for
+from tests.recorded import entries_of
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
@@ -31,9 +36,10 @@ def test_a_configuration_reloaded_while_driving(tmp_path: Path) -> None:
     config = tmp_path / "run.toml"
     good = 'robot = "denning"\n[behaviors.arbiter]\nbase_velocity_m_s = 0.3\n'
     config.write_text(good, encoding="utf-8")
+    recorded = tmp_path / "run.mcap"
     with (
         emulated(tmp_path) as robot,
-        running(tmp_path, "run", "run", str(config), "--port", robot.port, "--arm") as run,
+        running(tmp_path, "run", "run", str(config), "--port", robot.port, "--arm", "--record", str(recorded)) as run,
     ):
         wait_for(lambda: is_driving(robot.trace), "driving")
         bad = reloaded(run, config, good.replace("0.3", '"fast"'), 1)
@@ -50,3 +56,7 @@ def test_a_configuration_reloaded_while_driving(tmp_path: Path) -> None:
         assert run.modes()[-1] == "DRIVE"
         run.signal(signal.SIGTERM)
         assert run.end() == 0
+    assert sum(entry.topic == SETTINGS for entry in entries_of(recorded)) == 1
+    assert call(["replay", str(recorded), "--verify"]) == DONE
+    with open_recording(recorded) as recording:
+        assert recording.world is None, "on a port that was given nobody knows what stands there"

@@ -15,8 +15,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.hil.machine import PATIENCE_S
 from tests.hil.planted import LONG_S, planted
-from tests.hil.running import DEADMAN_S, PATIENCE_S, Running, emulated, wait_for
+from tests.hil.running import DEADMAN_S, Running, emulated, wait_for
 from tests.hil.truth import Truth
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels"), pytest.mark.promise("P1")]

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from drivers.emulator.trace import HEADER
 from drivers.messages import Flags
-from tests.hil.running import DRIVING_M_S, PATIENCE_S
+from tests.hil.machine import PATIENCE_S
+from tests.hil.running import DRIVING_M_S
 
 _OF = [HEADER.split(",").index(name) for name in ("t_s", "host_s", "v_m_s", "w_rad_s", "flags")]
 
