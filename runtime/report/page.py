@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from html import escape
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Final
 
 import numpy as np
 
@@ -22,13 +23,15 @@ from runtime.report.parts import note, section, settings_list, table, tile
 from runtime.tables import Units, length, place
 from runtime.trace.form import RANGE, Trace
 
-LOG_SHOWN = 40
-CAPTIONS = {
-    "raw": "Every echo as the arc from which it may have come.",
-    "segments": "Outline segments: tangents to the arcs of two readings of one sensor.",
-    "clusters": "Clusters of outline segments by minimum distance, as rectangles with an X at the centre.",
-    "models": "Models where they were matched, over what stood there where that is known.",
-}
+LOG_SHOWN: Final = 40
+CAPTIONS: Final = MappingProxyType(
+    {
+        "raw": "Every echo as the arc from which it may have come.",
+        "segments": "Outline segments: tangents to the arcs of two readings of one sensor.",
+        "clusters": "Clusters of outline segments by minimum distance, as rectangles with an X at the centre.",
+        "models": "Models where they were matched, over what stood there where that is known.",
+    }
+)
 
 
 def page(trace: Trace, units: Units) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -155,6 +156,8 @@ class _Listener:
 
 def _of_ring_log(path: Path, asked: Asked, ready: Callable[[Settings], None], on_step: Told) -> Trace:
     settings = load_settings(None, asked.sets, robot=asked.robot, models=asked.models)
+    firings = read_ring_log(path, sensors=len(settings.ring.mounts))
+    first = next(firings)  # complains about a wrong file before anybody waits for kernels
     ready(settings)
     trace = Trace(path, settings, None if asked.world is None else load_world(asked.world))
     gathering = Gathering(trace)
@@ -173,6 +176,6 @@ def _of_ring_log(path: Path, asked: Asked, ready: Callable[[Settings], None], on
         gathering.pass_by(t_s, perception)
         trace.cycles += 1
 
-    replay_firings(settings, read_ring_log(path, sensors=len(settings.ring.mounts)), on_firing)
+    replay_firings(settings, itertools.chain((first,), firings), on_firing)
     gathering.end(kept[0] if kept else None)
     return trace

@@ -36,7 +36,6 @@ def exported(run: Path, form: str, out: Path, *more: str) -> Path:
     return out
 
 
-@pytest.mark.compiled
 def test_csv(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
     folder = exported(hall_run, "csv", tmp_path / "new")
     read = {}
@@ -57,7 +56,6 @@ def test_csv(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
     assert len(read["odometry"]) > 100
 
 
-@pytest.mark.compiled
 def test_parquet(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
     import pyarrow.parquet as pq
 
@@ -72,7 +70,6 @@ def test_parquet(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
     assert read["segments"].num_rows == len(trace.segments) > 50
 
 
-@pytest.mark.compiled
 def test_foxglove(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
     from mcap.reader import make_reader
     from mcap_protobuf.decoder import DecoderFactory
@@ -116,7 +113,6 @@ def test_foxglove(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
     assert fired == sorted(int(row[1]) for row in trace.echoes if row[6] == trace.echoes[-1, 6])
 
 
-@pytest.mark.compiled
 def test_a_scan_puts_echoes_where_they_were(trace: Trace) -> None:
     from runtime.export.shapes import even_radius, rounds, whole_ring
 
@@ -138,7 +134,6 @@ def test_a_scan_puts_echoes_where_they_were(trace: Trace) -> None:
     assert count > 300
 
 
-@pytest.mark.compiled
 def test_rosbag2(hall_run: Path, trace: Trace, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
@@ -177,7 +172,6 @@ def test_rosbag2(hall_run: Path, trace: Trace, tmp_path: Path, capsys: pytest.Ca
     assert "is there already" in capsys.readouterr().err
 
 
-@pytest.mark.compiled
 def test_a_ring_log_out_and_in(hall_run: Path, hall_log: Path, trace: Trace, tmp_path: Path) -> None:
     heard: list[Firing] = []
     for entry in entries_of(hall_run):
@@ -202,7 +196,6 @@ def test_a_ring_log_into_the_others(hall_log: Path, tmp_path: Path) -> None:
         exported(hall_log, form, tmp_path / form, "--world", "hallway")
 
 
-@pytest.mark.compiled
 def test_an_uneven_ring_for_foxglove(tmp_path: Path) -> None:
     """Each echo as an arc of its own."""
     from mcap.reader import make_reader

@@ -43,7 +43,6 @@ def drawn(hall_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.compiled
 def test_every_picture_in_every_form(drawn: Path) -> None:
     for name in PICTURES:
         assert (drawn / f"{name}.pdf").read_bytes().startswith(b"%PDF-")
@@ -58,7 +57,6 @@ def test_every_picture_in_every_form(drawn: Path) -> None:
         assert len(text) < 600_000
 
 
-@pytest.mark.compiled
 def test_each_shows_its_own(drawn: Path) -> None:
     raw, segments, clusters, models = (ids(drawn / f"{name}.svg") for name in PICTURES)
     assert "echoes" in raw
@@ -83,7 +81,6 @@ def test_the_same_run_is_the_same_file(hall_run: Path, drawn: Path, tmp_path: Pa
             assert (tmp_path / file).read_bytes() == (drawn / file).read_bytes(), file
 
 
-@pytest.mark.compiled
 def test_the_overview_moves(drawn: Path) -> None:
     with Image.open(drawn / "overview.gif") as film:
         assert getattr(film, "n_frames", 1) >= 20
@@ -100,7 +97,6 @@ def test_the_overview_moves(drawn: Path) -> None:
     assert blue[1] > blue[0] + 200, "models appear"
 
 
-@pytest.mark.compiled
 def test_a_trace_holds_the_run(hall_run: Path) -> None:
     trace = traced(hall_run)
     assert trace.world == HALLWAY
@@ -199,7 +195,6 @@ def test_files_that_cannot_be_shown(
         assert name in next(lines(capsys))
 
 
-@pytest.mark.compiled
 def test_places_that_cannot_be_written(hall_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").touch()
     for command, more in (("figures", ()), ("export", ("--to", "csv"))):

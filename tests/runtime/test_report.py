@@ -61,7 +61,6 @@ def page(hall_run: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
     return path.read_text("utf-8")
 
 
-@pytest.mark.compiled
 def test_it_needs_nothing_else(page: str) -> None:
     reader = Reader(page)
     assert reader.open == []
@@ -74,7 +73,6 @@ def test_it_needs_nothing_else(page: str) -> None:
     assert len(page.encode()) < SIZE_MAX
 
 
-@pytest.mark.compiled
 def test_it_tells_the_run(page: str) -> None:
     text = " ".join(Reader(page).text)
     for title in ("Objects", "Pictures", "Timing", "Line", "Modes and stop reasons", "Settings", "Made by"):
@@ -92,7 +90,6 @@ def test_it_tells_the_run(page: str) -> None:
     assert "0.249 ft" in text
 
 
-@pytest.mark.compiled
 def test_a_page_beside_a_ring_log(hall_log: Path, tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     log.write_bytes(hall_log.read_bytes())
