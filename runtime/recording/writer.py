@@ -94,7 +94,7 @@ class Standing:
     """In all files."""
     messages: int = 0
     dropped: int = 0
-    """Handed over while the queue was full, or while no file could be written."""
+    """Handed over while the queue was full or no file could be written, or not yet in a file when it failed."""
     trouble: str | None = None
     """The last one with the disk."""
     sync_max_s: float = 0.0
@@ -126,6 +126,7 @@ class RecordingWriter:
         self._parts = 0
         self._retry_s = 0.0
         self._before = 0
+        self._unflushed = 0
         self._mode: ModeState | None = None
         self._map: dict[bytes, int] = {}
         self._numbered = 0
@@ -191,6 +192,8 @@ class RecordingWriter:
         if self._part is not None:
             self._part.abandon()
         self._part = None
+        self.drop(self._unflushed)
+        self._unflushed = 0
         self._retry_s = self._clock() + RETRY_S
         self.standing = replace(self.standing, trouble=why)
 
@@ -214,13 +217,15 @@ class RecordingWriter:
             try:
                 part.finish()
                 self.standing = replace(self.standing, bytes=self._before + part.path.stat().st_size)
+                self._unflushed = 0
             except OSError as error:
-                self.standing = replace(self.standing, trouble=f"{part.path}: {error.strerror or error}")
+                self._leave(f"{part.path}: {error.strerror or error}")
 
     def _flush(self) -> None:
         if self._part is not None:
             self._enter_pieces()
             self._part.flush()
+            self._unflushed = 0
             self.standing = replace(self.standing, bytes=self._before + self._part.bytes)
             if self._place.is_full(self._part.bytes):
                 self.wants_keyframe = True
@@ -310,6 +315,7 @@ class RecordingWriter:
 
     def _add(self, topic: str, form: Form, log_ns: int, sequence: int = 0) -> None:
         if self._part is not None:
+            self._unflushed += 1
             self._part.add(topic, encode(form), log_ns, sequence)
             self.standing = replace(self.standing, messages=self.standing.messages + 1)
 

@@ -83,16 +83,16 @@ def test_a_full_disk_under_the_log_and_the_recording(tmp_path: Path, measured: C
 
 
 def test_a_disk_that_fills_up_on_the_way(tmp_path: Path, measured: Callable[[str], None]) -> None:
-    """A limit on the size of files: every file that grows beyond 32 KiB fails from then on."""
+    """A limit on the size of files: every file that grows beyond 16 KiB fails from then on."""
     (tmp_path / "runs").mkdir()
     where = ("--set", f"recording.folder={json.dumps(str(tmp_path / 'runs'))}")
     # The shell counts in blocks of 512 bytes.
-    with beside(tmp_path, "run", "", *where, limit="ulimit -f 64") as (run, summary):
+    with beside(tmp_path, "run", "", *where, limit="ulimit -f 32") as (run, summary):
         told, figures = compare(run, summary, tmp_path)
     assert told["recording"]["dropped"] > 0
     assert told["recording"]["trouble"] is not None
     assert "the recording has trouble" in (tmp_path / "run.jsonl").read_text("utf-8")
-    measured(f"full after 32 KiB: {figures}; {told['recording']['dropped']} messages lost, counted and told")
+    measured(f"full after 16 KiB: {figures}; {told['recording']['dropped']} messages lost, counted and told")
 
 
 def test_a_folder_where_nothing_can_be_written(tmp_path: Path, measured: Callable[[str], None]) -> None:

@@ -137,8 +137,8 @@ def tell(operator: Operator, measured: Callable[[str], None]) -> None:
     worst = max(range(len(operator.waits_s)), key=lambda k: operator.waits_s[k])
     wait_ms, control_ms = 1e3 * operator.waits_s[worst], 1e3 * operator.controls_s[worst]
     measured(
-        f"{len(operator.waits_s)} requests on the pty, cycles busy for {1e3 * BUSY_S:g} ms, a stalled disk: HALT "
-        f"on the line ≤ {wait_ms:.1f} ms later (control {control_ms:.1f})"
+        f"{len(operator.waits_s)} requests on the pty, cycles busy for {1e3 * BUSY_S:g} ms, the disk at a stand: "
+        f"HALT on the line ≤ {wait_ms:.1f} ms later (control {control_ms:.1f})"
     )
 
 
