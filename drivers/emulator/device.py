@@ -113,8 +113,12 @@ class EmulatedRobot:
         of_sonar, of_drift, of_boots, of_output, of_input, of_outliers = map(
             np.random.default_rng, np.random.SeedSequence(seed).spawn(6)
         )
-        self._boots, self._output_noise, self._input_noise = of_boots, of_output, of_input
-        self._outliers = of_outliers
+        self._boots, self._output_noise, self._input_noise, self._outliers = (
+            of_boots,
+            of_output,
+            of_input,
+            of_outliers,
+        )
         self._sensors = len(mounts)
         self._ring_radius_mm = round(1000.0 * max(math.hypot(m.x_m, m.y_m) for m in mounts))
         scene = compile_scene(world)

@@ -18,7 +18,8 @@ from drivers.firing import firing_pattern, sensors
 from drivers.messages import Firing, Pose
 from perception.pipeline import Perception
 from perception.sensor_report import SensorFault
-from perception.sensor_watch import FAILURES, RETURNS, SensorWatch
+from perception.sensor_trial import FAILURES, RETURNS
+from perception.sensor_watch import SensorWatch
 from runtime.random_halls import random_hall
 
 pytestmark = [pytest.mark.compiled]
