@@ -38,6 +38,10 @@ SHORT_M: Final = 0.15
 """A reading is short where it is by this less than those before and after it,"""
 SHORT_SHARE: Final = 0.05
 """and by this share of them."""
+LATELY: Final = 0.05
+"""The weight of the newest firing in how regular the sets are."""
+REGULAR_MIN: Final = 0.8
+"""Sets that do not come again and again are no pattern, and nothing is held against them."""
 SHORTS: Final = 8.0
 """So many short readings, each other one counting two off, are crosstalk."""
 RETURNS: Final = 5
@@ -57,8 +61,10 @@ AT, OFF = 21, 22
 # Where the ring was at the last reading.
 X1, Y1 = 23, 24
 COLUMNS: Final = 25
-# Cells of the ring's own memory: firings, sets known, place of the last firing.
-FIRINGS, KNOWN, LAST_X, LAST_Y = range(4)
+# Cells of the ring's own memory: firings, sets ever known, place of the last firing, and how regular the sets are:
+# the share of firings, of late, whose set was known.
+FIRINGS, KNOWN, LAST_X, LAST_Y, REGULAR = range(5)
+RING: Final = 5
 # What a firing may bring: another verdict on a sensor, ranges that are not believed, ranges that are masked.
 CHANGED, LESS_BELIEVED, LESS_POSSIBLE = 1, 2, 4
 
@@ -75,7 +81,9 @@ def set_of(ranges: Floats, sets: NDArray[np.uint8], shorts: Floats, crossed: NDA
                 same = False
                 break
         if same:
+            ring[REGULAR] += LATELY * (1.0 - ring[REGULAR])
             return k
+    ring[REGULAR] -= LATELY * ring[REGULAR]
     k = known % sets.shape[0]
     for i in range(ranges.shape[0]):
         sets[k, i] = 0 if math.isnan(ranges[i]) else 1
@@ -229,7 +237,7 @@ def watch(
         Who fires at all.
     half_angle, tolerance, near : float
         Of the beam (rad); readings this near to one another are equal, and echoes nearer than `near` are near (m).
-    memory : (n, COLUMNS), ring : (4,), sets : (SETS, n), shorts, crossed : (n, SETS), faults : (n,)
+    memory : (n, COLUMNS), ring : (RING,), sets : (SETS, n), shorts, crossed : (n, SETS), faults : (n,)
         What is remembered.
     believed, possible : (n,) float
         Overwritten: what is to be believed of the ranges, and that with what is in doubt.
@@ -273,8 +281,9 @@ def watch(
         else:
             c[COUNT] += 1.0
         judge(i, r, x, y, yaw + axes[i], half_angle, tolerance, sides, memory, faults)
-        weigh_crosstalk(i, r, s, memory, shorts, crossed)
-        if is_doubtful(i, r, x, y, s, memory):
+        if ring[REGULAR] >= REGULAR_MIN:
+            weigh_crosstalk(i, r, s, memory, shorts, crossed)
+        if ring[REGULAR] >= REGULAR_MIN and is_doubtful(i, r, x, y, s, memory):
             believed[i] = math.nan
             news |= LESS_BELIEVED
         c[R2], c[S2] = c[R1], c[S1]

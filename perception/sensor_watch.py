@@ -40,6 +40,7 @@ from perception.sensor_trial import (
     LESS_BELIEVED,
     LESS_POSSIBLE,
     MISSED,
+    RING,
     SETS,
     watch,
 )
@@ -105,7 +106,7 @@ class SensorWatch:
         self._tolerance = max(1.1 * ring.resolution_m, 0.005)
         self._near = NEAR_SHARE * ring.range_max_m
         self._memory = np.zeros((count, COLUMNS))
-        self._ring = np.zeros(4)
+        self._ring = np.zeros(RING)
         self._sets = np.zeros((SETS, count), np.uint8)
         self._shorts = np.zeros((count, SETS))
         self._crossed = np.zeros((count, SETS), np.uint8)
