@@ -80,10 +80,20 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "20 % outliers, a garbage burst, a 1 ft odometry jump: seen from the robot, objects are back within "
             ".05 ft of truth within 20 readings; no ghost of the old frame and no false object survives 10 s",
         ),
+        "P10": Promise(
+            "No silent death",
+            "any task or thread killed or raising: SAFE_STOP within two cycles, the culprit named; the deadman is "
+            "fed only while all parts report health; never from a thread",
+        ),
         "P11": Promise(
             "Configuration cannot half-apply",
             "every field × {missing, wrong type, low, high, typo}: message with path, value, range, nearest name; "
             "10⁴ random live reloads are atomic, the last good one kept; restart-only fields say so",
+        ),
+        "P12": Promise(
+            "Disk trouble stays on disk",
+            "full disk, 5 s fsync, read-only folder, a log or terminal that takes nothing: no cycle is late beyond "
+            "the paired control, the loss is counted and reported",
         ),
         "P13": Promise(
             "One owner",
@@ -94,16 +104,6 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "Input files cannot hurt",
             "10⁵ mutated ring logs, worlds, models, robot files (here a share of them, in `make soak` all): clear "
             "error or right result, no traceback, no hang, memory ≤ 500 MB",
-        ),
-        "P10": Promise(
-            "No silent death",
-            "any task or thread killed or raising: SAFE_STOP within two cycles, the culprit named; the deadman is "
-            "fed only while all parts report health; never from a thread",
-        ),
-        "P12": Promise(
-            "Disk trouble stays on disk",
-            "full disk, 5 s fsync, read-only folder, a log or terminal that takes nothing: no cycle is late beyond "
-            "the paired control, the loss is counted and reported",
         ),
         "P15": Promise(
             "It runs on",
