@@ -41,6 +41,7 @@ soak: $(VENV)/soak.stamp
 	$(BIN)/python -m pytest -q -m hypothesis --hypothesis-profile=explore
 	$(BIN)/python -m pytest -m soak --promises=docs/promises-soak.md
 	@$(BIN)/python -m tests.timing.growth $(SOAK)
+	@$(BIN)/python -m tests.timing.budget $(SOAK)
 
 # Small lies put into the code, and whether the tests notice: writes docs/mutants.md.
 mutants: $(VENV)/test.stamp

@@ -183,8 +183,11 @@ class BehaviorsConfig(Strict):
 class RealtimeConfig(Strict):
     """What the operating system is asked for, so that cycles begin on time; what it refuses is told, not fatal."""
 
-    slice_s: float | None = Field(default=0.0001, ge=0.0001, le=0.1)
-    """Turns of the processor this short let a waking cycle in before programs that want it all (from Linux 6.12)."""
+    slice_s: float | None = Field(default=None, ge=0.0001, le=0.1)
+    """Turns of the processor this short let a waking cycle in before programs that want it all (from Linux 6.12).
+
+    One shorter than a cycle's work lets them in again in the middle of it.
+    """
     priority: int | None = Field(default=None, ge=1, le=99)
     """Run under SCHED_FIFO at this priority: before everything that is not real-time."""
     core: int | None = Field(default=None, ge=0, le=4095)

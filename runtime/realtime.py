@@ -1,7 +1,7 @@
 """Asking the operating system for precedence: what it grants is used, what it refuses is told in one line each.
 
-Only the shortened slice is asked for by default, because anybody may have it. The rest can starve other programs, so
-it is for whoever owns the machine to switch on: section `[realtime]`.
+Nothing is asked for by default. It is for whoever owns the machine to switch on, because it is at the cost of other
+programs: section `[realtime]`.
 """
 
 from __future__ import annotations

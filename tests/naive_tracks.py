@@ -301,12 +301,12 @@ def after_merging(t: int, live: Array, place: Array, rho: Array, llr: Array, mer
 
 def next_in_turn(
     live: Array, fresh: Array, kept: Array, sigma: Array, likely: Array, owed: Array, away: Array, passed: Array,
-    threshold: float,
+    threshold: float, reach: float,
 ) -> tuple[int, Array]:  # fmt: skip
     """Return whose turn it is, −1 nobody's, and who waits.
 
     Worth is unseen readings for an object's size, fourfold where unsure, raised above the threshold where work is
-    owed; the nearer to the robot the better. Whoever was passed over more than sixty times comes first.
+    owed; half of it counts at the end of the reach. Whoever was passed over more than sixty times comes first.
     """
     worth = fresh / (kept + 8.0) * np.where((sigma > 0.03 * FT) | (likely < 0.95), 4.0, 1.0) + owed * (
         threshold + 1e-6
@@ -314,7 +314,7 @@ def next_in_turn(
     waits = live & (worth > threshold)
     if not waits.any():
         return -1, waits
-    order = np.where(passed > 60, 1e9 + passed, worth * 3.0 / (3.0 + away))
+    order = np.where(passed > 60, 1e9 + passed, worth * reach / (reach + away))
     return int(np.argmax(np.where(waits, order, -np.inf))), waits
 
 

@@ -43,8 +43,6 @@ SIZE: Final = 8.0
 """A small object's readings are taken for so many more."""
 OWED: Final = 1e-6
 """By so much what is worked off to the end is above the threshold by itself."""
-NEAR_M: Final = 3.0
-"""An object as far as this from the robot counts half as much as one beside it."""
 PATIENCE: Final = 60
 """Quanta that may go to others; then an object goes before all that are not passed over as often."""
 OVERDUE: Final = 1e9
@@ -78,11 +76,14 @@ def worth_polygon(s: State, p: Settings, t: int, threshold: float) -> float:
 
 
 @kernel
-def rank(s: State, v: float, x: float, y: float, passed: int) -> float:
-    """Return the place in the row of something of worth `v` at (x, y), passed over so often: the largest is next."""
+def rank(s: State, p: Settings, v: float, x: float, y: float, passed: int) -> float:
+    """Return the place in the row of something of worth `v` at (x, y), passed over so often: the largest is next.
+
+    At the end of the ring's reach it counts half as much as beside the robot.
+    """
     if passed > PATIENCE:
         return OVERDUE + passed
-    return v * NEAR_M / (NEAR_M + math.hypot(x - s.g[HERE_X], y - s.g[HERE_Y]))
+    return v * p.range_max / (p.range_max + math.hypot(x - s.g[HERE_X], y - s.g[HERE_Y]))
 
 
 @kernel
@@ -102,7 +103,7 @@ def choose(s: State, p: Settings, threshold: float) -> int:
     for t in range(s.ti.shape[0]):
         v = worth(s, p, t, threshold)
         if v > threshold:
-            v = rank(s, v, s.tf[t, TX], s.tf[t, TY], s.ti[t, PASSED])
+            v = rank(s, p, v, s.tf[t, TX], s.tf[t, TY], s.ti[t, PASSED])
             s.ti[t, PASSED] += 1
             if v > best:
                 best = v
@@ -120,7 +121,7 @@ def choose_polygon(s: State, p: Settings, threshold: float) -> int:
     for t in range(s.pi.shape[0]):
         v = worth_polygon(s, p, t, threshold)
         if v > threshold:
-            v = rank(s, v, s.pf[t, PX], s.pf[t, PY], s.pi[t, PASSED])
+            v = rank(s, p, v, s.pf[t, PX], s.pf[t, PY], s.pi[t, PASSED])
             s.pi[t, PASSED] += 1
             if v > best:
                 best = v

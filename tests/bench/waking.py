@@ -28,7 +28,7 @@ PERIOD_S: Final = 0.05
 WAKES_A_TURN: Final = 40
 SPIN_S: Final = 0.001
 SLICE_S: Final = 0.0001
-"""The default of realtime.slice_s."""
+"""As realtime.slice_s."""
 CONTROL: Final = "time.sleep, no loop"
 
 Sleep: TypeAlias = Callable[[float], Awaitable[object]]

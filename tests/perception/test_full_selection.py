@@ -69,7 +69,7 @@ def test_the_rule_against_its_oracle() -> None:
         want, waits = naive_tracks.next_in_turn(
             i[:, ST] != FREE, i[:, DIRTY], i[:, NRES], f[:, [R00, R11]].max(axis=1), f[:, PROB],
             (i[:, QUIET] > P.quiet) & (i[:, POLISH] > 0), np.hypot(*(f[:, [TX, TY]] - s.g[[HERE_X, HERE_Y]]).T),
-            passed, THRESHOLD,
+            passed, THRESHOLD, P.range_max,
         )  # fmt: skip
         assert selection.is_waiting(s, P, THRESHOLD) == waits.any()
         assert selection.choose(s, P, THRESHOLD) == want

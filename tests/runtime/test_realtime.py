@@ -13,7 +13,7 @@ from config.settings import RealtimeConfig
 from runtime.realtime import ask
 
 ROOT = Path(__file__).parents[2]
-NOTHING = RealtimeConfig(slice_s=None)
+NOTHING = RealtimeConfig()
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="these requests are Linux's own")
 
@@ -52,11 +52,9 @@ def test_nothing_is_asked_for_that_nobody_named(refusing: Libc) -> None:
     assert refusing.calls == []
 
 
-def test_only_what_needs_no_permission_is_asked_for_by_default() -> None:
+def test_nothing_is_asked_for_by_default() -> None:
     default = RealtimeConfig()
-    assert default.priority is None
-    assert default.core is None
-    assert not default.lock_memory
+    assert (default.slice_s, default.priority, default.core, default.lock_memory) == (None, None, None, False)
 
 
 @pytest.mark.usefixtures("refusing")
@@ -73,7 +71,7 @@ def test_every_refusal_names_the_setting_the_reason_and_the_way_out(monkeypatch:
 
 
 def test_a_core_that_is_not_there_is_named_beside_those_that_are() -> None:
-    (line,) = ask(RealtimeConfig(slice_s=None, core=100_000))
+    (line,) = ask(RealtimeConfig(core=100_000))
     assert line.startswith("realtime.core = 100000 is not a core this process may use (")
     assert str(min(os.sched_getaffinity(0))) in line
 
