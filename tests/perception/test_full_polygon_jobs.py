@@ -32,7 +32,7 @@ STEP_MAX = 2 * POSE_MAX + (len(P.radii) + 1) * POSE_MAX + GATHERING
 
 
 def copy(s: State) -> State:
-    return State(*(np.copy(array) for array in s))
+    return s._replace(**{name: np.copy(getattr(s, name)) for name in s._fields})
 
 
 def memories() -> Iterator[State]:

@@ -5,6 +5,7 @@ They stand so that what tells their headings apart is heard from the way: of a m
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Final, Literal
 
