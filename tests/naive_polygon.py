@@ -15,6 +15,8 @@ FT = 0.3048
 END_M = 0.12 * FT
 GRAZING = 0.05
 CORNER_PRICE = 0.7
+EDGE_REACH = 1.0
+EDGE_PRICE = 3.0 / FT
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,16 @@ def predict(
         if 0.0 <= place <= abs(b - a) and off <= may:
             inner = END_M < place < abs(b - a) - END_M
             feet.append((((sensor - a) * outward.conjugate()).real, off <= must and inner))
+    ring = list(vertices)
+
+    def price(corner: complex) -> float:
+        """A convex edge is weak, and from afar not heard; an open outline's has no inside to be convex to."""
+        i = ring.index(corner)
+        bend = ((ring[(i + 1) % len(ring)] - corner) / (corner - ring[i - 1])).imag
+        return CORNER_PRICE + (
+            EDGE_PRICE * max(0.0, abs(corner - sensor) - EDGE_REACH) if closed and bend > 0.0 else 0.0
+        )
+
     corners = [(abs(v - sensor), angle_between(v - sensor, axis)) for a, b, _ in faced for v in (a, b)]
     within = [d for d, off in corners if off <= may]
 
@@ -86,7 +98,10 @@ def predict(
         return [d for d in found if d is not None]
 
     foot = min(feet, default=None)
-    corner = Rule(min(within, default=None), must=False, price=CORNER_PRICE)
+    nearest = min((v for a, b, _ in faced for v in (a, b) if angle_between(v - sensor, axis) <= may),
+                  key=lambda v: abs(v - sensor), default=None)  # fmt: skip
+    corner = Rule(None if nearest is None else abs(nearest - sensor), must=False,
+                  price=CORNER_PRICE if nearest is None else price(nearest))  # fmt: skip
     mirror = corner if foot is None else Rule(*foot)
     points = [d for d, _ in feet] + within + edges(half)
     well_inside = any(off <= must for _, off in corners) or bool(edges(must))

@@ -23,6 +23,10 @@ CORNER_PRICE: Final = 0.7
 nothing: it is all the readings of a sensor that may then be heard, or none, and a price for each would turn the body
 until they must."""
 
+EDGE_REACH_M: Final = 1.0
+EDGE_PRICE_PER_M: Final = 3.0 / FOOT_M
+"""A convex edge only scatters, 20 to 30 dB below a mirror's echo: an answer from beyond this costs that much more."""
+
 SURE: Final = 4
 """Column of `stats`, after those of `contact`: hits that had to be."""
 
@@ -101,6 +105,8 @@ def predict(
     foot = NOTHING
     foot_must = False
     corner2 = NOTHING * NOTHING
+    before = 0
+    after = 0
     edge = NOTHING
     must = False
     for k in range(faces.shape[0]):
@@ -128,6 +134,8 @@ def predict(
                 d2 = height * height + across * across
                 if d2 < corner2 and dot * dot >= ear.cos_opt * ear.cos_opt * d2:
                     corner2 = d2
+                    before = k - 1 + end
+                    after = k + end
                 must = must or dot * dot >= ear.cos_in * ear.cos_in * d2
         for hand in (-1.0, 1.0):
             towards = ahead * ear.cos_half - hand * aside * ear.sin_half
@@ -145,7 +153,12 @@ def predict(
     must = foot_must or (must and nearest < NOTHING)
     if foot < NOTHING:
         return foot, foot_must, 0.0, nearest, must
-    return corner, False, CORNER_PRICE, nearest, must
+    price = CORNER_PRICE
+    if closed and EDGE_REACH_M < corner < NOTHING:
+        after %= faces.shape[0]
+        if faces[before, 2] * faces[after, 3] - faces[before, 3] * faces[after, 2] > 0.0:
+            price += EDGE_PRICE_PER_M * (corner - EDGE_REACH_M)
+    return corner, False, price, nearest, must
 
 
 @kernel

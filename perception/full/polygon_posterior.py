@@ -42,16 +42,16 @@ CUT: Final = float((_NORMAL * LATTICE[:, 0] ** 2).sum() / _NORMAL.sum())
 """Variance that such a lattice gives a normal distribution as wide as expected, in squared pitches."""
 CUT_OFF: Final = PITCH**2 * CUT
 """The same in squared standard deviations: one, but for the tails that are cut off."""
-ATTEMPTS: Final = 3
+ATTEMPTS: Final = 5
 """How often a lattice is laid at most: the bound on the work."""
 TOP_LEAD: Final = 40.0
 """A point better than the middle by more than this, nat, weighs no more."""
 OFF_CENTRE: Final = 0.7
 """A mean this many pitches off the middle asks for a new lattice."""
-NARROW: Final = 0.5 * CUT
-WIDE: Final = 1.6 * CUT
+NARROW: Final = 0.7 * CUT
+WIDE: Final = 1.4 * CUT
 """So do variances beyond these, in squared pitches."""
-THINNEST: Final = 0.06 * CUT
+THINNEST: Final = 0.1 * CUT
 """Least variance, in squared pitches, that the next lattice believes: less falls between the points."""
 CORRELATED: Final = 0.95
 """Share of a correlation that the next lattice believes, so that it never collapses."""
