@@ -368,6 +368,6 @@ def is_sure_polygon(
     if not len(heard) or heard[:, 4].min() > 6.5 * FT:
         return False
     spread = 1 - float(np.hypot(*heard[:, 2:4].mean(0)))
-    is_heard = hits >= (14 if len(kept) >= 80 else 20)
+    is_heard = hits >= (12 if len(kept) >= 80 else 20)
     placed = max(variances) <= (0.2 * FT) ** 2
     return established and probability >= least and is_heard and placed and spread > 0.02

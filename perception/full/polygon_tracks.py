@@ -85,10 +85,10 @@ EVIDENCE_MIN: Final = 5.0
 UNKNOWN_LEAD: Final = 8.0
 """Evidence below the first, or behind an unknown thing's by the second, is the end, nat."""
 ESTABLISH: Final = 0.9
-ESTABLISH_HITS: Final = 14.0
-ESTABLISH_SURE: Final = 4.0
+ESTABLISH_HITS: Final = 10.0
+ESTABLISH_SURE: Final = 3.0
 MANY_HITS: Final = 20.0
-MANY_SURE: Final = 3.0
+MANY_SURE: Final = 2.0
 """A track is established by so many hits, and so many that had to be: corners alone fit anywhere."""
 DOUBT: Final = 0.3
 DOUBT_SHARE: Final = 0.75

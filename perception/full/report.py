@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from perception.full.contact import FAR
+from perception.full.settings import MAY_DEG
 from perception.full.state import (
     C00,
     C01,
@@ -41,9 +42,9 @@ from perception.full.state import (
     PPROB,
     PROB,
     PTH,
+    PTT,
     PX,
     PXX,
-    PXY,
     PY,
     PYY,
     SPAN,
@@ -75,11 +76,13 @@ POLYGON_NEAR_M: Final = 6.5 * FOOT_M
 POLYGON_SPREAD: Final = 0.02
 """A polygon is seen from near and from more than one direction: one face, square on from afar, may be any wall's."""
 POLYGON_HITS: Final = 20.0
-POLYGON_HITS_SWEPT: Final = 14.0
+POLYGON_HITS_SWEPT: Final = 12.0
 POLYGON_SWEPT: Final = 80
 """It answers so often; or less often, where so many readings bear on it, silences and all, and it explains them."""
 POLYGON_INFLATE: Final = 1.15
 """What a polygon's covariance is multiplied with when it is reported: what its neighbours do to it is no noise."""
+POLYGON_TURN: Final = math.radians(MAY_DEG)
+"""And its heading is not known better than the beam's edges are, rad: hearing or not at an edge turns a body."""
 WALL_ECHOES_MIN: Final = 10.0
 WALL_M: Final = 2.0 * FOOT_M
 CORNER_M: Final = 1.0 * FOOT_M
@@ -209,11 +212,20 @@ def circle(s: State, p: Settings, t: int, label: str, probability: float) -> See
     )
 
 
+def polygon_covariance(track: Floats) -> Floats:
+    """Return the covariance of a polygon's x, y (m) and heading (rad) from its row of `State.pf`; shape (3, 3)."""
+    covariance = np.zeros((3, 3))
+    covariance[np.tril_indices(3)] = POLYGON_INFLATE * track[PXX : PTT + 1]
+    covariance[2, 2] += POLYGON_TURN**2
+    return covariance + np.tril(covariance, -1).T
+
+
 def polygon(s: State, p: Settings, t: int, label: str, probability: float) -> SeenObject:
     """Return a polygon's track as an object; of the headings at which it looks alike the least one from −π on."""
     track = s.pf[t]
     theta = float(track[PTH])
-    xx, xy, yy = (POLYGON_INFLATE * float(track[k]) for k in (PXX, PXY, PYY))
+    covariance = polygon_covariance(track)
+    xx, xy, yy = float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1])
     period = 2.0 * math.pi / int(p.sym[s.pi[t, MODEL]])
     return SeenObject(
         label, float(track[PX]), float(track[PY]), (theta + 0.5 * period) % period - 0.5 * period,

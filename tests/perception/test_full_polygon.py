@@ -27,8 +27,9 @@ from perception.full.polygon_posterior import (
     lower_root,
     weigh_lattice,
 )
+from perception.full.report import polygon_covariance
 from perception.full.settings import make_settings
-from perception.full.state import State, make_state
+from perception.full.state import NPF, PTT, PXX, State, make_state
 from perception.kernel import Floats, Ints
 from tests import naive_polygon
 from tests.naive_polygon import Rule
@@ -244,15 +245,18 @@ def spread_of(state: State, w: Floats, pose: Floats, left: int) -> tuple[Floats,
     begin_lattice(state, P, 0, pose, np.zeros(6))
     while state.job[LAID] < ATTEMPTS:
         lattice_on(state, P, 0, left)
-    c = np.zeros((3, 3))
-    c[np.tril_indices(3)] = state.work[COV : COV + 6]
-    return state.work[MIDDLE : MIDDLE + 3].copy(), c + np.tril(c, -1).T
+    track = np.zeros(NPF)
+    track[PXX : PTT + 1] = state.work[COV : COV + 6]
+    return state.work[MIDDLE : MIDDLE + 3].copy(), polygon_covariance(track)
 
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("rule", [0, 1], ids=["mirror", "cone"])
 def test_the_covariance_is_honest(rule: int) -> None:
-    """95 % of true poses lie in the 95 % ellipse, of the place and of the whole pose, on noisy boxes."""
+    """95 % of true poses lie in the 95 % ellipse, of the place and of the whole pose, on noisy boxes.
+
+    Or a little more: what is reported allows for neighbours, and here are none.
+    """
     rng = np.random.default_rng(6)
     state = make_state(24, P)
     state.job[HISS] = P.noises.tolist().index([NOISE_M, 0.0])
@@ -273,8 +277,8 @@ def test_the_covariance_is_honest(rule: int) -> None:
         e = mean - truth
         place.append(e[:2] @ np.linalg.solve(c[:2, :2], e[:2]) < 5.991)
         whole.append(e @ np.linalg.solve(c, e) < 7.815)
-    assert np.mean(place) == pytest.approx(0.95, abs=0.03)
-    assert np.mean(whole) == pytest.approx(0.95, abs=0.03)
+    assert 0.92 <= np.mean(place) <= 0.99
+    assert 0.92 <= np.mean(whole) <= 0.99
 
 
 def test_a_lattice_is_the_same_however_often_it_is_interrupted() -> None:

@@ -14,7 +14,7 @@ from perception.full.polygon_births import GATHERING, next_birth, try_polygon
 from perception.full.polygon_job import BIRTH, JOB, NO_JOB, QUANTUM, TRACK, cost
 from perception.full.polygon_tracks import next_track, pquantum, refine_polygon
 from perception.full.settings import make_settings
-from perception.full.state import ASKED, FREE, PB, PCAP, PT, PX, PXX, PY, ST, State, make_state
+from perception.full.state import ASKED, DIRTY, FREE, PB, PCAP, PT, PX, PXX, PY, ST, State, make_state
 from perception.pipeline import Perception
 from runtime.open_loop import perceive
 from runtime.scenes import halls, readings
@@ -42,7 +42,7 @@ def memories() -> Iterator[State]:
     assert isinstance(perception.method, FullPerception)
     for k, firing in enumerate(readings(SETTINGS.ring, hall, 0)):
         perceive(perception, firing)
-        if k > 20 and k % 6 == 0:
+        if k > 20 and k % 4 == 0:
             s = copy(perception.method.memory)
             while s.job[JOB] != NO_JOB:
                 pquantum(s, P, THRESHOLD)
@@ -87,7 +87,8 @@ def test_what_comes_of_a_job_does_not_depend_on_where_it_was_cut() -> None:
 
 
 def test_a_quantum_says_whether_there_was_work_and_the_work_ends() -> None:
-    s = list(memories())[-1]
+    *_, s = memories()
+    s.pi[s.pi[:, ST] != FREE, DIRTY] = PB * PCAP
     quanta = 0
     while pquantum(s, P, THRESHOLD):
         quanta += 1
