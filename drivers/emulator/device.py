@@ -108,14 +108,12 @@ class EmulatedRobot:
         clock_start_us: int = 0,
     ) -> None:
         mounts = robot.ring.mounts
-        if len(mounts) > frames.SENSORS_MAX:
-            raise ValueError(
-                f"the ring has {len(mounts)} sensors: the protocol's masks have room for {frames.SENSORS_MAX}"
-            )
+        self._sensors, most = len(mounts), frames.SENSORS_MAX
+        if self._sensors > most:
+            raise ValueError(f"the ring has {self._sensors} sensors: the protocol's masks have room for {most}")
         seeds = np.random.SeedSequence(seed).spawn(6)
         of_sonar, of_drift, self._boots, *noises = map(np.random.default_rng, seeds)
         self._output_noise, self._input_noise, self._outliers = noises
-        self._sensors = len(mounts)
         self._ring_radius_mm = round(1000.0 * max(math.hypot(m.x_m, m.y_m) for m in mounts))
         scene = compile_scene(world)
         start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
@@ -136,8 +134,7 @@ class EmulatedRobot:
     def truth(self) -> Truth:
         """The true state at the last event."""
         body = self._body
-        t_s = self._moved_us * 1e-6
-        return Truth(t_s, body.pose, body.ring_yaw, body.twist, self.flags, body.contacts)
+        return Truth(self._moved_us * 1e-6, body.pose, body.ring_yaw, body.twist, self.flags, body.contacts)
 
     @property
     def flags(self) -> Flags:

@@ -65,7 +65,7 @@ def test_a_replay_is_the_run_to_the_bit(run: Path) -> None:
     verdict = verdict_of(run)
     assert verdict.first is None, str(verdict.first)
     assert (verdict.cycles, verdict.different, verdict.first_cycle) == (20 * SECONDS, 0, 1)
-    assert set(verdict.refinement) == {"budget", "converged", "nothing"}
+    assert set(verdict.refinement) >= {"budget", "converged", "nothing"}
     assert verdict.keyframes >= SECONDS / 2.0 - 2
     assert verdict.missing == []
     assert verdict.state is not None
@@ -110,7 +110,7 @@ def test_the_papers_method_too(tmp_path: Path) -> None:
         verdict = verdict_of(path, since_s=since_s)
         assert verdict.first is None, str(verdict.first)
         assert verdict.cycles >= 20 * (10.0 - since_s)
-        assert set(verdict.refinement) == {"budget", "converged", "nothing"}
+        assert set(verdict.refinement) >= {"budget", "converged", "nothing"}
 
 
 @pytest.mark.compiled

@@ -88,6 +88,22 @@ def test_tracks_are_not_used_up_in_the_long_hall() -> None:
     assert max(held) < SETTINGS.perception.full.tracks_max, max(held)
 
 
+@pytest.mark.compiled
+def test_the_record_says_how_many_quanta_ran_and_why_no_more() -> None:
+    """With one quantum a firing the rest waits for the next firing; with one a cycle it waits for the next cycle."""
+    settings = load_settings("hallway")
+    assert settings.world is not None
+    records: list[CycleRecord] = []
+    for allowance in (Quanta(50), Quanta(0.5)):
+        simulate(
+            settings, settings.world, 0, 15.0, lambda record, _truth: records.append(record), allowance=allowance
+        )
+    quanta: dict[str, set[int]] = {}
+    for record in records:
+        quanta.setdefault(record.refinement, set()).add(record.quanta)
+    assert quanta == {"nothing": {0}, "converged": {1}, "quota": {1}, "budget": {0}}
+
+
 @pytest.fixture(scope="module")
 def sweep() -> dict[float, BudgetRow]:
     """Return a drive under each of several budgets in counted quanta."""
