@@ -1,12 +1,12 @@
 # Two commands matter: `make run` starts the robot in the emulator, `make test` proves that it works.
-# `make bench` measures it against what one would use instead.
+# `make bench` measures it against what one would use instead, `make soak` runs the long forms of the tests.
 
 PYTHON ?= python3.11
 VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: run test lint tests boundscheck coverage bench soak clean
+.PHONY: run test lint tests boundscheck coverage promises mutants soak bench clean
 
 run: $(VENV)/run.stamp
 	@$(BIN)/echolocate run
@@ -23,13 +23,29 @@ tests: $(VENV)/test.stamp
 
 # Compiled code reads beyond an array in silence; this run does not let it.
 boundscheck: $(VENV)/test.stamp
-	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(BIN)/python -m pytest -q -m "not realtime and not compiled" \
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(BIN)/python -m pytest -q -m "not realtime and not compiled and not soak" \
 		tests/perception tests/drivers/test_acoustics.py tests/drivers/test_emulator.py
 
 # Coverage sees into kernels only where they are not compiled.
 coverage: $(VENV)/test.stamp
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest -q -m "not realtime and not compiled"
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest -q -m "not realtime and not compiled and not soak"
 	$(BIN)/python -m coverage report --skip-covered --fail-under=90
+
+# What is promised, measured again: writes docs/promises.md. (With a blank for the =, pytest takes the page for a test.)
+promises: $(VENV)/test.stamp
+	$(BIN)/python -m pytest -q -m "promise and not soak" --promises=docs/promises.md
+
+# The long forms, the fuzzers, and an hour and a half of driving in virtual time: does anything grow, compile late, or
+# collect all garbage? And generated examples that no run had before; `make tests` has the same ones every time.
+soak: $(VENV)/soak.stamp
+	$(BIN)/python -m pytest -q -m hypothesis --hypothesis-profile=explore
+	$(BIN)/python -m pytest -m soak --promises=docs/promises-soak.md
+	@$(BIN)/python -m tests.timing.growth $(SOAK)
+	@$(BIN)/python -m tests.timing.budget $(SOAK)
+
+# Small lies put into the code, and whether the tests notice: writes docs/mutants.md.
+mutants: $(VENV)/test.stamp
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m tests.mutation.campaign
 
 # Ours against the libraries one would use instead, and against the clock; BENCH=--quick for a small run of the first,
 # TIMING="--against earlier.json" for a comparison.
@@ -37,12 +53,6 @@ bench: $(VENV)/bench.stamp
 	@$(BIN)/python -m tests.bench $(BENCH)
 	@$(BIN)/python -m tests.bench timing $(TIMING)
 	@$(BIN)/python -m tests.bench waking
-
-# An hour and a half of driving in virtual time: does anything grow, compile late, or collect all garbage, and does any
-# cycle take more than its budget and a quantum?
-soak: $(VENV)/test.stamp
-	@$(BIN)/python -m tests.timing.growth $(SOAK)
-	@$(BIN)/python -m tests.timing.budget $(SOAK)
 
 clean:
 	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage
@@ -59,6 +69,10 @@ $(VENV)/run.stamp: pyproject.toml | $(VENV)/bin/python
 
 $(VENV)/test.stamp: pyproject.toml | $(VENV)/bin/python
 	$(PIP) --editable ".[dev]"
+	@touch $@
+
+$(VENV)/soak.stamp: pyproject.toml | $(VENV)/bin/python
+	$(PIP) --editable ".[dev,fuzz]"
 	@touch $@
 
 $(VENV)/bench.stamp: pyproject.toml | $(VENV)/bin/python

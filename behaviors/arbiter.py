@@ -105,16 +105,14 @@ def _course_speed_m_s(angle_rad: float, config: ArbiterConfig) -> float:
 
 def _complaint(responses: Sequence[Response], percept: Percept, expected: Sequence[str]) -> str | None:
     """Return why these inputs allow no decision, None where they do."""
-    given, wanted = Counter(r.schema for r in responses), Counter(expected)
-    if missing := sorted(wanted - given):
-        return f"no answer from the schema {', '.join(missing)}: the decision lacks a part, so the robot stops"
-    if surplus := sorted(given - wanted):
-        return f"the schema {', '.join(surplus)} answered without being asked: its vector belongs to no decision"
+    given = [r.schema for r in responses]
+    if sorted(given) != sorted(expected):
+        return _roll_call(Counter(given), Counter(expected))
     for r in responses:
-        if not (math.isfinite(r.x) and math.isfinite(r.y)):
+        if not (_is_finite(r.x) and _is_finite(r.y)):
             return (
-                f"the schema {r.schema} answered ({r.x:g}, {r.y:g}), which is no vector: "
-                "look for an echo or a pose that is not a number"
+                f"the schema {r.schema} answered ({_shown(r.x)}, {_shown(r.y)}), which is no vector: "
+                "look for an axis left out, or for an echo or a pose that is not a number"
             )
     if not (math.isfinite(sum(r.x for r in responses)) and math.isfinite(sum(r.y for r in responses))):
         return "the schemas' vectors are too large to add: look for a gain or a pose that is out of all proportion"
@@ -124,3 +122,23 @@ def _complaint(responses: Sequence[Response], percept: Percept, expected: Sequen
     if not np.isfinite(percept.obstacles).all():
         return "an echo is not a finite point: check the ring's ranges and the odometry, then re-arm"
     return None
+
+
+def _roll_call(given: Counter[str], expected: Counter[str]) -> str:
+    """Return who is missing, or else who is there without being asked."""
+    if missing := sorted(expected - given):
+        return f"no answer from the schema {', '.join(missing)}: the decision lacks a part, so the robot stops"
+    surplus = ", ".join(sorted(given - expected))
+    return f"the schema {surplus} answered without being asked: its vector belongs to no decision"
+
+
+def _is_finite(value: float) -> bool:
+    """Say whether a component is a finite number; schemas are other people's code, and one may leave an axis out."""
+    try:
+        return math.isfinite(value)
+    except (TypeError, OverflowError):  # no number at all, or a whole one beyond any float
+        return False
+
+
+def _shown(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else repr(value)[:20]

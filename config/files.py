@@ -6,6 +6,8 @@ import difflib
 import json
 import os
 import re
+import select
+import stat
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -18,11 +20,19 @@ from config.layers import Source
 Kind: TypeAlias = Literal["robots", "worlds", "models", "runs"]
 """What a file is about, and the folder the shipped ones of that kind lie in."""
 
-SIZE_MAX = 1 << 20
+SIZE_MAX = 1 << 18
 """Bytes. Nothing a person writes comes near; /dev/zero and a recording given by mistake go far beyond."""
+
+PIPE_WAIT_S = 5.0
+"""Patience with a pipe or a device that is named instead of a file."""
 
 DEPTH_MAX = 12
 """Tables and lists within one another. The schema needs six."""
+
+
+_KEY = r"""(?:(?<![A-Za-z0-9_-])[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.){0,256}+"|'[^'\n]{0,256}+')"""
+_LONG_KEY = re.compile(rf"{_KEY}(?:[ \t]*+\.[ \t]*+{_KEY}){{31}}")
+"""A dotted key of 32 parts. Nothing in it backtracks, and parts too long for it are too few to matter."""
 
 
 class ConfigError(Exception):
@@ -81,13 +91,14 @@ def read_document(kind: Kind, name: str | os.PathLike[str], named_by: Source | N
     path = (Path() if named_by is None else named_by.base) / name
     shown = one_line(str(path))
     try:
-        with path.open("rb") as file:
-            data = file.read(SIZE_MAX + 1)
+        data = _read(path)
     except FileNotFoundError:
         by = "" if named_by is None else f"; named by {named_by.name}"
         raise ConfigError(f"{shown}: file not found{by}; {_known(kind)}") from None
     except IsADirectoryError:
         raise ConfigError(f"{shown}: is a directory, not a TOML file") from None
+    except TimeoutError:
+        raise ConfigError(f"{shown}: is a pipe from which nothing came for {PIPE_WAIT_S:g} s; give a file") from None
     except OSError as error:
         raise ConfigError(f"{shown}: cannot be read: {error.strerror or error}") from None
     except ValueError as error:  # a NUL or a lone surrogate in the path
@@ -104,7 +115,7 @@ def parse_document(data: bytes, shown: str) -> dict[str, Any]:
         Where they are too many, not UTF-8 or not TOML, with line and column.
     """
     if len(data) > SIZE_MAX:
-        raise ConfigError(f"{shown}: larger than {SIZE_MAX >> 20} MiB, so not a settings file")
+        raise ConfigError(f"{shown}: larger than {SIZE_MAX >> 10} KiB, so not a settings file")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -125,6 +136,7 @@ def parse_toml(text: str, shown: str) -> dict[str, Any]:
     ConfigError
         Where it is, and holds what no setting can.
     """
+    _refuse_long_keys(text, shown)
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -154,6 +166,22 @@ def did_you_mean(word: str, known: Sequence[str]) -> str:
     lower = {k.lower(): k for k in known}
     near = difflib.get_close_matches(word.lower()[:80], lower, n=1, cutoff=0.6)
     return f"; did you mean {lower[near[0]]}?" if near else ""
+
+
+def _read(path: Path) -> bytes:
+    """Return the file's bytes, one more than allowed at most; a pipe on which nobody writes ends in TimeoutError."""
+    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOCTTY | os.O_NONBLOCK)
+    with os.fdopen(fd, "rb", buffering=0) as file:
+        kind = os.fstat(fd).st_mode
+        if stat.S_ISDIR(kind):
+            raise IsADirectoryError
+        data, more = bytearray(), b" "
+        while more and len(data) <= SIZE_MAX:
+            if not stat.S_ISREG(kind) and not select.select([fd], [], [], PIPE_WAIT_S)[0]:
+                raise TimeoutError
+            more = file.read(SIZE_MAX + 1 - len(data)) or b""
+            data += more
+    return bytes(data)
 
 
 def _read_shipped(kind: Kind, name: str, named_by: Source | None) -> Document:
@@ -190,6 +218,15 @@ def _placed(message: str, text: str) -> str:
         line = text.count("\n") + 1
         place = f"line {line}, column {len(text) - text.rfind(chr(10))} (end of the file)"
     return one_line(f"{place}: {what}" if what else message)
+
+
+def _refuse_long_keys(text: str, shown: str) -> None:
+    """Refuse a.a.a.… before it is parsed: time and memory that tomllib takes grow with the square of its length."""
+    found = _LONG_KEY.search(text)
+    if found is not None:
+        line = text.count("\n", 0, found.start()) + 1
+        begin = ".".join(found[0][:60].split(".")[:3])
+        raise ConfigError(f"{shown}: line {line}: {one_line(begin)}.…: lists or tables are nested too deeply")
 
 
 def _refuse_extremes(table: dict[str, Any], shown: str) -> None:

@@ -24,6 +24,7 @@ from config.world import WorldConfig
 
 __all__ = [
     "ConfigError",
+    "changed_settings",
     "list_shipped",
     "load_any",
     "load_model",
@@ -159,6 +160,36 @@ def load_settings(
     if problems:
         raise ConfigError(*problems)
     return _validated(Settings, settings)
+
+
+def changed_settings(settings: Settings, name: str, overrides: Sequence[str]) -> Settings:
+    """Return settings that are already whole with single ones overridden.
+
+    Parameters
+    ----------
+    settings
+        Whole, as from a recording.
+    name
+        Where they come from, for complaints.
+    overrides
+        Texts of the form ``dotted.path=value``.
+
+    Raises
+    ------
+    ConfigError
+        With a line for each problem.
+    """
+    source = Source(name)
+    layers = Layers(source)
+    layers.lay(settings.model_dump(mode="json"), source)
+    changes = [parse_override(text) for text in overrides]
+    files = [change for change in changes if change.names_files]
+    if files:
+        raise ConfigError(f"--set {dotted(files[0].location)}: names a file; that goes with a run file only")
+    problems = apply_overrides(changes, layers)
+    if problems:
+        raise ConfigError(*problems)
+    return _validated(Settings, layers)
 
 
 def _load(kind: Kind, name: str | os.PathLike[str], model: type[M]) -> M:

@@ -6,7 +6,7 @@ Everything that differs from one robot to the next, and nothing that does not.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -15,7 +15,13 @@ from config.strict import Many, Strict
 SOUND_SPEED_M_S = 343.0
 """Speed of sound in dry air at 20 °C; what the ring's own electronics assume."""
 
-Preset = Literal["single", "opposite_pairs", "thirds", "quadrants", "octets"]
+SENSORS_MAX = 255
+"""Sensors in a ring, and sets in a firing pattern; a file that lists a million must not fill the memory."""
+
+SensorSet: TypeAlias = Annotated[Many[Annotated[int, Field(ge=0, lt=SENSORS_MAX)]], Field(max_length=SENSORS_MAX)]
+"""Numbers of sensors that fire together."""
+
+Preset = Literal["single", "opposite_pairs", "thirds", "quadrants", "octets", "alternating"]
 
 
 class Mount(NamedTuple):
@@ -29,8 +35,8 @@ class Mount(NamedTuple):
 class SensorConfig(Strict):
     """One sensor of a ring that is not a regular one."""
 
-    x_m: float
-    y_m: float
+    x_m: float = Field(ge=-10.0, le=10.0)
+    y_m: float = Field(ge=-10.0, le=10.0)
     angle_deg: float = Field(ge=-360.0, le=360.0)
 
 
@@ -38,14 +44,15 @@ class FiringConfig(Strict):
     """Which sensors fire together, and how often: a preset, or sets of one's own."""
 
     preset: Preset | None = None
-    """A regular pattern by name: how many sensors, equally spaced, fire at a time."""
-    sets: Many[Many[Annotated[int, Field(ge=0)]]] | None = None
+    """A regular pattern by name: how many sensors, equally spaced, fire at a time; `alternating` fires octets and
+    thirds in turn, so that no two sensors fire together in both and crosstalk shows."""
+    sets: Annotated[Many[SensorSet], Field(max_length=SENSORS_MAX)] | None = None
     """Sets of sensor numbers, fired in turn; instead of a preset."""
     rotations: int = Field(default=1, ge=1, le=255)
     """Fire `sets` this many times round, one sensor further round the ring each time."""
     step_period_s: float = Field(default=0.05, ge=0.001, le=60.0)
     """Time from one firing to the next."""
-    window_m: float | None = Field(default=None, gt=0.0)
+    window_m: float | None = Field(default=None, gt=0.0, le=100.0)
     """How far each firing listens; `ring.range_max_m` where it is not given."""
 
     @model_validator(mode="after")
@@ -67,9 +74,9 @@ def _preset_as_table(value: Any) -> Any:  # noqa: ANN401 - a validator sees what
 class RingConfig(Strict):
     """The ring of sensors: regular (count and radius_m) or listed one by one (sensors)."""
 
-    count: int | None = Field(default=None, ge=2, le=255)
+    count: int | None = Field(default=None, ge=2, le=SENSORS_MAX)
     radius_m: float | None = Field(default=None, ge=0.0, le=10.0)
-    sensors: Many[SensorConfig] | None = None
+    sensors: Annotated[Many[SensorConfig], Field(max_length=SENSORS_MAX)] | None = None
     beam_half_angle_deg: float = Field(gt=0.0, lt=90.0)
     resolution_m: float = Field(ge=0.0, lt=1.0)
     """Step of the reported range; 0 = not quantised."""
@@ -125,10 +132,10 @@ class LinkConfig(Strict):
     """A command unanswered for this long is sent again."""
     tries: int = Field(default=3, ge=1, le=100)
     """After this many unanswered tries the link is down."""
-    silence_max_s: float = Field(default=0.5, ge=0.05, le=60.0)
-    """With nothing heard for this long the link is down; odometry comes also when still."""
+    silence_max_s: float = Field(default=0.4, ge=0.05, le=60.0)
+    """With no odometry for this long the link is down; it comes also when still. Noticed by the next cycle."""
     reopen_first_s: float = Field(default=0.05, gt=0.0, le=60.0)
-    reopen_max_s: float = Field(default=1.0, gt=0.0, le=600.0)
+    reopen_max_s: float = Field(default=0.5, gt=0.0, le=600.0)
     """First and longest wait between attempts to open the port; it doubles in between."""
 
 

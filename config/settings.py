@@ -50,7 +50,7 @@ class MapConfig(Strict):
 
     capacity: int = Field(default=4096, ge=16, le=4_000_000)
     """Segments held at most; the oldest leaves for a new one."""
-    age_max_s: float = Field(default=120.0, gt=0.0)
+    age_max_s: float = Field(default=120.0, gt=0.0, le=1e6)
     """Segments leave the map at this age."""
     contradiction_margin_m: float = Field(default=0.2, ge=0.0, le=10.0)
     """A segment leaves when a sensor that faces it hears an echo from this much behind it."""
@@ -61,7 +61,7 @@ class ClustersConfig(Strict):
 
     threshold_m: float = Field(default=0.4572, gt=0.0, le=100.0)
     """T: a segment farther than this from every cluster's centre founds a new cluster."""
-    segments_min: int = Field(default=8, ge=1)
+    segments_min: int = Field(default=8, ge=1, le=10_000)
     """Clusters of fewer segments get no model."""
     clusters_max: int = Field(default=128, ge=1, le=4096)
 
@@ -71,8 +71,8 @@ class RelaxationConfig(Strict):
 
     gamma: float = Field(default=2.0, gt=0.0, le=100.0)
     """γ: sphere_i = γ times the length of model segment i."""
-    negligible_m: float = Field(default=3e-4, gt=0.0)
-    negligible_rad: float = Field(default=1e-3, gt=0.0)
+    negligible_m: float = Field(default=3e-4, gt=0.0, le=1.0)
+    negligible_rad: float = Field(default=1e-3, gt=0.0, le=1.0)
     """The process stops when the total increment is below both."""
     iterations_max: int = Field(default=500, ge=1, le=1_000_000)
     """A model that has not settled by then is left as it is until new evidence comes."""
@@ -82,12 +82,12 @@ class RelaxationConfig(Strict):
 class RecognitionConfig(Strict):
     """When a relaxed model counts as an object seen."""
 
-    tolerance_m: float = Field(default=0.1, gt=0.0)
+    tolerance_m: float = Field(default=0.1, gt=0.0, le=10.0)
     tolerance_deg: float = Field(default=30.0, gt=0.0, le=90.0)
     """A segment supports the model where it lies this near to a side and this parallel to it."""
     support_min: float = Field(default=0.5, ge=0.0, le=1.0)
     """Share of the cluster's segments that support the model, at least."""
-    separation_m: float = Field(default=0.3, ge=0.0)
+    separation_m: float = Field(default=0.3, ge=0.0, le=100.0)
     """Two candidates that rest nearer to one another than this are one object."""
     coverage_min: float = Field(default=0.35, ge=0.0, le=1.0)
     """Share of the model's outline whose sides have support, at least."""
@@ -98,15 +98,17 @@ class FullConfig(Strict):
 
     report_probability: float = Field(default=0.95, gt=0.0, lt=1.0)
     """A model is reported from this probability on."""
+    report_probability_near: float = Field(default=0.8, gt=0.0, lt=1.0)
+    """The same for what was heard from within 6 ft; farther away are explanations that nobody thought of."""
     tracks_max: int = Field(default=48, ge=1, le=1000)
     """Round things held in mind at a time, models or not."""
     attempts_per_firing: int = Field(default=3, ge=0, le=64)
     """Unexplained outline segments looked at for new objects, a firing."""
     fresh_share: float = Field(default=0.08, gt=0.0, le=1.0)
     """An object is refined once this share of its readings is new."""
-    quanta_per_firing: int = Field(default=1, ge=1, le=1000)
+    quanta_per_firing: int = Field(default=2, ge=1, le=1000)
     """Refinements a firing, at most; what is left waits for the next one."""
-    polygon_quanta_per_firing: int = Field(default=2, ge=1, le=1000)
+    polygon_quanta_per_firing: int = Field(default=12, ge=1, le=1000)
     """The same for polygons, so that drums in view do not starve the boxes beside them."""
 
 
@@ -129,7 +131,7 @@ class MoveAheadConfig(Strict):
 
     move_ahead_gain: float = Field(default=1.0, ge=0.0, le=100.0)
     move_ahead_direction_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
-    distance_m: float | None = Field(default=None, gt=0.0)
+    distance_m: float | None = Field(default=None, gt=0.0, le=1e6)
     """How far to go from where the drive began; without end where it is not given."""
     at_end: Literal["stop", "turn_back"] = "stop"
 
@@ -188,7 +190,7 @@ class RealtimeConfig(Strict):
     """
     priority: int | None = Field(default=None, ge=1, le=99)
     """Run under SCHED_FIFO at this priority: before everything that is not real-time."""
-    core: int | None = Field(default=None, ge=0)
+    core: int | None = Field(default=None, ge=0, le=4095)
     """Stay on this core."""
     lock_memory: bool = False
     """Never let memory be swapped out."""
@@ -202,6 +204,21 @@ class LogConfig(Strict):
     level: Literal["debug", "info", "warning", "error"] = "info"
 
 
+class RecordingConfig(Strict):
+    """The recording that every run leaves behind, in a folder where the oldest make room for the newest."""
+
+    enabled: bool = True
+    """Keep one where ``--record`` names no file."""
+    folder: str | None = None
+    """Where it is not given, echolocate/runs in the user's state folder."""
+    cap_mb: float = Field(default=1000.0, ge=1.0, le=1e7)
+    """All recordings in the folder together, megabytes; an hour takes about 30."""
+    keep: int = Field(default=100, ge=1, le=100_000)
+    """Files in the folder, at most."""
+    keyframe_period_s: float = Field(default=40.0, ge=0.1, le=3600.0)
+    """So often the whole state is recorded: a replay can begin there."""
+
+
 class Settings(RobotConfig):
     """All settings of one run: the robot's sections at the top, then what it recognises and does."""
 
@@ -213,6 +230,7 @@ class Settings(RobotConfig):
     behaviors: BehaviorsConfig = BehaviorsConfig()
     realtime: RealtimeConfig = RealtimeConfig()
     log: LogConfig = LogConfig()
+    recording: RecordingConfig = RecordingConfig()
 
     @model_validator(mode="after")
     def _distinct_models(self) -> Settings:

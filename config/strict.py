@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, TypeAlias, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 T = TypeVar("T")
 
@@ -33,5 +33,8 @@ def _list_as_tuple(value: Any) -> Any:  # noqa: ANN401 - a validator sees whatev
 Many: TypeAlias = Annotated[tuple[T, ...], BeforeValidator(_list_as_tuple)]
 """An immutable sequence written as a TOML list."""
 
-Point: TypeAlias = Annotated[tuple[float, float], BeforeValidator(_list_as_tuple)]
+Place: TypeAlias = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
+"""A coordinate, metres; nobody drives ten kilometres by sonar, and the squares of a typo overflow."""
+
+Point: TypeAlias = Annotated[tuple[Place, Place], BeforeValidator(_list_as_tuple)]
 """A pair of coordinates in metres written as a TOML list of two numbers."""

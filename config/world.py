@@ -2,52 +2,58 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Final, Literal, TypeAlias
 
 from pydantic import Field
 
-from config.strict import Many, Point, Strict
+from config.strict import Many, Place, Point, Strict
+
+THINGS_MAX: Final = 1000
+"""Things of a kind in a world, and corners of a thing."""
+
+Turn: TypeAlias = Annotated[float, Field(ge=-360.0, le=360.0)]
+"""An angle, degrees."""
 
 
 class DrumConfig(Strict):
     """A closed cylinder."""
 
-    x_m: float
-    y_m: float
+    x_m: Place
+    y_m: Place
     radius_m: float = Field(gt=0.0, le=100.0)
 
 
 class WallConfig(Strict):
     """A straight wall between two points, seen from both sides."""
 
-    x1_m: float
-    y1_m: float
-    x2_m: float
-    y2_m: float
+    x1_m: Place
+    y1_m: Place
+    x2_m: Place
+    y2_m: Place
 
 
 class BoxConfig(Strict):
     """A rectangle by its centre, its sides, and its rotation."""
 
-    x_m: float
-    y_m: float
+    x_m: Place
+    y_m: Place
     width_m: float = Field(gt=0.0, le=100.0)
     depth_m: float = Field(gt=0.0, le=100.0)
-    angle_deg: float = 0.0
+    angle_deg: Turn = 0.0
 
 
 class PolygonConfig(Strict):
     """A closed polygon by its corners, in order."""
 
-    vertices_m: Many[Point] = Field(min_length=3)
+    vertices_m: Many[Point] = Field(min_length=3, max_length=THINGS_MAX)
 
 
 class StartConfig(Strict):
     """Where the robot stands when the world begins, in world coordinates."""
 
-    x_m: float = 0.0
-    y_m: float = 0.0
-    heading_deg: float = 0.0
+    x_m: Place = 0.0
+    y_m: Place = 0.0
+    heading_deg: Turn = 0.0
 
 
 class AcousticsConfig(Strict):
@@ -83,10 +89,10 @@ class OdometryConfig(Strict):
 class WorldConfig(Strict):
     """A world file."""
 
-    drum: Many[DrumConfig] = ()
-    wall: Many[WallConfig] = ()
-    box: Many[BoxConfig] = ()
-    polygon: Many[PolygonConfig] = ()
+    drum: Many[DrumConfig] = Field(default=(), max_length=THINGS_MAX)
+    wall: Many[WallConfig] = Field(default=(), max_length=THINGS_MAX)
+    box: Many[BoxConfig] = Field(default=(), max_length=THINGS_MAX)
+    polygon: Many[PolygonConfig] = Field(default=(), max_length=THINGS_MAX)
     start: StartConfig = StartConfig()
     acoustics: AcousticsConfig = AcousticsConfig()
     odometry: OdometryConfig = OdometryConfig()

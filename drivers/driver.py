@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
-from drivers.messages import Firing, Identity, LinkCounts, Odometry, Twist
+from config.robot import RingConfig
+from drivers.messages import Firing, Identity, LinkCounts, Odometry, Pose, Twist
 
 
 class LineState(Enum):
@@ -35,6 +36,8 @@ class Heard:
     """The newest one, None where none came."""
     rebooted: bool
     """The robot restarted: its clock and odometry began again at zero."""
+    notes: tuple[str, ...] = ()
+    """What an operator should know of it: what happened, likely cause, next action."""
 
 
 class RobotDriver(Protocol):
@@ -55,6 +58,10 @@ class RobotDriver(Protocol):
     @property
     def counts(self) -> LinkCounts:
         """Frames over the line so far."""
+
+    @property
+    def frame(self) -> Pose:
+        """The origin of the poses handed up, in the robot's own odometry: another one since that has leapt."""
 
     @property
     def waiting(self) -> int:
@@ -80,6 +87,9 @@ class RobotDriver(Protocol):
 
     def release(self) -> None:
         """Clear the latch, so that DRIVE is obeyed again."""
+
+    def set_firing(self, ring: RingConfig) -> None:
+        """Fire the pattern of this ring from now on; nothing happens where it is the one under way."""
 
     def outgoing(self, *, writable: bool) -> bytes:
         """Return what should go on the line now; only HALT while the line is not `writable`."""

@@ -13,8 +13,16 @@ from types import MappingProxyType
 
 from config.robot import SOUND_SPEED_M_S, Preset, RingConfig
 
-_AT_A_TIME: Mapping[Preset, int] = MappingProxyType(
-    {"single": 1, "opposite_pairs": 2, "thirds": 3, "quadrants": 4, "octets": 8}
+_AT_A_TIME: Mapping[Preset, tuple[int, ...]] = MappingProxyType(
+    {
+        "single": (1,),
+        "opposite_pairs": (2,),
+        "thirds": (3,),
+        "quadrants": (4,),
+        "octets": (8,),
+        # Partners 3 n and 8 n places on: in a ring of 24 no two sensors fire together in both.
+        "alternating": (8, 3),
+    }
 )
 _TOLERANCE_S = 1e-9
 
@@ -66,15 +74,17 @@ def _mask(numbers: Iterable[int]) -> int:
 
 
 def _preset_masks(preset: Preset, count: int) -> tuple[int, ...]:
-    together = _AT_A_TIME[preset]
-    if count % together:
-        possible = ", ".join(name for name, size in _AT_A_TIME.items() if count % size == 0)
+    sizes = _AT_A_TIME[preset]
+    if any(count % together for together in sizes):
+        possible = ", ".join(name for name, ways in _AT_A_TIME.items() if not any(count % size for size in ways))
         raise FiringError(
-            f'ring.firing: preset "{preset}" fires {together} sensors at a time, equally spaced, and {count} sensors '
-            f"do not divide by {together}; possible for this ring: {possible}, or sets of your own"
+            f'ring.firing: preset "{preset}" fires {" or ".join(map(str, sizes))} sensors at a time, equally spaced, '
+            f"and {count} sensors do not divide by {' or '.join(str(size) for size in sizes if count % size)}; "
+            f"possible for this ring: {possible}, or sets of your own"
         )
-    steps = count // together
-    return tuple(_mask(range(step, count, steps)) for step in range(steps))
+    return tuple(
+        _mask(range(step, count, count // together)) for together in sizes for step in range(count // together)
+    )
 
 
 def _rotated_masks(sets: tuple[tuple[int, ...], ...], rotations: int, count: int) -> tuple[int, ...]:

@@ -82,6 +82,11 @@ class Link:
         return self._line is not None and self._line.up and self._line.waiting <= _WRITABLE_MAX
 
     @property
+    def waiting(self) -> int:
+        """Bytes sent that have not left this process; never more than 4 KiB."""
+        return 0 if self._line is None else self._line.waiting
+
+    @property
     def last_error(self) -> str | None:
         """Why the line was lost or could not be opened the last time, in one line; None while all is well."""
         return self._last_error
@@ -304,9 +309,17 @@ async def _open_off_loop(config: LinkConfig, opener: OpenPort, timeout_s: float)
                 port.close()
 
     threading.Thread(target=work, name=f"open {config.port}", daemon=True).start()
+    taken = False
     try:
-        return await asyncio.wait_for(opened, timeout_s)
+        # Not `wait_for`: before Python 3.12 it swallows a cancellation that comes together with the result.
+        async with asyncio.timeout(timeout_s):
+            port = await opened
+        taken = True
     except TimeoutError as e:
         raise LinkError(explain(config, TimeoutError(f"{timeout_s:g} s so far"))) from e
     except OPENING_ERRORS as e:
         raise LinkError(explain(config, e)) from e
+    finally:
+        if not taken and opened.done() and not opened.cancelled() and opened.exception() is None:
+            opened.result().close()
+    return port

@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntFlag
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-Floats: TypeAlias = NDArray[np.float64]
+from drivers.array_form import NumberList
+
+Floats: TypeAlias = Annotated[NDArray[np.float64], NumberList()]
 
 
 def wrap_angle(angle_rad: float) -> float:

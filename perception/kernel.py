@@ -38,3 +38,10 @@ def kernel(function: F) -> F:
 def owning_kernel(function: F) -> F:
     """Compile `function` as `kernel` does, with reference counts: for what allocates or takes numba's objects."""
     return cast("F", numba.njit(cache=True)(function))
+
+
+@kernel
+def copy_span(source: Floats, begin: int, count: int, target: Floats, at: int) -> None:
+    """Copy `count` values of one row into another; numba allocates where a slice is assigned to a slice."""
+    for k in range(count):
+        target[at + k] = source[begin + k]

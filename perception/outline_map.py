@@ -139,6 +139,10 @@ class OutlineMap:
         while self.count and (not self.alive[self.start] or t - self.times[self.start] > self._config.age_max_s):
             self._drop_oldest()
 
+    def adopt(self, config: MapConfig) -> None:
+        """Go on with another age limit and margin; the capacity stays."""
+        self._config = config
+
     def contradict(self, firing: Firing) -> int:
         """Remove segments behind which `firing` heard an echo; return how many."""
         return erase_contradicted(

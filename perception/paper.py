@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
@@ -37,6 +38,9 @@ class PaperPerception:
     config : PerceptionConfig
         The constants of each step.
     """
+
+    SCRATCH: Final = ("_scratch",)
+    """Only for reporting, and no memory."""
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> None:
         mounts = mounts_array(ring.mounts)
@@ -123,6 +127,14 @@ class PaperPerception:
         self.outline.clear()
         self.clusters.update(self.outline)
         self.candidates.clear()
+
+    def adopt(self, config: PerceptionConfig) -> None:
+        """Go on with other limits of recognition and ageing; what sizes an array stays."""
+        self._config = config
+        self.outline.adopt(config.map)
+
+    def restored(self) -> None:
+        """Drop what was worked out before the memory was put back from a snapshot: here nothing."""
 
     def _judge(self, cluster: int, m: int) -> SeenObject | None:
         """Return the candidate as an object if it fits well enough."""

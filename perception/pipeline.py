@@ -20,6 +20,9 @@ from perception.kernel import Floats
 from perception.paper import PaperPerception
 from perception.seen import SeenObject
 from perception.segments import mounts_array
+from perception.sensor_report import SensorReport
+from perception.sensor_watch import SensorWatch
+from perception.snapshot import Snapshot, put_back, snapshot_of
 
 __all__ = ["Method", "Perception", "SeenObject", "method_of"]
 
@@ -76,6 +79,14 @@ class Method(Protocol):
         """Begin anew, as after the odometry did."""
         ...
 
+    def adopt(self, config: PerceptionConfig) -> None:
+        """Go on with other constants, of those that a running process follows (`config.reload.LIVE`)."""
+        ...
+
+    def restored(self) -> None:
+        """Drop what was worked out before the memory was put back from a snapshot."""
+        ...
+
 
 def method_of(ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> Method:
     """Return the method that the configuration names."""
@@ -99,6 +110,7 @@ class Perception:
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> None:
         self.method = method_of(ring, models, config)
+        self.watch = SensorWatch(ring)
         self._echoes = FreshEchoes(mounts_array(ring.mounts))
         self._sensors = len(ring.mounts)
 
@@ -137,8 +149,9 @@ class Perception:
         """
         if len(firing.ranges_m) != self._sensors:
             raise ValueError(f"a firing of {len(firing.ranges_m)} ranges came to a ring of {self._sensors} sensors")
-        self._echoes.update(firing)
-        return self.method.observe(firing)
+        believed, possible = self.watch.believe(firing)
+        self._echoes.update(possible)
+        return self.method.observe(believed)
 
     def refine(self) -> int:
         """Do one quantum of refinement and return its iterations, zero where nothing is left to improve."""
@@ -163,4 +176,32 @@ class Perception:
     def forget(self) -> None:
         """Begin anew, as after the odometry did."""
         self.method.forget()
+        self.watch.forget()
         self._echoes.clear()
+
+    def adopt(self, config: PerceptionConfig) -> None:
+        """Go on with other constants, of those that a running process follows (`config.reload.LIVE`)."""
+        self.method.adopt(config)
+
+    def listen_to(self, ring: RingConfig) -> None:
+        """Expect another firing pattern of the same sensors from now on."""
+        self.watch.listen_to(ring)
+
+    def sensors(self) -> tuple[SensorReport, ...]:
+        """Return which sensors are not believed, and why."""
+        return self.watch.reports()
+
+    def snapshot(self) -> Snapshot:
+        """Return copies of everything remembered, from which `restore` goes on to the bit."""
+        return snapshot_of(self)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot that perception of the same settings gave.
+
+        Raises
+        ------
+        ValueError
+            The snapshot is of other settings.
+        """
+        put_back(self, snapshot)
+        self.method.restored()

@@ -8,7 +8,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Protocol
+from typing import Final, Protocol
+
+QUANTA_PER_CYCLE: Final = 50
+"""What the default budget affords on a slow machine; virtual time needs a number instead of a clock."""
+
+
+def enough_quanta(done: int) -> bool:
+    """Say whether refinement may go on after `done` quanta of a cycle."""
+    return done < QUANTA_PER_CYCLE
 
 
 class Allowance(Protocol):

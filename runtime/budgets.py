@@ -74,7 +74,7 @@ class Answers:
         self.cut += record.refinement == "budget"
         self.cycles += 1
 
-    def on_state(self, state: State, start: Pose) -> None:
+    def on_state(self, _record: CycleRecord, state: State, start: Pose) -> None:
         """Look at what is reported."""
         told = state.perception.objects()
         if told is self._told or state.now_s is None:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from cyclopts import App, CycloptsError, Parameter, Token
+from cyclopts import App, CycloptsError, Parameter
 
 from runtime import VERSION
+from runtime.cli_shown import export, figures, report
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
+from runtime.options import Flag, JsonFile, Seed, Sets, UnitsOption
 from runtime.scene_names import SceneName
 
 app = App(
@@ -22,30 +23,6 @@ app = App(
     help="A robot's main process that recognises and locates objects by sonar alone.",
     version=VERSION,
 )
-
-Sets = Annotated[
-    tuple[str, ...],
-    Parameter(
-        name="--set",
-        negative="",
-        allow_leading_hyphen=False,
-        help="Override one setting, as in ring.firing=quadrants.",
-    ),
-]
-JsonFile = Annotated[str | None, Parameter(name="--json", help="Write the summary to this file.")]
-UnitsOption = Annotated[Literal["m", "ft"], Parameter(help="Units of what is printed.")]
-Flag = Parameter(negative="")
-
-
-def _whole(_type: type, tokens: Sequence[Token]) -> int:
-    """Return a whole number, none below zero; left alone, cyclopts takes 1.5 for 1."""
-    text = tokens[0].value
-    if not (text.isascii() and text.isdigit()):
-        raise ValueError(f"{text!r} must be a whole number, 0 or above.")
-    return int(text)
-
-
-Seed = Annotated[int, Parameter(converter=_whole)]
 
 
 @app.command
@@ -58,6 +35,7 @@ def run(
     seconds: float | None = None,
     headless: Annotated[bool, Flag] = False,
     record: str | None = None,
+    no_record: Annotated[bool, Flag] = False,
     json: JsonFile = None,
     world: str | None = None,
     seed: Seed = 0,
@@ -67,6 +45,8 @@ def run(
     sets: Sets = (),
 ) -> int:
     """Run the robot's main process; without a port, on the emulator in the paper's hall.
+
+    SIGUSR1 arms it, SIGUSR2 halts it, SIGHUP has it read the run file again, SIGINT and SIGTERM end it.
 
     Parameters
     ----------
@@ -81,7 +61,9 @@ def run(
     headless
         No live view: log lines instead.
     record
-        Write every firing to this ring log.
+        Record the run into this file, instead of into the folder of recordings; a name in .csv gives a ring log.
+    no_record
+        Leave no recording.
     world
         World of the emulator, a file or a name.
     seed
@@ -95,8 +77,8 @@ def run(
 
     emulation = Emulation(world=world, seed=seed, trace=trace, faults=faults)
     return run_robot(
-        config, sets, port=port, arm=arm, seconds=seconds, headless=headless, record=record, json_file=json,
-        emulation=emulation, units=units,
+        config, sets, port=port, arm=arm, seconds=seconds, headless=headless, record=record,
+        no_record=no_record, json_file=json, emulation=emulation, units=units,
     )  # fmt: skip
 
 
@@ -110,6 +92,7 @@ def emulate(
     robot: str | None = None,
     trace: str | None = None,
     latency: str | None = None,
+    clock: float = 0.0,
     config: str | None = None,
     sets: Sets = (),
     end_with_parent: Annotated[bool, Parameter(negative="", show=False)] = False,
@@ -132,6 +115,8 @@ def emulate(
         Write the truth to this CSV file, a hundred rows a second.
     latency
         Write to this CSV file when each echo had left and when each drive command came.
+    clock
+        What the robot's own clock shows at first, seconds; it wraps at 4294.967296.
     config
         Run file to take robot and world from.
     """
@@ -139,7 +124,7 @@ def emulate(
 
     return emulate_robot(
         config, sets, world=world, robot=robot, link=link, faults=faults, seed=seed, trace=trace,
-        latency=latency, end_with_parent=end_with_parent,
+        latency=latency, clock_s=clock, end_with_parent=end_with_parent,
     )  # fmt: skip
 
 
@@ -148,26 +133,72 @@ def replay(
     log: str,
     /,
     *,
+    verify: Annotated[bool, Flag] = False,
+    other: Annotated[str | None, Parameter(name="--with")] = None,
+    since: Annotated[float, Parameter(name="--from")] = 0.0,
+    until: Annotated[float | None, Parameter(name="--to")] = None,
+    speed: float | None = None,
     robot: str | None = None,
     model: Annotated[tuple[str, ...], Parameter(negative="")] = (),
     json: JsonFile = None,
     units: UnitsOption = "m",
     sets: Sets = (),
 ) -> int:
-    """Run perception over a ring log.
+    """Run the program again over a recording of a run, or perception over a ring log.
 
     Parameters
     ----------
     log
-        CSV with the header t,x,y,theta[,ring_yaw],r00,r01,…
+        A recording (MCAP), or a CSV with the header t,x,y,theta[,ring_yaw],r00,r01,…
+    verify
+        Fail unless every cycle comes out as it was recorded, to the bit.
+    other
+        Run file with other settings: say what would have been seen otherwise. So does --set.
+    since
+        Begin this many seconds after the recording's first cycle.
+    until
+        End this many seconds after it.
+    speed
+        This many times as fast as it was, in the live view; as fast as possible where it is not given.
     robot
         Robot file, or the name of a shipped one.
     model
         Object model to look for: a file or a name; may be repeated.
     """
-    from runtime.commands.replay import replay_log
+    from pathlib import Path
 
+    from runtime.commands.replay import replay_log
+    from runtime.recording.reading import is_recording
+
+    if is_recording(Path(log)):
+        from runtime.commands.rerun import Span, replay_recording
+
+        return replay_recording(
+            log, sets, span=Span(since, until, speed), verify=verify, other=other, robot=robot, models=model,
+            json_file=json, units=units,
+        )  # fmt: skip
+    if verify or other is not None or since or until is not None or speed is not None:
+        raise Complaint(
+            f"{log}: is a ring log; --verify, --with, --from, --to and --speed are for recordings of a run (MCAP)",
+            WRONG_CALL,
+        )
     return replay_log(log, sets, robot=robot, models=model, json_file=json, units=units)
+
+
+@app.command
+def recover(recording: str, /, *, out: str | None = None) -> int:
+    """Restore what can be read of a recording that was cut off or damaged.
+
+    Parameters
+    ----------
+    recording
+        The damaged file; it is left as it is.
+    out
+        Where the restored one goes; where it is not given, beside it, as NAME-recovered.mcap.
+    """
+    from runtime.commands.recover import recover_recording
+
+    return recover_recording(recording, out)
 
 
 @app.command
@@ -188,6 +219,7 @@ def experiment(
     ),
     quanta: Annotated[tuple[float, ...], Parameter(negative="", consume_multiple=True)] = (),
     seeds: Seed = 1,
+    out: str | None = None,
     json: JsonFile = None,
     units: UnitsOption = "ft",
     sets: Sets = (),
@@ -212,10 +244,15 @@ def experiment(
         For `budget`: so many quanta a cycle instead, which makes the table repeatable; 0.1 is one in ten cycles.
     seeds
         Repeat with this many seeds, from 0 on.
+    out
+        Folder for recording, pictures and report of the run with seed 0.
     """
     from runtime.commands.experiment import run_experiment, run_scenes
 
     sets = (*sets, f"perception.method={method}")
+    if scene is not None and out is not None:
+        raise Complaint("--scene gives perception readings without a run: there is nothing to record in --out",
+                        WRONG_CALL)  # fmt: skip
     if name == "budget":
         from runtime.commands.budget import run_budgets
 
@@ -228,7 +265,11 @@ def experiment(
         if name != "hallway" or world is not None:
             raise Complaint("--scene is a hallway of its own: call `experiment hallway`, without --world", WRONG_CALL)
         return run_scenes(scene, sets, models=model, seeds=seeds, json_file=json, units=units)
-    return run_experiment(name, sets, world=world, models=model, seeds=seeds, json_file=json, units=units)
+    return run_experiment(name, sets, world=world, models=model, seeds=seeds, out=out, json_file=json, units=units)
+
+
+for command in (figures, report, export):
+    app.command(command)
 
 
 @app.command
@@ -243,6 +284,31 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
     from runtime.commands.check import check_config
 
     return check_config(config, sets)
+
+
+@app.command
+def service(
+    config: str | None = None,
+    /,
+    *,
+    port: str | None = None,
+    user: str | None = None,
+    sets: Sets = (),
+) -> int:
+    """Print a systemd unit that runs the robot's main process from boot on; it never arms the robot.
+
+    Parameters
+    ----------
+    config
+        Run file, or the name of a shipped one.
+    port
+        Serial port of the robot, where the run file names none.
+    user
+        Who runs it; where it is not given, a user that systemd makes for it.
+    """
+    from runtime.commands.service import print_service
+
+    return print_service(config, sets, port=port, user=user)
 
 
 def complain(text: str) -> None:

@@ -26,11 +26,13 @@ def gather(
     *,
     echo_age_s: float | None = None,
     overrun: str | None = None,
+    unwell: str | None = None,
 ) -> Inputs:
     """Return everything a cycle that begins at `now_s` is told."""
     driver.tick(now_s)
     gap_max_s = gap_max(driver)
-    return Inputs(now_s, driver.state, driver.trouble, driver.take(), request, gap_max_s, echo_age_s, overrun)
+    state, trouble, heard = driver.state, driver.trouble, driver.take()
+    return Inputs(now_s, state, trouble, heard, request, gap_max_s, echo_age_s, overrun, unwell)
 
 
 def gap_max(driver: RobotDriver) -> float:

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final, TypedDict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from statistics import mean, pstdev
+from typing import Any, Final, NotRequired, TypedDict
 
 from config.settings import Settings
 from config.world import WorldConfig
+from drivers.emulator.memory import OnBytes
 from drivers.messages import Pose
 from runtime.books import Quantiles, worst_of
 from runtime.complaint import FAILED, Complaint
 from runtime.modes import Mode
 from runtime.simulate import Simulated, simulate
+from runtime.step import CycleRecord, State
+from runtime.summary import object_row
 
 GATE_M: Final = 0.3048
 """An estimate farther than a foot from every drum is a false one."""
@@ -37,6 +42,24 @@ class Outcome(TypedDict):
     max_error: float | None
     times_real_time: float
     cycle_us: Quantiles
+    spread: NotRequired[Spread]
+    """Where there was more than one seed."""
+
+
+class Spread(TypedDict):
+    """Errors over many seeds, each seed's drums taken together, m."""
+
+    seeds: int
+    mean: float
+    deviation: float
+    """Of the seeds' mean errors."""
+    worst: float
+    """The largest error of a single drum."""
+    worst_seed: int
+    missed: int
+    missed_most: int
+    """Drums not found by the seed that found fewest."""
+    false: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,20 +72,35 @@ class SeedOutcome:
     virtual_s: float
     wall_s: float
     cycle_us: Quantiles
+    end: dict[str, Any] = field(default_factory=dict)
+    """What a recording of it says at its end, as a run's summary does."""
 
 
-def run_seed(settings: Settings, world: WorldConfig, seed: int) -> SeedOutcome:
+def run_seed(
+    settings: Settings,
+    world: WorldConfig,
+    seed: int,
+    on_state: Callable[[CycleRecord, State, Pose], None] | None = None,
+    on_bytes: OnBytes | None = None,
+) -> SeedOutcome:
     """Run the experiment once in virtual time.
+
+    Parameters
+    ----------
+    settings, world, seed
+        The robot, what it meets, and everything random.
+    on_state, on_bytes : callable, optional
+        A recorder's, as `simulate` calls them.
 
     Raises
     ------
     Complaint
         The robot stopped for a reason, touched something, or did not get through in `SECONDS_MAX`.
     """
-    run = simulate(settings, world, seed, SECONDS_MAX)
+    run = simulate(settings, world, seed, SECONDS_MAX, on_state=on_state, on_bytes=on_bytes)
     refuse_unfinished(run, seed, SECONDS_MAX)
     rows, false = against_truth(world, estimates(run))
-    return SeedOutcome(seed, rows, false, run.virtual_s, run.wall_s, run.books.cycle_us())
+    return SeedOutcome(seed, rows, false, run.virtual_s, run.wall_s, run.books.cycle_us(), end_of(run))
 
 
 def refuse_unfinished(run: Simulated, seed: int, seconds_max: float) -> None:
@@ -85,6 +123,19 @@ def refuse_unfinished(run: Simulated, seed: int, seconds_max: float) -> None:
             "for its radius and safety margin",
             FAILED,
         )
+
+
+def end_of(run: Simulated) -> dict[str, Any]:
+    """Return the summary of a run in virtual time: what there is of ``echolocate run``'s without a clock."""
+    counts = run.counts
+    return {
+        "objects": [object_row(seen) for seen in run.state.perception.objects()],
+        "cycles": run.books.cycles,
+        "cycle_us": run.books.cycle_us(),
+        "link": {"frames": counts.frames, "bad": counts.bad, "lost": counts.lost},
+        "mode": run.state.mode.mode.value,
+        "stop_reasons": [],
+    }
 
 
 def estimates(run: Simulated) -> list[tuple[float, float]]:
@@ -115,12 +166,35 @@ def nearest_pairs(truth: list[tuple[float, float]], seen: list[tuple[float, floa
     return match
 
 
+def spread(outcomes: Sequence[SeedOutcome]) -> Spread | None:
+    """Return how much the seeds differ, None where no drum was found by any."""
+    means, worst = [], []
+    for outcome in outcomes:
+        errors = [row["error"] for row in outcome.rows if row["error"] is not None]
+        if errors:
+            means.append(sum(errors) / len(errors))
+            worst.append((max(errors), outcome.seed))
+    if not means:
+        return None
+    missed = [sum(row["error"] is None for row in outcome.rows) for outcome in outcomes]
+    return {
+        "seeds": len(outcomes),
+        "mean": mean(means),
+        "deviation": pstdev(means),
+        "worst": max(worst)[0],
+        "worst_seed": max(worst)[1],
+        "missed": sum(missed),
+        "missed_most": max(missed),
+        "false": sum(outcome.false for outcome in outcomes),
+    }
+
+
 def summarise(outcomes: list[SeedOutcome]) -> Outcome:
     """Return the summary over all runs: their rows one after another."""
     rows = [row for outcome in outcomes for row in outcome.rows]
     errors = [row["error"] for row in rows if row["error"] is not None]
     wall_s = sum(outcome.wall_s for outcome in outcomes)
-    return {
+    outcome: Outcome = {
         "drums": rows,
         "false": sum(outcome.false for outcome in outcomes),
         "mean_error": sum(errors) / len(errors) if errors else None,
@@ -128,3 +202,6 @@ def summarise(outcomes: list[SeedOutcome]) -> Outcome:
         "times_real_time": sum(outcome.virtual_s for outcome in outcomes) / wall_s if wall_s else 0.0,
         "cycle_us": worst_of([outcome.cycle_us for outcome in outcomes]),
     }
+    if len(outcomes) > 1 and (over := spread(outcomes)) is not None:
+        outcome["spread"] = over
+    return outcome

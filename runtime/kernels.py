@@ -28,8 +28,8 @@ WARM: Final = "warm"
 """A file of this name says that everything was compiled into this folder once."""
 
 
-def cache_folder() -> Path:
-    """Return the folder for the kernels of these very sources, Python and numba; made if it can be."""
+def kernels_key() -> str:
+    """Return a digest of everything that compiled kernels depend on: these very sources, Python and numba."""
     checked = os.environ.get("NUMBA_BOUNDSCHECK", "")  # numba's own key does not hold it
     digest = hashlib.sha256(f"{sys.version}{version('numba')}{version('numpy')}{checked}".encode())
     for package in PACKAGES:
@@ -37,10 +37,16 @@ def cache_folder() -> Path:
         for place in spec.submodule_search_locations or () if spec else ():
             for source in sorted(Path(place).glob("*.py")):
                 digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_folder() -> Path:
+    """Return the folder for the kernels of these very sources, Python and numba; made if it can be."""
+    key = kernels_key()
     mine = f"echolocate-{os.getuid()}"
     homes = [Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"), Path(tempfile.gettempdir()) / mine]
     for home in homes:
-        folder = home / "echolocate" / "kernels" / digest.hexdigest()[:16]
+        folder = home / "echolocate" / "kernels" / key
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=folder):

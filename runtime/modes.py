@@ -93,6 +93,8 @@ class Situation:
     """Longest such time after which driving may go on."""
     overrun: str | None = None
     """Why the cycle cannot keep its time any more; None while it can."""
+    unwell: str | None = None
+    """Which part of the program has failed; None while all work."""
 
 
 def advance(state: ModeState, seen: Situation) -> ModeState:
@@ -112,6 +114,9 @@ def advance(state: ModeState, seen: Situation) -> ModeState:
         return state if reason is None else state.enter(Mode.SAFE_STOP, seen.now_s, reason)
     if seen.request is Request.HALT:
         return state.enter(Mode.SAFE_STOP, seen.now_s, "halted by the operator; re-arm to go on")
+    if seen.unwell is not None:
+        known = state.mode is Mode.SAFE_STOP and state.reason == seen.unwell and seen.request is None
+        return replace(state, arming_s=None) if known else state.enter(Mode.SAFE_STOP, seen.now_s, seen.unwell)
     if seen.line is not LineState.READY:
         if state.mode is Mode.SAFE_STOP:
             return replace(state, arming_s=None)
@@ -125,6 +130,8 @@ def why_stop(state: ModeState, seen: Situation) -> str | None:
     """Return the reason why driving must end, None where there is none."""
     if seen.request is Request.HALT:
         return "halted by the operator; re-arm to go on"
+    if seen.unwell is not None:
+        return seen.unwell
     if seen.line is not LineState.READY:
         return seen.trouble or LINE_REASONS[seen.line]
     if seen.gap_s > seen.gap_max_s:

@@ -15,6 +15,7 @@ from drivers.messages import Firing
 from perception.pipeline import Perception, SeenObject
 from runtime.books import Books, worst_of
 from runtime.experiment import DrumRow, Outcome, against_truth, nearest_pairs
+from runtime.first_fix import FirstFix, FixWatch, summarise_fixes
 from runtime.scene_names import SceneName
 from runtime.scenes import Hall, halls, readings
 
@@ -43,6 +44,8 @@ class SceneOutcome(Outcome):
     halls: int
     inside_95: float | None
     """Share of the drums found that stand inside their 95 % ellipse; without where the method gives none."""
+    first_fix: FirstFix | None
+    """How long before passing drums were fixed; without where the way is not straight or nothing was."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +60,8 @@ class HallOutcome:
     """What the readings took."""
     inside: list[bool]
     """For each drum found with a covariance, whether it stands in the 95 % ellipse."""
+    fixes: list[float | None]
+    """For each drum of a straight hall, how far before it the robot was at its first sure fix, m."""
 
 
 def perceive(perception: Perception, firing: Firing) -> tuple[SeenObject, ...]:
@@ -73,12 +78,14 @@ def run_hall(settings: Settings, hall: Hall, seed: int) -> HallOutcome:
     seen: tuple[SeenObject, ...] = ()
     heard = list(readings(settings.ring, hall, seed))
     books = Books(late_after_s=math.inf)
+    watch = FixWatch(() if hall.path else hall.world.drum)
     for firing in heard:
         begin = time.perf_counter()
         seen = perceive(perception, firing)
         books.enter(time.perf_counter() - begin)
+        watch.look(float(firing.pose.x), seen)
     drums, boxes, false = judge(hall.world, seen, settings.models)
-    return HallOutcome(drums, boxes, false, heard[-1].t_s, books, inside_ellipse(drums, seen))
+    return HallOutcome(drums, boxes, false, heard[-1].t_s, books, inside_ellipse(drums, seen), watch.fixes())
 
 
 def inside_ellipse(drums: Iterable[DrumRow], seen: Iterable[SeenObject]) -> list[bool]:
@@ -152,6 +159,7 @@ def summarise_scene(name: SceneName, outcomes: list[HallOutcome], models: Iterab
         "scene": name,
         "halls": len(outcomes),
         "inside_95": sum(inside) / len(inside) if inside else None,
+        "first_fix": summarise_fixes([fix for outcome in outcomes for fix in outcome.fixes]),
         "drums": drums,
         "boxes": boxes,
         "false": sum(outcome.false for outcome in outcomes),

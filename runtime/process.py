@@ -10,35 +10,34 @@ import asyncio
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from config.settings import Settings
 from drivers.denning.robot import DenningRobot
-from drivers.driver import LineState, RobotDriver
-from drivers.link import Link, LinkError
-from drivers.messages import Firing, Flags, Twist
+from drivers.driver import RobotDriver
+from drivers.link import Link
+from drivers.messages import Firing, Twist
 from perception.pipeline import Perception
 from runtime.books import Books
 from runtime.commanding import gap_max, gather, give
-from runtime.complaint import FAILED, WRONG_CALL, Complaint
+from runtime.ends import Ends
 from runtime.footprint import Footprint, FootprintRow
+from runtime.health import Health, told
 from runtime.memory import MemoryPolicy, collect_young
 from runtime.meter import Reading
 from runtime.modes import Mode, Request
+from runtime.notices import Notices
+from runtime.notify import Notifier
 from runtime.phases import Phase
 from runtime.realtime import ask
 from runtime.rhythm import Rhythm
-from runtime.step import STANDSTILL, Command, CycleRecord, State, step
+from runtime.step import Command, CycleRecord, State, step
 from runtime.summary import RunSummary, run_summary
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
-CONNECT_MAX_S: Final = 5.0
-"""A robot that has not answered properly by then will not without help."""
-
-HALT_MAX_S: Final = 0.5
-"""How long the end of a run waits for the base to confirm that it stands."""
+Way: TypeAlias = Literal["in", "out"]
 
 LINE_OPENED: Final = "line opened"
 LINK_RECEIVE: Final = "link receive"
@@ -54,6 +53,10 @@ class Observers:
 
     on_cycle: Callable[[CycleRecord, State, Books, RobotDriver], None] | None = None
     on_firing: Callable[[Firing], None] | None = None
+    on_bytes: Callable[[Way, float, bytes], None] | None = None
+    """Gets what goes over the line, either way, and when, by the host's clock."""
+    on_settings: Callable[[Settings], None] | None = None
+    """Gets settings taken over while the robot runs, before the first cycle under them."""
 
 
 class RobotProcess:
@@ -69,6 +72,13 @@ class RobotProcess:
         View and recorder.
     clock : callable
         Monotonic, s.
+    notifier : Notifier, optional
+        Tells the service manager that started this process, where one did.
+
+    Attributes
+    ----------
+    health : Health
+        Whoever adds a part to the run has it watched here.
     """
 
     def __init__(
@@ -77,11 +87,14 @@ class RobotProcess:
         log: FilteringBoundLogger,
         observers: Observers = Observers(),
         clock: Callable[[], float] = time.monotonic,
+        notifier: Notifier | None = None,
     ) -> None:
         self._settings = settings
         self._log = log
         self._observers = observers
         self._clock = clock
+        self._notifier = Notifier() if notifier is None else notifier
+        self.health = Health(log)
         self._driver = DenningRobot(settings)
         self._state = State(Perception(settings.ring, settings.models, settings.perception))
         self._rhythm = Rhythm(settings, clock, CALLBACKS)
@@ -92,19 +105,33 @@ class RobotProcess:
             timed(LINK_RECEIVE, self._received),
             timed(LINE_LOST, self._closed),
         )
+        self._ends = Ends(self._link, self._driver, self._send, clock)
         self._memory = MemoryPolicy(timed(COLLECTION, collect_young))
         self._stop_reasons: list[str] = []
+        self._notices = Notices()
         self._request: Request | None = None
+        self._arm_when_ready = False
         self._stop = asyncio.Event()
+        self._next_settings: Settings | None = None
 
     def request(self, request: Request) -> None:
-        """Take an operator's request into the next cycle; a HALT is not overruled by an ARM in the same one."""
+        """Take an operator's request into the next cycle; a HALT is not overruled by an ARM in the same one.
+
+        The base is told to halt at once; the next cycle only takes note of it.
+        """
         if self._request is not Request.HALT:
             self._request = request
+        if request is Request.HALT:
+            self._halt()
+
+    def reconfigure(self, settings: Settings) -> None:
+        """Go on with other settings from the next cycle on; only such as `config.reload` lets through."""
+        self._next_settings = settings
 
     def stop(self) -> None:
         """End the run in good order: halt the base, then close the line."""
         self._stop.set()
+        self._halt()
         self._rhythm.wake()
 
     async def run(self, *, arm: bool, seconds: float | None) -> RunSummary:
@@ -122,78 +149,71 @@ class RobotProcess:
         Complaint
             The port cannot be opened, or the robot does not answer as it should.
         """
-        await self._connect()
-        keeper = asyncio.create_task(self._link.run(), name="link")
-        for refusal in ask(self._settings.realtime):
-            self._log.warning(refusal)
-        footprint = Footprint(self._memory)
-        try:
-            if arm:
-                self.request(Request.ARM)
-            with self._memory.driving():
-                await self._cycle(seconds)
-        finally:
-            cost = footprint.close()
-            self._rhythm.close()
-            await self._shut_down(keeper)
+        with self.health.hearing_accidents():
+            await self._ends.connect(self._stop.is_set)
+            name = None if self._driver.identity is None else self._driver.identity.name
+            self._log.info("robot ready", port=self._settings.link.port, robot=name)
+            keeper = asyncio.create_task(self._link.run(), name="link")
+            self.health.watch_task("link", keeper)
+            for refusal in ask(self._settings.realtime):
+                self._log.warning(refusal)
+            footprint = Footprint(self._memory)
+            try:
+                self._arm_when_ready = arm
+                with self._memory.driving():
+                    await self._cycle(seconds)
+            finally:
+                cost = footprint.close()
+                self._rhythm.close()
+                await self._shut_down(keeper)
         return self._summary(cost)
-
-    async def _connect(self) -> None:
-        """Open the port and wait until the robot is ready."""
-        try:
-            await self._link.open_once()
-        except LinkError as error:
-            in_use = "in use" in str(error)
-            raise Complaint(str(error), FAILED if in_use else WRONG_CALL) from error
-        give_up_s = self._clock() + CONNECT_MAX_S
-        while self._driver.state is not LineState.READY and not self._stop.is_set():
-            now_s = self._clock()
-            self._driver.tick(now_s)
-            self._send()
-            lost = None if self._link.is_open else self._link.last_error
-            if now_s > give_up_s or lost is not None or self._driver.state is LineState.DOWN:
-                await self._link.stop()
-                raise Complaint(lost or self._driver.trouble or self._nobody(), FAILED)
-            await asyncio.sleep(0.005)
-        name = None if self._driver.identity is None else self._driver.identity.name
-        self._log.info("robot ready", port=self._settings.link.port, robot=name)
-
-    def _nobody(self) -> str:
-        return f"nothing on {self._settings.link.port} answers like the robot: check its power and link.baud"
 
     async def _cycle(self, seconds: float | None) -> None:
         """Run cycles in their rhythm until the run ends."""
         began_s, rhythm = self._clock(), self._rhythm
         with rhythm.start(began_s, gap_max(self._driver)):
             while not self._stop.is_set():
-                now = await rhythm.wait()
-                if now is None:
-                    continue
-                if seconds is not None and now.wall_s - began_s >= seconds:
-                    return
                 try:
+                    now = await rhythm.wait()
+                    if now is None:
+                        continue
+                    if seconds is not None and now.wall_s - began_s >= seconds:
+                        return
                     self._one_cycle(now)
+                    left_s = rhythm.end(self._clock())
+                    self._memory.cycle_done(left_s)
                 except Exception as error:  # noqa: BLE001 - whatever it is, the robot must stand still first
                     self._fail(error)
                     return
-                left_s = rhythm.end(self._clock())
-                self._memory.cycle_done(left_s)
 
     def _fail(self, error: Exception) -> None:
         """Halt before anything else, then say what happened; FAULT is not left."""
-        self._driver.halt()
-        self._send()
-        reason = f"the cycle failed ({type(error).__name__}: {error}): a fault of this program, see the log"
+        self._halt()
+        what = f"the cycle failed ({told(error)})"
+        reason = f"{what}, likely by a fault of the program: see the log, then start it again"
         self._state.mode = self._state.mode.enter(Mode.FAULT, self._clock(), reason)
         self._note_mode()
         self._log.error("the cycle failed", exc_info=error)
 
     def _one_cycle(self, now: Reading) -> None:
+        if self._next_settings is not None:
+            self._settings, self._next_settings = self._next_settings, None
+            self._driver.set_firing(self._settings.ring)
+            self._state.perception.adopt(self._settings.perception)
+            self._state.perception.listen_to(self._settings.ring)
+            if self._observers.on_settings is not None:
+                self._observers.on_settings(self._settings)
+        if self._arm_when_ready and self._state.mode.mode is Mode.READY:
+            self._arm_when_ready = False
+            self.request(Request.ARM)
         rhythm, start_s = self._rhythm, now.wall_s
         mark = rhythm.keeper.mark
         request, self._request = self._request, None
         begun = rhythm.begin(now)
-        inputs = gather(self._driver, start_s, request, echo_age_s=begun.echo_age_s, overrun=rhythm.overrun)
+        unwell = self.health.unwell()
+        inputs = gather(
+            self._driver, start_s, request, echo_age_s=begun.echo_age_s, overrun=rhythm.overrun, unwell=unwell
+        )
         mark(Phase.GATHER)
         budget_s = self._settings.cycle.perception_budget_s
         before = self._state.mode
@@ -207,38 +227,59 @@ class RobotProcess:
         )
         if self._state.mode.entered_since(before):
             self._note_mode()
+        for line in self._notices.news(inputs.heard, self._state.perception):
+            self._log.warning(line)
         if self._observers.on_firing is not None:
             for firing in inputs.heard.firings:
                 self._observers.on_firing(firing)
         if self._observers.on_cycle is not None:
             self._observers.on_cycle(record, self._state, rhythm.books, self._driver)
+        if unwell is None:
+            self._notifier.well(start_s)
         mark(Phase.OBSERVERS)
 
     def _note_mode(self) -> None:
         state = self._state.mode
         if state.mode in {Mode.SAFE_STOP, Mode.FAULT} and state.reason is not None:
             self._stop_reasons.append(state.reason)
+        self._notifier.status(state.mode.value if state.reason is None else f"{state.mode.value}: {state.reason}")
         self._log.info("mode", mode=state.mode.value, reason=state.reason, cycle=self._state.cycle)
 
     def _carry_out(self, command: Command, stale_s: float) -> None:
         """Put the command on the line, but no velocity decided too long ago; the next cycle stops for such a gap."""
-        if isinstance(command, Twist) and self._clock() > stale_s:
-            return
-        give(self._driver, command)
-        self._send()
+        if not isinstance(command, Twist):
+            give(self._driver, command)
+            self._send()
+        elif self._clock() <= stale_s:
+            give(self._driver, command)
+            self._send()
+            if self._clock() > stale_s:
+                # Held up between the look at the clock and the line: a base that had stopped by itself was set in
+                # motion. The HALT is right behind.
+                self._halt()
 
     def _send(self) -> None:
         if self._link.is_open and (data := self._driver.outgoing(writable=self._link.writable)):
-            self._link.send(data)
+            taken = self._link.send(data)
+            if taken and self._observers.on_bytes is not None:
+                self._observers.on_bytes("out", self._clock(), data)
+
+    def _halt(self) -> None:
+        """Have the base told now, whatever else is under way; on a line that is gone, as soon as it is back."""
+        self._driver.halt()
+        self._send()
 
     def _opened(self) -> None:
         self._driver.opened(self._clock())
+        self._send()
 
     def _received(self, data: bytes) -> None:
         now_s, waiting = self._clock(), self._driver.waiting
         self._driver.receive(data, now_s)
         if self._driver.waiting > waiting:
             self._rhythm.hear(now_s)
+        if self._observers.on_bytes is not None:
+            self._observers.on_bytes("in", now_s, data)
 
     def _closed(self, reason: str) -> None:
         self._driver.closed()
@@ -248,16 +289,9 @@ class RobotProcess:
     async def _shut_down(self, keeper: asyncio.Task[None]) -> None:
         """Halt the base and wait until it stands still; then close the line."""
         self._stop.set()
-        self._driver.halt()
-        give_up_s = self._clock() + HALT_MAX_S
-        halted = False
-        while self._link.is_open and not halted and self._clock() < give_up_s:
-            self._driver.tick(self._clock())
-            self._send()
-            await asyncio.sleep(0.005)
-            odometry = self._driver.take().odometry
-            halted = odometry is not None and Flags.LATCHED in odometry.flags and odometry.twist == STANDSTILL
-        if not halted:
+        self.health.relieve()
+        self._notifier.stopping()
+        if not await self._ends.halt():
             self._log.warning("the base did not confirm the halt; its deadman stops it")
         keeper.cancel()
         await asyncio.gather(keeper, return_exceptions=True)

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable
 from config.settings import Settings
 from drivers.messages import Firing
 from perception.pipeline import Perception
+from runtime.allowance import enough_quanta
 from runtime.books import Books
-from runtime.simulate import enough_quanta
 from runtime.summary import ReplaySummary, object_row
 
 

@@ -95,17 +95,19 @@ def _lines(file: BinaryIO, path: Path) -> Iterator[str]:
 
 
 def _rows(file: BinaryIO, path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Yield the cells of each row that is not blank, with the number of the line it begins on."""
-    reader = csv.reader(_lines(file, path), strict=True)
-    row = 1
-    try:
-        for cells in reader:
-            if cells:
-                yield row, cells
-            row = reader.line_num + 1
-    except csv.Error as error:
-        hint = "save it with plain cells and LF or CRLF line ends"
-        raise _fault(path, row, f"is not CSV ({error})", hint) from error
+    """Yield the cells of each row that is not blank, with its number.
+
+    Each line is read by itself. A quoted cell may span lines in CSV but not here: one quote too few would otherwise
+    make a single row of the whole rest of the file, in memory.
+    """
+    for row, line in enumerate(_lines(file, path), start=1):
+        try:
+            cells = next(csv.reader((line,), strict=True))
+        except csv.Error as error:
+            hint = "save it with plain cells and LF or CRLF line ends"
+            raise _fault(path, row, f"is not CSV ({error})", hint) from error
+        if cells:
+            yield row, cells
 
 
 def _firings(rows: Iterator[tuple[int, list[str]]], path: Path, sensors: int | None) -> Iterator[Firing]:

@@ -16,17 +16,14 @@ from config.settings import Settings
 from config.world import WorldConfig
 from drivers.denning.robot import DenningRobot
 from drivers.emulator.device import EmulatedRobot, Truth
-from drivers.emulator.memory import MemoryLine
-from drivers.messages import Pose
+from drivers.emulator.memory import MemoryLine, OnBytes
+from drivers.messages import LinkCounts, Pose
 from perception.pipeline import Perception
-from runtime.allowance import Allowance, Quanta
+from runtime.allowance import QUANTA_PER_CYCLE, Allowance, Quanta
 from runtime.books import Books
 from runtime.commanding import gather, give
 from runtime.modes import Mode, Request
 from runtime.step import CycleRecord, State, step
-
-QUANTA_PER_CYCLE: Final = 50
-"""What the default budget affords on a slow machine; virtual time needs a number instead of a clock."""
 
 SETTLING_S: Final = 1.0
 """How long a robot that has arrived still listens, so that the last echoes count."""
@@ -44,11 +41,7 @@ class Simulated:
     wall_s: float
     books: Books
     """What the cycles took."""
-
-
-def enough_quanta(done: int) -> bool:
-    """Say whether refinement may go on after `done` quanta."""
-    return done < QUANTA_PER_CYCLE
+    counts: LinkCounts
 
 
 def simulate(
@@ -59,7 +52,10 @@ def simulate(
     on_cycle: Callable[[CycleRecord, Truth], None] | None = None,
     *,
     allowance: Allowance | None = None,
-    on_state: Callable[[State, Pose], None] | None = None,
+    on_state: Callable[[CycleRecord, State, Pose], None] | None = None,
+    clock_start_us: int = 0,
+    reload: Callable[[int], Settings | None] | None = None,
+    on_bytes: OnBytes | None = None,
 ) -> Simulated:
     """Drive through `world` until the leg is done, the robot stops for a reason, or the time is up.
 
@@ -78,12 +74,18 @@ def simulate(
     allowance : Allowance, optional
         How much refinement a cycle may do; `QUANTA_PER_CYCLE` where not given.
     on_state : callable, optional
-        Gets the state after every cycle, and where the odometry began.
+        Gets every record, the state it left, and where the odometry began.
+    clock_start_us : int
+        What the robot's own clock shows at first, µs; it wraps at 2³².
+    reload : callable, optional
+        Asked with the number of each cycle for settings to go on with from there, as after a reload.
+    on_bytes : callable, optional
+        Gets what goes over the line, either way, and when.
     """
     allowance = Quanta(QUANTA_PER_CYCLE) if allowance is None else allowance
-    robot = EmulatedRobot(settings, world, seed)
+    robot = EmulatedRobot(settings, world, seed, clock_start_us=clock_start_us)
     driver = DenningRobot(settings)
-    line = MemoryLine(driver, robot)
+    line = MemoryLine(driver, robot, on_bytes=on_bytes)
     state = State(Perception(settings.ring, settings.models, settings.perception))
     start = robot.truth.pose
     began = time.perf_counter()
@@ -91,6 +93,10 @@ def simulate(
     until, now = seconds_max, 0.0
     while now < until:
         now = (books.cycles + 1) / settings.cycle.rate_hz
+        if reload is not None and (other := reload(books.cycles + 1)) is not None:
+            settings = other
+            driver.set_firing(settings.ring)
+            state.perception.adopt(settings.perception)
         line.exchange(now)
         request = Request.ARM if state.mode.mode is Mode.READY else None
         inputs = gather(driver, now, request)
@@ -101,7 +107,7 @@ def simulate(
         if on_cycle is not None:
             on_cycle(record, robot.truth)
         if on_state is not None:
-            on_state(state, start)
+            on_state(record, state, start)
         if state.mode.mode is Mode.SAFE_STOP or (state.leg is not None and state.leg.done):
             until = min(until, now + SETTLING_S)
-    return Simulated(state, start, robot.truth, now, time.perf_counter() - began, books)
+    return Simulated(state, start, robot.truth, now, time.perf_counter() - began, books, driver.counts)

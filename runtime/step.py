@@ -53,6 +53,8 @@ class Inputs:
     """How long the oldest of these firings has waited for this cycle; None where none came or nobody asks."""
     overrun: str | None = None
     """Why the cycle cannot keep its time any more; None while it can."""
+    unwell: str | None = None
+    """Which part of the program has failed; None while all work."""
 
 
 @dataclass(slots=True)
@@ -153,7 +155,7 @@ def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
     state.now_s = inputs.now_s
     situation = Situation(
         inputs.now_s, inputs.line, inputs.trouble, flags, inputs.heard.rebooted, inputs.request,
-        gap_s, inputs.gap_max_s, inputs.overrun,
+        gap_s, inputs.gap_max_s, inputs.overrun, inputs.unwell,
     )  # fmt: skip
     state.mode = advance(before, situation)
     if state.mode.mode is Mode.DRIVE:

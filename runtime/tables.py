@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from rich.table import Table
 
+from runtime.first_fix import ASKED_M
+
 if TYPE_CHECKING:
     # The robot's own process has tables too, and shall not load the emulator for them.
     from runtime.budgets import BudgetRow
-    from runtime.experiment import DrumRow, Outcome
+    from runtime.experiment import DrumRow, Outcome, Spread
     from runtime.open_loop import BoxRow, SceneOutcome
     from runtime.summary import ObjectRow, RunSummary
 
@@ -68,6 +70,16 @@ def verdict(outcome: Outcome, units: Units) -> str:
     return _verdict(_found("drums", outcome["drums"]), outcome, units)
 
 
+def spread_verdict(spread: Spread, units: Units) -> str:
+    """Return how much the seeds differ, in one line."""
+    return (
+        f"{spread['seeds']} seeds: mean error {length(spread['mean'], units, 3)} ± "
+        f"{length(spread['deviation'], units, 3)} {units} from seed to seed; worst single error "
+        f"{length(spread['worst'], units, 3)} {units} (seed {spread['worst_seed']}); {spread['missed']} drums not "
+        f"found, at most {spread['missed_most']} by one seed; {spread['false']} false"
+    )
+
+
 def scene_verdict(outcome: SceneOutcome, units: Units) -> str:
     """Return a scene's outcome in one line."""
     drums, boxes = outcome["drums"], outcome["boxes"]
@@ -75,6 +87,12 @@ def scene_verdict(outcome: SceneOutcome, units: Units) -> str:
     line = f"{outcome['scene']}: {_verdict(', '.join(parts) or 'nothing to be found', outcome, units)}"
     if outcome["inside_95"] is not None:
         line += f"; {outcome['inside_95']:.1%} of the drums found stand in their 95 % ellipse"
+    if (fix := outcome["first_fix"]) is not None:
+        least = "a drum never" if fix["least"] is None else f"{length(fix['least'], units)} {units}"
+        line += (
+            f"; first sure fix before passing: least {least}, median {length(fix['median'], units)} {units}, "
+            f"{fix['share']:.0%} by {length(ASKED_M, units)} {units}"
+        )
     if outcome["scene"] == "halls" and drums:
         recall = sum(row["estimate"] is not None for row in drums) / len(drums)
         line += f"; recall {recall:.3f}, {outcome['false'] / outcome['halls']:.3f} false a hall"

@@ -31,6 +31,7 @@ from drivers.driver import RobotDriver
 from drivers.messages import Floats, LinkCounts, Pose
 from perception.pipeline import SeenObject
 from runtime.books import Books, Quantiles
+from runtime.health import Worker
 from runtime.modes import ModeState, Request
 from runtime.plan import draw_plan
 from runtime.step import CycleRecord, State
@@ -70,6 +71,8 @@ class Snapshot:
     missed: int = 0
     faults: tuple[tuple[str, int], ...] = ()
     """Culprits of late and overrun cycles, and how many each."""
+    sensors: tuple[str, ...] = ()
+    """Why sensors are not believed."""
 
 
 class View:
@@ -97,6 +100,11 @@ class View:
         self._slot: Snapshot | None = None
         self._wake = threading.Event()
         self._done = False
+        self._painter = Worker("view", self._paint)
+
+    def probe(self) -> str | None:
+        """Say how its thread ended; None while it draws. See `runtime.health`."""
+        return self._painter.probe()
 
     def on_cycle(self, record: CycleRecord, state: State, books: Books, driver: RobotDriver) -> None:
         """Leave the ingredients of the next picture in the slot."""
@@ -112,6 +120,7 @@ class View:
             record.mode, pose, list(self._trail), state.perception.segments_now(), record.clusters,
             state.perception.things(), self._ranges.copy(), driver.counts,
             books.cycles, books.late, books.cycle_us(), books.lag_us(), books.missed, tuple(books.faults.items()),
+            tuple(report.reason for report in state.perception.sensors()),
         )  # fmt: skip
         self._wake.set()
 
@@ -120,14 +129,13 @@ class View:
         """Own the terminal while the run lasts."""
         interval_s = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH_INTERVAL_S)
-        painter = threading.Thread(target=self._paint, name="view", daemon=True)
-        painter.start()
+        self._painter.start()
         try:
             yield
         finally:
             self._done = True
             self._wake.set()
-            painter.join(timeout=1.0)
+            self._painter.join(timeout=1.0)
             sys.setswitchinterval(interval_s)
 
     def _paint(self) -> None:
@@ -158,6 +166,8 @@ class View:
         grid = Table.grid(padding=(0, 2))
         grid.add_row("ring", self._ring(snapshot.ranges))
         grid.add_row("map", f"{len(snapshot.segments)} segments, {snapshot.clusters} hypotheses")
+        for reason in snapshot.sensors:
+            grid.add_row("masked", reason)
         counts = snapshot.counts
         grid.add_row("line", f"{counts.frames} frames, {counts.bad} bad, {counts.lost} lost")
         took, lag = snapshot.cycle_us, snapshot.lag_us
@@ -197,7 +207,15 @@ def keys(on_request: Callable[[Request], None], on_quit: Callable[[], None]) -> 
 
     def read() -> None:
         # Not through sys.stdin: what that keeps in its buffer wakes nobody.
-        for key in os.read(fd, KEYS_MAX).decode(errors="replace"):
+        try:
+            pressed = os.read(fd, KEYS_MAX)
+        except OSError:
+            pressed = b""
+        if not pressed:
+            # The terminal is gone, and with it whoever could have halted the robot.
+            loop.remove_reader(fd)
+            on_quit()
+        for key in pressed.decode(errors="replace"):
             if key in KEYS:
                 on_request(KEYS[key])
             elif key == "q":
@@ -209,4 +227,5 @@ def keys(on_request: Callable[[Request], None], on_quit: Callable[[], None]) -> 
         yield
     finally:
         loop.remove_reader(fd)
-        termios.tcsetattr(fd, termios.TCSADRAIN, before)
+        with contextlib.suppress(termios.error):
+            termios.tcsetattr(fd, termios.TCSADRAIN, before)

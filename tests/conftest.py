@@ -2,20 +2,42 @@
 
 Numba reads its settings when it is imported, so the cache is named here, before any test module is. A run with
 `NUMBA_DISABLE_JIT=1` (coverage sees inside kernels) or `NUMBA_BOUNDSCHECK=1` is slower than real time on purpose:
-tests marked `realtime` say nothing there and are skipped.
+tests marked `realtime` say nothing there and are skipped. Those marked `soak` run only where they are asked for.
+
+What a run of the tests says must depend on nothing but the sources: so generated examples are the same in every run
+(`make soak` looks for new ones), and what the user's terminal is like is forgotten.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 from rich.console import Console
 
 from config.load import load_settings
 from runtime.kernels import ready_kernels, use_cache
+from tests import promises
 
 use_cache()
+
+TERMINAL = ("COLUMNS", "LINES", "FORCE_COLOR", "NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE", "TTY_COMPATIBLE",
+            "TTY_INTERACTIVE", "PY_COLORS", "JUPYTER_COLUMNS", "JUPYTER_LINES")  # fmt: skip
+"""What decides how wide and how colourful output is; CI systems like to set it."""
+
+for _name in TERMINAL:
+    os.environ.pop(_name, None)
+
+# How long an example takes says something about the machine only.
+_SLOW = [HealthCheck.too_slow]
+settings.register_profile("reproducible", deadline=None, derandomize=True, suppress_health_check=_SLOW)
+settings.register_profile(
+    "explore", deadline=None, max_examples=1000, print_blob=True, database=None, suppress_health_check=_SLOW
+)
+settings.load_profile("reproducible")
 
 
 def slowed_down() -> str | None:
@@ -26,7 +48,13 @@ def slowed_down() -> str | None:
     return None
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--promises", metavar="PAGE", help="write what was measured, see tests/promises.py")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    promises.collect(config, items)
     slow = slowed_down()
     if slow is None:
         return
@@ -34,6 +62,46 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.get_closest_marker("realtime") is not None:
             item.add_marker(skip)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if item.get_closest_marker(promises.CARRIES) is not None:
+        item.user_properties.append((promises.CARRIES, ""))
+
+
+class _Clerk:
+    """Enters what tests report into the ledger, and writes the page at the end."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        self._config = config
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        self._config.stash[promises.LEDGER].take_report(report)
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        page = self._config.getoption("promises")
+        if page is None:
+            return
+        ledger, soak = (
+            self._config.stash.get(promises.LEDGER, promises.Ledger()),
+            Path(page).name == promises.SOAK_PAGE.name,
+        )
+        try:
+            Path(page).write_text(promises.render(ledger, soak=soak), encoding="utf-8")
+        except ValueError as error:
+            self._config.get_terminal_writer().line(f"\n{page} is left as it is: {error}", red=True)
+            session.exitstatus = pytest.ExitCode.USAGE_ERROR
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.pluginmanager.register(_Clerk(config), "promises")
+
+
+@pytest.fixture
+def measured(request: pytest.FixtureRequest) -> Callable[[str], None]:
+    """Tell what a test measured, for the page of promises."""
+    return lambda text: request.node.user_properties.append((promises.MEASURED, text))
 
 
 @pytest.fixture(scope="session", autouse=True)

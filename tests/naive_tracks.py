@@ -300,15 +300,17 @@ def after_merging(t: int, live: Array, place: Array, rho: Array, llr: Array, mer
 
 
 def next_in_turn(
-    live: Array, fresh: Array, kept: Array, sigma: Array, owed: Array, away: Array, passed: Array, threshold: float,
-    reach: float,
+    live: Array, fresh: Array, kept: Array, sigma: Array, likely: Array, owed: Array, away: Array, passed: Array,
+    threshold: float, reach: float,
 ) -> tuple[int, Array]:  # fmt: skip
     """Return whose turn it is, −1 nobody's, and who waits.
 
     Worth is unseen readings for an object's size, fourfold where unsure, raised above the threshold where work is
     owed; half of it counts at the end of the reach. Whoever was passed over more than sixty times comes first.
     """
-    worth = fresh / (kept + 8.0) * np.where(sigma > 0.03 * FT, 4.0, 1.0) + owed * (threshold + 1e-6)
+    worth = fresh / (kept + 8.0) * np.where((sigma > 0.03 * FT) | (likely < 0.95), 4.0, 1.0) + owed * (
+        threshold + 1e-6
+    )
     waits = live & (worth > threshold)
     if not waits.any():
         return -1, waits
@@ -346,20 +348,26 @@ def fate(
     return 1 if probability < 0.2 or dispersion < 0.5 * spread else 2
 
 
-def is_sure_circle(
-    established: bool, known: bool, probability: float, least: float, rivals: Sequence[float], llr: float,
-    unknown: float, variances: Sequence[float],
+def is_called(
+    called: bool, established: bool, known: bool, probability: float, sure: float, near: float,
+    rivals: Sequence[float], wall: float, dispersion: float, llr: float, unknown: float, variances: Sequence[float],
 ) -> bool:  # fmt: skip
-    """Tell whether a circle may be called by a model's name."""
+    """Tell whether a circle is called by a model's name: given when sure, kept while likely and well placed."""
     share = 1.1 if max(rivals) < -20 else 1.25
-    placed = max(variances) < (0.2 * FT) ** 2
-    return established and known and probability >= least and llr > share * unknown and placed
+    seen_round = dispersion >= 0.008
+    possible = established and known and seen_round and llr > share * unknown and max(variances) < (0.17 * FT) ** 2
+    needed = near if wall != 0 and wall <= -4 else sure
+    return possible and (probability >= needed or (called and probability >= min(needed, 0.5)))
 
 
-def is_sure_polygon(established: bool, probability: float, least: float, hits: float, kept: Array) -> bool:
+def is_sure_polygon(
+    established: bool, probability: float, least: float, hits: float, variances: Sequence[float], kept: Array
+) -> bool:  # fmt: skip
     """Tell whether a polygon may be called by its name: seen from near, and from more than one direction."""
     heard = kept[kept[:, 4] < SILENT]
     if not len(heard) or heard[:, 4].min() > 6.5 * FT:
         return False
     spread = 1 - float(np.hypot(*heard[:, 2:4].mean(0)))
-    return established and probability >= least and hits >= 20 and spread > 0.02
+    is_heard = hits >= (12 if len(kept) >= 80 else 20)
+    placed = max(variances) <= (0.2 * FT) ** 2
+    return established and probability >= least and is_heard and placed and spread > 0.02

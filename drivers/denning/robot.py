@@ -9,20 +9,26 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from config.robot import RobotConfig
+from config.robot import RingConfig, RobotConfig
 from drivers.denning import troubles
 from drivers.denning.clock import Jump
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.commands import Command
 from drivers.denning.frames import Ack, Drive, Echo, Frame, Halt, Hello, Ident, Nak, NakCode, Odom, Pattern, Release
 from drivers.denning.stamping import Stamper
+from drivers.denning.watch import DriveWatch, RingWatch
 from drivers.denning.wire import identity_of, to_wire, wire_pattern
 from drivers.driver import Heard, LineState
-from drivers.messages import Firing, Identity, LinkCounts, Odometry, Twist
+from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
 
 _GREET_AGAIN_S = 0.5
 """Pace of greeting a robot that does not answer or is the wrong one."""
-_DRIVE_SEQS_KEPT = 32
+_UNTAKEN_SHARE = 0.75
+"""DRIVEs untaken for this share of the longest silence mean that nobody hears them; they come only once a cycle."""
+_STEPS_MISSED = 2
+"""A ring may be silent for this many firings more than the line may be for odometry."""
+_STEPS_SETTLING = 3
+"""So many steps after a new pattern was taken the last echo of the one before has come."""
 _FIRINGS_MAX = 1024
 """Firings kept for one who does not take them; the oldest leave."""
 _ORDER = ("HALT", "HELLO", "PATTERN", "RELEASE")
@@ -46,7 +52,8 @@ class DenningRobot:
     def __init__(self, config: RobotConfig) -> None:
         self._config = config
         self._pattern = wire_pattern(config.ring)
-        self._stamper = Stamper(len(config.ring.mounts))
+        self._stamper = Stamper(len(config.ring.mounts), config.body)
+        self._stamper.set_window(self._pattern.window)
         self._state = LineState.CLOSED
         self._trouble: str | None = None
         self._identity: Identity | None = None
@@ -60,7 +67,11 @@ class DenningRobot:
         self._flush_first = False
         self._commands: dict[str, Command] = {}
         self._drive: Twist | None = None
-        self._drive_seqs: deque[int] = deque(maxlen=_DRIVE_SEQS_KEPT)
+        self._watch = DriveWatch()
+        self._ring = RingWatch(config.link.silence_max_s + _STEPS_MISSED * 1e-3 * self._pattern.step_period_ms)
+        self._pattern_s = 0.0
+        self._settling_s = 0.0
+        self._ask_who = False
         self._firings: deque[Firing] = deque(maxlen=_FIRINGS_MAX)
         self._odometry: Odometry | None = None
         self._rebooted = False
@@ -93,14 +104,25 @@ class DenningRobot:
 
     @property
     def late_echoes(self) -> int:
-        """Firings dropped because no odometry tells where they took place."""
+        """Firings dropped: no odometry tells where they took place, or they came twice, or after a newer one."""
         return self._stamper.late_echoes
+
+    @property
+    def out_of_window(self) -> int:
+        """Ranges dropped that lie beyond the window their firing listened for."""
+        return self._stamper.out_of_window
+
+    @property
+    def frame(self) -> Pose:
+        """The origin of the poses handed up, in the robot's own odometry: another one since that has leapt."""
+        return self._stamper.frame
 
     def opened(self, now_s: float) -> None:
         """Begin (again) on a line just opened: greet the robot and set its firing pattern."""
         self.closed()
         self._now_s = self._frame_s = now_s
         self._flush_first = True
+        self._watch = DriveWatch()
         self._greet()
 
     def closed(self) -> None:
@@ -132,13 +154,13 @@ class DenningRobot:
             heard, tries = self._decoder, self._commands[name].tries
             trouble = troubles.no_answer(name, tries, frames=heard.frames, bad=heard.bad, baud=self._config.link.baud)
             self._go_down(trouble)
-        silent_s = now_s - self._odometry_s
-        if self._state is LineState.READY and silent_s > self._config.link.silence_max_s:
-            others = now_s - self._frame_s <= self._config.link.silence_max_s
-            self._go_down(troubles.silence(silent_s, others=others))
+        if self._state is LineState.READY:
+            self._listen()
+            if "PATTERN" not in self._commands and now_s - self._pattern_s > self._settling_s:
+                self._stamper.set_window(self._pattern.window)
 
     def drive(self, twist: Twist) -> None:
-        """Ask for a velocity; replaces one that is not yet on the line, and is saturated to what fits the wire.
+        """Ask for a velocity; replaces one that is not yet on the line, and is held to the limits of the body.
 
         It goes on the line only while the robot is READY and no HALT waits for its answer.
 
@@ -164,6 +186,26 @@ class DenningRobot:
             self._commands.pop("HALT", None)
             self._ask("RELEASE")
 
+    def set_firing(self, ring: RingConfig) -> None:
+        """Fire the pattern of this ring from now on; nothing happens where it is the one under way.
+
+        Until the robot has taken it, the echoes of the one before still count: an echo names its own sensors.
+
+        Raises
+        ------
+        drivers.firing.FiringError
+            The ring cannot carry it out, or the protocol cannot say it; the pattern stays as it was.
+        """
+        pattern = wire_pattern(ring)
+        if pattern == self._pattern:
+            return
+        # Until the new one is under way, whose echoes come next cannot be told.
+        self._stamper.set_window(max(self._pattern.window, pattern.window))
+        self._settling_s = _STEPS_SETTLING * 1e-3 * max(self._pattern.step_period_ms, pattern.step_period_ms)
+        self._pattern = pattern
+        if self._state is LineState.READY or "PATTERN" in self._commands:
+            self._ask("PATTERN")
+
     def outgoing(self, *, writable: bool) -> bytes:
         """Return what should go on the line now; only HALT while the line is not `writable`."""
         if self._state is LineState.CLOSED:
@@ -179,10 +221,15 @@ class DenningRobot:
         if self._state is not LineState.READY or "HALT" in self._commands:
             self._drive = None
         if writable and self._drive is not None:
-            seq = self._next_seq()
-            self._drive_seqs.append(seq)
-            out += encode(Drive(seq, to_wire(self._drive.v), to_wire(self._drive.w)))
+            seq, body = self._next_seq(), self._config.body
+            self._watch.sent(seq, self._now_s)
+            v, w = to_wire(self._drive.v, body.speed_max_m_s), to_wire(self._drive.w, body.turn_max_rad_s)
+            out += encode(Drive(seq, v, w))
             self._drive = None
+        if writable and self._ask_who:
+            # Not a command under way: nobody need wait for the answer, and no answer is no news.
+            self._ask_who = False
+            out += encode(Hello(self._next_seq()))
         if out and self._flush_first:
             # Ends whatever half a frame an earlier user of the line left in the robot's decoder.
             self._flush_first = False
@@ -191,11 +238,25 @@ class DenningRobot:
 
     def take(self) -> Heard:
         """Return and forget what arrived since the last call."""
-        heard = Heard(tuple(self._firings), self._odometry, self._rebooted)
+        heard = Heard(tuple(self._firings), self._odometry, self._rebooted, self._stamper.notes())
         self._firings.clear()
         self._odometry = None
         self._rebooted = False
         return heard
+
+    def _listen(self) -> None:
+        """Notice a robot that has fallen silent, one that no longer hears, and a ring that does not fire."""
+        silence_max_s = self._config.link.silence_max_s
+        silent_s = self._now_s - self._odometry_s
+        untaken_s = self._watch.untaken_s(self._odometry_s)  # what came after it, it cannot tell of
+        if silent_s > silence_max_s:
+            # An echo may well come right after the last odometry of all.
+            others = self._frame_s - self._odometry_s > 0.5 * silence_max_s
+            self._go_down(troubles.silence(silent_s, others=others))
+        elif untaken_s > _UNTAKEN_SHARE * silence_max_s:
+            self._go_down(troubles.deafness(untaken_s))
+        elif self._ring.should_ask(self._now_s):
+            self._ask_who = True
 
     def _next_seq(self) -> int:
         seq = self._seq
@@ -227,6 +288,8 @@ class DenningRobot:
         halt = self._commands.pop("HALT", None)
         self._commands.clear()
         self._drive = None
+        self._ask_who = False
+        self._watch.settle()
         self._stamper.drop_held()
         if halt is not None:
             self._ask("HALT")
@@ -250,6 +313,7 @@ class DenningRobot:
             case Odom():
                 self._take_odometry(frame)
             case Echo() if self._state is LineState.READY:
+                self._ring.heard(self._now_s)
                 self._stamper.echo(frame)
             case _:
                 pass  # an echo of a pattern that is not ours yet
@@ -270,6 +334,7 @@ class DenningRobot:
             self._firings.clear()
             self._odometry = None
             self._rebooted = True
+            self._watch = DriveWatch()
         elif self._jump is not None:
             self._stamper.break_off()
         self._jump = None
@@ -285,6 +350,8 @@ class DenningRobot:
         if name == "PATTERN":
             self._state = LineState.READY
             self._odometry_s = self._now_s
+            self._ring.heard(self._now_s)
+            self._pattern_s = self._now_s
             if "HALT" in self._commands:
                 self._ask("HALT")  # a robot that answers all else must answer this, within the usual patience
         if self._state is LineState.READY:
@@ -299,8 +366,10 @@ class DenningRobot:
                 self._trouble = trouble
             else:
                 self._go_down(trouble)
-        elif nak.of in self._drive_seqs and nak.code != NakCode.LATCHED:
-            self._trouble = troubles.refusal("DRIVE", nak.code)
+        elif nak.of in self._watch:
+            self._watch.settle()
+            if nak.code != NakCode.LATCHED:
+                self._trouble = troubles.refusal("DRIVE", nak.code)
 
     def _answered(self, seq: int) -> str | None:
         """Return the name of the command under way one of whose tries was `seq`."""
@@ -318,4 +387,7 @@ class DenningRobot:
             return
         self._odometry_s = self._now_s
         self._odometry = sample
+        self._watch.named(odom.last_drive_seq)
+        if sample.flags & Flags.LATCHED:
+            self._watch.settle()  # while latched it takes none, and says so
         self._firings.extend(self._stamper.firings())

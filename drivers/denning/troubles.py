@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import MappingProxyType
 
 from config.robot import RobotConfig
@@ -73,6 +74,14 @@ def silence(silent_s: float, *, others: bool) -> str:
     )
 
 
+def deafness(untaken_s: float) -> str:
+    """Return what to make of DRIVEs that the odometry does not name."""
+    return (
+        f"the robot can be heard and has not taken a DRIVE for {untaken_s:.2f} s; the line to it is broken or its "
+        f"receiver hangs: check the cable, then restart the robot"
+    )
+
+
 def refusal(command: str, code: int) -> str:
     """Return what to make of a NAK."""
     meaning = _MEANINGS.get(NakCode(code), "") if code in list(NakCode) else "for a reason this program does not know"
@@ -84,3 +93,13 @@ def refusal(command: str, code: int) -> str:
     elif code == NakCode.VALUE_OUT_OF_RANGE and command == "DRIVE":
         action = "lower body.speed_max_m_s and body.turn_max_rad_s to what the robot can do"
     return f"the robot refuses {command} (NAK {code}): {meaning}; {action}"
+
+
+def odometry_jump(off_m: float, turned_rad: float, ring_rad: float) -> str:
+    """Return what to make of odometry that leapt by so much, the heading and the ring's direction by so much."""
+    return (
+        f"the odometry leapt by {off_m:.2f} m and {math.degrees(turned_rad):+.0f} degrees, the ring's direction by "
+        f"{math.degrees(ring_rad):+.0f}: farther than the wheels could have turned; a wheel slipped, or an "
+        f"encoder or its counter failed: the leap is taken out and the map goes on; if it comes again, check wheels "
+        f"and encoders"
+    )

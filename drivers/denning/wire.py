@@ -71,9 +71,11 @@ def wire_pattern(ring: RingConfig) -> WirePattern:
     return WirePattern(step_ms, window, pattern.masks)
 
 
-def to_wire(value: float) -> int:
-    """Return metres or radians a second as a signed 16-bit thousandth, saturated."""
-    return max(-_I16_MAX - 1, min(_I16_MAX, round(value * 1e3)))
+def to_wire(value: float, limit: float) -> int:
+    """Return metres or radians a second as signed 16-bit thousandths, never beyond ±`limit`, not even by rounding."""
+    most = min(_I16_MAX, math.floor(limit * 1e3 + 1e-6))
+    held = max(-limit, min(limit, value))  # before it is scaled: a large number times a thousand is none
+    return max(-most, min(most, round(held * 1e3)))
 
 
 def identity_of(ident: Ident) -> Identity:

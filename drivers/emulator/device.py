@@ -31,6 +31,7 @@ from drivers.emulator.faults import (
     MotorFault,
     Mute,
     OdometryJump,
+    Outliers,
     Reboot,
     StuckSensor,
     Unplug,
@@ -107,15 +108,12 @@ class EmulatedRobot:
         clock_start_us: int = 0,
     ) -> None:
         mounts = robot.ring.mounts
-        if len(mounts) > frames.SENSORS_MAX:
-            raise ValueError(
-                f"the ring has {len(mounts)} sensors: the protocol's masks have room for {frames.SENSORS_MAX}"
-            )
-        of_sonar, of_drift, of_boots, of_output, of_input = map(
-            np.random.default_rng, np.random.SeedSequence(seed).spawn(5)
-        )
-        self._boots, self._output_noise, self._input_noise = of_boots, of_output, of_input
-        self._sensors = len(mounts)
+        self._sensors, most = len(mounts), frames.SENSORS_MAX
+        if self._sensors > most:
+            raise ValueError(f"the ring has {self._sensors} sensors: the protocol's masks have room for {most}")
+        seeds = np.random.SeedSequence(seed).spawn(6)
+        of_sonar, of_drift, self._boots, *noises = map(np.random.default_rng, seeds)
+        self._output_noise, self._input_noise, self._outliers = noises
         self._ring_radius_mm = round(1000.0 * max(math.hypot(m.x_m, m.y_m) for m in mounts))
         scene = compile_scene(world)
         start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
@@ -136,8 +134,7 @@ class EmulatedRobot:
     def truth(self) -> Truth:
         """The true state at the last event."""
         body = self._body
-        t_s = self._moved_us * 1e-6
-        return Truth(t_s, body.pose, body.ring_yaw, body.twist, self.flags, body.contacts)
+        return Truth(self._moved_us * 1e-6, body.pose, body.ring_yaw, body.twist, self.flags, body.contacts)
 
     @property
     def flags(self) -> Flags:
@@ -310,6 +307,9 @@ class EmulatedRobot:
         """Return the echo byte of each sensor in `mask`, lowest first."""
         fired = [i for i in range(self._sensors) if mask >> i & 1]
         ranges = self._sonar.fire(self._body.pose, self._body.ring_yaw, fired, window_m)
+        for outliers in self._faults.all(Outliers):
+            wild = self._outliers.random(len(ranges)) < outliers.share
+            ranges[wild] = self._outliers.uniform(0.0, window_m, len(ranges))[wild]
         stuck = {fault.sensor: fault.range_m for fault in self._faults.all(StuckSensor)}
         return tuple(echo_byte(stuck[i] if i in stuck else float(ranges[i])) for i in fired)
 

@@ -80,6 +80,14 @@ class StuckSensor(_Timed):
     range_m: float | None = Field(default=None, ge=0.0)
 
 
+class Outliers(_Timed):
+    """Sensors report any range inside their window, whatever there is."""
+
+    kind: Literal["outliers"]
+    share: float = Field(default=0.2, gt=0.0, le=1.0)
+    """Probability for each reading."""
+
+
 class OdometryJump(_Timed):
     """The odometry's pose jumps."""
 
@@ -96,7 +104,7 @@ class Unplug(_Timed):
 
 
 Fault: TypeAlias = (
-    Mute | Deaf | Garbage | BitErrors | Reboot | Bumper | MotorFault | StuckSensor | OdometryJump | Unplug
+    Mute | Deaf | Garbage | BitErrors | Reboot | Bumper | MotorFault | StuckSensor | Outliers | OdometryJump | Unplug
 )
 
 

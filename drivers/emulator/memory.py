@@ -6,8 +6,13 @@ would on a real line. Nothing here waits, and one seed gives one run.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Literal, TypeAlias
+
 from drivers.driver import RobotDriver
 from drivers.emulator.device import EmulatedRobot
+
+OnBytes: TypeAlias = Callable[[Literal["in", "out"], float, bytes], None]
 
 STEP_S = 0.005
 """Bytes change hands this often."""
@@ -24,12 +29,17 @@ class MemoryLine:
         The robot's end, not yet advanced.
     start_s
         The host's time at which the robot's begins.
+    on_bytes
+        Gets what changes hands, seen from the host, and when.
     """
 
-    def __init__(self, driver: RobotDriver, robot: EmulatedRobot, start_s: float = 0.0) -> None:
+    def __init__(
+        self, driver: RobotDriver, robot: EmulatedRobot, start_s: float = 0.0, on_bytes: OnBytes | None = None
+    ) -> None:
         self._driver = driver
         self._robot = robot
         self._start_s = start_s
+        self._on_bytes = on_bytes
         self._steps = 0
         self._open = False
 
@@ -54,4 +64,10 @@ class MemoryLine:
         if data:
             self._driver.receive(data, now_s)
         self._driver.tick(now_s)
-        self._robot.receive(self._driver.outgoing(writable=True))
+        answer = self._driver.outgoing(writable=True)
+        self._robot.receive(answer)
+        if self._on_bytes is not None:
+            if data:
+                self._on_bytes("in", now_s, data)
+            if answer:
+                self._on_bytes("out", now_s, answer)

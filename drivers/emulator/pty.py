@@ -221,6 +221,7 @@ async def serve(
     ready: Callable[[str], None],
     latency_path: str | None = None,
     exit_with_parent: bool = False,
+    clock_start_us: int = 0,
     clock: Callable[[], float] = time.monotonic,
 ) -> None:
     """Be a robot on a pty until SIGTERM or SIGINT.
@@ -239,6 +240,8 @@ async def serve(
         Called once, with the path to open, when a host can open it.
     exit_with_parent
         End by itself `LINGER_S` after the process that started this one is gone.
+    clock_start_us
+        As for `EmulatedRobot`.
     clock
         The host's monotonic clock, seconds.
 
@@ -257,7 +260,7 @@ async def serve(
     with contextlib.ExitStack() as stack:
         for number in (signal.SIGTERM, signal.SIGINT):
             stack.callback(loop.remove_signal_handler, number)
-        device = EmulatedRobot(robot, world, seed, faults=faults)
+        device = EmulatedRobot(robot, world, seed, faults=faults, clock_start_us=clock_start_us)
         trace = None if trace_path is None else TruthTrace(_open_trace(trace_path, stack))
         latency = None if latency_path is None else LatencyTrace(_open_trace(latency_path, stack))
         port = PtyPort(link_path)

@@ -11,6 +11,9 @@ believed follows from the raw ranges alone:
 `posterior`            where a circle's centre is, and how well known: mean and covariance of the exact likelihood
 `wedge`                two faces and their edge: what a box's corner looks like, the drum's closest rival
 `polygon`              polygon: predicted range, evidence, search for the pose
+`polygon_posterior`    where a polygon is, which way it faces, and how well both are known
+`polygon_job`          the same work in quanta: what takes longer than one goes on in the next
+`entry`                how Python calls all this: memory and settings by one handle
 =====================  ==============================================================================================
 
 A *reading* is a row (x, y, ux, uy, r): the sensor's place (m), its axis as a unit vector, its raw range (m), all in

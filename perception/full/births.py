@@ -13,6 +13,7 @@ from typing import Final
 from perception.full.contact import HIGH, LOW, fit_circle
 from perception.full.contact import HITS as HIT
 from perception.full.contact import NEAR as NEARBY
+from perception.full.hearing import audible
 from perception.full.noise_choice import noise_variance
 from perception.full.pairs import map_near
 from perception.full.reservoir import gather, put
@@ -162,7 +163,7 @@ def birth(s: State, p: Settings, kind: int, sx: float, sy: float, nx: float, ny:
     if is_known(s, p, s.pose[0], s.pose[1], rho, nx, ny):
         return 0
     relax_onto_map(s, p, kind)
-    n = gather(s, p, s.pose[0], s.pose[1], rho, s.w)
+    n = audible(s, p, gather(s, p, s.pose[0], s.pose[1], rho, s.w), s.pose[0], s.pose[1], rho, -1)
     if n < READINGS_MIN:
         return 0
     var0, rel2 = noise_variance(s, p)
@@ -170,7 +171,7 @@ def birth(s: State, p: Settings, kind: int, sx: float, sy: float, nx: float, ny:
         s.w, n, s.pose[0], s.pose[1], rho, p.cos_opt, p.gate, FIRST_SOFT, var0, rel2, STEPS, s.fit
     ):  # fmt: skip
         return 0
-    n = gather(s, p, s.fit[0], s.fit[1], rho, s.w)
+    n = audible(s, p, gather(s, p, s.fit[0], s.fit[1], rho, s.w), s.fit[0], s.fit[1], rho, -1)
     if not fit_circle(s.w, n, s.fit[0], s.fit[1], rho, p.cos_opt, p.gate, SOFT, var0, rel2, STEPS, s.fit):
         return 0
     x, y, h00, h01, h11 = s.fit[0], s.fit[1], s.fit[2], s.fit[3], s.fit[4]

@@ -68,9 +68,9 @@ def pquantum(h: Handle, threshold: float) -> bool:
 
 
 @owning_kernel
-def sure_circles(h: Handle, least: float, told: Floats, sure: Ints) -> int:
-    """Write the circles that are sure to `sure`, those that changed as ~t, and return how many; see `report`."""
+def sure_circles(h: Handle, told: Floats, sure: Ints) -> int:
+    """Write the circles that have a name to `sure`, those that changed as ~t, and return how many; see `report`."""
     s = h.s
-    n = report.sure_circles(s.ti, s.tf, s.comp, h.p.models, least, sure)
+    n = report.sure_circles(s.ti, sure)
     report.mark_changed(s.ti, s.tf, told, n, sure)
     return n

@@ -14,11 +14,11 @@ import numpy as np
 
 from config.model import ModelConfig
 from config.robot import RingConfig
-from config.settings import FullConfig
+from config.settings import FullConfig, PerceptionConfig
 from drivers.messages import Firing
 from perception.full.entry import hold, observe, pquantum, quantum, sure_circles
 from perception.full.report import POLYGON_PROBABILITY, circle, other_things, polygon, sure_polygons
-from perception.full.settings import circle_models, make_settings
+from perception.full.settings import circle_models, make_settings, tuned
 from perception.full.state import KIND, MODEL, PPROB, PROB, PT, SEGMENTS, ST, clear, make_state
 from perception.kernel import Floats
 from perception.seen import SeenObject
@@ -40,6 +40,9 @@ class FullPerception:
     config : FullConfig
         What a user may set.
     """
+
+    SCRATCH: Final = ("_sure", "_told", "_handle")
+    """No memory: what reporting works with, and another way to the memory."""
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: FullConfig) -> None:
         self._mounts = mounts_array(ring.mounts)
@@ -124,7 +127,7 @@ class FullPerception:
     def _sure_objects(self) -> tuple[SeenObject, ...]:
         s, p = self.memory, self.settings
         least = self._config.report_probability
-        n = sure_circles(self._handle, least, self._told, self._sure)
+        n = sure_circles(self._handle, self._told, self._sure)
         seen = [self._circles[t] if t >= 0 else self._tell_circle(~t) for t in self._sure[:n].tolist()]
         if p.polys > 0:
             least = min(least, POLYGON_PROBABILITY)
@@ -161,3 +164,14 @@ class FullPerception:
         self._left = 0
         self._polygons_left = 0
         self._circles_pending = self._polygons_pending = self._polygons_turn = False
+
+    def adopt(self, config: PerceptionConfig) -> None:
+        """Go on with other constants; the number of tracks stays."""
+        self._config = config.full
+        self.settings = tuned(self.settings, config.full)
+        self._handle = hold(self.memory, self.settings)
+        self._objects = None
+
+    def restored(self) -> None:
+        """Drop what was worked out before the memory was put back from a snapshot."""
+        self._objects = None

@@ -13,8 +13,8 @@ from perception.full.births import CELL_M, birth
 from perception.full.contact import FAR
 from perception.full.noise_choice import choose_noise, noise_variance, roughness
 from perception.full.pairs import map_add, tangent
-from perception.full.polygon_births import pbirth
-from perception.full.polygon_tracks import poly_claims
+from perception.full.polygon_births import ask_for_polygon
+from perception.full.polygon_claims import poly_claims
 from perception.full.reservoir import put
 from perception.full.selection import is_waiting
 from perception.full.state import (
@@ -305,7 +305,7 @@ def propose(s: State, p: Settings, made: int, now: float) -> None:
         for kind in range(max(1, p.models)):
             tries += birth(s, p, kind, x, y, nx, ny, now)
         for model in range(p.polys):
-            tries += pbirth(s, p, model, x, y, nx, ny)
+            tries += ask_for_polygon(s, model, x, y, nx, ny)
         s.owner[int(s.segs[chosen, 7])] = -100
         if tries >= TRIES:
             return

@@ -1,14 +1,16 @@
-"""Contact of a polygon of any form, open or closed: likelihood of raw ranges at a pose, and the search for the pose.
+"""What raw ranges say of a polygon of any form, open or closed, at a pose; and the search for the pose.
 
-A side answers at the foot of the perpendicular from the sensor where that lies on the side and in the beam: it must,
-which is strong. A corner, and the point where the edge of a cone's beam meets a side, may, which is weak: mirrors do
-not answer from there, cones do. So a weak explanation costs something and is taken only where a strong one is worse.
+Smooth sides answer like mirrors, from the foot of the perpendicular and nowhere else; rough ones answer from their
+nearest point in the beam, like a cone. Either rule says of each reading one range, which it should have or may have.
+Nobody tells which rule a body keeps, so it is weighed under both and the two likelihoods are added: the choice is
+paid for once. To choose reading by reading whichever explains it better would be paid for in false precision, for
+there is always a pose at which a dozen accidents happen to help.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 from perception.full.contact import DROP_PRICE, DROP_SHARE, HITS, LLR, NEAR, THROUGHS, level_of
 from perception.full.likelihood import loglik
@@ -16,37 +18,51 @@ from perception.kernel import Floats, Ints, kernel
 
 FOOT_M: Final = 0.3048
 
-STRONG: Final = 0
-MUST: Final = 1
-MISS: Final = 2
-WEAK: Final = 3
-"""Columns of a prediction: range that a side answers at (m, `SILENT` where none does); 1 where that side must answer;
-range less the range of the best explanation (m); 1 where that explanation is a weak one."""
+CORNER_PRICE: Final = 0.7
+"""What an answer costs that a mirror may give or not, nat: about log 2. At a side's end or the beam's edge it costs
+nothing: it is all the readings of a sensor that may then be heard, or none, and a price for each would turn the body
+until they must."""
+
+EDGE_REACH_M: Final = 1.0
+EDGE_PRICE_PER_M: Final = 3.0 / FOOT_M
+"""A convex edge only scatters, 20 to 30 dB below a mirror's echo: an answer from beyond this costs that much more."""
 
 SURE: Final = 4
-"""Column of `stats`, after those of `contact`: hits that are strong."""
+"""Column of `stats`, after those of `contact`: hits that had to be."""
 
-SILENT: Final = -1.0
 NOTHING: Final = 1e18
-"""A range and a miss (m) that anything is better than."""
-
-WEAK_PRICE: Final = 0.7
-"""An explanation that may answer or not costs this, nat: about log 2."""
+"""A range (m) of no answer."""
 MARGIN_M: Final = 0.12 * FOOT_M
 """A foot this near the end of its side need not answer: a pose is not known better."""
-PREFERENCE_M: Final = 0.03 * FOOT_M
-"""A weak explanation must be better than a strong one by this: else corners would steal what sides answer."""
-AGAIN_M: Final = 1e-3 * FOOT_M
-"""And better than another weak one by this, so that a corner is one corner from both its sides."""
-EXPLAINED_M: Final = 0.05 * FOOT_M
-"""A miss as small as this needs no beam's edge to explain it."""
 GRAZING_COS: Final = 0.05
 """An edge of the beam that is more parallel to a side than this does not hear it."""
+
+
+class Ear(NamedTuple):
+    """How a sensor hears: its beam, and what its readings are held against."""
+
+    cos_opt: float
+    """Cosines of the angles off the axis up to which a thing may answer, …"""
+    cos_in: float
+    """… must answer, …"""
+    cos_half: float
+    """… and nominally does; and the sines of the last two."""
+    sin_half: float
+    sin_in: float
+    gate: float
+    """As in `Settings`, as are the next three."""
+    miss: float
+    short: float
+    per_metre: float
+
 
 ALONG, ACROSS, TURN = range(3)
 """What a pose may do: move along the body's own axes, turn."""
 TURN_PER_M: Final = 0.7 / FOOT_M
 """A search turns by this for each metre that it moves, rad/m: what moves the side of a body of 1.4 ft as far."""
+AXES: Final = 3
+SHRINK: Final = 0.5
+"""What a step is multiplied with where no way gains."""
 GAIN_MIN: Final = 1e-6
 """A step that gains less than this is none, nat."""
 FINEST_M: Final = 0.005 * FOOT_M
@@ -54,152 +70,134 @@ FINEST_M: Final = 0.005 * FOOT_M
 
 
 @kernel
-def is_better_weak(miss: float, best: float, is_best_weak: bool) -> bool:
-    """Tell whether a weak explanation with this `miss` (m) takes the place of the best so far."""
-    return abs(miss) + (AGAIN_M if is_best_weak else PREFERENCE_M) < abs(best)
-
-
-@kernel
 def predict(
-    sx: float, sy: float, ux: float, uy: float, r: float, vertices: Floats, count: int, closed: bool, cos_opt: float,
-    cos_in: float, cos_half: float, sin_half: float, out: Floats,
-) -> None:  # fmt: skip
-    """Predict what a sensor hears of a polygon, and by how much its range misses the best explanation.
+    sx: float, sy: float, ux: float, uy: float, faces: Floats, closed: bool, ear: Ear
+) -> tuple[float, bool, float, float, bool]:  # fmt: skip
+    """Predict what a polygon answers, as a mirror and as a cone.
 
-    A closed outline answers on its outer side only, which is right of each side; an open one on both.
+    =======  ========================================================  ===========================================
+    rule     range                                                     must be heard
+    =======  ========================================================  ===========================================
+    mirror   nearest foot of a perpendicular in the beam               the foot well in the beam and on its side
+             else the nearest corner in the beam                       never
+    cone     nearest point in the beam: foot, corner or beam's edge    something lies well in the beam
+    =======  ========================================================  ===========================================
+
+    Sides that a closed outline turns its inside to do not answer; a side of an open one answers to both its faces.
 
     Parameters
     ----------
     sx, sy, ux, uy : float
-        The sensor's place (m) and unit axis in the polygon's frame.
-    r : float
-        Its range, m.
-    vertices : (≥ count, 2) float
-        Vertices, counterclockwise where closed, m.
-    count : int
-        How many there are.
+        A sensor's place (m) and axis (unit vector) in the polygon's frame.
+    faces : (sides, 5) float
+        From `Settings.faces`: where a side begins x, y (m), its unit direction, its length (m); counter-clockwise.
     closed : bool
-        Whether a side leads from the last vertex to the first.
-    cos_opt, cos_in : float
-        Cosines of the angles off the axis at which an echo may, and must, be heard.
-    cos_half, sin_half : float
-        Of half the beam's opening: its two edges.
-    out : (≥ 4,) float
-        Out: columns `STRONG`, `MUST`, `MISS`, `WEAK`.
+        Whether the last side joins the first.
+    ear : Ear
+        The beam.
+
+    Returns
+    -------
+    (float, bool, float, float, bool)
+        Range of a mirror (m, `NOTHING` where none), whether it must be heard, what its answer costs (nat); range of a
+        cone, whether it must be heard.
     """
-    strong = NOTHING
+    foot = NOTHING
+    foot_must = False
+    corner2 = NOTHING * NOTHING
+    before = 0
+    after = 0
+    edge = NOTHING
     must = False
-    best = NOTHING
-    weak = False
-    sides = count if closed else count - 1
-    for k in range(sides):
-        k2 = (k + 1) % count
-        ax = vertices[k, 0]
-        ay = vertices[k, 1]
-        tx = vertices[k2, 0] - ax
-        ty = vertices[k2, 1] - ay
-        length = math.sqrt(tx * tx + ty * ty)
-        tx /= length
-        ty /= length
-        px = sx - ax
-        py = sy - ay
-        nx = ty
-        ny = -tx
-        distance = px * ty - py * tx
-        if distance < 0.0:
+    for k in range(faces.shape[0]):
+        tx = faces[k, 2]
+        ty = faces[k, 3]
+        length = faces[k, 4]
+        px = sx - faces[k, 0]
+        py = sy - faces[k, 1]
+        height = px * ty - py * tx
+        ahead = uy * tx - ux * ty
+        if height < 0.0:
             if closed:
                 continue
-            distance = -distance
-            nx = -nx
-            ny = -ny
-        foot = px * tx + py * ty
-        facing = -(nx * ux + ny * uy)
-        if facing >= cos_opt and 0.0 <= foot <= length:
-            if distance < strong:
-                strong = distance
-                must = facing >= cos_in and MARGIN_M < foot < length - MARGIN_M
-            if abs(r - distance) < abs(best):
-                best = r - distance
-                weak = False
-        for end in (k, k2):
-            dx = vertices[end, 0] - sx
-            dy = vertices[end, 1] - sy
-            d = math.sqrt(dx * dx + dy * dy)
-            if dx * ux + dy * uy >= cos_opt * d and is_better_weak(r - d, best, weak):
-                best = r - d
-                weak = True
-        if abs(best) > EXPLAINED_M:
-            for edge in (-1.0, 1.0):
-                ex = ux * cos_half - edge * uy * sin_half
-                ey = uy * cos_half + edge * ux * sin_half
-                towards = -(nx * ex + ny * ey)
+            height = -height
+            ahead = -ahead
+        along = px * tx + py * ty
+        aside = ux * tx + uy * ty
+        if 0.0 <= along <= length and height < foot and ahead >= ear.cos_opt:
+            foot = height
+            foot_must = ahead >= ear.cos_in and MARGIN_M < along < length - MARGIN_M
+        for end in range(2):
+            across = end * length - along
+            dot = height * ahead + across * aside
+            if dot > 0.0:
+                d2 = height * height + across * across
+                if d2 < corner2 and dot * dot >= ear.cos_opt * ear.cos_opt * d2:
+                    corner2 = d2
+                    before = k - 1 + end
+                    after = k + end
+                must = must or dot * dot >= ear.cos_in * ear.cos_in * d2
+        for hand in (-1.0, 1.0):
+            towards = ahead * ear.cos_half - hand * aside * ear.sin_half
+            if towards > GRAZING_COS:
+                sideways = aside * ear.cos_half + hand * ahead * ear.sin_half
+                if 0.0 <= along * towards + height * sideways <= length * towards:
+                    edge = min(edge, height / towards)
+            if not must:
+                towards = ahead * ear.cos_in - hand * aside * ear.sin_in
                 if towards > GRAZING_COS:
-                    d = distance / towards
-                    met = foot + d * (ex * tx + ey * ty)
-                    if 0.0 <= met <= length and is_better_weak(r - d, best, weak):
-                        best = r - d
-                        weak = True
-    out[STRONG] = strong if strong < NOTHING else SILENT
-    out[MUST] = 1.0 if must else 0.0
-    out[MISS] = best
-    out[WEAK] = 1.0 if weak else 0.0
+                    sideways = aside * ear.cos_in + hand * ahead * ear.sin_in
+                    must = 0.0 <= along * towards + height * sideways <= length * towards
+    corner = math.sqrt(corner2)
+    nearest = min(foot, corner, edge)
+    must = foot_must or (must and nearest < NOTHING)
+    if foot < NOTHING:
+        return foot, foot_must, 0.0, nearest, must
+    price = CORNER_PRICE
+    if closed and EDGE_REACH_M < corner < NOTHING:
+        after %= faces.shape[0]
+        if faces[before, 2] * faces[after, 3] - faces[before, 3] * faces[after, 2] > 0.0:
+            price += EDGE_PRICE_PER_M * (corner - EDGE_REACH_M)
+    return corner, False, price, nearest, must
 
 
 @kernel
-def worth(v: float, is_weak: bool, must: bool, outlier: float) -> float:
-    """Return what a match counts, nat.
-
-    Parameters
-    ----------
-    v : float
-        Log ratio of its miss.
-    is_weak, must : bool
-        Whether a weak explanation is meant; whether a side must have answered.
-    outlier : float
-        Log ratio of an outlier: what a side that must have answered was, if nothing explains the range.
-    """
-    if is_weak:
-        v -= WEAK_PRICE
-        if v < 0.0:
-            return outlier if must else 0.0
-    elif v < 0.0 and not must:
-        return 0.0
-    return v
+def surplus(throughs: float, hits: float) -> float:
+    """Return what drop-outs beyond `DROP_SHARE` (and one) cost, nat."""
+    return max(0.0, DROP_PRICE * (throughs - DROP_SHARE * (hits + throughs) - 1.0))
 
 
 @kernel
 def score_poly(
-    w: Floats, n: int, x: float, y: float, theta: float, vertices: Floats, count: int, closed: bool, cos_opt: float,
-    cos_in: float, cos_half: float, sin_half: float, gate: float, miss: float, short: float, lev: Ints,
-    per_metre: float, table: Floats, inv_step: Floats, out: Floats, stats: Floats,
+    w: Floats, n: int, every: int, x: float, y: float, theta: float, faces: Floats, closed: bool, ear: Ear,
+    lev: Ints, table: Floats, inv_step: Floats, stats: Floats,
 ) -> float:  # fmt: skip
     """Weigh what readings say of a polygon at a pose: a log ratio to the background.
 
-    ==============================================  ==========================================================
-    range less that of the best explanation, e      counts
-    ==============================================  ==========================================================
-    |e| < gate                                      the table's L(e), see `worth`
-    else, a side must answer and r is beyond it     `miss`: a drop-out; dearer where there are too many of them
-    else, a side must answer and r is before it     `short`: something unseen stands in front
-    else                                            nothing
-    ==============================================  ==========================================================
+    ==========================  ===================================================
+    range within the gate       the table's evidence; where it need not be heard never less than nothing
+    beyond, must be heard       `miss`: a drop-out
+    before, must be heard       `short`: something unseen stands in front
+    else                        nothing
+    ==========================  ===================================================
+
+    So each reading counts under either rule; of what must be heard, drop-outs beyond `DROP_SHARE` (and
+    one) cost `DROP_PRICE` more each. The evidence is log((exp M + exp C) / 2) of the two sums.
 
     Parameters
     ----------
     w : (capacity, 5) float
         Readings: place x, y (m), unit axis, range (m).
-    n : int
-        Readings in use.
+    n, every : int
+        Readings in use, and the step from one that is weighed to the next.
     x, y, theta : float
         The polygon's pose: m, rad.
-    vertices, count, closed, cos_opt, cos_in, cos_half, sin_half
+    faces, closed, ear
         As for `predict`.
-    gate, miss, short, lev, per_metre, table, inv_step
+    lev, table, inv_step
         As for `contact.score_circle`.
-    out : (≥ 4,) float
-        Scratch.
     stats : (≥ 5,) float
-        Out: columns `LLR`, `HITS`, `THROUGHS`, `NEAR` of `contact`, and `SURE`.
+        Out: columns `LLR`, `HITS`, `THROUGHS`, `NEAR` of `contact`, and `SURE`; the counts by the likelier rule.
 
     Returns
     -------
@@ -208,45 +206,64 @@ def score_poly(
     """
     c = math.cos(theta)
     s = math.sin(theta)
-    last = table.shape[1] - 1
-    llr = 0.0
-    hits = 0.0
-    sure = 0.0
-    throughs = 0.0
-    near = 0.0
-    for j in range(n):
+    mirror = 0.0
+    cone = 0.0
+    mirror_hits = 0.0
+    mirror_throughs = 0.0
+    mirror_near = 0.0
+    mirror_sure = 0.0
+    cone_hits = 0.0
+    cone_throughs = 0.0
+    cone_near = 0.0
+    cone_sure = 0.0
+    for j in range(0, n, every):
         dx = w[j, 0] - x
         dy = w[j, 1] - y
         r = w[j, 4]
-        predict(
-            c * dx + s * dy, -s * dx + c * dy, c * w[j, 2] + s * w[j, 3], -s * w[j, 2] + c * w[j, 3], r, vertices,
-            count, closed, cos_opt, cos_in, cos_half, sin_half, out,
+        at, must, price, at_cone, must_cone = predict(
+            c * dx + s * dy, -s * dx + c * dy, c * w[j, 2] + s * w[j, 3], -s * w[j, 2] + c * w[j, 3], faces, closed,
+            ear,
         )  # fmt: skip
-        must = out[MUST] > 0.0
-        if abs(out[MISS]) < gate:
-            near += 1.0
-            is_weak = out[WEAK] > 0.0
-            k = level_of(lev, r, per_metre)
-            v = worth(loglik(table, inv_step, k, out[MISS]), is_weak, must, table[k, last])
+        k = level_of(lev, r, ear.per_metre)
+        v = 0.0
+        if abs(r - at) < ear.gate:
+            v = loglik(table, inv_step, k, r - at) - price
+            v = v if must else max(v, 0.0)
+            mirror_near += 1.0
             if v > 0.0:
-                hits += 1.0
-                if not is_weak:
-                    sure += 1.0
-            llr += v
+                mirror_hits += 1.0
+                if must:
+                    mirror_sure += 1.0
         elif must:
-            if r > out[STRONG]:
-                llr += miss
-                throughs += 1.0
-            else:
-                llr += short
-    extra = throughs - DROP_SHARE * (hits + throughs)
-    if extra > 1.0:
-        llr -= DROP_PRICE * (extra - 1.0)
+            v = ear.short
+            if r > at:
+                v = ear.miss
+                mirror_throughs += 1.0
+        mirror += v
+        if at_cone != at or must_cone != must or price > 0.0:
+            v = 0.0
+            if abs(r - at_cone) < ear.gate:
+                v = loglik(table, inv_step, k, r - at_cone)
+                v = v if must_cone else max(v, 0.0)
+            elif must_cone:
+                v = ear.miss if r > at_cone else ear.short
+        cone += v
+        if abs(r - at_cone) < ear.gate:
+            cone_near += 1.0
+            if v > 0.0:
+                cone_hits += 1.0
+                if must_cone:
+                    cone_sure += 1.0
+        elif must_cone and r > at_cone:
+            cone_throughs += 1.0
+    mirror -= surplus(mirror_throughs, mirror_hits)
+    cone -= surplus(cone_throughs, cone_hits)
+    llr = max(mirror, cone) + math.log(0.5 + 0.5 * math.exp(-abs(mirror - cone)))
     stats[LLR] = llr
-    stats[HITS] = hits
-    stats[THROUGHS] = throughs
-    stats[NEAR] = near
-    stats[SURE] = sure
+    stats[HITS] = mirror_hits if mirror >= cone else cone_hits
+    stats[THROUGHS] = mirror_throughs if mirror >= cone else cone_throughs
+    stats[NEAR] = mirror_near if mirror >= cone else cone_near
+    stats[SURE] = mirror_sure if mirror >= cone else cone_sure
     return llr
 
 
@@ -260,63 +277,90 @@ def moved(x: float, y: float, theta: float, axis: int, step: float) -> tuple[flo
     return x, y, theta + step
 
 
-@kernel
-def search(
-    w: Floats, n: int, pose: Floats, step: float, shrink: float, rounds: int, vertices: Floats, count: int,
-    closed: bool, cos_opt: float, cos_in: float, cos_half: float, sin_half: float, gate: float, miss: float,
-    short: float, lev: Ints, per_metre: float, table: Floats, inv_step: Floats, out: Floats, stats: Floats,
-) -> float:  # fmt: skip
-    """Search for the pose of greatest likelihood, along the body's own axes.
+X, Y, THETA, BEST, STEP = range(5)
+"""Cells of a search's numbers: where it is, what the readings say there (nat), how far it steps (m)."""
+AT, LEFT, GAINED = range(3)
+"""Cells of its counts: what it tries next (−1: nothing has been weighed yet), rounds it may still make, whether this
+round gained."""
 
-    The likelihood has steps where sides begin and cease to answer, so nothing is differentiated: each axis is tried
-    both ways, and where none gains the steps shrink.
+
+@kernel
+def begin_search(f: Floats, z: Ints, x: float, y: float, theta: float, step: float, rounds: int) -> None:
+    """Set out for a search.
 
     Parameters
     ----------
-    w, n
-        As for `score_poly`.
-    pose : (3,) float
-        x, y (m), theta (rad): from where, updated.
+    f, z : (≥ 5,) float, (≥ 3,) int
+        Out: the search, as above.
+    x, y, theta : float
+        From where, m, rad.
     step : float
         First step, m; turns go with it, by `TURN_PER_M`.
-    shrink : float
-        What a step is multiplied with where none of them gains.
     rounds : int
         Rounds at most: the bound on the work.
-    vertices, count, closed, cos_opt, cos_in, cos_half, sin_half, gate, miss, short, lev, per_metre, table, inv_step
+    """
+    f[X] = x
+    f[Y] = y
+    f[THETA] = theta
+    f[BEST] = 0.0
+    f[STEP] = step
+    z[AT] = -1
+    z[LEFT] = rounds
+    z[GAINED] = 0
+
+
+@kernel
+def search(
+    w: Floats, n: int, every: int, f: Floats, z: Ints, allowed: int, faces: Floats, closed: bool, ear: Ear,
+    lev: Ints, table: Floats, inv_step: Floats, stats: Floats,
+) -> int:  # fmt: skip
+    """Go on searching for the pose of greatest likelihood, along the body's own axes.
+
+    The likelihood has steps where sides begin and cease to answer, so nothing is differentiated: each axis is tried
+    both ways, and where none gains the steps shrink. A search stops where it stands when its allowance is spent, and
+    goes on from there; it is over when no round is left.
+
+    Parameters
+    ----------
+    w, n, every
         As for `score_poly`.
-    out, stats
-        As for `score_poly`, scratch.
+    f, z
+        The search, from `begin_search`; updated.
+    allowed : int
+        Poses to weigh at most.
+    faces, closed, ear, lev, table, inv_step, stats
+        As for `score_poly`; `stats` is scratch.
 
     Returns
     -------
-    float
-        The log ratio at the pose, nat; never less than where it began.
+    int
+        Poses weighed.
     """
-    best = score_poly(
-        w, n, pose[0], pose[1], pose[2], vertices, count, closed, cos_opt, cos_in, cos_half, sin_half, gate, miss,
-        short, lev, per_metre, table, inv_step, out, stats,
-    )  # fmt: skip
-    turn = step * TURN_PER_M
-    for _ in range(rounds):
-        is_better = False
-        for axis in range(3):
-            for sign in (-1.0, 1.0):
-                x, y, theta = moved(pose[0], pose[1], pose[2], axis, sign * (turn if axis == TURN else step))
-                v = score_poly(
-                    w, n, x, y, theta, vertices, count, closed, cos_opt, cos_in, cos_half, sin_half, gate, miss,
-                    short, lev, per_metre, table, inv_step, out, stats,
-                )  # fmt: skip
-                if v > best + GAIN_MIN:
-                    best = v
-                    pose[0] = x
-                    pose[1] = y
-                    pose[2] = theta
-                    is_better = True
-                    break
-        if not is_better:
-            step *= shrink
-            turn *= shrink
-            if step < FINEST_M:
-                break
-    return best
+    weighed = 0
+    while weighed < allowed and z[LEFT] > 0:
+        weighed += 1
+        if z[AT] < 0:
+            f[BEST] = score_poly(w, n, every, f[X], f[Y], f[THETA], faces, closed, ear, lev, table, inv_step, stats)
+            z[AT] = 0
+            continue
+        axis = z[AT] // 2
+        step = f[STEP] * (TURN_PER_M if axis == TURN else 1.0) * (1.0 if z[AT] % 2 == 1 else -1.0)
+        x, y, theta = moved(f[X], f[Y], f[THETA], axis, step)
+        v = score_poly(w, n, every, x, y, theta, faces, closed, ear, lev, table, inv_step, stats)
+        z[AT] += 1
+        if v > f[BEST] + GAIN_MIN:
+            f[X] = x
+            f[Y] = y
+            f[THETA] = theta
+            f[BEST] = v
+            z[GAINED] = 1
+            z[AT] = 2 * (axis + 1)
+        if z[AT] == 2 * AXES:
+            z[AT] = 0
+            z[LEFT] -= 1
+            if z[GAINED] == 0:
+                f[STEP] *= SHRINK
+                if f[STEP] < FINEST_M:
+                    z[LEFT] = 0
+            z[GAINED] = 0
+    return weighed

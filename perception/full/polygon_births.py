@@ -1,8 +1,8 @@
 """Hypotheses of polygons: each distinct side of a model laid on a segment that nothing explains.
 
 As for circles the paper's relaxation moves the body onto the outline map, and the raw readings that the sensors
-remember decide. Along a side, contact says little, so each side is tried shifted as well. Here is also what keeps a
-polygon's readings, and how they are weighed.
+remember decide. Along a side, contact says little, so each side is tried shifted as well. To propose one takes no
+time; to try it is a job. Here is also what keeps a polygon's readings.
 """
 
 from __future__ import annotations
@@ -14,8 +14,29 @@ from perception.full.births import CELL_M
 from perception.full.contact import HITS as HIT
 from perception.full.contact import NEAR as NEARBY
 from perception.full.pairs import map_near
-from perception.full.polygon import score_poly, search
+from perception.full.polygon import BEST, THETA, X, Y
+from perception.full.polygon_job import (
+    BIRTH,
+    FOUND,
+    FOUND_LLR,
+    HEARD,
+    HISS,
+    JOB,
+    NEXT,
+    QUESTIONS,
+    SEGMENT,
+    STAGE,
+    WHO,
+    end_job,
+    seek,
+    seek_on,
+    sought,
+    weigh_pose,
+)
 from perception.full.state import (
+    CTH,
+    CX,
+    CY,
     DIRTY,
     ESTABLISHED,
     FREE,
@@ -31,6 +52,7 @@ from perception.full.state import (
     PULLING,
     PX,
     PY,
+    RIVAL,
     ST,
     TENTATIVE,
     Settings,
@@ -41,8 +63,13 @@ from perception.relaxation import relax
 
 FOOT_M: Final = 0.3048
 TWO_PI: Final = 2.0 * math.pi
-ROOM: Final = 64
-"""Rows of the scratch that gathering leaves free."""
+LAY, TRY, FINE = range(3)
+"""Stages of a birth: a side is laid on the segment, tried, and the best trial is looked at closely."""
+GATHERING: Final = 800
+"""What gathering readings costs, in the job's currency."""
+SAME_M: Final = 0.25 * FOOT_M
+SAME_COS: Final = 0.98
+"""A segment this near to another one, and this parallel, asks the same."""
 AROUND_M: Final = 0.3 * FOOT_M
 """Segments up to this far off the farthest vertex may pull."""
 GAMMA: Final = 2.0
@@ -62,18 +89,19 @@ TRIAL_MIN: Final = 15.0
 FINE_STEP_M: Final = 0.1 * FOOT_M
 FINE_ROUNDS: Final = 10
 HITS_MIN: Final = 6.0
-SHRINK: Final = 0.5
 WHOLE: Final = 0.9
 """A track that explains this share of what is near stands where it is …"""
 APART_WHOLE: Final = 1.5
 APART: Final = 0.5
 """… and nothing like it is begun this near, in inner radii; any other one gives way sooner."""
+CHALLENGE_DIRTY: Final = 8
+"""A challenger is worth so many unseen readings."""
 
 
 @kernel
 def bears(
-    qx: float, qy: float, ux: float, uy: float, r: float, cx: float, cy: float, bound: float, half: float,
-    gate: float, reach: float,
+    qx: float, qy: float, ux: float, uy: float, r: float, cx: float, cy: float, bound: float, cos_half: float,
+    sin_half: float, gate: float, reach: float,
 ) -> bool:  # fmt: skip
     """Tell whether a reading says anything for or against a body within a circle.
 
@@ -83,8 +111,8 @@ def bears(
         The reading: place (m), unit axis, range (m).
     cx, cy, bound : float
         Centre and radius of the circle, m.
-    half : float
-        Half the beam's opening, rad.
+    cos_half, sin_half : float
+        Of half the beam's opening.
     gate : float
         A range that ends farther than this before the circle says nothing, m.
     reach : float
@@ -93,14 +121,13 @@ def bears(
     dx = cx - qx
     dy = cy - qy
     dot = dx * ux + dy * uy
-    if dot <= 0.0:
+    if dot <= 0.0 or dot > reach:
+        return False
+    # by how much the centre lies outside the nearer edge of the beam
+    if abs(dx * uy - dy * ux) * cos_half - dot * sin_half > bound:
         return False
     d = math.sqrt(dx * dx + dy * dy)
-    if d > reach or r < d - bound - gate:
-        return False
-    if d <= bound:
-        return True
-    return math.acos(min(1.0, dot / d)) <= half + math.asin(bound / d)
+    return d <= reach and r >= d - bound - gate
 
 
 @kernel
@@ -114,28 +141,29 @@ def pput(bins: Floats, bn: Ints, t: int, cx: float, cy: float, q: Floats) -> Non
 
 
 @kernel
-def pflatten(s: State, t: int, w: Floats) -> int:
+def pflatten(bins: Floats, bn: Ints, t: int, w: Floats) -> int:
     """Copy all readings of polygon `t` to `w`, shape (n, 5), and return how many."""
     n = 0
     for b in range(PB):
-        for k in range(min(s.pbn[t, b], PCAP)):
+        for k in range(min(bn[t, b], PCAP)):
             for z in range(5):
-                w[n, z] = s.pbins[t, b, k, z]
+                w[n, z] = bins[t, b, k, z]
             n += 1
     return n
 
 
 @kernel
-def pgather(s: State, p: Settings, model: int, cx: float, cy: float, w: Floats) -> int:
-    """Copy to `w` what the sensors remember that bears on a polygon at (cx, cy); return how many."""
-    bound = p.bound[model]
-    room = w.shape[0] - ROOM
+def collect(
+    hist: Floats, hn: Ints, cx: float, cy: float, bound: float, cos_half: float, sin_half: float, gate: float,
+    reach: float, w: Floats,
+) -> int:  # fmt: skip
+    """Copy to `w` what the sensors remember that `bears` on a circle; return how many."""
     n = 0
-    for i in range(s.hist.shape[0]):
-        for k in range(min(s.hn[i], HK)):
-            h = s.hist[i, k]
-            if bears(h[0], h[1], h[2], h[3], h[4], cx, cy, bound, p.half_angle, p.gate, p.pair_max):
-                if n >= room:
+    for i in range(hist.shape[0]):
+        for k in range(min(hn[i], HK)):
+            h = hist[i, k]
+            if bears(h[0], h[1], h[2], h[3], h[4], cx, cy, bound, cos_half, sin_half, gate, reach):
+                if n >= w.shape[0]:
                     return n
                 for z in range(5):
                     w[n, z] = h[z]
@@ -144,35 +172,31 @@ def pgather(s: State, p: Settings, model: int, cx: float, cy: float, w: Floats) 
 
 
 @kernel
-def pscore(s: State, p: Settings, model: int, n: int, pose: Floats, step: float, rounds: int) -> float:
-    """Search from `pose`, updated, on the `n` readings in `s.w`; return the log ratio there, nat."""
-    return search(
-        s.w, n, pose, step, SHRINK, rounds, p.verts[model], p.nv[model], p.closed[model] > 0, p.cos_opt, p.cos_in,
-        p.cos_half, math.sin(p.half_angle), p.gate, p.miss, p.short, p.levels[int(s.g[NOISE])], p.per_metre, p.table,
-        p.inv_step, s.stats2, s.stats,
+def pgather(s: State, p: Settings, model: int, cx: float, cy: float) -> int:
+    """Copy to `s.pw` what the sensors remember that bears on a polygon at (cx, cy); return how many.
+
+    Where that is more than there is room for, it is thinned out evenly: the sensors lie there one after another.
+    """
+    n = collect(
+        s.hist, s.hn, cx, cy, p.bound[model], p.cos_half, math.sin(p.half_angle), p.gate, p.pair_max, s.w
     )  # fmt: skip
+    kept = min(n, s.pw.shape[0])
+    for j in range(kept):
+        for z in range(5):
+            s.pw[j, z] = s.w[j * n // kept, z]
+    return int(kept)
 
 
 @kernel
-def prestat(s: State, p: Settings, model: int, n: int, pose: Floats) -> float:
-    """Return the log ratio at `pose` of the `n` readings in `s.w`, nat; `s.stats` tells the rest."""
-    return score_poly(
-        s.w, n, pose[0], pose[1], pose[2], p.verts[model], p.nv[model], p.closed[model] > 0, p.cos_opt, p.cos_in,
-        p.cos_half, math.sin(p.half_angle), p.gate, p.miss, p.short, p.levels[int(s.g[NOISE])], p.per_metre, p.table,
-        p.inv_step, s.stats2, s.stats,
-    )  # fmt: skip
-
-
-@kernel
-def is_taken(s: State, p: Settings, model: int, x: float, y: float) -> bool:
-    """Tell whether a track of the same model stands at (x, y) already."""
+def taken_by(s: State, p: Settings, model: int, x: float, y: float) -> int:
+    """Return which track of the same model stands at (x, y) already, −1 if none does."""
     for t in range(s.pi.shape[0]):
         if s.pi[t, ST] != FREE and s.pi[t, MODEL] == model:
             is_whole = s.pi[t, ST] == ESTABLISHED and s.pf[t, PHITS] > WHOLE * s.pf[t, PNEAR]
             apart = (APART_WHOLE if is_whole else APART) * p.inner[model]
             if math.hypot(x - s.pf[t, PX], y - s.pf[t, PY]) < apart:
-                return True
-    return False
+                return int(t)
+    return -1
 
 
 @kernel
@@ -225,8 +249,8 @@ def free_polygon(s: State) -> int:
 
 
 @kernel
-def begin_polygon(s: State, model: int, llr: float, n: int) -> None:
-    """Found a tentative track at `s.pose` on the `n` readings in `s.w`, where there is room."""
+def begin_polygon(s: State, model: int, x: float, y: float, theta: float, llr: float) -> None:
+    """Found a tentative track on the job's readings, where there is room."""
     t = free_polygon(s)
     if t < 0:
         return
@@ -235,60 +259,135 @@ def begin_polygon(s: State, model: int, llr: float, n: int) -> None:
     s.pbn[t, :] = 0
     s.pi[t, ST] = TENTATIVE
     s.pi[t, MODEL] = model
-    s.pi[t, DIRTY] = n
-    s.pf[t, PX] = s.pose[0]
-    s.pf[t, PY] = s.pose[1]
-    s.pf[t, PTH] = s.pose[2]
+    s.pi[t, DIRTY] = s.job[HEARD]
+    s.pf[t, PX] = x
+    s.pf[t, PY] = y
+    s.pf[t, PTH] = theta
     s.pf[t, PLLR] = llr
-    for j in range(n):
-        pput(s.pbins, s.pbn, t, s.pose[0], s.pose[1], s.w[j])
+    for j in range(s.job[HEARD]):
+        pput(s.pbins, s.pbn, t, x, y, s.pw[j])
 
 
 @kernel
-def pbirth(s: State, p: Settings, model: int, sx: float, sy: float, nx: float, ny: float) -> int:
-    """Try a polygon behind a segment; return 1 if that took work, whatever came of it.
+def challenge(s: State, t: int, x: float, y: float, theta: float) -> None:
+    """Have track `t` try a pose on its own readings: its place is right, and its pose perhaps is not."""
+    s.pi[t, RIVAL] = 1
+    s.pi[t, DIRTY] += CHALLENGE_DIRTY
+    s.pf[t, CX] = x
+    s.pf[t, CY] = y
+    s.pf[t, CTH] = theta
+
+
+@kernel
+def ask_for_polygon(s: State, model: int, sx: float, sy: float, nx: float, ny: float) -> int:
+    """Note that a polygon shall be tried behind a segment; return 1, or 0 where that has been asked of late.
 
     Parameters
     ----------
-    s, p
-        Memory, updated, and settings.
+    s
+        Memory, updated.
     model : int
         Which polygon.
     sx, sy, nx, ny : float
         The segment's middle (m) and unit normal, away from the sensors.
     """
-    sides = p.nv[model] if p.closed[model] > 0 else p.nv[model] - 1
-    sides = max(1, sides // p.sym[model])
-    best = -math.inf
-    x = 0.0
-    y = 0.0
-    theta = 0.0
-    for k in range(sides):
-        for shift in SHIFTS:
-            lay_side(s, p, model, k, shift, sx, sy, nx, ny)
-            if is_taken(s, p, model, s.pose[0], s.pose[1]):
-                return 0
-            if shift == 0.0:
-                relax_polygon(s, p, model, sides)
-            n = pgather(s, p, model, s.pose[0], s.pose[1], s.w)
-            if n < READINGS_MIN:
-                continue
-            v = pscore(s, p, model, min(n, TRIAL_READINGS), s.pose, TRIAL_STEP_M, TRIAL_ROUNDS)
-            if v > best:
-                best = v
-                x = s.pose[0]
-                y = s.pose[1]
-                theta = s.pose[2]
-    if best < TRIAL_MIN:
-        return 1
-    s.pose[0] = x
-    s.pose[1] = y
-    s.pose[2] = theta
-    n = pgather(s, p, model, x, y, s.w)
-    pscore(s, p, model, n, s.pose, FINE_STEP_M, FINE_ROUNDS)
-    llr = prestat(s, p, model, n, s.pose)
-    if llr < p.unknown * s.stats[NEARBY] or s.stats[HIT] < HITS_MIN:
-        return 1
-    if not is_taken(s, p, model, s.pose[0], s.pose[1]):
-        begin_polygon(s, model, llr, n)
+    for k in range(min(s.job[QUESTIONS], s.asked.shape[0])):
+        ask = s.asked[k]
+        if ask[0] == model and math.hypot(sx - ask[1], sy - ask[2]) < SAME_M and nx * ask[3] + ny * ask[4] > SAME_COS:
+            return 0
+    ask = s.asked[s.job[QUESTIONS] % s.asked.shape[0]]
+    ask[0] = model
+    ask[1] = sx
+    ask[2] = sy
+    ask[3] = nx
+    ask[4] = ny
+    ask[5] = 0.0
+    s.job[QUESTIONS] += 1
     return 1
+
+
+@kernel
+def next_birth(s: State) -> bool:
+    """Begin with the newest segment that waits; return whether one did."""
+    for back in range(1, min(s.job[QUESTIONS], s.asked.shape[0]) + 1):
+        ask = s.asked[(s.job[QUESTIONS] - back) % s.asked.shape[0]]
+        if ask[5] == 0.0:
+            ask[5] = 1.0
+            s.job[JOB] = BIRTH
+            s.job[STAGE] = LAY
+            s.job[WHO] = int(ask[0])
+            s.job[NEXT] = 0
+            s.job[HISS] = int(s.g[NOISE])
+            s.work[FOUND_LLR] = -math.inf
+            for z in range(4):
+                s.work[SEGMENT + z] = ask[1 + z]
+            return True
+    return False
+
+
+@kernel
+def ways_to_lie(p: Settings, model: int) -> int:
+    """Return how many sides of a model can lie on a segment and look different, either face of an open one's."""
+    if p.closed[model] > 0:
+        return max(1, int(p.nv[model] // p.sym[model]))
+    return int(2 * (p.nv[model] - 1))
+
+
+@kernel
+def lay_next(s: State, p: Settings) -> int:
+    """Lay the next side on the segment and set out from there, or from the best of all; return what that cost."""
+    model = s.job[WHO]
+    sides = p.nv[model] if p.closed[model] > 0 else p.nv[model] - 1
+    seg = s.work[SEGMENT : SEGMENT + 4]
+    k = s.job[NEXT] // len(SHIFTS)
+    if k >= ways_to_lie(p, model):
+        if s.work[FOUND_LLR] < TRIAL_MIN:
+            end_job(s)
+            return 1
+        s.job[HEARD] = pgather(s, p, model, s.work[FOUND], s.work[FOUND + 1])
+        seek(s, s.work[FOUND], s.work[FOUND + 1], s.work[FOUND + 2], FINE_STEP_M, FINE_ROUNDS, s.pw.shape[0])
+        s.job[STAGE] = FINE
+        return GATHERING
+    shift = SHIFTS[s.job[NEXT] % len(SHIFTS)]
+    hand = 1.0 if k < sides else -1.0
+    lay_side(s, p, model, k % sides, shift, seg[0], seg[1], hand * seg[2], hand * seg[3])
+    s.job[NEXT] += 1
+    if shift == 0.0:
+        relax_polygon(s, p, model, sides)
+    s.job[HEARD] = pgather(s, p, model, s.pose[0], s.pose[1])
+    if s.job[HEARD] >= READINGS_MIN:
+        seek(s, s.pose[0], s.pose[1], s.pose[2], TRIAL_STEP_M, TRIAL_ROUNDS, TRIAL_READINGS)
+        s.job[STAGE] = TRY
+    return GATHERING
+
+
+@kernel
+def try_polygon(s: State, p: Settings, left: int) -> int:
+    """Go on with a birth for what is left of a quantum; return what that cost."""
+    model = s.job[WHO]
+    if s.job[STAGE] == LAY:
+        return int(lay_next(s, p))
+    spent = seek_on(s, p, model, left)
+    if not sought(s):
+        return int(spent)
+    if s.job[STAGE] == TRY:
+        s.job[STAGE] = LAY
+        if s.work[BEST] > s.work[FOUND_LLR]:
+            s.work[FOUND] = s.work[X]
+            s.work[FOUND + 1] = s.work[Y]
+            s.work[FOUND + 2] = s.work[THETA]
+            s.work[FOUND_LLR] = s.work[BEST]
+        return int(spent)
+    x = s.work[X]
+    y = s.work[Y]
+    theta = s.work[THETA]
+    llr = weigh_pose(s, p, model, x, y, theta)
+    enough = llr >= p.unknown * s.stats[NEARBY] and s.stats[HIT] >= HITS_MIN
+    if enough:
+        t = taken_by(s, p, model, x, y)
+        if t < 0:
+            begin_polygon(s, model, x, y, theta, llr)
+        else:
+            challenge(s, t, x, y, theta)
+    end_job(s)
+    return int(spent)

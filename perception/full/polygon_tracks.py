@@ -1,8 +1,8 @@
 """Tracks of polygons: the same life as the circles', with a heading.
 
-A polygon's likelihood has many summits (a face shifted along itself, a body turned by half of what makes it look
-alike), so a young track is thrown over to the others now and then. Its top is flat, because ranges are rounded: the
-pose is the middle of the plateau and the plateau's width is what is not known.
+A track is refined in stages, as a job that a quantum takes on by a step: its readings are dealt out, its pose is
+looked for, judged, and placed. Its likelihood's top is flat, because ranges are rounded: the pose is the middle of
+the plateau and the plateau's width is what is not known.
 """
 
 from __future__ import annotations
@@ -12,274 +12,109 @@ from typing import Final
 
 from perception.full.contact import HITS as HIT
 from perception.full.contact import NEAR as NEARBY
-from perception.full.polygon import ACROSS, ALONG, MISS, SURE, TURN, moved, predict
-from perception.full.polygon_births import WHOLE, bears, pflatten, pput, prestat, pscore
-from perception.full.refine import bounded_exp
+from perception.full.polygon import BEST, SURE
+from perception.full.polygon_births import next_birth, pflatten, try_polygon
+from perception.full.polygon_claims import OVERLAP, leave_to_next_neighbour
+from perception.full.polygon_job import (
+    BY_TURNS,
+    COV,
+    FOUND,
+    FOUND_LLR,
+    HEARD,
+    HISS,
+    JOB,
+    LAID,
+    MIDDLE,
+    NEXT,
+    NO_JOB,
+    QUANTUM,
+    STAGE,
+    TRACK,
+    WHO,
+    cost,
+    end_job,
+    seek_on,
+    sides_of,
+    sought,
+    weigh_pose,
+)
+from perception.full.polygon_posterior import ATTEMPTS, begin_lattice, lattice_on
+from perception.full.polygon_rivals import compare_circles, is_wall
+from perception.full.polygon_throws import (
+    DEAL,
+    FITTING,
+    JUDGE,
+    LOOK_NEAR,
+    LOOK_WIDE,
+    SPREAD,
+    THROW,
+    THROW_GAIN,
+    keep_found,
+    search_first,
+    throw_next,
+)
 from perception.full.selection import choose_polygon
 from perception.full.state import (
     DIRTY,
     ESTABLISHED,
     FREE,
-    KIND,
-    LC,
-    LHI,
-    LLO,
-    LLR,
-    LN,
-    LNX,
-    LNY,
-    LOX,
-    LOY,
     MODEL,
+    NOISE,
     NRES,
-    PCX,
     PHITS,
     PLLR,
     PNEAR,
+    POLISH,
     PPROB,
     PSURE,
     PTH,
+    PTT,
     PX,
+    PXX,
     PY,
+    QUIET,
     REFS,
     ST,
     TENTATIVE,
-    TX,
-    TY,
     Settings,
     State,
-)  # fmt: skip
-from perception.kernel import kernel
+)
+from perception.kernel import copy_span, kernel
 
-FOOT_M: Final = 0.3048
-POLYGON: Final = 1000
-"""What polygon t explains belongs to this plus t in `State.owner`."""
-
-YOUNG: Final = 4
-AGAIN: Final = 8
-"""The search is wide in fewer refinements than the first, in each of so many after, …"""
-FITTING: Final = 0.85
-"""… and every other time while less than this share of the near readings is explained."""
-WIDE_STEP_M: Final = 0.3 * FOOT_M
-WIDE_ROUNDS: Final = 14
-NARROW_STEP_M: Final = 0.05 * FOOT_M
-NARROW_ROUNDS: Final = 6
-THROWS: Final = (0.5, -0.5, 1.0, -1.0)
-"""A young track is thrown along and across by so many inner radii, …"""
-THROW_TURNS: Final = (-0.5, 0.5)
-"""… and turned by so many times π over the order of its symmetry."""
-THROW_STEP_M: Final = 0.1 * FOOT_M
-THROW_ROUNDS: Final = 5
-THROW_GAIN: Final = 1.0
-"""Another summit must be higher by this, nat."""
-
-PLATEAU_STEPS: Final = 12
-PLATEAU_STEP_M: Final = 0.02 * FOOT_M
-PLATEAU_STEP_RAD: Final = 0.01
-"""The plateau is looked at so often each way: a quarter of a foot, 7°."""
-PLATEAU_DEPTH: Final = -8.0
-"""It ends where the log ratio has fallen by this, nat."""
-PLATEAU_RISE: Final = 5.0
-"""What is higher than the pose found counts as higher by this at most, nat."""
-VARIANCE_MIN_M2: Final = 1e-4 * FOOT_M * FOOT_M
-VARIANCE_MIN_RAD2: Final = 0.25e-4
-"""Half the step of the plateau, squared: nothing is seen finer."""
-
-WALL_ECHOES_MIN: Final = 12.0
-WALL_SIZE: Final = 3.0
-"""A wall is longer than so many inner radii."""
-WALL_BEHIND: Final = -1.15
-WALL_FRONT: Final = 0.7
-"""A body whose centre is so many inner radii behind a wall's face, or before it, is the wall."""
-WALL_BEYOND_M: Final = 2.0 * FOOT_M
-
-CIRCLE_NEAR_M: Final = 0.3 * FOOT_M
-"""Circles whose centres lie no farther than this off the farthest vertex stand in the same place."""
-LEAD: Final = 6.0
-"""An established polygon that leads a circle in its place by this removes it, nat."""
 EVIDENCE_MIN: Final = 5.0
 UNKNOWN_LEAD: Final = 8.0
 """Evidence below the first, or behind an unknown thing's by the second, is the end, nat."""
 ESTABLISH: Final = 0.9
-ESTABLISH_HITS: Final = 16.0
+ESTABLISH_HITS: Final = 10.0
+ESTABLISH_SURE: Final = 3.0
+MANY_HITS: Final = 20.0
+MANY_SURE: Final = 2.0
+"""A track is established by so many hits, and so many that had to be: corners alone fit anywhere."""
 DOUBT: Final = 0.3
 DOUBT_SHARE: Final = 0.75
+"""One less probable, or that explains less of what is near, is in doubt."""
 TWIN: Final = 0.4
-OVERLAP: Final = 1.8
-"""Two bodies whose centres are nearer than this, in inner radii, are one; or cannot both be there."""
-
-
-@kernel
-def poly_claims(s: State, p: Settings, m: int, tight: float) -> None:
-    """Let established polygons claim what they explain, and all keep what bears on them.
-
-    Parameters
-    ----------
-    s, p
-        Memory, updated, and settings.
-    m : int
-        Readings in `s.cur`.
-    tight : float
-        How far off an explained range is at most, m.
-    """
-    sin_half = math.sin(p.half_angle)
-    for t in range(s.pi.shape[0]):
-        if s.pi[t, ST] == FREE:
-            continue
-        model = s.pi[t, MODEL]
-        x = s.pf[t, PX]
-        y = s.pf[t, PY]
-        c = math.cos(s.pf[t, PTH])
-        sn = math.sin(s.pf[t, PTH])
-        bound = p.bound[model]
-        vertices = p.verts[model]
-        count = p.nv[model]
-        closed = p.closed[model] > 0
-        may_claim = s.pi[t, ST] == ESTABLISHED and s.pf[t, PHITS] > WHOLE * s.pf[t, PNEAR]
-        for i in range(m):
-            q = s.cur[i]
-            if not bears(q[0], q[1], q[2], q[3], q[4], x, y, bound, p.half_angle, p.gate, p.pair_max):
-                continue
-            owner = s.owner[i]
-            if 0 <= owner < POLYGON and s.ti[owner, KIND] < p.models:
-                continue
-            pput(s.pbins, s.pbn, t, x, y, q)
-            s.pi[t, DIRTY] += 1
-            if may_claim:
-                dx = q[0] - x
-                dy = q[1] - y
-                predict(
-                    c * dx + sn * dy, -sn * dx + c * dy, c * q[2] + sn * q[3], -sn * q[2] + c * q[3], q[4], vertices,
-                    count, closed, p.cos_opt, p.cos_in, p.cos_half, sin_half, s.stats,
-                )  # fmt: skip
-                if abs(s.stats[MISS]) < tight:
-                    s.owner[i] = POLYGON + t
-
-
-@kernel
-def throw(s: State, p: Settings, model: int, n: int) -> None:
-    """Look for a higher summit around `s.pose`, updated."""
-    best = prestat(s, p, model, n, s.pose)
-    x = s.pose[0]
-    y = s.pose[1]
-    theta = s.pose[2]
-    for k in range(2 * len(THROWS) + len(THROW_TURNS)):
-        if k < 2 * len(THROWS):
-            # both ways along, then both ways across, first near, then far
-            far = 2 * (k // 4)
-            axis = ALONG if k % 4 < 2 else ACROSS
-            step = THROWS[far + k % 2] * p.inner[model]
-        else:
-            axis = TURN
-            step = THROW_TURNS[k - 2 * len(THROWS)] * math.pi / p.sym[model]
-        s.root[0], s.root[1], s.root[2] = moved(x, y, theta, axis, step)
-        v = pscore(s, p, model, n, s.root, THROW_STEP_M, THROW_ROUNDS)
-        if v > best + THROW_GAIN:
-            best = v
-            s.pose[0] = s.root[0]
-            s.pose[1] = s.root[1]
-            s.pose[2] = s.root[2]
-
-
-@kernel
-def locate_polygon(s: State, p: Settings, t: int, n: int) -> None:
-    """Search for the pose of track `t` and enter it, with what its `n` readings say there."""
-    model = s.pi[t, MODEL]
-    track = s.pf[t]
-    refs = s.pi[t, REFS]
-    s.pose[0] = track[PX]
-    s.pose[1] = track[PY]
-    s.pose[2] = track[PTH]
-    is_fitting = track[PHITS] >= FITTING * track[PNEAR]
-    if refs < YOUNG or refs % AGAIN == 0 or (not is_fitting and refs % 2 == 0):
-        pscore(s, p, model, n, s.pose, WIDE_STEP_M, WIDE_ROUNDS)
-        throw(s, p, model, n)
-    else:
-        pscore(s, p, model, n, s.pose, NARROW_STEP_M, NARROW_ROUNDS)
-    track[PLLR] = prestat(s, p, model, n, s.pose)
-    track[PX] = s.pose[0]
-    track[PY] = s.pose[1]
-    track[PTH] = s.pose[2]
-    track[PHITS] = s.stats[HIT]
-    track[PNEAR] = s.stats[NEARBY]
-    track[PSURE] = s.stats[SURE]
-
-
-@kernel
-def centre_on_plateau(s: State, p: Settings, t: int, n: int) -> None:
-    """Move track `t` from `s.pose` to the middle of the plateau, axis by axis, and take its spread as variance."""
-    model = s.pi[t, MODEL]
-    track = s.pf[t]
-    for axis in range(3):
-        unit = PLATEAU_STEP_RAD if axis == TURN else PLATEAU_STEP_M
-        least = VARIANCE_MIN_RAD2 if axis == TURN else VARIANCE_MIN_M2
-        weight = 1.0
-        first = 0.0
-        second = 0.0
-        for sign in (-1.0, 1.0):
-            for k in range(1, PLATEAU_STEPS + 1):
-                step = sign * unit * k
-                s.root[0], s.root[1], s.root[2] = moved(s.pose[0], s.pose[1], s.pose[2], axis, step)
-                v = prestat(s, p, model, n, s.root) - track[PLLR]
-                if v < PLATEAU_DEPTH:
-                    break
-                share = math.exp(min(v, PLATEAU_RISE))
-                weight += share
-                first += share * step
-                second += share * step * step
-        mean = first / weight
-        track[PCX + axis] = max(second / weight - mean * mean, least)
-        track[PX], track[PY], track[PTH] = moved(track[PX], track[PY], track[PTH], axis, mean)
-
-
-@kernel
-def is_wall(s: State, x: float, y: float, inner: float, claim: float) -> bool:
-    """Tell whether a body of inner radius `inner` (m) at (x, y) is a stretch of a wall longer than `claim` (m)."""
-    for k in range(s.lines.shape[0]):
-        line = s.lines[k]
-        if line[LN] > WALL_ECHOES_MIN and line[LHI] - line[LLO] > max(claim, WALL_SIZE * inner):
-            dx = x - line[LOX]
-            dy = y - line[LOY]
-            off = line[LC] - line[LNX] * dx - line[LNY] * dy
-            along = -line[LNY] * dx + line[LNX] * dy
-            beside = line[LLO] - WALL_BEYOND_M < along < line[LHI] + WALL_BEYOND_M
-            if beside and WALL_BEHIND * inner < off < WALL_FRONT * inner:
-                return True
-    return False
-
-
-@kernel
-def compare_circles(s: State, p: Settings, t: int) -> None:
-    """Enter the probability of track `t` against nothing, an unknown thing and the circles that stand in its place.
-
-    Circles that are far less likely than an established polygon go.
-    """
-    track = s.pf[t]
-    own = track[PLLR] + p.prior
-    around = p.bound[s.pi[t, MODEL]] + CIRCLE_NEAR_M
-    total = 1.0 + bounded_exp(-own) + bounded_exp(p.unknown_poly * track[PNEAR] + p.prior - own)
-    for k in range(s.ti.shape[0]):
-        if s.ti[k, ST] != FREE and math.hypot(s.tf[k, TX] - track[PX], s.tf[k, TY] - track[PY]) < around:
-            v = s.tf[k, LLR] + (p.prior if s.ti[k, KIND] < p.models else 0.0)
-            if v < own - LEAD and s.pi[t, ST] == ESTABLISHED:
-                s.ti[k, ST] = FREE
-            elif s.ti[k, ST] == ESTABLISHED:
-                total += bounded_exp(v - own)
-    track[PPROB] = 1.0 / total
+"""Two bodies whose centres are nearer than this, in inner radii, are one."""
 
 
 @kernel
 def judge(s: State, p: Settings, t: int) -> None:
-    """Establish track `t`, doubt it or end it."""
+    """Establish track `t`, doubt it or end it; what is not placed yet is established once it is."""
     track = s.pf[t]
     if track[PLLR] < EVIDENCE_MIN or track[PLLR] < p.unknown_poly * track[PNEAR] - UNKNOWN_LEAD:
         s.pi[t, ST] = FREE
     elif s.pi[t, ST] == TENTATIVE:
         is_fitting = track[PHITS] > FITTING * track[PNEAR]
-        if track[PPROB] > ESTABLISH and is_fitting and track[PHITS] >= ESTABLISH_HITS:
-            s.pi[t, ST] = ESTABLISHED
+        sure = ESTABLISH_SURE if track[PHITS] < MANY_HITS else MANY_SURE
+        is_heard = track[PHITS] >= ESTABLISH_HITS and track[PSURE] >= sure
+        if track[PPROB] > ESTABLISH and is_fitting and is_heard:
+            s.job[STAGE] = SPREAD
+            if track[PXX] > 0.0:
+                s.pi[t, ST] = ESTABLISHED
     elif track[PPROB] < DOUBT or track[PHITS] < DOUBT_SHARE * track[PNEAR]:
         s.pi[t, ST] = TENTATIVE
+    else:
+        s.job[STAGE] = SPREAD
 
 
 @kernel
@@ -302,26 +137,8 @@ def merge_polygons(s: State, p: Settings, t: int) -> None:
 
 
 @kernel
-def prefine(s: State, p: Settings, t: int) -> None:
-    """Refine polygon track `t`: pose, spread, evidence, probability, and what becomes of it."""
-    n = pflatten(s, t, s.w)
-    s.pi[t, NRES] = n
-    s.pi[t, DIRTY] = 0
-    s.pi[t, REFS] += 1
-    locate_polygon(s, p, t, n)
-    centre_on_plateau(s, p, t, n)
-    if is_wall(s, s.pf[t, PX], s.pf[t, PY], p.inner[s.pi[t, MODEL]], p.claim):
-        s.pi[t, ST] = FREE
-        return
-    compare_circles(s, p, t)
-    judge(s, p, t)
-    if s.pi[t, ST] != FREE:
-        merge_polygons(s, p, t)
-
-
-@kernel
-def pquantum(s: State, p: Settings, threshold: float) -> bool:
-    """Refine the polygon whose turn it is, and return whether there was one.
+def next_track(s: State, p: Settings, threshold: float) -> bool:
+    """Begin with the polygon whose turn it is; return whether there is one.
 
     Parameters
     ----------
@@ -333,5 +150,108 @@ def pquantum(s: State, p: Settings, threshold: float) -> bool:
     chosen = choose_polygon(s, p, threshold)
     if chosen < 0:
         return False
-    prefine(s, p, chosen)
+    if s.pi[chosen, QUIET] > p.quiet:
+        s.pi[chosen, POLISH] -= 1
+    s.pi[chosen, DIRTY] = 0
+    s.pi[chosen, REFS] += 1
+    s.job[JOB] = TRACK
+    s.job[STAGE] = DEAL
+    s.job[WHO] = chosen
+    s.job[NEXT] = 0
+    s.job[HISS] = int(s.g[NOISE])
+    s.job[HEARD] = pflatten(s.pbins, s.pbn, chosen, s.pw)
+    return True
+
+
+@kernel
+def judge_found(s: State, p: Settings, t: int) -> None:
+    """Enter the pose that was found, with what the readings say there, and what becomes of the track."""
+    track = s.pf[t]
+    model = s.pi[t, MODEL]
+    x, y, theta = s.work[FOUND], s.work[FOUND + 1], s.work[FOUND + 2]
+    track[PLLR] = weigh_pose(s, p, model, x, y, theta)
+    track[PX] = x
+    track[PY] = y
+    track[PTH] = theta
+    track[PHITS] = s.stats[HIT]
+    track[PNEAR] = s.stats[NEARBY]
+    track[PSURE] = s.stats[SURE]
+    if is_wall(s, p, t):
+        s.pi[t, ST] = FREE
+        return
+    compare_circles(s, p, t)
+    judge(s, p, t)
+    if s.pi[t, ST] != FREE:
+        merge_polygons(s, p, t)
+
+
+@kernel
+def refine_polygon(s: State, p: Settings, left: int) -> int:
+    """Go on with a track for what is left of a quantum; return what that cost.
+
+    Its readings are dealt out between it and its neighbours; its pose is looked for, widely and then near by; what
+    the readings say there decides what becomes of it; how well it is known is found last.
+    """
+    t = s.job[WHO]
+    model = s.pi[t, MODEL]
+    stage = s.job[STAGE]
+    if stage == DEAL:
+        if s.job[NEXT] < s.pi.shape[0]:
+            return int(leave_to_next_neighbour(s, p, t))
+        s.pi[t, NRES] = s.job[HEARD]
+        search_first(s, t)
+        return 1
+    if stage in (LOOK_WIDE, THROW, LOOK_NEAR):
+        spent = seek_on(s, p, model, left)
+        if sought(s):
+            if stage == LOOK_NEAR:
+                keep_found(s)
+                s.job[STAGE] = JUDGE
+                return int(spent)
+            if stage == LOOK_WIDE:
+                keep_found(s)
+                copy_span(s.work, FOUND, 3, s.work, MIDDLE)
+                s.job[STAGE] = THROW
+                s.job[NEXT] = 0
+            elif s.work[BEST] > s.work[FOUND_LLR] + THROW_GAIN:
+                keep_found(s)
+            throw_next(s, p, t)
+        return int(spent)
+    if stage == JUDGE:
+        judge_found(s, p, t)
+        if s.pi[t, ST] != FREE and s.job[STAGE] == SPREAD:
+            begin_lattice(s, p, model, s.pf[t, PX : PTH + 1], s.pf[t, PXX : PTT + 1])
+        else:
+            end_job(s)
+        return cost((1 + p.radii.shape[0]) * s.job[HEARD], 1, sides_of(p, model))
+    spent = lattice_on(s, p, model, left)
+    if s.job[LAID] == ATTEMPTS:
+        copy_span(s.work, MIDDLE, 3, s.pf[t], PX)
+        copy_span(s.work, COV, 6, s.pf[t], PXX)
+        s.pi[t, ST] = ESTABLISHED
+        end_job(s)
+    return int(spent)
+
+
+@kernel
+def pquantum(s: State, p: Settings, threshold: float) -> bool:
+    """Go on with the job at hand for a quantum, or else with the next one; return whether there was one.
+
+    Tracks and births take turns where both wait.
+
+    Parameters
+    ----------
+    s, p, threshold
+        As for `next_track`.
+    """
+    if s.job[JOB] == NO_JOB:
+        s.job[BY_TURNS] = 1 - s.job[BY_TURNS]
+        if s.job[BY_TURNS] == 1:
+            if not next_track(s, p, threshold) and not next_birth(s):
+                return False
+        elif not next_birth(s) and not next_track(s, p, threshold):
+            return False
+    left = QUANTUM
+    while left > 0 and s.job[JOB] != NO_JOB:
+        left -= refine_polygon(s, p, left) if s.job[JOB] == TRACK else try_polygon(s, p, left)
     return True

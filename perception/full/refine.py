@@ -10,15 +10,18 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.full.basin import ACROSS_M, seek
 from perception.full.births import LINE_M, SWITCH, VARIANCE_MAX_M2
 from perception.full.contact import CLOSEST, DISPERSION, HIGH, LOW, THROUGHS, fit_circle
 from perception.full.contact import HITS as HIT
 from perception.full.contact import NEAR as NEARBY
+from perception.full.hearing import audible
 from perception.full.noise_choice import hear_residuals, noise_variance
 from perception.full.posterior import posterior_circle
+from perception.full.report import call_or_not
 from perception.full.reservoir import flatten
 from perception.full.rivals import SOFT, compete_circle, compete_line, score
-from perception.full.selection import choose, is_waiting
+from perception.full.selection import CERTAIN, UNSURE_ROOT_M, choose, is_waiting
 from perception.full.state import (
     C00,
     C01,
@@ -70,13 +73,14 @@ READINGS_MIN: Final = 3
 BASIN: Final = 6.0
 """A robust fit this many σ² off (and the first two refinements) takes the pose over."""
 YOUNG: Final = 2
+LOST: Final = 2.0
+"""A mean this much worse than where it was looked for has left the beams that heard it, nat."""
 CORRELATION_MAX: Final = 0.9
 ROOT_MIN_M2: Final = 1e-6 * FOOT_M * FOOT_M
 SWITCH_ROOT_M: Final = 0.02 * FOOT_M
 """After a change of kind the pose is looked for this far round at least."""
 SWITCH_DIRTY: Final = 4
 LINE_HITS_MIN: Final = 6.0
-CERTAIN: Final = 0.95
 THROUGH_SHARE: Final = 0.5
 """A wedge shares this much of the silences that speak against its rival."""
 WALL_ECHOES_MIN: Final = 10.0
@@ -125,8 +129,13 @@ def locate(s: State, p: Settings, t: int, n: int) -> None:
             track[R00] = math.sqrt(c00)
             track[R10] = min(limit, max(-limit, -h01 / det)) / track[R00]
             track[R11] = math.sqrt(max(c11 - track[R10] ** 2, ROOT_MIN_M2))
-    s.pose[0] = track[TX]
-    s.pose[1] = track[TY]
+    if max(track[R00], track[R11]) > UNSURE_ROOT_M and seek(s, p, t, n):
+        track[R00] = max(track[R00], ACROSS_M)
+        track[R11] = max(track[R11], ACROSS_M)
+    x = track[TX]
+    y = track[TY]
+    s.pose[0] = x
+    s.pose[1] = y
     s.root[0] = track[R00]
     s.root[1] = track[R10]
     s.root[2] = track[R11]
@@ -142,6 +151,10 @@ def locate(s: State, p: Settings, t: int, n: int) -> None:
     track[C00] = s.cov[0]
     track[C01] = s.cov[1]
     track[C11] = s.cov[2]
+    unsure = max(track[R00], track[R11]) > UNSURE_ROOT_M
+    if unsure and score(s, p, n, x, y, rho) > score(s, p, n, track[TX], track[TY], rho) + LOST:
+        track[TX] = x
+        track[TY] = y
 
 
 @kernel
@@ -255,8 +268,8 @@ def probability(s: State, p: Settings, t: int, prior: float) -> float:
 @kernel
 def refine(s: State, p: Settings, t: int) -> None:
     """Refine track `t`: pose, evidence, rivals, noise, probability, and what becomes of it."""
-    n = flatten(s, t, s.w)
     track = s.tf[t]
+    n = audible(s, p, flatten(s, t, s.w), track[TX], track[TY], track[TRHO], t)
     s.ti[t, NRES] = n
     s.ti[t, DIRTY] = 0
     s.ti[t, REFS] += 1
@@ -280,6 +293,7 @@ def refine(s: State, p: Settings, t: int) -> None:
             s.ti[t, ST] = ESTABLISHED
     elif s.ti[t, ST] == ESTABLISHED and (track[PROB] < DOUBT or track[SPAN] < 0.5 * p.spread):
         s.ti[t, ST] = TENTATIVE
+    call_or_not(s.ti, s.tf, s.comp, p.models, p.report, p.report_near if prior >= p.prior else p.report, t)
     merge_duplicates(s, p, t)
 
 

@@ -14,10 +14,12 @@ from typing import Final
 import numpy as np
 
 from perception.full.contact import FAR
+from perception.full.settings import MAY_DEG
 from perception.full.state import (
     C00,
     C01,
     C11,
+    CALLED,
     ESTABLISHED,
     FREE,
     HITS,
@@ -36,14 +38,16 @@ from perception.full.state import (
     LP11,
     MODEL,
     PCAP,
-    PCX,
-    PCY,
     PHITS,
     PPROB,
     PROB,
     PTH,
+    PTT,
     PX,
+    PXX,
     PY,
+    PYY,
+    SPAN,
     ST,
     TRHO,
     TX,
@@ -60,12 +64,25 @@ OVER_UNKNOWN: Final = 1.25
 OVER_UNKNOWN_ALONE: Final = 1.1
 """Evidence over that of an unknown thing: a share of it, less where every rival is far behind."""
 ALONE: Final = -20.0
-SIGMA_MAX_M: Final = 0.2 * FOOT_M
+NO_WALL: Final = -4.0
+"""A wall this far behind is none, nat. Walls are what there is most of, and the rival that is met most often."""
+ASPECTS: Final = 0.008
+"""Dispersion of the axes from which on a thing has been seen from two sides: what lies straight ahead has not."""
+KEPT: Final = 0.5
+"""A name once given is kept while it is likelier than everything else together."""
+SIGMA_MAX_M: Final = 0.17 * FOOT_M
 POLYGON_PROBABILITY: Final = 0.9
 POLYGON_NEAR_M: Final = 6.5 * FOOT_M
 POLYGON_SPREAD: Final = 0.02
-POLYGON_HITS: Final = 20.0
 """A polygon is seen from near and from more than one direction: one face, square on from afar, may be any wall's."""
+POLYGON_HITS: Final = 20.0
+POLYGON_HITS_SWEPT: Final = 12.0
+POLYGON_SWEPT: Final = 80
+"""It answers so often; or less often, where so many readings bear on it, silences and all, and it explains them."""
+POLYGON_INFLATE: Final = 1.15
+"""What a polygon's covariance is multiplied with when it is reported: what its neighbours do to it is no noise."""
+POLYGON_TURN: Final = math.radians(MAY_DEG)
+"""And its heading is not known better than the beam's edges are, rad: hearing or not at an edge turns a body."""
 WALL_ECHOES_MIN: Final = 10.0
 WALL_M: Final = 2.0 * FOOT_M
 CORNER_M: Final = 1.0 * FOOT_M
@@ -76,30 +93,45 @@ UNKNOWN_HITS: Final = 5.0
 
 
 @kernel
-def sure_circles(ti: Ints, tf: Floats, comp: Floats, models: int, least: float, out: Ints) -> int:
-    """Write the tracks that are sure to be models to `out` and return how many.
+def call_or_not(ti: Ints, tf: Floats, comp: Floats, models: int, sure: float, least: float, t: int) -> None:
+    """Give track `t` a model's name once that is sure, and take it away once it is not even likely any more.
+
+    A name that came and went with every rival's turn would be worth nothing to whoever steers by it.
 
     Parameters
     ----------
     ti, tf, comp
-        As in `State`.
+        As in `State`; `ti` is updated.
     models : int
         Kinds below this are models.
-    least : float
-        Probability.
-    out : (tracks,) int
-        Out.
+    sure, least : float
+        Probability from which on a name is given; and from which on where a wall is out of the question.
+    t : int
+        Track.
     """
+    wall = comp[t, comp.shape[1] - 2]
+    if wall == 0.0 or wall > NO_WALL:
+        least = sure
+    if ti[t, ST] != ESTABLISHED or ti[t, KIND] >= models or tf[t, PROB] < min(least, KEPT):
+        ti[t, CALLED] = 0
+        return
+    rival = -1e300
+    for k in range(comp.shape[1]):
+        if k != ti[t, KIND]:
+            rival = max(rival, comp[t, k])
+    over = OVER_UNKNOWN_ALONE if rival < ALONE else OVER_UNKNOWN
+    if tf[t, LLR] <= over * tf[t, UNK] or tf[t, SPAN] < ASPECTS or max(tf[t, C00], tf[t, C11]) >= SIGMA_MAX_M**2:
+        ti[t, CALLED] = 0
+    elif tf[t, PROB] >= least:
+        ti[t, CALLED] = 1
+
+
+@kernel
+def sure_circles(ti: Ints, out: Ints) -> int:
+    """Write the tracks that have a round model's name to `out`, shape (tracks,), and return how many."""
     n = 0
     for t in range(ti.shape[0]):
-        if ti[t, ST] != ESTABLISHED or ti[t, KIND] >= models or tf[t, PROB] < least:
-            continue
-        rival = -1e300
-        for k in range(comp.shape[1]):
-            if k != ti[t, KIND]:
-                rival = max(rival, comp[t, k])
-        over = OVER_UNKNOWN_ALONE if rival < ALONE else OVER_UNKNOWN
-        if tf[t, LLR] > over * tf[t, UNK] and max(tf[t, C00], tf[t, C11]) < SIGMA_MAX_M**2:
+        if ti[t, ST] == ESTABLISHED and ti[t, CALLED] == 1:
             out[n] = t
             n += 1
     return n
@@ -131,22 +163,26 @@ def mark_changed(ti: Ints, tf: Floats, told: Floats, n: int, sure: Ints) -> None
 
 @kernel
 def sure_polygons(pi: Ints, pf: Floats, pbn: Ints, pbins: Floats, least: float, out: Ints) -> int:
-    """Write the polygon tracks that are sure to `out` and return how many; arguments as for `sure_circles`."""
+    """Write the polygon tracks that are sure to `out` and return how many; arguments as in `State`."""
     n = 0
     for t in range(pi.shape[0]):
-        if pi[t, ST] != ESTABLISHED or pf[t, PPROB] < least or pf[t, PHITS] < POLYGON_HITS:
+        if pi[t, ST] != ESTABLISHED or pf[t, PPROB] < least or max(pf[t, PXX], pf[t, PYY]) > SIGMA_MAX_M**2:
             continue
+        swept = 0
         nearest = FAR
         heard = 0
         x = 0.0
         y = 0.0
         for b in range(pbn.shape[1]):
+            swept += min(pbn[t, b], PCAP)
             for k in range(min(pbn[t, b], PCAP)):
                 if pbins[t, b, k, 4] < FAR:
                     nearest = min(nearest, pbins[t, b, k, 4])
                     x += pbins[t, b, k, 2]
                     y += pbins[t, b, k, 3]
                     heard += 1
+        if pf[t, PHITS] < (POLYGON_HITS_SWEPT if swept >= POLYGON_SWEPT else POLYGON_HITS):
+            continue
         if heard > 0 and nearest <= POLYGON_NEAR_M and 1.0 - math.hypot(x, y) / heard > POLYGON_SPREAD:
             out[n] = t
             n += 1
@@ -176,14 +212,20 @@ def circle(s: State, p: Settings, t: int, label: str, probability: float) -> See
     )
 
 
+def polygon_covariance(track: Floats) -> Floats:
+    """Return the covariance of a polygon's x, y (m) and heading (rad) from its row of `State.pf`; shape (3, 3)."""
+    covariance = np.zeros((3, 3))
+    covariance[np.tril_indices(3)] = POLYGON_INFLATE * track[PXX : PTT + 1]
+    covariance[2, 2] += POLYGON_TURN**2
+    return covariance + np.tril(covariance, -1).T
+
+
 def polygon(s: State, p: Settings, t: int, label: str, probability: float) -> SeenObject:
     """Return a polygon's track as an object; of the headings at which it looks alike the least one from −π on."""
     track = s.pf[t]
     theta = float(track[PTH])
-    c, sn = math.cos(theta), math.sin(theta)
-    along, across = float(track[PCX]), float(track[PCY])
-    xx, yy = c * c * along + sn * sn * across, sn * sn * along + c * c * across
-    xy = c * sn * (along - across)
+    covariance = polygon_covariance(track)
+    xx, xy, yy = float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1])
     period = 2.0 * math.pi / int(p.sym[s.pi[t, MODEL]])
     return SeenObject(
         label, float(track[PX]), float(track[PY]), (theta + 0.5 * period) % period - 0.5 * period,

@@ -19,6 +19,7 @@ from perception.full.state import (
     NRES,
     PASSED,
     POLISH,
+    PROB,
     PX,
     PY,
     QUIET,
@@ -35,7 +36,9 @@ from perception.kernel import kernel
 FOOT_M: Final = 0.3048
 UNSURE: Final = 4.0
 UNSURE_ROOT_M: Final = 0.03 * FOOT_M
-"""Evidence counts so many times where an object's place is less sure than this."""
+"""Evidence counts so many times where an object's place is less sure than this, maybe altogether wrong."""
+CERTAIN: Final = 0.95
+"""Or where its name is less sure than this."""
 SIZE: Final = 8.0
 """A small object's readings are taken for so many more."""
 OWED: Final = 1e-6
@@ -54,7 +57,7 @@ def worth(s: State, p: Settings, t: int, threshold: float) -> float:
     if s.ti[t, ST] == FREE:
         return 0.0
     v: float = s.ti[t, DIRTY] / (s.ti[t, NRES] + SIZE)
-    if max(s.tf[t, R00], s.tf[t, R11]) > UNSURE_ROOT_M:
+    if max(s.tf[t, R00], s.tf[t, R11]) > UNSURE_ROOT_M or s.tf[t, PROB] < CERTAIN:
         v *= UNSURE
     if s.ti[t, QUIET] > p.quiet and s.ti[t, POLISH] > 0:
         v += threshold + OWED
@@ -62,11 +65,13 @@ def worth(s: State, p: Settings, t: int, threshold: float) -> float:
 
 
 @kernel
-def worth_polygon(s: State, t: int) -> float:
+def worth_polygon(s: State, p: Settings, t: int, threshold: float) -> float:
     """Return the same for polygon `t`."""
     if s.pi[t, ST] == FREE:
         return 0.0
     v: float = s.pi[t, DIRTY] / (s.pi[t, NRES] + SIZE)
+    if s.pi[t, QUIET] > p.quiet and s.pi[t, POLISH] > 0:
+        v += threshold + OWED
     return v
 
 
@@ -114,7 +119,7 @@ def choose_polygon(s: State, p: Settings, threshold: float) -> int:
     best = -1.0
     chosen = -1
     for t in range(s.pi.shape[0]):
-        v = worth_polygon(s, t)
+        v = worth_polygon(s, p, t, threshold)
         if v > threshold:
             v = rank(s, p, v, s.pf[t, PX], s.pf[t, PY], s.pi[t, PASSED])
             s.pi[t, PASSED] += 1

@@ -81,10 +81,19 @@ def _chords(radius: float) -> Floats:
     return np.column_stack([0.5 * (p[1:] + p[:-1]), np.arctan2(d[:, 1], d[:, 0]), np.hypot(d[:, 0], d[:, 1])])
 
 
-def _polygons(models: Sequence[ModelConfig]) -> tuple[Floats, Ints, Ints, Ints, Floats, Floats, Floats]:
-    """Return vertices, how many, closed, symmetry, inner and outer radius, and sides of the polygon models."""
+def least_half_width(corners: Floats) -> float:
+    """Return half the width of an outline in the direction in which it is narrowest; vertices of shape (n, 2), m."""
+    along = corners[:, None] - corners[None]
+    across = np.column_stack([-along[..., 1].ravel(), along[..., 0].ravel()])
+    length = np.hypot(across[:, 0], across[:, 1])
+    far = corners @ (across[length > 0.0] / length[length > 0.0, None]).T
+    return 0.5 * float((far.max(axis=0) - far.min(axis=0)).min())
+
+
+def _polygons(models: Sequence[ModelConfig]) -> tuple[Floats, Ints, Ints, Ints, Floats, Floats, Floats, Floats]:
+    """Return vertices, how many, closed, symmetry, inner and outer radius, sides and faces of the polygon models."""
     many, most = max(1, len(models)), max([4, *(len(m.vertices_m) for m in models)])
-    vertices, sides = np.zeros((many, most, 2)), np.zeros((many, most, 4))
+    vertices, sides, faces = np.zeros((many, most, 2)), np.zeros((many, most, 4)), np.zeros((many, most, 5))
     count, closed, symmetry = np.zeros(many, np.int64), np.zeros(many, np.int64), np.ones(many, np.int64)
     inner, bound = np.zeros(many), np.zeros(many)
     for i, model in enumerate(models):
@@ -96,10 +105,22 @@ def _polygons(models: Sequence[ModelConfig]) -> tuple[Floats, Ints, Ints, Ints, 
         n, k = len(corners), len(object_sides)
         vertices[i, :n], sides[i, :k], count[i], closed[i] = corners, object_sides, n, model.closed
         x, y, direction = object_sides[:, 0], object_sides[:, 1], object_sides[:, 2]
-        inner[i] = np.abs(x * np.sin(direction) - y * np.cos(direction)).min()
+        tangents = np.column_stack([np.cos(direction), np.sin(direction)])
+        faces[i, :k] = np.column_stack([corners[:k], tangents, object_sides[:, 3]])
+        # The origin may lie on a side, or outside of a hollow outline; then its width tells how large it is.
+        inner[i] = max(np.abs(x * tangents[:, 1] - y * tangents[:, 0]).min(), least_half_width(corners))
         bound[i] = np.hypot(corners[:, 0], corners[:, 1]).max()
         symmetry[i] = polygon_symmetry(corners) if model.closed else 1
-    return vertices, count, closed, symmetry, inner, bound, sides
+    return vertices, count, closed, symmetry, inner, bound, sides, faces
+
+
+def tuned(p: Settings, config: FullConfig) -> Settings:
+    """Return the kernels' settings with what a running process may change taken from `config`."""
+    return p._replace(
+        attempts=config.attempts_per_firing,
+        report=config.report_probability,
+        report_near=min(config.report_probability, config.report_probability_near),
+    )
 
 
 def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: FullConfig) -> Settings:
@@ -128,8 +149,8 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: FullC
         rivals = [*rivals[1:], rivals[0]]  # hypotheses need a body to lie behind a segment, and a point is none
     radii = np.array([*known, *rivals])
     outlines = [m for m in models if m.arc_radius_m is None]
-    vertices, count, closed, symmetry, inner, bound, sides = _polygons(outlines)
-    return Settings(
+    vertices, count, closed, symmetry, inner, bound, sides, faces = _polygons(outlines)
+    untuned = Settings(
         half_angle=half_angle,
         cos_half=math.cos(half_angle),
         cos_opt=math.cos(may),
@@ -153,7 +174,7 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: FullC
         merge=0.9 * float(radii[0]),
         all_until=80,
         claim=4.0 * FOOT_M,
-        attempts=config.attempts_per_firing,
+        attempts=0,
         hyp_sigma=0.7 * FOOT_M,
         radii=radii,
         models=len(known),
@@ -171,7 +192,11 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: FullC
         inner=inner,
         bound=bound,
         psides=sides,
+        faces=faces,
         inflate=1.1,
+        report=0.0,
+        report_near=0.0,
         quiet=12,
         polish=6,
     )
+    return tuned(untuned, config)

@@ -1,7 +1,8 @@
 """The full method's whole memory: arrays made once, and the settings they are read with, as named tuples.
 
 Compiled kernels take named tuples of arrays as they are, so one argument carries everything that is remembered and
-one everything that was set; nothing here is ever resized. Kernels call them `s` and `p`. Lengths are metres.
+one everything that was set; nothing here is ever resized. Kernels call them `s` and `p`. Python, to which such a call
+is dear, goes by `perception.full.entry`. Lengths are metres.
 """
 
 from __future__ import annotations
@@ -37,6 +38,9 @@ PB: Final = 24
 PCAP: Final = 12
 """Readings in such a bin."""
 
+ASKED: Final = 32
+"""Segments that wait for a polygon to be tried behind them, and of late did."""
+
 # Columns of `State.tf`, a circle's track: centre, heading (none), radius, lower root of the covariance that the next
 # grid starts from, covariance, log ratio to the background, counts, probability, dispersion of the axes, birth.
 TX, TY, TTH, TRHO, R00, R10, R11, C00, C01, C11, LLR, HITS, THRU, NEAR, PROB, SPAN, BORN, LXX, LXY, LYY, UNK, SEEN = (
@@ -44,14 +48,17 @@ TX, TY, TTH, TRHO, R00, R10, R11, C00, C01, C11, LLR, HITS, THRU, NEAR, PROB, SP
 )
 NTF: Final = 24
 # Columns of `State.ti` and `State.pi`. ST: 0 free, 1 tentative, 2 established. KIND: index into `Settings.radii`.
-# QUIET: firings without evidence; POLISH: refinements still owed once it is quiet; PASSED: quanta for others since.
-ST, KIND, DIRTY, CYC, NRES, MODEL, REFS, QUIET, POLISH, PASSED = range(10)
-NTI: Final = 10
+# QUIET: firings without evidence; POLISH: refinements still owed once it is quiet; CALLED: 1 while it has its name.
+# RIVAL: of a polygon, whether it has a challenger. PASSED: quanta for others since.
+ST, KIND, DIRTY, CYC, NRES, MODEL, REFS, QUIET, POLISH, CALLED, RIVAL, PASSED = range(12)
+NTI: Final = 12
 # Columns of `State.lines`: normal, distance along it from an origin on the spot, that origin, covariance of angle and
 # distance, extent along the line, log odds of being there still, echoes that it explained (0: free).
 LNX, LNY, LC, LOX, LOY, LP00, LP01, LP11, LLO, LHI, LLOG, LN = range(12)
-# Columns of `State.pf`, a polygon's track: pose, log ratio, counts, probability, must-answer hits, variances.
-PX, PY, PTH, PLLR, PHITS, PNEAR, PPROB, PSURE, PCX, PCY, PCT = range(11)
+# Columns of `State.pf`, a polygon's track: pose, log ratio, counts, probability, must-answer hits, covariance of x, y
+# and heading, pose of a challenger.
+PX, PY, PTH, PLLR, PHITS, PNEAR, PPROB, PSURE, PXX, PXY, PYY, PXT, PYT, PTT, CX, CY, CTH = range(17)
+NPF: Final = 17
 # Cells of `State.g`; HERE is where the ring last fired.
 NOISE, SEGMENTS, BIRTHS, REFINEMENTS, HERE_X, HERE_Y = range(6)
 
@@ -128,13 +135,19 @@ class Settings(NamedTuple):
     sym: Ints
     """Order of each polygon's rotational symmetry."""
     inner: Floats
-    """Distance of the nearest side from the origin."""
+    """Distance of the nearest side from the origin, and at least half the outline's least width."""
     bound: Floats
     """Distance of the farthest vertex from the origin."""
     psides: Floats
     """(M, V, 4) sides for the relaxation."""
+    faces: Floats
+    """(M, V, 5) the same for contact: where each begins, its unit direction, its length."""
     inflate: float
     """What the posterior's covariance is multiplied with when it is reported."""
+    report: float
+    """A model is called by its name from this probability on."""
+    report_near: float
+    """The same where it was heard from within `far`."""
     quiet: int
     """Firings without evidence after which what is left is worked off."""
     polish: int
@@ -196,6 +209,14 @@ class State(NamedTuple):
     """(PULLING,) 0, 1, 2, …"""
     last: Floats
     """(S, 5) each sensor's last reading that said anything new."""
+    job: Ints
+    """(24,) what is being done about which polygon, and how far that has come; see `polygon_job`."""
+    work: Floats
+    """(56,) the numbers of that job."""
+    pw: Floats
+    """(PT's reservoir, 5) its readings."""
+    asked: Floats
+    """(ASKED, 6) where polygons shall be tried: model, segment's middle and normal, whether it has been tried."""
 
 
 def make_state(sensors: int, p: Settings, tracks: int = NT, slots: int = BUCKETS) -> State:
@@ -208,8 +229,9 @@ def make_state(sensors: int, p: Settings, tracks: int = NT, slots: int = BUCKETS
         ddl=z(noises), ntot=z(noises), nll=z((tracks, noises)), bins=z((tracks, NB, CAP, 5)), bn=z((tracks, NB), n),
         lines=z((NL, 12)), g=z(8), w=z((WORK, 5)), w2=z((WORK, 5)), wl=z(WORK, n), cur=z((sensors, 6)),
         owner=z(sensors, n), fit=z(12), stats=z(12), segs=z((8 * sensors, 8)), near=z((32, 4)),
-        pi=z((PT, NTI), n), pf=z((PT, 12)), pbins=z((PT, PB, PCAP, 5)), pbn=z((PT, PB), n), stats2=z(12),
+        pi=z((PT, NTI), n), pf=z((PT, NPF)), pbins=z((PT, PB, PCAP, 5)), pbn=z((PT, PB), n), stats2=z(12),
         pose=z(3), root=z(3), cov=z(3), pull=z((PULLING, 5)), all_pull=np.arange(PULLING), last=z((sensors, 5)),
+        job=z(24, n), work=z(56), pw=z((PB * PCAP, 5)), asked=z((ASKED, 6)),
     )  # fmt: skip
     clear(s)
     return s

@@ -5,9 +5,13 @@ from __future__ import annotations
 import asyncio
 import sys
 from collections.abc import Sequence
+from typing import Final
 
 from config.load import load_settings
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
+
+CLOCK_WRAP_S: Final = 2**32 * 1e-6
+"""The robot counts microseconds in 32 bits."""
 
 
 def emulate_robot(
@@ -21,6 +25,7 @@ def emulate_robot(
     seed: int,
     trace: str | None,
     latency: str | None,
+    clock_s: float,
     end_with_parent: bool,
 ) -> int:
     """Carry out the command; see `runtime.cli.emulate`."""
@@ -30,6 +35,8 @@ def emulate_robot(
 
     if settings.world is None:
         raise Complaint("no world is given: name one with --world", WRONG_CALL)
+    if not 0.0 <= clock_s < CLOCK_WRAP_S:
+        raise Complaint(f"--clock {clock_s:g}: must be from 0 to below {CLOCK_WRAP_S} s, where it wraps", WRONG_CALL)
     script = () if faults is None else load_faults(faults)
 
     def ready(path: str) -> None:
@@ -41,6 +48,7 @@ def emulate_robot(
             serve(
                 settings, settings.world, link_path=link, faults=script, seed=seed, trace_path=trace,
                 latency_path=latency, ready=ready, exit_with_parent=end_with_parent,
+                clock_start_us=round(1e6 * clock_s),
             )
         )  # fmt: skip
     except EmulatorError as error:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 from rich.console import Console
 from rich.progress import track
@@ -10,11 +12,17 @@ from rich.progress import track
 from config.load import load_settings
 from config.settings import Settings
 from runtime.commands.firing import refuse_impossible_firing
-from runtime.complaint import DONE, WRONG_CALL, Complaint
+from runtime.commands.showing import folder, read
+from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
 from runtime.kernels import ready_kernels
 from runtime.scene_names import SceneName
-from runtime.tables import Units, boxes_table, scene_verdict, table_2, verdict
+from runtime.tables import Units, boxes_table, scene_verdict, spread_verdict, table_2, verdict
 
+if TYPE_CHECKING:
+    from runtime.experiment import SeedOutcome
+
+QUEUE_MAX: Final = 1_000_000
+"""Virtual time waits for no disk: everything may wait in memory."""
 SEEDS_SHOWN = 2
 ROWS_SHOWN = 24
 """Tables of more runs or rows than this say nothing to a person."""
@@ -27,6 +35,7 @@ def run_experiment(
     world: str | None,
     models: Sequence[str] = (),
     seeds: int,
+    out: str | None = None,
     json_file: str | None,
     units: Units,
 ) -> int:
@@ -41,15 +50,70 @@ def run_experiment(
     from runtime.experiment import run_seed, summarise
     from runtime.summary import write_json
 
+    place = None if out is None else folder("--out", out)
+    told = Console(soft_wrap=True, highlight=False)
     runs = track(range(seeds), "driving", console=console, transient=True, disable=not console.is_terminal)
-    outcome = summarise([run_seed(settings, settings.world, seed) for seed in runs])
+    outcomes = []
+    for seed in runs:
+        if seed == 0 and place is not None:
+            outcomes.append(recorded(settings, seed, place / f"{name}.mcap"))
+        else:
+            outcomes.append(run_seed(settings, settings.world, seed))
+    outcome = summarise(outcomes)
     if json_file is not None:
         write_json(json_file, outcome)
-    out = Console()
     if seeds <= SEEDS_SHOWN:
-        out.print(table_2(outcome, units))
-    out.print(verdict(outcome, units), soft_wrap=True)
+        told.print(table_2(outcome, units))
+    told.print(verdict(outcome, units))
+    if "spread" in outcome:
+        told.print(spread_verdict(outcome["spread"], units))
+    if place is not None:
+        for path in shown(place, name, console, units):
+            told.print(str(path))
     return DONE
+
+
+def recorded(settings: Settings, seed: int, path: Path) -> SeedOutcome:
+    """Run the experiment once and record it.
+
+    Raises
+    ------
+    Complaint
+        As `run_seed`, or the file cannot be written.
+    """
+    from drivers.messages import Pose
+    from runtime.experiment import run_seed
+    from runtime.recording.folder import OneFile
+    from runtime.recording.recorder import Recorder
+    from runtime.step import CycleRecord, State
+
+    now = [0.0]
+    with Recorder(settings, OneFile(path), clock=lambda: now[0], queue_max=QUEUE_MAX, emulated=True) as recorder:
+
+        def on_state(record: CycleRecord, state: State, _start: Pose) -> None:
+            now[0] = record.inputs.now_s
+            recorder.on_cycle(record, state)
+
+        if settings.world is None:
+            raise Complaint("there is no world to drive through", WRONG_CALL)
+        outcome = run_seed(settings, settings.world, seed, on_state, recorder.on_bytes)
+        recorder.on_summary(outcome.end)
+    if recorder.standing.trouble is not None or recorder.standing.dropped:
+        why = recorder.standing.trouble or "the disk was too slow"
+        raise Complaint(f"--out: the recording is not whole: {why}; make room or choose another place", FAILED)
+    return outcome
+
+
+def shown(place: Path, name: str, console: Console, units: Units) -> list[Path]:
+    """Draw the recorded run and write its page; return all files."""
+    from runtime.commands.figures import draw_all
+    from runtime.commands.report import report
+    from runtime.trace.sources import Asked
+
+    trace = read(Asked(str(place / f"{name}.mcap")), console)
+    page = place / f"{name}.html"
+    report(trace, page, console, units=units)
+    return [trace.path, page, *draw_all(trace, place, console, moving=True, units=units)]
 
 
 def run_scenes(

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import queue
 import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,21 +12,24 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from config.load import load_settings
+from config.load import ConfigError, load_settings
 from config.settings import Settings
 from runtime import VERSION
 from runtime.advice import advice
 from runtime.commands.firing import refuse_impossible_firing
+from runtime.commands.keeping import Keeping, kept
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
 from runtime.kernels import ready_kernels
-from runtime.logs import open_log
+from runtime.logs import LogStanding, open_log
+from runtime.notify import Notifier
+from runtime.ownership import owned
 from runtime.tables import Units, objects_table, timing_table, timing_verdict
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
-    from drivers.messages import Firing
     from runtime.process import RobotProcess
+    from runtime.reload import Reloader
     from runtime.summary import RunSummary
 
 
@@ -63,6 +64,7 @@ def run_robot(
     seconds: float | None,
     headless: bool,
     record: str | None,
+    no_record: bool,
     json_file: str | None,
     emulation: Emulation,
     units: Units,
@@ -72,19 +74,22 @@ def run_robot(
     refuse_impossible_firing(settings.ring)
     if seconds is not None and not seconds > 0.0:
         raise Complaint(f"--seconds {seconds}: must be above 0", WRONG_CALL)
-    port = port if port is not None else settings.link.port
+    given, port = port, port if port is not None else settings.link.port
     if port is not None:
         settings = on_port(settings, port)
     refuse_unwritable({"--record": record, "--json": json_file})
     console = Console(stderr=True)
     ready_kernels(settings, console)
     live = not headless and console.is_terminal and not console.is_dumb_terminal
+    lines = LogStanding()
     with contextlib.ExitStack() as stack:
-        log = stack.enter_context(open_log(settings.log, terminal=not live))
+        if record is not None:
+            stack.enter_context(owned(Path(record), f"--record {record}"))
+        keeping = stack.enter_context(kept(settings, record, no_record=no_record, emulated=port is None))
+        log = stack.enter_context(open_log(settings.log, terminal=not live, tap=keeping.on_log, standing=lines))
         log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
         for text in advice(settings):
             log.warning(text)
-        on_firing = None if record is None else stack.enter_context(recording(record))
 
         async def whole() -> RunSummary:
             from runtime.emulated import emulator
@@ -95,11 +100,18 @@ def run_robot(
                     emulated = await running.enter_async_context(emulator(emulation.arguments(config, sets)))
                     chosen = on_port(settings, emulated)
                 return await watch(
-                    chosen, log, console, live=live, units=units, on_firing=on_firing,
+                    chosen, log, console, live=live, units=units, keeping=keeping, lines=lines,
                     arm=arm or port is None, seconds=seconds,
+                    propose=lambda: proposed(
+                        config, sets, emulation.world, given, None if port else chosen.link.port
+                    ),
                 )  # fmt: skip
 
         summary = asyncio.run(whole())
+        keeping.on_summary(summary)
+    if keeping.standing is not None:
+        summary["recording"] = keeping.standing
+    summary["log"] = {"lost": lines.lost, "trouble": lines.trouble}
     if json_file is not None:
         from runtime.summary import write_json
 
@@ -108,8 +120,11 @@ def run_robot(
     out.print(objects_table(summary["objects"], units))
     out.print(timing_table(summary))
     out.print(timing_verdict(summary))
+    if lines.lost:
+        out.print(f"{lines.lost} lines of the log are missing: {lines.trouble}; make room or choose another log.file")
     if summary["mode"] == "FAULT":
         raise Complaint(summary["stop_reasons"][-1], FAILED)
+    keeping.complain()
     return DONE
 
 
@@ -130,6 +145,25 @@ def on_port(settings: Settings, port: str) -> Settings:
     return settings.model_copy(update={"link": settings.link.model_copy(update={"port": port})})
 
 
+def proposed(
+    config: str | None, sets: Sequence[str], world: str | None, given: str | None, emulated: str | None
+) -> Settings:
+    """Return the settings as the files hold them now, for a run on a port that was given, or is the emulator's.
+
+    Raises
+    ------
+    ConfigError
+        What is wrong with them, a firing pattern that the ring cannot carry out included.
+    """
+    settings = load_settings(config, sets, world=world)
+    try:
+        refuse_impossible_firing(settings.ring)
+    except Complaint as complaint:
+        raise ConfigError(str(complaint)) from complaint
+    port = given or settings.link.port or emulated
+    return settings if port is None else on_port(settings, port)
+
+
 async def watch(
     settings: Settings,
     log: FilteringBoundLogger,
@@ -137,67 +171,53 @@ async def watch(
     *,
     live: bool,
     units: Units,
-    on_firing: Callable[[Firing], None] | None,
+    keeping: Keeping,
+    lines: LogStanding,
     arm: bool,
     seconds: float | None,
+    propose: Callable[[], Settings],
 ) -> RunSummary:
-    """Run the process under the eyes of the live view, and end it on SIGINT or SIGTERM."""
-    from runtime.process import Observers, RobotProcess
+    """Run the process under the eyes of the live view; it heeds signals and keys, and its parts are watched."""
+    from runtime.process import RobotProcess
+    from runtime.reload import Reloader
     from runtime.view import View, keys
 
     with contextlib.ExitStack() as stack:
         view = View(settings, console, units) if live else None
-        observers = Observers(None if view is None else view.on_cycle, on_firing)
-        process = RobotProcess(settings, log, observers)
-        stack.enter_context(stopping_on_signals(process))
+        observers = keeping.observers(None if view is None else view.on_cycle, log)
+        process = RobotProcess(settings, log, observers, notifier=stack.enter_context(Notifier.from_environment()))
+        reloader = Reloader(settings, propose, process.reconfigure, log)
+        stack.enter_context(signals(process, reloader))
         if view is not None:
             stack.enter_context(view.shown())
             stack.enter_context(keys(process.request, process.stop))
+            process.health.watch("view", view.probe)
+        for name, probe in {"recorder": keeping.probe, "log": lines.probe, "reload": reloader.probe}.items():
+            process.health.watch(name, probe)
         return await process.run(arm=arm, seconds=seconds)
 
 
 @contextlib.contextmanager
-def stopping_on_signals(process: RobotProcess) -> Iterator[None]:
-    """End the run in good order on SIGINT and SIGTERM; SIGUSR1 arms a robot that has no keyboard."""
+def signals(process: RobotProcess, reloader: Reloader) -> Iterator[None]:
+    """Heed signals: INT and TERM end the run in good order, USR1 arms and USR2 halts a robot without a keyboard.
+
+    HUP has the configuration read again; what is wrong with it is told in the log and the last good one kept.
+    """
     from runtime.modes import Request
 
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, process.stop)
-    loop.add_signal_handler(signal.SIGUSR1, process.request, Request.ARM)
+    calls: dict[signal.Signals, Callable[[], None]] = {
+        signal.SIGINT: process.stop,
+        signal.SIGTERM: process.stop,
+        signal.SIGUSR1: lambda: process.request(Request.ARM),
+        signal.SIGUSR2: lambda: process.request(Request.HALT),
+        signal.SIGHUP: reloader.ask,
+    }
+    for number, call in calls.items():
+        loop.add_signal_handler(number, call)
     try:
         yield
     finally:
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1):
+        for number in calls:
             loop.remove_signal_handler(number)
-
-
-@contextlib.contextmanager
-def recording(path: str) -> Iterator[Callable[[Firing], None]]:
-    """Write the run's firings to a ring log, in a thread: a slow disk delays no cycle.
-
-    Raises
-    ------
-    Complaint
-        The file cannot be written.
-    """
-    from runtime.ringlog import RingLogError, write_ring_log
-
-    waiting: queue.SimpleQueue[Firing | None] = queue.SimpleQueue()
-    failures: list[RingLogError] = []
-
-    def work() -> None:
-        try:
-            write_ring_log(Path(path), iter(waiting.get, None))
-        except RingLogError as error:
-            failures.append(error)
-
-    writer = threading.Thread(target=work, name="ring log")
-    writer.start()
-    try:
-        yield waiting.put
-    finally:
-        waiting.put(None)
-        writer.join()
-    if failures:
-        raise Complaint(str(failures[0]), FAILED)
+        reloader.cancel()

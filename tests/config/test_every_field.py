@@ -21,6 +21,7 @@ from config.load import ConfigError, load_model, load_robot, load_settings, load
 from config.model import ModelConfig
 from config.robot import RobotConfig
 from config.settings import Settings
+from config.strict import Strict
 from config.world import WorldConfig
 from tests.config.toml_text import MODEL, ROBOT, RUN, WORLD, document, irregular, toml
 
@@ -82,9 +83,8 @@ def settings_of(root: str, model: type[BaseModel], table: Any, at: tuple[str | i
         location = (*at, key)
         if get_origin(annotation) is tuple:
             yield Setting(root, location, field, "list")
-            item = inner(get_args(annotation)[0])
-            if isinstance(item, type) and issubclass(item, BaseModel) and key in table:
-                yield from settings_of(root, item, table[key][0], (*location, 0))
+            if key in table:
+                yield from entries_of(root, annotation, table[key], location)
         elif get_origin(annotation) is Literal:
             yield Setting(root, location, field, "name")
         elif issubclass(annotation, BaseModel):
@@ -94,7 +94,22 @@ def settings_of(root: str, model: type[BaseModel], table: Any, at: tuple[str | i
             yield Setting(root, location, field, annotation)
 
 
+def entries_of(root: str, annotation: Any, table: Any, at: tuple[str | int, ...]) -> Iterator[Setting]:
+    """Yield what the first entry of a list may be."""
+    entry, location = get_args(annotation)[0], (*at, 0)
+    kind = inner(entry)
+    if get_origin(kind) is tuple:
+        yield Setting(root, location, FieldInfo.from_annotation(entry), "list")
+        yield from entries_of(root, kind, table[0], location)
+    elif issubclass(kind, BaseModel):
+        yield from settings_of(root, kind, table[0], location)
+    else:
+        yield Setting(root, location, FieldInfo.from_annotation(entry), kind)
+
+
 SETTINGS = [s for root, (model, table, _) in ROOTS.items() for s in settings_of(root, model, table)]
+NAMED = [s for s in SETTINGS if isinstance(s.location[-1], str)]
+"""Those that have a name; entries of lists have numbers."""
 NAMES_FILES = (("models",), ("world",))
 """Settings of a run that may also be names, and have defaults: see test_load."""
 
@@ -123,12 +138,53 @@ def test_the_walk_reaches_everything() -> None:
     assert len(paths) > 90
 
 
+def models_within(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Yield every settings model that an annotation leads to, by whatever way."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+        for field in annotation.model_fields.values():
+            yield from models_within(field.annotation)
+    for argument in get_args(annotation):
+        yield from models_within(argument)
+
+
+def strict_models(base: type[Strict] = Strict) -> Iterator[type[Strict]]:
+    for model in base.__subclasses__():
+        yield model
+        yield from strict_models(model)
+
+
+@pytest.mark.promise("P11")
+def test_no_field_of_any_model_is_left_out(record_property: Callable[[str, object], None]) -> None:
+    """So a new setting is tested the day it is added: a branch that the tables above do not open is a failure."""
+    every = {model for root, _, _ in ROOTS.values() for model in models_within(root)}
+    shipped = {m for m in strict_models() if m.__module__.startswith("config.")}
+    assert shipped <= every, "a settings model that no file can hold"
+    wanted = {id(field) for model in every for field in model.model_fields.values()}
+    assert wanted <= {id(s.field) for s in SETTINGS}
+    cases = sum(len(WRONG[s.kind]) for s in SETTINGS) + len(REQUIRED) + len(NAMED) + len(list(bounds()))
+    record_property(
+        "measured", f"{len(wanted)} fields of {len(every)} models, {cases} harmed files, each told in a line"
+    )
+
+
+@pytest.mark.promise("P11")
+def test_every_number_has_a_lower_and_an_upper_bound() -> None:
+    """Without both, a slip of the keyboard overflows somewhere far from the file that it is in."""
+    for setting in SETTINGS:
+        if setting.kind in (int, float):
+            told = [type(bound) for bound in setting.field.metadata]
+            assert {annotated_types.Ge, annotated_types.Gt} & {*told}, f"{setting} has no lower bound"
+            assert {annotated_types.Le, annotated_types.Lt} & {*told}, f"{setting} has no upper bound"
+
+
 @pytest.mark.parametrize("root", ROOTS)
 def test_the_unharmed_table_is_good(root: str, tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(document(ROOTS[root][1]), encoding="utf-8")
     ROOTS[root][2](tmp_path / "mine.toml")
 
 
+@pytest.mark.promise("P11")
 @pytest.mark.parametrize("setting", [s for s in SETTINGS if s.location not in NAMES_FILES], ids=str)
 def test_wrong_type(setting: Setting, tmp_path: Path) -> None:
     for given in WRONG[setting.kind]:
@@ -140,9 +196,10 @@ def test_wrong_type(setting: Setting, tmp_path: Path) -> None:
         assert lines[0].startswith(f"{setting.path} = {shown}: {WANTED[setting.kind]}")
 
 
-REQUIRED = [s for s in SETTINGS if s.field.is_required() and s.location not in NAMES_FILES]
+REQUIRED = [s for s in NAMED if s.field.is_required() and s.location not in NAMES_FILES]
 
 
+@pytest.mark.promise("P11")
 @pytest.mark.parametrize("setting", REQUIRED, ids=str)
 def test_missing(setting: Setting, tmp_path: Path) -> None:
     table = copy.deepcopy(ROOTS[setting.root][1])
@@ -150,7 +207,8 @@ def test_missing(setting: Setting, tmp_path: Path) -> None:
     assert refused(setting, table, tmp_path) == [f"{setting.path}: missing"]
 
 
-@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+@pytest.mark.promise("P11")
+@pytest.mark.parametrize("setting", NAMED, ids=str)
 def test_misspelt(setting: Setting, tmp_path: Path) -> None:
     table = copy.deepcopy(ROOTS[setting.root][1])
     key = str(setting.location[-1])
@@ -176,6 +234,7 @@ def bounds() -> Iterator[tuple[Setting, float, str]]:
                     yield setting, constraint.le + step, "must be at most "
 
 
+@pytest.mark.promise("P11")
 @pytest.mark.parametrize(("setting", "value", "wanted"), list(bounds()), ids=str)
 def test_out_of_bounds(setting: Setting, value: float, wanted: str, tmp_path: Path) -> None:
     table = copy.deepcopy(ROOTS[setting.root][1])

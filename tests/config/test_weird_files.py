@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from pathlib import Path
 
 import pytest
@@ -40,11 +41,11 @@ def complaint(path: str | Path) -> str:
         ("a = 1".encode("utf-16"), "line 1: byte 0xff is not UTF-8 text"),
         (b"a = " + b"[" * 5000, "lists or tables are nested too deeply"),
         (b"a = " + b"[" * 40 + b"]" * 40, "a.0.0.…: lists or tables are nested too deeply"),
-        (b".".join([b"a"] * 3000) + b" = 1", "a.a.a.…: lists or tables are nested too deeply"),
+        (b".".join([b"a"] * 3000) + b" = 1", "line 1: a.a.a.…: lists or tables are nested too deeply"),
         (b"a = " + b"9" * 6000, "holds a number with far too many digits"),
         (b"[ring]\ncount = 0x" + b"f" * 60, "ring.count: an integer beyond 64 bits"),
         (b"[ring]\ncount = 9223372036854775808", "ring.count: an integer beyond 64 bits"),
-        (b"#" * (SIZE_MAX + 1), "larger than 1 MiB, so not a settings file"),
+        (b"#" * (SIZE_MAX + 1), "larger than 256 KiB, so not a settings file"),
     ],
 )
 def test_not_settings(data: bytes, wanted: str, tmp_path: Path) -> None:
@@ -109,3 +110,29 @@ def test_an_endless_device() -> None:
     if not Path("/dev/zero").exists():
         pytest.skip("no such device here")
     assert complaint("/dev/zero").startswith("/dev/zero: larger than")
+
+
+@pytest.mark.promise("P14")
+def test_a_pipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a shell's <(…) gives is read to its end; one on which nobody writes is not waited for for ever."""
+    path = tmp_path / "pipe.toml"
+    os.mkfifo(path)
+    monkeypatch.setattr("config.files.PIPE_WAIT_S", 0.05)
+    reader = os.open(path, os.O_RDWR)
+    try:
+        assert complaint(path) == f"{path}: is a pipe from which nothing came for 0.05 s; give a file"
+    finally:
+        os.close(reader)
+    monkeypatch.undo()
+    read, write = os.pipe()
+    text = document(ROBOT).encode() + b"#" * 200_000  # more than a pipe holds
+    worker = threading.Thread(target=write_all, args=(write, text))
+    worker.start()
+    assert load_robot(f"/dev/fd/{read}").body.radius_m == 0.4
+    worker.join()
+    os.close(read)
+
+
+def write_all(fd: int, data: bytes) -> None:
+    with open(fd, "wb") as file:
+        file.write(data)

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.denning import frames
 from drivers.denning.codec import FRAME_MAX, Decoder, crc, encode
 from drivers.denning.frames import Ack, Drive, Echo, Frame, Halt, Hello, Ident, NakCode, Odom, Pattern
 from tests.drivers.vectors import BAD, GOOD, Side
@@ -120,6 +121,30 @@ def test_a_name_that_is_no_text_is_no_identity() -> None:
         assert decoder.rejected == [(0, NakCode.VALUE_OUT_OF_RANGE)]
 
 
+def test_an_identity_with_another_length_of_name_is_none() -> None:
+    body = bytes((0x81, 0, 1, 24, 125, 1, 244, 1, 20, 0, 7, 0, 0, 0))
+    for name in (b"", b"x" * 15, b"x" * 17):
+        decoder = Decoder("robot")
+        assert decoder.feed(stuffed(body + name)) == []
+        assert decoder.rejected == [(0, NakCode.WRONG_LENGTH)]
+
+
+def test_a_name_keeps_its_last_letter_and_what_cannot_be_sent_becomes_a_question() -> None:
+    for name, heard in (("BOX", "BOX"), ("", ""), ("\ud800", "?")):
+        (ident,) = Decoder("robot").feed(encode(Ident(0, 1, 24, 381, 500, 20, 7, name)))
+        assert isinstance(ident, Ident)
+        assert ident.name == heard
+
+
+def test_the_longest_pattern_and_the_nearest_echo() -> None:
+    longest = Pattern(0, 50, 255, tuple(range(1, 25)))
+    assert Decoder("host").feed(encode(longest)) == [longest]
+    for tenths in range(1, 5):
+        decoder = Decoder("robot")
+        assert decoder.feed(stuffed(bytes((0x91, 0, 0, 0, 0, 0, 0, 1, 0, 0, tenths)))) == []
+        assert decoder.rejected == [(0, NakCode.VALUE_OUT_OF_RANGE)]
+
+
 def test_gaps_in_the_sequence_are_counted_across_the_wrap() -> None:
     decoder = Decoder("host")
     for seq in (250, 251, 255, 0, 2, 2):
@@ -207,6 +232,7 @@ ODOM = Odom(0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
         (Echo(0, 0, 0, 3, (9,)), "Echo.tenths_ft", "asks for 2"),
         (Echo(0, 0, 0, 3, (9, 4)), "Echo.tenths_ft[1]", "5 to 255"),
         (Ident(0, 1, 24, 1, 1, 1, 1, "x" * 17), "Ident.name", "16 bytes"),
+        (Ident(0, 1, 24, 1, 1, 1, 1, "a\0b"), "Ident.name", "without a zero"),
     ],
 )
 def test_what_does_not_fit_is_refused_by_name(frame: Frame, field: str, limits: str) -> None:
@@ -228,3 +254,15 @@ def test_the_end_of_a_frame_that_was_under_way_when_the_line_opened_is_no_bad_fr
     decoder = Decoder("robot", midway=midway)
     decoder.feed(b"\xff" * 1000 + b"\0")
     assert decoder.bad == 1, "no frame is as long as that"
+
+
+def test_the_numbers_of_the_protocol() -> None:
+    """A robot elsewhere has them too."""
+    assert [(code.name, int(code)) for code in NakCode] == [
+        ("UNKNOWN_TYPE", 1), ("WRONG_LENGTH", 2), ("VALUE_OUT_OF_RANGE", 3), ("LATCHED", 4),
+    ]  # fmt: skip
+    assert (frames.VERSION, frames.SENSORS_MAX, frames.MASKS_MAX) == (1, 24, 24)
+    assert (frames.WINDOW_MIN, frames.WINDOW_MAX) == (5, 255)
+    assert (frames.FAULT, frames.TENTHS_MIN, frames.TENTHS_MAX, frames.NO_ECHO) == (0, 5, 254, 255)
+    assert frames.TENTH_FT_M == 0.03048
+    assert FRAME_MAX == 128

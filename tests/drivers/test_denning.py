@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -27,6 +28,7 @@ from drivers.denning.frames import (
 )
 from drivers.denning.robot import DenningRobot
 from drivers.driver import LineState, RobotDriver
+from drivers.firing import FiringError
 from drivers.messages import Flags, LinkCounts, Pose, Twist
 from tests.drivers.vectors import OCTETS
 
@@ -55,6 +57,7 @@ class Bench:
         self.robot = DenningRobot(config)
         self.now = 100.0
         self.ident = IDENT
+        self.last_drive = 0
         self._ears = Decoder("host")
         self._seq = 0
 
@@ -264,7 +267,7 @@ def test_a_refused_pattern_is_trouble(code: int, text: str) -> None:
         raise AssertionError(bench.robot.trouble)
 
 
-def test_the_newest_drive_wins_and_is_saturated(bench: Bench) -> None:
+def test_the_newest_drive_wins_and_is_held_to_the_limits_of_the_body(bench: Bench) -> None:
     bench.robot.drive(Twist(0.1, 0.2))
     bench.robot.drive(Twist(0.3054, -0.25))
     (drive,) = bench.heard()
@@ -274,7 +277,18 @@ def test_the_newest_drive_wins_and_is_saturated(bench: Bench) -> None:
     bench.robot.drive(Twist(1e9, -1e9))
     (drive,) = bench.heard()
     assert isinstance(drive, Drive)
-    assert (drive.v_mm_s, drive.w_mrad_s) == (32767, -32768)
+    assert (drive.v_mm_s, drive.w_mrad_s) == (600, -1000)
+
+
+def test_a_limit_is_not_passed_by_rounding() -> None:
+    body = CONFIG.body.model_copy(update={"speed_max_m_s": 0.3057, "turn_max_rad_s": 40.0})
+    bench = Bench(CONFIG.model_copy(update={"body": body}))
+    bench.open()
+    bench.greet()
+    bench.robot.drive(Twist(0.3057, 39.0))
+    (drive,) = bench.heard()
+    assert isinstance(drive, Drive)
+    assert (drive.v_mm_s, drive.w_mrad_s) == (305, 32767)
 
 
 @pytest.mark.parametrize("twist", [Twist(math.nan, 0.0), Twist(0.0, math.inf)])
@@ -484,6 +498,93 @@ def test_an_echo_that_nothing_places_is_dropped_and_counted(bench: Bench) -> Non
     assert [f.t_s for f in bench.robot.take().firings] == pytest.approx([1.1])
 
 
+@pytest.mark.promise("P8")
+def test_late_doubled_and_out_of_window_echoes_go_no_further(measured: Callable[[str], None]) -> None:
+    """Every echo once more, once late, and ranges beyond the window in between."""
+    window = 50
+    near = CONFIG.ring.model_copy(
+        update={"firing": FiringConfig(preset="octets", window_m=window * 0.03048, step_period_s=0.02)}
+    )
+    bench = Bench(CONFIG.model_copy(update={"ring": near}))
+    bench.open()
+    bench.greet()
+    good: list[Echo] = []
+    t_us = 0
+    bench.odom(t_us)
+    for k in range(200):
+        t_us += PERIOD_US
+        mask = OCTETS[k % 3]
+        tenths = tuple(window + 1 + k if (i + k) % 4 == 0 else 255 if i % 3 else window - i for i in range(8))
+        echo = Echo(0, t_us - 5_000, k % 3, mask, tuple(min(t, 254) if t != 255 else 255 for t in tenths))
+        bench.now += 0.02
+        bench.odom(t_us)
+        bench.say(echo, echo)
+        if good:
+            bench.say(good[-1])
+        good.append(echo)
+    firings = bench.robot.take().firings
+    assert [f.t_s for f in firings] == pytest.approx([1e-6 * echo.t_us for echo in good])
+    for firing in firings:
+        heard = firing.ranges_m[np.isfinite(firing.ranges_m)]
+        assert (heard <= window * 0.03048 + 1e-9).all()
+        assert heard.size + np.isinf(firing.ranges_m).sum() == 6, "the others are kept"
+    assert bench.robot.late_echoes == 200 + 199
+    assert bench.robot.out_of_window == (200 + 200 + 199) * 2
+    measured(
+        f"200 firings, each echo twice and once late, a quarter of the ranges beyond the window: {len(firings)} "
+        f"firings and 0 such ranges came through"
+    )
+
+
+def test_a_wider_window_counts_from_the_pattern_on_and_a_narrower_one_after_it(bench: Bench) -> None:
+    t_us = bench.run(0.4, t_us=0)
+    far = Echo(0, t_us - 5_000, 0, OCTETS[0], (200,) * 8)
+    narrow = CONFIG.ring.model_copy(update={"firing": FiringConfig(preset="octets", window_m=2.0)})
+    bench.robot.set_firing(narrow)
+    bench.say(far)
+    assert np.isfinite(bench.robot.take().firings[-1].ranges_m).sum() == 8, "an echo of the pattern before"
+    t_us = bench.run(0.4, t_us=t_us)
+    bench.say(replace(far, t_us=t_us - 5_000))
+    assert np.isnan(bench.robot.take().firings[-1].ranges_m).all()
+
+
+@pytest.mark.promise("P9")
+@pytest.mark.parametrize(("x", "heading"), [(3048, 0), (-3048, 0), (50_000, 0), (0, 5000), (3048, -20_000)])
+def test_a_leap_of_the_odometry_is_taken_out_and_told(bench: Bench, x: int, heading: int) -> None:
+    """Poses go on as the wheels say; the robot's own odometry is `frame` away."""
+    t_us = bench.run(0.4, t_us=0)
+    bench.robot.take()
+    for _ in range(2):  # one that leaps very far is asked who it is, and answers
+        t_us += PERIOD_US
+        bench.pass_time(0.02)
+        bench.odom(t_us, x_0p1mm=x, heading_1em4rad=heading, ring_yaw_1em4rad=heading)
+        bench.answer()
+        bench.answer()
+    heard = bench.robot.take()
+    assert heard.odometry is not None
+    assert heard.odometry.pose == Pose(0.0, 0.0, 0.0)
+    assert heard.odometry.ring_yaw == 0.0
+    (note,) = heard.notes
+    assert "leapt" in note
+    assert "check wheels" in note
+    frame = bench.robot.frame
+    assert (frame.x, frame.y, frame.theta) == pytest.approx((x * 1e-4, 0.0, heading * 1e-4))
+    assert not heard.rebooted
+
+
+def test_a_base_that_moves_in_leaps_is_believed(bench: Bench) -> None:
+    """One whose odometry comes in steps, or that is faster than its file says, does not leap: it moves so."""
+    t_us = 0
+    for k in range(100):
+        t_us += PERIOD_US
+        bench.pass_time(0.02)
+        bench.odom(t_us, x_0p1mm=2000 * (k // 3))
+    heard = bench.robot.take()
+    assert heard.odometry is not None
+    assert heard.odometry.pose.x == pytest.approx(6.6)
+    assert heard.notes == ()
+
+
 def test_echoes_without_odometry_do_not_pile_up(bench: Bench) -> None:
     bench.odom(0)
     for k in range(200):
@@ -541,16 +642,95 @@ def test_silence_is_down_and_motion_does_not_resume_by_itself(bench: Bench) -> N
     t_us = bench.run(1.0, t_us=0)
     assert bench.state() is LineState.READY
     bench.robot.drive(Twist(0.1, 0.0))
-    bench.pass_time(0.49)
+    bench.pass_time(0.39)
     assert bench.state() is LineState.READY
     bench.robot.release()
     bench.pass_time(0.02)
     assert bench.state() is LineState.DOWN
-    assert "nothing heard for 0.51 s" in (bench.robot.trouble or "")
+    assert "nothing heard for 0.41 s" in (bench.robot.trouble or "")
     assert bench.heard() == []
     bench.run(1.0, t_us=t_us + 600_000)
     assert bench.state() is LineState.READY
     assert only(bench.heard(), Drive) == []
+
+
+def drive_on(bench: Bench, seconds: float, t_us: int, *, deaf: bool = False, flags: int = 0) -> int:
+    """Drive at 20 Hz with a robot that names the DRIVE it took last, but for the time that it is deaf."""
+    last = bench.last_drive
+    for _ in range(round(seconds / 0.05)):
+        bench.robot.drive(Twist(0.1, 0.0))
+        taken = [frame.seq for frame in bench.answer() if isinstance(frame, Drive)]
+        last = last if deaf else taken[-1] if taken else last
+        bench.now += 0.05
+        t_us += 50_000
+        bench.odom(t_us, last_drive_seq=last, flags=flags)
+        bench.say(Echo(0, t_us, 0, 1, (10,)))
+        bench.robot.tick(bench.now)
+    bench.last_drive = last
+    return t_us
+
+
+def test_a_robot_that_talks_on_but_takes_no_drive_is_down(bench: Bench) -> None:
+    t_us = drive_on(bench, 1.0, 0)
+    assert bench.state() is LineState.READY
+    drive_on(bench, 0.3, t_us, deaf=True)
+    assert bench.state() is LineState.READY
+    drive_on(bench, 0.1, t_us + 300_000, deaf=True)
+    assert bench.state() is LineState.DOWN
+    assert "can be heard and has not taken a DRIVE for 0.35 s" in (bench.robot.trouble or "")
+    assert "check the cable" in (bench.robot.trouble or "")
+
+
+def test_a_robot_that_never_names_the_drive_it_took_is_not_held_to_it(bench: Bench) -> None:
+    drive_on(bench, 30.0, 0, deaf=True)
+    assert bench.state() is LineState.READY
+
+
+def test_a_latched_robot_takes_no_drive_and_that_is_no_trouble(bench: Bench) -> None:
+    t_us = drive_on(bench, 1.0, 0)
+    drive_on(bench, 2.0, t_us, deaf=True, flags=1)
+    assert bench.state() is LineState.READY
+
+
+def test_lost_frames_are_no_deafness(bench: Bench) -> None:
+    t_us = drive_on(bench, 1.0, 0)
+    for _ in range(20):
+        t_us = drive_on(bench, 0.25, t_us, deaf=True)
+        t_us = drive_on(bench, 0.05, t_us)
+    assert bench.state() is LineState.READY
+
+
+@pytest.mark.parametrize("boot_id", [IDENT.boot_id, 0xB002])
+def test_a_robot_whose_ring_has_fallen_silent_is_asked_who_it_is(bench: Bench, boot_id: int) -> None:
+    """A restart just as the clock wraps shows in nothing but that: the pattern is gone, and the odometry goes on."""
+    t_us = bench.run(0.45, t_us=2**32 - 500_000)
+    bench.robot.take()
+    bench.ident = replace(IDENT, boot_id=boot_id)
+    heard: list[Frame] = []
+    for _ in range(10):
+        t_us += PERIOD_US
+        bench.now += 0.02
+        bench.odom(t_us)
+        bench.robot.tick(bench.now)
+        heard += bench.answer()
+    heard += bench.answer()
+    restarted = boot_id != IDENT.boot_id
+    assert [type(frame) for frame in heard] == ([Hello, Pattern] if restarted else [Hello])
+    assert bench.robot.take().rebooted == restarted
+    assert bench.state() is LineState.READY
+    assert bench.robot.trouble is None
+
+
+def test_a_silent_ring_is_asked_about_at_a_modest_pace(bench: Bench) -> None:
+    hellos, t_us = 0, 0
+    for _ in range(500):
+        t_us += PERIOD_US
+        bench.now += 0.02
+        bench.odom(t_us)
+        bench.robot.tick(bench.now)
+        hellos += len(only(bench.heard(), Hello))
+    assert bench.state() is LineState.READY, "nobody need answer"
+    assert 15 <= hellos <= 20
 
 
 def test_missing_odometry_alone_is_down_too(bench: Bench) -> None:
@@ -559,6 +739,15 @@ def test_missing_odometry_alone_is_down_too(bench: Bench) -> None:
         bench.say(Echo(0, 5, 0, 1, (10,)))
     assert bench.state() is LineState.DOWN
     assert "no odometry" in (bench.robot.trouble or "")
+
+
+def test_an_echo_just_after_the_last_odometry_does_not_make_it_a_robot_that_talks(bench: Bench) -> None:
+    t_us = bench.run(0.2, t_us=0)
+    bench.pass_time(0.01)
+    bench.say(Echo(0, t_us, 0, 1, (10,)))
+    bench.pass_time(0.4)
+    assert bench.state() is LineState.DOWN
+    assert "nothing heard" in (bench.robot.trouble or "")
 
 
 def test_a_restart_between_two_lines_is_noticed(bench: Bench) -> None:
@@ -673,3 +862,40 @@ def test_firings_nobody_takes_do_not_pile_up(bench: Bench) -> None:
     firings = bench.robot.take().firings
     assert len(firings) == 1024
     assert firings[-1].t_s == pytest.approx(1099 * 0.02)
+
+
+def test_another_firing_pattern_while_it_drives(bench: Bench) -> None:
+    ring = CONFIG.ring.model_copy(update={"firing": FiringConfig(preset="quadrants", step_period_s=0.06)})
+    bench.robot.set_firing(CONFIG.ring)
+    assert bench.heard() == [], "the one under way is not said again"
+    bench.robot.set_firing(ring)
+    (pattern,) = only(bench.answer(), Pattern)
+    assert isinstance(pattern, Pattern)
+    assert (len(pattern.masks), pattern.step_period_ms) == (6, 60)
+    assert bench.state() is LineState.READY
+    bench.robot.closed()
+    bench.open()
+    (again,) = only([*bench.answer(), *bench.answer()], Pattern)
+    assert replace(again, seq=pattern.seq) == pattern, "kept for the next line"
+
+
+def test_another_firing_pattern_before_the_first_is_taken() -> None:
+    """An answer to the first must not pass for one to the second."""
+    bench = Bench()
+    bench.open()
+    bench.answer()
+    (first,) = only(bench.heard(), Pattern)
+    ring = CONFIG.ring.model_copy(update={"firing": FiringConfig(preset="quadrants", step_period_s=0.06)})
+    bench.robot.set_firing(ring)
+    bench.say(Ack(0, first.seq))
+    assert bench.state() is LineState.GREETING
+    assert len(only(bench.answer(), Pattern)) == 1
+    assert bench.state() is LineState.READY
+
+
+def test_a_firing_pattern_that_cannot_be(bench: Bench) -> None:
+    ring = CONFIG.ring.model_copy(update={"firing": FiringConfig(sets=((40,),))})
+    with pytest.raises(FiringError):
+        bench.robot.set_firing(ring)
+    assert bench.heard() == []
+    assert bench.state() is LineState.READY

@@ -37,7 +37,7 @@ from drivers.emulator.device import EmulatedRobot
 from drivers.emulator.faults import Fault, FaultScript, load_faults
 from drivers.emulator.memory import MemoryLine
 from drivers.emulator.uart import QUEUE_MAX, Uart
-from drivers.messages import Flags, Identity, LinkCounts, Twist
+from drivers.messages import Flags, Identity, LinkCounts, Pose, Twist
 
 F = TypeVar("F", bound=Frame)
 OCTETS = tuple(0b1_0000_0001_0000_0001 << k for k in range(8))
@@ -691,10 +691,16 @@ class PlainDriver:
 
     def release(self) -> None: ...
 
+    def set_firing(self, ring: RingConfig) -> None: ...
+
     def outgoing(self, *, writable: bool) -> bytes:
         assert writable
         out, self._out = self._out, b""
         return out
+
+    @property
+    def frame(self) -> Pose:
+        return Pose(0.0, 0.0, 0.0)
 
     @property
     def waiting(self) -> int:

@@ -37,6 +37,19 @@ def test_presets_fire_every_sensor_once_equally_spaced(preset: Preset, steps: in
     assert (pattern.step_period_s, pattern.window_m) == (0.05, 7.7724)
 
 
+def test_alternating_gives_every_sensor_other_partners() -> None:
+    masks = [set(sensors(mask)) for mask in firing_pattern(ring(FiringConfig(preset="alternating"))).masks]
+    for i in range(24):
+        (first, second) = (mask - {i} for mask in masks if i in mask)
+        assert first
+        assert second
+        assert not first & second
+    with pytest.raises(
+        FiringError, match="fires 8 or 3 sensors at a time, equally spaced, and 16 sensors do not divide"
+    ):
+        firing_pattern(ring(FiringConfig(preset="alternating"), count=16))
+
+
 def test_presets_are_those_of_the_protocol() -> None:
     assert firing_pattern(ring(FiringConfig(preset="octets"))).masks == OCTETS
     assert firing_pattern(ring(FiringConfig(preset="thirds"))).masks == THIRDS
@@ -66,21 +79,25 @@ def test_time_of_flight_is_there_and_back() -> None:
     assert time_of_flight_s(3.43) == pytest.approx(0.02)
 
 
-def test_a_step_shorter_than_its_window_says_what_would_do() -> None:
-    firing = FiringConfig(preset="octets", step_period_s=0.02)
+@pytest.mark.parametrize(("step_s", "range_max_m"), [(0.02, 7.7724), (0.0203, 100.0)])
+def test_a_step_shorter_than_its_window_says_what_would_do(step_s: float, range_max_m: float) -> None:
+    def with_step(step_period_s: float, window_m: float | None = None) -> RingConfig:
+        firing = FiringConfig(preset="octets", step_period_s=step_period_s, window_m=window_m)
+        return ring(firing, 24, range_max_m)
+
     with pytest.raises(FiringError, match="shorter than sound takes") as caught:
-        firing_pattern(ring(firing))
+        firing_pattern(with_step(step_s))
     text = str(caught.value)
     shortest = float(re.findall(r"step_period_s at least ([0-9.]+)", text)[0])
     longest = float(re.findall(r"window_m at most ([0-9.]+)", text)[0])
-    assert shortest == pytest.approx(time_of_flight_s(7.7724), abs=1e-4)
-    assert longest == pytest.approx(3.43, abs=1e-3)
-    firing_pattern(ring(FiringConfig(preset="octets", step_period_s=shortest)))
-    firing_pattern(ring(FiringConfig(preset="octets", step_period_s=0.02, window_m=longest)))
+    assert time_of_flight_s(range_max_m) <= shortest < time_of_flight_s(range_max_m) + 1e-4 + 1e-9
+    assert time_of_flight_s(longest) <= step_s + 1e-9 < time_of_flight_s(longest + 1e-3) + 1e-9
+    firing_pattern(with_step(shortest))
+    firing_pattern(with_step(step_s, longest))
     with pytest.raises(FiringError):
-        firing_pattern(ring(FiringConfig(preset="octets", step_period_s=shortest - 2e-4)))
+        firing_pattern(with_step(shortest - 2e-4))
     with pytest.raises(FiringError):
-        firing_pattern(ring(FiringConfig(preset="octets", step_period_s=0.02, window_m=longest + 2e-3)))
+        firing_pattern(with_step(step_s, longest + 2e-3))
 
 
 def test_a_step_exactly_as_long_as_its_window_will_do() -> None:

@@ -12,13 +12,13 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from drivers.emulator.trace import HEADER
 from drivers.messages import Flags
+from tests.hil.machine import PATIENCE_S
 
 ROOT = Path(__file__).parents[2]
-PATIENCE_S = 40.0
-"""For what must come at once on any machine; only a failing test waits so long."""
 DRIVING_M_S = 0.2
 DEADMAN_S = 0.5
 
@@ -35,6 +35,8 @@ def wait_for(done: Callable[[], bool], what: str) -> None:
 class Row:
     """A row of the truth trace."""
 
+    t_s: float
+    """The robot's own time, which does not go on where the emulator stands still."""
     host_s: float
     v: float
     w: float
@@ -50,9 +52,14 @@ def rows(trace: Path) -> list[Row]:
     if not trace.exists():
         return []
     names = HEADER.split(",")
-    of = [names.index(name) for name in ("host_s", "v_m_s", "w_rad_s", "flags")]
+    t, host, v, w, flags = (names.index(name) for name in ("t_s", "host_s", "v_m_s", "w_rad_s", "flags"))
     cells = (line.split(",") for line in trace.read_text().split("\n")[1:-1])
-    return [Row(float(c[of[0]]), float(c[of[1]]), float(c[of[2]]), Flags(int(c[of[3]]))) for c in cells]
+    return [Row(float(c[t]), float(c[host]), float(c[v]), float(c[w]), Flags(int(c[flags]))) for c in cells]
+
+
+def robot_time(trace: Path, host_s: float) -> float:
+    """Return the robot's time at a moment of the host's clock that the trace has come to, s."""
+    return max(row.t_s for row in rows(trace) if row.host_s <= host_s)
 
 
 def is_driving(trace: Path) -> bool:
@@ -65,6 +72,13 @@ def reaches(trace: Path, host_s: float) -> bool:
     """Say whether the trace has come to a moment of the host's clock."""
     now = rows(trace)
     return bool(now) and now[-1].host_s >= host_s
+
+
+class Signalled(NamedTuple):
+    """A signal was sent between these two moments of the host's clock."""
+
+    before_s: float
+    after_s: float
 
 
 @dataclass
@@ -87,11 +101,11 @@ class Running:
     def complaints(self) -> list[str]:
         return [line for line in self.err.splitlines() if line.startswith("echolocate: ")]
 
-    def signal(self, number: signal.Signals) -> float:
-        """Send a signal; return the host's time just before."""
-        now_s = time.monotonic()
+    def signal(self, number: signal.Signals) -> Signalled:
+        """Send a signal; a busy machine may let some time pass in between."""
+        before_s = time.monotonic()
         self.process.send_signal(number)
-        return now_s
+        return Signalled(before_s, time.monotonic())
 
     def end(self) -> int:
         """Wait for its own end and return the exit code."""

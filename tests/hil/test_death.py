@@ -11,7 +11,19 @@ from pathlib import Path
 import pytest
 
 from drivers.messages import Flags
-from tests.hil.running import DEADMAN_S, Row, emulated, is_driving, reaches, rows, running, wait_for
+from tests.hil.machine import stalls_excused
+from tests.hil.running import (
+    DEADMAN_S,
+    Row,
+    Signalled,
+    emulated,
+    is_driving,
+    reaches,
+    robot_time,
+    rows,
+    running,
+    wait_for,
+)
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
@@ -19,49 +31,53 @@ STOPPED_WITHIN_S = DEADMAN_S + 0.3
 """The deadman, and the ramp down to a stop."""
 
 
-def check_stop(trace: Path, since_s: float, until_s: float) -> None:
-    """Assert that the wheels stand still from `STOPPED_WITHIN_S` after `since_s` on."""
+def check_stop(trace: Path, sent: Signalled, until_s: float) -> None:
+    """Assert that the wheels stand still from `STOPPED_WITHIN_S` after a signal on, by the robot's own clock."""
     wait_for(lambda: reaches(trace, until_s), "the end of the trace")
-    seen = [row for row in rows(trace) if since_s <= row.host_s <= until_s]
+    begin_s = robot_time(trace, sent.after_s)
+    seen = [row for row in rows(trace) if sent.before_s <= row.host_s <= until_s]
     assert max(row.v for row in seen) > 0.2, "it drove when it happened"
     moving: list[Row] = [row for row in seen if not row.still]
-    late = [row for row in moving if row.host_s > since_s + STOPPED_WITHIN_S]
-    assert not late, f"still moving {late[-1].host_s - since_s:.3f} s later"
-    logging.getLogger(__name__).info("still %.3f s later", moving[-1].host_s - since_s)
+    late = [row for row in moving if row.t_s > begin_s + STOPPED_WITHIN_S]
+    assert not late, f"still moving {late[-1].t_s - begin_s:.3f} s later"
+    logging.getLogger(__name__).info("still %.3f s later", moving[-1].t_s - begin_s)
 
 
+@stalls_excused
 def test_killed_while_driving_on_a_port(tmp_path: Path) -> None:
     with emulated(tmp_path) as robot, running(tmp_path, "run", "run", "--port", robot.port, "--arm") as run:
         wait_for(lambda: is_driving(robot.trace), "driving")
-        killed_s = run.signal(signal.SIGKILL)
+        killed = run.signal(signal.SIGKILL)
         run.process.wait()
-        check_stop(robot.trace, killed_s, killed_s + 2.0)
+        check_stop(robot.trace, killed, killed.after_s + 2.0)
         assert rows(robot.trace)[-1].flags & Flags.DEADMAN
 
 
+@stalls_excused
 def test_killed_while_driving_on_its_own_emulator(tmp_path: Path) -> None:
     """The emulator sees its robot to a stop and then ends by itself."""
     trace = tmp_path / "trace.csv"
     with running(tmp_path, "run", "run", "--trace", str(trace)) as run:
         wait_for(lambda: is_driving(trace), "driving")
-        killed_s = run.signal(signal.SIGKILL)
+        killed = run.signal(signal.SIGKILL)
         run.process.wait()
-        check_stop(trace, killed_s, killed_s + 2.0)
+        check_stop(trace, killed, killed.after_s + 2.0)
         wait_for(lambda: rows(trace)[-1].host_s < time.monotonic() - 1.0, "the emulator's own end")
 
 
+@stalls_excused
 @pytest.mark.parametrize("stopped_s", [1.0, 3.5], ids=["one second", "longer than the pty's buffer lasts"])
 def test_stopped_while_driving_and_continued(tmp_path: Path, stopped_s: float) -> None:
     path = tmp_path / "summary.json"
     command = ["run", "--arm", "--json", str(path)]
     with emulated(tmp_path) as robot, running(tmp_path, "run", *command, "--port", robot.port) as run:
         wait_for(lambda: is_driving(robot.trace), "driving")
-        since_s = run.signal(signal.SIGSTOP)
-        check_stop(robot.trace, since_s, since_s + max(stopped_s, STOPPED_WITHIN_S + 0.1))
+        stopped = run.signal(signal.SIGSTOP)
+        check_stop(robot.trace, stopped, stopped.after_s + max(stopped_s, STOPPED_WITHIN_S + 0.1))
         assert rows(robot.trace)[-1].flags & Flags.DEADMAN
-        continued_s = run.signal(signal.SIGCONT)
+        continued = run.signal(signal.SIGCONT)
         run.comes_to("SAFE_STOP")
-        check_stop(robot.trace, since_s, continued_s + 1.5)
+        check_stop(robot.trace, stopped, continued.after_s + 1.5)
         assert run.modes() == ["READY", "DRIVE", "SAFE_STOP"]
         assert rows(robot.trace)[-1].flags & Flags.LATCHED
 

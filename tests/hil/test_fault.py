@@ -15,9 +15,11 @@ from runtime.emulated import emulator
 from runtime.logs import open_log
 from runtime.process import Observers, RobotProcess
 from runtime.step import CycleRecord, State
+from tests.hil.machine import PATIENCE_S, stalls_excused
 from tests.hil.running import rows
 
 
+@stalls_excused
 @pytest.mark.realtime
 @pytest.mark.usefixtures("warm_kernels")
 async def test_a_cycle_that_fails_halts_the_base_and_ends_in_fault(tmp_path: Path) -> None:
@@ -29,7 +31,7 @@ async def test_a_cycle_that_fails_halts_the_base_and_ends_in_fault(tmp_path: Pat
     async with emulator(["--trace", str(trace)]) as port:
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
             process = RobotProcess(on_port(load_settings("hallway"), port), log, Observers(on_cycle=fail))
-            summary = await process.run(arm=True, seconds=20.0)
+            summary = await process.run(arm=True, seconds=PATIENCE_S)
     assert summary["mode"] == "FAULT"
     assert summary["cycles"] == 39
     assert "ZeroDivisionError: planted" in summary["stop_reasons"][-1]

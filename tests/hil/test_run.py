@@ -18,7 +18,18 @@ from drivers.messages import Flags
 from runtime.books import Books
 from runtime.pacing import Pacer
 from runtime.rhythm import LATE_SHARE
-from tests.hil.running import Emulated, Running, emulated, is_driving, reaches, rows, running, wait_for
+from tests.hil.machine import BareStarts, stalls_excused
+from tests.hil.running import (
+    Emulated,
+    Running,
+    emulated,
+    is_driving,
+    reaches,
+    robot_time,
+    rows,
+    running,
+    wait_for,
+)
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
@@ -27,6 +38,8 @@ SETTINGS = load_settings("hallway")
 PERIOD_S = 1.0 / SETTINGS.cycle.rate_hz
 DRIVE_S = 26
 """Down the hallway and out of it; the drums are all known by then."""
+STARTS_MAX = 12
+"""So many bare starts of Python with numba, each as slow as the slowest beside it; an idle machine needs five."""
 
 
 async def bare_loop(running_too: Running) -> Books:
@@ -35,6 +48,7 @@ async def bare_loop(running_too: Running) -> Books:
     while running_too.process.poll() is None:
         start_s = time.monotonic()
         books.enter(0.0, start_s - pacer.deadline_s)
+        books.missed += max(0, math.floor((start_s - pacer.deadline_s) / PERIOD_S))
         await asyncio.sleep(max(0.0, pacer.advance(time.monotonic()) - time.monotonic()))
     return books
 
@@ -45,6 +59,7 @@ def summary_of(path: Path) -> dict[str, Any]:
     return got
 
 
+@stalls_excused
 def test_six_drums_in_real_time_beside_a_bare_loop(tmp_path: Path) -> None:
     path = tmp_path / "summary.json"
     with running(tmp_path, "run", "run", "--seconds", str(DRIVE_S), "--json", str(path)) as run:
@@ -66,42 +81,52 @@ def test_six_drums_in_real_time_beside_a_bare_loop(tmp_path: Path) -> None:
     assert summary["link"]["frames"] > 50 * DRIVE_S
     assert (summary["link"]["bad"], summary["link"]["lost"]) == (0, 0)
     assert (summary["mode"], summary["stop_reasons"]) == ("DRIVE", [])
-    assert summary["cycles"] + summary["missed"] == pytest.approx(DRIVE_S / PERIOD_S, abs=2)
     figures = {"late": summary["late"], "bare late": bare.late, "lag": summary["lag_us"], "bare lag": bare.lag_us(),
-               "cycle": summary["cycle_us"], "errors": errors, "missed": summary["missed"]}  # fmt: skip
+               "cycle": summary["cycle_us"], "errors": errors, "missed": summary["missed"],
+               "bare missed": bare.missed, "cycles": summary["cycles"]}  # fmt: skip
     logging.getLogger(__name__).info("%s", figures)
-    # The margin: one cycle in fifty. The loop that drives also has bytes to read when its deadline comes.
-    assert summary["late"] <= bare.late + 0.02 * summary["cycles"], figures
-    assert summary["missed"] <= 2, figures
-    assert summary["lag_us"]["p50"] <= bare.lag_us()["p50"] + 2000.0, figures
+    # The margin: one cycle in fifty. The loop that drives also has bytes to read when its deadline comes, and where
+    # the emulator is held up the ring's next echo, and with it the cycle, comes that much later.
+    margin = 0.02 * DRIVE_S / PERIOD_S
+    assert summary["cycles"] + summary["missed"] == pytest.approx(DRIVE_S / PERIOD_S, abs=margin), figures
+    assert summary["late"] <= bare.late + margin, figures
+    assert summary["missed"] <= bare.missed + margin, figures
+    # A tenth of a period beyond the bare loop: half a period is what a timer that knows nothing of the ring costs.
+    assert summary["lag_us"]["p50"] <= bare.lag_us()["p50"] + 0.1e6 * PERIOD_S, figures
 
 
 def drive(folder: Path, robot: Emulated, name: str = "run", *more: str) -> Any:
     return running(folder, name, "run", "--port", robot.port, *more)
 
 
+@stalls_excused
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupt_halts_the_base_before_the_end(tmp_path: Path, number: signal.Signals) -> None:
     path = tmp_path / "summary.json"
     with emulated(tmp_path) as robot:
         with drive(tmp_path, robot, "run", "--arm", "--json", str(path)) as run:
             wait_for(lambda: is_driving(robot.trace), "driving")
-            signalled_s = run.signal(number)
-            assert run.end() == 0
-            ended_s = time.monotonic()
+            with BareStarts() as bare:
+                signalled = run.signal(number)
+                assert run.end() == 0
+                ended_s = time.monotonic()
         wait_for(lambda: reaches(robot.trace, ended_s + 0.3), "trace beyond the end")
-        latched_s = next(row.host_s for row in rows(robot.trace) if row.flags & Flags.LATCHED)
-        assert signalled_s - 0.1 < latched_s < ended_s, "the base latched before the program ended"
-        after = [row for row in rows(robot.trace) if row.host_s > latched_s + 0.15]
+        latched = next(row for row in rows(robot.trace) if row.flags & Flags.LATCHED)
+        signalled_at_s = robot_time(robot.trace, signalled.before_s)
+        assert latched.t_s > signalled_at_s - 0.02, "it halted before it was told to"
+        assert latched.host_s < ended_s, "the base latched before the program ended"
+        after = [row for row in rows(robot.trace) if row.t_s > latched.t_s + 0.15]
         assert after
         assert all(row.still and row.flags & Flags.LATCHED for row in after)
-        assert ended_s - signalled_s < 3.0
+        # Half a second at most for the halt, a fifth for the last bytes, and to take a Python down.
+        assert ended_s - signalled.after_s < 1.0 + STARTS_MAX * bare.longest_s
     assert run.complaints == []
     summary = summary_of(path)
     assert summary["mode"] == "DRIVE"
     assert summary["link"]["bad"] == 0
 
 
+@stalls_excused
 def test_unarmed_it_waits_until_it_is_armed_and_drives_only_then(tmp_path: Path) -> None:
     with emulated(tmp_path) as robot, drive(tmp_path, robot) as run:
         run.comes_to("READY")
@@ -117,6 +142,7 @@ def test_unarmed_it_waits_until_it_is_armed_and_drives_only_then(tmp_path: Path)
         assert run.complaints == []
 
 
+@stalls_excused
 def test_two_runs_in_a_row_on_the_same_robot(tmp_path: Path) -> None:
     """The first leaves the base latched and bytes in the pty; the second releases it and drives on."""
     with emulated(tmp_path) as robot:
@@ -131,12 +157,16 @@ def test_two_runs_in_a_row_on_the_same_robot(tmp_path: Path) -> None:
             summary = summary_of(path)
             assert (summary["mode"], summary["stop_reasons"]) == ("DRIVE", [])
             assert (summary["link"]["bad"], summary["link"]["lost"]) == (0, 0)
-            assert rows(robot.trace)[-1].flags & Flags.LATCHED
+            wait_for(lambda: bool(rows(robot.trace)[-1].flags & Flags.LATCHED), "the halt of its end")
 
 
-def test_from_start_to_first_cycle_within_five_seconds(tmp_path: Path) -> None:
-    with emulated(tmp_path) as robot:
+@stalls_excused
+def test_from_start_to_first_cycle_takes_as_long_as_a_few_bare_starts(tmp_path: Path) -> None:
+    with emulated(tmp_path) as robot, BareStarts() as bare:
         begun_s = time.monotonic()
         with drive(tmp_path, robot) as run:
             run.comes_to("READY")
-            assert time.monotonic() - begun_s < 5.0
+            took_s = time.monotonic() - begun_s
+    logging.getLogger(__name__).info("%.2f s, a bare start %.2f s", took_s, bare.longest_s)
+    # On an idle machine, whose bare start is 0.35 s, that is five seconds.
+    assert took_s < 1.0 + STARTS_MAX * bare.longest_s

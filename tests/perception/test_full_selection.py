@@ -20,6 +20,7 @@ from perception.full.state import (
     NRES,
     PASSED,
     POLISH,
+    PROB,
     PX,
     PY,
     QUIET,
@@ -50,7 +51,7 @@ def shared() -> State:
 def alike(s: State, evidence: int = 10) -> State:
     """Make all tracks worth the same: at one place, with one covariance and as much evidence."""
     s.ti[:, ST], s.ti[:, NRES], s.ti[:, DIRTY] = ESTABLISHED, 100, evidence
-    s.tf[:, [R00, R11]] = 0.001
+    s.tf[:, [R00, R11]], s.tf[:, PROB] = 0.001, 1.0
     return s
 
 
@@ -62,10 +63,11 @@ def test_the_rule_against_its_oracle() -> None:
         s.ti[:, [DIRTY, POLISH]] *= rng.integers(2)
         s.ti[:, PASSED] = rng.integers(selection.PATIENCE + 4, size=TRACKS) * rng.integers(2)
         s.tf[:, [TX, TY]], s.tf[:, [R00, R11]] = rng.normal(0, 4, (TRACKS, 2)), rng.uniform(0, 0.02, (TRACKS, 2))
+        s.tf[:, PROB] = rng.uniform(0.9, 1.0, TRACKS)
         s.g[[HERE_X, HERE_Y]] = rng.normal(0, 4, 2)
         i, f, passed = s.ti, s.tf, s.ti[:, PASSED].copy()
         want, waits = naive_tracks.next_in_turn(
-            i[:, ST] != FREE, i[:, DIRTY], i[:, NRES], f[:, [R00, R11]].max(axis=1),
+            i[:, ST] != FREE, i[:, DIRTY], i[:, NRES], f[:, [R00, R11]].max(axis=1), f[:, PROB],
             (i[:, QUIET] > P.quiet) & (i[:, POLISH] > 0), np.hypot(*(f[:, [TX, TY]] - s.g[[HERE_X, HERE_Y]]).T),
             passed, THRESHOLD, P.range_max,
         )  # fmt: skip

@@ -20,6 +20,7 @@ from perception.full.state import (
     BORN,
     C00,
     C11,
+    CALLED,
     CAP,
     CYC,
     DIRTY,
@@ -41,6 +42,8 @@ from perception.full.state import (
     PPROB,
     PROB,
     PT,
+    PXX,
+    PYY,
     QUIET,
     R00,
     R11,
@@ -519,22 +522,28 @@ def test_what_is_sure_is_reported() -> None:
         for t in range(TRACKS):
             random_track(rng, s, t)
         s.ti[:, KIND] = rng.integers(0, 2, TRACKS)
-        s.tf[:, PROB] = rng.uniform(0.9, 1, TRACKS)
+        s.tf[:, PROB] = rng.uniform(0.4, 1, TRACKS)
         s.tf[:, UNK] = s.tf[:, LLR] / rng.uniform(1, 1.4, TRACKS)
         s.tf[:, [C00, C11]] = rng.uniform(0, 0.07, (TRACKS, 2)) ** 2
         s.comp[...] = rng.uniform(-60, -15, s.comp.shape)
+        s.comp[:, -2] = rng.choice([0.0, -3.9, -4.1, -30.0], TRACKS)
+        s.tf[:, SPAN] = rng.uniform(0.004, 0.03, TRACKS)
+        s.ti[:, CALLED] = rng.integers(0, 2, TRACKS)
         want = [
             t for t in range(TRACKS)
-            if naive_tracks.is_sure_circle(
-                s.ti[t, ST] == ESTABLISHED, s.ti[t, KIND] < P.models, s.tf[t, PROB], 0.92,
-                np.delete(s.comp[t], s.ti[t, KIND]).tolist(), s.tf[t, LLR], s.tf[t, UNK],
+            if naive_tracks.is_called(
+                s.ti[t, CALLED] == 1, s.ti[t, ST] == ESTABLISHED, s.ti[t, KIND] < P.models, s.tf[t, PROB], 0.92, 0.7,
+                np.delete(s.comp[t], s.ti[t, KIND]).tolist(), s.comp[t, -2], s.tf[t, SPAN], s.tf[t, LLR],
+                s.tf[t, UNK],
                 s.tf[t, [C00, C11]].tolist(),
             )
         ]  # fmt: skip
-        n = report.sure_circles(s.ti, s.tf, s.comp, P.models, 0.92, out)
+        for t in range(TRACKS):
+            report.call_or_not(s.ti, s.tf, s.comp, P.models, 0.92, 0.7, t)
+        n = report.sure_circles(s.ti, out)
         assert out[:n].tolist() == want
         sure += n
-    assert sure > 500
+    assert sure > 200
 
 
 def test_polygons_are_sure_when_seen_from_near_and_from_two_sides() -> None:
@@ -544,17 +553,20 @@ def test_polygons_are_sure_when_seen_from_near_and_from_two_sides() -> None:
         kept = []
         for t in range(PT):
             s.pi[t, ST] = rng.choice([TENTATIVE, ESTABLISHED])
-            s.pf[t, PPROB], s.pf[t, PHITS] = rng.uniform(0.85, 1), rng.uniform(15, 60)
-            w = around(rng, int(rng.integers(0, 30)), np.zeros(2), 0.2)
+            s.pf[t, PPROB], s.pf[t, PHITS] = rng.uniform(0.85, 1), rng.uniform(10, 40)
+            s.pf[t, PXX], s.pf[t, PYY] = rng.uniform(0, 0.005, 2)
+            w = around(rng, int(rng.integers(0, 120)), np.zeros(2), 0.2)
             w[:, 4] += rng.choice([0.0, 1.8])
             w[:, 2:4] = unit(rng.uniform(0, 7) + rng.normal(0, rng.uniform(0, 0.5), len(w)))
             for i, q in enumerate(w):
-                s.pbins[t, i % 3, s.pbn[t, i % 3] % PCAP] = q
-                s.pbn[t, i % 3] += 1
+                s.pbins[t, i % 10, s.pbn[t, i % 10] % PCAP] = q
+                s.pbn[t, i % 10] += 1
             kept.append(w)
         want = [
             t for t in range(PT)
-            if naive_tracks.is_sure_polygon(s.pi[t, ST] == ESTABLISHED, s.pf[t, PPROB], 0.9, s.pf[t, PHITS], kept[t])
+            if naive_tracks.is_sure_polygon(
+                s.pi[t, ST] == ESTABLISHED, s.pf[t, PPROB], 0.9, s.pf[t, PHITS], s.pf[t, [PXX, PYY]].tolist(), kept[t]
+            )
         ]  # fmt: skip
         n = report.sure_polygons(s.pi, s.pf, s.pbn, s.pbins, 0.9, out)
         assert out[:n].tolist() == want

@@ -6,6 +6,8 @@ Seeds 101 and 202 were not looked at while the constants were chosen.
 from __future__ import annotations
 
 import json
+import re
+import time
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +18,9 @@ from config.settings import Settings
 from config.world import WorldConfig
 from runtime.cli import call
 from runtime.commands.experiment import one_way
-from runtime.complaint import DONE, FAILED, Complaint
+from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
 from runtime.experiment import run_seed, summarise
+from runtime.recording.reading import open_recording
 
 pytestmark = pytest.mark.compiled
 
@@ -63,12 +66,44 @@ def test_the_papers_hallway(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
 @pytest.mark.realtime
 @pytest.mark.usefixtures("warm_kernels")
 def test_twenty_times_as_fast_as_the_robot(tmp_path: Path) -> None:
-    best = 0.0
-    for _ in range(3):  # the wall clock of a busy machine
-        best = max(best, experiment(tmp_path, "hallway")["times_real_time"])
-        if best >= 20.0:
-            return
-    assert best >= 20.0
+    begin_s, begin_cpu_s = time.monotonic(), time.process_time()
+    outcome = experiment(tmp_path, "hallway")
+    wall_s, cpu_s = time.monotonic() - begin_s, time.process_time() - begin_cpu_s
+    # By the processor's clock: what others do on this machine meanwhile costs nothing here.
+    assert outcome["times_real_time"] * wall_s / cpu_s >= 20.0, (wall_s, cpu_s)
+
+
+def test_an_experiment_leaves_recording_pictures_and_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    outcome = experiment(tmp_path, "irregular", "--seeds", "3", "--out", str(out))
+    told = capsys.readouterr().out
+    spread = outcome["spread"]
+    assert spread["seeds"] == 3
+    assert spread["mean"] == pytest.approx(outcome["mean_error"], rel=0.2)
+    assert spread["worst"] == outcome["max_error"]
+    of_worst = outcome["drums"][8 * spread["worst_seed"] : 8 * spread["worst_seed"] + 8]
+    assert max(row["error"] or 0.0 for row in of_worst) == spread["worst"]
+    assert 0.0 < spread["deviation"] < spread["worst"]
+    assert "3 seeds: mean error" in told
+    files = {path.name for path in out.iterdir()}
+    kinds = ("svg", "pdf", "png")
+    pictures = {f"{name}.{kind}" for name in ("raw", "segments", "clusters", "models") for kind in kinds}
+    assert files >= {"irregular.mcap", "irregular.html", "overview.gif", *pictures}
+    assert all(str(out / name) in told for name in files)
+    recorded = out / "irregular.mcap"
+    assert call(["replay", str(recorded), "--verify"]) == DONE
+    with open_recording(recorded) as recording:
+        assert recording.world == load_settings("irregular").world
+    # The recording is the run of seed 0, and the page tells its errors.
+    page = (out / "irregular.html").read_text("utf-8")
+    truth = next(row for row in outcome["drums"][:8] if row["error"] is not None)
+    assert f"{truth['error'] / FT:.3f}" in page
+    assert "as the paper's Figure 13" in re.sub(r"<[^>]*>", "", page)
+
+
+def test_scenes_record_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["experiment", "hallway", "--scene", "clean", "--out", str(tmp_path)]) == WRONG_CALL
+    assert "nothing to record" in capsys.readouterr().err
 
 
 def test_the_same_seed_gives_the_same_outcome(tmp_path: Path) -> None:

@@ -117,6 +117,23 @@ def test_transition(before: ModeState, seen: Situation, mode: Mode, reason: str 
         assert after.since_s == NOW
 
 
+def test_a_part_that_has_failed_ends_every_mode_but_a_fault_and_an_arm_changes_nothing() -> None:
+    seen = replace(QUIET, unwell="the part `link` has ended")
+    for before in (CONNECTING, READY, DRIVE, STOPPED, arming(READY, WAITED), arming(STOPPED, WAITED)):
+        after = advance(before, seen)
+        assert (after.mode, after.reason, after.since_s) == (Mode.SAFE_STOP, seen.unwell, NOW)
+        assert after.arming_s is None
+        later = replace(seen, now_s=NOW + 0.05)
+        assert advance(after, later) == after, "it is entered once"
+        armed = advance(after, replace(later, request=Request.ARM))
+        assert armed == ModeState(Mode.SAFE_STOP, NOW + 0.05, seen.unwell), "and told again to whoever arms"
+        lost = replace(later, line=LineState.CLOSED)
+        assert advance(after, lost) == after
+        assert "halted by the operator" in str(advance(after, replace(later, request=Request.HALT)).reason)
+    assert advance(FAULT, seen) == FAULT
+    assert advance(DRIVE, replace(seen, line=LineState.CLOSED)).reason == seen.unwell, "the cause, not what it does"
+
+
 def test_the_table_shows_every_mode_from_every_other_that_leads_there() -> None:
     shown = {(before.mode, mode) for before, _, mode, _, _ in TRANSITIONS}
     everywhere = {
@@ -175,3 +192,35 @@ def test_cycles_that_overrun_too_often_stop_a_drive_and_end_an_arming() -> None:
     assert (arming.mode, arming.reason) == (Mode.SAFE_STOP, reason)
     assert advance(ModeState(Mode.READY, NOW - 5.0), seen).mode is Mode.READY
     assert advance(ModeState(Mode.DRIVE, NOW - 5.0), replace(seen, request=Request.HALT)).reason != reason
+
+
+@pytest.mark.parametrize(
+    ("before", "seen", "mode"),
+    [
+        (replace(READY, arming_s=0.0), replace(QUIET, now_s=ARMING_MIN_S), Mode.DRIVE),
+        (replace(READY, arming_s=0.0), replace(flags(Flags.LATCHED), now_s=ARMING_MAX_S), Mode.READY),
+        (replace(READY, arming_s=0.0), replace(QUIET, now_s=1.0, gap_s=GAP_MAX_S), Mode.DRIVE),
+        (replace(DRIVE, since_s=0.0), replace(flags(Flags.DEADMAN), now_s=DEADMAN_GRACE_S), Mode.DRIVE),
+    ],
+    ids=["waited just long enough", "the latch has its whole second", "a gap as long as may be", "grace to its end"],
+)
+def test_to_the_very_end_of_a_patience(before: ModeState, seen: Situation, mode: Mode) -> None:
+    assert advance(before, seen).mode is mode
+
+
+def test_patience_in_seconds() -> None:
+    """The protocol sends odometry every 20 ms and its deadman is half a second; an operator waits for one."""
+    assert (ARMING_MIN_S, ARMING_MAX_S, DEADMAN_GRACE_S, GAP_MAX_S) == (0.1, 1.0, 0.5, 0.45)
+
+
+def test_modes_and_requests_are_called_what_logs_and_summaries_call_them() -> None:
+    assert [mode.value for mode in Mode] == ["CONNECTING", "READY", "DRIVE", "SAFE_STOP", "FAULT"]
+    assert [request.value for request in Request] == ["arm", "halt"]
+
+
+def test_a_mode_entered_again_is_entered() -> None:
+    assert (CONNECTING.mode, CONNECTING.since_s) == (Mode.CONNECTING, 0.0)
+    assert not DRIVE.entered_since(DRIVE)
+    assert not replace(DRIVE, arming_s=1.0, reason="another").entered_since(DRIVE)
+    assert DRIVE.enter(Mode.DRIVE, NOW).entered_since(DRIVE)
+    assert STOPPED.entered_since(DRIVE)

@@ -18,8 +18,9 @@ from drivers.driver import Heard, LineState
 from drivers.messages import Firing, Flags, Odometry, Pose, Twist
 from perception.paper import PaperPerception
 from perception.pipeline import Perception
+from runtime.allowance import enough_quanta
 from runtime.modes import Mode, ModeState, Request
-from runtime.simulate import enough_quanta, simulate
+from runtime.simulate import simulate
 from runtime.step import STANDSTILL, Command, CycleRecord, Inputs, Order, State, step
 
 SETTINGS = load_settings("hallway", ["perception.method=paper"])

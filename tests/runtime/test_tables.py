@@ -85,7 +85,8 @@ def test_where_the_time_went_and_by_whose_fault() -> None:
     }  # fmt: skip
     summary: RunSummary = {
         "objects": [], "cycles": 240, "process": cost, "cycle_us": spread, "late": 7, "missed": 1, "lag_us": spread,
-        "link": {"frames": 0, "bad": 0, "lost": 0}, "mode": "DRIVE", "stop_reasons": [], "timing": timing,
+        "link": {"frames": 0, "bad": 0, "lost": 0}, "sensors": [], "mode": "DRIVE", "stop_reasons": [],
+        "timing": timing,
     }  # fmt: skip
     console = Console(record=True, width=110, file=io.StringIO(), color_system=None)
     console.print(timing_table(summary))

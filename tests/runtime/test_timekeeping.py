@@ -303,24 +303,27 @@ def test_the_meter_tells_work_from_sleep() -> None:
     while meter.read().thread_s - slept.thread_s < 0.02:
         pass
     worked = meter.read()
-    assert worked.thread_s - slept.thread_s <= worked.process_s - slept.process_s + 0.001
+    # The clocks are read one after another.
+    assert worked.thread_s - slept.thread_s <= worked.process_s - slept.process_s + 0.01
 
 
 def hold(watch: Watch) -> None:
-    while watch.seen is None:
+    # Set in here: whoever runs when it rings is seen, and a busy machine may let it ring at once.
+    watch.expect(0.01)
+    end_s = time.monotonic() + 60.0
+    while watch.seen is None and time.monotonic() < end_s:
         pass
 
 
 async def test_the_watch_names_the_callback_that_holds_the_loop() -> None:
     watch = Watch()
     with watch.on_duty():
-        watch.expect(0.01)
         asyncio.get_running_loop().call_soon(hold, watch)
-        async with asyncio.timeout(30.0):
+        async with asyncio.timeout(60.0):
             while watch.seen is None:
                 await asyncio.sleep(0.001)
-        assert watch.seen == ("hold", "hold")
-        watch.expect(30.0)
+        assert watch.seen in {("hold", "hold"), ("hold", "Watch.expect")}
+        watch.expect(600.0)
         assert watch.seen is None
 
 
@@ -335,7 +338,7 @@ async def test_the_watch_sees_nobody_where_the_loop_sleeps() -> None:
     watch._look = counted  # type: ignore[method-assign, assignment]
     with watch.on_duty():
         watch.expect(0.005)
-        async with asyncio.timeout(30.0):
+        async with asyncio.timeout(60.0):
             while not looks:
                 await asyncio.sleep(0.2)
     assert watch.seen is None or watch.seen.callback.startswith("test_the_watch_sees_nobody")

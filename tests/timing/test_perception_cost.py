@@ -14,8 +14,11 @@ import pytest
 
 from config.load import load_settings
 from drivers.messages import Firing
+from perception.full import entry, refine
+from perception.full.method import FullPerception
 from perception.pipeline import Perception
-from runtime.simulate import enough_quanta, simulate
+from runtime.allowance import enough_quanta
+from runtime.simulate import simulate
 from runtime.step import CycleRecord, State, step
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
@@ -92,6 +95,26 @@ def test_the_cost_does_not_grow_with_the_way(records: list[CycleRecord]) -> None
         medians.append(float(np.median(costs)))
     assert max(medians) <= MEDIAN_MS, medians
     assert medians[-1] <= 3.0 * medians[0] + 0.2, medians
+
+
+def test_a_handle_goes_over_for_less_than_two_tuples() -> None:
+    """A call that finds nothing to do costs what handing over costs: by the handle about a fifth."""
+    perception = FullPerception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception.full)
+    s, p = perception.memory, perception.settings
+    handle, never, costs = entry.hold(s, p), 1e9, []
+    for _ in range(200):
+        spent = []
+        calls: tuple[Callable[[], bool], ...]
+        calls = (lambda: entry.quantum(handle, never)), (lambda: refine.quantum(s, p, never))
+        for call in calls:
+            call()
+            begin_ns = time.thread_time_ns()
+            for _ in range(20):
+                call()
+            spent.append(time.thread_time_ns() - begin_ns)
+        costs.append(spent)
+    by_handle, by_tuples = np.median(costs, axis=0)
+    assert by_handle < 0.5 * by_tuples, (by_handle, by_tuples)
 
 
 class VirtualClock:

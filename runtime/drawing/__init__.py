@@ -1,0 +1,1 @@
+"""Pictures of a run as the paper draws them; the only place that knows matplotlib."""

@@ -1,0 +1,49 @@
+"""How pictures look: one ink, the Okabe-Ito colours that everybody can tell apart, and never colour alone."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import Any, Final
+
+INK: Final = "#1c1c1c"
+MUTED: Final = "#6e6e6e"
+GRID: Final = "#e3e3e3"
+PAPER: Final = "#ffffff"
+THING: Final = "#cfcfcf"
+"""What stood there."""
+ECHO: Final = "#0072b2"
+SEGMENT: Final = "#d55e00"
+CLUSTER: Final = "#009e73"
+MODEL: Final = "#0072b2"
+ROBOT: Final = "#cc79a7"
+
+WIDTH_IN: Final = 7.2
+"""Of a picture; two columns of a page."""
+DPI: Final = 200
+
+RC: Final[MappingProxyType[str, Any]] = MappingProxyType(
+    {
+        "font.family": "DejaVu Sans",
+        "font.size": 9.0,
+        "axes.edgecolor": MUTED,
+        "axes.labelcolor": INK,
+        "axes.linewidth": 0.8,
+        "axes.titlesize": 11.0,
+        "axes.titleweight": "bold",
+        "axes.titlelocation": "left",
+        "axes.grid": True,
+        "axes.axisbelow": True,
+        "figure.facecolor": PAPER,
+        "axes.facecolor": PAPER,
+        "grid.color": GRID,
+        "grid.linewidth": 0.6,
+        "text.color": INK,
+        "xtick.color": INK,
+        "ytick.color": INK,
+        "legend.frameon": False,
+        "legend.fontsize": 8.5,
+        "pdf.fonttype": 42,
+        "svg.hashsalt": "echolocate",
+    }
+)
+"""matplotlib's settings; `svg.hashsalt` makes the same run the same file."""

@@ -1,0 +1,159 @@
+"""The loop's side of a recording: what happened is handed over as it is, and the loop goes on.
+
+Handing over is an append to a queue. Only now and then is more asked of the loop: once a second a copy of the map,
+half a second later the objects, and once in a while, as a keyframe, a copy of everything that is remembered; all of
+it after the command has been sent.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from importlib.metadata import version
+from types import TracebackType
+from typing import Any, Final
+
+from llvmlite.binding import get_host_cpu_name
+
+from config.settings import Settings
+from runtime import VERSION
+from runtime.kernels import kernels_key
+from runtime.recording.channels import CYCLE, KEYFRAME, LOG, OBJECTS, SEGMENTS, SERIAL, SETTINGS, SUMMARY
+from runtime.recording.folder import Place
+from runtime.recording.forms import FORMAT, About, LogLine, RunEnd, left_by
+from runtime.recording.writer import QUEUE_MAX, Item, Moment, RecordingWriter, Reloaded, Standing
+from runtime.step import CycleRecord, State
+
+MOMENT_S: Final = 1.0
+"""So often the map and the objects are recorded, as changes."""
+
+
+def made_by() -> dict[str, str]:
+    """Return what the last bit of a result may depend on besides its inputs."""
+    return {
+        "echolocate": VERSION,
+        "python": platform.python_version(),
+        "numpy": version("numpy"),
+        "numba": version("numba"),
+        "kernels": kernels_key(),
+        "compiled": "no" if os.environ.get("NUMBA_DISABLE_JIT", "0") not in {"", "0"} else "yes",
+        "processor": f"{platform.machine()} {get_host_cpu_name()}",
+    }
+
+
+def about(settings: Settings, clock: Callable[[], float], *, emulated: bool) -> About:
+    """Return what stands at the beginning of a recording that begins now."""
+    return About(
+        format=FORMAT,
+        settings=settings.model_dump(mode="json"),
+        made_by=made_by(),
+        started=datetime.now(UTC).isoformat(timespec="seconds"),
+        unix_minus_host_ns=time.time_ns() - round(1e9 * clock()),
+        part=1,
+        emulated=emulated,
+    )
+
+
+class Recorder:
+    """Takes everything that a run does and has it written; a context in which the writing goes on.
+
+    Parameters
+    ----------
+    settings : Settings
+        Of the run.
+    place : Place
+        Where the recording goes.
+    clock : callable
+        The host's clock of the run: monotonic, s.
+    queue_max : int
+        Items that may wait; what does not fit is dropped and counted.
+    emulated : bool
+        Whether the settings' world is what the robot meets.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        place: Place,
+        clock: Callable[[], float] = time.monotonic,
+        queue_max: int = QUEUE_MAX,
+        *,
+        emulated: bool = False,
+    ) -> None:
+        self._clock = clock
+        self._queue_max = queue_max
+        self._moment_cycles = max(1, round(MOMENT_S * settings.cycle.rate_hz))
+        self._keyframe_s = settings.recording.keyframe_period_s
+        self._writer = RecordingWriter(place, about(settings, clock, emulated=emulated))
+        self._last_keyframe_s: float | None = None
+        self._gap = False
+        self._cycle = 0
+
+    def __enter__(self) -> Recorder:
+        self._writer.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._writer.stop()
+
+    @property
+    def standing(self) -> Standing:
+        """How the recording stands."""
+        return self._writer.standing
+
+    def probe(self) -> str | None:
+        """Say how its thread ended; None while it runs. See `runtime.health`."""
+        return self._writer.probe()
+
+    def on_cycle(self, record: CycleRecord, state: State) -> None:
+        """Take a cycle, just over."""
+        now_s = record.inputs.now_s
+        self._cycle = record.cycle
+        self._hand(CYCLE, now_s, record)
+        if self._last_keyframe_s is None:
+            self._last_keyframe_s = now_s
+        room = len(self._writer.queue) < self._queue_max
+        due = self._gap or self._writer.wants_keyframe or now_s - self._last_keyframe_s >= self._keyframe_s
+        if due and room:
+            self._gap = self._writer.wants_keyframe = False
+            self._last_keyframe_s = now_s
+            seen = state.perception
+            whole = Moment(record.cycle, seen.segments_now(), seen.objects(), left_by(state), seen.snapshot())
+            self._hand(KEYFRAME, now_s, whole)
+        elif record.cycle % self._moment_cycles == 0:
+            self._hand(SEGMENTS, now_s, Moment(record.cycle, segments=state.perception.segments_now()))
+        elif record.cycle % self._moment_cycles == self._moment_cycles // 2:
+            self._hand(OBJECTS, now_s, Moment(record.cycle, objects=state.perception.objects()))
+
+    def on_bytes(self, way: str, host_s: float, data: bytes) -> None:
+        """Take bytes that came or went over the line."""
+        self._hand(SERIAL[way], host_s, data)
+
+    def on_settings(self, settings: Settings) -> None:
+        """Take settings that are in force from the next cycle on; never dropped, for what follows hangs on them."""
+        self._writer.queue.append(Item(SETTINGS, self._clock(), Reloaded(self._cycle + 1, settings)))
+
+    def on_summary(self, summary: Mapping[str, Any]) -> None:
+        """Take what the run says of itself at its end."""
+        self._writer.queue.append(Item(SUMMARY, self._clock(), RunEnd.model_construct(summary=dict(summary))))
+
+    def on_log(self, event: Mapping[str, Any]) -> None:
+        """Take a line of the log."""
+        fields = {name: value for name, value in event.items() if name not in {"level", "event", "timestamp"}}
+        line = LogLine.model_construct(
+            level=str(event.get("level", "info")), event=str(event.get("event", "")),
+            fields={name: str(value) for name, value in fields.items()},
+        )  # fmt: skip
+        self._hand(LOG, self._clock(), line)
+
+    def _hand(self, topic: str, host_s: float, what: object) -> None:
+        if len(self._writer.queue) < self._queue_max:
+            self._writer.queue.append(Item(topic, host_s, what))
+        else:
+            self._writer.drop()
+            self._gap = self._gap or topic == CYCLE

@@ -1,0 +1,108 @@
+"""The same echoes with other settings: what would have been seen, and where the robot would have stopped.
+
+The robot's way is as it was recorded; only what the program makes of the echoes, and what it would have commanded,
+is new.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from config.settings import Settings
+from config.world import WorldConfig
+from drivers.messages import Pose
+from perception.pipeline import SeenObject
+from runtime.allowance import enough_quanta
+from runtime.experiment import against_truth
+from runtime.modes import Mode
+from runtime.recording.channels import CYCLE, SETTINGS, Entry, decode
+from runtime.recording.forms import Cycle, SettingsChange
+from runtime.recording.reading import Recording, RecordingError, settings_in
+from runtime.recording.rerun import again, fresh_state
+from runtime.step import Command, CycleRecord, State, step
+from runtime.summary import ObjectRow, object_row
+
+
+@dataclass(slots=True)
+class Story:
+    """One telling of a run."""
+
+    objects: list[ObjectRow] = field(default_factory=list)
+    errors_m: list[float | None] | None = None
+    """Of each drum, None where it was not seen; no list where the world is not known."""
+    false: int = 0
+    stops: list[tuple[float, str]] = field(default_factory=list)
+    """When, in seconds after the first cycle, and why."""
+
+
+@dataclass(slots=True)
+class Retold:
+    """A run as it was, and as it would have been."""
+
+    was: Story = field(default_factory=Story)
+    would_be: Story = field(default_factory=Story)
+    cycles: int = 0
+    other_commands: int = 0
+    first_other_s: float | None = None
+
+
+def retell(recording: Recording, settings: Settings, on_entry: Callable[[Entry], None] | None = None) -> Retold:
+    """Run the step over a recording with its own settings and with others, side by side.
+
+    Raises
+    ------
+    RecordingError
+        The other settings are of another ring.
+    """
+    mine, others = recording.settings, len(settings.ring.mounts)
+    if others != len(mine.ring.mounts):
+        raise RecordingError(
+            f"{recording.path}: was made with a ring of {len(mine.ring.mounts)} sensors, and these settings are of "
+            f"one of {others}: name settings of the same robot"
+        )
+    told, was, would_be = Retold(), fresh_state(mine), fresh_state(settings)
+    begun_s = None
+    for entry in recording.entries():
+        if on_entry is not None:
+            on_entry(entry)
+        if entry.topic == SETTINGS:
+            mine = settings_in(decode(SettingsChange, entry.data).settings)
+            was.perception.adopt(mine.perception)
+        if entry.topic != CYCLE:
+            continue
+        record = decode(Cycle, entry.data).record
+        begun_s = record.inputs.now_s if begun_s is None else begun_s
+        at_s = record.inputs.now_s - begun_s
+        first = again(was, record, mine)
+        second = step(would_be, record.inputs, settings, _ignore, enough_quanta)
+        told.cycles += 1
+        _note_stop(told.was, first, at_s)
+        _note_stop(told.would_be, second, at_s)
+        if first.command != second.command:
+            told.other_commands += 1
+            told.first_other_s = at_s if told.first_other_s is None else told.first_other_s
+    _sum_up(told.was, was, recording.world)
+    _sum_up(told.would_be, would_be, recording.world)
+    return told
+
+
+def _ignore(command: Command) -> None:
+    """Carry nothing out."""
+
+
+def _note_stop(story: Story, record: CycleRecord, at_s: float) -> None:
+    if record.mode.mode is Mode.SAFE_STOP and record.mode.since_s == record.inputs.now_s:
+        story.stops.append((at_s, record.mode.reason or ""))
+
+
+def _sum_up(story: Story, state: State, world: WorldConfig | None) -> None:
+    seen: tuple[SeenObject, ...] = state.perception.objects()
+    story.objects = [object_row(one) for one in seen]
+    if world is None or not world.drum:
+        return
+    start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
+    places = [start.compose(Pose(one.x, one.y, one.theta)) for one in seen]
+    rows, story.false = against_truth(world, [(p.x, p.y) for p in places])
+    story.errors_m = [row["error"] for row in rows]

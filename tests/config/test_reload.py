@@ -1,0 +1,173 @@
+"""A running process takes a changed configuration over whole or keeps the last good one, whatever the file holds."""
+
+from __future__ import annotations
+
+import copy
+import random
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import BaseModel
+
+from config.load import ConfigError, load_settings
+from config.reload import LIVE, Difference, differences, reload
+from config.settings import Settings
+from tests.config.test_every_field import SETTINGS, Setting, holder
+from tests.config.toml_text import MODEL, RUN, document
+
+RELOADS = 10_000
+
+
+def every_path(model: type[BaseModel], at: str = "") -> Iterator[str]:
+    for key, field in model.model_fields.items():
+        yield f"{at}{key}"
+        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+            yield from every_path(field.annotation, f"{at}{key}.")
+
+
+def settings_from(folder: Path, table: dict[str, Any]) -> Settings:
+    path = folder / "run.toml"
+    path.write_text(document(table), encoding="utf-8")
+    return load_settings(path)
+
+
+def test_whatever_is_declared_live_exists() -> None:
+    assert set(every_path(Settings)) >= LIVE
+
+
+def test_what_a_process_is_built_from_is_not_live() -> None:
+    fixed = """
+        link.port link.baud ring.count ring.sensors ring.range_max_m body.radius_m models cycle.rate_hz log.file world
+        perception.method perception.map.capacity perception.full.tracks_max
+    """
+    for path in fixed.split():
+        assert not Difference(tuple(path.split(".")), 1, 2).live, path
+
+
+def test_every_live_change_is_named_and_taken_over(tmp_path: Path) -> None:
+    before = settings_from(tmp_path, RUN)
+    table = copy.deepcopy(RUN)
+    table["behaviors"]["arbiter"] = {"base_velocity_m_s": 0.25}
+    table["perception"]["full"] = {"report_probability": 0.9}
+    table["ring"]["firing"]["preset"] = "quadrants"
+    table["perception"]["map"] = {"age_max_s": 60.0}
+    outcome = reload(before, lambda: settings_from(tmp_path, table))
+    assert outcome.problems == ()
+    assert outcome.settings == settings_from(tmp_path, table)
+    assert [str(d) for d in outcome.changed] == [
+        'ring.firing.preset: "octets" → "quadrants"',
+        "perception.full.report_probability: 0.95 → 0.9",
+        "perception.map.age_max_s: 120.0 → 60.0",
+        "behaviors.arbiter.base_velocity_m_s: 0.3 → 0.25",
+    ]
+
+
+@pytest.mark.promise("P11")
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        (lambda t: t["link"].update(port="/dev/ttyS1"), 'link.port: "/dev/ttyS0" → "/dev/ttyS1": needs a restart'),
+        (lambda t: t["link"].update(baud=19200), "link.baud: 9600 → 19200: needs a restart"),
+        (lambda t: t["ring"].update(count=16), "ring.count: 24 → 16: needs a restart"),
+        (lambda t: t["cycle"].update(rate_hz=40.0), "cycle.rate_hz: 20.0 → 40.0: needs a restart"),
+        (lambda t: t.pop("world"), "world.drum: "),
+        (lambda t: t.update(models=[MODEL, {**MODEL, "name": "b"}]), "models: [{…}] → [{…}, {…}]: needs a restart"),
+    ],
+)
+def test_what_needs_a_restart_says_so_by_name(
+    change: Callable[[dict[str, Any]], object], line: str, tmp_path: Path
+) -> None:
+    before = settings_from(tmp_path, RUN)
+    table = copy.deepcopy(RUN)
+    change(table)
+    table["behaviors"]["arbiter"] = {"base_velocity_m_s": 0.25}
+    outcome = reload(before, lambda: settings_from(tmp_path, table))
+    assert outcome.settings is before, "a live change beside one that is not is not taken over either"
+    assert outcome.changed == ()
+    assert any(problem.startswith(line) for problem in outcome.problems), outcome.problems
+    assert all(problem.endswith(": needs a restart") for problem in outcome.problems)
+    assert not any("base_velocity" in problem for problem in outcome.problems)
+
+
+def test_no_change_is_no_problem(tmp_path: Path) -> None:
+    before = settings_from(tmp_path, RUN)
+    outcome = reload(before, lambda: settings_from(tmp_path, RUN))
+    assert outcome.settings is before
+    assert (outcome.changed, outcome.problems) == ((), ())
+
+
+GOOD: dict[Any, tuple[Any, ...]] = {
+    float: (0.0, 0.05, 0.1, 0.3, 0.5, 0.9, 1.0, 5.0, 40.0),
+    int: (0, 1, 2, 5, 16, 24, 300, 9600),
+    bool: (True, False),
+    str: ("/dev/ttyS0", "elsewhere", "corner"),
+    "name": ("sum", "largest", "stop", "turn_back", "paper", "full", "octets", "quadrants", "info", "cone"),
+    "list": ([], [[0], [1]]),
+    "table": ({},),
+}
+BAD = ("oddly", -1.0, 1e300, True, {"a": 1}, [1.5], 7)
+FIELDS = [s for s in SETTINGS if s.root == "run"]
+LIVE_FIELDS = [s for s in FIELDS if Difference(s.location, 0, 1).live]
+
+
+def harm(rng: random.Random, table: dict[str, Any]) -> None:
+    """Change one to three settings to something that may be good or bad."""
+    for _ in range(rng.randint(1, 3)):
+        setting: Setting = rng.choice(LIVE_FIELDS if rng.random() < 0.7 else FIELDS)
+        key = setting.location[-1]
+        try:
+            under = holder(table, setting.location)
+            value = rng.choice(GOOD[setting.kind]) if rng.random() < 0.9 else rng.choice(BAD)
+            under[f"{key}q" if rng.random() < 0.03 else key] = copy.deepcopy(value)
+        except (AttributeError, IndexError, KeyError, TypeError):
+            continue  # the way there is already harmed
+
+
+def rendered(settings: Settings) -> str:
+    return settings.model_dump_json()
+
+
+@pytest.mark.promise("P11")
+def test_any_number_of_random_reloads_are_atomic(record_property: Callable[[str, object], None]) -> None:
+    """Each is taken over whole or changes nothing; and no live difference is ever left out or added."""
+    rng = random.Random(11)
+    current = Settings.model_validate(copy.deepcopy(RUN))
+    told = {"taken over": 0, "no good": 0, "needs a restart": 0, "as before": 0}
+    table = copy.deepcopy(RUN)
+    for _ in range(RELOADS):
+        attempt = copy.deepcopy(table)
+        harm(rng, attempt)
+        wanted: list[Settings] = []
+
+        def propose(attempt: dict[str, Any] = attempt, wanted: list[Settings] = wanted) -> Settings:
+            try:
+                wanted.append(Settings.model_validate(attempt))
+            except ValueError as error:
+                raise ConfigError(str(error)) from None
+            return wanted[0]
+
+        before, text = current, rendered(current)
+        outcome = reload(current, propose)
+        current = outcome.settings
+        if not wanted:
+            kind = "no good"
+        elif outcome.problems:
+            kind = "needs a restart"
+            assert any(not d.live for d in differences(before, wanted[0]))
+        elif outcome.changed:
+            kind = "taken over"
+            assert current is wanted[0]
+            assert all(d.live for d in outcome.changed)
+            assert {d.path for d in outcome.changed} == {d.path for d in differences(before, current)}
+            table = attempt
+        else:
+            kind = "as before"
+            assert wanted[0] == before
+        told[kind] += 1
+        if kind != "taken over":
+            assert current is before
+        assert rendered(before) == text, "the last good one is untouched"
+    assert min(told.values()) > RELOADS // 100, told
+    record_property("measured", f"{RELOADS} random reloads, none half applied: {told}")

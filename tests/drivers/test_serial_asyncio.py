@@ -1,0 +1,203 @@
+"""The habits of pyserial-asyncio 0.6 that cost others a day: one test for each that `drivers/link.py` survives it."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import threading
+import time
+from collections.abc import AsyncIterator, Iterator
+from pathlib import Path
+
+import pytest
+import serial
+
+from config.robot import LinkConfig
+from drivers.link import Link, LinkError
+from drivers.port import open_port
+from tests.drivers.test_link import Ends, Host, running, soon
+from tests.hil.machine import PATIENCE_S
+
+
+@pytest.fixture
+def ends(tmp_path: Path) -> Iterator[Ends]:
+    pty = Ends(tmp_path / "robot")
+    yield pty
+    pty.unplug()
+
+
+@pytest.fixture(autouse=True)
+async def loop_complaints() -> AsyncIterator[None]:
+    complaints: list[object] = []
+    asyncio.get_running_loop().set_exception_handler(lambda _, context: complaints.append(context))
+    yield
+    assert complaints == []
+
+
+async def test_write_buffers_without_bound_past_pause_writing(ends: Ends) -> None:
+    """Ours takes 4 KiB and then says no, frame by frame, and what was taken arrives whole."""
+    host = Host()
+    link = host.link(ends.path)
+    async with running(link):
+        await soon(host.opened)
+        frame, taken, waited = b"0123456789abcdef", 0, 0
+        for _ in range(20_000):
+            taken += link.send(frame)
+            waited = max(waited, link.waiting)
+            assert link.waiting <= 4096
+        assert taken < 20_000
+        assert waited > 4096 - len(frame)
+        assert await ends.read(taken * len(frame)) == frame * taken
+        assert link.waiting == 0
+
+
+async def test_an_exception_in_data_received_goes_to_the_loop_and_the_port_stays_up(ends: Ends) -> None:
+    """Ours ends the line with the culprit's name and opens it again; the loop's handler is not bothered."""
+    host = Host()
+
+    def careless(data: bytes) -> None:
+        if data == b"bad":
+            raise ArithmeticError("planted")
+        host.data.put_nowait(data)
+
+    config = LinkConfig(port=str(ends.path), reopen_first_s=0.001)
+    link = Link(config, lambda: host.opened.put_nowait(None), careless, host.closed.put_nowait)
+    async with running(link):
+        await soon(host.opened)
+        os.write(ends.master, b"bad")
+        assert "ArithmeticError: planted" in await soon(host.closed)
+        assert not link.is_open
+        await soon(host.opened)
+        os.write(ends.master, b"good")
+        assert await soon(host.data) == b"good"
+
+
+async def test_close_on_a_stalled_peer_never_reports_connection_lost(ends: Ends) -> None:
+    """Ours aborts: the end is told within its fifth of a second, though nobody reads what waits."""
+    host = Host()
+    link = host.link(ends.path)
+    async with running(link):
+        await soon(host.opened)
+        while link.send(bytes(64)):
+            await asyncio.sleep(0)
+        await asyncio.wait_for(link.stop(), PATIENCE_S)
+        assert host.closed.get_nowait() == "it was closed at this end"
+        assert not link.is_open
+        assert link.waiting == 0
+
+
+@pytest.mark.parametrize("busy", [False, True], ids=["idle", "with bytes waiting"])
+async def test_after_an_unplug_read_drain_and_wait_closed_all_raise(ends: Ends, busy: bool) -> None:
+    """Ours tells it once, by the handler; sending, asking and stopping afterwards raise nothing."""
+    host = Host()
+    link = host.link(ends.path)
+    await link.open_once()
+    await soon(host.opened)
+    while busy and link.send(bytes(64)):
+        await asyncio.sleep(0)
+    ends.unplug()
+    assert "was lost" in await soon(host.closed)
+    assert not link.send(b"gone")
+    assert not link.is_open
+    assert not link.writable
+    assert link.waiting == 0
+    await link.stop()
+    assert host.closed.empty()
+    with pytest.raises(LinkError, match="no such port"):
+        await link.open_once()
+
+
+async def test_opening_blocks(ends: Ends) -> None:
+    """Ours opens in a thread: the loop goes on meanwhile, and an opening without end is given up and told."""
+    host, release, ticks = Host(), threading.Event(), 0
+
+    def opener(config: LinkConfig) -> serial.Serial:
+        assert threading.current_thread() is not threading.main_thread()
+        release.wait(PATIENCE_S)
+        return open_port(config)
+
+    link = host.link(ends.path, opener=opener)
+    opening = asyncio.create_task(link.open_once())
+    while ticks < 20:
+        await asyncio.sleep(0.001)
+        ticks += 1
+        assert not opening.done()
+    release.set()
+    await asyncio.wait_for(opening, PATIENCE_S)
+    await soon(host.opened)
+    await link.stop()
+
+
+@pytest.mark.parametrize("opens", [True, False])
+async def test_wait_for_swallows_a_cancellation_that_comes_with_the_result(ends: Ends, opens: bool) -> None:
+    """Ours ends when it is told to, also in the very turn of the loop in which the port opens, and closes it."""
+    host, release, ports = Host(), threading.Event(), list[serial.Serial]()
+
+    def opener(config: LinkConfig) -> serial.Serial:
+        release.wait(PATIENCE_S)
+        if not opens:
+            raise serial.SerialException(2, "no such port")
+        ports.append(open_port(config))
+        return ports[-1]
+
+    link = host.link(ends.path, opener=opener)
+    task = asyncio.create_task(link.run())
+    await asyncio.sleep(0)
+    (thread,) = [one for one in threading.enumerate() if one.name == f"open {ends.path}"]
+    release.set()
+    thread.join()  # what it has to say waits for the loop's next turn; so does the cancellation behind it
+    asyncio.get_running_loop().call_soon(task.cancel)
+    done, _ = await asyncio.wait([task], timeout=PATIENCE_S)
+    assert done, "it was told to end and goes on for ever"
+    assert task.cancelled()
+    assert not any(port.is_open for port in ports)
+    assert not link.is_open
+
+
+async def test_the_fast_fork_freezes_the_loop_on_a_peer_that_stops_reading(ends: Ends) -> None:
+    """Ours never waits for the port: with the line full every call returns, and the loop turns."""
+    host = Host()
+    link = host.link(ends.path)
+    async with running(link):
+        await soon(host.opened)
+        while link.send(bytes(64)):
+            await asyncio.sleep(0)
+        longest_s = 0.0
+        for _ in range(1000):
+            begun_s = time.thread_time()
+            link.send(bytes(64))
+            await asyncio.sleep(0)
+            longest_s = max(longest_s, time.thread_time() - begun_s)
+        # A frozen loop would not come here at all. The processor's own time: a busy machine does not count.
+        assert longest_s < 1.0
+        assert link.is_open
+
+
+async def test_a_pty_opens_twice_without_complaint_unless_it_is_exclusive(ends: Ends) -> None:
+    """Ours asks for it alone, so the second to come is refused, and may have it once the first has gone."""
+    first, second = Host(), Host()
+    one, two = first.link(ends.path), second.link(ends.path)
+    await one.open_once()
+    await soon(first.opened)
+    with pytest.raises(LinkError, match="in use by another program"):
+        await two.open_once()
+    await one.stop()
+    await two.open_once()
+    await soon(second.opened)
+    await two.stop()
+
+
+async def test_the_master_gets_eio_when_the_last_slave_closes_and_the_robot_lives_on(ends: Ends) -> None:
+    """A host that comes back finds the same line, also after the other end has seen it hang up."""
+    host = Host()
+    link = host.link(ends.path)
+    os.close(ends._slave)  # as the emulator does: the host's is the only one
+    for _ in range(3):
+        await link.open_once()
+        await soon(host.opened)
+        os.write(ends.master, b"hello")
+        assert await soon(host.data) == b"hello"
+        await link.stop()
+        with pytest.raises(OSError, match="Input/output error"):
+            os.read(ends.master, 100)
+    ends._slave = os.open(os.devnull, os.O_RDONLY)

@@ -1,0 +1,299 @@
+"""P6: a peer that falls silent or stops reading harms nothing: the loop runs on, nothing piles up, it is noticed."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import threading
+import time
+from collections.abc import AsyncIterator, Callable, Coroutine
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import pytest
+
+from config.robot import LinkConfig
+from drivers.denning.codec import Decoder, encode
+from drivers.denning.frames import Ack, Drive, Frame, Halt, Hello, Ident, Odom, Pattern, Release, RobotFrame
+from drivers.denning.robot import DenningRobot
+from drivers.driver import LineState
+from drivers.emulator.faults import Deaf, Fault, Mute
+from drivers.link import Link
+from drivers.messages import Twist
+from tests.drivers.cable import CYCLE_STEPS, ROBOT, STEP_S, Cable
+from tests.drivers.test_link import Ends, running
+from tests.hil.machine import PATIENCE_S
+
+pytestmark = pytest.mark.promise("P6")
+
+CYCLE_S = 0.05
+TICK_S = 0.005
+UNSENT_MAX = 4096
+DEAD_WITHIN_S = 0.5
+GAP_MARGIN_S = 0.005
+ATTEMPTS = 8
+"""The machine may hold up this loop and not its control; it does not do so eight times in a row."""
+
+
+class Peer(Ends):
+    """A robot that sends odometry at 50 Hz and answers, and can be told to fall silent or to stop reading."""
+
+    def __init__(self, path: Path, *, names_drives: bool = True) -> None:
+        super().__init__(path)
+        self.mute = self.deaf = False
+        self.heard: list[Frame] = []
+        self._names_drives = names_drives
+        self._ears, self._seq, self._t_us, self._last_drive = Decoder("host"), 0, 0, 0
+
+    async def run(self) -> None:
+        while True:
+            await asyncio.sleep(0.02)
+            self._t_us = round(1e6 * time.monotonic()) % 2**32
+            self._say(Odom(0, self._t_us, 0, 0, 0, 0, 0, 0, 0, self._last_drive))
+            if not self.deaf:
+                self.listen()
+
+    def listen(self) -> None:
+        """Read everything there is, and answer."""
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                for frame in self._ears.feed(os.read(self.master, 4096)):
+                    self.heard.append(frame)
+                    self._answer(frame)
+
+    def _answer(self, frame: Frame) -> None:
+        match frame:
+            case Hello():
+                self._say(Ident(0, 1, 24, 381, 500, 20, 7, "denning"))
+            case Pattern() | Halt() | Release():
+                self._say(Ack(0, frame.seq))
+            case Drive() if self._names_drives:
+                self._last_drive = frame.seq
+            case _:
+                pass
+
+    def _say(self, frame: RobotFrame) -> None:
+        if not self.mute:
+            with contextlib.suppress(BlockingIOError):
+                os.write(self.master, encode(replace(frame, seq=self._seq)))
+            self._seq = (self._seq + 1) % 256
+
+
+@dataclass
+class Gaps:
+    """How far apart the ticks of a loop lie, at worst, in the time that is looked at."""
+
+    worst_s: float = 0.0
+    counting: bool = False
+
+    async def run(self) -> None:
+        last_s = time.monotonic()
+        while True:
+            await asyncio.sleep(TICK_S)
+            now_s = time.monotonic()
+            if self.counting:
+                self.worst_s = max(self.worst_s, now_s - last_s)
+            last_s = now_s
+
+
+class Control:
+    """The same ticks at the same time in a loop of another thread, which has nothing to do with the line."""
+
+    def __init__(self) -> None:
+        self.gaps = Gaps()
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._work)
+
+    def _work(self) -> None:
+        with contextlib.suppress(asyncio.CancelledError):
+            self._loop.run_until_complete(self._task)
+        self._loop.close()
+
+    def __enter__(self) -> Gaps:
+        self._task = self._loop.create_task(self.gaps.run())
+        self._thread.start()
+        return self.gaps
+
+    def __exit__(self, *_: object) -> None:
+        self._loop.call_soon_threadsafe(self._task.cancel)
+        self._thread.join()
+
+
+@dataclass
+class Host:
+    """A main process in miniature: twenty times a second it drives, and once the robot is down it halts."""
+
+    path: Path
+    unsent_max: int = 0
+    asked: int = 0
+    down_s: float | None = None
+    driver: DenningRobot = field(default_factory=lambda: DenningRobot(ROBOT))
+
+    def __post_init__(self) -> None:
+        now = time.monotonic
+        self.link = Link(
+            LinkConfig(port=str(self.path)),
+            lambda: self.driver.opened(now()),
+            lambda data: self.driver.receive(data, now()),
+            lambda _: self.driver.closed(),
+        )
+
+    def cycle(self) -> None:
+        self.driver.tick(time.monotonic())
+        if self.driver.state is LineState.DOWN and self.down_s is None:
+            self.down_s = time.monotonic()
+            self.driver.halt()
+        if self.down_s is None:
+            self.asked += 1
+            self.driver.drive(Twist(1e-3 * (self.asked % 500), 0.0))
+        self.driver.take()
+        self.send()
+
+    def send(self) -> None:
+        data = self.driver.outgoing(writable=self.link.writable)
+        if self.link.is_open and data:
+            self.link.send(data)
+        self.unsent_max = max(self.unsent_max, self.link.waiting)
+
+    async def run(self) -> None:
+        while True:
+            self.cycle()
+            await asyncio.sleep(CYCLE_S)
+
+    async def until(self, done: Callable[[], bool]) -> None:
+        async with asyncio.timeout(PATIENCE_S):
+            while not done():
+                await asyncio.sleep(TICK_S)
+
+
+@contextlib.asynccontextmanager
+async def tasks(*work: Callable[[], Coroutine[None, None, None]]) -> AsyncIterator[None]:
+    """Have work done beside; none of it may end by itself."""
+    under_way = [asyncio.create_task(one()) for one in work]
+    try:
+        yield
+        assert not any(task.done() for task in under_way)
+    finally:
+        for task in under_way:
+            task.cancel()
+        await asyncio.gather(*under_way, return_exceptions=True)
+
+
+async def stall(path: Path, how: str, seconds: float) -> tuple[float, float, int, float]:
+    """Let a peer stall and come back; return worst gap, control's worst gap, most bytes unsent, and time to death."""
+    peer, host, gaps = Peer(path), Host(path), Gaps()
+    try:
+        with Control() as control:
+            async with running(host.link), tasks(peer.run, host.run, gaps.run):
+                await host.until(lambda: host.driver.state is LineState.READY and host.asked > 10)
+                gaps.counting = control.counting = True
+                begun_s = time.monotonic()
+                peer.mute, peer.deaf = how != "not reading", how != "mute"
+                await asyncio.sleep(seconds)
+                gaps.counting = control.counting = False
+                assert host.link.is_open, "a stalled line is not a lost one"
+                assert host.down_s is not None, "the link was not called dead"
+                before = len(peer.heard)
+                peer.mute = peer.deaf = False
+                await host.until(lambda: host.driver.state is LineState.READY)
+        heard = peer.heard
+        first_halt = next(i for i, frame in enumerate(heard) if isinstance(frame, Halt))
+        assert not any(isinstance(frame, Drive) for frame in heard[first_halt:]), "the newest command is HALT"
+        stale = [frame for frame in heard[before:first_halt] if isinstance(frame, Drive)]
+        assert len(stale) <= DEAD_WITHIN_S / CYCLE_S
+        return gaps.worst_s, control.worst_s, host.unsent_max, host.down_s - begun_s
+    finally:
+        peer.unplug()
+
+
+async def survive(path: Path, how: str, seconds: float) -> str:
+    """Stall until the worst gap is no worse than the control's; return the figures of that attempt."""
+    seen = []
+    for _ in range(ATTEMPTS):
+        gap_s, control_s, unsent, dead_s = await stall(path, how, seconds)
+        assert unsent <= UNSENT_MAX
+        seen.append((gap_s, control_s, dead_s))
+        if gap_s <= control_s + GAP_MARGIN_S and 0.0 < dead_s <= DEAD_WITHIN_S:
+            return (
+                f"{how} for {seconds:g} s: worst gap {1e3 * gap_s:.1f} ms (control {1e3 * control_s:.1f}), at most "
+                f"{unsent} bytes unsent, called dead after {dead_s:.2f} s"
+            )
+    raise AssertionError(f"the loop stands still while the peer is {how}: (gap, control, dead) {seen}")
+
+
+HOWS = ("mute", "not reading", "mute and not reading")
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("how", HOWS)
+async def test_a_stalled_peer_is_harmless(tmp_path: Path, how: str, measured: Callable[[str], None]) -> None:
+    measured(await survive(tmp_path / "robot", how, 5.0))
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("how", HOWS)
+async def test_a_peer_stalled_for_a_minute_is_harmless(
+    tmp_path: Path, how: str, measured: Callable[[str], None]
+) -> None:
+    measured(await survive(tmp_path / "robot", how, 60.0))
+
+
+async def test_the_newest_drive_wins_over_a_full_line(tmp_path: Path, measured: Callable[[str], None]) -> None:
+    """A peer that talks and does not read: DRIVEs stop leaving, and once it reads again the newest is the next."""
+    peer, host = Peer(tmp_path / "robot", names_drives=False), Host(tmp_path / "robot")
+    try:
+        async with running(host.link), tasks(peer.run):
+            while host.driver.state is not LineState.READY:
+                host.driver.tick(time.monotonic())
+                host.send()
+                await asyncio.sleep(TICK_S)
+            peer.deaf = True
+            while host.link.writable:
+                host.cycle()
+                await asyncio.sleep(0)
+            for _ in range(500):
+                host.cycle()
+            newest = host.asked % 500
+            assert host.unsent_max <= UNSENT_MAX
+            assert host.down_s is None
+            peer.deaf = False
+            async with asyncio.timeout(PATIENCE_S):
+                while not any(isinstance(f, Drive) and f.v_mm_s == newest for f in peer.heard[-3:]):
+                    host.send()
+                    host.driver.tick(time.monotonic())
+                    await asyncio.sleep(TICK_S)
+    finally:
+        peer.unplug()
+    drives = [frame.v_mm_s for frame in peer.heard if isinstance(frame, Drive)]
+    assert drives[-1] == newest
+    assert host.asked - len(drives) >= 499, "those that nobody could take were replaced, not kept"
+    replaced = host.asked - len(drives)
+    measured(f"not reading: {replaced} DRIVEs replaced by newer ones, ≤ {host.unsent_max} bytes unsent")
+
+
+FAULTS: dict[str, Callable[[float], Fault]] = {
+    "mute": lambda at_s: Mute(kind="mute", at_s=at_s, duration_s=60.0),
+    "deaf": lambda at_s: Deaf(kind="deaf", at_s=at_s, duration_s=60.0),
+}
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("kind", FAULTS)
+def test_the_link_is_called_dead_within_half_a_second(kind: str, measured: Callable[[str], None]) -> None:
+    """In virtual time, exactly: at every phase of the cycle and of the odometry, noticed at 20 Hz."""
+    worst_s = 0.0
+    for phase in range(25):
+        at_s = 0.5 + 0.004 * phase
+        cable = Cable(faults=(FAULTS[kind](at_s),))
+        cable.plug()
+        while cable.driver.state is not LineState.DOWN or cable.now_s < at_s:
+            assert cable.now_s <= at_s + 1.0
+            cable.step()
+        # A cycle sees the driver's state when it begins.
+        cycle_s = CYCLE_STEPS * STEP_S
+        noticed_s = -(-cable.now_s // cycle_s) * cycle_s
+        worst_s = max(worst_s, noticed_s - at_s)
+        assert cable.driver.trouble
+    assert worst_s <= DEAD_WITHIN_S + 1e-9
+    measured(f"{kind}, at 25 phases: called dead after ≤ {worst_s:.3f} s")

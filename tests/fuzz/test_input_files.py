@@ -1,0 +1,139 @@
+"""Input files cannot hurt: whatever is done to them, a clear line or a right result, soon and in little memory."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import random
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from config.load import ConfigError, load_settings, load_world
+from drivers.emulator.device import EmulatedRobot
+from runtime.replay import replay
+from runtime.ringlog import RingLogError, read_ring_log
+from tests.fuzz.campaign import KINDS, shipped
+from tests.fuzz.hazards import HAZARDS
+from tests.fuzz.mutators import mutated
+
+ROOT = Path(__file__).parents[2]
+FILES = 4_000
+SOAK_FILES = 20_000
+"""Of each of five kinds: 10⁵."""
+MEMORY_MAX_MB = 500
+SLOW_S = 10.0
+"""Processor time for a file; the slowest takes milliseconds."""
+
+
+def child(module: str, *arguments: str) -> Any:
+    """Run a module in a process of its own and return what it says."""
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-m", module, *arguments], capture_output=True, text=True, timeout=1200, env=env, check=False
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    return json.loads(done.stdout)
+
+
+def check(kind: str, count: int, seed: int, record_property: Callable[[str, object], None]) -> None:
+    told = child("tests.fuzz.campaign", kind, str(seed), str(count))
+    assert told["hurt"] == []
+    assert told["good"] + told["refused"] == count
+    assert min(told["good"], told["refused"]) > count // 50, "harm that is never or always seen tests nothing"
+    assert told["memory_mb"] < MEMORY_MAX_MB
+    assert told["slowest_s"] < SLOW_S
+    record_property(
+        "measured",
+        f"{count} harmed files ({kind}): {told['refused']} refused in clear lines, {told['good']} still good, none "
+        f"hurt; {told['memory_mb']} MB, slowest {told['slowest_s'] * 1e3:.1f} ms",
+    )
+
+
+@pytest.mark.promise("P14")
+@pytest.mark.parametrize("kind", KINDS)
+def test_harmed_files(kind: str, record_property: Callable[[str, object], None]) -> None:
+    check(kind, FILES, 1, record_property)
+
+
+@pytest.mark.soak
+@pytest.mark.promise("P14")
+@pytest.mark.parametrize("kind", KINDS)
+def test_very_many_harmed_files(kind: str, record_property: Callable[[str, object], None]) -> None:
+    check(kind, SOAK_FILES, 2, record_property)
+
+
+@pytest.mark.promise("P14")
+def test_files_made_to_exhaust(record_property: Callable[[str, object], None]) -> None:
+    """A gigabyte, a million of anything, what a parser takes the square of: refused, or read, and both soon."""
+    told = child("tests.fuzz.hazards")
+    assert set(told["cases"]) == set(HAZARDS)
+    for name, case in told["cases"].items():
+        assert case["hurt"] is None, f"{name}: {case['hurt']}"
+        assert case["cpu_s"] < SLOW_S, f"{name} took {case['cpu_s']} s"
+    assert told["memory_mb"] < MEMORY_MAX_MB
+    slowest = max(told["cases"], key=lambda name: float(told["cases"][name]["cpu_s"]))
+    record_property(
+        "measured",
+        f"{len(HAZARDS)} files made to exhaust: {told['memory_mb']} MB, slowest {slowest} "
+        f"({told['cases'][slowest]['cpu_s']:.1f} s)",
+    )
+
+
+EXTREMES = (0.0, -0.0, 5e-324, 1e-9, 0.3048, 1.0, -1.0, 1e3, -1e6, 1e9, 1e15, 1e100, 1.7e308, -1.7e308)
+
+
+def wild_log(rng: random.Random, sensors: int) -> str:
+    """Return a ring log that keeps to the form and is otherwise beyond all sense."""
+
+    def cell(share: float, low: float, high: float) -> float:
+        value = rng.choice(EXTREMES) if rng.random() < share else rng.uniform(low, high)
+        return max(low, value) if low >= 0.0 else value
+
+    share = rng.choice((0.0, 0.02, 0.3))
+    rows, t = ["t,x,y,theta," + ",".join(f"r{i:02d}" for i in range(sensors))], 0.0
+    for k in range(40):
+        t = max(t, cell(share, 0.0, 0.1) + 0.05 * k)
+        ranges = [rng.choice(("", "inf", repr(cell(share, 0.0, 5.0)))) for _ in range(sensors)]
+        stamp = [t, cell(share, -1.0, 1.0), cell(share, -1.0, 1.0), cell(share, -4.0, 4.0)]
+        rows.append(",".join([*map(repr, stamp), *ranges]))
+    return "\n".join(rows) + "\n"
+
+
+@pytest.mark.compiled
+@pytest.mark.promise("P14")
+@pytest.mark.parametrize("method", ["paper", "full"])
+def test_logs_beyond_all_sense_are_replayed(method: str, tmp_path: Path) -> None:
+    settings = load_settings("hallway", [f"perception.method={method}"])
+    rng = random.Random(14)
+    for _ in range(150):
+        path = tmp_path / "log.csv"
+        path.write_text(wild_log(rng, len(settings.ring.mounts)))
+        try:
+            summary = replay(settings, read_ring_log(path))
+        except RingLogError as error:
+            raise AssertionError(path.read_text()) from error
+        for seen in summary["objects"]:
+            assert all(math.isfinite(v) for v in (seen["x"], seen["y"], seen["theta"], seen["score"])), seen
+
+
+@pytest.mark.compiled
+@pytest.mark.promise("P14")
+def test_harmed_worlds_that_are_still_good_can_be_driven_in(tmp_path: Path) -> None:
+    robot = load_settings("hallway")
+    rng, seeds, driven = random.Random(15), shipped("worlds"), 0
+    path = tmp_path / "world.toml"
+    for _ in range(400):
+        path.write_bytes(mutated(rng, seeds))
+        try:
+            world = load_world(path)
+        except ConfigError:
+            continue
+        EmulatedRobot(robot, world, seed=1).advance(0.3)
+        driven += 1
+    assert driven > 40

@@ -1,0 +1,157 @@
+"""What this machine does to any program just now: whether it stood still, and how long a start takes it.
+
+Tests in real time judge a program, not the machine they run on. A virtual machine that is put aside for half a second
+stops the robot, as it must, and fails a test that says nothing is wrong with the program. So a witness that does
+nothing but wake runs beside each trial: where it saw the machine stand still a failed trial says nothing, and is
+repeated. Where it saw no such thing a failure is one, and no trial is repeated.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import logging
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final, TypeVar, cast
+
+PATIENCE_S: Final = 60.0
+"""For what must come at once on any machine: only what hangs takes so long."""
+
+TRIALS: Final = 4
+
+STALL_S: Final = 0.1
+"""Ten programs that compute on two cores let the witness wait for 20 ms. The emulator gives up following the clock
+after 0.1 s, the robot's base stops after 0.5 s."""
+
+AnyTest = TypeVar("AnyTest", bound=Callable[..., Any])
+
+WITNESS: Final = """
+import os, sys, time
+if hasattr(os, "sched_setaffinity"):
+    os.sched_setaffinity(0, {int(sys.argv[1])})
+before_s = time.monotonic()
+while True:
+    time.sleep(0.02)
+    now_s = time.monotonic()
+    if now_s - before_s - 0.02 > float(sys.argv[2]):
+        sys.stdout.write(f"{now_s - before_s - 0.02:.3f}\\n")
+        sys.stdout.flush()
+    before_s = now_s
+"""
+
+
+class Witness:
+    """Notes, on each core, for how long a program that asks for nothing was kept from running."""
+
+    def __init__(self) -> None:
+        # Appended to by several processes, and read from its beginning here.
+        self._notes = tempfile.TemporaryFile("a+")  # noqa: SIM115 - closed by __exit__
+        cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else [0]
+        # Isolated and without site packages: it starts at once.
+        command = [sys.executable, "-I", "-S", "-c", WITNESS]
+        self._processes = [
+            subprocess.Popen([*command, str(core), str(STALL_S)], stdin=subprocess.DEVNULL, stdout=self._notes)
+            for core in cores[:4]
+        ]
+
+    def __enter__(self) -> Witness:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for process in self._processes:
+            process.kill()
+            process.wait()
+        self._notes.close()
+
+    def stalls_s(self) -> list[float]:
+        """Return how long each standstill so far was."""
+        self._notes.seek(0)
+        return [float(line) for line in self._notes.read().split()]
+
+
+def _may_repeat(witness: Witness, number: int, error: Exception) -> bool:
+    stalls_s = witness.stalls_s()
+    if not stalls_s or number == TRIALS:
+        return False
+    logging.getLogger(__name__).warning("the machine stood still for %s s, so this says nothing: %r", stalls_s, error)
+    return True
+
+
+def _anew(told: dict[str, Any], number: int) -> dict[str, Any]:
+    """Give a repeated trial a folder of its own."""
+    if number == 1 or not isinstance(told.get("tmp_path"), Path):
+        return told
+    folder = told["tmp_path"] / f"trial{number}"
+    folder.mkdir()
+    return {**told, "tmp_path": folder}
+
+
+def stalls_excused(test: AnyTest) -> AnyTest:
+    """Repeat a test that failed while the machine itself stood still; see above."""
+    if inspect.iscoroutinefunction(test):
+
+        @functools.wraps(test)
+        async def repeated_async(**told: Any) -> None:
+            for number in range(1, TRIALS + 1):
+                with Witness() as witness:
+                    try:
+                        await test(**_anew(told, number))
+                    except Exception as error:
+                        if not _may_repeat(witness, number, error):
+                            raise
+                    else:
+                        return
+
+        return cast(AnyTest, repeated_async)
+
+    @functools.wraps(test)
+    def repeated(**told: Any) -> None:
+        for number in range(1, TRIALS + 1):
+            with Witness() as witness:
+                try:
+                    test(**_anew(told, number))
+                except Exception as error:
+                    if not _may_repeat(witness, number, error):
+                        raise
+                else:
+                    return
+
+    return cast(AnyTest, repeated)
+
+
+class BareStarts:
+    """Starts Python and imports numba, over and over, beside what is tried: a start that is not ours.
+
+    Attributes
+    ----------
+    longest_s
+        The longest of them, s; also of one that has not come to its end.
+    """
+
+    def __init__(self) -> None:
+        self.longest_s = 0.0
+        self._done = threading.Event()
+        self._worker = threading.Thread(target=self._work, name="bare starts")
+
+    def __enter__(self) -> BareStarts:
+        self._worker.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._done.set()
+        self._worker.join()
+
+    def _work(self) -> None:
+        while not self._done.is_set():
+            begin_s = time.monotonic()
+            subprocess.run([sys.executable, "-c", "import numba"], stdin=subprocess.DEVNULL, check=True)
+            self.longest_s = max(self.longest_s, time.monotonic() - begin_s)
+            # One a second: a control is no load.
+            self._done.wait(1.0)

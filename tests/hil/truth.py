@@ -1,0 +1,78 @@
+"""The emulator's truth trace followed while it is written: each line is read once, however often one looks."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from drivers.emulator.trace import HEADER
+from drivers.messages import Flags
+from tests.hil.machine import PATIENCE_S
+from tests.hil.running import DRIVING_M_S
+
+_OF = [HEADER.split(",").index(name) for name in ("t_s", "host_s", "v_m_s", "w_rad_s", "flags")]
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A row: the robot's own time, the host's at that moment, and how the wheels turn."""
+
+    t_s: float
+    host_s: float
+    v: float
+    w: float
+    flags: Flags
+
+    @property
+    def still(self) -> bool:
+        return self.v == 0.0 and self.w == 0.0
+
+    @property
+    def driving(self) -> bool:
+        return self.v > DRIVING_M_S
+
+
+@dataclass
+class Truth:
+    """What has been read of the trace so far."""
+
+    path: Path
+    rows: list[Moment] = field(default_factory=list)
+    _offset: int = 0
+
+    def read(self) -> list[Moment]:
+        """Read on, and return all rows."""
+        if self.path.exists():
+            with self.path.open("rb") as file:
+                file.seek(self._offset)
+                data = file.read()
+            whole = data[: data.rfind(b"\n") + 1]
+            self._offset += len(whole)
+            for line in whole.decode("ascii").splitlines():
+                cells = line.split(",")
+                if cells[0] != "t_s":
+                    t_s, host_s, v, w, flags = (cells[i] for i in _OF)
+                    self.rows.append(Moment(float(t_s), float(host_s), float(v), float(w), Flags(int(flags))))
+        return self.rows
+
+    def at(self, host_s: float) -> Moment:
+        """Return the last row at or before a moment of the host's clock."""
+        return next(row for row in reversed(self.read()) if row.host_s <= host_s)
+
+    def at_robot(self, t_s: float) -> Moment:
+        """Return the last row at or before a moment of the robot's clock."""
+        return next(row for row in reversed(self.read()) if row.t_s <= t_s)
+
+    def since(self, t_s: float) -> list[Moment]:
+        """Return the rows after a moment of the robot's clock."""
+        return [row for row in self.read() if row.t_s > t_s]
+
+    def wait(self, done: Callable[[Moment], bool], what: str, patience_s: float = PATIENCE_S) -> Moment:
+        """Wait until the newest row is as it should be, and return it."""
+        end_s = time.monotonic() + patience_s
+        while not ((rows := self.read()) and done(rows[-1])):
+            assert time.monotonic() < end_s, f"it never came: {what}"
+            time.sleep(0.01)
+        return rows[-1]

@@ -1,0 +1,33 @@
+"""Mutants that may live, each with the reason why no test should notice it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+ACCEPTED: Mapping[str, Mapping[str, str]] = MappingProxyType(
+    {
+        "drivers/denning/codec.py": {
+            "encode: True → False": "a layout's fields and codes are written side by side and are equally many",
+        },
+        "drivers/firing.py": {
+            "_check_step: step_period_s >= needed_s - _TOLERANCE_S → step_period_s > needed_s - _TOLERANCE_S": (
+                "they differ where a step is short by exactly the tolerance, a nanosecond: either answer is right"
+            ),
+        },
+        "behaviors/arbiter.py": {
+            "arbitrate: magnitude < NEGLIGIBLE → magnitude <= NEGLIGIBLE": (
+                "at exactly a hundredth of a wish, standing still and crawling are both right"
+            ),
+            "arbitrate: 0.0 <= v <= body.speed_max_m_s and abs(w) <= body.turn_max_rad_s → "
+            "0.0 <= v <= body.speed_max_m_s or abs(w) <= body.turn_max_rad_s": (
+                "the last line of defence: what is refused before it leaves nothing that could reach it"
+            ),
+            "arbitrate: return Stop(f\"the arbiter worked out a velocity outside the base's limits "
+            "(v {v:g} m/s, w {w:g} rad… → return None": "the same line of defence: nothing comes to it",
+            "_course_speed_m_s: angle_rad < CAUTIOUS_ANGLE_RAD → angle_rad <= CAUTIOUS_ANGLE_RAD": (
+                "at that angle both branches give the cautious velocity"
+            ),
+        },
+    }
+)

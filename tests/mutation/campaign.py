@@ -1,0 +1,193 @@
+"""Runs the tests of a module against each of its mutants, each in a forked process; writes docs/mutants.md.
+
+`NUMBA_DISABLE_JIT=1 python -m tests.mutation.campaign [MODULE …]`. The parent has loaded every library but none of
+our modules that could be under test, so that a mutant costs its tests and little more; a mutant that hangs is killed.
+"""
+
+from __future__ import annotations
+
+import importlib.abc
+import importlib.util
+import os
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+from types import ModuleType
+
+from tests.mutation.accepted import ACCEPTED
+from tests.mutation.mutants import Mutant, mutants
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "mutants.md"
+TARGETS: dict[str, tuple[str, ...]] = {
+    "drivers/denning/codec.py": ("tests/drivers/test_codec.py", "tests/drivers/test_denning.py"),
+    "drivers/denning/frames.py": ("tests/drivers/test_codec.py", "tests/drivers/test_firing.py"),
+    "drivers/firing.py": ("tests/drivers/test_firing.py",),
+    "behaviors/arbiter.py": ("tests/behaviors/test_arbiter.py",),
+    "runtime/modes.py": ("tests/runtime/test_modes.py",),
+}
+KILLED_MIN = 0.85
+PATIENCE_S = 180
+JOBS = 2 * (os.cpu_count() or 1)
+"""More than processors: much of a run is waiting for files."""
+LIBRARIES = ("hypothesis", "numba", "numpy", "orjson", "pydantic", "pytest", "pytest_asyncio", "rich.console",
+             "structlog", "cobs.cobs", "serial")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Outcome:
+    module: str
+    killed: tuple[Mutant, ...]
+    survived: tuple[Mutant, ...]
+
+    @property
+    def share(self) -> float:
+        return len(self.killed) / max(1, len(self.killed) + len(self.survived))
+
+    @property
+    def unexplained(self) -> list[str]:
+        return [m.key for m in self.survived if m.key not in ACCEPTED.get(self.module, {})]
+
+
+class _Liar(importlib.abc.MetaPathFinder, importlib.abc.Loader):
+    """Gives a module another source."""
+
+    def __init__(self, module: str, source: str) -> None:
+        self._name = module.removesuffix(".py").replace("/", ".")
+        self._path = str(ROOT / module)
+        self._source = source
+
+    def find_spec(self, name: str, path: object, target: object = None) -> ModuleSpec | None:  # noqa: ARG002
+        if name != self._name:
+            return None
+        return importlib.util.spec_from_file_location(name, self._path, loader=self)
+
+    def create_module(self, spec: ModuleSpec) -> None:  # noqa: ARG002
+        return None
+
+    def exec_module(self, module: ModuleType) -> None:
+        exec(compile(self._source, self._path, "exec"), module.__dict__)
+
+
+def load_libraries() -> None:
+    for name in LIBRARIES:
+        importlib.import_module(name)
+
+
+def start(module: str, source: str, tests: Sequence[str]) -> int:
+    """Run `tests` with another source of `module` in a process of its own, and return its number."""
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            signal.alarm(PATIENCE_S)
+            code = _run(module, source, tests)
+        finally:
+            os._exit(code)
+    return child
+
+
+def survivors(module: str, sources: Sequence[str], tests: Sequence[str]) -> list[int]:
+    """Return the numbers of the sources with which `tests` pass; they run a few at a time."""
+    running: dict[int, int] = {}
+    passed = []
+    todo = list(enumerate(sources))[::-1]
+    while todo or running:
+        while todo and len(running) < JOBS:
+            number, source = todo.pop()
+            running[start(module, source, tests)] = number
+        child, status = os.wait()
+        number = running.pop(child)
+        if status == 0:
+            passed.append(number)
+    return sorted(passed)
+
+
+def _run(module: str, source: str, tests: Sequence[str]) -> int:
+    """Run the tests in this process, without a word, to the first failure; examples are not shrunk."""
+    import hypothesis
+    import pytest
+
+    silent = os.open(os.devnull, os.O_WRONLY)
+    for fd in (1, 2):
+        os.dup2(silent, fd)
+    os.chdir(ROOT)
+    phases = (hypothesis.Phase.explicit, hypothesis.Phase.generate)
+    hypothesis.settings.register_profile("mutants", phases=phases, database=None, derandomize=True, deadline=None)
+    hypothesis.settings.load_profile("mutants")
+    os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
+    sys.meta_path.insert(0, _Liar(module, source))
+    options = ["-x", "-q", "-p", "no:cacheprovider", "-p", "pytest_asyncio.plugin", "-m", "not soak and not realtime"]
+    options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # libraries are loaded already, on purpose
+    with tempfile.TemporaryDirectory() as folder:  # pytest's own folders are not for several runs at a time
+        return int(pytest.main([*options, "--basetemp", f"{folder}/tests", *tests]))
+
+
+def campaign(module: str, tests: Sequence[str]) -> Outcome:
+    """Return what became of every mutant of `module`.
+
+    Raises
+    ------
+    RuntimeError
+        The tests fail without any mutant.
+    """
+    source = (ROOT / module).read_text("utf-8")
+    if not survivors(module, [source], tests):
+        raise RuntimeError(f"{module}: its tests fail without any mutant")
+    found = list(mutants(source))
+    alive = set(survivors(module, [m.source for m in found], tests))
+    killed = tuple(m for k, m in enumerate(found) if k not in alive)
+    return Outcome(module, killed, tuple(m for k, m in enumerate(found) if k in alive))
+
+
+def page(outcomes: Iterable[Outcome]) -> str:
+    """Return the document."""
+    lines = [
+        "# Mutants",
+        "",
+        "Each module below was changed in one place at a time, and its own tests were run on the change, without",
+        "compiled kernels. `make mutants` repeats that and writes this page. A change that no test notices is listed",
+        "with the reason why it may stay.",
+        "",
+        "| module | mutants | killed | share |",
+        "|---|---|---|---|",
+    ]
+    found = list(outcomes)
+    for o in found:
+        many = len(o.killed) + len(o.survived)
+        lines.append(f"| `{o.module}` | {many} | {len(o.killed)} | {100 * o.share:.1f} % |")
+    for o in found:
+        lines += ["", f"## Survivors of `{o.module}`", ""] + ([] if o.survived else ["None."])
+        for m in o.survived:
+            reason = ACCEPTED.get(o.module, {}).get(m.key, "no reason yet")
+            lines.append(f"- `{m.where}`: `{m.before}` → `{m.after}`: {reason}")
+    return "\n".join(lines) + "\n"
+
+
+def main(modules: Sequence[str]) -> int:
+    load_libraries()
+    outcomes = []
+    for module in modules or list(TARGETS):
+        begun_s = time.monotonic()
+        outcome = campaign(module, TARGETS[module])
+        outcomes.append(outcome)
+        many = len(outcome.killed) + len(outcome.survived)
+        sys.stdout.write(
+            f"{module}: {len(outcome.killed)} of {many} killed ({100 * outcome.share:.1f} %), "
+            f"{time.monotonic() - begun_s:.0f} s\n"
+        )
+        for m in outcome.survived:
+            sys.stdout.write(f"  {'' if m.key in ACCEPTED.get(module, {}) else 'NEW '}line {m.line} {m.key}\n")
+        sys.stdout.flush()
+    if not modules:
+        PAGE.write_text(page(outcomes), "utf-8")
+    return 0 if all(o.share >= KILLED_MIN and not o.unexplained for o in outcomes) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

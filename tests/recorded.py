@@ -1,0 +1,110 @@
+"""Recordings made for tests: runs in virtual time with refinement cut short at random, recorded as a real run is."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+from mcap.writer import CompressionType, Writer
+
+from config.load import load_settings
+from config.settings import Settings
+from runtime.recording.channels import CHANNELS, CYCLE, Entry, schema_of
+from runtime.recording.folder import OneFile, Place
+from runtime.recording.part import CHUNK_BYTES, INDEX, PROFILE
+from runtime.recording.reading import open_recording
+from runtime.recording.recorder import Recorder
+from runtime.recording.writer import Standing
+from runtime.simulate import simulate
+
+WAIT_S = 30.0
+
+
+def hall(*sets: str) -> Settings:
+    """Return the settings of the six-drum hall, with a keyframe every two seconds."""
+    return load_settings("hallway", ["recording.keyframe_period_s=2.0", *sets])
+
+
+def until(done: Callable[[], bool], what: str) -> None:
+    """Wait for another thread."""
+    end_s = time.monotonic() + WAIT_S
+    while not done():
+        assert time.monotonic() < end_s, what
+        time.sleep(0.001)
+
+
+class FiveInSix:
+    """Refuses every sixth quantum, at random."""
+
+    def __init__(self, seed: int) -> None:
+        self._rng = np.random.default_rng(seed)
+
+    def begin(self) -> None:
+        """Begin a cycle."""
+
+    def __call__(self, _done: int) -> bool:
+        """Say whether there may be another quantum."""
+        return bool(self._rng.random() > 1.0 / 6.0)
+
+
+def record(
+    settings: Settings,
+    path: Path | Place,
+    seconds: float,
+    seed: int = 0,
+    queue_max: int = 8192,
+    reloads: Mapping[int, Settings] = MappingProxyType({}),
+) -> Standing:
+    """Record a run in virtual time in which every sixth quantum of refinement is refused for want of time."""
+    world = settings.world
+    assert world is not None
+    now = [0.0]
+    place = OneFile(path) if isinstance(path, Path) else path
+    with Recorder(settings, place, clock=lambda: now[0], queue_max=queue_max, emulated=True) as recorder:
+        until(lambda: recorder.standing.file is not None or recorder.standing.trouble is not None, "a file")
+
+        def on_state(record: object, state: object, _start: object) -> None:
+            recorder.on_cycle(record, state)  # type: ignore[arg-type]
+            for way in ("in", "out"):
+                recorder.on_bytes(way, now[0], b"\x00bytes\xff")
+            now[0] += 0.05
+
+        recorder.on_log({"level": "info", "event": "start", "timestamp": "now", "why": None})
+
+        def reload(cycle: int) -> Settings | None:
+            if cycle in reloads:
+                recorder.on_settings(reloads[cycle])
+            return reloads.get(cycle)
+
+        simulate(
+            settings, world, seed, seconds, on_state=on_state, allowance=FiveInSix(seed), reload=reload,
+        )  # fmt: skip
+        recorder.on_summary({"mode": "DRIVE", "cycles": 20 * seconds})
+    return recorder.standing
+
+
+def entries_of(path: Path) -> list[Entry]:
+    """Return every message of a recording."""
+    with open_recording(path) as recording:
+        return list(recording.entries())
+
+
+def rewrite(entries: Iterator[Entry] | list[Entry], path: Path, profile: str = f"{PROFILE}/1") -> None:
+    """Write messages as a recording, a chunk every ten cycles."""
+    with path.open("wb") as file:
+        writer = Writer(file, CHUNK_BYTES, CompressionType.ZSTD, INDEX, enable_data_crcs=True)
+        writer.start(profile, "echolocate 9")
+        numbers: dict[str, int] = {}
+        for topic, form in CHANNELS.items():
+            schema = writer.register_schema(form.__name__, "jsonschema", schema_of(form))
+            numbers[topic] = writer.register_channel(topic, "json", schema)
+        cycles = 0
+        for entry in entries:
+            writer.add_message(numbers[entry.topic], entry.log_ns, entry.data, entry.log_ns)
+            cycles += entry.topic == CYCLE
+            if entry.topic == CYCLE and cycles % 10 == 0:
+                writer.flush()
+        writer.finish()

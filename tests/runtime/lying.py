@@ -1,0 +1,90 @@
+"""A whole run in virtual time on a robot that lies, and its objects against the truth, seen from the robot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from config.load import load_settings
+from config.settings import Settings
+from config.world import WorldConfig
+from drivers.denning.robot import DenningRobot
+from drivers.emulator.device import EmulatedRobot
+from drivers.emulator.faults import Fault
+from drivers.emulator.memory import MemoryLine
+from drivers.messages import Firing, Pose
+from perception.pipeline import Perception
+from runtime.allowance import enough_quanta
+from runtime.commanding import gather, give
+from runtime.modes import Mode, Request
+from runtime.step import CycleRecord, State, step
+
+FT = 0.3048
+
+
+@dataclass
+class Run:
+    """The program and the emulator, cycle by cycle; armed as soon as it is ready."""
+
+    settings: Settings
+    world: WorldConfig
+    seed: int
+    faults: Sequence[Fault] = ()
+    arms: bool = True
+    cycles: int = 0
+    firings: list[Firing] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        settings = self.settings
+        self.robot = EmulatedRobot(settings, self.world, self.seed, faults=self.faults)
+        self.driver = DenningRobot(settings)
+        self.line = MemoryLine(self.driver, self.robot)
+        self.state = State(Perception(settings.ring, settings.models, settings.perception))
+
+    @property
+    def now_s(self) -> float:
+        return self.cycles / self.settings.cycle.rate_hz
+
+    def cycle(self) -> CycleRecord:
+        self.cycles += 1
+        self.line.exchange(self.now_s)
+        request = Request.ARM if self.arms and self.state.mode.mode is Mode.READY else None
+        inputs = gather(self.driver, self.now_s, request)
+        record = step(self.state, inputs, self.settings, lambda c: give(self.driver, c), enough_quanta)
+        self.firings += inputs.heard.firings
+        self.notes += inputs.heard.notes
+        return record
+
+    def until(self, now_s: float) -> None:
+        while self.now_s < now_s:
+            self.cycle()
+
+    def objects_ft(self) -> list[tuple[float, float]]:
+        """Return each object's place in feet as the robot sees it now, by what it believes of its own pose."""
+        odometry = self.state.odometry
+        if odometry is None:
+            return []
+        # The ring's direction, not the wheels': it is the ring that sees.
+        here = Pose(odometry.pose.x, odometry.pose.y, odometry.ring_yaw).inverse()
+        seen = [here.compose(Pose(o.x, o.y, 0.0)) for o in self.state.perception.objects()]
+        return [(p.x / FT, p.y / FT) for p in seen]
+
+    def drums_ft(self) -> list[tuple[float, float]]:
+        """Return where each drum truly is from the robot, feet."""
+        truth = self.robot.truth
+        here = Pose(truth.pose.x, truth.pose.y, truth.ring_yaw).inverse()
+        seen = [here.compose(Pose(d.x_m, d.y_m, 0.0)) for d in self.world.drum]
+        return [(p.x / FT, p.y / FT) for p in seen]
+
+    def errors_ft(self) -> list[float]:
+        """Return how far each object is from the nearest drum, feet."""
+        drums = self.drums_ft()
+        return [min(math.dist(seen, drum) for drum in drums) for seen in self.objects_ft()]
+
+
+def hallway(seed: int, *faults: Fault, method: str = "full", sets: Sequence[str] = ()) -> Run:
+    settings = load_settings("hallway", [f"perception.method={method}", *sets])
+    assert settings.world is not None
+    return Run(settings, settings.world, seed, faults)

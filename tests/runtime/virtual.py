@@ -1,0 +1,155 @@
+"""The whole main process in virtual time: its own loop, rhythm, modes and driver, on an emulated robot in memory.
+
+The loop never waits: where it would, the clock goes on. Only the line is replaced, and the timer that the kernel
+keeps. What takes time takes as long as a test says, by moving the clock.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import selectors
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from config.load import load_settings
+from config.robot import LinkConfig
+from config.settings import Settings
+from drivers.emulator.device import EmulatedRobot
+from drivers.emulator.faults import Fault
+from runtime.wake import LoopTimer
+
+STEP_S = 0.005
+REOPEN_S = 0.05
+
+
+class _Selector(selectors.SelectSelector):
+    """Instead of waiting it moves the clock on."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.now_s = 100.0
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        ready = super().select(0.0)
+        if not ready:
+            assert timeout is not None, "nothing will ever happen again"
+            self.now_s += max(0.0, timeout)
+        return ready
+
+
+class VirtualLoop(asyncio.SelectorEventLoop):
+    """A loop whose clock is its selector's."""
+
+    def __init__(self) -> None:
+        self.clock_of = _Selector()
+        super().__init__(self.clock_of)
+        # Else a moment that rounding puts just after the clock's is waited for without end.
+        self._clock_resolution = 1e-7
+
+    def time(self) -> float:
+        return self.clock_of.now_s
+
+    def spend(self, seconds: float) -> None:
+        """Let time pass as if something had held the loop."""
+        self.clock_of.now_s += seconds
+
+
+class MemoryLink:
+    """In place of `drivers.link.Link`: the other end is an emulated robot, and its cable can be pulled."""
+
+    def __init__(
+        self,
+        robot: EmulatedRobot,
+        loop: VirtualLoop,
+        config: LinkConfig,
+        on_opened: Callable[[], None],
+        on_data: Callable[[bytes], None],
+        on_closed: Callable[[str], None],
+    ) -> None:
+        self.config = config
+        self.is_open = False
+        self.last_error: str | None = None
+        self.plugged = True
+        self.opened_s = 0.0
+        self._robot = robot
+        self._loop = loop
+        self._begin_s = loop.time()
+        self._calls = (on_opened, on_data, on_closed)
+        self._turn: asyncio.TimerHandle | None = None
+
+    @property
+    def writable(self) -> bool:
+        return self.is_open
+
+    def send(self, data: bytes) -> bool:
+        self.live()
+        self._robot.receive(data)
+        return True
+
+    async def open_once(self) -> None:
+        if not self.is_open and self.plugged:
+            self.is_open = True
+            self.opened_s = self._loop.time()
+            self._calls[0]()
+            self._turn = self._loop.call_later(STEP_S, self._exchange)
+
+    async def run(self) -> None:
+        try:
+            while True:
+                await self.open_once()
+                await asyncio.sleep(REOPEN_S)
+        finally:
+            await self.stop()
+
+    async def stop(self) -> None:
+        self.is_open = False
+        if self._turn is not None:
+            self._turn.cancel()
+
+    def pull(self) -> None:
+        """Pull the cable out."""
+        self.plugged = self.is_open = False
+        if self._turn is not None:
+            self._turn.cancel()
+        self.last_error = "pulled out"
+        self._calls[2]("pulled out")
+
+    def plug(self) -> None:
+        """Plug it in again; it is opened again soon."""
+        self.plugged = True
+
+    def live(self) -> bytes:
+        """Let the robot live up to now, and return what it sent."""
+        return self._robot.advance(self._loop.time() - self._begin_s)
+
+    def _exchange(self) -> None:
+        if self.is_open:
+            self._turn = self._loop.call_later(STEP_S, self._exchange)
+            if data := self.live():
+                self._calls[1](data)
+
+
+@contextlib.contextmanager
+def in_virtual_time(
+    monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] = ()
+) -> Iterator[tuple[VirtualLoop, Settings, EmulatedRobot, list[MemoryLink]]]:
+    """Give a loop in which `RobotProcess` runs on a robot in memory; the list will hold its link."""
+    settings = load_settings("hallway", ["link.port=memory", *sets])
+    assert settings.world is not None
+    loop, links = VirtualLoop(), list[MemoryLink]()
+    robot = EmulatedRobot(settings, settings.world, 3, faults=faults)
+
+    def link(*args: Any) -> MemoryLink:
+        links.append(MemoryLink(robot, loop, *args))
+        return links[-1]
+
+    monkeypatch.setattr("runtime.process.Link", link)
+    monkeypatch.setattr("runtime.wake.best_alarm", LoopTimer)
+    monkeypatch.setattr("runtime.process.ask", lambda _realtime: ())
+    try:
+        yield loop, settings, robot, links
+    finally:
+        loop.close()
