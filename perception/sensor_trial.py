@@ -268,11 +268,11 @@ def watch(
             continue
         c[MISSED] = 0.0
         faults[i] &= ~FAILING
-        if c[EVER] > 0.0 and not (abs(r - c[R1]) <= LEAP_M or r == c[R1]):
+        if c[EVER] > 0.0 and not (r == c[R1] or abs(r - c[R1]) <= LEAP_M):
             c[LEAPS] += 1.0
         if r < near:
             c[ECHOES] += 1.0
-        if c[COUNT] == 0.0 or not (abs(r - c[RUN]) <= tolerance or r == c[RUN]):
+        if c[COUNT] == 0.0 or not (r == c[RUN] or abs(r - c[RUN]) <= tolerance):
             c[SINCE] = ring[FIRINGS]
             c[STEPS] += 1.0
             begin_run(i, r, x, y, yaw, sides, memory)

@@ -75,6 +75,7 @@ POLYGON_PROBABILITY: Final = 0.9
 POLYGON_NEAR_M: Final = 6.5 * FOOT_M
 POLYGON_SPREAD: Final = 0.02
 """A polygon is seen from near and from more than one direction: one face, square on from afar, may be any wall's."""
+POLYGON_SIGMA_MAX_M: Final = 0.2 * FOOT_M
 POLYGON_HITS: Final = 20.0
 POLYGON_HITS_SWEPT: Final = 12.0
 POLYGON_SWEPT: Final = 80
@@ -166,7 +167,7 @@ def sure_polygons(pi: Ints, pf: Floats, pbn: Ints, pbins: Floats, least: float, 
     """Write the polygon tracks that are sure to `out` and return how many; arguments as in `State`."""
     n = 0
     for t in range(pi.shape[0]):
-        if pi[t, ST] != ESTABLISHED or pf[t, PPROB] < least or max(pf[t, PXX], pf[t, PYY]) > SIGMA_MAX_M**2:
+        if pi[t, ST] != ESTABLISHED or pf[t, PPROB] < least or max(pf[t, PXX], pf[t, PYY]) > POLYGON_SIGMA_MAX_M**2:
             continue
         swept = 0
         nearest = FAR
