@@ -211,7 +211,7 @@ class DenningRobot:
         if self._state is LineState.CLOSED:
             self._drive = None
             return b""
-        if self._drive is None and not self._commands:
+        if self._drive is None and not self._commands and not self._ask_who:
             return b""
         out = bytearray()
         for name in _ORDER if writable else _ORDER[:1]:
