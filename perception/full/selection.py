@@ -92,7 +92,7 @@ def is_waiting(s: State, p: Settings, threshold: float) -> bool:
     most = 0.0
     for t in range(s.ti.shape[0]):
         most = max(most, worth(s, p, t, threshold))
-    return most > threshold
+    return bool(most > threshold)
 
 
 @kernel
