@@ -95,7 +95,8 @@ def test_one_flipped_bit_costs_a_chunk_at_most_and_is_told(small: bytes) -> None
         lost = [chunk for chunk in whole if chunk not in chunks]
         assert len(lost) <= 1, (at, len(lost))
         assert all(chunk in whole for chunk in chunks), (at, "what was not written is read")
-        assert salvage.damage, (at, "nothing is told")
+        # Zstandard has bits that no reader looks at: what costs nothing need not be told.
+        assert salvage.damage or not lost, (at, "nothing is told")
 
 
 @settings(max_examples=150, deadline=None)
