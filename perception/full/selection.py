@@ -20,8 +20,6 @@ from perception.full.state import (
     PASSED,
     POLISH,
     PROB,
-    PX,
-    PY,
     QUIET,
     R00,
     R11,
@@ -115,13 +113,16 @@ def choose(s: State, p: Settings, threshold: float) -> int:
 
 @kernel
 def choose_polygon(s: State, p: Settings, threshold: float) -> int:
-    """Return the polygon whose turn it is, as `choose` does the circle."""
+    """Return the polygon whose turn it is, as `choose` does the circle, but near or far alike.
+
+    Polygons that face each other across the way share readings: where the nearer went first, one was found twice.
+    """
     best = -1.0
     chosen = -1
     for t in range(s.pi.shape[0]):
         v = worth_polygon(s, p, t, threshold)
         if v > threshold:
-            v = rank(s, p, v, s.pf[t, PX], s.pf[t, PY], s.pi[t, PASSED])
+            v = OVERDUE + s.pi[t, PASSED] if s.pi[t, PASSED] > PATIENCE else v
             s.pi[t, PASSED] += 1
             if v > best:
                 best = v

@@ -166,7 +166,7 @@ async def test_overruns_in_a_row_end_in_a_safe_stop_that_names_the_callback(tmp_
     assert "hold_the_loop" in reason, reason
     timing = summary["timing"]
     # A busy machine may have made the row one or two longer at its beginning, and made one of them worse.
-    assert PLANTED_FROM < summary["cycles"] <= PLANTED_FROM + 10
+    assert PLANTED_FROM < summary["cycles"] <= PLANTED_FROM + 20  # five in a row; one that is none begins anew
     assert timing["overruns"] >= 5
     named = sum(count for culprit, count in timing["faults"].items() if "hold_the_loop" in culprit)
     assert named >= 3, timing

@@ -21,8 +21,6 @@ from perception.full.state import (
     PASSED,
     POLISH,
     PROB,
-    PX,
-    PY,
     QUIET,
     R00,
     R11,
@@ -94,10 +92,10 @@ def test_new_evidence_doubt_and_nearness_each_decide_where_all_else_is_alike() -
     assert selection.choose(for_nearness, P, THRESHOLD) == 6
 
 
-def test_polygons_are_chosen_by_the_same_rule() -> None:
+def test_polygons_are_chosen_by_evidence_and_patience_alone() -> None:
     s = shared()
     s.pi[:TRACKS, ST], s.pi[:TRACKS, NRES], s.pi[:TRACKS, DIRTY] = ESTABLISHED, 100, 10
-    s.pf[2, [PX, PY]] = s.g[[HERE_X, HERE_Y]] = (4.0, 4.0)
+    s.pi[2, DIRTY] += 1
     assert selection.choose_polygon(s, P, THRESHOLD) == 2
     s.pi[7, PASSED] = selection.PATIENCE + 1
     assert selection.choose_polygon(s, P, THRESHOLD) == 7
