@@ -11,6 +11,7 @@ import hashlib
 import os
 import sys
 import tempfile
+from collections.abc import Iterable, Sequence
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -24,8 +25,12 @@ if TYPE_CHECKING:
 PACKAGES: Final = ("perception", "perception.full", "drivers.emulator")
 """Where kernels live."""
 
-WARM: Final = "warm"
-"""A file of this name says that everything was compiled into this folder once."""
+PAPER: Final = "paper"
+CIRCLES: Final = "full"
+POLYGONS: Final = "polygons"
+EMULATOR: Final = "emulator"
+PARTS: Final = (EMULATOR, CIRCLES, POLYGONS, PAPER)
+"""What is compiled for itself; a file of this name in the cache says that it was done. Methods lend their names."""
 
 
 def kernels_key() -> str:
@@ -61,36 +66,34 @@ def use_cache() -> Path:
     return Path(os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder())))
 
 
-def is_warm(folder: Path) -> bool:
-    """Say whether everything was compiled into `folder` before."""
-    return (folder / WARM).exists() or os.environ.get("NUMBA_DISABLE_JIT", "0") not in {"", "0"}
+def needed(settings: Settings) -> tuple[str, ...]:
+    """Return the parts that a run with these settings needs: polygons are half the work, and many runs have none."""
+    outlines = any(model.arc_radius_m is None for model in settings.models)
+    polygons = (POLYGONS,) if outlines and settings.perception.method == CIRCLES else ()
+    return (EMULATOR, settings.perception.method, *polygons)
 
 
-def warm_up(settings: Settings) -> None:
-    """Run every kernel of both methods once, on a robot that drives past a wall, so that none is compiled later.
+def missing(folder: Path, parts: Iterable[str]) -> list[str]:
+    """Return those of the parts that were never compiled into `folder`; none where nothing is compiled."""
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in {"", "0"}:
+        return []
+    return [part for part in parts if not (folder / part).exists()]
+
+
+def warm_up(settings: Settings, parts: Iterable[str]) -> None:
+    """Run every kernel of these parts once, so that none is compiled later.
 
     Parameters
     ----------
     settings : Settings
         Ring, models and constants of the run.
+    parts : iterable of str
+        Of `PARTS`.
     """
-    import numpy as np
+    from runtime import warming
 
-    from config.model import ModelConfig
-    from drivers.messages import Firing, Pose
-    from perception.pipeline import Perception
-
-    square = ModelConfig(name="warm-up", closed=True, vertices_m=((1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)))
-    eager = settings.perception.clusters.model_copy(update={"segments_min": 1})
-    for method in ("paper", "full"):
-        config = settings.perception.model_copy(update={"clusters": eager, "method": method})
-        perception = Perception(settings.ring, (*settings.models, square), config)
-        for k in range(24):
-            ranges = np.full(len(settings.ring.mounts), 2.0)
-            perception.observe(Firing(0.1 * k, Pose(0.1 * k, 0.0, 0.0), 0.0, ranges))
-            while perception.pending:
-                perception.refine()
-        perception.things()
+    for part in parts:
+        warming.RUN_ONCE[part](settings)
 
 
 def compiled_signatures() -> int:
@@ -109,7 +112,7 @@ def compiled_signatures() -> int:
     return sum(len(kernel.overloads) for kernel in kernels.values())
 
 
-def ready_kernels(settings: Settings, console: Console) -> None:
+def ready_kernels(settings: Settings, console: Console, parts: Iterable[str] | None = None) -> None:
     """Have every kernel compiled, or say that it takes a while and compile it.
 
     Parameters
@@ -118,27 +121,30 @@ def ready_kernels(settings: Settings, console: Console) -> None:
         Ring, models and constants of the run.
     console : Console
         Where to say so.
+    parts : iterable of str, optional
+        Of `PARTS`; what a run with these settings needs where not given.
     """
     folder = use_cache()
-    if is_warm(folder):
-        warm_up(settings)
+    parts = needed(settings) if parts is None else tuple(parts)
+    absent = missing(folder, parts)
+    if not absent:
+        warm_up(settings, (part for part in parts if part != EMULATOR))
         return
     with console.status("compiling kernels; this happens once"):
-        compile_all(settings, folder)
+        compile_parts(settings, folder, absent)
+        warm_up(settings, (part for part in parts if part not in {*absent, EMULATOR}))
 
 
-def compile_all(settings: Settings, folder: Path) -> None:
-    """Compile the kernels of perception and of the emulator, and note that it was done."""
-    from config.world import DrumConfig, WallConfig, WorldConfig
-    from drivers.emulator.device import EmulatedRobot
+def compile_parts(settings: Settings, folder: Path, parts: Sequence[str]) -> None:
+    """Compile these parts into `folder`, two at a time where there are two processors, and note that it was done."""
+    from runtime import warming
 
-    warm_up(settings)
-    for model in ("cone", "specular"):
-        acoustics = WorldConfig().acoustics.model_copy(update={"model": model, "crosstalk": 0.5})
-        world = WorldConfig(
-            drum=(DrumConfig(x_m=2.0, y_m=0.0, radius_m=0.3),),
-            wall=(WallConfig(x1_m=3.0, y1_m=-3.0, x2_m=3.0, y2_m=3.0),),
-            acoustics=acoustics,
-        )
-        EmulatedRobot(settings, world, seed=0).advance(0.5)
-    (folder / WARM).touch()
+    if CIRCLES in parts and (os.cpu_count() or 1) > 1:
+        # What another process compiled meanwhile is found in the cache; what begins first depends on nothing of it.
+        with warming.helper(POLYGONS if POLYGONS in parts else CIRCLES):
+            warming.hear(settings)
+            if POLYGONS in parts:
+                warming.RUN_ONCE[CIRCLES](settings)
+    warm_up(settings, parts)
+    for part in parts:
+        (folder / part).touch()

@@ -19,7 +19,7 @@ from hypothesis import HealthCheck, settings
 from rich.console import Console
 
 from config.load import load_settings
-from runtime.kernels import ready_kernels, use_cache
+from runtime.kernels import PARTS, ready_kernels, use_cache
 from tests import promises
 
 use_cache()
@@ -113,4 +113,4 @@ def _state_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
 @pytest.fixture(scope="session")
 def warm_kernels() -> None:
     """Have every kernel compiled before a clock runs, also for processes that a test starts."""
-    ready_kernels(load_settings("hallway"), Console(stderr=True))
+    ready_kernels(load_settings("hallway"), Console(stderr=True), PARTS)

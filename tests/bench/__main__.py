@@ -10,7 +10,7 @@ from rich.console import Console
 
 from config.load import load_settings
 from runtime.complaint import Complaint
-from runtime.kernels import ready_kernels, use_cache
+from runtime.kernels import PARTS, ready_kernels, use_cache
 from tests.bench.contestant import Peer
 from tests.bench.measure import Plan, measure
 from tests.bench.runners import Method, contestants
@@ -64,7 +64,7 @@ def bench(
     if repetitions is not None:
         plan = Plan(max(1, repetitions), plan.halls_max, plan.passes)
     settings = load_settings("hallway")
-    ready_kernels(settings, console)
+    ready_kernels(settings, console, PARTS)
     entered = [c for c in contestants(OURS, load_peers()) if only in c.name]
     if not entered:
         console.print(f"bench: no contestant's name contains {only!r}", markup=False)

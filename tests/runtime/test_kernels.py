@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable, Iterator, Sequence
 from importlib.machinery import ModuleSpec
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -15,6 +18,8 @@ from rich.console import Console
 import runtime.kernels as kernels
 from config.load import load_settings
 from config.settings import Settings
+from perception.full import entry
+from runtime import warming
 
 ROOT = Path(__file__).parents[2]
 
@@ -113,27 +118,98 @@ def test_an_existing_setting_is_respected(home: Path, monkeypatch: pytest.Monkey
     assert home.exists()
 
 
-def test_warmth_is_noted_once_everything_was_compiled(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_what_a_run_needs_is_compiled() -> None:
+    hallway = load_settings("hallway")
+    assert kernels.needed(hallway) == (kernels.EMULATOR, kernels.CIRCLES)
+    boxes = load_settings("hallway", models=["semicircle", "box"])
+    assert kernels.needed(boxes) == (kernels.EMULATOR, kernels.CIRCLES, kernels.POLYGONS)
+    paper = load_settings("hallway", ["perception.method=paper"], models=["box"])
+    assert kernels.needed(paper) == (kernels.EMULATOR, kernels.PAPER)
+    assert set(warming.RUN_ONCE) == set(kernels.PARTS)
+
+
+def test_each_part_is_compiled_once_and_warmed_up_ever_after(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(home))
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
     home.mkdir()
-    compiled = []
+    happened: list[str] = []
 
-    def compile_all(_settings: Settings, folder: Path) -> None:
-        compiled.append(folder)
-        (folder / kernels.WARM).touch()
+    def compile_parts(_settings: Settings, folder: Path, parts: Sequence[str]) -> None:
+        for part in parts:
+            (folder / part).touch()
+            happened.append(f"compile {part}")
 
-    monkeypatch.setattr(kernels, "compile_all", compile_all)
-    monkeypatch.setattr(kernels, "warm_up", lambda _settings: compiled.append(Path("warmed up")))
+    monkeypatch.setattr(kernels, "compile_parts", compile_parts)
+    monkeypatch.setattr(kernels, "warm_up", lambda _settings, parts: happened.extend(parts))
     settings, console = load_settings("hallway"), Console(quiet=True)
-    assert not kernels.is_warm(home)
     kernels.ready_kernels(settings, console)
-    assert kernels.is_warm(home)
+    assert happened == ["compile emulator", "compile full"]
+    happened.clear()
     kernels.ready_kernels(settings, console)
-    assert compiled == [home, Path("warmed up")]
-    (home / kernels.WARM).unlink()
+    assert happened == ["full"], "the emulator is another process"
+    happened.clear()
+    kernels.ready_kernels(load_settings("hallway", models=["box"]), console)
+    assert happened == ["compile polygons", "full"]
+    (home / kernels.CIRCLES).unlink()
+    assert kernels.missing(home, kernels.PARTS) == [kernels.CIRCLES, kernels.PAPER]
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
-    assert kernels.is_warm(home), "there is nothing to compile"
+    assert kernels.missing(home, kernels.PARTS) == [], "there is nothing to compile"
+
+
+@pytest.mark.parametrize(
+    ("parts", "processors", "helped"),
+    [
+        ((kernels.EMULATOR, kernels.CIRCLES), 2, ["helper full", "hear"]),
+        ((kernels.CIRCLES, kernels.POLYGONS), 2, ["helper polygons", "hear", "full"]),
+        ((kernels.POLYGONS,), 2, []),
+        ((kernels.EMULATOR, kernels.CIRCLES), 1, []),
+    ],
+)
+def test_a_helper_takes_what_comes_last(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parts: tuple[str, ...], processors: int, helped: list[str]
+) -> None:
+    happened: list[str] = []
+
+    @contextlib.contextmanager
+    def helper(part: str) -> Iterator[None]:
+        happened.append(f"helper {part}")
+        yield
+        happened.append("waited")
+
+    def noted(name: str) -> Callable[[Settings], None]:
+        return lambda _settings: happened.append(name)
+
+    monkeypatch.setattr(warming, "helper", helper)
+    monkeypatch.setattr(warming, "hear", noted("hear"))
+    monkeypatch.setattr(warming, "RUN_ONCE", {part: noted(part) for part in kernels.PARTS})
+    monkeypatch.setattr(os, "cpu_count", lambda: processors)
+    kernels.compile_parts(load_settings("hallway"), tmp_path, parts)
+    assert happened == [*helped, *(["waited"] if helped else []), *parts]
+    assert {path.name for path in tmp_path.iterdir()} == set(parts)
+
+
+def test_a_helper_compiles_the_refinement_of_either_kind(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On an empty memory that compiles and does nothing."""
+    asked = []
+    for name in ("quantum", "pquantum"):
+        monkeypatch.setattr(entry, name, lambda _handle, _share, name=name: asked.append(name))
+    warming.help_with(kernels.CIRCLES)
+    warming.help_with(kernels.POLYGONS)
+    assert asked == ["quantum", "pquantum"]
+
+
+def test_a_helper_that_hangs_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    real, started = subprocess.Popen, []
+
+    def hanging(_command: list[str], **streams: Any) -> subprocess.Popen[bytes]:
+        started.append(real([sys.executable, "-c", "import time; time.sleep(600)"], **streams))
+        return started[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", hanging)
+    monkeypatch.setattr(warming, "HELP_MAX_S", 0.01)
+    with warming.helper(kernels.CIRCLES):
+        assert started[0].poll() is None
+    assert started[0].returncode is not None
 
 
 COMPILED_LATER = """

@@ -2,6 +2,9 @@
 
 A program of its own, as the growth of a long drive is. Perception's time is that of its base part and of its quanta:
 in no cycle may that be more than the budget and one quantum, for which there is half a millisecond.
+
+A virtual machine whose host takes its processor away books that time to whoever was running. The drive is the same to
+the bit every time, so it is driven twice: what a cycle takes in both drives is its own, the rest is the machine's.
 """
 
 from __future__ import annotations
@@ -21,6 +24,7 @@ from config.settings import Settings
 from drivers.denning.robot import DenningRobot
 from drivers.emulator.device import EmulatedRobot
 from drivers.emulator.memory import MemoryLine
+from drivers.messages import Floats
 from perception.pipeline import Perception
 from runtime.allowance import ProcessorTime
 from runtime.commanding import gather, give
@@ -33,6 +37,7 @@ from runtime.step import Inputs, State, step
 
 QUANTUM_MAX_US: Final = 500.0
 """Of a quantum's CPU time, at p99.9."""
+DRIVES: Final = 2
 SETTLED_CYCLES: Final = 200
 """Until then the robot is being armed, and what is made at first need is made."""
 
@@ -51,12 +56,12 @@ class Account:
     quanta_us: list[float] = field(default_factory=list)
     causes: dict[str, int] = field(default_factory=dict)
 
-    def beyond_us(self) -> float:
-        """Return by how much the worst cycle took longer than its budget, or than its base where that is longer."""
-        return float((np.array(self.spent_us) - np.maximum(self.base_us, self.budget_us)).max())
+    def beyond_us(self) -> Floats:
+        """Return by how much each cycle took longer than its budget."""
+        return np.array(self.spent_us) - self.budget_us
 
     def figures(self) -> dict[str, Any]:
-        """Return what there is to say."""
+        """Return what there is to say of this drive alone."""
         return {
             "budget_us": self.budget_us,
             "cycles": len(self.spent_us),
@@ -64,8 +69,8 @@ class Account:
             "quantum_us": _quantiles(self.quanta_us),
             "perception_us": _quantiles(self.spent_us),
             "base_us": _quantiles(self.base_us),
-            "beyond_budget_us_max": round(self.beyond_us(), 1),
-            "cycles_over_budget": int((np.array(self.spent_us) > self.budget_us).sum()),
+            "beyond_budget_us_max": round(float(self.beyond_us().max()), 1),
+            "cycles_beyond_a_quantum": int((self.beyond_us() > QUANTUM_MAX_US).sum()),
             "causes": self.causes,
         }
 
@@ -141,11 +146,16 @@ def main(
     ready_kernels(settings, Console(stderr=True))
     kept = True
     for budget in budget_ms:
-        account = account_for(settings, cycles, 1e-3 * budget)
-        figures = account.figures()
+        drives = [account_for(settings, cycles, 1e-3 * budget) for _ in range(DRIVES)]
+        beyond_us = np.min([drive.beyond_us() for drive in drives], axis=0)
+        both = {
+            "beyond_budget_us_max": round(float(beyond_us.max()), 1),
+            "cycles_beyond_a_quantum": int((beyond_us > QUANTUM_MAX_US).sum()),
+        }
+        figures = {"in_every_drive": both, "drives": [drive.figures() for drive in drives]}
         sys.stdout.write(orjson.dumps(figures).decode() + "\n")
-        kept &= figures["beyond_budget_us_max"] <= QUANTUM_MAX_US
-        kept &= figures["quantum_us"]["p99.9"] <= QUANTUM_MAX_US
+        kept &= both["cycles_beyond_a_quantum"] == 0
+        kept &= all(drive.figures()["quantum_us"]["p99.9"] <= QUANTUM_MAX_US for drive in drives)
     return DONE if kept else FAILED
 
 

@@ -157,7 +157,9 @@ def test_no_cycle_takes_more_than_its_budget_and_a_quantum() -> None:
         [sys.executable, "-m", "tests.timing.budget", str(CYCLES)],
         cwd=ROOT, text=True, capture_output=True, timeout=300, check=False,
     )  # fmt: skip
-    ample, tight = (json.loads(line) for line in done.stdout.splitlines())
+    found = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [both["in_every_drive"]["cycles_beyond_a_quantum"] for both in found] == [0, 0], done.stdout
+    ample, tight = (both["drives"][0] for both in found)
     assert ample["cycles"] == tight["cycles"] == CYCLES
     assert "budget" not in ample["causes"], ample
     assert tight["causes"]["budget"] > 50, tight

@@ -1,0 +1,131 @@
+"""Running every kernel once, part by part: what was never compiled is compiled then, what was is loaded.
+
+Two processes that compile the same kernel do the same work twice, so a helper takes a part that the first process
+comes to last: `python -m runtime.warming full` compiles the refinement of circles, `… polygons` that of polygons.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
+
+from runtime.kernels import CIRCLES, EMULATOR, PAPER, POLYGONS, use_cache
+
+if TYPE_CHECKING:
+    from config.model import ModelConfig
+    from config.settings import Settings
+    from perception.pipeline import Perception
+
+FIRINGS: Final = 24
+"""So many, past a wall, leave nothing out."""
+HELP_MAX_S: Final = 300.0
+"""A helper slower than this is no help."""
+
+
+def _perception(settings: Settings, method: str, models: Sequence[ModelConfig]) -> Perception:
+    from perception.pipeline import Perception
+
+    eager = settings.perception.clusters.model_copy(update={"segments_min": 1})
+    config = settings.perception.model_copy(update={"clusters": eager, "method": method})
+    return Perception(settings.ring, models, config)
+
+
+def _drive(settings: Settings, perception: Perception, firings: int = FIRINGS) -> None:
+    """Drive past a wall."""
+    import numpy as np
+
+    from drivers.messages import Firing, Pose
+
+    for k in range(firings):
+        ranges = np.full(len(settings.ring.mounts), 2.0)
+        perception.observe(Firing(0.1 * k, Pose(0.1 * k, 0.0, 0.0), 0.0, ranges))
+        while firings > 1 and perception.pending:
+            perception.refine()
+    perception.things()
+
+
+def _square() -> ModelConfig:
+    from config.model import ModelConfig
+
+    corners = ((1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0))
+    return ModelConfig(name="warm-up", closed=True, vertices_m=corners)
+
+
+def hear(settings: Settings) -> None:
+    """Take in one firing and refine nothing."""
+    _drive(settings, _perception(settings, CIRCLES, settings.models), 1)
+
+
+def _circles(settings: Settings) -> None:
+    _drive(settings, _perception(settings, CIRCLES, settings.models))
+
+
+def _polygons(settings: Settings) -> None:
+    _drive(settings, _perception(settings, CIRCLES, (*settings.models, _square())))
+
+
+def _paper(settings: Settings) -> None:
+    _drive(settings, _perception(settings, PAPER, (*settings.models, _square())))
+
+
+def _emulator(settings: Settings) -> None:
+    from config.world import DrumConfig, WallConfig, WorldConfig
+    from drivers.emulator.device import EmulatedRobot
+
+    for model in ("cone", "specular"):
+        acoustics = WorldConfig().acoustics.model_copy(update={"model": model, "crosstalk": 0.5})
+        world = WorldConfig(
+            drum=(DrumConfig(x_m=2.0, y_m=0.0, radius_m=0.3),),
+            wall=(WallConfig(x1_m=3.0, y1_m=-3.0, x2_m=3.0, y2_m=3.0),),
+            acoustics=acoustics,
+        )
+        EmulatedRobot(settings, world, seed=0).advance(0.5)
+
+
+RUN_ONCE: Final[Mapping[str, Callable[[Settings], None]]] = MappingProxyType(
+    {EMULATOR: _emulator, CIRCLES: _circles, POLYGONS: _polygons, PAPER: _paper}
+)
+"""How each part is run once."""
+
+
+@contextlib.contextmanager
+def helper(part: str) -> Iterator[None]:
+    """Have another process compile the refinement of `part` meanwhile; wait for it at the end."""
+    quiet = subprocess.DEVNULL
+    process = subprocess.Popen(  # noqa: S603 - this very program
+        [sys.executable, "-m", "runtime.warming", part], stdin=quiet, stdout=quiet, stderr=quiet,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+    )  # fmt: skip
+    try:
+        yield
+        # Whatever became of it, what is missing is compiled by whoever needs it.
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(HELP_MAX_S)
+    finally:
+        process.kill()
+        process.wait()
+
+
+def help_with(part: str) -> None:
+    """Compile a part's refinement, on a memory in which nothing waits for it."""
+    from config.load import load_settings
+    from perception.full.entry import hold, pquantum, quantum
+    from perception.full.settings import make_settings
+    from perception.full.state import make_state
+
+    settings = load_settings(None)
+    full = settings.perception.full
+    told = make_settings(settings.ring, settings.models, full)
+    handle = hold(make_state(len(settings.ring.mounts), told, full.tracks_max), told)
+    refine = {CIRCLES: quantum, POLYGONS: pquantum}[part]
+    refine(handle, full.fresh_share)
+
+
+if __name__ == "__main__":
+    use_cache()
+    help_with(sys.argv[1])
