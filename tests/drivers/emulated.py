@@ -43,6 +43,14 @@ WORLD = WorldConfig(
 )
 
 
+def next_event_s(robot: EmulatedRobot) -> float:
+    """Return when `advance` will next have something to do."""
+    moments = [robot._next_us()]
+    if robot._uart.empty_us is not None:
+        moments.append(robot._uart.empty_us)
+    return min(moments) * 1e-6
+
+
 class Host:
     """A host's end that writes down everything with the time it came."""
 

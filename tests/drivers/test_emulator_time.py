@@ -27,7 +27,7 @@ from drivers.emulator.faults import Fault
 from drivers.emulator.memory import MemoryLine
 from drivers.emulator.uart import QUEUE_MAX, Uart
 from drivers.messages import Identity, LinkCounts, Pose, Twist
-from tests.drivers.emulated import ALL, WORLD, host, robot_config, script
+from tests.drivers.emulated import ALL, WORLD, host, next_event_s, robot_config, script
 from tests.drivers.vectors import THIRDS
 
 # The line.
@@ -135,7 +135,7 @@ def test_advancing_event_by_event_loses_nothing() -> None:
     got = b""
     moments: list[float] = []
     while not moments or moments[-1] < 1.0:
-        moments.append(h.robot.next_event_s)
+        moments.append(next_event_s(h.robot))
         got += h.robot.advance(moments[-1])
     assert moments == sorted(moments)
     assert got == other.robot.advance(moments[-1])
