@@ -50,7 +50,7 @@ def test_a_reservoir_keeps_the_newest_of_each_direction() -> None:
         for q in around(rng, int(rng.choice([0, 5, 600, 1500])), centre, 0.3):
             reservoir.put(s.bins, s.bn, t, *pair(centre), q)
             want.put(centre, q)
-        n = reservoir.flatten(s, t, s.w)
+        n = reservoir.flatten(s.bins, s.bn, t, s.w)
         assert rows(s.w[:n]) == rows(q for kept in want.kept for q in kept)
 
 
@@ -156,7 +156,7 @@ def test_readings_are_claimed_by_the_best_and_kept_by_all_they_bear_on() -> None
             bins, n = naive_tracks.Reservoir(NB, CAP), len(want)
             for q in want:
                 bins.put(s.tf[k, [TX, TY]], q)
-            count = reservoir.flatten(s, k, s.w)
+            count = reservoir.flatten(s.bins, s.bn, k, s.w)
             assert rows(s.w[:count]) == rows(q for room in bins.kept for q in room)
             assert s.ti[k, DIRTY] == 2 + n
             assert s.ti[k, QUIET] == (0 if n else 7 + (state != FREE))

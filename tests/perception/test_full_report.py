@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from perception.full import report
+from perception.full import report, walls
 from perception.full.state import (
     C00,
     C11,
@@ -117,7 +117,7 @@ def test_a_covariances_worst_axis_and_the_names_of_rivals() -> None:
             lever = np.array([0.5 * (line.low + line.high), 1.0])
             across = float(line.cov[1, 1] + lever[0] ** 2 * line.cov[0, 0])
             assert seen.sigma == pytest.approx(math.sqrt(max(across, length**2 / 12)), rel=1e-9)
-            assert report.is_wall(s.lines[k]) == (line.echoes > 10 and length > 2 * FT)
+            assert walls.is_wall(s.lines[k]) == (line.echoes > 10 and length > 2 * FT)
         random_track(rng, s, 0)
         s.tf[0, TRHO] = rng.choice([0.0, 0.1, 0.6])
         by_wall = any(

@@ -123,7 +123,7 @@ def test_the_next_free_track() -> None:
         i, f = s.ti, s.tf
         free, tentative = np.flatnonzero(i[:, ST] == FREE), np.flatnonzero(i[:, ST] == TENTATIVE)
         weakest = int(tentative[np.argmin(f[tentative, LLR])]) if len(tentative) else -1
-        assert births.free_track(s) == (free[0] if len(free) else weakest)
+        assert births.free_track(s.ti, s.tf[:, LLR]) == (free[0] if len(free) else weakest)
 
 
 def test_a_segment_of_a_known_body_is_known() -> None:
@@ -175,7 +175,7 @@ def test_a_refinement_keeps_its_books_and_decides_by_what_it_found() -> None:
         readings = around(rng, int(rng.choice([2, 10, 40, 120])), s.tf[0, [TX, TY]], float(s.tf[0, TRHO]))
         for q in readings:
             reservoir.put(s.bins, s.bn, 0, float(s.tf[0, TX]), float(s.tf[0, TY]), q)
-        n, before, quiet = reservoir.flatten(s, 0, s.w), int(s.ti[0, ST]), bool(turn % 2)
+        n, before, quiet = reservoir.flatten(s.bins, s.bn, 0, s.w), int(s.ti[0, ST]), bool(turn % 2)
         s.ti[0, [DIRTY, QUIET, POLISH]] = 100, P.quiet + quiet, 3
         s.tf[0, PROB] = -1.0
         count = s.g[REFINEMENTS]
