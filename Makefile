@@ -24,7 +24,7 @@ tests: $(VENV)/test.stamp
 # Compiled code reads beyond an array in silence; this run does not let it.
 boundscheck: $(VENV)/test.stamp
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(BIN)/python -m pytest -q -m "not realtime and not compiled and not soak" \
-		tests/perception tests/drivers/test_acoustics.py tests/drivers/test_emulator.py
+		tests/perception tests/drivers/test_acoustics.py tests/drivers/test_emulator*.py
 
 # Coverage sees into kernels only where they are not compiled.
 coverage: $(VENV)/test.stamp

@@ -14,6 +14,9 @@ from typing import Any, TypeAlias
 Location: TypeAlias = tuple[str | int, ...]
 """The way from the root to a value: keys of tables, numbers of list entries."""
 
+Holder: TypeAlias = dict[str, Any] | list[Any]
+"""A table or a list: what can hold a value."""
+
 FIRING: Location = ("ring", "firing")
 """The one table that is a single decision: naming another pattern replaces it whole."""
 
@@ -63,7 +66,7 @@ class Layers:
                 self._put(under, {}, location, source)
             self.lay(value, source, location)
 
-    def put(self, location: Location, value: Any, source: Source) -> None:  # noqa: ANN401 - whatever TOML held
+    def put(self, location: Location, value: object, source: Source) -> None:
         """Set one value, making the tables on the way to it.
 
         Raises
@@ -95,12 +98,16 @@ class Layers:
         inside = [s for where, s in self._origins.items() if where[: len(location)] == location]
         return [self.source_of(location), *inside]
 
-    def _put(self, holder: Any, value: Any, location: Location, source: Source) -> None:  # noqa: ANN401
+    def _put(self, holder: Holder, value: object, location: Location, source: Source) -> None:
         key = location[-1]
         if isinstance(holder, list) or key in holder:
             for where in [w for w in self._origins if w[: len(location)] == location]:
                 del self._origins[where]
-        holder[key] = {"preset": value} if location == FIRING and isinstance(value, str) else copy.deepcopy(value)
+        held = {"preset": value} if location == FIRING and isinstance(value, str) else copy.deepcopy(value)
+        if isinstance(holder, list):
+            holder[int(key)] = held
+        else:
+            holder[str(key)] = held
         if self.source_of(location) != source:
             self._origins[location] = source
         if self._order[-1] != source.name:
@@ -111,7 +118,7 @@ def _own_pattern(value: dict[str, Any]) -> bool:
     return not value.keys().isdisjoint({"preset", "sets"})
 
 
-def _entry(holder: Any, key: str | int, location: Location) -> str | int:  # noqa: ANN401
+def _entry(holder: object, key: str | int, location: Location) -> str | int:
     """Return `key` as the step it is in `holder`, the value at `location`."""
     where = ".".join(map(str, location))
     if isinstance(holder, dict):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from config.files import DEPTH_MAX, ConfigError, TomlSyntaxError, one_line, parse_toml
 from config.layers import Layers, Location, PathError, Source
@@ -16,7 +15,8 @@ class Override:
     """One value and where it goes."""
 
     location: Location
-    value: Any
+    value: object
+    """Whatever TOML holds."""
 
     @property
     def names_files(self) -> bool:
@@ -55,7 +55,7 @@ def apply_overrides(overrides: list[Override], layers: Layers) -> list[str]:
     return problems
 
 
-def _parse_value(text: str, shown: str) -> Any:  # noqa: ANN401 - whatever TOML holds
+def _parse_value(text: str, shown: str) -> object:
     if "\n" in text or "\r" in text:
         return text
     try:

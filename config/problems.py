@@ -8,7 +8,7 @@ import re
 import types
 from collections.abc import Iterator
 from types import MappingProxyType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Union, get_args, get_origin
 
 import annotated_types
 from pydantic import BaseModel, ValidationError
@@ -181,7 +181,7 @@ def _other_bounds(model: type[BaseModel], location: Location, kind: str) -> str:
     return f" (and {' and '.join(words)})" if words else ""
 
 
-def _unwrapped(annotation: Any) -> Any:  # noqa: ANN401 - an annotation can be anything
+def _unwrapped(annotation: object) -> object:
     """Return an annotation without Annotated and without the None of an optional field."""
     while True:
         origin, arguments = get_origin(annotation), get_args(annotation)
@@ -193,9 +193,9 @@ def _unwrapped(annotation: Any) -> Any:  # noqa: ANN401 - an annotation can be a
             return annotation
 
 
-def _annotation_at(model: Any, location: Location) -> Any:  # noqa: ANN401
+def _annotation_at(model: object, location: Location) -> object:
     """Return the annotation of what lies at `location`; None beyond the schema's end."""
-    annotation: Any = model
+    annotation = model
     for key in location:
         annotation = _unwrapped(annotation)
         if isinstance(key, int):
@@ -215,12 +215,13 @@ def _field_at(model: type[BaseModel], location: Location) -> FieldInfo | None:
     return _fields(_unwrapped(_annotation_at(model, location[:-1]))).get(location[-1])
 
 
-def _fields(annotation: Any) -> dict[str, FieldInfo]:  # noqa: ANN401
-    is_model = isinstance(annotation, type) and issubclass(annotation, BaseModel)
-    return dict(annotation.model_fields) if is_model else {}
+def _fields(annotation: object) -> dict[str, FieldInfo]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return dict(annotation.model_fields)
+    return {}
 
 
-def _every_location(annotation: Any, at: Location = ()) -> Iterator[Location]:  # noqa: ANN401
+def _every_location(annotation: object, at: Location = ()) -> Iterator[Location]:
     """Yield every key of the schema that is not inside a list."""
     for key, field in _fields(_unwrapped(annotation)).items():
         yield (*at, key)

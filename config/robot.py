@@ -6,7 +6,7 @@ Everything that differs from one robot to the next, and nothing that does not.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
+from typing import Annotated, Literal, NamedTuple, TypeAlias
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -66,7 +66,7 @@ class FiringConfig(Strict):
         return self
 
 
-def _preset_as_table(value: Any) -> Any:  # noqa: ANN401 - a validator sees whatever the file held
+def _preset_as_table(value: object) -> object:
     """Let ``firing = "octets"`` stand for ``firing = {preset = "octets"}``."""
     return {"preset": value} if isinstance(value, str) else value
 

@@ -5,7 +5,7 @@ A misspelt key that is silently ignored is a robot that drives with settings nob
 
 from __future__ import annotations
 
-from typing import Annotated, Any, TypeAlias, TypeVar
+from typing import Annotated, TypeAlias, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
@@ -25,7 +25,7 @@ class Strict(BaseModel):
     )
 
 
-def _list_as_tuple(value: Any) -> Any:  # noqa: ANN401 - a validator sees whatever the file held
+def _list_as_tuple(value: object) -> object:
     """Let TOML's only sequence type fill an immutable field."""
     return tuple(value) if isinstance(value, list) else value
 

@@ -8,7 +8,6 @@ and writer's own rule.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +28,7 @@ class NumberList:
         )
 
 
-def _as_list(value: Any) -> Any:  # noqa: ANN401 - a validator sees whatever there is
+def _as_list(value: object) -> object:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 

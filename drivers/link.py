@@ -184,7 +184,7 @@ class Link:
 class _Transport(serial_asyncio.SerialTransport):  # type: ignore[misc]  # the library has no types
     """The library's transport, minus two habits: an unplugged cable is no program error, and an end is an end."""
 
-    def _fatal_error(self, exc: BaseException, message: str = "") -> None:  # noqa: ARG002 - the library's signature
+    def _fatal_error(self, exc: BaseException, _message: str = "") -> None:
         self._abort(exc)
 
     def _close(self, exc: BaseException | None = None) -> None:
@@ -222,7 +222,7 @@ class _Line(asyncio.Protocol):
         """Bytes that have not left this process."""
         return int(self.transport.get_write_buffer_size())
 
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:  # noqa: ARG002 - asyncio's signature
+    def connection_made(self, _transport: asyncio.BaseTransport) -> None:
         self.made.set()
         if self.up:
             self._link._made()

@@ -22,7 +22,7 @@ from perception.kernel import Floats
 from perception.model import ObjectModel
 from perception.outline_map import OutlineMap
 from perception.recognition import goodness_of_fit
-from perception.seen import SeenObject
+from perception.seen import SeenObject, Tally
 from perception.segments import SegmentExtractor, mounts_array
 
 
@@ -62,8 +62,8 @@ class PaperPerception:
 
     @property
     def waiting(self) -> bool:
-        """Whether refinement has anything left to improve."""
-        return self.candidates.pending
+        """The same: no candidate waits for a firing."""
+        return self.pending
 
     def observe(self, firing: Firing) -> int:
         """Take in one firing and return how many outline segments it completed."""
@@ -83,19 +83,9 @@ class PaperPerception:
         return self.candidates.refine(self.clusters, self.outline)
 
     @property
-    def living(self) -> int:
-        """Outline segments in the map."""
-        return self.outline.living
-
-    @property
-    def total(self) -> int:
-        """Outline segments ever made."""
-        return self.outline.total
-
-    @property
-    def hypotheses(self) -> int:
-        """Clusters."""
-        return self.clusters.count
+    def tally(self) -> Tally:
+        """How many segments and clusters there are."""
+        return Tally(self.outline.living, self.outline.total, self.clusters.count)
 
     def segments_now(self) -> Floats:
         """Return the outline segments in the map: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""

@@ -18,7 +18,7 @@ from perception.echoes import FreshEchoes
 from perception.full.method import FullPerception
 from perception.kernel import Floats
 from perception.paper import PaperPerception
-from perception.seen import SeenObject
+from perception.seen import SeenObject, Tally
 from perception.segments import mounts_array
 from perception.sensor_report import SensorReport
 from perception.sensor_watch import SensorWatch
@@ -41,18 +41,8 @@ class Method(Protocol):
         ...
 
     @property
-    def living(self) -> int:
-        """Outline segments in the map."""
-        ...
-
-    @property
-    def total(self) -> int:
-        """Outline segments ever made."""
-        ...
-
-    @property
-    def hypotheses(self) -> int:
-        """Where something is thought to be: clusters, or tracks."""
+    def tally(self) -> Tally:
+        """How many segments and hypotheses there are."""
         ...
 
     def observe(self, firing: Firing) -> int:
@@ -125,19 +115,9 @@ class Perception:
         return self.method.waiting
 
     @property
-    def living(self) -> int:
-        """Outline segments in the map."""
-        return self.method.living
-
-    @property
-    def total(self) -> int:
-        """Outline segments ever made."""
-        return self.method.total
-
-    @property
-    def hypotheses(self) -> int:
-        """Where something is thought to be: clusters, or tracks."""
-        return self.method.hypotheses
+    def tally(self) -> Tally:
+        """How many segments and hypotheses there are."""
+        return self.method.tally
 
     def observe(self, firing: Firing) -> int:
         """Take in one firing and return how many outline segments it completed.

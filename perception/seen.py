@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,3 +28,14 @@ class SeenObject:
     """That it is what it is called; the paper's method does not know."""
     covariance: tuple[float, float, float] | None = None
     """xx, xy, yy of the position, m²; the paper's method does not know."""
+
+
+class Tally(NamedTuple):
+    """How much a method holds at the moment, and how much it has made."""
+
+    living: int
+    """Outline segments in the map."""
+    total: int
+    """Outline segments ever made."""
+    hypotheses: int
+    """Where something is thought to be: clusters, or tracks, established or not."""

@@ -19,12 +19,11 @@ from config.world import WorldConfig
 from drivers.emulator.device import Truth
 from drivers.messages import Pose
 from runtime.allowance import Allowance
-from runtime.experiment import GATE_M, against_truth, estimates, refuse_unfinished
+from runtime.experiment import GATE_M, SECONDS_MAX, against_truth, estimates, refuse_unfinished
 from runtime.long_hall import WAY_M, long_hall
 from runtime.simulate import simulate
 from runtime.step import CycleRecord, State
 
-SECONDS_MAX: Final = 600.0
 QUANTA_PER_FIRING: Final = 50
 """So many that time, and nothing else, ends refinement."""
 

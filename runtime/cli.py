@@ -15,7 +15,7 @@ from cyclopts import App, CycloptsError, Parameter
 from runtime import VERSION
 from runtime.cli_shown import export, figures, report
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
-from runtime.options import Flag, JsonFile, Seed, Sets, UnitsOption
+from runtime.options import ConfigFile, Flag, JsonFile, ModelFiles, RobotFile, Seed, Sets, Several, UnitsOption
 from runtime.scene_names import SceneName
 
 app = App(
@@ -27,7 +27,7 @@ app = App(
 
 @app.command
 def run(
-    config: str | None = None,
+    config: ConfigFile = None,
     /,
     *,
     port: str | None = None,
@@ -50,8 +50,6 @@ def run(
 
     Parameters
     ----------
-    config
-        Run file, or the name of a shipped one.
     port
         Serial port of the robot. The robot waits in READY until it is armed.
     arm
@@ -89,7 +87,7 @@ def emulate(
     link: str | None = None,
     faults: str | None = None,
     seed: Seed = 0,
-    robot: str | None = None,
+    robot: RobotFile = None,
     trace: str | None = None,
     latency: str | None = None,
     clock: float = 0.0,
@@ -109,8 +107,6 @@ def emulate(
         Fault script.
     seed
         Of everything random.
-    robot
-        Robot file, or the name of a shipped one.
     trace
         Write the truth to this CSV file, a hundred rows a second.
     latency
@@ -138,8 +134,8 @@ def replay(
     since: Annotated[float, Parameter(name="--from")] = 0.0,
     until: Annotated[float | None, Parameter(name="--to")] = None,
     speed: float | None = None,
-    robot: str | None = None,
-    model: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    robot: RobotFile = None,
+    model: ModelFiles = (),
     json: JsonFile = None,
     units: UnitsOption = "m",
     sets: Sets = (),
@@ -160,10 +156,6 @@ def replay(
         End this many seconds after it.
     speed
         This many times as fast as it was, in the live view; as fast as possible where it is not given.
-    robot
-        Robot file, or the name of a shipped one.
-    model
-        Object model to look for: a file or a name; may be repeated.
     """
     from pathlib import Path
 
@@ -209,15 +201,9 @@ def experiment(
     method: Literal["paper", "full"] = "full",
     scene: SceneName | None = None,
     world: str | None = None,
-    model: Annotated[tuple[str, ...], Parameter(negative="")] = (),
-    budget_ms: Annotated[tuple[float, ...], Parameter(negative="", consume_multiple=True)] = (
-        0.2,
-        0.5,
-        1.0,
-        2.0,
-        5.0,
-    ),
-    quanta: Annotated[tuple[float, ...], Parameter(negative="", consume_multiple=True)] = (),
+    model: ModelFiles = (),
+    budget_ms: Annotated[tuple[float, ...], Several] = (0.2, 0.5, 1.0, 2.0, 5.0),
+    quanta: Annotated[tuple[float, ...], Several] = (),
     seeds: Seed = 1,
     out: str | None = None,
     json: JsonFile = None,
@@ -236,8 +222,6 @@ def experiment(
         Instead of driving the robot, give perception alone a scene's readings at exact poses.
     world
         Another world, a file or a name.
-    model
-        Object model to look for: a file or a name; may be repeated.
     budget_ms
         For `budget`: processor time that perception has in a cycle, ms.
     quanta
@@ -288,19 +272,12 @@ def check(config: str, /, *, sets: Sets = ()) -> int:
 
 @app.command
 def service(
-    config: str | None = None,
-    /,
-    *,
-    port: str | None = None,
-    user: str | None = None,
-    sets: Sets = (),
+    config: ConfigFile = None, /, *, port: str | None = None, user: str | None = None, sets: Sets = ()
 ) -> int:
     """Print a systemd unit that runs the robot's main process from boot on; it never arms the robot.
 
     Parameters
     ----------
-    config
-        Run file, or the name of a shipped one.
     port
         Serial port of the robot, where the run file names none.
     user

@@ -2,29 +2,50 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from cyclopts import Parameter
 
 from runtime.options import Flag, Sets, UnitsOption
 
-Robot = Annotated[str | None, Parameter(help="Ring logs: robot file, or the name of a shipped one.")]
-Models = Annotated[
-    tuple[str, ...],
-    Parameter(name="--model", negative="", help="Ring logs: object model, a file or a name; may be repeated."),
-]
-World = Annotated[str | None, Parameter(help="What stood there, a world file or a name, where FILE does not know.")]
+if TYPE_CHECKING:
+    from runtime.trace.sources import Asked
+
+File = Annotated[str, Parameter(help="A recording (MCAP) or a ring log (CSV).")]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Besides:
+    """What FILE may not say of itself."""
+
+    world: Annotated[
+        str | None, Parameter(help="What stood there, a world file or a name, where FILE does not know.")
+    ] = None
+    robot: Annotated[str | None, Parameter(help="Ring logs: robot file, or the name of a shipped one.")] = None
+    models: Annotated[
+        tuple[str, ...],
+        Parameter(name="--model", negative="", help="Ring logs: object model, a file or a name; may be repeated."),
+    ] = ()
+
+    def asked(self, file: str, sets: tuple[str, ...]) -> Asked:
+        """Return what is asked for, in the words of those who read it."""
+        from runtime.trace.sources import Asked
+
+        return Asked(file, sets, self.robot, self.models, self.world)
+
+
+NOTHING: Final = Besides()
 
 
 def figures(
-    file: str,
+    file: File,
     /,
     *,
     out: str,
     still: Annotated[bool, Flag] = False,
-    world: World = None,
-    robot: Robot = None,
-    models: Models = (),
+    besides: Besides = NOTHING,
     units: UnitsOption = "m",
     sets: Sets = (),
 ) -> int:
@@ -32,27 +53,22 @@ def figures(
 
     Parameters
     ----------
-    file
-        A recording (MCAP) or a ring log (CSV).
     out
         Folder for the pictures: SVG, PDF and PNG; GIF, and MP4 where ffmpeg is there.
     still
         Leave the moving overview out.
     """
     from runtime.commands.figures import draw_figures
-    from runtime.trace.sources import Asked
 
-    return draw_figures(Asked(file, sets, robot, models, world), out, moving=not still, units=units)
+    return draw_figures(besides.asked(file, sets), out, moving=not still, units=units)
 
 
 def report(
-    file: str,
+    file: File,
     /,
     *,
     out: str | None = None,
-    world: World = None,
-    robot: Robot = None,
-    models: Models = (),
+    besides: Besides = NOTHING,
     units: UnitsOption = "m",
     sets: Sets = (),
 ) -> int:
@@ -60,40 +76,32 @@ def report(
 
     Parameters
     ----------
-    file
-        A recording (MCAP) or a ring log (CSV).
     out
         The page; where it is not given, beside the file, as NAME.html.
     """
     from runtime.commands.report import write_report
-    from runtime.trace.sources import Asked
 
-    return write_report(Asked(file, sets, robot, models, world), out, units=units)
+    return write_report(besides.asked(file, sets), out, units=units)
 
 
 def export(
-    file: str,
+    file: File,
     /,
     *,
     to: Literal["csv", "parquet", "foxglove", "rosbag2", "ringlog"],
     out: str,
-    world: World = None,
-    robot: Robot = None,
-    models: Models = (),
+    besides: Besides = NOTHING,
     sets: Sets = (),
 ) -> int:
     """Write a run in the form of other programs; all but csv and ringlog need `pip install 'echolocate[export]'`.
 
     Parameters
     ----------
-    file
-        A recording (MCAP) or a ring log (CSV).
     to
         Tables (csv, parquet), an MCAP for Foxglove, a ROS 2 bag, or a recording's firings as a ring log.
     out
         A folder for tables, a new folder for a bag, else a file.
     """
     from runtime.commands.export import export_run
-    from runtime.trace.sources import Asked
 
-    return export_run(Asked(file, sets, robot, models, world), to, out)
+    return export_run(besides.asked(file, sets), to, out)

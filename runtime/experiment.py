@@ -9,6 +9,7 @@ from statistics import mean, pstdev
 from typing import Any, Final, NotRequired, TypedDict
 
 from config.settings import Settings
+from config.units import FOOT_M
 from config.world import WorldConfig
 from drivers.emulator.memory import OnBytes
 from drivers.messages import Pose
@@ -19,7 +20,7 @@ from runtime.simulate import Simulated, simulate
 from runtime.step import CycleRecord, State
 from runtime.summary import object_row
 
-GATE_M: Final = 0.3048
+GATE_M: Final = FOOT_M
 """An estimate farther than a foot from every drum is a false one."""
 
 SECONDS_MAX: Final = 600.0

@@ -11,10 +11,10 @@ from collections.abc import Iterable, Sequence
 from statistics import median
 from typing import Final, TypedDict
 
+from config.units import FOOT_M
 from config.world import DrumConfig
 from perception.seen import SeenObject
 
-FOOT_M: Final = 0.3048
 WITHIN_M: Final = 0.25 * FOOT_M
 ASKED_M: Final = 4.0 * FOOT_M
 """How long before is asked for."""

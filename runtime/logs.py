@@ -63,7 +63,7 @@ class _Tee:
         colors = terminal is not None and terminal.isatty()
         self._render = structlog.dev.ConsoleRenderer(colors=colors, pad_event_to=0)
 
-    def __call__(self, logger: Any, name: str, event: MutableMapping[str, Any]) -> Mapping[str, Any]:  # noqa: ANN401
+    def __call__(self, logger: object, name: str, event: MutableMapping[str, Any]) -> Mapping[str, Any]:
         settings = event.pop("settings", None)
         self._note_trouble(logger, event)
         if self._standing.file is not None:
@@ -73,7 +73,7 @@ class _Tee:
         self._show(logger, name, event)
         raise structlog.DropEvent
 
-    def _note_trouble(self, logger: Any, event: Mapping[str, Any]) -> None:  # noqa: ANN401
+    def _note_trouble(self, logger: object, event: Mapping[str, Any]) -> None:
         """Tell of trouble with the file before the line that finds it, where lines still arrive."""
         trouble = self._standing.trouble
         if trouble != self._told:
@@ -81,7 +81,7 @@ class _Tee:
             warning = {"event": "the log has trouble", "reason": trouble, "lost": self._standing.lost}
             self._show(logger, "warning", {**warning, "level": "warning", "timestamp": event.get("timestamp")})
 
-    def _show(self, logger: Any, name: str, event: Mapping[str, Any]) -> None:  # noqa: ANN401
+    def _show(self, logger: object, name: str, event: Mapping[str, Any]) -> None:
         if self._tap is not None:
             self._tap(dict(event))
         if self._standing.terminal is not None:

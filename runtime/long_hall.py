@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 
+from config.units import FOOT_M
 from config.world import AcousticsConfig, DrumConfig, StartConfig, WorldConfig
 
-FOOT_M: Final = 0.3048
 A_SIDE: Final = 20
 RADIUS_FT: Final = 1.0
 PITCH_FT: Final = 3.2

@@ -14,14 +14,13 @@ from config.world import BoxConfig, WorldConfig
 from drivers.messages import Firing
 from perception.pipeline import Perception, SeenObject
 from runtime.books import Books, worst_of
+from runtime.drawing.geometry import CHI2_95
 from runtime.experiment import DrumRow, Outcome, against_truth, nearest_pairs
 from runtime.first_fix import FirstFix, FixWatch, summarise_fixes
 from runtime.scene_names import SceneName
 from runtime.scenes import Hall, halls, readings
 
 _QUARTER_TURN: Final = 0.5 * math.pi
-CHI2_95: Final = 5.991
-"""The 95 % quantile of χ² of two degrees of freedom."""
 RADIUS_TOLERANCE_M: Final = 0.01
 """A cylinder is a drum to be found where its radius is a model's to within this."""
 

@@ -19,6 +19,14 @@ Sets = Annotated[
 JsonFile = Annotated[str | None, Parameter(name="--json", help="Write the summary to this file.")]
 UnitsOption = Annotated[Literal["m", "ft"], Parameter(help="Units of what is printed.")]
 Flag = Parameter(negative="")
+Several = Parameter(negative="", consume_multiple=True)
+"""`--option a b c`, as well as the option again and again."""
+ConfigFile = Annotated[str | None, Parameter(help="Run file, or the name of a shipped one.")]
+RobotFile = Annotated[str | None, Parameter(help="Robot file, or the name of a shipped one.")]
+ModelFiles = Annotated[
+    tuple[str, ...],
+    Parameter(negative="", help="Object model to look for: a file or a name; may be repeated."),
+]
 
 
 def whole(_type: type, tokens: Sequence[Token]) -> int:

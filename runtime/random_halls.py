@@ -11,9 +11,9 @@ from typing import Final
 
 import numpy as np
 
+from config.units import FOOT_M
 from config.world import AcousticsConfig, BoxConfig, DrumConfig, PolygonConfig, StartConfig, WorldConfig
 
-FOOT_M: Final = 0.3048
 DRUM: Final = 1.0
 POST: Final = 0.35
 BARREL: Final = 2.2

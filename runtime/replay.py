@@ -41,8 +41,8 @@ def replay(
             on_firing(firing, perception)
     return {
         "objects": [object_row(seen) for seen in perception.objects()],
-        "segments": perception.total,
-        "clusters": perception.hypotheses,
+        "segments": perception.tally.total,
+        "clusters": perception.tally.hypotheses,
         "cycles": books.cycles,
         "cycle_us": books.cycle_us(),
     }

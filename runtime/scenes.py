@@ -16,14 +16,13 @@ from typing import Final, Literal
 import numpy as np
 
 from config.robot import RingConfig
+from config.units import FOOT_M
 from config.world import AcousticsConfig, BoxConfig, DrumConfig, StartConfig, WallConfig, WorldConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose
 from runtime.random_halls import random_hall
 from runtime.scene_names import SceneName
-
-FOOT_M: Final = 0.3048
 
 PLACES_FT: Final = tuple((x, y) for y in (4.0, -4.0) for x in (1.0, 4.0, 7.0))
 """Where the paper's six drums stand (its Table 2)."""

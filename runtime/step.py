@@ -125,9 +125,10 @@ def step(
     quanta, iterations, refinement = _refine(state.perception, may_refine)
     mark(Phase.REFINE)
     state.cycle += 1
+    tally = state.perception.tally
     return CycleRecord(
-        state.cycle, inputs, state.mode, command, new_segments, state.perception.living,
-        state.perception.hypotheses, quanta, iterations, refinement,
+        state.cycle, inputs, state.mode, command, new_segments, tally.living, tally.hypotheses, quanta, iterations,
+        refinement,
     )  # fmt: skip
 
 

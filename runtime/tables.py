@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from rich.table import Table
 
+from config.units import FOOT_M
 from runtime.first_fix import ASKED_M
 
 if TYPE_CHECKING:
@@ -19,12 +20,10 @@ if TYPE_CHECKING:
 
 Units: TypeAlias = Literal["m", "ft"]
 
-METRES_A_FOOT: Final = 0.3048
-
 
 def length(metres: float, units: Units, digits: int = 2) -> str:
     """Return a length as text in the units asked for."""
-    return f"{metres if units == 'm' else metres / METRES_A_FOOT:.{digits}f}"
+    return f"{metres if units == 'm' else metres / FOOT_M:.{digits}f}"
 
 
 def place(x: float, y: float, units: Units) -> str:

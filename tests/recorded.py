@@ -17,10 +17,13 @@ from runtime.recording.folder import OneFile, Place
 from runtime.recording.part import CHUNK_BYTES, INDEX, PROFILE
 from runtime.recording.reading import open_recording
 from runtime.recording.recorder import Recorder
+from runtime.recording.rerun import Verdict, replay
 from runtime.recording.writer import Standing
 from runtime.simulate import simulate
 
 WAIT_S = 30.0
+SECONDS = 12.0
+"""Of the recorded run that tests share."""
 
 
 def hall(*sets: str) -> Settings:
@@ -108,3 +111,11 @@ def rewrite(entries: Iterator[Entry] | list[Entry], path: Path, profile: str = f
             if entry.topic == CYCLE and cycles % 10 == 0:
                 writer.flush()
         writer.finish()
+
+
+def verdict_of(path: Path, **span: float) -> Verdict:
+    """Replay a recording that is whole, or a span of it."""
+    with open_recording(path) as recording:
+        verdict = replay(recording, **span)  # type: ignore[arg-type]
+        assert recording.damage == []
+    return verdict

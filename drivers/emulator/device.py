@@ -73,8 +73,6 @@ class EmulatedRobot:
         What it is and where it stands.
     seed
         Everything random follows from it.
-    boot_id
-        Of the first start; drawn from the seed where not given.
     faults
         What goes wrong, and when.
     clock_start_us
@@ -103,7 +101,6 @@ class EmulatedRobot:
         robot: RobotConfig,
         world: WorldConfig,
         seed: int,
-        boot_id: int | None = None,
         faults: Sequence[Fault] = (),
         clock_start_us: int = 0,
     ) -> None:
@@ -124,7 +121,7 @@ class EmulatedRobot:
         self._now_us = self._moved_us = 0
         self._ahead_us: int | None = None  # the next event, until something happens
         self._faults = FaultSchedule(faults)
-        self._boot_id = self._new_boot_id() if boot_id is None else boot_id
+        self._boot_id = self._new_boot_id()
         self._boot(clock_start_us)
         # Load the compiled kernels now: the first firing has no time for it.
         clearance(start.x, start.y, scene.circles, scene.segments)
@@ -155,14 +152,6 @@ class EmulatedRobot:
     def dropped(self) -> int:
         """Frames that did not fit into the transmitter's queue."""
         return self._uart.dropped
-
-    @property
-    def next_event_s(self) -> float:
-        """When `advance` will next have something to do."""
-        moments = [self._next_us()]
-        if self._uart.empty_us is not None:
-            moments.append(self._uart.empty_us)
-        return min(moments) * 1e-6
 
     def advance(self, to_s: float) -> bytes:
         """Live until `to_s`, seconds after the start, and return the bytes that have left the robot by then."""

@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from config.units import FOOT_M
 from perception.full.rivals import score
 from perception.full.state import TRHO, TX, TY, Settings, State
 from perception.kernel import kernel
 
-FOOT_M: Final = 0.3048
 ACROSS: Final = 3
 ACROSS_M: Final = 0.12 * FOOT_M
 """So many places on either side, so far apart: half a foot, a beam's edge at two and a half feet."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from config.units import FOOT_M
 from perception.full.contact import HIGH, LOW, fit_circle
 from perception.full.contact import HITS as HIT
 from perception.full.contact import NEAR as NEARBY
@@ -39,10 +40,9 @@ from perception.full.state import (
     State,
 )  # fmt: skip
 from perception.full.walls import new_line
-from perception.kernel import kernel
+from perception.kernel import Floats, Ints, kernel
 from perception.relaxation import relax
 
-FOOT_M: Final = 0.3048
 CELL_M: Final = 1.0 * FOOT_M
 """A cell of the outline map."""
 AROUND_M: Final = 0.4 * FOOT_M
@@ -68,17 +68,35 @@ VARIANCE_MAX_M2: Final = 0.2 * FOOT_M * FOOT_M
 
 
 @kernel
-def free_track(s: State) -> int:
-    """Return a free track, else the tentative one with the least evidence, else −1."""
-    worst = 1e18
+def free_track(of: Ints, evidence: Floats) -> int:
+    """Return a free track, else the tentative one with the least evidence, else −1.
+
+    Parameters
+    ----------
+    of : (n, ≥ 1) int
+        `State.ti` or `State.pi`.
+    evidence : (n,) float
+        Log ratio of each to the background, nat.
+    """
+    worst = math.inf
     slot = -1
-    for t in range(s.ti.shape[0]):
-        if s.ti[t, ST] == FREE:
+    for t in range(of.shape[0]):
+        if of[t, ST] == FREE:
             return t
-        if s.ti[t, ST] == TENTATIVE and s.tf[t, LLR] < worst:
-            worst = s.tf[t, LLR]
+        if of[t, ST] == TENTATIVE and evidence[t] < worst:
+            worst = evidence[t]
             slot = t
     return slot
+
+
+@kernel
+def let_pull(mapped: Floats, pull: Floats) -> None:
+    """Enter a row of `State.near` as one of `State.pull`: a mapped segment has a middle and a normal, and no ends."""
+    pull[0] = mapped[0]
+    pull[1] = mapped[1]
+    pull[2] = mapped[0]
+    pull[3] = mapped[1]
+    pull[4] = math.atan2(mapped[3], mapped[2])
 
 
 @kernel
@@ -102,14 +120,9 @@ def relax_onto_map(s: State, p: Settings, kind: int) -> None:
     m = map_near(s.pose[0], s.pose[1], rho + AROUND_M, CELL_M, s.tags, s.fill, s.store, s.near)
     q = 0
     for j in range(m):
-        nx = s.near[j, 2]
-        ny = s.near[j, 3]
-        if nx * (s.pose[0] - s.near[j, 0]) + ny * (s.pose[1] - s.near[j, 1]) > FACING * rho:
-            s.pull[q, 0] = s.near[j, 0]
-            s.pull[q, 1] = s.near[j, 1]
-            s.pull[q, 2] = s.near[j, 0]
-            s.pull[q, 3] = s.near[j, 1]
-            s.pull[q, 4] = math.atan2(ny, nx)
+        deep = s.near[j, 2] * (s.pose[0] - s.near[j, 0]) + s.near[j, 3] * (s.pose[1] - s.near[j, 1])
+        if deep > FACING * rho:
+            let_pull(s.near[j], s.pull[q])
             q += 1
             if q == PULLING:
                 break
@@ -120,7 +133,7 @@ def relax_onto_map(s: State, p: Settings, kind: int) -> None:
 @kernel
 def begin_track(s: State, kind: int, rho: float, x: float, y: float, n: int, now: float) -> int:
     """Found a tentative track on the `n` readings in `s.w` and return it, −1 where there is no room."""
-    t = free_track(s)
+    t = free_track(s.ti, s.tf[:, LLR])
     if t < 0:
         return -1
     s.ti[t, :] = 0

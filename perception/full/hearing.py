@@ -9,14 +9,10 @@ by the one before it, so with the echoes of that one in the sum a wall along all
 from __future__ import annotations
 
 import math
-from typing import Final
 
-from perception.full.noise_choice import noise_variance
+from perception.full.noise_choice import noise_variance, reach_of
 from perception.full.state import ESTABLISHED, KIND, R00, ST, TRHO, TX, TY, Settings, State
 from perception.kernel import Floats, kernel
-
-SIGMAS: Final = 3.0
-"""An echo this near to a known object is its, as when it claims it."""
 
 
 @kernel
@@ -48,7 +44,7 @@ def is_anothers(
         dy = s.tf[t, TY] - q[1]
         d = math.sqrt(dx * dx + dy * dy)
         e = abs(q[4] - (d - s.tf[t, TRHO]))
-        tight = p.half_box + SIGMAS * math.sqrt(var0 + rel2 * d * d) + 2.0 * s.tf[t, R00]
+        tight = reach_of(p.half_box, var0 + rel2 * d * d) + 2.0 * s.tf[t, R00]
         if dx * q[2] + dy * q[3] >= p.cos_opt * d and e < min(off, tight):
             return True
     return False

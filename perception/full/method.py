@@ -21,7 +21,7 @@ from perception.full.report import POLYGON_PROBABILITY, circle, other_things, po
 from perception.full.settings import circle_models, make_settings, tuned
 from perception.full.state import KIND, MODEL, PPROB, PROB, PT, SEGMENTS, ST, clear, make_state
 from perception.kernel import Floats
-from perception.seen import SeenObject
+from perception.seen import SeenObject, Tally
 from perception.segments import mounts_array
 
 DRAWN_M: Final = 0.1
@@ -75,19 +75,12 @@ class FullPerception:
         return self._circles_pending or self._polygons_pending
 
     @property
-    def living(self) -> int:
-        """Outline segments in the map."""
-        return int(np.minimum(self.memory.fill, self.memory.store.shape[1]).sum())
-
-    @property
-    def total(self) -> int:
-        """Outline segments ever made."""
-        return int(self.memory.g[SEGMENTS])
-
-    @property
-    def hypotheses(self) -> int:
-        """Tracks, established or not."""
-        return int(np.count_nonzero(self.memory.ti[:, ST]) + np.count_nonzero(self.memory.pi[:, ST]))
+    def tally(self) -> Tally:
+        """How many segments and tracks there are, the latter established or not."""
+        s = self.memory
+        living = np.minimum(s.fill, s.store.shape[1]).sum()
+        tracks = np.count_nonzero(s.ti[:, ST]) + np.count_nonzero(s.pi[:, ST])
+        return Tally(int(living), int(s.g[SEGMENTS]), int(tracks))
 
     def observe(self, firing: Firing) -> int:
         """Take in one firing and return how many outline segments it completed."""

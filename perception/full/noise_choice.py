@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from config.units import FOOT_M
 from perception.full.contact import FAR
 from perception.full.likelihood import loglik
 from perception.full.state import (
@@ -30,7 +31,8 @@ from perception.full.state import (
 from perception.kernel import Floats, kernel
 
 TWO_PI: Final = 2.0 * math.pi
-FOOT_M: Final = 0.3048
+SIGMAS: Final = 3.0
+"""A range this many σ and half its rounding off what is expected is explained."""
 TRIPLE_M: Final = 1.0 * FOOT_M
 """Three places farther apart than this hardly see one surface."""
 BENT_M2: Final = 1e-4 * FOOT_M * FOOT_M
@@ -51,6 +53,12 @@ def noise_variance(s: State, p: Settings) -> tuple[float, float]:
     """Return the variance of a range r that is believed in now, as var0 (m²) and rel2: var0 + rel2 · r²."""
     h = int(s.g[NOISE])
     return p.noises[h, 0] ** 2 + p.half_box**2 / 3.0 + BOX_M2, p.noises[h, 1] ** 2
+
+
+@kernel
+def reach_of(half_box: float, var: float) -> float:
+    """Return how far off an explained range is at most, m: rounded by ± `half_box` (m), of variance `var` (m²)."""
+    return half_box + SIGMAS * math.sqrt(var)
 
 
 @kernel

@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from config.units import FOOT_M
 from perception.full.births import CELL_M, birth
 from perception.full.contact import FAR
-from perception.full.noise_choice import choose_noise, noise_variance, roughness
-from perception.full.pairs import map_add, tangent
+from perception.full.noise_choice import choose_noise, noise_variance, reach_of, roughness
+from perception.full.pairs import SEG, map_add, tangent
 from perception.full.polygon_births import ask_for_polygon
 from perception.full.polygon_claims import poly_claims
 from perception.full.reservoir import put
@@ -40,7 +41,6 @@ from perception.full.state import (
 from perception.full.walls import update_lines
 from perception.kernel import Floats, Ints, kernel
 
-FOOT_M: Final = 0.3048
 PLACE_MAX_M: Final = 0.5 * FAR
 """A place this far from the odometry's origin is none: ranges as long as this mean silence."""
 STILL_M: Final = 0.05 * FOOT_M
@@ -49,7 +49,6 @@ STILL_COS: Final = 0.9998
 CLAIM_ASIDE_M: Final = 0.004 * FOOT_M
 KEEP_ASIDE_M: Final = 0.01 * FOOT_M
 """How far outside a beam a centre may lie for the reading to be claimed, and kept."""
-SIGMAS: Final = 3.0
 BASELINE_M: Final = 0.5 * FOOT_M
 """Shortest baseline of one sensor; the next ones are twice and four times this."""
 BASELINES: Final = 3
@@ -120,7 +119,7 @@ def claim(s: State, p: Settings, m: int) -> None:
             if dot <= 0.0 or dot < p.cos_opt * d - CLAIM_ASIDE_M:
                 continue
             e = abs(s.cur[i, 4] - (d - s.tf[t, TRHO]))
-            if e < best and e < p.half_box + SIGMAS * math.sqrt(var0 + rel2 * d * d) + 2.0 * s.tf[t, R00]:
+            if e < best and e < reach_of(p.half_box, var0 + rel2 * d * d) + 2.0 * s.tf[t, R00]:
                 best = e
                 s.owner[i] = t
 
@@ -188,7 +187,7 @@ def pair(i: int, q: Floats, other: Floats, cos_half: float, var: float, segs: Fl
         other[0], other[1], other[2], other[3], other[4], q[0], q[1], q[2], q[3], q[4], cos_half, var, segs[made]
     ):
         return made
-    segs[made, 7] = float(i)
+    segs[made, SEG] = float(i)
     return made + 1
 
 
@@ -293,7 +292,7 @@ def propose(s: State, p: Settings, made: int, now: float) -> None:
         chosen = -1
         best = p.hyp_sigma
         for k in range(made):
-            i = int(s.segs[k, 7])
+            i = int(s.segs[k, SEG])
             if s.owner[i] == -1 and s.cur[i, 4] <= p.pair_max:
                 aside = s.segs[k, 6] * (s.cur[i, 4] + p.radii[0])
                 if aside < best:
@@ -306,7 +305,7 @@ def propose(s: State, p: Settings, made: int, now: float) -> None:
             tries += birth(s, p, kind, x, y, nx, ny, now)
         for model in range(p.polys):
             tries += ask_for_polygon(s, model, x, y, nx, ny)
-        s.owner[int(s.segs[chosen, 7])] = -100
+        s.owner[int(s.segs[chosen, SEG])] = -100
         if tries >= TRIES:
             return
 
@@ -349,7 +348,7 @@ def observe(
     claim(s, p, m)
     if p.polys > 0:
         var0, _ = noise_variance(s, p)
-        poly_claims(s, p, m, p.half_box + SIGMAS * math.sqrt(var0))
+        poly_claims(s, p, m, reach_of(p.half_box, var0))
     update_lines(s, p, m)
     keep(s, p, m)
     made = make_segments(s, p, m, now)

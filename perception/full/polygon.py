@@ -12,11 +12,10 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
+from config.units import FOOT_M
 from perception.full.contact import DROP_PRICE, DROP_SHARE, HITS, LLR, NEAR, THROUGHS, level_of
 from perception.full.likelihood import loglik
 from perception.kernel import Floats, Ints, kernel
-
-FOOT_M: Final = 0.3048
 
 CORNER_PRICE: Final = 0.7
 """What an answer costs that a mirror may give or not, nat: about log 2. At a side's end or the beam's edge it costs

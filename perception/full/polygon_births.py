@@ -2,7 +2,7 @@
 
 As for circles the paper's relaxation moves the body onto the outline map, and the raw readings that the sensors
 remember decide. Along a side, contact says little, so each side is tried shifted as well. To propose one takes no
-time; to try it is a job. Here is also what keeps a polygon's readings.
+time; to try it is a job.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.full.births import CELL_M
+from config.units import FOOT_M
+from perception.full.births import CELL_M, GAMMA, free_track, let_pull
 from perception.full.contact import HITS as HIT
 from perception.full.contact import NEAR as NEARBY
 from perception.full.pairs import map_near
@@ -33,6 +34,7 @@ from perception.full.polygon_job import (
     sought,
     weigh_pose,
 )
+from perception.full.reservoir import put
 from perception.full.state import (
     CTH,
     CX,
@@ -43,8 +45,6 @@ from perception.full.state import (
     HK,
     MODEL,
     NOISE,
-    PB,
-    PCAP,
     PHITS,
     PLLR,
     PNEAR,
@@ -61,8 +61,6 @@ from perception.full.state import (
 from perception.kernel import Floats, Ints, kernel
 from perception.relaxation import relax
 
-FOOT_M: Final = 0.3048
-TWO_PI: Final = 2.0 * math.pi
 LAY, TRY, FINE = range(3)
 """Stages of a birth: a side is laid on the segment, tried, and the best trial is looked at closely."""
 GATHERING: Final = 800
@@ -72,8 +70,6 @@ SAME_COS: Final = 0.98
 """A segment this near to another one, and this parallel, asks the same."""
 AROUND_M: Final = 0.3 * FOOT_M
 """Segments up to this far off the farthest vertex may pull."""
-GAMMA: Final = 2.0
-"""The paper's γ."""
 RELAXATIONS: Final = 3
 NEGLIGIBLE_M: Final = 0.01 * FOOT_M
 NEGLIGIBLE_RAD: Final = 0.01
@@ -131,28 +127,6 @@ def bears(
 
 
 @kernel
-def pput(bins: Floats, bn: Ints, t: int, cx: float, cy: float, q: Floats) -> None:
-    """Keep reading `q` (x, y, axis, range) of polygon `t` at (cx, cy); its direction's oldest makes room."""
-    b = int((math.atan2(q[1] - cy, q[0] - cx) / TWO_PI + 0.5) * PB) % PB
-    k = bn[t, b] % PCAP
-    bn[t, b] += 1
-    for z in range(5):
-        bins[t, b, k, z] = q[z]
-
-
-@kernel
-def pflatten(bins: Floats, bn: Ints, t: int, w: Floats) -> int:
-    """Copy all readings of polygon `t` to `w`, shape (n, 5), and return how many."""
-    n = 0
-    for b in range(PB):
-        for k in range(min(bn[t, b], PCAP)):
-            for z in range(5):
-                w[n, z] = bins[t, b, k, z]
-            n += 1
-    return n
-
-
-@kernel
 def collect(
     hist: Floats, hn: Ints, cx: float, cy: float, bound: float, cos_half: float, sin_half: float, gate: float,
     reach: float, w: Floats,
@@ -205,11 +179,7 @@ def relax_polygon(s: State, p: Settings, model: int, sides: int) -> None:
     near = map_near(s.pose[0], s.pose[1], p.bound[model] + AROUND_M, CELL_M, s.tags, s.fill, s.store, s.near)
     pulling = min(near, PULLING)
     for j in range(pulling):
-        s.pull[j, 0] = s.near[j, 0]
-        s.pull[j, 1] = s.near[j, 1]
-        s.pull[j, 2] = s.near[j, 0]
-        s.pull[j, 3] = s.near[j, 1]
-        s.pull[j, 4] = math.atan2(s.near[j, 3], s.near[j, 2])
+        let_pull(s.near[j], s.pull[j])
     relax(
         p.psides[model, :sides], s.pull, s.all_pull[:pulling], GAMMA, NEGLIGIBLE_M, NEGLIGIBLE_RAD, RELAXATIONS,
         s.pose,
@@ -235,23 +205,9 @@ def lay_side(
 
 
 @kernel
-def free_polygon(s: State) -> int:
-    """Return a free track, else the tentative one with the least evidence, else −1."""
-    slot = -1
-    worst = math.inf
-    for t in range(s.pi.shape[0]):
-        if s.pi[t, ST] == FREE:
-            return t
-        if s.pi[t, ST] == TENTATIVE and s.pf[t, PLLR] < worst:
-            worst = s.pf[t, PLLR]
-            slot = t
-    return slot
-
-
-@kernel
 def begin_polygon(s: State, model: int, x: float, y: float, theta: float, llr: float) -> None:
     """Found a tentative track on the job's readings, where there is room."""
-    t = free_polygon(s)
+    t = free_track(s.pi, s.pf[:, PLLR])
     if t < 0:
         return
     s.pi[t, :] = 0
@@ -265,7 +221,7 @@ def begin_polygon(s: State, model: int, x: float, y: float, theta: float, llr: f
     s.pf[t, PTH] = theta
     s.pf[t, PLLR] = llr
     for j in range(s.job[HEARD]):
-        pput(s.pbins, s.pbn, t, x, y, s.pw[j])
+        put(s.pbins, s.pbn, t, x, y, s.pw[j])
 
 
 @kernel

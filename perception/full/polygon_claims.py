@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.full.noise_choice import noise_variance
+from perception.full.noise_choice import noise_variance, reach_of
 from perception.full.polygon import Ear, predict
-from perception.full.polygon_births import WHOLE, bears, pput
+from perception.full.polygon_births import WHOLE, bears
 from perception.full.polygon_job import HEARD, NEXT, cost, ear_of, sides_of
+from perception.full.reservoir import put
 from perception.full.state import (
     DIRTY,
     ESTABLISHED,
@@ -28,11 +29,8 @@ from perception.full.state import (
 )
 from perception.kernel import Floats, kernel
 
-FOOT_M: Final = 0.3048
 POLYGON: Final = 1000
 """What polygon t explains belongs to this plus t in `State.owner`."""
-SIGMAS: Final = 3.0
-"""An echo this near to what is expected is explained."""
 OVERLAP: Final = 1.8
 """Two bodies whose centres are nearer than this, in inner radii, cannot both be there."""
 
@@ -91,7 +89,7 @@ def poly_claims(s: State, p: Settings, m: int, tight: float) -> None:
             owner = s.owner[i]
             if 0 <= owner < POLYGON and s.ti[owner, KIND] < p.models:
                 continue
-            pput(s.pbins, s.pbn, t, x, y, q)
+            put(s.pbins, s.pbn, t, x, y, q)
             s.pi[t, DIRTY] += 1
             s.pi[t, QUIET] = 0
             s.pi[t, POLISH] = p.polish
@@ -134,7 +132,7 @@ def leave_to_next_neighbour(s: State, p: Settings, t: int) -> int:
     if apart > p.bound[model] + p.gate + p.bound[u_model] or apart < OVERLAP * p.inner[model]:
         return 1
     var0, _ = noise_variance(s, p)
-    tight = p.half_box + SIGMAS * math.sqrt(var0)
+    tight = reach_of(p.half_box, var0)
     ear = ear_of(p)
     faces = p.faces[model, : sides_of(p, model)]
     u_faces = p.faces[u_model, : sides_of(p, u_model)]

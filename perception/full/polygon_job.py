@@ -37,7 +37,6 @@ ROOT: Final = 16
 TOP: Final = 22
 COV: Final = 23
 MOMENTS: Final = 29
-NUMBERS: Final = 39
 
 
 @kernel

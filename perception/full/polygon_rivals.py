@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from config.units import FOOT_M
 from perception.full.contact import LLR as CIRCLE_LLR
 from perception.full.contact import fit_circle, score_circle
-from perception.full.noise_choice import noise_variance
-from perception.full.polygon_claims import SIGMAS
+from perception.full.noise_choice import noise_variance, reach_of
 from perception.full.polygon_job import HEARD, HISS
 from perception.full.refine import bounded_exp
 from perception.full.rivals import SOFT
@@ -16,15 +16,12 @@ from perception.full.state import (
     ESTABLISHED,
     FREE,
     KIND,
-    LC,
     LHI,
     LLO,
     LLR,
     LN,
     LNX,
     LNY,
-    LOX,
-    LOY,
     MODEL,
     PHITS,
     PLLR,
@@ -38,9 +35,9 @@ from perception.full.state import (
     Settings,
     State,
 )
+from perception.full.walls import off_and_along, reaches
 from perception.kernel import Floats, kernel
 
-FOOT_M: Final = 0.3048
 WALL_ECHOES_MIN: Final = 12.0
 WALL_SIZE: Final = 3.0
 """A wall is longer than so many inner radii."""
@@ -63,7 +60,7 @@ def on_line(w: Floats, n: int, line: Floats, cos_opt: float, tight: float) -> in
     """Return how many of `n` readings a line explains: a row of `State.lines`."""
     explained = 0
     for j in range(n):
-        ahead = line[LC] - line[LNX] * (w[j, 0] - line[LOX]) - line[LNY] * (w[j, 1] - line[LOY])
+        ahead, _ = off_and_along(line, w[j, 0], w[j, 1])
         facing_it = line[LNX] * w[j, 2] + line[LNY] * w[j, 3]
         if abs(facing_it) >= cos_opt and facing_it * ahead > 0.0 and abs(w[j, 4] - abs(ahead)) < tight:
             explained += 1
@@ -78,13 +75,9 @@ def is_wall(s: State, p: Settings, t: int) -> bool:
     for k in range(s.lines.shape[0]):
         line = s.lines[k]
         if line[LN] > WALL_ECHOES_MIN and line[LHI] - line[LLO] > max(p.claim, WALL_SIZE * inner):
-            dx = s.pf[t, PX] - line[LOX]
-            dy = s.pf[t, PY] - line[LOY]
-            off = line[LC] - line[LNX] * dx - line[LNY] * dy
-            along = -line[LNY] * dx + line[LNX] * dy
-            beside = line[LLO] - WALL_BEYOND_M < along < line[LHI] + WALL_BEYOND_M
-            if beside and WALL_BEHIND * inner < off < WALL_FRONT * inner:
-                tight = p.half_box + SIGMAS * math.sqrt(var0 + rel2 * off * off)
+            off, along = off_and_along(line, s.pf[t, PX], s.pf[t, PY])
+            if reaches(line, along, WALL_BEYOND_M) and WALL_BEHIND * inner < off < WALL_FRONT * inner:
+                tight = reach_of(p.half_box, var0 + rel2 * off * off)
                 if on_line(s.pw, s.job[HEARD], line, p.cos_opt, tight) >= WALL_SHARE * s.pf[t, PHITS]:
                     return True
     return False

@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from config.units import FOOT_M
 from perception.full.polygon import ACROSS, ALONG, BEST, THETA, X, Y, moved
 from perception.full.polygon_births import lay_side, ways_to_lie
 from perception.full.polygon_job import FOUND, FOUND_LLR, HEARD, MIDDLE, NEXT, STAGE, seek, sides_of
 from perception.full.state import CTH, CX, CY, MODEL, PHITS, PNEAR, PTH, PX, PXX, PY, REFS, RIVAL, Settings, State
 from perception.kernel import Floats, copy_span, kernel
 
-FOOT_M: Final = 0.3048
 DEAL, LOOK_WIDE, THROW, LOOK_NEAR, JUDGE, SPREAD = range(6)
 """Stages of a refinement."""
 COARSE: Final = 96

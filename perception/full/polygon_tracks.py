@@ -13,7 +13,7 @@ from typing import Final
 from perception.full.contact import HITS as HIT
 from perception.full.contact import NEAR as NEARBY
 from perception.full.polygon import BEST, SURE
-from perception.full.polygon_births import next_birth, pflatten, try_polygon
+from perception.full.polygon_births import next_birth, try_polygon
 from perception.full.polygon_claims import OVERLAP, leave_to_next_neighbour
 from perception.full.polygon_job import (
     BY_TURNS,
@@ -53,6 +53,7 @@ from perception.full.polygon_throws import (
     search_first,
     throw_next,
 )
+from perception.full.reservoir import flatten
 from perception.full.selection import choose_polygon
 from perception.full.state import (
     DIRTY,
@@ -159,7 +160,7 @@ def next_track(s: State, p: Settings, threshold: float) -> bool:
     s.job[WHO] = chosen
     s.job[NEXT] = 0
     s.job[HISS] = int(s.g[NOISE])
-    s.job[HEARD] = pflatten(s.pbins, s.pbn, chosen, s.pw)
+    s.job[HEARD] = flatten(s.pbins, s.pbn, chosen, s.pw)
     return True
 
 

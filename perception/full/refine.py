@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from config.units import FOOT_M
 from perception.full.basin import ACROSS_M, seek
 from perception.full.births import LINE_M, SWITCH, VARIANCE_MAX_M2
 from perception.full.contact import CLOSEST, DISPERSION, HIGH, LOW, THROUGHS, fit_circle
@@ -32,15 +33,7 @@ from perception.full.state import (
     FREE,
     HITS,
     KIND,
-    LC,
-    LHI,
-    LLO,
     LLR,
-    LN,
-    LNX,
-    LNY,
-    LOX,
-    LOY,
     NEAR,
     NL,
     NOISE,
@@ -64,11 +57,10 @@ from perception.full.state import (
     Settings,
     State,
 )  # fmt: skip
-from perception.full.walls import new_line
+from perception.full.walls import is_wall, new_line, off_and_along, reaches
 from perception.full.wedge import wedge
 from perception.kernel import kernel
 
-FOOT_M: Final = 0.3048
 READINGS_MIN: Final = 3
 BASIN: Final = 6.0
 """A robust fit this many σ² off (and the first two refinements) takes the pose over."""
@@ -83,8 +75,6 @@ SWITCH_DIRTY: Final = 4
 LINE_HITS_MIN: Final = 6.0
 THROUGH_SHARE: Final = 0.5
 """A wedge shares this much of the silences that speak against its rival."""
-WALL_ECHOES_MIN: Final = 10.0
-WALL_M: Final = 2.0 * FOOT_M
 WALL_BEYOND_M: Final = 8.0 * FOOT_M
 WALL_BEHIND: Final = -0.85
 WALL_FRONT: Final = 0.7
@@ -237,13 +227,9 @@ def stands_in_wall(s: State, x: float, y: float, rho: float) -> bool:
     """Tell whether a body's centre would lie in a known wall or just before or behind it."""
     for k in range(NL):
         line = s.lines[k]
-        if line[LN] > WALL_ECHOES_MIN and line[LHI] - line[LLO] > WALL_M:
-            dx = x - line[LOX]
-            dy = y - line[LOY]
-            off = line[LC] - line[LNX] * dx - line[LNY] * dy
-            along = -line[LNY] * dx + line[LNX] * dy
-            beside = line[LLO] - WALL_BEYOND_M < along < line[LHI] + WALL_BEYOND_M
-            if beside and WALL_BEHIND * rho < off < WALL_FRONT * rho:
+        if is_wall(line):
+            off, along = off_and_along(line, x, y)
+            if reaches(line, along, WALL_BEYOND_M) and WALL_BEHIND * rho < off < WALL_FRONT * rho:
                 return True
     return False
 
@@ -269,7 +255,7 @@ def probability(s: State, p: Settings, t: int, prior: float) -> float:
 def refine(s: State, p: Settings, t: int) -> None:
     """Refine track `t`: pose, evidence, rivals, noise, probability, and what becomes of it."""
     track = s.tf[t]
-    n = audible(s, p, flatten(s, t, s.w), track[TX], track[TY], track[TRHO], t)
+    n = audible(s, p, flatten(s.bins, s.bn, t, s.w), track[TX], track[TY], track[TRHO], t)
     s.ti[t, NRES] = n
     s.ti[t, DIRTY] = 0
     s.ti[t, REFS] += 1

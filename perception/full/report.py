@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from config.units import FOOT_M
 from perception.full.contact import FAR
 from perception.full.settings import MAY_DEG
 from perception.full.state import (
@@ -56,10 +57,10 @@ from perception.full.state import (
     Settings,
     State,
 )  # fmt: skip
+from perception.full.walls import is_wall
 from perception.kernel import Floats, Ints, kernel
 from perception.seen import SeenObject
 
-FOOT_M: Final = 0.3048
 OVER_UNKNOWN: Final = 1.25
 OVER_UNKNOWN_ALONE: Final = 1.1
 """Evidence over that of an unknown thing: a share of it, less where every rival is far behind."""
@@ -84,8 +85,6 @@ POLYGON_INFLATE: Final = 1.15
 """What a polygon's covariance is multiplied with when it is reported: what its neighbours do to it is no noise."""
 POLYGON_TURN: Final = math.radians(MAY_DEG)
 """And its heading is not known better than the beam's edges are, rad: hearing or not at an edge turns a body."""
-WALL_ECHOES_MIN: Final = 10.0
-WALL_M: Final = 2.0 * FOOT_M
 CORNER_M: Final = 1.0 * FOOT_M
 """A point this near to a long wall's line is a corner of the room, not an edge of a thing."""
 POST_M: Final = 1.0 * FOOT_M
@@ -246,11 +245,6 @@ def wall(line: Floats) -> SeenObject:
         "wall", float(line[LOX] + line[LC] * nx) - ny * middle, float(line[LOY] + line[LC] * ny) + nx * middle,
         math.atan2(nx, -ny), worst_sigma(xx, xy, yy), int(line[LN]), probability, probability, (xx, xy, yy),
     )  # fmt: skip
-
-
-def is_wall(line: Floats) -> bool:
-    """Tell whether a line is long and heard often enough to be called a wall."""
-    return bool(line[LN] > WALL_ECHOES_MIN and line[LHI] - line[LLO] > WALL_M)
 
 
 def rival_label(s: State, t: int) -> str:

@@ -1,4 +1,4 @@
-"""Which raw readings an object keeps: the newest from each direction.
+"""Which raw readings an object keeps, a circle or a polygon: the newest from each direction.
 
 Hits and silences share the bins, so that the readings that found an object are pushed out by those that find it
 gone, from wherever one looks again; nothing is dropped for its age. What one direction has to say never crowds out
@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.full.state import CAP, HK, NB, Settings, State
+from config.units import FOOT_M
+from perception.full.state import HK, Settings, State
 from perception.kernel import Floats, Ints, kernel
 
 TWO_PI: Final = 2.0 * math.pi
-ASIDE_M: Final = 0.02 * 0.3048
+ASIDE_M: Final = 0.02 * FOOT_M
 """A centre this far outside a beam may still move into it while a hypothesis is fitted."""
 
 
@@ -22,24 +23,24 @@ ASIDE_M: Final = 0.02 * 0.3048
 def put(bins: Floats, bn: Ints, t: int, cx: float, cy: float, q: Floats) -> None:
     """Keep reading `q` (x, y, axis, range) of track `t`, whose centre is (cx, cy); its direction's oldest makes room.
 
-    It gets two arrays and not the whole memory: this is an inner loop, and handing over a named tuple of arrays costs
-    more than the work.
+    `bins` and `bn` are the circles' or the polygons' of `State`: two arrays and not the whole memory: this is an
+    inner loop, and handing over a named tuple of arrays costs more than the work.
     """
-    b = int((math.atan2(q[1] - cy, q[0] - cx) / TWO_PI + 0.5) * NB) % NB
-    k = bn[t, b] % CAP
+    b = int((math.atan2(q[1] - cy, q[0] - cx) / TWO_PI + 0.5) * bins.shape[1]) % bins.shape[1]
+    k = bn[t, b] % bins.shape[2]
     bn[t, b] += 1
     for z in range(5):
         bins[t, b, k, z] = q[z]
 
 
 @kernel
-def flatten(s: State, t: int, w: Floats) -> int:
+def flatten(bins: Floats, bn: Ints, t: int, w: Floats) -> int:
     """Copy all readings of track `t` to `w`, shape (n, 5), and return how many."""
     n = 0
-    for b in range(NB):
-        for k in range(min(s.bn[t, b], CAP)):
+    for b in range(bins.shape[1]):
+        for k in range(min(bn[t, b], bins.shape[2])):
             for q in range(5):
-                w[n, q] = s.bins[t, b, k, q]
+                w[n, q] = bins[t, b, k, q]
             n += 1
     return n
 

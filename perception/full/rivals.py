@@ -12,7 +12,7 @@ from typing import Final
 from perception.full.contact import fit_circle, fit_line, score_circle, score_line
 from perception.full.noise_choice import noise_variance
 from perception.full.state import NOISE, Settings, State
-from perception.kernel import kernel
+from perception.kernel import Floats, kernel
 
 SOFT: Final = 9.0
 """Robustness of the fits, σ²."""
@@ -20,17 +20,26 @@ HOPELESS: Final = -1e9
 
 
 @kernel
+def mean_bearing(w: Floats, n: int, cx: float, cy: float, rho: float, gate: float) -> tuple[int, float, float]:
+    """Return how many readings end near a circle, and the sum of their unit bearings to its centre."""
+    m = 0
+    sx = 0.0
+    sy = 0.0
+    for j in range(n):
+        dx = cx - w[j, 0]
+        dy = cy - w[j, 1]
+        d = math.sqrt(dx * dx + dy * dy)
+        if abs(w[j, 4] - (d - rho)) < gate and d > 0.0:
+            sx += dx / d
+            sy += dy / d
+            m += 1
+    return m, sx, sy
+
+
+@kernel
 def towards(s: State, p: Settings, n: int, cx: float, cy: float, rho: float) -> tuple[float, float]:
     """Return the mean direction from the sensors that hear a circle to its centre; zeros where none does."""
-    x = 0.0
-    y = 0.0
-    for j in range(n):
-        dx = cx - s.w[j, 0]
-        dy = cy - s.w[j, 1]
-        d = math.sqrt(dx * dx + dy * dy)
-        if d > 0.0 and abs(s.w[j, 4] - (d - rho)) < p.gate:
-            x += dx / d
-            y += dy / d
+    _, x, y = mean_bearing(s.w, n, cx, cy, rho, p.gate)
     m = math.hypot(x, y)
     if m == 0.0:
         return 0.0, 0.0

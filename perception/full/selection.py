@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from config.units import FOOT_M
 from perception.full.state import (
     DIRTY,
     FREE,
@@ -29,9 +30,8 @@ from perception.full.state import (
     Settings,
     State,
 )
-from perception.kernel import kernel
+from perception.kernel import Ints, kernel
 
-FOOT_M: Final = 0.3048
 UNSURE: Final = 4.0
 UNSURE_ROOT_M: Final = 0.03 * FOOT_M
 """Evidence counts so many times where an object's place is less sure than this, maybe altogether wrong."""
@@ -47,30 +47,30 @@ OVERDUE: Final = 1e9
 
 
 @kernel
-def worth(s: State, p: Settings, t: int, threshold: float) -> float:
-    """Return what a quantum is worth to circle `t`; it waits for one where that is above `threshold`.
+def news(track: Ints, quiet: int, threshold: float, weight: float) -> float:
+    """Return what is unseen of a track for its size, `weight` times; `track` is a row of `State.ti` or `State.pi`.
 
     A track that has had no evidence for a while is worked off to the end: whatever is unseen, and a few rounds more.
     """
-    if s.ti[t, ST] == FREE:
-        return 0.0
-    v: float = s.ti[t, DIRTY] / (s.ti[t, NRES] + SIZE)
-    if max(s.tf[t, R00], s.tf[t, R11]) > UNSURE_ROOT_M or s.tf[t, PROB] < CERTAIN:
-        v *= UNSURE
-    if s.ti[t, QUIET] > p.quiet and s.ti[t, POLISH] > 0:
+    v: float = weight * (track[DIRTY] / (track[NRES] + SIZE))
+    if track[QUIET] > quiet and track[POLISH] > 0:
         v += threshold + OWED
     return v
 
 
 @kernel
+def worth(s: State, p: Settings, t: int, threshold: float) -> float:
+    """Return what a quantum is worth to circle `t`; it waits for one where that is above `threshold`."""
+    if s.ti[t, ST] == FREE:
+        return 0.0
+    is_unsure = max(s.tf[t, R00], s.tf[t, R11]) > UNSURE_ROOT_M or s.tf[t, PROB] < CERTAIN
+    return news(s.ti[t], p.quiet, threshold, UNSURE if is_unsure else 1.0)
+
+
+@kernel
 def worth_polygon(s: State, p: Settings, t: int, threshold: float) -> float:
     """Return the same for polygon `t`."""
-    if s.pi[t, ST] == FREE:
-        return 0.0
-    v: float = s.pi[t, DIRTY] / (s.pi[t, NRES] + SIZE)
-    if s.pi[t, QUIET] > p.quiet and s.pi[t, POLISH] > 0:
-        v += threshold + OWED
-    return v
+    return 0.0 if s.pi[t, ST] == FREE else news(s.pi[t], p.quiet, threshold, 1.0)
 
 
 @kernel

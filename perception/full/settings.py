@@ -16,12 +16,11 @@ import numpy as np
 from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import FullConfig
+from config.units import FOOT_M
 from perception.full.likelihood import BINS, LEVELS, build_levels, build_table
 from perception.full.state import Settings
 from perception.kernel import Floats, Ints
 from perception.model import ObjectModel
-
-FOOT_M: Final = 0.3048
 
 RIVALS_M: Final = (0.0, 0.35 * FOOT_M, 2.2 * FOOT_M)
 """Radii that every circle has to beat: an edge or corner, a post, a barrel."""
@@ -181,7 +180,6 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: FullC
         sides=np.array([_chords(r) for r in radii]),
         table=table,
         inv_step=inv_step,
-        sigmas=sigmas,
         noises=noises,
         levels=levels,
         polys=len(outlines),

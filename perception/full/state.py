@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from perception.full.pairs import SEG
 from perception.kernel import Floats, Ints
 
 NT: Final = 48
@@ -124,7 +125,6 @@ class Settings(NamedTuple):
     """(k, m, 4) chords of each circle, for the relaxation."""
     table: Floats
     inv_step: Floats
-    sigmas: Floats
     noises: Floats
     levels: Ints
     polys: int
@@ -192,7 +192,7 @@ class State(NamedTuple):
     fit: Floats
     stats: Floats
     segs: Floats
-    """(8 S, 8) this firing's segments, and the reading each came from."""
+    """(8 S, SEG + 1) this firing's segments, and the reading each came from."""
     near: Floats
     """(32, 4) segments near a place."""
     pi: Ints
@@ -228,7 +228,7 @@ def make_state(sensors: int, p: Settings, tracks: int = NT, slots: int = BUCKETS
         store=z((slots, BUCKET, 4)), ti=z((tracks, NTI), n), tf=z((tracks, NTF)), comp=z((tracks, rivals)),
         ddl=z(noises), ntot=z(noises), nll=z((tracks, noises)), bins=z((tracks, NB, CAP, 5)), bn=z((tracks, NB), n),
         lines=z((NL, 12)), g=z(8), w=z((WORK, 5)), w2=z((WORK, 5)), wl=z(WORK, n), cur=z((sensors, 6)),
-        owner=z(sensors, n), fit=z(12), stats=z(12), segs=z((8 * sensors, 8)), near=z((32, 4)),
+        owner=z(sensors, n), fit=z(12), stats=z(12), segs=z((8 * sensors, SEG + 1)), near=z((32, 4)),
         pi=z((PT, NTI), n), pf=z((PT, NPF)), pbins=z((PT, PB, PCAP, 5)), pbn=z((PT, PB), n), stats2=z(12),
         pose=z(3), root=z(3), cov=z(3), pull=z((PULLING, 5)), all_pull=np.arange(PULLING), last=z((sensors, 5)),
         job=z(24, n), work=z(56), pw=z((PB * PCAP, 5)), asked=z((ASKED, 6)),

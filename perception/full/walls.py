@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from config.units import FOOT_M
 from perception.full.contact import FAR
-from perception.full.noise_choice import noise_variance
+from perception.full.noise_choice import SIGMAS, noise_variance
 from perception.full.state import (
     LC,
     LHI,
@@ -31,7 +32,6 @@ from perception.full.state import (
 )  # fmt: skip
 from perception.kernel import Floats, kernel
 
-FOOT_M: Final = 0.3048
 SAME_COS: Final = 0.98
 SAME_M: Final = 0.4 * FOOT_M
 JOIN_M: Final = 1.0 * FOOT_M
@@ -52,9 +52,32 @@ CORNER_SLACK_M: Final = 0.05 * FOOT_M
 CORNER_GROW_M: Final = 0.7 * FOOT_M
 """The same for echoes from where a cone's edge meets it."""
 CORNER_COS: Final = 0.1
+ECHOES_MIN: Final = 10.0
+WALL_M: Final = 2.0 * FOOT_M
+"""A line that explained more echoes than this and is longer than this is called a wall."""
 LOG_ODDS: Final = 3.0
 LOG_ODDS_MAX: Final = 6.0
 PER_ECHO: Final = 0.5
+
+
+@kernel
+def off_and_along(line: Floats, x: float, y: float) -> tuple[float, float]:
+    """Return how far a place lies before a line, a row of `State.lines`, and where along it its foot is, m."""
+    dx = x - line[LOX]
+    dy = y - line[LOY]
+    return line[LC] - line[LNX] * dx - line[LNY] * dy, -line[LNY] * dx + line[LNX] * dy
+
+
+@kernel
+def reaches(line: Floats, along: float, beyond: float) -> bool:
+    """Tell whether a foot lies between the ends of a line, or `beyond` them at most (m)."""
+    return bool(line[LLO] - beyond < along < line[LHI] + beyond)
+
+
+@kernel
+def is_wall(line: Floats) -> bool:
+    """Tell whether a line is long and heard often enough to be called a wall."""
+    return bool(line[LN] > ECHOES_MIN and line[LHI] - line[LLO] > WALL_M)
 
 
 @kernel
@@ -72,11 +95,8 @@ def new_line(
                 worst = -1e9
             continue
         if line[LNX] * nx + line[LNY] * ny > SAME_COS:
-            dx = ox + c * nx - line[LOX]
-            dy = oy + c * ny - line[LOY]
-            along = -line[LNY] * dx + line[LNX] * dy
-            near = abs(line[LNX] * dx + line[LNY] * dy - line[LC]) < SAME_M
-            if near and line[LLO] - JOIN_M < along < line[LHI] + JOIN_M:
+            off, along = off_and_along(line, ox + c * nx, oy + c * ny)
+            if abs(off) < SAME_M and reaches(line, along, JOIN_M):
                 return
         if line[LLOG] < worst:
             worst = line[LLOG]
@@ -141,27 +161,24 @@ def update_lines(s: State, p: Settings, m: int) -> None:
             dot = line[LNX] * s.cur[i, 2] + line[LNY] * s.cur[i, 3]
             if dot < FRONT_COS:
                 continue
-            px = s.cur[i, 0] - line[LOX]
-            py = s.cur[i, 1] - line[LOY]
-            expected = line[LC] - line[LNX] * px - line[LNY] * py
+            expected, foot = off_and_along(line, s.cur[i, 0], s.cur[i, 1])
             if expected <= 0.0:
                 continue
-            foot = -line[LNY] * px + line[LNX] * py
             r = s.cur[i, 4]
             var = var0 + rel2 * expected * expected
-            tight = p.half_box + SLACK_M + 3.0 * math.sqrt(max(var - p.half_box**2 / 3.0, 0.0))
+            tight = p.half_box + SLACK_M + SIGMAS * math.sqrt(max(var - p.half_box**2 / 3.0, 0.0))
             claims = line[LHI] - line[LLO] > p.claim
             if dot >= p.cos_opt:
                 e = r - expected
-                if abs(e) < tight and line[LLO] - GROW_M < foot < line[LHI] + GROW_M:
+                if abs(e) < tight and reaches(line, foot, GROW_M):
                     if s.owner[i] == -1 and claims:
                         s.owner[i] = -2 - k
                     line[LLO] = min(line[LLO], foot)
                     line[LHI] = max(line[LHI], foot)
                     line[LLOG] = min(line[LLOG] + PER_ECHO, LOG_ODDS_MAX)
                     line[LN] += 1.0
-                    follow(line, px, py, e, var)
-                elif e > p.gate and dot >= p.cos_in and line[LLO] + WITHIN_M < foot < line[LHI] - WITHIN_M:
+                    follow(line, s.cur[i, 0] - line[LOX], s.cur[i, 1] - line[LOY], e, var)
+                elif e > p.gate and dot >= p.cos_in and reaches(line, foot, -WITHIN_M):
                     line[LLOG] -= 1.0
                     if line[LLOG] < 0.0:
                         line[LN] = 0.0
@@ -172,7 +189,7 @@ def update_lines(s: State, p: Settings, m: int) -> None:
                 side = 1.0 if line[LNX] * s.cur[i, 3] - line[LNY] * s.cur[i, 2] < 0.0 else -1.0
                 at = foot - expected * math.tan(off) * side
                 near = abs(r - expected / math.cos(off)) < tight + CORNER_SLACK_M
-                if near and line[LLO] - CORNER_GROW_M < at < line[LHI] + CORNER_GROW_M:
+                if near and reaches(line, at, CORNER_GROW_M):
                     if s.owner[i] == -1 and claims:
                         s.owner[i] = -2 - k
                     if dot >= p.cos_half - CORNER_COS:

@@ -12,6 +12,7 @@ from typing import Final
 
 from perception.full.contact import fit_line, level_of
 from perception.full.likelihood import loglik
+from perception.full.rivals import SOFT, mean_bearing
 from perception.kernel import Floats, Ints, kernel
 
 IMPOSSIBLE: Final = -1e9
@@ -25,9 +26,6 @@ FEWEST_OF_A_FACE: Final = 3
 
 TURNS: Final = 3
 """How often readings are dealt out to the faces and both fitted anew."""
-
-SOFT: Final = 9.0
-"""σ² beyond which a residual counts for less than a quarter in a face's fit."""
 
 STEPS: Final = 3
 """Steps of a face's fit."""
@@ -49,23 +47,6 @@ HIT_PRICE: Final = 0.4
 
 PRICE: Final = 8.0
 """Price of the two parameters more than a circle has, nat."""
-
-
-@kernel
-def mean_bearing(w: Floats, n: int, cx: float, cy: float, rho: float, gate: float) -> tuple[int, float, float]:
-    """Return how many readings end near a circle, and the sum of their unit bearings to its centre."""
-    m = 0
-    sx = 0.0
-    sy = 0.0
-    for j in range(n):
-        dx = cx - w[j, 0]
-        dy = cy - w[j, 1]
-        d = math.sqrt(dx * dx + dy * dy)
-        if abs(w[j, 4] - (d - rho)) < gate and d > 0.0:
-            sx += dx / d
-            sy += dy / d
-            m += 1
-    return m, sx, sy
 
 
 @kernel

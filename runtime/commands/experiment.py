@@ -50,7 +50,7 @@ def run_experiment(
     from runtime.experiment import run_seed, summarise
     from runtime.summary import write_json
 
-    place = None if out is None else folder("--out", out)
+    place = None if out is None else folder(out)
     told = Console(soft_wrap=True, highlight=False)
     runs = track(range(seeds), "driving", console=console, transient=True, disable=not console.is_terminal)
     outcomes = []

@@ -36,7 +36,7 @@ def export_run(asked: Asked, form: Form, out: str) -> int:
         told.print(f"{target}: {ring_log(asked, target)} firings")
         return DONE
     if form in {"csv", "parquet"}:
-        target = folder("--out", out)
+        target = folder(out)
     elif form == "rosbag2" and target.exists():
         raise Complaint(f"--out {out}: is there already; a bag is a new folder", FAILED)
     trace = read(asked, console)

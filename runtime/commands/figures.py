@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def draw_figures(asked: Asked, out: str, *, moving: bool, units: Units) -> int:
     """Carry out the command; see `runtime.cli.figures`."""
     console = Console(stderr=True, soft_wrap=True, highlight=False)
-    place = folder("--out", out)
+    place = folder(out)
     trace = read(asked, console)
     told = Console(soft_wrap=True, highlight=False)
     for path in draw_all(trace, place, console, moving=moving, units=units):

@@ -156,8 +156,8 @@ def summarise(recording: Recording, verdict: Verdict) -> ReplaySummary:
     perception = verdict.state.perception if verdict.state is not None else None
     return {
         "objects": [] if perception is None else [object_row(seen) for seen in perception.objects()],
-        "segments": 0 if perception is None else perception.total,
-        "clusters": 0 if perception is None else perception.hypotheses,
+        "segments": 0 if perception is None else perception.tally.total,
+        "clusters": 0 if perception is None else perception.tally.hypotheses,
         "cycles": verdict.cycles,
         "cycle_us": verdict.books.cycle_us(),
         "verify": {

@@ -61,8 +61,8 @@ def writing(option: str, path: str | Path) -> Iterator[None]:
         ) from error
 
 
-def folder(option: str, path: str) -> Path:
-    """Return a folder to write into, made where it is missing.
+def folder(path: str) -> Path:
+    """Return the folder of `--out`, made where it is missing.
 
     Raises
     ------
@@ -71,8 +71,8 @@ def folder(option: str, path: str) -> Path:
     """
     made = Path(path)
     if made.exists() and not made.is_dir():
-        raise Complaint(f"{option} {path}: is a file; name a folder", WRONG_CALL)
-    with writing(option, path):
+        raise Complaint(f"--out {path}: is a file; name a folder", WRONG_CALL)
+    with writing("--out", path):
         made.mkdir(parents=True, exist_ok=True)
     return made
 

@@ -6,9 +6,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from config.units import FOOT_M
 from runtime.drawing.scene import errors_of
 from runtime.drawing.style import ECHO, MODEL, SEGMENT, WIDTH_IN
-from runtime.tables import METRES_A_FOOT, Units
+from runtime.tables import Units
 from runtime.trace.form import Trace
 
 
@@ -25,7 +26,7 @@ def course(trace: Trace, units: Units) -> Figure:
     known.yaxis.set_major_locator(MaxNLocator(integer=True))
     known.set_title("Course of the run")
     if with_errors:
-        unit = METRES_A_FOOT if units == "ft" else 1.0
+        unit = FOOT_M if units == "ft" else 1.0
         errors = [[e / unit for e in errors_of(m.objects, trace).values()] for m in trace.moments]
         at = [t for t, found in zip(times, errors, strict=True) if found]
         panels[1].plot(at, [max(found) for found in errors if found], color=SEGMENT, linewidth=1.5,

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from config.load import load_world
+from config.units import FOOT_M
 from runtime.drawing.geometry import Frame, window
 from runtime.drawing.scene import (
     draw_arcs,
@@ -23,10 +24,9 @@ from runtime.drawing.scene import (
     heard,
 )
 from runtime.drawing.style import MUTED, WIDTH_IN
-from runtime.tables import METRES_A_FOOT, Units
+from runtime.tables import Units
 from runtime.trace.form import RANGE, Trace
 
-NAMES: Final = ("raw", "segments", "clusters", "models")
 HEIGHT_MIN_IN, HEIGHT_MAX_IN = 3.0, 8.5
 ROOM_IN: Final = 1.2
 """For title, axis label and legend."""
@@ -42,7 +42,7 @@ class Canvas:
     @property
     def frame(self) -> Frame:
         """The plane."""
-        return Frame(self.trace.start, METRES_A_FOOT if self.units == "ft" else 1.0)
+        return Frame(self.trace.start, FOOT_M if self.units == "ft" else 1.0)
 
     def figure(self, room_in: float = ROOM_IN) -> tuple[Figure, Axes]:
         """Return an empty picture, as high as the run's shape asks for, with some room around the plane."""

@@ -69,30 +69,25 @@ def heard(echoes: Floats) -> Floats:
     return back[:: max(1, math.ceil(len(back) / ARCS_MAX))]
 
 
-def draw_arcs(
-    axes: Axes, echoes: Floats, half_angle: float, frame: Frame, *, faint: bool = False, gid: str = "echoes"
-) -> list[Line2D]:
+def draw_arcs(axes: Axes, echoes: Floats, half_angle: float, frame: Frame) -> list[Line2D]:
     """Draw each echo as the arc from which it may have come."""
     curves = frame.points(arcs(echoes, half_angle))
     codes = np.tile([Path.MOVETO, Path.CURVE4, Path.CURVE4, Path.CURVE4], len(curves))
-    alpha, width = (0.25, 0.6) if faint else (0.4, 0.7)
     if len(curves):
-        patch = PathPatch(Path(curves.reshape(-1, 2), codes), facecolor="none", edgecolor=ECHO, linewidth=width,
-                          alpha=alpha, zorder=3)  # fmt: skip
-        patch.set_gid(gid)
+        patch = PathPatch(Path(curves.reshape(-1, 2), codes), facecolor="none", edgecolor=ECHO, linewidth=0.7,
+                          alpha=0.4, zorder=3)  # fmt: skip
+        patch.set_gid("echoes")
         axes.add_patch(patch)
     return [Line2D([], [], color=ECHO, linewidth=1.2, alpha=0.8, label="echo, its arc")]
 
 
-def draw_segments(
-    axes: Axes, segments: Floats, frame: Frame, *, faint: bool = False, gid: str = "segments"
-) -> list[Line2D]:
+def draw_segments(axes: Axes, segments: Floats, frame: Frame, *, faint: bool = False) -> list[Line2D]:
     """Draw outline segments, (n, 4) ends."""
     lines = LineCollection(
         list(frame.points(segments.reshape(-1, 2, 2))), color=SEGMENT, linewidth=0.9 if faint else 1.3,
         alpha=0.45 if faint else 0.85, zorder=3,
     )  # fmt: skip
-    lines.set_gid(gid)
+    lines.set_gid("segments")
     axes.add_collection(lines)
     return [Line2D([], [], color=SEGMENT, linewidth=1.5, label="outline segment")]
 

@@ -18,18 +18,25 @@ from foxglove import messages as fx
 
 from drivers.messages import Pose
 from runtime.drawing.geometry import outline, things
-from runtime.export.shapes import HEIGHT_M, Round, even_radius, rounds, turned, whole_ring
+from runtime.export.shapes import (
+    CLUSTER,
+    HEIGHT_M,
+    MODEL,
+    SEGMENT,
+    TRUTH,
+    Colour,
+    Round,
+    even_radius,
+    rounds,
+    turned,
+    whole_ring,
+)
 from runtime.trace.form import BEARING, RANGE, Moment, Said, Trace, X, Y
 
 ARC_POINTS: Final = 9
 LINE_PX: Final = 2.0
 CROSS_M: Final = 0.08
-SEGMENT: Final = (0.84, 0.37, 0.0)
-CLUSTER: Final = (0.0, 0.62, 0.45)
-MODEL: Final = (0.0, 0.45, 0.70)
-TRUTH: Final = (0.6, 0.6, 0.6)
 
-Colour = tuple[float, float, float]
 Places = Iterable[Iterable[float]]
 
 

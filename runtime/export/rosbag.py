@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -18,18 +18,17 @@ from rosbags.typesys import Stores, get_typestore
 
 from drivers.messages import Odometry, Pose
 from runtime.drawing.geometry import outline, things
-from runtime.export.shapes import Round, rounds, turned
+from runtime.export.shapes import CLUSTER, MODEL, SEGMENT, TRUTH, Colour, Round, rounds, turned
 from runtime.trace.form import RANGE, SENSOR, Moment, Trace
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Msg, Msgarg
 
 VERSION: Final = 9
 LINE_M: Final = 0.02
 STRIP, LINES = 4, 5
 """Kinds of `visualization_msgs/Marker`."""
 DELETE_ALL: Final = 3
-SEGMENT: Final = (0.84, 0.37, 0.0)
-CLUSTER: Final = (0.0, 0.62, 0.45)
-MODEL: Final = (0.0, 0.45, 0.70)
-TRUTH: Final = (0.6, 0.6, 0.6)
 
 Points = list[tuple[float, float]]
 
@@ -70,7 +69,7 @@ class _Teller:
         for t_s, tell in sorted(items, key=lambda item: item[0]):
             tell(trace.unix_ns(t_s))
 
-    def _make(self, kind: str, **values: Any) -> Any:  # noqa: ANN401 - rosbags makes its types as it goes
+    def _make(self, kind: str, **values: Msgarg) -> Msg:
         return self._store.types[kind](**values)
 
     def _write(self, topic: str, kind: str, message: object, at: int) -> None:
@@ -78,21 +77,21 @@ class _Teller:
             self._connections[topic] = self._writer.add_connection(topic, kind, typestore=self._store)
         self._writer.write(self._connections[topic], at, self._store.serialize_cdr(message, kind))
 
-    def _header(self, frame: str, at: int) -> Any:  # noqa: ANN401
+    def _header(self, frame: str, at: int) -> Msg:
         stamp = self._make("builtin_interfaces/msg/Time", sec=at // 1_000_000_000, nanosec=at % 1_000_000_000)
         return self._make("std_msgs/msg/Header", stamp=stamp, frame_id=frame)
 
-    def _vector(self, x: float, y: float, z: float = 0.0) -> Any:  # noqa: ANN401
+    def _vector(self, x: float, y: float, z: float = 0.0) -> Msg:
         return self._make("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
 
-    def _point(self, x: float, y: float) -> Any:  # noqa: ANN401
+    def _point(self, x: float, y: float) -> Msg:
         return self._make("geometry_msgs/msg/Point", x=float(x), y=float(y), z=0.0)
 
-    def _turn(self, yaw: float) -> Any:  # noqa: ANN401
+    def _turn(self, yaw: float) -> Msg:
         x, y, z, w = turned(yaw)
         return self._make("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w)
 
-    def _placed(self, pose: Pose) -> Any:  # noqa: ANN401
+    def _placed(self, pose: Pose) -> Msg:
         return self._make(
             "geometry_msgs/msg/Pose", position=self._point(pose.x, pose.y), orientation=self._turn(pose.theta)
         )
@@ -167,7 +166,7 @@ class _Teller:
             markers.append(self._marker(f"models/{seen.model}", number, STRIP, row, MODEL, at))
         self._markers("/markers", markers, at)
 
-    def _markers(self, topic: str, markers: list[Any], at: int) -> None:
+    def _markers(self, topic: str, markers: list[Msg], at: int) -> None:
         kind = "visualization_msgs/msg/MarkerArray"
         self._write(topic, kind, self._make(kind, markers=markers), at)
 
@@ -177,11 +176,11 @@ class _Teller:
         number: int,
         kind: int,
         points: Points,
-        colour: tuple[float, float, float],
+        colour: Colour,
         at: int,
         frame: str = "odom",
         action: int = 0,
-    ) -> Any:  # noqa: ANN401
+    ) -> Msg:
         r, g, b = colour
         stamp = self._make("builtin_interfaces/msg/Time", sec=0, nanosec=0)
         nothing = self._make(

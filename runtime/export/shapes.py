@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -15,6 +16,13 @@ from runtime.trace.form import BEARING, RANGE, ROBOT_T, SENSOR, T, Trace, X, Y
 HEIGHT_M = 0.9
 """Of what is drawn upright: a drum's."""
 EVEN_M = 1e-6
+
+Colour = tuple[float, float, float]
+SEGMENT: Final = (0.84, 0.37, 0.0)
+CLUSTER: Final = (0.0, 0.62, 0.45)
+MODEL: Final = (0.0, 0.45, 0.70)
+TRUTH: Final = (0.6, 0.6, 0.6)
+"""Red, green and blue of what is drawn, from 0 to 1; close to the pictures' own, see `drawing.style`."""
 
 Quarter = tuple[float, float, float, float]
 

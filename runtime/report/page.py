@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from config.units import FOOT_M
 from drivers.messages import Pose
 from perception.seen import SeenObject
 from runtime import VERSION
@@ -116,7 +117,7 @@ def _table_2(trace: Trace, units: Units) -> str:
     told = note(f"As the paper's Table 2, in world coordinates. {false} recognised where nothing of the kind stands.")
     numbers = paper_figures(trace)
     if numbers is not None and numbers[0] == 6:
-        mean, worst = (length(0.3048 * feet, units, 3) for feet in (0.249, 0.349))
+        mean, worst = (length(FOOT_M * feet, units, 3) for feet in (0.249, 0.349))
         told += note(f"The paper's own Table 2 has a mean error of {mean} {units} and a worst of {worst} {units}.")
     return table(heads, rows) + told
 

@@ -64,6 +64,10 @@ class Said:
     text: str
 
 
+def _no_rows() -> Floats:
+    return np.zeros((0, 7))
+
+
 @dataclass(slots=True, eq=False)
 class Trace:
     """A run, in the odometry's frame; times are seconds after its first cycle or firing."""
@@ -76,14 +80,14 @@ class Trace:
     """Unix time of its first cycle; 0 where nobody knows."""
     seconds: float = 0.0
     cycles: int = 0
-    echoes: Floats = field(default_factory=lambda: _empty(7))
+    echoes: Floats = field(default_factory=_no_rows)
     """(n, 7): t (s), sensor, where the sensor was x, y (m), where it looked (rad), range (m, inf heard nothing), and
     the firing's own time by the robot's clock (s)."""
     odometry: list[tuple[float, Odometry]] = field(default_factory=list)
     """Thinned to ten a second."""
     moments: list[Moment] = field(default_factory=list)
     """Evenly over the run; the last is its end."""
-    segments: Floats = field(default_factory=lambda: _empty(7))
+    segments: Floats = field(default_factory=_no_rows)
     """(n, 7): the run's own map: first and last seen (s), ends x, y, x, y (m), normal (rad)."""
     modes: list[Entered] = field(default_factory=list)
     log: list[Said] = field(default_factory=list)
@@ -120,7 +124,3 @@ class Trace:
     def unix_ns(self, t_s: float) -> int:
         """Return a time of the run as Unix time, from 0 on where that is not known."""
         return self.begun_ns + round(1e9 * t_s)
-
-
-def _empty(columns: int) -> Floats:
-    return np.zeros((0, columns))

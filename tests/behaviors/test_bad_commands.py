@@ -16,7 +16,7 @@ from drivers.denning import frames
 from drivers.denning.codec import Decoder
 from drivers.messages import Twist
 from perception.percept import Percept, Pose
-from tests.drivers.test_denning import CONFIG, Bench
+from tests.drivers.scripted import CONFIG, Bench
 
 pytestmark = pytest.mark.promise("P3")
 

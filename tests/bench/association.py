@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.robot import RingConfig
+from config.units import FOOT_M
 from drivers.messages import Floats
-from runtime.scenes import FOOT_M
 from tests.bench.front_end import RADIUS_M, Place, Reading, Segment
 
 FOUND_GATE_M: Final = 1.0 * FOOT_M

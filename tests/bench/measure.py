@@ -13,10 +13,11 @@ from statistics import median
 from typing import Final, TypedDict
 
 from config.robot import RingConfig
+from config.units import FOOT_M
 from drivers.messages import Firing
 from runtime.experiment import nearest_pairs
 from runtime.scene_names import SceneName
-from runtime.scenes import FOOT_M, READINGS, Hall, halls, readings
+from runtime.scenes import READINGS, Hall, halls, readings
 from tests.bench.front_end import Place
 from tests.bench.runners import Contestant, Watch
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from runtime.scenes import FOOT_M
+from config.units import FOOT_M
 
 RANGE_SIGMA_M: Final = math.hypot(0.1 / math.sqrt(12.0), 0.03) * FOOT_M
 """Rounding to a tenth of a foot, and some."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
-from config.robot import BodyConfig, FiringConfig, LinkConfig, RingConfig, RobotConfig
+from config.robot import BodyConfig, LinkConfig, RobotConfig
 from config.world import DrumConfig, WorldConfig
 from drivers.denning.robot import DenningRobot
 from drivers.emulator.device import EmulatedRobot
 from drivers.emulator.faults import Fault
 from drivers.messages import Firing, Twist
+from tests.drivers.ring import RING
 
 Way: TypeAlias = Literal["to the robot", "to the host"]
 STEP_S = 0.005
@@ -18,15 +19,7 @@ CYCLE_STEPS = 10
 """A command every 50 ms."""
 
 ROBOT = RobotConfig(
-    ring=RingConfig(
-        count=24,
-        radius_m=0.381,
-        beam_half_angle_deg=12.0,
-        resolution_m=0.03048,
-        range_min_m=0.1524,
-        range_max_m=7.7724,
-        firing=FiringConfig(preset="octets"),
-    ),
+    ring=RING,
     body=BodyConfig(radius_m=0.381, speed_max_m_s=0.6, turn_max_rad_s=1.5, synchro=True),
     link=LinkConfig(port="/dev/robot"),
 )

@@ -16,7 +16,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from config.robot import LinkConfig
 from drivers.link import Link
-from tests.drivers.test_link import Ends
+from tests.drivers.ends import Ends
 from tests.hil.machine import PATIENCE_S
 
 WAITING_MAX = 4096

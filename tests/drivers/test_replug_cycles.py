@@ -22,7 +22,7 @@ from drivers.denning.robot import DenningRobot
 from drivers.driver import LineState
 from drivers.link import Link
 from tests.drivers.cable import ROBOT
-from tests.drivers.test_link import Ends, running, soon
+from tests.drivers.ends import Ends, running, soon
 
 GROWTH_MAX = 32 * 1024
 """Bytes by which memory may differ, whatever the number of cycles."""

@@ -6,8 +6,6 @@ import asyncio
 import os
 import threading
 import time
-from collections.abc import AsyncIterator, Iterator
-from pathlib import Path
 
 import pytest
 import serial
@@ -15,23 +13,10 @@ import serial
 from config.robot import LinkConfig
 from drivers.link import Link, LinkError
 from drivers.port import open_port
-from tests.drivers.test_link import Ends, Host, running, soon
+from tests.drivers.ends import Ends, Host, running, soon
 from tests.hil.machine import PATIENCE_S
 
-
-@pytest.fixture
-def ends(tmp_path: Path) -> Iterator[Ends]:
-    pty = Ends(tmp_path / "robot")
-    yield pty
-    pty.unplug()
-
-
-@pytest.fixture(autouse=True)
-async def loop_complaints() -> AsyncIterator[None]:
-    complaints: list[object] = []
-    asyncio.get_running_loop().set_exception_handler(lambda _, context: complaints.append(context))
-    yield
-    assert complaints == []
+pytestmark = pytest.mark.usefixtures("loop_complaints")
 
 
 async def test_write_buffers_without_bound_past_pause_writing(ends: Ends) -> None:

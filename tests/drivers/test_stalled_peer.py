@@ -22,7 +22,7 @@ from drivers.emulator.faults import Deaf, Fault, Mute
 from drivers.link import Link
 from drivers.messages import Twist
 from tests.drivers.cable import CYCLE_STEPS, ROBOT, STEP_S, Cable
-from tests.drivers.test_link import Ends, running
+from tests.drivers.ends import Ends, running
 from tests.hil.machine import PATIENCE_S
 
 pytestmark = pytest.mark.promise("P6")

@@ -1,4 +1,4 @@
-"""The command as a process of its own, and what the emulator's truth trace says it did; shared by the tests here."""
+"""The command as a process of its own; shared by the tests here."""
 
 from __future__ import annotations
 
@@ -14,12 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from drivers.emulator.trace import HEADER
-from drivers.messages import Flags
 from tests.hil.machine import PATIENCE_S
 
 ROOT = Path(__file__).parents[2]
-DRIVING_M_S = 0.2
 DEADMAN_S = 0.5
 
 
@@ -29,49 +26,6 @@ def wait_for(done: Callable[[], bool], what: str) -> None:
     while not done():
         assert time.monotonic() < end_s, f"it never came: {what}"
         time.sleep(0.01)
-
-
-@dataclass(frozen=True)
-class Row:
-    """A row of the truth trace."""
-
-    t_s: float
-    """The robot's own time, which does not go on where the emulator stands still."""
-    host_s: float
-    v: float
-    w: float
-    flags: Flags
-
-    @property
-    def still(self) -> bool:
-        return self.v == 0.0 and self.w == 0.0
-
-
-def rows(trace: Path) -> list[Row]:
-    """Return the complete rows so far."""
-    if not trace.exists():
-        return []
-    names = HEADER.split(",")
-    t, host, v, w, flags = (names.index(name) for name in ("t_s", "host_s", "v_m_s", "w_rad_s", "flags"))
-    cells = (line.split(",") for line in trace.read_text().split("\n")[1:-1])
-    return [Row(float(c[t]), float(c[host]), float(c[v]), float(c[w]), Flags(int(c[flags]))) for c in cells]
-
-
-def robot_time(trace: Path, host_s: float) -> float:
-    """Return the robot's time at a moment of the host's clock that the trace has come to, s."""
-    return max(row.t_s for row in rows(trace) if row.host_s <= host_s)
-
-
-def is_driving(trace: Path) -> bool:
-    """Say whether the wheels turn now."""
-    now = rows(trace)
-    return bool(now) and now[-1].v > DRIVING_M_S
-
-
-def reaches(trace: Path, host_s: float) -> bool:
-    """Say whether the trace has come to a moment of the host's clock."""
-    now = rows(trace)
-    return bool(now) and now[-1].host_s >= host_s
 
 
 class Signalled(NamedTuple):

@@ -12,18 +12,8 @@ import pytest
 
 from drivers.messages import Flags
 from tests.hil.machine import stalls_excused
-from tests.hil.running import (
-    DEADMAN_S,
-    Row,
-    Signalled,
-    emulated,
-    is_driving,
-    reaches,
-    robot_time,
-    rows,
-    running,
-    wait_for,
-)
+from tests.hil.running import DEADMAN_S, Signalled, emulated, running, wait_for
+from tests.hil.truth import Row, is_driving, reaches, robot_time, rows
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 

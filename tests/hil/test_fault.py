@@ -16,7 +16,7 @@ from runtime.logs import open_log
 from runtime.process import Observers, RobotProcess
 from runtime.step import CycleRecord, State
 from tests.hil.machine import PATIENCE_S, stalls_excused
-from tests.hil.running import rows
+from tests.hil.truth import rows
 
 
 @stalls_excused

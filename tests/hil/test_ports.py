@@ -19,7 +19,8 @@ import pytest
 from runtime.complaint import FAILED, WRONG_CALL
 from runtime.ends import CONNECT_MAX_S
 from tests.hil.machine import BareStarts, stalls_excused
-from tests.hil.running import Running, emulated, is_driving, running, wait_for
+from tests.hil.running import Running, emulated, running, wait_for
+from tests.hil.truth import is_driving
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 

@@ -12,7 +12,8 @@ from runtime.cli import call
 from runtime.complaint import DONE
 from runtime.recording.channels import SETTINGS
 from runtime.recording.reading import open_recording
-from tests.hil.running import Running, emulated, is_driving, rows, running, wait_for
+from tests.hil.running import Running, emulated, running, wait_for
+from tests.hil.truth import is_driving, rows
 from tests.recorded import entries_of
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]

@@ -19,17 +19,8 @@ from runtime.books import Books
 from runtime.pacing import Pacer
 from runtime.rhythm import LATE_SHARE
 from tests.hil.machine import BareStarts, stalls_excused
-from tests.hil.running import (
-    Emulated,
-    Running,
-    emulated,
-    is_driving,
-    reaches,
-    robot_time,
-    rows,
-    running,
-    wait_for,
-)
+from tests.hil.running import Emulated, Running, emulated, running, wait_for
+from tests.hil.truth import is_driving, reaches, robot_time, rows
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 

@@ -25,7 +25,13 @@ from tests.mutation.mutants import Mutant, mutants
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "mutants.md"
 TARGETS: dict[str, tuple[str, ...]] = {
-    "drivers/denning/codec.py": ("tests/drivers/test_codec.py", "tests/drivers/test_denning.py"),
+    "drivers/denning/codec.py": (
+        "tests/drivers/test_codec.py",
+        "tests/drivers/test_denning.py",
+        "tests/drivers/test_denning_driving.py",
+        "tests/drivers/test_denning_echoes.py",
+        "tests/drivers/test_denning_losses.py",
+    ),
     "drivers/denning/frames.py": ("tests/drivers/test_codec.py", "tests/drivers/test_firing.py"),
     "drivers/firing.py": ("tests/drivers/test_firing.py",),
     "behaviors/arbiter.py": ("tests/behaviors/test_arbiter.py",),

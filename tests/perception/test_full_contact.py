@@ -18,8 +18,8 @@ from tests import naive_full
 HALF_BOX = 0.01524
 GATE = 0.1524
 MISS, SHORT = math.log(0.1), -1.0
-COSINES = tuple(math.cos(math.radians(a)) for a in (12.4, 12.0, 10.5))
-OPT, HALF, IN = COSINES
+OPT, HALF, IN = (math.cos(math.radians(a)) for a in (12.4, 12.0, 10.5))
+COSINES = (OPT, HALF, IN)
 
 
 def pair(values: np.ndarray) -> tuple[float, float]:
@@ -40,8 +40,19 @@ class Case(NamedTuple):
         return self.w[: self.n]
 
     @property
+    def tables(self) -> tuple[np.ndarray, float, np.ndarray, np.ndarray]:
+        """What kernels are told of the noise."""
+        return self.noise.levels, self.noise.per_metre, self.noise.table, self.noise.inv_step
+
+    @property
     def place(self) -> tuple[float, float]:
         return pair(self.centre)
+
+
+def score_circle(case: Case, w: np.ndarray, x: float, y: float, stats: np.ndarray) -> None:
+    contact.score_circle(
+        w, case.n, x, y, case.rho, OPT, HALF, IN, GATE, MISS, SHORT, *case.tables, stats
+    )  # fmt: skip
 
 
 def cases(
@@ -94,26 +105,8 @@ def test_a_circles_score_equals_its_oracle() -> None:
     hits = 0.0
     for case in cases(2000, 1):
         stats = np.zeros(9)
-        contact.score_circle(
-            case.w,
-            case.n,
-            *case.place,
-            case.rho,
-            OPT,
-            HALF,
-            IN,
-            GATE,
-            MISS,
-            SHORT,
-            case.noise.levels,
-            case.noise.per_metre,
-            case.noise.table,
-            case.noise.inv_step,
-            stats,
-        )
-        want = naive_full.score_circle(
-            case.used, case.centre, case.rho, (OPT, HALF, IN), GATE, MISS, SHORT, case.noise
-        )
+        score_circle(case, case.w, *case.place, stats)
+        want = naive_full.score_circle(case.used, case.centre, case.rho, COSINES, GATE, MISS, SHORT, case.noise)
         order = (contact.LLR, contact.HITS, contact.THROUGHS, contact.NEAR, contact.SHORTS, contact.CLOSEST)
         names = ("llr", "hits", "throughs", "near", "shorts", "closest")
         assert stats[list(order)] == pytest.approx([want[name] for name in names], rel=1e-12, abs=1e-11)
@@ -142,25 +135,12 @@ def test_a_lines_fit_and_score_equal_their_oracles() -> None:
         n, c = naive_full.fit_line(case.used, n0, case.centre, -case.rho, OPT, GATE, 9.0, case.var0, case.rel2, 4)
         # a lone reading leaves the turn to the damping alone: hence not 1e-12
         assert out == pytest.approx([*n, c], abs=1e-6)
+        (nx, ny), (x, y) = pair(out), case.place
         contact.score_line(
-            case.w,
-            case.n,
-            *pair(out),
-            *case.place,
-            out[2],
-            OPT,
-            HALF,
-            IN,
-            GATE,
-            MISS,
-            case.noise.levels,
-            case.noise.per_metre,
-            case.noise.table,
-            case.noise.inv_step,
-            stats,
-        )
+            case.w, case.n, nx, ny, x, y, out[2], OPT, HALF, IN, GATE, MISS, *case.tables, stats
+        )  # fmt: skip
         llr, hits, throughs, low, high = naive_full.score_line(
-            case.used, out[:2], case.centre, float(out[2]), (OPT, HALF, IN), GATE, MISS, case.noise, contact.FAR
+            case.used, out[:2], case.centre, float(out[2]), COSINES, GATE, MISS, case.noise, contact.FAR
         )
         assert stats[[0, 1, 2, 4, 5]] == pytest.approx([llr, hits, throughs, low, high], rel=1e-12, abs=1e-11)
 
@@ -172,22 +152,7 @@ def test_the_posterior_equals_its_oracle() -> None:
         p, frame, spread = naive_full.posterior_circle(
             case.used, case.rho, OPT, GATE, case.noise, pose, np.array([[0.01, 0.0], [0.003, 0.015]])
         )
-        posterior_circle(
-            case.w,
-            case.n,
-            case.rho,
-            OPT,
-            GATE,
-            case.noise.levels,
-            case.noise.per_metre,
-            case.noise.table,
-            case.noise.inv_step,
-            work,
-            wlev,
-            pose,
-            root,
-            cov,
-        )
+        posterior_circle(case.w, case.n, case.rho, OPT, GATE, *case.tables, work, wlev, pose, root, cov)
         assert pose == pytest.approx(p, abs=1e-10)
         assert root == pytest.approx([frame[0, 0], frame[1, 0], frame[1, 1]], abs=1e-9)
         assert cov == pytest.approx([spread[0, 0], spread[0, 1], spread[1, 1]], abs=1e-10)
@@ -220,9 +185,10 @@ def test_the_wedge_equals_its_oracle() -> None:
     found = 0
     for case in cases(700, 6, ("circle", "edge"), least=12):
         fit, stats = np.zeros(3), np.zeros(8)
+        x, y = case.place
         got = wedge(
-            case.w, np.zeros_like(case.w), case.n, *case.place, case.rho, OPT, GATE, case.var0, case.rel2,
-            case.noise.levels, case.noise.per_metre, case.noise.table, case.noise.inv_step, fit, stats,
+            case.w, np.zeros_like(case.w), case.n, x, y, case.rho, OPT, GATE, case.var0, case.rel2,
+            *case.tables, fit, stats,
         )  # fmt: skip
         want = naive_full.wedge(case.used, case.centre, case.rho, OPT, GATE, case.var0, case.rel2, case.noise)
         if want is None:
@@ -240,23 +206,6 @@ def test_readings_of_nothing_fit_nothing() -> None:
     out, stats = np.zeros(5), np.zeros(9)
     assert contact.fit_circle(silent, case.n, 0.2, 0.3, 0.3, OPT, GATE, 9.0, case.var0, case.rel2, 4, out)
     assert out[:2] == pytest.approx([0.2, 0.3], abs=1e-12)
-    contact.score_circle(
-        silent,
-        case.n,
-        0.2,
-        0.3,
-        0.3,
-        OPT,
-        HALF,
-        IN,
-        GATE,
-        MISS,
-        SHORT,
-        case.noise.levels,
-        case.noise.per_metre,
-        case.noise.table,
-        case.noise.inv_step,
-        stats,
-    )
+    score_circle(case._replace(rho=0.3), silent, 0.2, 0.3, stats)
     assert stats[contact.HITS] == 0
     assert stats[contact.LLR] <= 0

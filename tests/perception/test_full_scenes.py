@@ -208,7 +208,7 @@ def test_forgetting_is_beginning_anew_to_the_bit() -> None:
         perceive(used, firing)
     used.forget()
     assert used.objects() == used.things() == ()
-    assert (used.living, used.hypotheses, used.pending) == (0, 0, False)
+    assert (used.tally.living, used.tally.hypotheses, used.pending) == (0, 0, False)
     for firing in readings(SETTINGS.ring, hall, 2):
         assert perceive(used, firing) == perceive(new, firing)
 

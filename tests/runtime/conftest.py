@@ -1,4 +1,4 @@
-"""A run among the six drums and its firings as a ring log, recorded once for all tests that show it."""
+"""Runs among the six drums, recorded once for all tests: to replay; to show, and its firings as a ring log."""
 
 from __future__ import annotations
 
@@ -8,7 +8,16 @@ import pytest
 
 from runtime.cli import call
 from runtime.complaint import DONE
-from tests.recorded import hall, record
+from tests.recorded import SECONDS, hall, record
+
+
+@pytest.fixture(scope="session")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recorded") / "hall.mcap"
+    standing = record(hall(), path, SECONDS)
+    assert (standing.dropped, standing.trouble, standing.files) == (0, None, 1)
+    assert standing.bytes == path.stat().st_size
+    return path
 
 
 @pytest.fixture(scope="session")

@@ -14,11 +14,11 @@ import pytest
 from PIL import Image
 
 from config.load import load_settings, load_world
+from config.units import FOOT_M
 from drivers.messages import Floats, Pose
 from runtime.cli import call
 from runtime.complaint import DONE, FAILED, WRONG_CALL
 from runtime.drawing.geometry import Frame, arcs, outline
-from runtime.tables import METRES_A_FOOT
 from runtime.trace.form import Trace
 from runtime.trace.sources import Asked, trace_of
 from tests.architecture import ROOMS
@@ -142,7 +142,7 @@ def test_an_arc_is_an_arc() -> None:
 
 
 def test_frames_and_outlines() -> None:
-    frame = Frame(Pose(-1.8288, 0.5, math.pi / 2), METRES_A_FOOT)
+    frame = Frame(Pose(-1.8288, 0.5, math.pi / 2), FOOT_M)
     (point,) = frame.points(np.array([[0.3048, 0.0]]))
     assert point == pytest.approx([-6.0, (0.5 + 0.3048) / 0.3048])
     from perception.seen import SeenObject

@@ -13,7 +13,8 @@ import numpy as np
 from skimage.draw import line
 from skimage.transform import hough_circle, hough_circle_peaks
 
-from runtime.scenes import FOOT_M, FROM_FT, TO_FT
+from config.units import FOOT_M
+from runtime.scenes import FROM_FT, TO_FT
 from tests.bench.association import Evidence
 from tests.bench.contestant import Peer
 from tests.bench.front_end import RADIUS_M, Place

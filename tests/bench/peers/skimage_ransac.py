@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from skimage.measure import CircleModel, ransac
 
+from config.units import FOOT_M
 from drivers.messages import Floats
-from runtime.scenes import FOOT_M
 from tests.bench.association import Evidence
 from tests.bench.contestant import Peer, Tracks
 from tests.bench.front_end import RADIUS_M, Place

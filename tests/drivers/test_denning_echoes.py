@@ -1,0 +1,226 @@
+"""Echoes and odometry of a Denning in virtual time: each firing at the pose of its own moment, nothing piled up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from config.robot import FiringConfig
+from drivers.denning.codec import encode
+from drivers.denning.frames import (
+    Echo,
+    RobotFrame,
+)
+from drivers.messages import Flags, LinkCounts, Pose
+from tests.drivers.scripted import CONFIG, IDENT, ODOM, PERIOD_US, Bench
+from tests.drivers.vectors import OCTETS
+
+
+def test_odometry_in_si(bench: Bench) -> None:
+    bench.odom(
+        1_000_000,
+        x_0p1mm=12345,
+        y_0p1mm=-6789,
+        heading_1em4rad=70000,
+        ring_yaw_1em4rad=-100,
+        v_mm_s=305,
+        w_mrad_s=-250,
+        flags=0b11001,
+        last_drive_seq=9,
+    )
+    odometry = bench.robot.take().odometry
+    assert odometry is not None
+    assert odometry.t_s == pytest.approx(1.0)
+    assert (odometry.pose.x, odometry.pose.y, odometry.pose.theta) == pytest.approx((1.2345, -0.6789, 7.0))
+    assert (odometry.ring_yaw, odometry.twist.v, odometry.twist.w) == pytest.approx((-0.01, 0.305, -0.25))
+    assert odometry.flags == Flags.LATCHED | Flags.DEADMAN | Flags.BATTERY_LOW
+    assert odometry.last_drive_seq == 9
+    assert bench.robot.take().odometry is None
+
+
+def test_a_firing_has_the_pose_of_its_own_moment(bench: Bench) -> None:
+    # A quarter of a circle of radius 0.1 m around (0, 0.1); the ring does something else.
+    for t_us, x, y, heading in ((0, 0, 0, 0), (PERIOD_US, 1000, 1000, 15708)):
+        bench.odom(t_us, x_0p1mm=x, y_0p1mm=y, heading_1em4rad=heading, ring_yaw_1em4rad=2000 + t_us // 100)
+    bench.say(Echo(0, PERIOD_US // 2, 0, 0x800021, (30, 255, 0)))
+    (firing,) = bench.robot.take().firings
+    assert firing.t_s == pytest.approx(0.01)
+    assert (firing.pose.x, firing.pose.y, firing.pose.theta) == pytest.approx(
+        (0.1 * math.sqrt(0.5), 0.1 - 0.1 * math.sqrt(0.5), math.pi / 4), abs=1e-4
+    )
+    assert firing.ring_yaw == pytest.approx(0.21)
+    assert firing.ranges_m.shape == (24,)
+    assert firing.ranges_m[0] == pytest.approx(0.9144)
+    assert math.isinf(firing.ranges_m[5])
+    assert np.isnan(np.delete(firing.ranges_m, [0, 5])).all()
+
+
+def test_an_echo_before_its_odometry_is_held_and_keeps_its_turn(bench: Bench) -> None:
+    bench.odom(0)
+    bench.say(Echo(0, 10_000, 0, 1, (10,)), Echo(0, 30_000, 1, 1, (20,)))
+    assert bench.robot.take().firings == ()
+    bench.odom(PERIOD_US, x_0p1mm=100)
+    (first,) = bench.robot.take().firings
+    assert first.pose.x == pytest.approx(0.005)
+    bench.odom(2 * PERIOD_US, x_0p1mm=300)
+    (second,) = bench.robot.take().firings
+    assert second.pose.x == pytest.approx(0.02)
+    assert bench.robot.late_echoes == 0
+
+
+def test_one_chunk_or_byte_by_byte_is_the_same(bench: Bench) -> None:
+    frames: list[RobotFrame] = [
+        replace(ODOM, t_us=0),
+        Echo(0, 10_000, 0, 1, (10,)),
+        replace(ODOM, t_us=PERIOD_US, x_0p1mm=7),
+        Echo(0, 15_000, 1, 2, (11,)),
+    ]
+    data = b"".join(encode(replace(frame, seq=2 + k)) for k, frame in enumerate(frames))
+    other = Bench()
+    other.open()
+    other.greet()
+    bench.robot.receive(data, bench.now)
+    for i in range(len(data)):
+        other.robot.receive(data[i : i + 1], other.now)
+    whole, single = bench.robot.take(), other.robot.take()
+    assert [(f.t_s, f.pose, f.ring_yaw) for f in whole.firings] == [
+        (f.t_s, f.pose, f.ring_yaw) for f in single.firings
+    ]
+    assert len(whole.firings) == 2
+    assert whole.odometry == single.odometry
+    assert bench.robot.counts == other.robot.counts == LinkCounts(frames=6)
+
+
+def test_an_echo_that_nothing_places_is_dropped_and_counted(bench: Bench) -> None:
+    bench.odom(1_000_000)
+    bench.say(Echo(0, 990_000, 0, 1, (10,)))
+    assert bench.robot.late_echoes == 1, "older than the history"
+    bench.say(Echo(0, 1_040_000, 0, 1, (10,)))
+    bench.odom(1_100_000)
+    assert bench.robot.late_echoes == 2, "between two samples too far apart"
+    bench.say(Echo(0, 1_100_000, 0, 1, (10,)), Echo(0, 1_090_000, 0, 1, (10,)), Echo(0, 9_000_000, 0, 1, (10,)))
+    assert bench.robot.late_echoes == 4, "before the one before it, and from a far future"
+    assert [f.t_s for f in bench.robot.take().firings] == pytest.approx([1.1])
+
+
+@pytest.mark.promise("P8")
+def test_late_doubled_and_out_of_window_echoes_go_no_further(measured: Callable[[str], None]) -> None:
+    """Every echo once more, once late, and ranges beyond the window in between."""
+    window = 50
+    near = CONFIG.ring.model_copy(
+        update={"firing": FiringConfig(preset="octets", window_m=window * 0.03048, step_period_s=0.02)}
+    )
+    bench = Bench(CONFIG.model_copy(update={"ring": near}))
+    bench.open()
+    bench.greet()
+    good: list[Echo] = []
+    t_us = 0
+    bench.odom(t_us)
+    for k in range(200):
+        t_us += PERIOD_US
+        mask = OCTETS[k % 3]
+        tenths = tuple(window + 1 + k if (i + k) % 4 == 0 else 255 if i % 3 else window - i for i in range(8))
+        echo = Echo(0, t_us - 5_000, k % 3, mask, tuple(min(t, 254) if t != 255 else 255 for t in tenths))
+        bench.now += 0.02
+        bench.odom(t_us)
+        bench.say(echo, echo)
+        if good:
+            bench.say(good[-1])
+        good.append(echo)
+    firings = bench.robot.take().firings
+    assert [f.t_s for f in firings] == pytest.approx([1e-6 * echo.t_us for echo in good])
+    for firing in firings:
+        heard = firing.ranges_m[np.isfinite(firing.ranges_m)]
+        assert (heard <= window * 0.03048 + 1e-9).all()
+        assert heard.size + np.isinf(firing.ranges_m).sum() == 6, "the others are kept"
+    assert bench.robot.late_echoes == 200 + 199
+    assert bench.robot.out_of_window == (200 + 200 + 199) * 2
+    measured(
+        f"200 firings, each echo twice and once late, a quarter of the ranges beyond the window: {len(firings)} "
+        f"firings and 0 such ranges came through"
+    )
+
+
+def test_a_wider_window_counts_from_the_pattern_on_and_a_narrower_one_after_it(bench: Bench) -> None:
+    t_us = bench.run(0.4, t_us=0)
+    far = Echo(0, t_us - 5_000, 0, OCTETS[0], (200,) * 8)
+    narrow = CONFIG.ring.model_copy(update={"firing": FiringConfig(preset="octets", window_m=2.0)})
+    bench.robot.set_firing(narrow)
+    bench.say(far)
+    assert np.isfinite(bench.robot.take().firings[-1].ranges_m).sum() == 8, "an echo of the pattern before"
+    t_us = bench.run(0.4, t_us=t_us)
+    bench.say(replace(far, t_us=t_us - 5_000))
+    assert np.isnan(bench.robot.take().firings[-1].ranges_m).all()
+
+
+@pytest.mark.promise("P9")
+@pytest.mark.parametrize(("x", "heading"), [(3048, 0), (-3048, 0), (50_000, 0), (0, 5000), (3048, -20_000)])
+def test_a_leap_of_the_odometry_is_taken_out_and_told(bench: Bench, x: int, heading: int) -> None:
+    """Poses go on as the wheels say; the robot's own odometry is `frame` away."""
+    t_us = bench.run(0.4, t_us=0)
+    bench.robot.take()
+    for _ in range(2):  # one that leaps very far is asked who it is, and answers
+        t_us += PERIOD_US
+        bench.pass_time(0.02)
+        bench.odom(t_us, x_0p1mm=x, heading_1em4rad=heading, ring_yaw_1em4rad=heading)
+        bench.answer()
+        bench.answer()
+    heard = bench.robot.take()
+    assert heard.odometry is not None
+    assert heard.odometry.pose == Pose(0.0, 0.0, 0.0)
+    assert heard.odometry.ring_yaw == 0.0
+    (note,) = heard.notes
+    assert "leapt" in note
+    assert "check wheels" in note
+    frame = bench.robot.frame
+    assert (frame.x, frame.y, frame.theta) == pytest.approx((x * 1e-4, 0.0, heading * 1e-4))
+    assert not heard.rebooted
+
+
+def test_a_base_that_moves_in_leaps_is_believed(bench: Bench) -> None:
+    """One whose odometry comes in steps, or that is faster than its file says, does not leap: it moves so."""
+    t_us = 0
+    for k in range(100):
+        t_us += PERIOD_US
+        bench.pass_time(0.02)
+        bench.odom(t_us, x_0p1mm=2000 * (k // 3))
+    heard = bench.robot.take()
+    assert heard.odometry is not None
+    assert heard.odometry.pose.x == pytest.approx(6.6)
+    assert heard.notes == ()
+
+
+def test_echoes_without_odometry_do_not_pile_up(bench: Bench) -> None:
+    bench.odom(0)
+    for k in range(200):
+        bench.say(Echo(0, 1000 + k, 0, 1, (10,)))
+    assert bench.robot.late_echoes == 200 - 64
+    bench.odom(PERIOD_US)
+    assert len(bench.robot.take().firings) == 64
+
+
+def test_a_fault_of_the_sensors_beyond_the_ring_is_passed_over() -> None:
+    ring = CONFIG.ring.model_copy(update={"count": 16})
+    bench = Bench(CONFIG.model_copy(update={"ring": ring}))
+    bench.ident = replace(IDENT, sensors=16)
+    bench.open()
+    bench.greet()
+    bench.odom(0)
+    bench.say(Echo(0, 0, 0, 0x810000 | 1, (10, 11, 12)))
+    (firing,) = bench.robot.take().firings
+    assert firing.ranges_m.shape == (16,)
+    assert np.nansum(firing.ranges_m) == pytest.approx(0.3048)
+
+
+def test_firings_nobody_takes_do_not_pile_up(bench: Bench) -> None:
+    for k in range(1100):
+        bench.odom(k * PERIOD_US)
+        bench.say(Echo(0, k * PERIOD_US, 0, 1, (10,)))
+        bench.now += 0.02
+    firings = bench.robot.take().firings
+    assert len(firings) == 1024
+    assert firings[-1].t_s == pytest.approx(1099 * 0.02)

@@ -1,0 +1,92 @@
+"""The pure step on paper: a robot whose every cycle is written down; shared by the tests of the step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from config.load import load_settings
+from config.settings import Settings
+from drivers.driver import Heard, LineState
+from drivers.messages import Firing, Flags, Odometry, Pose, Twist
+from perception.pipeline import Perception
+from runtime.modes import Mode, Request
+from runtime.step import STANDSTILL, CycleRecord, Inputs, Order, State, step
+
+SETTINGS = load_settings("hallway", ["perception.method=paper"])
+
+"""The paper's method, whose arrays are compared here."""
+
+PERIOD_S = 1.0 / SETTINGS.cycle.rate_hz
+
+NOTHING = Heard((), None, rebooted=False)
+
+HERE = Pose(0.0, 0.0, 0.0)
+
+PATIENCE_S = SETTINGS.behaviors.avoid_static_obstacle.echo_age_max_s
+
+
+class Perceiving(Perception):
+    """Perception that says when it refines."""
+
+    log: list[object]
+
+    def refine(self) -> int:
+        iterations = super().refine()
+        self.log.append(("refined", iterations))
+        return iterations
+
+
+@dataclass
+class Script:
+    """A robot on paper: cycles at 20 Hz, each hearing odometry at the robot's time and a firing if there is one."""
+
+    settings: Settings = SETTINGS
+    quanta: int = 50
+    log: list[object] = field(default_factory=list)
+    now_s: float = 100.0
+    robot_s: float = 7.0
+    pose: Pose = HERE
+
+    def __post_init__(self) -> None:
+        perception = Perceiving(self.settings.ring, self.settings.models, self.settings.perception)
+        perception.log = self.log
+        self.state = State(perception)
+
+    def may_refine(self, done: int) -> bool:
+        self.log.append(("may?", done))
+        return done < self.quanta
+
+    def cycle(
+        self,
+        *,
+        flags: Flags = Flags.NONE,
+        line: LineState = LineState.READY,
+        trouble: str | None = None,
+        request: Request | None = None,
+        firing: bool = True,
+        odometry: bool = True,
+        rebooted: bool = False,
+    ) -> CycleRecord:
+        """Run one cycle; 3 m of free space around the robot."""
+        self.now_s += PERIOD_S
+        self.robot_s += PERIOD_S
+        sensors = len(self.settings.ring.mounts)
+        firings = (Firing(self.robot_s, self.pose, 0.0, np.full(sensors, 3.0)),) if firing else ()
+        told = Odometry(self.robot_s, self.pose, 0.0, Twist(0.0, 0.0), flags, 0) if odometry else None
+        inputs = Inputs(self.now_s, line, trouble, Heard(firings, told, rebooted), request)
+        self.log.clear()
+        return step(self.state, inputs, self.settings, lambda c: self.log.append(("command", c)), self.may_refine)
+
+    def driving(self) -> Script:
+        """Arm and go on until it drives."""
+        record = self.cycle()
+        assert (record.mode.mode, record.command) == (Mode.READY, STANDSTILL)
+        record = self.cycle(request=Request.ARM)
+        assert (record.mode.mode, record.command) == (Mode.READY, Order.RELEASE)
+        while record.mode.mode is Mode.READY:
+            record = self.cycle()
+        assert record.mode.mode is Mode.DRIVE
+        assert isinstance(record.command, Twist)
+        return self
