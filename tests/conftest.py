@@ -77,7 +77,9 @@ class _Clerk:
         self._config = config
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        self._config.stash[promises.LEDGER].take_report(report)
+        ledger = self._config.stash.get(promises.LEDGER, None)
+        if ledger is not None:  # None in a process that has others collect and run the tests
+            ledger.take_report(report)
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         page = self._config.getoption("promises")
