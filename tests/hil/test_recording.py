@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import random
+import shutil
 import time
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from runtime.complaint import DONE, FAILED
 from runtime.recording.channels import CYCLE, KEYFRAME, LOG, SERIAL, decode
 from runtime.recording.forms import About, Cycle, LogLine, SerialBytes
 from runtime.recording.reading import open_recording
+from tests.hil.machine import stalls_excused
 from tests.hil.running import running
 from tests.recorded import entries_of
 
@@ -77,6 +79,7 @@ def check(folder: Path, seconds: float, replays: int, *more: str) -> None:
     logging.getLogger(__name__).info("%s", {**told["verify"], "bytes": kept["bytes"], "lag": summary["lag_us"]})
 
 
+@stalls_excused
 def test_a_run_over_the_pty_is_replayed_to_the_bit(tmp_path: Path) -> None:
     check(tmp_path, 12.0, 2, "--set", "recording.keyframe_period_s=3.0")
     entries = entries_of(tmp_path / "hall.mcap")
@@ -100,9 +103,9 @@ def killed(folder: Path, name: str, after_s: float) -> tuple[Path, float]:
     return path, killed_s
 
 
-def check_killed(folder: Path, number: int, rng: random.Random) -> float:
+def check_killed(folder: Path, after_s: float) -> float:
     """Kill a run, restore its recording, replay it; return how much was lost, s."""
-    path, killed_s = killed(folder, f"run{number}", rng.uniform(1.0, 5.0))
+    path, killed_s = killed(folder, "run", after_s)
     restored = path.with_name(f"{path.stem}-recovered.mcap")
     assert call(["recover", str(path)]) == DONE
     got = verify(restored)
@@ -113,15 +116,32 @@ def check_killed(folder: Path, number: int, rng: random.Random) -> float:
     return killed_s - 1e-9 * cycles[-1].log_ns
 
 
+def lost_in(folder: Path, kills: int, seed: int, lost_max_s: float) -> list[float]:
+    """Kill so many runs at random moments; return how much each lost, s, none of it more than is allowed."""
+    rng, lost = random.Random(seed), list[float]()
+
+    @stalls_excused
+    def one(tmp_path: Path, after_s: float) -> None:
+        lost_s = check_killed(tmp_path, after_s)
+        assert lost_s <= lost_max_s
+        lost.append(lost_s)
+
+    for number in range(kills):
+        place = folder / f"{number}"
+        place.mkdir()
+        one(tmp_path=place, after_s=rng.uniform(1.0, 5.0))
+        shutil.rmtree(place)
+    return lost
+
+
 def test_a_killed_run_is_restored(tmp_path: Path) -> None:
-    rng = random.Random(7)
-    lost = [check_killed(tmp_path, number, rng) for number in range(5)]
+    # The margin is for a machine with much else to do; the soak has none.
+    lost = lost_in(tmp_path, 5, seed=7, lost_max_s=3.0 * LOST_MAX_S)
     logging.getLogger(__name__).info("lost %s s", [round(s, 3) for s in lost])
-    # The margin is for a machine that lets nothing run for a while; the soak has none.
     assert sorted(lost)[2] <= LOST_MAX_S
-    assert max(lost) <= 3.0 * LOST_MAX_S
 
 
+@stalls_excused
 def test_every_run_leaves_a_recording_unless_told_otherwise(tmp_path: Path) -> None:
     where = ("--set", f"recording.folder={json.dumps(str(tmp_path / 'runs'))}")
     with running(tmp_path, "none", "run", "--seconds", "0.5", "--no-record", *where) as run:
@@ -140,6 +160,7 @@ def test_every_run_leaves_a_recording_unless_told_otherwise(tmp_path: Path) -> N
         assert len(cycles) >= 5  # of 20: how many depends on what else the machine does
 
 
+@stalls_excused
 def test_a_full_disk_fails_the_call_and_not_the_run(tmp_path: Path) -> None:
     path = tmp_path / "summary.json"
     with running(tmp_path, "run", "run", "--seconds", "3", "--record", "/dev/full", "--json", str(path)) as run:
@@ -165,13 +186,12 @@ def test_a_folder_that_cannot_be_written_stops_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.soak
+@stalls_excused
 def test_ten_minutes_are_replayed_to_the_bit(tmp_path: Path) -> None:
     check(tmp_path, 605.0, 10)
 
 
 @pytest.mark.soak
 def test_a_hundred_killed_runs_are_restored(tmp_path: Path) -> None:
-    rng = random.Random(100)
-    lost = [check_killed(tmp_path, number, rng) for number in range(100)]
+    lost = lost_in(tmp_path, 100, seed=100, lost_max_s=LOST_MAX_S)
     logging.getLogger(__name__).info("lost at most %.3f s", max(lost))
-    assert max(lost) <= LOST_MAX_S, sorted(lost)[-5:]
