@@ -46,7 +46,7 @@ def write_foxglove(trace: Trace, path: Path) -> list[Path]:
     with path.open("wb") as file:
         disk = _Disk(file)
         try:
-            with foxglove.open_mcap(disk, context=context):  # type: ignore[arg-type] - that is all it asks for
+            with foxglove.open_mcap(disk, context=context):
                 _Teller(trace, context).tell()
         except RuntimeError:
             if disk.refusal is None:
@@ -62,7 +62,7 @@ class _Disk:
         self._file = file
         self.refusal: OSError | None = None
 
-    def write(self, data: bytes) -> int:
+    def write(self, data: bytes | bytearray) -> int:
         """Write, as a file does."""
         return self._kept(lambda: self._file.write(data))
 

@@ -70,8 +70,7 @@ def measure_recording(plan: TimingPlan, sets: Sequence[str], told: Callable[[str
 
 def hour_mb(summary: dict[str, Any]) -> float:
     """Return what an hour of such a run takes on the disk, MB."""
-    periods = summary["cycles"] + summary["missed"]
-    seconds = 1e-6 * summary["timing"]["period"] * periods
+    seconds = 1e-6 * float(summary["timing"]["period"]) * int(summary["cycles"] + summary["missed"])
     return float(summary["recording"]["bytes"]) / 1e6 / seconds * 3600.0
 
 

@@ -123,21 +123,23 @@ def test_noise_stops_it_only_where_it_lasts_and_is_named(rate: float, measured: 
         ]
         run = hallway(seed, *noise)
         run.until(FROM_S)
-        assert run.state.mode.mode is Mode.DRIVE, "half a second is got over"
+        driving = run.state.mode
+        assert driving.mode is Mode.DRIVE, "half a second is got over"
         bad = run.driver.counts.bad
         run.until(FROM_S + 1.3)
         assert run.driver.counts.bad > bad + 50
-        assert run.state.mode.mode is Mode.SAFE_STOP
-        reason = str(run.state.mode.reason)
+        stopped = run.state.mode
+        assert stopped.mode is Mode.SAFE_STOP
+        reason = str(stopped.reason)
         assert "broken frames came in place of its echoes: noise on the line" in reason
         assert reason.endswith(", then re-arm")
-        assert 0.9 < run.state.mode.since_s - (FROM_S + 0.017 * seed) < 1.2
+        assert 0.9 < stopped.since_s - (FROM_S + 0.017 * seed) < 1.2
         firings = len(run.firings)
         run.until(FROM_S + 3.0)
         assert run.driver.state is LineState.READY
         assert run.driver.trouble is None
         assert len(run.firings) > firings + 20
-        assert run.state.mode.mode is Mode.SAFE_STOP, "motion never resumes by itself"
+        assert run.state.mode == stopped, "motion never resumes by itself"
     measured(f"{rate:g} bytes of noise a second: 0.5 s are got over, after 1 s without an echo SAFE_STOP, by name")
 
 
