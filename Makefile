@@ -18,18 +18,20 @@ lint: $(VENV)/test.stamp
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+# What watches the clock runs alone, the rest on all processors.
 tests: $(VENV)/test.stamp
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -q -n auto -m "not realtime and not soak"
+	$(BIN)/python -m pytest -m "realtime and not soak"
 
 # Compiled code reads beyond an array in silence; this run does not let it.
 boundscheck: $(VENV)/test.stamp
-	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(BIN)/python -m pytest -q -m "not realtime and not compiled and not soak" \
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(BIN)/python -m pytest -q -n auto -m "not realtime and not compiled and not soak" \
 		tests/perception tests/drivers/test_acoustics.py tests/drivers/test_emulator*.py
 
 # Coverage sees into kernels only where they are not compiled.
 coverage: $(VENV)/test.stamp
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest -q -m "not realtime and not compiled and not soak"
-	$(BIN)/python -m coverage report --skip-covered --fail-under=90
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -n auto -m "not realtime and not compiled and not soak" \
+		--cov --cov-report=term:skip-covered --cov-fail-under=90
 
 # What is promised, measured again: writes docs/promises.md. (With a blank for the =, pytest takes the page for a test.)
 promises: $(VENV)/test.stamp
@@ -53,6 +55,7 @@ bench: $(VENV)/bench.stamp
 	@$(BIN)/python -m tests.bench $(BENCH)
 	@$(BIN)/python -m tests.bench timing $(TIMING)
 	@$(BIN)/python -m tests.bench waking
+	@$(BIN)/python -m tests.bench recording
 
 clean:
 	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage

@@ -7,12 +7,12 @@ import contextlib
 import os
 import signal
 import sys
-import tempfile
 from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
 from typing import Final
 
 from runtime.complaint import FAILED, WRONG_CALL, Complaint
+from runtime.run_folder import run_folder
 
 READY_WORD: Final = "ready"
 """First word of the one line the emulator prints."""
@@ -40,8 +40,8 @@ async def emulator(arguments: Sequence[str]) -> AsyncIterator[str]:
     Complaint
         The emulator did not get ready; its own words are in the message.
     """
-    with tempfile.TemporaryDirectory(prefix="echolocate-") as folder:
-        port = Path(folder) / "robot"
+    with contextlib.ExitStack() as stack:
+        port = _folder(stack) / "robot"
         process = await asyncio.create_subprocess_exec(
             sys.executable, "-m", "runtime.cli", "emulate", "--link", str(port), "--end-with-parent", *arguments,
             stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE, start_new_session=True,
@@ -52,6 +52,17 @@ async def emulator(arguments: Sequence[str]) -> AsyncIterator[str]:
             yield str(port)
         finally:
             await _end(process)
+
+
+def _folder(stack: contextlib.ExitStack) -> Path:
+    try:
+        return stack.enter_context(run_folder())
+    except OSError as error:
+        raise Complaint(
+            f"no temporary folder can be made for the emulator: {error.strerror or error}; make room, or name "
+            "another place in TMPDIR",
+            FAILED,
+        ) from error
 
 
 async def _wait_until_ready(process: asyncio.subprocess.Process) -> None:

@@ -57,6 +57,7 @@ class Spread(TypedDict):
     worst: float
     """The largest error of a single drum."""
     worst_seed: int
+    """The first that had it."""
     missed: int
     missed_most: int
     """Drums not found by the seed that found fewest."""
@@ -183,7 +184,7 @@ def spread(outcomes: Sequence[SeedOutcome]) -> Spread | None:
         "mean": mean(means),
         "deviation": pstdev(means),
         "worst": max(worst)[0],
-        "worst_seed": max(worst)[1],
+        "worst_seed": max(worst, key=lambda one: (one[0], -one[1]))[1],
         "missed": sum(missed),
         "missed_most": max(missed),
         "false": sum(outcome.false for outcome in outcomes),

@@ -160,7 +160,7 @@ def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
     )  # fmt: skip
     state.mode = advance(before, situation)
     if state.mode.mode is Mode.DRIVE:
-        decision = _drive(state, settings)
+        decision = _drive(state, settings, inputs.trouble)
         if isinstance(decision, Drive):
             return decision.twist
         state.mode = state.mode.enter(Mode.SAFE_STOP, inputs.now_s, decision.reason)
@@ -171,15 +171,16 @@ def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
     return STANDSTILL if state.mode.mode is Mode.READY else None
 
 
-def _drive(state: State, settings: Settings) -> Drive | Stop:
-    """Ask the schemas and the arbiter."""
+def _drive(state: State, settings: Settings, trouble: str | None) -> Drive | Stop:
+    """Ask the schemas and the arbiter; `trouble` is what the driver knows of a ring that is not heard."""
     odometry, behaviors = state.odometry, settings.behaviors
     if odometry is None:
         return Stop("no odometry has arrived: check that the base reports it, then re-arm")
     silence = odometry.t_s - state.last_firing_s
     patience = behaviors.avoid_static_obstacle.echo_age_max_s
     if silence > patience:
-        return Stop(f"the ring has not reported for {silence:.1f} s: check the ring's power and cable, then re-arm")
+        likely = trouble or "check the ring's power and cable"
+        return Stop(f"the ring has not reported for {silence:.1f} s: {likely}, then re-arm")
     if state.leg is None:
         state.leg = Leg.starting_at(odometry.pose)
     percept = Percept(odometry.pose, state.perception.obstacles(odometry.t_s, patience))

@@ -72,9 +72,9 @@ def verdict(outcome: Outcome, units: Units) -> str:
 def spread_verdict(spread: Spread, units: Units) -> str:
     """Return how much the seeds differ, in one line."""
     return (
-        f"{spread['seeds']} seeds: mean error {length(spread['mean'], units, 3)} ± "
-        f"{length(spread['deviation'], units, 3)} {units} from seed to seed; worst single error "
-        f"{length(spread['worst'], units, 3)} {units} (seed {spread['worst_seed']}); {spread['missed']} drums not "
+        f"{spread['seeds']} seeds: mean error {length(spread['mean'], units, 4)} ± "
+        f"{length(spread['deviation'], units, 4)} {units} from seed to seed; worst single error "
+        f"{length(spread['worst'], units, 4)} {units} (seed {spread['worst_seed']}); {spread['missed']} drums not "
         f"found, at most {spread['missed_most']} by one seed; {spread['false']} false"
     )
 

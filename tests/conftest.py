@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -66,7 +67,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    if item.get_closest_marker(promises.CARRIES) is not None:
+    if any(item.get_closest_marker(name) is not None for name in (promises.CARRIES, "soak")):
         item.user_properties.append((promises.CARRIES, ""))
 
 
@@ -85,12 +86,12 @@ class _Clerk:
         page = self._config.getoption("promises")
         if page is None:
             return
-        ledger, soak = (
-            self._config.stash.get(promises.LEDGER, promises.Ledger()),
-            Path(page).name == promises.SOAK_PAGE.name,
-        )
+        ledger, path = self._config.stash.get(promises.LEDGER, promises.Ledger()), Path(page)
+        soak, day = path.name == promises.SOAK_PAGE.name, datetime.now(UTC).date().isoformat()
         try:
-            Path(page).write_text(promises.render(ledger, soak=soak), encoding="utf-8")
+            before = promises.rows_in(path.read_text("utf-8")) if path.exists() else []
+            rows = promises.merged(ledger, before, soak=soak, day=day)
+            path.write_text(promises.render(rows, soak=soak), encoding="utf-8")
         except ValueError as error:
             self._config.get_terminal_writer().line(f"\n{page} is left as it is: {error}", red=True)
             session.exitstatus = pytest.ExitCode.USAGE_ERROR
@@ -98,6 +99,13 @@ class _Clerk:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(_Clerk(config), "promises")
+    if getattr(config.option, "numprocesses", None):
+        # Before there are several processes, each of which would compile all of it.
+        _compile_all()
+
+
+def _compile_all() -> None:
+    ready_kernels(load_settings("hallway"), Console(stderr=True), PARTS)
 
 
 @pytest.fixture
@@ -115,4 +123,4 @@ def _state_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
 @pytest.fixture(scope="session")
 def warm_kernels() -> None:
     """Have every kernel compiled before a clock runs, also for processes that a test starts."""
-    ready_kernels(load_settings("hallway"), Console(stderr=True), PARTS)
+    _compile_all()

@@ -2,13 +2,15 @@
 
 A test carries a promise by `@pytest.mark.promise("P4")` and tells what it measured by the fixture `measured`. The
 hooks in `conftest.py` call in here: an unknown ID ends every run before it begins, an ID that no test carries ends a
-run of the whole suite, and `--promises=PAGE` writes the page of what was promised and what was measured.
+run of the whole suite, and `--promises=PAGE` writes the page of what was promised and what was measured. A run of
+some tests only renews their rows and leaves the others as they are; each row has its own date.
 
 To add a promise, add its entry to `PROMISES` and mark a test with its ID.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -117,7 +119,10 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
 
 @dataclass(frozen=True)
 class Carrier:
-    """One test function that carries promises; parameters of one function are one carrier."""
+    """One test function that carries promises; parameters of one function are one carrier.
+
+    A long form may carry none: it is listed all the same, for what it measured.
+    """
 
     test: str
     ids: tuple[str, ...]
@@ -175,9 +180,9 @@ def carriers_of(items: Iterable[pytest.Item]) -> tuple[Carrier, ...]:
                 f"{item.nodeid}: @pytest.mark.promise names {named}; known are {', '.join(PROMISES)}: "
                 f"correct the ID, or add it to tests/promises.py"
             )
-        if ids:
+        soak = item.get_closest_marker("soak") is not None
+        if ids or soak:
             test = item.nodeid.split("[")[0]
-            soak = item.get_closest_marker("soak") is not None
             found[test] = Carrier(test, ids, soak and found.get(test, Carrier("", (), soak=True)).soak)
     return tuple(found.values())
 
@@ -206,39 +211,80 @@ def collect(config: pytest.Config, items: Sequence[pytest.Item]) -> None:
         )
 
 
+NO_PROMISE = "–"
+"""In place of an ID."""
+
+
+class Row(NamedTuple):
+    """A row of the page."""
+
+    promise: str
+    test: str
+    measured: str
+    day: str
+
+    def __str__(self) -> str:
+        return f"| {self.promise} | `{self.test}` | {self.measured} | {self.day} |"
+
+
+_ROW = re.compile(r"\| (?P<promise>P\d+|–) \| `(?P<test>[^`]+)` \| (?P<measured>.*) \| (?P<day>[-\d]+) \|")
+
+
+def _place(row: tuple[str, ...]) -> tuple[int, str]:
+    """Return where a row that begins with ID and test belongs: whichever run wrote it, the page is the same."""
+    return [*PROMISES, NO_PROMISE].index(row[0]), row[1]
+
+
 def rows_of(carriers: Iterable[Carrier], *, soak: bool) -> list[tuple[str, str]]:
-    """Return (ID, test) as the page lists them, by ID and then in the order of collection."""
+    """Return (ID, test) as the page lists them, by ID and then by the test's name."""
     mine = [carrier for carrier in carriers if carrier.soak == soak]
-    return [(one, carrier.test) for one in PROMISES for carrier in mine if one in carrier.ids]
+    return sorted(((one, c.test) for c in mine for one in c.ids or (NO_PROMISE,)), key=_place)
+
+
+def rows_in(page: str) -> list[Row]:
+    """Return the rows of a written page."""
+    return [Row(**found.groupdict()) for found in map(_ROW.fullmatch, page.splitlines()) if found is not None]
 
 
 def listed_in(page: str) -> list[tuple[str, str]]:
     """Return the (ID, test) that a written page lists."""
-    rows = [[cell.strip() for cell in line.split("|")] for line in page.splitlines() if line.startswith("| P")]
-    return [(row[1], row[2].strip("`")) for row in rows]
+    return [(row.promise, row.test) for row in rows_in(page)]
 
 
-def render(ledger: Ledger, *, soak: bool) -> str:
-    """Return the page: what is promised, then which test measured what.
+def merged(ledger: Ledger, before: Iterable[Row], *, soak: bool, day: str) -> list[Row]:
+    """Return the rows of the page: of what ran anew, and as it was of what did not.
 
     Raises
     ------
     ValueError
-        A test that carries a promise failed, or did not run to its end.
+        A test that carries a promise failed; or, in a run of the whole suite, did not run to its end.
     """
-    rows = rows_of(ledger.carriers, soak=soak)
-    tests = {test for _, test in rows}
-    if missing := sorted(tests & ledger.failed | tests - ledger.results.keys()):
+    due = rows_of(ledger.carriers, soak=soak)
+    tests = {test for _, test in due}
+    if missing := sorted(tests & ledger.failed | (tests - ledger.results.keys() if ledger.whole else set())):
         raise ValueError(f"did not pass: {', '.join(missing)}")
+    ran = {
+        (one, test): Row(one, test, "<br>".join(ledger.results[test]) or "passed", day)
+        for one, test in due
+        if test in ledger.results
+    }
+    if ledger.whole:
+        return list(ran.values())
+    known = {(row.promise, row.test): row for row in before if row.promise in {*PROMISES, NO_PROMISE}} | ran
+    return sorted(known.values(), key=_place)
+
+
+def render(rows: Sequence[Row], *, soak: bool) -> str:
+    """Return the page: what is promised, then which test measured what, and when."""
     command, other = ("make soak", "make promises") if soak else ("make promises", "make soak")
     lines = [
         "# What is promised, and what was measured",
         "",
         f"Written by `{command}` from the tests that ran; the {'short' if soak else 'long'} forms: `{other}`.",
+        f"`pytest{' -m soak' if soak else ''} TEST --promises=PAGE` renews the rows of single tests.",
         "",
     ]
-    kept = dict.fromkeys(one for one, _ in rows)
+    kept = dict.fromkeys(row.promise for row in rows if row.promise in PROMISES)
     lines += [f"- **{one}: {PROMISES[one].text}.** {PROMISES[one].figure}." for one in kept]
-    lines += ["", "| promise | test | measured |", "|---|---|---|"]
-    lines += [f"| {one} | `{test}` | {'<br>'.join(ledger.results[test]) or 'passed'} |" for one, test in rows]
-    return "\n".join(lines) + "\n"
+    lines += ["", "| promise | test | measured | on |", "|---|---|---|---|"]
+    return "\n".join([*lines, *map(str, rows)]) + "\n"

@@ -63,6 +63,7 @@ class DenningRobot:
         self._now_s = 0.0
         self._odometry_s = 0.0
         self._frame_s = 0.0
+        self._bad_then = 0
         self._seq = 0
         self._flush_first = False
         self._commands: dict[str, Command] = {}
@@ -84,6 +85,8 @@ class DenningRobot:
     @property
     def trouble(self) -> str | None:
         """What is wrong, in one line; None where nothing is."""
+        if self._trouble is None and self._state is LineState.READY:
+            return troubles.noise(self._ring.drowned(self._now_s, self._decoder.bad), "its echoes")
         return self._trouble
 
     @property
@@ -129,6 +132,7 @@ class DenningRobot:
         """Forget what was under way; only a HALT not yet answered is kept for the next line."""
         self._earlier = self.counts
         self._decoder = Decoder("robot", midway=True)
+        self._bad_then = 0
         self._state = LineState.CLOSED
         self._abandon()
 
@@ -252,7 +256,8 @@ class DenningRobot:
         if silent_s > silence_max_s:
             # An echo may well come right after the last odometry of all.
             others = self._frame_s - self._odometry_s > 0.5 * silence_max_s
-            self._go_down(troubles.silence(silent_s, others=others))
+            bad = self._decoder.bad - self._bad_then
+            self._go_down(troubles.silence(silent_s, others=others, bad=bad))
         elif untaken_s > _UNTAKEN_SHARE * silence_max_s:
             self._go_down(troubles.deafness(untaken_s))
         elif self._ring.should_ask(self._now_s):
@@ -313,7 +318,7 @@ class DenningRobot:
             case Odom():
                 self._take_odometry(frame)
             case Echo() if self._state is LineState.READY:
-                self._ring.heard(self._now_s)
+                self._ring.heard(self._now_s, self._decoder.bad)
                 self._stamper.echo(frame)
             case _:
                 pass  # an echo of a pattern that is not ours yet
@@ -349,8 +354,8 @@ class DenningRobot:
         del self._commands[name]
         if name == "PATTERN":
             self._state = LineState.READY
-            self._odometry_s = self._now_s
-            self._ring.heard(self._now_s)
+            self._odometry_s, self._bad_then = self._now_s, self._decoder.bad
+            self._ring.heard(self._now_s, self._decoder.bad)
             self._pattern_s = self._now_s
             if "HALT" in self._commands:
                 self._ask("HALT")  # a robot that answers all else must answer this, within the usual patience
@@ -385,7 +390,7 @@ class DenningRobot:
             self._abandon()
             self._greet()
             return
-        self._odometry_s = self._now_s
+        self._odometry_s, self._bad_then = self._now_s, self._decoder.bad
         self._odometry = sample
         self._watch.named(odom.last_drive_seq)
         if sample.flags & Flags.LATCHED:

@@ -10,6 +10,9 @@ from drivers.denning.frames import VERSION, Ident, NakCode
 
 _RADIUS_TOLERANCE_MM = 1.0
 
+_NOISE_MIN = 3
+"""So many broken frames and no odometry are a line that is disturbed; one or two are how a line ends."""
+
 _MEANINGS = MappingProxyType(
     {
         NakCode.UNKNOWN_TYPE: "it does not know this command",
@@ -61,8 +64,20 @@ def no_answer(command: str, tries: int, *, frames: int, bad: int, baud: int) -> 
     )
 
 
-def silence(silent_s: float, *, others: bool) -> str:
-    """Return what to make of missing odometry; `others` where frames of other kinds still come."""
+def silence(silent_s: float, *, others: bool, bad: int) -> str:
+    """Return what to make of missing odometry.
+
+    Parameters
+    ----------
+    silent_s
+        For how long it has been missing.
+    others
+        Frames of other kinds still come.
+    bad
+        Broken frames that came meanwhile.
+    """
+    if (drowned := noise(bad, "it")) is not None:
+        return f"no odometry for {silent_s:.2f} s, {drowned}; it is taken up as soon as it can be understood"
     if others:
         return (
             f"no odometry for {silent_s:.2f} s although the robot sends other things; its base has stopped working: "
@@ -71,6 +86,16 @@ def silence(silent_s: float, *, others: bool) -> str:
     return (
         f"nothing heard for {silent_s:.2f} s; the robot is off or restarting, or its cable is loose: check its power "
         f"and cable; it is taken up as soon as it answers"
+    )
+
+
+def noise(bad: int, what: str) -> str | None:
+    """Return what to make of so many broken frames in place of something; None where that is nothing to speak of."""
+    if bad < _NOISE_MIN:
+        return None
+    return (
+        f"{bad} broken frames came in place of {what}: noise on the line drowns what the robot says, check its cable "
+        f"and shield, and that nothing else sends on it"
     )
 
 

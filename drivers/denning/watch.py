@@ -54,11 +54,13 @@ class RingWatch:
 
     def __init__(self, patience_s: float) -> None:
         self._patience_s = patience_s
-        self._since_s = 0.0
+        self._since_s = self._heard_s = 0.0
+        self._bad = 0
 
-    def heard(self, now_s: float) -> None:
-        """Begin to wait anew: an echo frame has come, or a pattern was set."""
-        self._since_s = now_s
+    def heard(self, now_s: float, bad: int) -> None:
+        """Begin to wait anew: an echo frame has come, or a pattern was set; so many broken frames came until now."""
+        self._since_s = self._heard_s = now_s
+        self._bad = bad
 
     def should_ask(self, now_s: float) -> bool:
         """Return True once after each stretch of silence."""
@@ -66,3 +68,7 @@ class RingWatch:
             return False
         self._since_s = now_s
         return True
+
+    def drowned(self, now_s: float, bad: int) -> int:
+        """Return how many broken frames came in place of echoes; 0 while that is too soon to say."""
+        return bad - self._bad if now_s - self._heard_s > self._patience_s else 0

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import queue
-import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -19,10 +17,10 @@ if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
     from drivers.driver import RobotDriver
-    from drivers.messages import Firing
     from runtime.books import Books
     from runtime.process import Observers
     from runtime.recording.recorder import Recorder
+    from runtime.recording.ringlog_writer import RingLogWriter
     from runtime.step import CycleRecord, State
     from runtime.summary import RecordingRow
 
@@ -38,18 +36,18 @@ class Keeping:
     Parameters
     ----------
     recorder : Recorder, optional
-        None where nothing is recorded.
-    on_firing : callable, optional
-        Gets every firing, for a ring log.
+        None where there is no recording.
+    ring_log : RingLogWriter, optional
+        None where there is no ring log.
     asked_for : bool
         Whether the user named the file: then trouble with it is the command's failure.
     """
 
     def __init__(
-        self, recorder: Recorder | None, on_firing: Callable[[Firing], None] | None, *, asked_for: bool
+        self, recorder: Recorder | None = None, ring_log: RingLogWriter | None = None, *, asked_for: bool = False
     ) -> None:
         self._recorder = recorder
-        self._on_firing = on_firing
+        self._ring_log = ring_log
         self._asked_for = asked_for
         self._told: str | None = None
 
@@ -62,19 +60,22 @@ class Keeping:
         """Return who watches the run: the recorder and the view."""
         from runtime.process import Observers
 
-        recorder = self._recorder
-        if recorder is None:
-            return Observers(view, self._on_firing)
+        recorder, ring_log, kept = self._recorder, self._ring_log, self._kept
+        if kept is None:
+            return Observers(view)
 
         def on_cycle(record: CycleRecord, state: State, books: Books, driver: RobotDriver) -> None:
-            recorder.on_cycle(record, state)
-            if recorder.standing.trouble != self._told:
-                self._told = recorder.standing.trouble
-                log.warning("the recording has trouble", reason=self._told, dropped=recorder.standing.dropped)
+            if recorder is not None:
+                recorder.on_cycle(record, state)
+            if kept.standing.trouble != self._told:
+                self._told = kept.standing.trouble
+                log.warning("the recording has trouble", reason=self._told, dropped=kept.standing.dropped)
             if view is not None:
                 view(record, state, books, driver)
 
-        return Observers(on_cycle, self._on_firing, recorder.on_bytes, recorder.on_settings)
+        if recorder is None:
+            return Observers(on_cycle, None if ring_log is None else ring_log.put)
+        return Observers(on_cycle, None, recorder.on_bytes, recorder.on_settings)
 
     def on_summary(self, summary: Mapping[str, Any]) -> None:
         """Take what the run says of itself at its end."""
@@ -83,14 +84,18 @@ class Keeping:
 
     def probe(self) -> str | None:
         """Say how the recorder ended; None while it runs, or where there is none. See `runtime.health`."""
-        return None if self._recorder is None else self._recorder.probe()
+        return None if self._kept is None else self._kept.probe()
+
+    @property
+    def _kept(self) -> Recorder | RingLogWriter | None:
+        return self._recorder if self._ring_log is None else self._ring_log
 
     @property
     def standing(self) -> RecordingRow | None:
         """How the recording stands, for the summary; None where there is none."""
-        if self._recorder is None:
+        if self._kept is None:
             return None
-        standing = asdict(self._recorder.standing)
+        standing = asdict(self._kept.standing)
         return {
             "file": standing["file"],
             "files": standing["files"],
@@ -108,11 +113,14 @@ class Keeping:
         Complaint
             The disk refused, or something was dropped.
         """
-        now = None if self._recorder is None else self._recorder.standing
+        now = None if self._kept is None else self._kept.standing
         if self._asked_for and now is not None and (now.trouble is not None or now.dropped):
+            what, salvage = "recording", " (`echolocate recover` reads what is there)"
+            if self._ring_log is not None:
+                what, salvage = "ring log", ""
             raise Complaint(
-                f"--record: the recording is not whole: {now.trouble or 'the disk was too slow'}; {now.dropped} "
-                "messages are missing; make room or choose another disk (`echolocate recover` reads what is there)",
+                f"--record: the {what} is not whole: {now.trouble or 'the disk was too slow'}; {now.dropped} "
+                f"messages are missing; make room or choose another disk{salvage}",
                 FAILED,
             )
 
@@ -131,18 +139,15 @@ def kept(settings: Settings, record: str | None, *, no_record: bool, emulated: b
         Keep no recording in the folder either.
     emulated : bool
         Whether the settings' world is what the robot meets.
-
-    Raises
-    ------
-    Complaint
-        The ring log cannot be written.
     """
     with contextlib.ExitStack() as stack:
         if record is not None and Path(record).suffix.lower() == RING_LOG:
-            yield Keeping(None, stack.enter_context(ring_log(record)), asked_for=True)
+            from runtime.recording.ringlog_writer import RingLogWriter
+
+            yield Keeping(ring_log=stack.enter_context(RingLogWriter(Path(record))), asked_for=True)
             return
         if record is None and (no_record or not settings.recording.enabled):
-            yield Keeping(None, None, asked_for=False)
+            yield Keeping()
             return
         from runtime.recording.folder import OneFile, Place, Rotating, recordings_folder
         from runtime.recording.recorder import Recorder
@@ -154,35 +159,4 @@ def kept(settings: Settings, record: str | None, *, no_record: bool, emulated: b
         else:
             place = Rotating(recordings_folder(settings.recording), run, settings.recording)
         recorder = stack.enter_context(Recorder(settings, place, emulated=emulated))
-        yield Keeping(recorder, None, asked_for=record is not None)
-
-
-@contextlib.contextmanager
-def ring_log(path: str) -> Iterator[Callable[[Firing], None]]:
-    """Write the run's firings to a ring log, in a thread: a slow disk delays no cycle.
-
-    Raises
-    ------
-    Complaint
-        The file cannot be written.
-    """
-    from runtime.ringlog import RingLogError, write_ring_log
-
-    waiting: queue.SimpleQueue[Firing | None] = queue.SimpleQueue()
-    failures: list[RingLogError] = []
-
-    def work() -> None:
-        try:
-            write_ring_log(Path(path), iter(waiting.get, None))
-        except RingLogError as error:
-            failures.append(error)
-
-    writer = threading.Thread(target=work, name="ring log")
-    writer.start()
-    try:
-        yield waiting.put
-    finally:
-        waiting.put(None)
-        writer.join()
-    if failures:
-        raise Complaint(str(failures[0]), FAILED)
+        yield Keeping(recorder, asked_for=record is not None)

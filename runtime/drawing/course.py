@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from config.units import FOOT_M
-from runtime.drawing.scene import errors_of
+from runtime.drawing.scene import stand_for
 from runtime.drawing.style import ECHO, MODEL, SEGMENT, WIDTH_IN
 from runtime.tables import Units
 from runtime.trace.form import Trace
@@ -27,7 +27,7 @@ def course(trace: Trace, units: Units) -> Figure:
     known.set_title("Course of the run")
     if with_errors:
         unit = FOOT_M if units == "ft" else 1.0
-        errors = [[e / unit for e in errors_of(m.objects, trace).values()] for m in trace.moments]
+        errors = [[one.error_m / unit for one in stand_for(m.objects, trace).values()] for m in trace.moments]
         at = [t for t, found in zip(times, errors, strict=True) if found]
         panels[1].plot(at, [max(found) for found in errors if found], color=SEGMENT, linewidth=1.5,
                        linestyle=(0, (3, 1.5)), label="worst", gid="worst")  # fmt: skip

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -117,7 +117,7 @@ def draw_objects(
     """Draw the models where they were matched, with the error of each where the truth is known."""
     models = {model.name: model for model in trace.settings.models}
     whole = trace.settings.perception.method == "full"
-    errors = errors_of(objects, trace) if told else {}
+    known = stand_for(objects, trace) if told else {}
     for number, seen in enumerate(objects, 1):
         points, closed = outline(seen, models.get(seen.model), whole=whole)
         shape = Polygon(frame.points(points), closed=closed, facecolor="none", edgecolor=MODEL, linewidth=2.2,
@@ -135,11 +135,18 @@ def draw_objects(
         if told:
             model = models.get(seen.model)
             reach = 0.1 if model is None else model.arc_radius_m or max(math.hypot(*v) for v in model.vertices_m)
-            error = f"\n{length(errors[number - 1], units, 3)} {units}" if number - 1 in errors else ""
-            _label(axes, f"{number}{error}", (x, y), reach / frame.unit_m, up=y >= axes.viewLim.intervaly.mean())
+            one = known.get(number - 1)
+            error = "" if one is None else f"\n{length(one.error_m, units, 3)} {units}"
+            _label(
+                axes,
+                f"{number if one is None else one.name}{error}",
+                (x, y),
+                reach / frame.unit_m,
+                up=y >= axes.viewLim.intervaly.mean(),
+            )
     if not objects:
         return []
-    kind = "matched model, + its place" + (", its error" if errors else "")
+    kind = "matched model, + its place" + (", its error" if known else "")
     return [Line2D([], [], color=MODEL, linewidth=2.2, marker="+", markeredgecolor=INK, label=kind)]
 
 
@@ -152,11 +159,20 @@ def _label(axes: Axes, text: str, at: tuple[float, float], reach: float, *, up: 
     note.set_path_effects([withStroke(linewidth=2.5, foreground=PAPER)])
 
 
-def errors_of(objects: Sequence[SeenObject], trace: Trace) -> dict[int, float]:
-    """Return for each object that is something that stood there how far it is off, m."""
+class Thing(NamedTuple):
+    """Something that stood there and was recognised: its name as in Table 2, and how far off it was seen, m."""
+
+    name: str
+    error_m: float
+
+
+def stand_for(objects: Sequence[SeenObject], trace: Trace) -> dict[int, Thing]:
+    """Return what each object stands for, where that is something that stood there and the truth is known."""
     if trace.world is None:
         return {}
     placed = [trace.start.compose(Pose(o.x, o.y, o.theta)) for o in objects]
-    truth = [(d.x_m, d.y_m) for d in trace.world.drum] + [(b.x_m, b.y_m) for b in trace.world.box]
+    drums, boxes = trace.world.drum, trace.world.box
+    truth = [(d.x_m, d.y_m) for d in drums] + [(b.x_m, b.y_m) for b in boxes]
+    names = [f"drum {i}" for i in range(1, len(drums) + 1)] + [f"box {i}" for i in range(1, len(boxes) + 1)]
     pairs = nearest_pairs(truth, [(p.x, p.y) for p in placed])
-    return {j: math.dist(truth[i], (placed[j].x, placed[j].y)) for i, j in pairs.items()}
+    return {j: Thing(names[i], math.dist(truth[i], (placed[j].x, placed[j].y))) for i, j in pairs.items()}

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final, TypeVar
 
 import foxglove
 from foxglove import channels as ch
@@ -37,6 +37,7 @@ ARC_POINTS: Final = 9
 LINE_PX: Final = 2.0
 CROSS_M: Final = 0.08
 
+T = TypeVar("T")
 Places = Iterable[Iterable[float]]
 
 
@@ -49,9 +50,43 @@ def write_foxglove(trace: Trace, path: Path) -> list[Path]:
         The file cannot be written.
     """
     context = foxglove.Context()
-    with path.open("wb") as file, foxglove.open_mcap(file, context=context):
-        _Teller(trace, context).tell()
+    with path.open("wb") as file:
+        disk = _Disk(file)
+        try:
+            with foxglove.open_mcap(disk, context=context):
+                _Teller(trace, context).tell()
+        except RuntimeError:
+            if disk.refusal is None:
+                raise
+            raise disk.refusal from None
     return [path]
+
+
+class _Disk:
+    """A file that keeps why it would not be written: the SDK tells only that something went wrong."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self.refusal: OSError | None = None
+
+    def write(self, data: bytes | bytearray) -> int:
+        """Write, as a file does."""
+        return self._kept(lambda: self._file.write(data))
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        """Seek, as a file does."""
+        return self._kept(lambda: self._file.seek(offset, whence))
+
+    def flush(self) -> None:
+        """Flush, as a file does."""
+        self._kept(self._file.flush)
+
+    def _kept(self, act: Callable[[], T]) -> T:
+        try:
+            return act()
+        except OSError as error:
+            self.refusal = self.refusal or error
+            raise
 
 
 class _Teller:

@@ -136,8 +136,14 @@ def refuse_strangers(path: Path, salvage: Salvage) -> None:
         raise RecordingError(f"{path}: is an MCAP file of another program ({named!r}), not a recording of a run")
 
 
-def _refuse_newer(path: Path, salvage: Salvage, told: About | None) -> None:
-    """Refuse what this program is too old for; what stands under a checksum goes before what does not."""
+def refuse_newer(path: Path, salvage: Salvage, told: About | None = None) -> None:
+    """Refuse what this program is too old for; what stands under a checksum goes before what does not.
+
+    Raises
+    ------
+    RecordingError
+        It was written by a newer program.
+    """
     form = re.fullmatch(rf"{PROFILE}/(\d+)", salvage.profile)
     of_header = int(form[1]) if form is not None else 0
     of_file = of_header if told is None else told.format
@@ -155,29 +161,39 @@ def open_recording(path: Path) -> Iterator[Recording]:
     Raises
     ------
     RecordingError
-        It is none, is of a newer program, or holds nothing that can be read.
+        It is none, is of a newer program, or holds nothing that can be read; also where what is done with it finds a
+        message that is none of this version's.
     """
     with mapped(path) as data:
         salvage = Salvage(data)
         refuse_strangers(path, salvage)
         about = next((e for chunk in salvage.chunks() for e in chunk if e.topic == ABOUT), None)
         if about is None:
-            _refuse_newer(path, salvage, None)
+            refuse_newer(path, salvage)
             raise RecordingError(f"{path}: {_why_nothing(salvage)}")
         try:
             told = decode(About, about.data)
-            _refuse_newer(path, salvage, told)
+            refuse_newer(path, salvage, told)
             settings = settings_in(told.settings)
         except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            where = ".".join(map(str, first["loc"]))
             raise RecordingError(
-                f"{path}: its settings are not those of this version ({where}: {first['msg']}); replay it with the "
+                f"{path}: its settings are not those of this version ({_first_of(error)}); replay it with the "
                 f"version that made it, or name settings by --with"
             ) from error
         recording = Recording(path, told, settings, data)
-        yield recording
+        try:
+            yield recording
+        except ValidationError as error:
+            raise RecordingError(
+                f"{path}: a message in it has a form that this version does not know ({_first_of(error)}): replay it "
+                f"with the version that made it"
+            ) from error
         del recording, salvage
+
+
+def _first_of(error: ValidationError) -> str:
+    first = error.errors(include_url=False)[0]
+    return f"{'.'.join(map(str, first['loc']))}: {' '.join(first['msg'].split())}"
 
 
 def _why_nothing(salvage: Salvage) -> str:

@@ -11,7 +11,7 @@ from mcap.writer import CompressionType, Writer
 
 from runtime.recording.channels import CHANNELS, CYCLE, Entry, schema_of
 from runtime.recording.part import CHUNK_BYTES, INDEX, PROFILE
-from runtime.recording.reading import RecordingError, mapped, refuse_strangers
+from runtime.recording.reading import RecordingError, mapped, refuse_newer, refuse_strangers
 from runtime.recording.salvage import Damage, Salvage
 
 BESIDE: Final = ".part"
@@ -76,6 +76,7 @@ def _copy(salvage: Salvage, source: Path, beside: Path, target: Path) -> Recover
             chunks += 1
             writer.flush()
         if not messages:
+            refuse_newer(source, salvage)
             raise RecordingError(f"{source}: holds no chunk that is whole: nothing can be restored")
         writer.finish()
         file.flush()

@@ -16,6 +16,7 @@ from runtime import VERSION
 from runtime.drawing.course import course
 from runtime.drawing.files import styled, svg_of
 from runtime.drawing.pictures import paper_figures, pictures
+from runtime.drawing.scene import stand_for
 from runtime.experiment import DrumRow
 from runtime.open_loop import BoxRow, judge
 from runtime.report.inline import inlined
@@ -126,9 +127,11 @@ def _others(trace: Trace, units: Units) -> str:
     if not trace.objects:
         return note("Nothing was recognised.")
     heads = ["", f"x ({units})", f"y ({units})", "heading (°)", f"σ ({units})", "support", "score"]
+    known = stand_for(trace.objects, trace)
+    names = [known[j].name if j in known else str(j + 1) for j in range(len(trace.objects))]
     rows = [
         [
-            f"{number} {o.model}",
+            f"{name}, {o.model}",
             length(o.x, units, 3),
             length(o.y, units, 3),
             f"{math.degrees(o.theta):.0f}",
@@ -136,11 +139,9 @@ def _others(trace: Trace, units: Units) -> str:
             str(o.support),
             f"{o.score:.3f}",
         ]
-        for number, o in enumerate(trace.objects, 1)
+        for name, o in zip(names, trace.objects, strict=True)
     ]
-    return note("What the run itself reports, in the odometry's frame, numbered as in the picture:") + table(
-        heads, rows
-    )
+    return note("What the run itself reports, in the odometry's frame, named as in the picture:") + table(heads, rows)
 
 
 def _pictures(trace: Trace, units: Units) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated, Final
+from collections.abc import Callable
+from typing import Annotated, Final, TypeAlias
 
 from cyclopts import App, Parameter
 from rich.console import Console
@@ -13,9 +14,10 @@ from runtime.complaint import Complaint
 from runtime.kernels import PARTS, ready_kernels, use_cache
 from tests.bench.contestant import Peer
 from tests.bench.measure import Plan, measure
+from tests.bench.recording import measure_recording
 from tests.bench.runners import Method, contestants
 from tests.bench.table import results_table
-from tests.bench.timing import TimingPlan, measure_timing
+from tests.bench.timing import Timing, TimingPlan, measure_timing
 from tests.bench.timing_table import figures_table, quantiles_table, read_earlier
 from tests.bench.waking import figures, waking_table
 from tests.bench.waking import measure as measure_waking
@@ -30,7 +32,10 @@ FULL: Final = Plan(repetitions=3, halls_max=10, passes=20)
 QUICK: Final = Plan(repetitions=1, halls_max=2, passes=4)
 
 TIMING: Final = TimingPlan(seconds=20.0, rounds=3, busy=0)
+RECORDING: Final = TimingPlan(seconds=60.0, rounds=1, busy=0)
 WAKING_TURNS: Final = 10
+
+Measure: TypeAlias = Callable[[TimingPlan, tuple[str, ...], Callable[[str], None]], Timing]
 
 app = App(help="Measure our methods and the libraries that one would use instead, on the same readings.")
 
@@ -107,24 +112,35 @@ def timing(
     sets
         Override one setting, as in cycle.rate_hz=10.
     """
-    use_cache()
-    from runtime.summary import write_json
+    plan = TimingPlan(max(1.0, seconds), max(1, rounds), max(0, busy))
+    return _measured(measure_timing, plan, sets, json, against)
 
-    console = Console(stderr=True)
-    try:
-        earlier = None if against is None else read_earlier(against)
-        ready_kernels(load_settings("hallway"), console)
-        plan = TimingPlan(max(1.0, seconds), max(1, rounds), max(0, busy))
-        with console.status("bench") as status:
-            result = measure_timing(plan, sets, status.update)
-        write_json(json, result.as_json())
-    except Complaint as complaint:
-        console.print(f"bench: {complaint}", markup=False)
-        return complaint.exit_code
-    wide = _wide()
-    wide.print(quantiles_table(result, earlier))
-    wide.print(figures_table(result, earlier))
-    return 0
+
+@app.command
+def recording(
+    *,
+    json: str = "recording.json",
+    against: str | None = None,
+    seconds: float = RECORDING.seconds,
+    rounds: int = RECORDING.rounds,
+    sets: Annotated[tuple[str, ...], Parameter(name="--set", negative="", allow_leading_hyphen=False)] = (),
+) -> int:
+    """Measure what recording costs a run over the pty: time of its loop, room on the disk.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    against
+        JSON of an earlier run to compare with.
+    seconds
+        How long runs with and without a recording last, each round.
+    rounds
+        How often.
+    sets
+        Override one setting, as in recording.keyframe_period_s=10.
+    """
+    return _measured(measure_recording, TimingPlan(max(1.0, seconds), max(1, rounds), 0), sets, json, against)
 
 
 @app.command
@@ -153,6 +169,27 @@ def waking(*, json: str = "waking.json", turns: int = WAKING_TURNS, busy: int = 
         console.print(f"bench: {complaint}", markup=False)
         return complaint.exit_code
     _wide().print(waking_table(by_load))
+    return 0
+
+
+def _measured(measure: Measure, plan: TimingPlan, sets: tuple[str, ...], json: str, against: str | None) -> int:
+    """Measure, write the figures and print them."""
+    use_cache()
+    from runtime.summary import write_json
+
+    console = Console(stderr=True)
+    try:
+        earlier = None if against is None else read_earlier(against)
+        ready_kernels(load_settings("hallway"), console)
+        with console.status("bench") as status:
+            result = measure(plan, sets, status.update)
+        write_json(json, result.as_json())
+    except Complaint as complaint:
+        console.print(f"bench: {complaint}", markup=False)
+        return complaint.exit_code
+    wide = _wide()
+    wide.print(quantiles_table(result, earlier))
+    wide.print(figures_table(result, earlier))
     return 0
 
 

@@ -10,6 +10,7 @@ import orjson
 from rich.table import Table
 
 from runtime.complaint import WRONG_CALL, Complaint
+from tests.bench.recording import DROPPED, HOUR_MB, LOOP_P99
 from tests.bench.timing import CONTROL, ECHO_TO_DRIVE, LATE, VIRTUAL, WAKING, WINDOW_USED, Timing
 
 COLUMNS: Final = ("p50", "p99", "p99.9", "max")
@@ -20,7 +21,7 @@ LATE_MAX_US: Final = 1000.0
 LIMITS: Final = {
     "start_s": 2.5, "rss_mb": 250.0, "rss_peak_mb": 250.0, "cpu_share": 0.06,
     "compilations": 0.0, "full collections": 0.0, "link lost": 0.0, "stops": 0.0, WINDOW_USED: 0.03,
-    VIRTUAL: 10.0,
+    VIRTUAL: 10.0, LOOP_P99: 300.0, HOUR_MB: 30.0, DROPPED: 0.0,
 }  # fmt: skip
 """What each figure may be at most."""
 

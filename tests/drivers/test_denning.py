@@ -21,7 +21,7 @@ from drivers.denning.robot import DenningRobot
 from drivers.driver import LineState, RobotDriver
 from drivers.firing import FiringError
 from drivers.messages import LinkCounts, Twist
-from tests.drivers.scripted import CONFIG, IDENT, ODOM, Bench, only
+from tests.drivers.scripted import CONFIG, IDENT, ODOM, PERIOD_US, Bench, only
 from tests.drivers.vectors import OCTETS
 
 
@@ -183,6 +183,29 @@ def test_noise_instead_of_an_answer_points_at_the_baud_rate() -> None:
         bench.robot.receive(b"\x9f\x33\0", bench.now)
         bench.pass_time(0.01)
     assert "likely the baud rate" in (bench.robot.trouble or "")
+
+
+@pytest.mark.parametrize(
+    ("broken", "told"), [(1, "nothing heard for 0.41 s"), (9, "9 broken frames came in place of it: noise")]
+)
+def test_noise_in_place_of_odometry_is_named_and_one_broken_frame_is_not(
+    bench: Bench, broken: int, told: str
+) -> None:
+    bench.robot.receive(b"\x9f\x33\0" * broken, bench.now)
+    bench.pass_time(0.41)
+    assert bench.state() is LineState.DOWN
+    assert told in (bench.robot.trouble or "")
+
+
+def test_noise_in_place_of_echoes_is_named_once_they_are_overdue(bench: Bench) -> None:
+    for k in range(30):
+        bench.odom(k * PERIOD_US)
+        bench.robot.receive(b"\x9f\x33\0" * (k % 2), bench.now)
+        bench.pass_time(0.02)
+        assert bench.robot.trouble is None or k > 20
+    assert "broken frames came in place of its echoes: noise" in (bench.robot.trouble or "")
+    bench.say(Echo(0, 29 * PERIOD_US, 0, 1, (10,)))
+    assert bench.robot.trouble is None
 
 
 def test_another_firing_pattern_while_it_drives(bench: Bench) -> None:

@@ -101,7 +101,7 @@ async def test_opening_blocks(ends: Ends) -> None:
         release.wait(PATIENCE_S)
         return open_port(config)
 
-    link = host.link(ends.path, opener=opener)
+    link = host.link(ends.path, opener=opener, open_timeout_s=PATIENCE_S)
     opening = asyncio.create_task(link.open_once())
     while ticks < 20:
         await asyncio.sleep(0.001)
@@ -125,7 +125,7 @@ async def test_wait_for_swallows_a_cancellation_that_comes_with_the_result(ends:
         ports.append(open_port(config))
         return ports[-1]
 
-    link = host.link(ends.path, opener=opener)
+    link = host.link(ends.path, opener=opener, open_timeout_s=PATIENCE_S)
     task = asyncio.create_task(link.run())
     await asyncio.sleep(0)
     (thread,) = [one for one in threading.enumerate() if one.name == f"open {ends.path}"]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import logging
 import random
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from runtime.complaint import DONE, FAILED
 from runtime.recording.channels import CYCLE, KEYFRAME, LOG, SERIAL, decode
 from runtime.recording.forms import About, Cycle, LogLine, SerialBytes
 from runtime.recording.reading import open_recording
+from tests.hil.machine import stalls_excused
 from tests.hil.running import running
 from tests.recorded import entries_of
 
@@ -53,8 +56,8 @@ def keyframe_times(path: Path) -> list[float]:
     return [1e-9 * (entry.log_ns - first) for entry in entries if entry.topic == KEYFRAME]
 
 
-def check(folder: Path, seconds: float, replays: int, *more: str) -> None:
-    """Record a run and replay it whole and from some of its keyframes."""
+def check(folder: Path, seconds: float, replays: int, *more: str) -> str:
+    """Record a run and replay it whole and from some of its keyframes; return the figures."""
     summary = record(folder, seconds, *more)
     kept = summary["recording"]
     assert (kept["dropped"], kept["trouble"], kept["files"]) == (0, None, 1)
@@ -73,10 +76,21 @@ def check(folder: Path, seconds: float, replays: int, *more: str) -> None:
         assert set(told["verify"]["refinement"]) >= {"budget", "converged", "nothing"}
         assert told["cycles"] >= 12_000
         assert told["verify"]["times_real_time"] >= 30.0
-        assert path.stat().st_size / seconds * 3600.0 <= HOUR_MB * 1e6
+        assert hour_mb(path.stat().st_size, seconds) <= HOUR_MB
     logging.getLogger(__name__).info("%s", {**told["verify"], "bytes": kept["bytes"], "lag": summary["lag_us"]})
+    causes = ", ".join(f"{count} {cause}" for cause, count in sorted(told["verify"]["refinement"].items()))
+    return (
+        f"{told['cycles']:,} cycles over the pty replayed, and from {replays} keyframes: 0 differences; refinement "
+        f"ended by {causes}; {told['verify']['times_real_time']:.0f} × real time, "
+        f"{hour_mb(kept['bytes'], seconds):.1f} MB an hour"
+    )
 
 
+def hour_mb(size: int, seconds: float) -> float:
+    return size / seconds * 3600.0 / 1e6
+
+
+@stalls_excused
 def test_a_run_over_the_pty_is_replayed_to_the_bit(tmp_path: Path) -> None:
     check(tmp_path, 12.0, 2, "--set", "recording.keyframe_period_s=3.0")
     entries = entries_of(tmp_path / "hall.mcap")
@@ -90,7 +104,7 @@ def test_a_run_over_the_pty_is_replayed_to_the_bit(tmp_path: Path) -> None:
 
 def killed(folder: Path, name: str, after_s: float) -> tuple[Path, float]:
     """Kill a recorded run some time after its first cycle; return the file, and when it was killed, in Unix time."""
-    path = folder / f"{name}.mcap"
+    path = folder / "hall.mcap"
     with running(folder, name, "run", "--record", str(path), *TIGHT) as run:
         run.comes_to("DRIVE")
         time.sleep(after_s)
@@ -100,9 +114,9 @@ def killed(folder: Path, name: str, after_s: float) -> tuple[Path, float]:
     return path, killed_s
 
 
-def check_killed(folder: Path, number: int, rng: random.Random) -> float:
+def check_killed(folder: Path, name: str, after_s: float) -> float:
     """Kill a run, restore its recording, replay it; return how much was lost, s."""
-    path, killed_s = killed(folder, f"run{number}", rng.uniform(1.0, 5.0))
+    path, killed_s = killed(folder, name, after_s)
     restored = path.with_name(f"{path.stem}-recovered.mcap")
     assert call(["recover", str(path)]) == DONE
     got = verify(restored)
@@ -113,15 +127,32 @@ def check_killed(folder: Path, number: int, rng: random.Random) -> float:
     return killed_s - 1e-9 * cycles[-1].log_ns
 
 
+def lost_in(folder: Path, kills: int, seed: int, lost_max_s: float) -> list[float]:
+    """Kill so many runs at random moments; return how much each lost, s, none of it more than is allowed.
+
+    All record into one file: each takes over that of the one before, whose lock has died with it.
+    """
+    rng, lost, names = random.Random(seed), list[float](), itertools.count()
+
+    @stalls_excused
+    def one() -> None:
+        lost_s = check_killed(folder, f"run{next(names)}", rng.uniform(1.0, 5.0))
+        assert lost_s <= lost_max_s
+        lost.append(lost_s)
+
+    for _ in range(kills):
+        one()
+    return lost
+
+
 def test_a_killed_run_is_restored(tmp_path: Path) -> None:
-    rng = random.Random(7)
-    lost = [check_killed(tmp_path, number, rng) for number in range(5)]
+    # The margin is for a machine with much else to do; the soak has none.
+    lost = lost_in(tmp_path, 5, seed=7, lost_max_s=3.0 * LOST_MAX_S)
     logging.getLogger(__name__).info("lost %s s", [round(s, 3) for s in lost])
-    # The margin is for a machine that lets nothing run for a while; the soak has none.
     assert sorted(lost)[2] <= LOST_MAX_S
-    assert max(lost) <= 3.0 * LOST_MAX_S
 
 
+@stalls_excused
 def test_every_run_leaves_a_recording_unless_told_otherwise(tmp_path: Path) -> None:
     where = ("--set", f"recording.folder={json.dumps(str(tmp_path / 'runs'))}")
     with running(tmp_path, "none", "run", "--seconds", "0.5", "--no-record", *where) as run:
@@ -140,6 +171,7 @@ def test_every_run_leaves_a_recording_unless_told_otherwise(tmp_path: Path) -> N
         assert len(cycles) >= 5  # of 20: how many depends on what else the machine does
 
 
+@stalls_excused
 def test_a_full_disk_fails_the_call_and_not_the_run(tmp_path: Path) -> None:
     path = tmp_path / "summary.json"
     with running(tmp_path, "run", "run", "--seconds", "3", "--record", "/dev/full", "--json", str(path)) as run:
@@ -165,13 +197,16 @@ def test_a_folder_that_cannot_be_written_stops_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.soak
-def test_ten_minutes_are_replayed_to_the_bit(tmp_path: Path) -> None:
-    check(tmp_path, 605.0, 10)
+@stalls_excused
+def test_ten_minutes_are_replayed_to_the_bit(tmp_path: Path, measured: Callable[[str], None]) -> None:
+    measured(check(tmp_path, 605.0, 10))
 
 
 @pytest.mark.soak
-def test_a_hundred_killed_runs_are_restored(tmp_path: Path) -> None:
-    rng = random.Random(100)
-    lost = [check_killed(tmp_path, number, rng) for number in range(100)]
-    logging.getLogger(__name__).info("lost at most %.3f s", max(lost))
-    assert max(lost) <= LOST_MAX_S, sorted(lost)[-5:]
+@pytest.mark.promise("P13")
+def test_five_hundred_killed_runs_are_restored(tmp_path: Path, measured: Callable[[str], None]) -> None:
+    lost = lost_in(tmp_path, 500, seed=100, lost_max_s=LOST_MAX_S)
+    measured(
+        f"{len(lost)} runs killed at random moments, each recording into the file of the one before: all restored "
+        f"and replayed without a difference, at most {max(lost):.2f} s lost (mean {sum(lost) / len(lost):.2f} s)"
+    )

@@ -12,6 +12,7 @@ from runtime.cli import call
 from runtime.complaint import DONE
 from runtime.recording.channels import SETTINGS
 from runtime.recording.reading import open_recording
+from tests.hil.machine import stalls_excused
 from tests.hil.running import Running, emulated, running, wait_for
 from tests.hil.truth import is_driving, rows
 from tests.recorded import entries_of
@@ -33,6 +34,7 @@ def reloaded(run: Running, config: Path, text: str, times: int) -> dict[str, obj
 
 
 @pytest.mark.promise("P11")
+@stalls_excused
 def test_a_configuration_reloaded_while_driving(tmp_path: Path) -> None:
     config = tmp_path / "run.toml"
     good = 'robot = "denning"\n[behaviors.arbiter]\nbase_velocity_m_s = 0.3\n'

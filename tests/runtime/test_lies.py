@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
+from drivers.driver import LineState
 from drivers.emulator.faults import Fault, Garbage, OdometryJump, Outliers, StuckSensor
 from runtime.modes import Mode
 from runtime.notices import Notices
@@ -106,6 +107,40 @@ def test_a_leap_is_told_and_the_robot_drives_on(measured: Callable[[str], None])
     for seen in run.state.perception.objects():
         assert in_frame(frame, seen).x - seen.x == pytest.approx(FT, abs=0.01)
     measured("a leap of 1 ft in mid-run: no stop, one line to the operator")
+
+
+@promise
+@pytest.mark.parametrize("rate", [200.0, 8000.0])
+def test_noise_stops_it_only_where_it_lasts_and_is_named(rate: float, measured: Callable[[str], None]) -> None:
+    """A frame with noise before it is lost with it, so nothing of the ring is heard: for how long may it go on blind?
+
+    For as long as an echo may be old (`echo_age_max_s`, 1 s); and it stops knowing why, and does not go on by itself.
+    """
+    for seed in SEEDS:
+        noise = [
+            Garbage(kind="garbage", at_s=at_s + 0.017 * seed, duration_s=lasts_s, bytes_per_s=rate)
+            for at_s, lasts_s in ((10.0, 0.5), (FROM_S, 1.2))
+        ]
+        run = hallway(seed, *noise)
+        run.until(FROM_S)
+        driving = run.state.mode
+        assert driving.mode is Mode.DRIVE, "half a second is got over"
+        bad = run.driver.counts.bad
+        run.until(FROM_S + 1.3)
+        assert run.driver.counts.bad > bad + 50
+        stopped = run.state.mode
+        assert stopped.mode is Mode.SAFE_STOP
+        reason = str(stopped.reason)
+        assert "broken frames came in place of its echoes: noise on the line" in reason
+        assert reason.endswith(", then re-arm")
+        assert 0.9 < stopped.since_s - (FROM_S + 0.017 * seed) < 1.2
+        firings = len(run.firings)
+        run.until(FROM_S + 3.0)
+        assert run.driver.state is LineState.READY
+        assert run.driver.trouble is None
+        assert len(run.firings) > firings + 20
+        assert run.state.mode == stopped, "motion never resumes by itself"
+    measured(f"{rate:g} bytes of noise a second: 0.5 s are got over, after 1 s without an echo SAFE_STOP, by name")
 
 
 @pytest.mark.promise("P8")

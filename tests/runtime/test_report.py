@@ -83,6 +83,8 @@ def test_it_tells_the_run(page: str) -> None:
     errors = [float(e) for e in re.findall(r"\(-?[\d.]+, -?[\d.]+\)</td><td>([\d.]+)</td>", page)]
     assert len(errors) >= 3
     assert max(errors) < 0.1
+    named = re.findall(r"<td>(drum \d), semicircle</td>", page)
+    assert len(set(named)) == len(named) == len(errors), "each by the name that it has in Table 2"
     assert "not found" in text, "the last drums are not reached in that time"
     assert "Never stopped for a reason." in text
     assert "behaviors.arbiter.base_velocity_m_s" in text
