@@ -28,15 +28,22 @@ LIVE: Final = frozenset(
         "perception.full.quanta_per_firing",
         "perception.full.report_probability",
         "perception.full.report_probability_near",
+        "perception.clusters.segments_min",
+        "perception.clusters.threshold_m",
         "perception.map.age_max_s",
         "perception.map.contradiction_margin_m",
         "perception.recognition",
+        "perception.relaxation",
+        "perception.segments",
         "ring.firing",
     }
 )
 """Settings, and sections of them, that a running process follows. Everything else sizes an array, opens a port or
 describes a robot that does not change while it drives: it needs a restart, and so does a new setting until it is
-entered here."""
+entered here. Models are followed where further ones come after those from before: see `Difference.live`."""
+
+
+MODELS: Final = ("models",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +61,13 @@ class Difference:
 
     @property
     def live(self) -> bool:
-        """Whether a running process follows the change."""
+        """Whether a running process follows the change.
+
+        Further models are further explanations of what was heard, and nothing that is remembered says otherwise. A
+        model that goes or changes leaves objects behind that are called by it, so that needs a restart.
+        """
+        if self.location == MODELS and isinstance(self.before, tuple) and isinstance(self.after, tuple):
+            return self.before == self.after[: len(self.before)]
         keys = [str(key) for key in self.location]
         return any(".".join(keys[:n]) in LIVE for n in range(1, len(keys) + 1))
 
@@ -74,7 +87,11 @@ class Reload:
     """Why nothing was taken over, one line each; empty where it was."""
 
 
-def reload(current: Settings, propose: Callable[[], Settings]) -> Reload:
+def reload(
+    current: Settings,
+    propose: Callable[[], Settings],
+    hindrance: Callable[[Settings, Settings], str | None] = lambda _current, _proposed: None,
+) -> Reload:
     """Return the settings in force after an attempt to change them.
 
     Parameters
@@ -83,6 +100,8 @@ def reload(current: Settings, propose: Callable[[], Settings]) -> Reload:
         In force so far; never touched.
     propose
         Loads and validates the new ones whole; raises ConfigError where they are no good.
+    hindrance
+        Says of settings in force and of good new ones why this very process cannot go from one to the other.
     """
     try:
         proposed = propose()
@@ -92,6 +111,9 @@ def reload(current: Settings, propose: Callable[[], Settings]) -> Reload:
     fixed = tuple(f"{d}: needs a restart" for d in changed if not d.live)
     if fixed:
         return Reload(current, problems=fixed)
+    hindered = hindrance(current, proposed) if changed else None
+    if hindered is not None:
+        return Reload(current, problems=(hindered,))
     return Reload(proposed, changed) if changed else Reload(current)
 
 

@@ -66,6 +66,11 @@ def use_cache() -> Path:
     return Path(os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder())))
 
 
+def is_interpreted() -> bool:
+    """Tell whether nothing is compiled at all."""
+    return os.environ.get("NUMBA_DISABLE_JIT", "0") not in {"", "0"}
+
+
 def needed(settings: Settings) -> tuple[str, ...]:
     """Return the parts that a run with these settings needs: polygons are half the work, and many runs have none."""
     outlines = any(model.arc_radius_m is None for model in settings.models)
@@ -73,15 +78,33 @@ def needed(settings: Settings) -> tuple[str, ...]:
     return (EMULATOR, settings.perception.method, *polygons)
 
 
+def hindrance(running: Settings, proposed: Settings) -> str | None:
+    """Return why a running process cannot go on with other settings: kernels would be compiled while it drives.
+
+    Parameters
+    ----------
+    running, proposed : Settings
+        Those in force, for which everything was compiled or loaded at the start, and those to be taken over.
+    """
+    if is_interpreted() or set(needed(proposed)) <= set(needed(running)):
+        return None
+    return (
+        "models: the first one without arc_radius_m needs kernels that are readied at the start, and compiling them "
+        "now would hold the robot up: start with such a model, e.g. `--set models=box`; then more can be added live"
+    )
+
+
 def missing(folder: Path, parts: Iterable[str]) -> list[str]:
     """Return those of the parts that were never compiled into `folder`; none where nothing is compiled."""
-    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in {"", "0"}:
+    if is_interpreted():
         return []
     return [part for part in parts if not (folder / part).exists()]
 
 
 def warm_up(settings: Settings, parts: Iterable[str]) -> None:
     """Run every kernel of these parts once, so that none is compiled later.
+
+    What a person does by hand is done as well: a first edit must not hold up a cycle.
 
     Parameters
     ----------

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from config.reload import Reload, reload
 from config.settings import Settings
+from runtime.kernels import hindrance
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
@@ -72,7 +73,7 @@ class Reloader:
         while True:
             self._again = False
             try:
-                self._conclude(await asyncio.to_thread(reload, self.current, self._propose))
+                self._conclude(await asyncio.to_thread(reload, self.current, self._propose, hindrance))
             except Exception as error:  # noqa: BLE001 - a reload that fails must not end a run that goes well
                 self._log.error(
                     "the configuration is kept: reading it failed", error=f"{type(error).__name__}: {error}"

@@ -56,21 +56,50 @@ def _square() -> ModelConfig:
     return ModelConfig(name="warm-up", closed=True, vertices_m=corners)
 
 
+def _edited(settings: Settings, method: str, models: Sequence[ModelConfig]) -> None:
+    """Drive past a wall, then do every kind of edit with each model: a person's first must not hold up a cycle."""
+    from perception.edits import (
+        ClearMap,
+        ConfirmObject,
+        DeleteSegments,
+        MoveObject,
+        PinSegments,
+        PlaceModel,
+        RejectObject,
+    )
+
+    perception = _perception(settings, method, models)
+    _drive(settings, perception)
+    numbers = tuple(perception.segments().numbers[:2].tolist())
+    perception.edit(PinSegments(numbers, pinned=True))
+    for model in models:
+        perception.edit(PlaceModel(model.name, 1.0, 2.5, 0.0))
+    for seen in perception.objects():
+        if seen.number is not None:
+            perception.evidence(seen.number)
+            perception.edit(MoveObject(seen.number, 1.1, 2.5, 0.0))
+            perception.edit(MoveObject(seen.number, 9.0, 9.0, 0.0))
+            perception.edit(ConfirmObject(seen.number))
+            perception.edit(RejectObject(seen.number))
+    perception.edit(DeleteSegments(numbers))
+    perception.edit(ClearMap())
+
+
 def hear(settings: Settings) -> None:
     """Take in one firing and refine nothing."""
     _drive(settings, _perception(settings, CIRCLES, settings.models), 1)
 
 
 def _circles(settings: Settings) -> None:
-    _drive(settings, _perception(settings, CIRCLES, settings.models))
+    _edited(settings, CIRCLES, settings.models)
 
 
 def _polygons(settings: Settings) -> None:
-    _drive(settings, _perception(settings, CIRCLES, (*settings.models, _square())))
+    _edited(settings, CIRCLES, (*settings.models, _square()))
 
 
 def _paper(settings: Settings) -> None:
-    _drive(settings, _perception(settings, PAPER, (*settings.models, _square())))
+    _edited(settings, PAPER, (*settings.models, _square()))
 
 
 def _emulator(settings: Settings) -> None:

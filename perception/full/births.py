@@ -15,6 +15,7 @@ from perception.full.contact import HIGH, LOW, fit_circle
 from perception.full.contact import HITS as HIT
 from perception.full.contact import NEAR as NEARBY
 from perception.full.hearing import audible
+from perception.full.marks import give_number, is_barred
 from perception.full.noise_choice import noise_variance
 from perception.full.pairs import map_near
 from perception.full.reservoir import gather, put
@@ -28,6 +29,7 @@ from perception.full.state import (
     FREE,
     KIND,
     LLR,
+    MARK,
     PULLING,
     R00,
     R11,
@@ -68,8 +70,8 @@ VARIANCE_MAX_M2: Final = 0.2 * FOOT_M * FOOT_M
 
 
 @kernel
-def free_track(of: Ints, evidence: Floats) -> int:
-    """Return a free track, else the tentative one with the least evidence, else −1.
+def free_track(of: Ints, evidence: Floats, names: Ints) -> int:
+    """Return a free track, else the tentative one with the least evidence that no person spoke of, else −1.
 
     Parameters
     ----------
@@ -77,13 +79,15 @@ def free_track(of: Ints, evidence: Floats) -> int:
         `State.ti` or `State.pi`.
     evidence : (n,) float
         Log ratio of each to the background, nat.
+    names : (≥ n, 2) int
+        Its rows of `State.names`.
     """
     worst = math.inf
     slot = -1
     for t in range(of.shape[0]):
         if of[t, ST] == FREE:
             return t
-        if of[t, ST] == TENTATIVE and evidence[t] < worst:
+        if of[t, ST] == TENTATIVE and evidence[t] < worst and names[t, MARK] == 0:
             worst = evidence[t]
             slot = t
     return slot
@@ -133,9 +137,18 @@ def relax_onto_map(s: State, p: Settings, kind: int) -> None:
 @kernel
 def begin_track(s: State, kind: int, rho: float, x: float, y: float, n: int, now: float) -> int:
     """Found a tentative track on the `n` readings in `s.w` and return it, −1 where there is no room."""
-    t = free_track(s.ti, s.tf[:, LLR])
+    t = free_track(s.ti, s.tf[:, LLR], s.names)
     if t < 0:
         return -1
+    begin_at(s, t, kind, rho, x, y, n, now)
+    give_number(s.names, s.tally, t)
+    s.g[BIRTHS] += 1
+    return t
+
+
+@kernel
+def begin_at(s: State, t: int, kind: int, rho: float, x: float, y: float, n: int, now: float) -> None:
+    """Make track `t` a tentative one on the `n` readings in `s.w`."""
     s.ti[t, :] = 0
     s.tf[t, :] = 0.0
     s.comp[t, :] = 0.0
@@ -150,8 +163,6 @@ def begin_track(s: State, kind: int, rho: float, x: float, y: float, n: int, now
     s.tf[t, BORN] = now
     for j in range(n):
         put(s.bins, s.bn, t, x, y, s.w[j])
-    s.g[BIRTHS] += 1
-    return t
 
 
 @kernel
@@ -213,7 +224,7 @@ def birth(s: State, p: Settings, kind: int, sx: float, sy: float, nx: float, ny:
         return 1
     if chosen != kind and best < p.unknown * near + RIVAL_OVER_UNKNOWN:
         return 1
-    if is_known(s, p, bx, by, -1.0, nx, ny):
+    if is_known(s, p, bx, by, -1.0, nx, ny) or is_barred(s, bx, by, chosen, best):
         return 1
     t = begin_track(s, chosen, p.radii[chosen], bx, by, n, now)
     if t < 0:

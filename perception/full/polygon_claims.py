@@ -7,8 +7,9 @@ from typing import Final
 
 from perception.full.noise_choice import noise_variance, reach_of
 from perception.full.polygon import Ear, predict
-from perception.full.polygon_births import WHOLE, bears
+from perception.full.polygon_births import WHOLE
 from perception.full.polygon_job import HEARD, NEXT, cost, ear_of, sides_of
+from perception.full.polygon_readings import bears
 from perception.full.reservoir import put
 from perception.full.state import (
     DIRTY,

@@ -12,11 +12,15 @@ from perception.full.state import (
     C00,
     C11,
     CALLED,
+    CONFIRMED,
     ESTABLISHED,
+    FREE,
     KIND,
     LLR,
+    MARK,
     PCAP,
     PHITS,
+    PLACED,
     PPROB,
     PROB,
     PT,
@@ -67,9 +71,13 @@ def test_what_is_sure_is_reported() -> None:
         ]  # fmt: skip
         for t in range(TRACKS):
             report.call_or_not(s.ti, s.tf, s.comp, P.models, 0.92, 0.7, t)
-        n = report.sure_circles(s.ti, out)
+        s.names[:TRACKS, MARK] = 0
+        n = report.sure_circles(s.ti, s.names, out)
         assert out[:n].tolist() == want
         sure += n
+        s.names[:TRACKS, MARK] = rng.choice([0, CONFIRMED, PLACED], TRACKS)
+        said = [t for t in range(TRACKS) if s.ti[t, ST] != FREE and s.names[t, MARK] > 0]
+        assert out[: report.sure_circles(s.ti, s.names, out)].tolist() == sorted({*want, *said})
     assert sure > 200
 
 
@@ -95,9 +103,13 @@ def test_polygons_are_sure_when_seen_from_near_and_from_two_sides() -> None:
                 s.pi[t, ST] == ESTABLISHED, s.pf[t, PPROB], 0.9, s.pf[t, PHITS], s.pf[t, [PXX, PYY]].tolist(), kept[t]
             )
         ]  # fmt: skip
-        n = report.sure_polygons(s.pi, s.pf, s.pbn, s.pbins, 0.9, out)
+        s.names[:] = 0
+        n = report.sure_polygons(s.pi, s.pf, s.pbn, s.pbins, s.names, TRACKS, 0.9, out)
         assert out[:n].tolist() == want
         sure += n
+        s.names[TRACKS + 5, MARK] = CONFIRMED
+        n = report.sure_polygons(s.pi, s.pf, s.pbn, s.pbins, s.names, TRACKS, 0.9, out)
+        assert out[:n].tolist() == sorted({*want, 5})
     assert sure > 200
 
 

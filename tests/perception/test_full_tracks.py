@@ -13,6 +13,7 @@ from perception.full.contact import FAR
 from perception.full.method import FullPerception
 from perception.full.state import (
     BORN,
+    CONFIRMED,
     CYC,
     DIRTY,
     ESTABLISHED,
@@ -20,9 +21,12 @@ from perception.full.state import (
     HITS,
     KIND,
     LLR,
+    MARK,
     NEAR,
     NOISE,
     NRES,
+    NUMBER,
+    PLACED,
     POLISH,
     PROB,
     QUIET,
@@ -100,17 +104,23 @@ def test_rivals_are_fitted_and_scored_on_the_same_readings() -> None:
     assert asked > 800
 
 
-def test_of_two_tracks_in_one_place_the_one_with_more_evidence_stays() -> None:
+def test_of_two_tracks_in_one_place_the_one_with_more_evidence_stays_or_that_a_person_spoke_of() -> None:
     rng, s, merged = np.random.default_rng(11), shared(), 0
+    names = s.names[:TRACKS]
     for _ in range(3000):
         for k in range(TRACKS):
             random_track(rng, s, k)
+        names[:, NUMBER] = rng.permutation(TRACKS) + 1
+        names[:, MARK] = rng.choice([0, CONFIRMED, PLACED], TRACKS, p=[0.8, 0.1, 0.1])
         t = int(rng.integers(TRACKS))
         s.ti[t, ST] = TENTATIVE
         live = s.ti[:, ST] != FREE
-        want = naive_tracks.after_merging(t, live, s.tf[:, [TX, TY]], s.tf[:, TRHO], s.tf[:, LLR], P.merge)
+        want, numbers = naive_tracks.after_merging(
+            t, live, s.tf[:, [TX, TY]], s.tf[:, TRHO], s.tf[:, LLR], P.merge, names[:, MARK], names[:, NUMBER]
+        )
         refine.merge_duplicates(s, P, t)
         assert ((s.ti[:, ST] != FREE) == want).all()
+        assert (names[want, NUMBER] == numbers[want]).all()
         merged += int((live != want).sum())
     assert merged > 500
 
@@ -121,9 +131,11 @@ def test_the_next_free_track() -> None:
         for k in range(TRACKS):
             random_track(rng, s, k, int(rng.choice([FREE, TENTATIVE, ESTABLISHED], p=[0.08, 0.32, 0.6])))
         i, f = s.ti, s.tf
-        free, tentative = np.flatnonzero(i[:, ST] == FREE), np.flatnonzero(i[:, ST] == TENTATIVE)
+        s.names[:TRACKS, MARK] = rng.choice([0, PLACED], TRACKS, p=[0.7, 0.3])
+        free = np.flatnonzero(i[:, ST] == FREE)
+        tentative = np.flatnonzero((i[:, ST] == TENTATIVE) & (s.names[:TRACKS, MARK] == 0))
         weakest = int(tentative[np.argmin(f[tentative, LLR])]) if len(tentative) else -1
-        assert births.free_track(s.ti, s.tf[:, LLR]) == (free[0] if len(free) else weakest)
+        assert births.free_track(s.ti, s.tf[:, LLR], s.names) == (free[0] if len(free) else weakest)
 
 
 def test_a_segment_of_a_known_body_is_known() -> None:

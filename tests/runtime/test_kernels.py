@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from rich.console import Console
 
 import runtime.kernels as kernels
 from config.load import load_settings
+from config.reload import reload
 from config.settings import Settings
 from perception.full import entry
 from runtime import warming
@@ -128,6 +130,26 @@ def test_only_what_a_run_needs_is_compiled() -> None:
     assert set(warming.RUN_ONCE) == set(kernels.PARTS)
 
 
+def test_a_running_process_takes_over_no_model_whose_kernels_it_has_not_readied(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
+    round_one, drums = load_settings("hallway"), load_settings("hallway", models=["semicircle", "drum"])
+    boxes = load_settings("hallway", models=["semicircle", "box"])
+    told = kernels.hindrance(round_one, boxes)
+    assert told is not None
+    assert "start with such a model" in told
+    assert kernels.hindrance(round_one, drums) is None
+    assert kernels.hindrance(boxes, boxes) is None
+    paper = ["perception.method=paper"]
+    assert kernels.hindrance(load_settings("hallway", paper), load_settings("hallway", paper, models=["box"])) is None
+    refused = reload(round_one, lambda: boxes, kernels.hindrance)
+    assert (refused.settings, refused.problems) == (round_one, (told,))
+    assert reload(round_one, lambda: round_one, kernels.hindrance).problems == ()
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    assert kernels.hindrance(round_one, boxes) is None, "nothing is compiled"
+
+
 def test_each_part_is_compiled_once_and_warmed_up_ever_after(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(home))
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
@@ -218,28 +240,75 @@ from runtime.kernels import ready_kernels, use_cache
 use_cache()
 from config.load import load_settings
 from rich.console import Console
-settings = load_settings("hallway")
+settings = load_settings("hallway", sys.argv[1].split(), models=sys.argv[2].split())
 ready_kernels(settings, Console(quiet=True))
 from numba.core import event
 late = []
 class Listener(event.Listener):
     def on_start(self, e): late.append(str(e.data["dispatcher"].py_func.__name__))
     def on_end(self, e): pass
+from config.load import load_model
+from perception.edits import (
+    ClearMap, ConfirmObject, DeleteSegments, MoveObject, PinSegments, PlaceModel, RejectObject,
+)
+from runtime.kernels import hindrance
+from runtime.modes import Mode, Request
+from runtime.simulate import Said, simulate
+
+further = settings.model_copy(update={"models": (*settings.models, load_model(sys.argv[3]))})
+assert hindrance(settings, further) is None
+
+def by_hand(cycle, state):
+    # every half second one thing after the other, also with a model that came late
+    perception, arm = state.perception, Request.ARM if state.mode.mode is Mode.READY else None
+    if cycle % 10 or state.odometry is None:
+        return Said(arm)
+    seen = [o for o in perception.objects() if o.number is not None]
+    for known in seen:
+        perception.evidence(known.number)
+    first = perception.segments().numbers[:4].tolist()
+    x, y = state.odometry.pose.x, state.odometry.pose.y
+    pose = (x + 1.5, y + 0.5, 0.3)
+    edits = (
+        [PlaceModel(m.name, *pose) for m in further.models[: None if cycle > 100 else -1]],
+        [PinSegments(tuple(first), True)], [DeleteSegments(tuple(first[:2]))],
+        [MoveObject(o.number, o.x + 0.2, o.y, 0.1) for o in seen], [ConfirmObject(o.number) for o in seen],
+        [RejectObject(o.number) for o in seen], [ClearMap()] if cycle > 200 else [],
+    )
+    return Said(arm, edits=tuple(edits[cycle // 10 % len(edits)]))
+
 with event.install_listener("numba:compile", Listener()):
-    from runtime.simulate import simulate
-    simulate(settings, settings.world, 0, 12.0)
+    run = simulate(
+        settings, settings.world, 0, 15.0, operator=by_hand, reload=lambda n: further if n == 100 else None,
+    )
+assert run.state.cycle > 280 and run.state.odometry.pose.x > 1.0, run.state
 sys.exit(" ".join(late))
 """
 
 
 @pytest.mark.realtime
 @pytest.mark.usefixtures("warm_kernels")
-def test_nothing_of_perception_is_compiled_while_the_robot_drives() -> None:
+@pytest.mark.parametrize(
+    ("sets", "models", "further"),
+    [
+        ("perception.method=full", "semicircle", "drum"),
+        ("perception.method=full", "semicircle box", "hexagon.toml"),
+        ("perception.method=paper", "semicircle", "box"),
+    ],
+)
+def test_nothing_of_perception_is_compiled_while_the_robot_drives_and_a_person_edits(
+    tmp_path: Path, sets: str, models: str, further: str
+) -> None:
     """The emulator's kernels may still load: it is another process when it matters."""
+    hexagon = [[math.cos(a), math.sin(a)] for a in (k * math.pi / 3.0 for k in range(6))]
+    (tmp_path / "hexagon.toml").write_text(f'name = "hexagon"\nclosed = true\nvertices_m = {hexagon}\n')
+    further = str(tmp_path / further) if "." in further else further
     done = subprocess.run(
-        [sys.executable, "-c", COMPILED_LATER], cwd=ROOT, text=True, capture_output=True, timeout=120, check=False
-    )
+        [sys.executable, "-c", COMPILED_LATER, sets, models, further],
+        cwd=ROOT, text=True, capture_output=True, timeout=120, check=False,
+    )  # fmt: skip
     sources = "".join(path.read_text("utf-8") for path in (ROOT / "perception").rglob("*.py"))
+    assert "Traceback" not in done.stderr, done.stderr
     late = [name for name in done.stderr.split() if f"def {name}(" in sources]
     assert late == [], done.stderr
 
