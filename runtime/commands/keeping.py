@@ -1,4 +1,7 @@
-"""What a run leaves behind: a recording where nothing else is said, and a ring log where that is asked for."""
+"""What a run leaves behind: a recording where nothing else is said, and a ring log where that is asked for.
+
+There is a recorder in every run, be it one that is switched off: an operator may want to record from now on.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import contextlib
 import os
 import queue
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -23,6 +27,7 @@ if TYPE_CHECKING:
     from runtime.books import Books
     from runtime.process import Observers
     from runtime.recording.recorder import Recorder
+    from runtime.recording.writer import Standing
     from runtime.step import CycleRecord, State
     from runtime.summary import RecordingRow
 
@@ -37,17 +42,15 @@ class Keeping:
 
     Parameters
     ----------
-    recorder : Recorder, optional
-        None where nothing is recorded.
+    recorder : Recorder
+        On or off.
     on_firing : callable, optional
         Gets every firing, for a ring log.
     asked_for : bool
         Whether the user named the file: then trouble with it is the command's failure.
     """
 
-    def __init__(
-        self, recorder: Recorder | None, on_firing: Callable[[Firing], None] | None, *, asked_for: bool
-    ) -> None:
+    def __init__(self, recorder: Recorder, on_firing: Callable[[Firing], None] | None, *, asked_for: bool) -> None:
         self._recorder = recorder
         self._on_firing = on_firing
         self._asked_for = asked_for
@@ -55,16 +58,13 @@ class Keeping:
 
     def on_log(self, event: Mapping[str, Any]) -> None:
         """Take a line of the log."""
-        if self._recorder is not None:
-            self._recorder.on_log(event)
+        self._recorder.on_log(event)
 
     def observers(self, view: OnCycle | None, log: FilteringBoundLogger) -> Observers:
         """Return who watches the run: the recorder and the view."""
         from runtime.process import Observers
 
         recorder = self._recorder
-        if recorder is None:
-            return Observers(view, self._on_firing)
 
         def on_cycle(record: CycleRecord, state: State, books: Books, driver: RobotDriver) -> None:
             recorder.on_cycle(record, state)
@@ -78,19 +78,33 @@ class Keeping:
 
     def on_summary(self, summary: Mapping[str, Any]) -> None:
         """Take what the run says of itself at its end."""
-        if self._recorder is not None:
-            self._recorder.on_summary(summary)
+        self._recorder.on_summary(summary)
+
+    @property
+    def now(self) -> Standing | None:
+        """The recording under way; None where there is none."""
+        standing = self._recorder.standing
+        return standing if standing.under_way and self._recorder.is_on else None
+
+    async def record(self, *, on: bool) -> str | None:
+        """Begin another recording with the next cycle, or end the one under way; returns why not."""
+        self._recorder.switch(on=on)
+        return None
+
+    async def bookmark(self, text: str) -> str | None:
+        """Put a mark into the recording; returns why not."""
+        return self._recorder.bookmark(text)
 
     def probe(self) -> str | None:
-        """Say how the recorder ended; None while it runs, or where there is none. See `runtime.health`."""
-        return None if self._recorder is None else self._recorder.probe()
+        """Say how the recorder ended; None while it runs. See `runtime.health`."""
+        return self._recorder.probe()
 
     @property
     def standing(self) -> RecordingRow | None:
-        """How the recording stands, for the summary; None where there is none."""
-        if self._recorder is None:
-            return None
+        """How the recording stands, for the summary; None where there was none."""
         standing = asdict(self._recorder.standing)
+        if not standing["files"] and standing["trouble"] is None:
+            return None
         return {
             "file": standing["file"],
             "files": standing["files"],
@@ -108,8 +122,8 @@ class Keeping:
         Complaint
             The disk refused, or something was dropped.
         """
-        now = None if self._recorder is None else self._recorder.standing
-        if self._asked_for and now is not None and (now.trouble is not None or now.dropped):
+        now = self._recorder.standing
+        if self._asked_for and (now.trouble is not None or now.dropped):
             raise Complaint(
                 f"--record: the recording is not whole: {now.trouble or 'the disk was too slow'}; {now.dropped} "
                 "messages are missing; make room or choose another disk (`echolocate recover` reads what is there)",
@@ -118,7 +132,14 @@ class Keeping:
 
 
 @contextlib.contextmanager
-def kept(settings: Settings, record: str | None, *, no_record: bool, emulated: bool) -> Iterator[Keeping]:
+def kept(
+    settings: Settings,
+    record: str | None,
+    *,
+    no_record: bool,
+    emulated: bool,
+    clock: Callable[[], float] = time.monotonic,
+) -> Iterator[Keeping]:
     """Keep what is to be kept while the run lasts.
 
     Parameters
@@ -128,33 +149,32 @@ def kept(settings: Settings, record: str | None, *, no_record: bool, emulated: b
     record : str, optional
         A file by name: a recording, or a ring log where it ends in ``.csv``.
     no_record : bool
-        Keep no recording in the folder either.
+        Keep no recording in the folder either, unless it is switched on.
     emulated : bool
         Whether the settings' world is what the robot meets.
+    clock : callable
+        The run's, s.
 
     Raises
     ------
     Complaint
         The ring log cannot be written.
     """
-    with contextlib.ExitStack() as stack:
-        if record is not None and Path(record).suffix.lower() == RING_LOG:
-            yield Keeping(None, stack.enter_context(ring_log(record)), asked_for=True)
-            return
-        if record is None and (no_record or not settings.recording.enabled):
-            yield Keeping(None, None, asked_for=False)
-            return
-        from runtime.recording.folder import OneFile, Place, Rotating, recordings_folder
-        from runtime.recording.recorder import Recorder
+    from runtime.recording.folder import OneFile, Place, Rotating, recordings_folder
+    from runtime.recording.recorder import Recorder
 
-        run = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{os.getpid()}"
-        place: Place
-        if record is not None:
-            place = OneFile(Path(record))
+    run = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{os.getpid()}"
+    place: Place = Rotating(recordings_folder(settings.recording), run, settings.recording)
+    with contextlib.ExitStack() as stack:
+        on_firing = None
+        if record is not None and Path(record).suffix.lower() == RING_LOG:
+            on, on_firing = False, stack.enter_context(ring_log(record))
+        elif record is not None:
+            on, place = True, OneFile(Path(record))
         else:
-            place = Rotating(recordings_folder(settings.recording), run, settings.recording)
-        recorder = stack.enter_context(Recorder(settings, place, emulated=emulated))
-        yield Keeping(recorder, None, asked_for=record is not None)
+            on = settings.recording.enabled and not no_record
+        recorder = stack.enter_context(Recorder(settings, place, clock, emulated=emulated, on=on))
+        yield Keeping(recorder, on_firing, asked_for=record is not None and on)
 
 
 @contextlib.contextmanager

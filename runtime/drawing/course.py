@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from runtime.drawing.scene import errors_of
-from runtime.drawing.style import ECHO, MODEL, SEGMENT, WIDTH_IN
+from runtime.drawing.style import ECHO, MODEL, MUTED, SEGMENT, WIDTH_IN
 from runtime.tables import METRES_A_FOOT, Units
 from runtime.trace.form import Trace
 
@@ -42,5 +42,10 @@ def course(trace: Trace, units: Units) -> Figure:
                 gid="gaps", rasterized=len(gaps) > 2000)  # fmt: skip
     rhythm.set(xlabel="t (s)", ylabel="between cycles (ms)")
     rhythm.set_ylim(bottom=0.0)
+    for number, mark in enumerate(trace.bookmarks, 1):
+        for panel in panels:
+            panel.axvline(mark.t_s, color=MUTED, linewidth=0.9, linestyle=(0, (1, 1.5)), gid=f"bookmark-{number}")
+        known.annotate(str(number), (mark.t_s, 1.0), xycoords=("data", "axes fraction"), xytext=(2.0, -9.0),
+                       textcoords="offset points", fontsize=8)  # fmt: skip
     figure.align_ylabels()
     return figure
