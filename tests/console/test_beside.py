@@ -29,8 +29,8 @@ from tests.recorded import hall, record
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
-WINDOWS = 8
-WINDOW_S = 1.5
+WINDOWS = 4
+WINDOW_S = 1.25
 
 
 @stalls_excused

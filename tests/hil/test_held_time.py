@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import logging
 import os
 import signal
 import time
@@ -36,8 +37,8 @@ pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
 SETTINGS = load_settings("hallway")
 PERIOD_S = 1.0 / SETTINGS.cycle.rate_hz
-PAUSE_S = 1.5
-"""Three times the base's deadman, and more than any patience with the line."""
+PAUSE_S = 1.0
+"""Twice the base's deadman, and more than any patience with the line."""
 
 Act = Callable[[RobotProcess, EmulatorControl, list[CycleRecord]], Awaitable[None]]
 
@@ -95,7 +96,9 @@ async def test_held_stepped_and_sped_up_the_robot_drives_on(tmp_path: Path) -> N
         assert await control.set_speed(3.0) is None
         cycles, run_s, host_s = len(records), control.clock(), time.monotonic()
         await until(lambda: len(records) >= cycles + 60)
-        assert control.clock() - run_s > 1.2 * (time.monotonic() - host_s), "faster than real time"
+        speed = (control.clock() - run_s) / (time.monotonic() - host_s)
+        logging.getLogger(__name__).info("three times real time was %.2f", speed)
+        assert 1.2 < speed < 3.1
         assert await control.set_speed(0.5) is None
         cycles = len(records)
         await until(lambda: len(records) >= cycles + 10)
@@ -134,12 +137,16 @@ async def test_a_halt_while_it_is_held_leaves_nothing_to_move(tmp_path: Path) ->
 
 
 @stalls_excused
-async def test_an_emulator_that_is_stopped_and_one_that_is_killed(tmp_path: Path) -> None:
+async def test_an_emulator_that_is_stopped_and_one_that_is_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     async def act(_process: RobotProcess, control: EmulatorControl, records: list[CycleRecord]) -> None:
         (pid,) = children()
         os.kill(pid, signal.SIGSTOP)
         try:
-            assert await control.pause() == HANGS
+            with monkeypatch.context() as impatient:
+                impatient.setattr("runtime.emulated.ANSWER_MAX_S", 0.3)
+                assert await control.pause() == HANGS
             await until(lambda: records[-1].mode.mode is Mode.SAFE_STOP)
         finally:
             os.kill(pid, signal.SIGCONT)
