@@ -29,10 +29,10 @@ from runtime.tables import Units, objects_table, timing_table, timing_verdict
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
-    from runtime.emulated import TimeControl
     from runtime.process import RobotProcess
     from runtime.reload import Reloader
     from runtime.summary import RunSummary
+    from runtime.time_control import TimeControl
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +95,8 @@ def run_robot(
             log.warning(text)
 
         async def whole() -> RunSummary:
-            from runtime.emulated import NoTimeControl, emulator
+            from runtime.emulated import emulator
+            from runtime.time_control import NoTimeControl
 
             async with contextlib.AsyncExitStack() as running:
                 chosen = settings

@@ -20,7 +20,7 @@ from drivers.messages import Flags
 from runtime.books import Books
 from runtime.clock import PacedClock
 from runtime.commands.run import on_port
-from runtime.emulated import GONE, HANGS, EmulatorControl, emulator
+from runtime.emulated import emulator
 from runtime.logs import open_log
 from runtime.modes import Mode, Request
 from runtime.process import Observers, RobotProcess
@@ -30,6 +30,7 @@ from runtime.recording.recorder import Recorder
 from runtime.recording.rerun import replay
 from runtime.step import CycleRecord, State
 from runtime.summary import RunSummary
+from runtime.time_control import GONE, HANGS, EmulatorControl
 from tests.hil.machine import PATIENCE_S, stalls_excused
 from tests.hil.running import rows
 
@@ -145,7 +146,7 @@ async def test_an_emulator_that_is_stopped_and_one_that_is_killed(
         os.kill(pid, signal.SIGSTOP)
         try:
             with monkeypatch.context() as impatient:
-                impatient.setattr("runtime.emulated.ANSWER_MAX_S", 0.3)
+                impatient.setattr("runtime.time_control.ANSWER_MAX_S", 0.3)
                 assert await control.pause() == HANGS
             await until(lambda: records[-1].mode.mode is Mode.SAFE_STOP)
         finally:

@@ -16,7 +16,7 @@ from drivers.emulator.control import Governor
 from drivers.emulator.device import EmulatedRobot
 from drivers.emulator.faults import Fault
 from runtime.clock import PacedClock
-from runtime.emulated import EmulatorControl
+from runtime.time_control import EmulatorControl
 from runtime.wake import LoopTimer
 from tests.runtime.virtual import STEP_S, MemoryLink, VirtualLoop
 

@@ -15,11 +15,11 @@ from drivers.driver import RobotDriver
 from drivers.emulator.device import EmulatedRobot
 from drivers.messages import Flags
 from runtime.books import Books
-from runtime.emulated import GONE, HANGS, LEAD_S, NO_CYCLE, NOT_OURS, EmulatorControl, NoTimeControl
 from runtime.modes import Mode, Request
 from runtime.process import Observers, RobotProcess
 from runtime.step import CycleRecord, State
 from runtime.summary import RunSummary
+from runtime.time_control import GONE, HANGS, LEAD_S, NO_CYCLE, NOT_OURS, EmulatorControl, NoTimeControl
 from tests.runtime.held import Held, held
 
 pytestmark = pytest.mark.compiled
