@@ -60,6 +60,11 @@ class Series:
         self.worst_s = max(self.worst_s, value_s)
         self.total_s += value_s
 
+    @property
+    def newest_s(self) -> float:
+        """The last one booked."""
+        return float(self._values_s[(self.count - 1) % KEPT])
+
     def spread(self) -> Spread:
         """Return median, tail and worst."""
         if not self.count:

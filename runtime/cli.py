@@ -91,6 +91,7 @@ def emulate(
     trace: str | None = None,
     latency: str | None = None,
     clock: float = 0.0,
+    control: Annotated[bool, Flag] = False,
     config: str | None = None,
     sets: Sets = (),
     end_with_parent: Annotated[bool, Parameter(negative="", show=False)] = False,
@@ -113,6 +114,10 @@ def emulate(
         Write to this CSV file when each echo had left and when each drive command came.
     clock
         What the robot's own clock shows at first, seconds; it wraps at 4294.967296.
+    control
+        Obey laws of time from standard input, each a line: pace NUMBER HOST_S RUN_S FACTOR UNTIL_S. At the host's
+        monotonic time HOST_S it is RUN_S for the robot, and goes on by FACTOR until it stands still at UNTIL_S. To
+        standard output goes how far it has lived: at NUMBER RUN_S.
     config
         Run file to take robot and world from.
     """
@@ -120,7 +125,7 @@ def emulate(
 
     return emulate_robot(
         config, sets, world=world, robot=robot, link=link, faults=faults, seed=seed, trace=trace,
-        latency=latency, clock_s=clock, end_with_parent=end_with_parent,
+        latency=latency, clock_s=clock, end_with_parent=end_with_parent, control=control,
     )  # fmt: skip
 
 

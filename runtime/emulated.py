@@ -9,10 +9,12 @@ import signal
 import sys
 from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
+from runtime.clock import PacedClock
 from runtime.complaint import FAILED, WRONG_CALL, Complaint
 from runtime.run_folder import run_folder
+from runtime.time_control import EmulatorControl
 
 READY_WORD: Final = "ready"
 """First word of the one line the emulator prints."""
@@ -23,9 +25,18 @@ START_MAX_S: Final = 60.0
 END_MAX_S: Final = 2.0
 
 
+class OwnEmulator(NamedTuple):
+    """An emulator of this process's own."""
+
+    port: str
+    """The port it answers on."""
+    control: EmulatorControl
+    """Holds its time; `control.clock` is the clock for the run on it."""
+
+
 @contextlib.asynccontextmanager
-async def emulator(arguments: Sequence[str]) -> AsyncIterator[str]:
-    """Run ``echolocate emulate`` beside this process and give the port it answers on.
+async def emulator(arguments: Sequence[str], clock: PacedClock | None = None) -> AsyncIterator[OwnEmulator]:
+    """Run ``echolocate emulate`` beside this process.
 
     It gets a session of its own, so that Ctrl-C on the terminal reaches this process only, which then halts the
     robot before it goes. When this process is killed the emulated base stops by itself and the emulator ends.
@@ -34,6 +45,8 @@ async def emulator(arguments: Sequence[str]) -> AsyncIterator[str]:
     ----------
     arguments : sequence of str
         Further arguments of the command.
+    clock : PacedClock, optional
+        The run's, where it must be known before the emulator is.
 
     Raises
     ------
@@ -43,14 +56,20 @@ async def emulator(arguments: Sequence[str]) -> AsyncIterator[str]:
     with contextlib.ExitStack() as stack:
         port = _folder(stack) / "robot"
         process = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", "runtime.cli", "emulate", "--link", str(port), "--end-with-parent", *arguments,
-            stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE, start_new_session=True,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+            sys.executable, "-m", "runtime.cli", "emulate", "--link", str(port), "--end-with-parent", "--control",
+            *arguments, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
+            start_new_session=True, env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
         )  # fmt: skip
+        listener: asyncio.Task[None] | None = None
         try:
             await _wait_until_ready(process)
-            yield str(port)
+            control = EmulatorControl(lambda line: _write(process, line), PacedClock() if clock is None else clock)
+            listener = asyncio.create_task(_listen(process, control), name="emulator's time")
+            yield OwnEmulator(str(port), control)
         finally:
+            if listener is not None:
+                listener.cancel()
+                await asyncio.gather(listener, return_exceptions=True)
             await _end(process)
 
 
@@ -63,6 +82,19 @@ def _folder(stack: contextlib.ExitStack) -> Path:
             "another place in TMPDIR",
             FAILED,
         ) from error
+
+
+async def _listen(process: asyncio.subprocess.Process, control: EmulatorControl) -> None:
+    try:
+        while process.stdout is not None and (line := await process.stdout.readline()):
+            control.heard(line)
+    finally:
+        control.gone()
+
+
+def _write(process: asyncio.subprocess.Process, line: bytes) -> None:
+    if process.stdin is not None and not process.stdin.is_closing():
+        process.stdin.write(line)
 
 
 async def _wait_until_ready(process: asyncio.subprocess.Process) -> None:

@@ -11,6 +11,8 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
+from runtime.clock import run_clock
+
 
 class Reading(NamedTuple):
     """What the clocks show at one moment."""
@@ -22,6 +24,13 @@ class Reading(NamedTuple):
     """CPU time of all threads of this process."""
     waits: int
     """How often this thread gave up the processor by itself."""
+    ahead_s: float = 0.0
+    """How far the host's clock is ahead of the run's, which `wall_s` is by: they part where time can be held."""
+
+    @property
+    def host_s(self) -> float:
+        """The moment by the host's clock: what work takes is counted by that one."""
+        return self.wall_s + self.ahead_s
 
 
 class Meter:
@@ -30,13 +39,15 @@ class Meter:
     Parameters
     ----------
     clock : callable
-        Monotonic, s.
+        Monotonic, s; or the run's.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
+        self._clock = run_clock(clock)
 
     def read(self) -> Reading:
         """Return what the clocks show now; about 5 µs."""
         waits = resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw
-        return Reading(self._clock(), time.thread_time(), time.process_time(), waits)
+        host_s = self._clock.host()
+        wall_s = self._clock.at(host_s)
+        return Reading(wall_s, time.thread_time(), time.process_time(), waits, host_s - wall_s)

@@ -19,6 +19,7 @@ from drivers.link import Link
 from drivers.messages import Firing, Twist
 from perception.pipeline import Perception
 from runtime.books import Books
+from runtime.clock import run_clock
 from runtime.commanding import gap_max, gather, give
 from runtime.ends import Ends
 from runtime.footprint import Footprint, FootprintRow
@@ -71,7 +72,7 @@ class RobotProcess:
     observers : Observers
         View and recorder.
     clock : callable
-        Monotonic, s.
+        Monotonic, s. One that can be held holds the run with it: see `runtime.clock`.
     notifier : Notifier, optional
         Tells the service manager that started this process, where one did.
 
@@ -92,12 +93,12 @@ class RobotProcess:
         self._settings = settings
         self._log = log
         self._observers = observers
-        self._clock = clock
+        self._clock = run_clock(clock)
         self._notifier = Notifier() if notifier is None else notifier
         self.health = Health(log)
         self._driver = DenningRobot(settings)
         self._state = State(Perception(settings.ring, settings.models, settings.perception))
-        self._rhythm = Rhythm(settings, clock, CALLBACKS)
+        self._rhythm = Rhythm(settings, self._clock, CALLBACKS)
         timed = self._rhythm.keeper.timed
         self._link = Link(
             settings.link,
@@ -105,7 +106,7 @@ class RobotProcess:
             timed(LINK_RECEIVE, self._received),
             timed(LINE_LOST, self._closed),
         )
-        self._ends = Ends(self._link, self._driver, self._send, clock)
+        self._ends = Ends(self._link, self._driver, self._send, self._clock)
         self._memory = MemoryPolicy(timed(COLLECTION, collect_young))
         self._stop_reasons: list[str] = []
         self._notices = Notices()
@@ -205,7 +206,8 @@ class RobotProcess:
         if self._arm_when_ready and self._state.mode.mode is Mode.READY:
             self._arm_when_ready = False
             self.request(Request.ARM)
-        rhythm, start_s = self._rhythm, now.wall_s
+        rhythm, start_s, clock = self._rhythm, now.wall_s, self._clock.host
+        spent_s = now.host_s + self._settings.cycle.perception_budget_s
         mark = rhythm.keeper.mark
         request, self._request = self._request, None
         begun = rhythm.begin(now)
@@ -214,14 +216,13 @@ class RobotProcess:
             self._driver, start_s, request, echo_age_s=begun.echo_age_s, overrun=rhythm.overrun, unwell=unwell
         )
         mark(Phase.GATHER)
-        budget_s = self._settings.cycle.perception_budget_s
         before = self._state.mode
         record = step(
             self._state,
             inputs,
             self._settings,
             lambda command: self._carry_out(command, start_s + inputs.gap_max_s),
-            lambda _done: self._clock() - start_s < budget_s,
+            lambda _done: clock() < spent_s,
             mark,
         )
         if self._state.mode.entered_since(before):
@@ -288,6 +289,7 @@ class RobotProcess:
     async def _shut_down(self, keeper: asyncio.Task[None]) -> None:
         """Halt the base and wait until it stands still; then close the line."""
         self._stop.set()
+        self._clock.release()
         self.health.relieve()
         self._notifier.stopping()
         if not await self._ends.halt():

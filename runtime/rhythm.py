@@ -11,6 +11,7 @@ from typing import Final
 
 from config.settings import Settings
 from runtime.books import Books
+from runtime.clock import run_clock
 from runtime.meter import Meter, Reading
 from runtime.pacing import Begun, Pacer
 from runtime.timekeeping import Timekeeper
@@ -34,7 +35,7 @@ class Rhythm:
     settings : Settings
         Rate, firing step, and the limit on overruns.
     clock : callable
-        Monotonic, s.
+        Monotonic, s; or the run's.
     callbacks : tuple of str
         Names of the callbacks that the keeper will time.
     """
@@ -43,8 +44,10 @@ class Rhythm:
         self._period_s = 1.0 / settings.cycle.rate_hz
         self._step_s = settings.ring.firing.step_period_s
         self._overruns_max = settings.cycle.overruns_max
-        self._read = Meter(clock).read
-        self._waker = Waker(clock)
+        self._clock = run_clock(clock)
+        self._read = Meter(self._clock).read
+        self._waker = Waker(self._clock)
+        self._clock.listen(self._waker.wake)
         self._watch = Watch()
         self._pacer: Pacer | None = None
         self.books = Books(LATE_SHARE * self._period_s, is_touched=True)
@@ -69,13 +72,13 @@ class Rhythm:
         """Sleep until the next cycle is due and return what the clocks show; None where it was woken before."""
         pacer = self._started()
         await self._waker.until(pacer.deadline_s)
-        now = self._read()
-        return now if now.wall_s >= pacer.deadline_s else None
+        return None if self._clock.expect(pacer.deadline_s) > 0.0 else self._read()
 
     def begin(self, now: Reading) -> Begun:
         """Begin a cycle."""
         pacer = self._started()
         period_s, is_following = pacer.period_s, pacer.is_locked
+        self._clock.begun()
         begun = pacer.begin(now.wall_s)
         self.keeper.begin(now, begun, period_s, is_following=is_following)
         self._watch.expect(pacer.due_s + self.books.late_after_s - now.wall_s)

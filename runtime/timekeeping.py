@@ -40,7 +40,7 @@ class Stretch(NamedTuple):
     @property
     def wall_s(self) -> float:
         """How long it had the loop."""
-        return self.end.wall_s - self.begin.wall_s
+        return self.end.host_s - self.begin.host_s
 
     def held_up_by(self) -> str | None:
         """Return who kept it from working for most of its time, None where it was slow by itself."""
@@ -138,14 +138,14 @@ class Timekeeper:
         """Book the time since the last mark to `phase`, which has just ended."""
         now = self._read()
         if self._mark is not None:
-            self._phases[phase].add(now.wall_s - self._mark.wall_s)
+            self._phases[phase].add(now.host_s - self._mark.host_s)
             self._enter(Stretch(phase.value, self._mark, now))
             self._mark = now
 
     def end(self) -> None:
         """End the cycle."""
         if self._mark is not None and self._begin is not None and self._begun is not None:
-            self._books.enter(self._mark.wall_s - self._begin.wall_s, self._begun.late_s)
+            self._books.enter(self._mark.host_s - self._begin.host_s, self._begun.late_s)
 
     def timed(self, name: str, call: Callable[P, R]) -> Callable[P, R]:
         """Return `call` as a stretch of that name, which must be one of the callbacks."""
@@ -157,7 +157,7 @@ class Timekeeper:
                 return call(*args, **kwargs)
             finally:
                 end = self._read()
-                self._callbacks[name].add(end.wall_s - begin.wall_s)
+                self._callbacks[name].add(end.host_s - begin.host_s)
                 self._enter(Stretch(name, begin, end))
 
         return stretch
@@ -190,14 +190,15 @@ class Timekeeper:
     def _resume(self, now: Reading) -> None:
         """Take note of a beginning: either the loop has been busy ever since the last end, or it paused."""
         last, self._last = self._last, now
-        if last is None or now.thread_s - last.thread_s < MOSTLY * (now.wall_s - last.wall_s):
+        if last is None or now.thread_s - last.thread_s < MOSTLY * (now.host_s - last.host_s):
             self._held_since_s = now.wall_s
 
     def _enter(self, stretch: Stretch) -> None:
         if len(self._stretches) == STRETCHES_MAX:
             del self._stretches[0]
         self._stretches.append(stretch)
-        self._busy_s += stretch.wall_s
+        # What it left of the run's time, which does not go on beyond a cycle that takes long where it is held.
+        self._busy_s += stretch.end.wall_s - stretch.begin.wall_s
         self._last = stretch.end
 
     def _judge(self, now: Reading, begun: Begun) -> str:
@@ -229,7 +230,7 @@ class Timekeeper:
 
 def _robbed(begin: Reading, end: Reading) -> str | None:
     """Return who had the time between two readings, None where the thread had most of it."""
-    wall_s = end.wall_s - begin.wall_s
+    wall_s = end.host_s - begin.host_s
     if end.thread_s - begin.thread_s > MOSTLY * wall_s:
         return None
     return _beside(begin, end, wall_s) or OUTSIDE

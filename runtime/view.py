@@ -1,7 +1,7 @@
 """The live terminal view: mode and reason, the plan, objects, ring, line and timing.
 
 A terminal can be slow or held by Ctrl-S, so the loop only leaves the latest picture's ingredients in a slot; a
-thread draws them. Keys go the other way: a arms, space halts, q quits.
+thread draws them. Keys go the other way: a arms, space halts, q quits; p and s hold the time of an emulator.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ class View:
                 snapshot.pose, snapshot.trail, snapshot.segments, snapshot.objects, self._size_m, columns, 18
             )
         rows = [object_row(seen) for seen in snapshot.objects]
-        legend = "→ robot   • outline segments   o objects   a arm   space halt   q quit"
+        legend = "→ robot   • outline segments   o objects   a arm   space halt   p pause   s step   q quit"
         return Group(head, Panel(plan, subtitle=legend), objects_table(rows, self._units), self._numbers(snapshot))
 
     def _numbers(self, snapshot: Snapshot) -> Table:
@@ -196,7 +196,11 @@ def millis(quantiles: Quantiles) -> str:
 
 
 @contextlib.contextmanager
-def keys(on_request: Callable[[Request], None], on_quit: Callable[[], None]) -> Iterator[None]:
+def keys(
+    on_request: Callable[[Request], None],
+    on_quit: Callable[[], None],
+    on_other: Callable[[str], None] = lambda _key: None,
+) -> Iterator[None]:
     """Read single keys from the terminal while the run lasts; without a terminal there are none."""
     if not sys.stdin.isatty():
         yield
@@ -220,6 +224,8 @@ def keys(on_request: Callable[[Request], None], on_quit: Callable[[], None]) -> 
                 on_request(KEYS[key])
             elif key == "q":
                 on_quit()
+            else:
+                on_other(key)
 
     tty.setcbreak(fd)
     loop.add_reader(fd, read)

@@ -15,6 +15,8 @@ import time
 from collections.abc import Callable
 from typing import Final, Protocol
 
+from runtime.clock import run_clock
+
 _COUNT_BYTES: Final = 8
 """What is read from a timerfd: how often it fired."""
 _TURNS: Final = 2
@@ -115,7 +117,7 @@ class Waker:
     Parameters
     ----------
     clock : callable
-        The clock that deadlines are given in, s.
+        The clock that deadlines are given in, s; the run's may stand still before one.
     alarm : callable, optional
         Makes the alarm, in the loop of the first sleep; a timerfd where there is one.
     """
@@ -125,7 +127,7 @@ class Waker:
         clock: Callable[[], float] = time.monotonic,
         alarm: Callable[[Callable[[], None]], Alarm] | None = None,
     ) -> None:
-        self._clock = clock
+        self._clock = run_clock(clock)
         self._make_alarm = best_alarm if alarm is None else alarm
         self._alarm: Alarm | None = None
         self._sleep: asyncio.Future[None] | None = None
@@ -142,7 +144,7 @@ class Waker:
         The loop has taken in what had arrived before this returns, also where the deadline has passed long ago: a
         cycle after an overrun begins with what waited meanwhile.
         """
-        left_s = deadline_s - self._clock()
+        left_s = self._clock.expect(deadline_s)
         if self._woken or left_s <= 0.0:
             for _ in range(_TURNS):
                 await asyncio.sleep(0.0)
@@ -150,7 +152,8 @@ class Waker:
             if self._alarm is None:
                 self._alarm = self._make_alarm(self._end)
             self._sleep = asyncio.get_running_loop().create_future()
-            self._alarm.set(left_s)
+            if left_s < math.inf:
+                self._alarm.set(left_s)
             try:
                 await self._sleep
             finally:

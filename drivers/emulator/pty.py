@@ -20,6 +20,7 @@ from typing import TextIO
 
 from config.robot import RobotConfig
 from config.world import WorldConfig
+from drivers.emulator.control import ControlChannel
 from drivers.emulator.device import EmulatedRobot
 from drivers.emulator.faults import Fault
 from drivers.emulator.latency import LatencyTrace
@@ -194,10 +195,15 @@ class RealTime:
         self._robot_s = 0.0
         self.slipped_s = 0.0
 
-    def strides(self, now_s: float) -> Iterator[float]:
+    @property
+    def robot_s(self) -> float:
+        """How far the robot has come."""
+        return self._robot_s
+
+    def strides(self, now_s: float, *, may_slip: bool = True) -> Iterator[float]:
         """Yield the robot's times to advance to, one after another, up to the host's time `now_s`."""
         lag_s = now_s - self._start_s - self._robot_s
-        if lag_s > LAG_MAX_S:
+        if may_slip and lag_s > LAG_MAX_S:
             self._start_s += lag_s - LAG_MAX_S
             self.slipped_s += lag_s - LAG_MAX_S
         until_s = now_s - self._start_s
@@ -222,6 +228,7 @@ async def serve(
     latency_path: str | None = None,
     exit_with_parent: bool = False,
     clock_start_us: int = 0,
+    control: tuple[int, int] | None = None,
     clock: Callable[[], float] = time.monotonic,
 ) -> None:
     """Be a robot on a pty until SIGTERM or SIGINT.
@@ -242,13 +249,17 @@ async def serve(
         End by itself `LINGER_S` after the process that started this one is gone.
     clock_start_us
         As for `EmulatedRobot`.
+    control
+        Two file descriptors: laws of time are read from the one, and how far the robot has lived is written to the
+        other, see `ControlChannel`. The truth is then written by the run's clock, which is the host's until it is
+        held for the first time.
     clock
         The host's monotonic clock, seconds.
 
     Raises
     ------
     EmulatorError
-        The link or the trace cannot be made.
+        The link or the trace cannot be made, or there is no channel to be controlled by.
     ValueError
         The robot cannot be spoken to in this protocol.
     """
@@ -265,21 +276,34 @@ async def serve(
         latency = None if latency_path is None else LatencyTrace(_open_trace(latency_path, stack))
         port = PtyPort(link_path)
         stack.callback(port.close)
+        channel = None if control is None else _open_channel(control, stack)
         ready(port.path)
         timeline = RealTime(clock())
         orphaned_s: float | None = None
         while not stop.is_set():
-            now_s = clock()
-            for robot_s in timeline.strides(now_s):
+            host_s = now_s = clock()
+            pause_s, may_slip = PERIOD_S, True
+            if channel is not None:
+                channel.listen(host_s)
+                pace = channel.governor.pace
+                now_s = channel.governor.now_s(host_s)
+                pause_s, may_slip = PERIOD_S / max(1.0, pace.factor), pace.is_free
+            stood_s = timeline.robot_s
+            for robot_s in timeline.strides(now_s, may_slip=may_slip):
                 _exchange(device, port, robot_s, latency, clock)
                 if trace is not None:
                     truth = device.truth
                     trace.write(truth, timeline.host_s(truth.t_s))
+            if channel is not None:
+                if timeline.robot_s == stood_s:
+                    # Time stands still, and a HALT is heard nevertheless.
+                    _exchange(device, port, stood_s, latency, clock)
+                channel.lived(now_s)
             if exit_with_parent and orphaned_s is None and os.getppid() != parent:
-                orphaned_s = now_s
-            if orphaned_s is not None and now_s - orphaned_s > LINGER_S:
+                orphaned_s = host_s
+            if orphaned_s is not None and host_s - orphaned_s > LINGER_S:
                 return
-            await port.wait(PERIOD_S)
+            await port.wait(pause_s)
 
 
 def _exchange(
@@ -306,6 +330,15 @@ def _exchange(
             latency.sent(left, sent_s)
     if heard:
         device.receive(heard)
+
+
+def _open_channel(control: tuple[int, int], stack: contextlib.ExitStack) -> ControlChannel:
+    try:
+        channel = ControlChannel(*control)
+    except OSError as error:
+        raise EmulatorError(f"cannot be controlled: {os.strerror(error.errno or 0)}; give it two pipes") from error
+    stack.callback(channel.close)
+    return channel
 
 
 def _open_trace(trace_path: str, stack: contextlib.ExitStack) -> TextIO:

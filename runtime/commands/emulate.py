@@ -10,6 +10,8 @@ from typing import Final
 from config.load import load_settings
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
 
+PIPES: Final = (0, 1)
+"""Standard input and output: what a program that started this one holds the other ends of."""
 CLOCK_WRAP_S: Final = 2**32 * 1e-6
 """The robot counts microseconds in 32 bits."""
 
@@ -27,6 +29,7 @@ def emulate_robot(
     latency: str | None,
     clock_s: float,
     end_with_parent: bool,
+    control: bool,
 ) -> int:
     """Carry out the command; see `runtime.cli.emulate`."""
     settings = load_settings(config, sets, world=world, robot=robot)
@@ -49,6 +52,7 @@ def emulate_robot(
                 settings, settings.world, link_path=link, faults=script, seed=seed, trace_path=trace,
                 latency_path=latency, ready=ready, exit_with_parent=end_with_parent,
                 clock_start_us=round(1e6 * clock_s),
+                control=PIPES if control else None,
             )
         )  # fmt: skip
     except EmulatorError as error:

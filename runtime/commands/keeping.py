@@ -1,9 +1,13 @@
-"""What a run leaves behind: a recording where nothing else is said, and a ring log where that is asked for."""
+"""What a run leaves behind: a recording where nothing else is said, and a ring log where that is asked for.
+
+There is a recorder in every run, be it one that is switched off: an operator may want to record from now on.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -21,6 +25,7 @@ if TYPE_CHECKING:
     from runtime.process import Observers
     from runtime.recording.recorder import Recorder
     from runtime.recording.ringlog_writer import RingLogWriter
+    from runtime.recording.writer import Standing
     from runtime.step import CycleRecord, State
     from runtime.summary import RecordingRow
 
@@ -35,67 +40,78 @@ class Keeping:
 
     Parameters
     ----------
-    recorder : Recorder, optional
-        None where there is no recording.
+    recorder : Recorder
+        On or off.
     ring_log : RingLogWriter, optional
         None where there is no ring log.
     asked_for : bool
         Whether the user named the file: then trouble with it is the command's failure.
     """
 
-    def __init__(
-        self, recorder: Recorder | None = None, ring_log: RingLogWriter | None = None, *, asked_for: bool = False
-    ) -> None:
+    def __init__(self, recorder: Recorder, ring_log: RingLogWriter | None = None, *, asked_for: bool = False) -> None:
         self._recorder = recorder
         self._ring_log = ring_log
         self._asked_for = asked_for
-        self._told: str | None = None
+        self._told: dict[Recorder | RingLogWriter, str | None] = {}
 
     def on_log(self, event: Mapping[str, Any]) -> None:
         """Take a line of the log."""
-        if self._recorder is not None:
-            self._recorder.on_log(event)
+        self._recorder.on_log(event)
 
     def observers(self, view: OnCycle | None, log: FilteringBoundLogger) -> Observers:
         """Return who watches the run: the recorder and the view."""
         from runtime.process import Observers
 
-        recorder, ring_log, kept = self._recorder, self._ring_log, self._kept
-        if kept is None:
-            return Observers(view)
+        recorder, ring_log = self._recorder, self._ring_log
+        parts = (recorder,) if ring_log is None else (ring_log, recorder)
 
         def on_cycle(record: CycleRecord, state: State, books: Books, driver: RobotDriver) -> None:
-            if recorder is not None:
-                recorder.on_cycle(record, state)
-            if kept.standing.trouble != self._told:
-                self._told = kept.standing.trouble
-                log.warning("the recording has trouble", reason=self._told, dropped=kept.standing.dropped)
+            recorder.on_cycle(record, state)
+            for part in parts:
+                standing = part.standing
+                if standing.trouble != self._told.get(part):
+                    self._told[part] = standing.trouble
+                    log.warning("the recording has trouble", reason=standing.trouble, dropped=standing.dropped)
             if view is not None:
                 view(record, state, books, driver)
 
-        if recorder is None:
-            return Observers(on_cycle, None if ring_log is None else ring_log.put)
-        return Observers(on_cycle, None, recorder.on_bytes, recorder.on_settings)
+        on_firing = None if ring_log is None else ring_log.put
+        return Observers(on_cycle, on_firing, recorder.on_bytes, recorder.on_settings)
 
     def on_summary(self, summary: Mapping[str, Any]) -> None:
         """Take what the run says of itself at its end."""
-        if self._recorder is not None:
-            self._recorder.on_summary(summary)
-
-    def probe(self) -> str | None:
-        """Say how the recorder ended; None while it runs, or where there is none. See `runtime.health`."""
-        return None if self._kept is None else self._kept.probe()
+        self._recorder.on_summary(summary)
 
     @property
-    def _kept(self) -> Recorder | RingLogWriter | None:
+    def now(self) -> Standing | None:
+        """The recording under way; None where there is none."""
+        standing = self._recorder.standing
+        return standing if standing.under_way and self._recorder.is_on else None
+
+    async def record(self, *, on: bool) -> str | None:
+        """Begin another recording with the next cycle, or end the one under way; returns why not."""
+        self._recorder.switch(on=on)
+        return None
+
+    async def bookmark(self, text: str) -> str | None:
+        """Put a mark into the recording; returns why not."""
+        return self._recorder.bookmark(text)
+
+    def probe(self) -> str | None:
+        """Say how the recorder or the ring log's writer ended; None while they run. See `runtime.health`."""
+        return self._recorder.probe() or (None if self._ring_log is None else self._ring_log.probe())
+
+    @property
+    def _asked(self) -> Recorder | RingLogWriter:
+        """What the run is to leave behind first of all."""
         return self._recorder if self._ring_log is None else self._ring_log
 
     @property
     def standing(self) -> RecordingRow | None:
-        """How the recording stands, for the summary; None where there is none."""
-        if self._kept is None:
+        """How ring log or recording stands, for the summary; None where there was none."""
+        standing = asdict(self._asked.standing)
+        if not standing["files"] and standing["trouble"] is None:
             return None
-        standing = asdict(self._kept.standing)
         return {
             "file": standing["file"],
             "files": standing["files"],
@@ -113,8 +129,8 @@ class Keeping:
         Complaint
             The disk refused, or something was dropped.
         """
-        now = None if self._kept is None else self._kept.standing
-        if self._asked_for and now is not None and (now.trouble is not None or now.dropped):
+        now = self._asked.standing
+        if self._asked_for and (now.trouble is not None or now.dropped):
             what, salvage = "recording", " (`echolocate recover` reads what is there)"
             if self._ring_log is not None:
                 what, salvage = "ring log", ""
@@ -126,7 +142,14 @@ class Keeping:
 
 
 @contextlib.contextmanager
-def kept(settings: Settings, record: str | None, *, no_record: bool, emulated: bool) -> Iterator[Keeping]:
+def kept(
+    settings: Settings,
+    record: str | None,
+    *,
+    no_record: bool,
+    emulated: bool,
+    clock: Callable[[], float] = time.monotonic,
+) -> Iterator[Keeping]:
     """Keep what is to be kept while the run lasts.
 
     Parameters
@@ -136,27 +159,25 @@ def kept(settings: Settings, record: str | None, *, no_record: bool, emulated: b
     record : str, optional
         A file by name: a recording, or a ring log where it ends in ``.csv``.
     no_record : bool
-        Keep no recording in the folder either.
+        Keep no recording in the folder either, unless it is switched on.
     emulated : bool
         Whether the settings' world is what the robot meets.
+    clock : callable
+        The run's, s.
     """
+    from runtime.recording.folder import OneFile, Place, Rotating, recordings_folder
+    from runtime.recording.recorder import Recorder
+    from runtime.recording.ringlog_writer import RingLogWriter
+
+    run = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{os.getpid()}"
+    place: Place = Rotating(recordings_folder(settings.recording), run, settings.recording)
     with contextlib.ExitStack() as stack:
+        ring_log: RingLogWriter | None = None
         if record is not None and Path(record).suffix.lower() == RING_LOG:
-            from runtime.recording.ringlog_writer import RingLogWriter
-
-            yield Keeping(ring_log=stack.enter_context(RingLogWriter(Path(record))), asked_for=True)
-            return
-        if record is None and (no_record or not settings.recording.enabled):
-            yield Keeping()
-            return
-        from runtime.recording.folder import OneFile, Place, Rotating, recordings_folder
-        from runtime.recording.recorder import Recorder
-
-        run = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{os.getpid()}"
-        place: Place
-        if record is not None:
-            place = OneFile(Path(record))
+            on, ring_log = False, stack.enter_context(RingLogWriter(Path(record)))
+        elif record is not None:
+            on, place = True, OneFile(Path(record))
         else:
-            place = Rotating(recordings_folder(settings.recording), run, settings.recording)
-        recorder = stack.enter_context(Recorder(settings, place, emulated=emulated))
-        yield Keeping(recorder, asked_for=record is not None)
+            on = settings.recording.enabled and not no_record
+        recorder = stack.enter_context(Recorder(settings, place, clock, emulated=emulated, on=on))
+        yield Keeping(recorder, ring_log, asked_for=record is not None)

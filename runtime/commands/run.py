@@ -16,6 +16,7 @@ from config.load import ConfigError, load_settings
 from config.settings import Settings
 from runtime import VERSION
 from runtime.advice import advice
+from runtime.clock import PacedClock, RunClock
 from runtime.commands.firing import refuse_impossible_firing
 from runtime.commands.keeping import Keeping, kept
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from runtime.process import RobotProcess
     from runtime.reload import Reloader
     from runtime.summary import RunSummary
+    from runtime.time_control import TimeControl
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +87,8 @@ def run_robot(
     with contextlib.ExitStack() as stack:
         if record is not None:
             stack.enter_context(owned(Path(record), f"--record {record}"))
-        keeping = stack.enter_context(kept(settings, record, no_record=no_record, emulated=port is None))
+        clock = PacedClock() if port is None else RunClock()
+        keeping = stack.enter_context(kept(settings, record, no_record=no_record, emulated=port is None, clock=clock))
         log = stack.enter_context(open_log(settings.log, terminal=not live, tap=keeping.on_log, standing=lines))
         log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
         for text in advice(settings):
@@ -93,15 +96,18 @@ def run_robot(
 
         async def whole() -> RunSummary:
             from runtime.emulated import emulator
+            from runtime.time_control import NoTimeControl
 
             async with contextlib.AsyncExitStack() as running:
                 chosen = settings
-                if port is None:
-                    emulated = await running.enter_async_context(emulator(emulation.arguments(config, sets)))
+                control: TimeControl = NoTimeControl()
+                if isinstance(clock, PacedClock):
+                    words = emulation.arguments(config, sets)
+                    emulated, control = await running.enter_async_context(emulator(words, clock))
                     chosen = on_port(settings, emulated)
                 return await watch(
-                    chosen, log, console, live=live, units=units, keeping=keeping, lines=lines,
-                    arm=arm or port is None, seconds=seconds,
+                    chosen, log, console, clock=clock, control=control, live=live, units=units, keeping=keeping,
+                    lines=lines, arm=arm or port is None, seconds=seconds,
                     propose=lambda: proposed(
                         config, sets, emulation.world, given, None if port else chosen.link.port
                     ),
@@ -169,6 +175,8 @@ async def watch(
     log: FilteringBoundLogger,
     console: Console,
     *,
+    clock: RunClock,
+    control: TimeControl,
     live: bool,
     units: Units,
     keeping: Keeping,
@@ -180,17 +188,20 @@ async def watch(
     """Run the process under the eyes of the live view; it heeds signals and keys, and its parts are watched."""
     from runtime.process import RobotProcess
     from runtime.reload import Reloader
+    from runtime.time_keys import TimeKeys
     from runtime.view import View, keys
 
     with contextlib.ExitStack() as stack:
         view = View(settings, console, units) if live else None
         observers = keeping.observers(None if view is None else view.on_cycle, log)
-        process = RobotProcess(settings, log, observers, notifier=stack.enter_context(Notifier.from_environment()))
+        process = RobotProcess(
+            settings, log, observers, clock, notifier=stack.enter_context(Notifier.from_environment())
+        )
         reloader = Reloader(settings, propose, process.reconfigure, log)
         stack.enter_context(signals(process, reloader))
         if view is not None:
             stack.enter_context(view.shown())
-            stack.enter_context(keys(process.request, process.stop))
+            stack.enter_context(keys(process.request, process.stop, TimeKeys(control, log).press))
             process.health.watch("view", view.probe)
         for name, probe in {"recorder": keeping.probe, "log": lines.probe, "reload": reloader.probe}.items():
             process.health.watch(name, probe)

@@ -8,7 +8,7 @@ from matplotlib.ticker import MaxNLocator
 
 from config.units import FOOT_M
 from runtime.drawing.scene import stand_for
-from runtime.drawing.style import ECHO, MODEL, SEGMENT, WIDTH_IN
+from runtime.drawing.style import ECHO, MODEL, MUTED, SEGMENT, WIDTH_IN
 from runtime.tables import Units
 from runtime.trace.form import Trace
 
@@ -43,5 +43,10 @@ def course(trace: Trace, units: Units) -> Figure:
                 gid="gaps", rasterized=len(gaps) > 2000)  # fmt: skip
     rhythm.set(xlabel="t (s)", ylabel="between cycles (ms)")
     rhythm.set_ylim(bottom=0.0)
+    for number, mark in enumerate(trace.bookmarks, 1):
+        for panel in panels:
+            panel.axvline(mark.t_s, color=MUTED, linewidth=0.9, linestyle=(0, (1, 1.5)), gid=f"bookmark-{number}")
+        known.annotate(str(number), (mark.t_s, 1.0), xycoords=("data", "axes fraction"), xytext=(2.0, -9.0),
+                       textcoords="offset points", fontsize=8)  # fmt: skip
     figure.align_ylabels()
     return figure

@@ -16,6 +16,7 @@ from config.units import FOOT_M
 from runtime.drawing.geometry import Frame, window
 from runtime.drawing.scene import (
     draw_arcs,
+    draw_bookmarks,
     draw_clusters,
     draw_objects,
     draw_segments,
@@ -118,6 +119,7 @@ def _picture(canvas: Canvas, title: str, line: str, draw: Callable[[Axes], list[
     handles += draw_things(axes, trace, frame)
     poses = [m.pose for m in trace.moments]
     handles += draw_way(axes, poses, frame, trace.settings.body.radius_m)
+    handles += draw_bookmarks(axes, trace.bookmarks, frame)
     axes.set_title(title)
     axes.set_title(line, loc="right", fontsize=8.5, fontweight="normal", color=MUTED)
     legend(figure, handles)

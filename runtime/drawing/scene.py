@@ -23,7 +23,7 @@ from runtime.drawing.geometry import Frame, arcs, ellipse, outline, rotated, thi
 from runtime.drawing.style import CLUSTER, ECHO, INK, MODEL, MUTED, PAPER, ROBOT, SEGMENT, THING
 from runtime.experiment import nearest_pairs
 from runtime.tables import Units, length
-from runtime.trace.form import RANGE, Cluster, Trace
+from runtime.trace.form import RANGE, Cluster, Marked, Trace
 
 ARCS_MAX: Final = 4000
 """Drawn in a picture; more are a grey mass, and megabytes."""
@@ -61,6 +61,17 @@ def draw_way(axes: Axes, poses: Sequence[Pose], frame: Frame, radius_m: float) -
     nose = frame.points(rotated(np.array([[0.0, 0.0], [radius_m, 0.0]]), last.x, last.y, last.theta))
     axes.plot(nose[:, 0], nose[:, 1], color=ROBOT, linewidth=1.6, zorder=5, gid="heading")
     return [line]
+
+
+def draw_bookmarks(axes: Axes, bookmarks: Sequence[Marked], frame: Frame) -> list[Line2D]:
+    """Draw where the robot was when each bookmark was put, under the bookmark's number."""
+    style: Any = {"marker": "D", "markersize": 5, "linestyle": "", "color": PAPER, "markeredgecolor": INK}
+    placed = [(number, mark.pose) for number, mark in enumerate(bookmarks, 1) if mark.pose is not None]
+    for number, pose in placed:
+        x, y = frame.points(np.array([[pose.x, pose.y]]))[0]
+        axes.plot(x, y, zorder=9, gid=f"bookmark-{number}", **style)
+        _label(axes, str(number), (x, y), 0.0, up=True)
+    return [Line2D([], [], label="bookmark", **style)] if placed else []
 
 
 def heard(echoes: Floats) -> Floats:

@@ -10,6 +10,7 @@ import orjson
 
 from runtime.recording.forms import (
     About,
+    Bookmark,
     Cycle,
     Form,
     FormSchema,
@@ -33,6 +34,7 @@ LOG: Final = "/log"
 KEYFRAME: Final = "/keyframe"
 SETTINGS: Final = "/settings"
 SUMMARY: Final = "/summary"
+BOOKMARK: Final = "/bookmark"
 
 CHANNELS: Final[Mapping[str, type[Form]]] = MappingProxyType(
     {
@@ -47,6 +49,7 @@ CHANNELS: Final[Mapping[str, type[Form]]] = MappingProxyType(
         KEYFRAME: Keyframe,
         SETTINGS: SettingsChange,
         SUMMARY: RunEnd,
+        BOOKMARK: Bookmark,
     }
 )
 """In the order in which they are numbered in a file, from 1; new ones go to the end."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import os
+import stat
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final, NamedTuple, Protocol
 
 from config.settings import RecordingConfig
 
@@ -97,6 +98,33 @@ class Rotating:
                     path.unlink()
                 left -= 1
                 total -= size
+
+
+class Listed(NamedTuple):
+    """A recording in the folder."""
+
+    file: str
+    """Its name there."""
+    bytes: int
+    modified_s: float
+    """Unix time."""
+
+
+def listing(folder: Path) -> list[Listed]:
+    """Return the recordings in a folder, newest first; none where there is no such folder. Waits for the disk."""
+    found = []
+    with contextlib.suppress(OSError):
+        for path in folder.glob(f"*{SUFFIX}"):
+            with contextlib.suppress(OSError):  # it made room for another just now
+                known = path.stat()
+                if stat.S_ISREG(known.st_mode):
+                    found.append(Listed(path.name, known.st_size, known.st_mtime))
+    return sorted(found, key=lambda one: (-one.modified_s, one.file))
+
+
+def in_folder(folder: Path, name: str) -> Path | None:
+    """Return the recording of that name in a folder; None where `listing` has none, wherever else the name leads."""
+    return next((folder / one.file for one in listing(folder) if one.file == name), None)
 
 
 def recordings_folder(config: RecordingConfig) -> Path:

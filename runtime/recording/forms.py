@@ -105,6 +105,14 @@ class LogLine(Form):
     fields: dict[str, Any]
 
 
+class Bookmark(Form):
+    """A mark that an operator put here, to be found again; nothing in the run hangs on it."""
+
+    cycle: int
+    """The last one before it."""
+    text: str
+
+
 class MapChange(Form):
     """What has happened to the outline map since the message before."""
 

@@ -57,6 +57,26 @@ class Recording:
         for chunk in self._salvage.chunks():
             yield from chunk
 
+    def chunks(self, since: int | None = None) -> Iterator[tuple[int, list[Entry]]]:
+        """Yield the messages chunk by chunk, each with the byte at which to begin to read it again.
+
+        Parameters
+        ----------
+        since : int, optional
+            Such a byte; all of the file has been read once before.
+        """
+        if since is None:
+            self._salvage = Salvage(self._data)
+            for chunk in self._salvage.chunks():
+                yield self._salvage.chunk_at, chunk
+            return
+        salvage = self._salvage
+        known = len(salvage.damage)
+        for chunk in salvage.chunks(since):
+            at = salvage.chunk_at
+            del salvage.damage[known:]
+            yield at, chunk
+
     @property
     def damage(self) -> list[Damage]:
         """What was found wrong by the last `entries`, once it has come to its end."""

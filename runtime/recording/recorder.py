@@ -21,14 +21,16 @@ from llvmlite.binding import get_host_cpu_name
 from config.settings import Settings
 from runtime import VERSION
 from runtime.kernels import kernels_key
-from runtime.recording.channels import CYCLE, KEYFRAME, LOG, OBJECTS, SEGMENTS, SERIAL, SETTINGS, SUMMARY
+from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, LOG, OBJECTS, SEGMENTS, SERIAL, SETTINGS, SUMMARY
 from runtime.recording.folder import Place
-from runtime.recording.forms import FORMAT, About, LogLine, RunEnd, left_by
-from runtime.recording.writer import QUEUE_MAX, Item, Moment, RecordingWriter, Reloaded, Standing
+from runtime.recording.forms import FORMAT, About, Bookmark, LogLine, RunEnd, left_by
+from runtime.recording.writer import QUEUE_MAX, Item, Moment, RecordingWriter, Reloaded, Standing, Switch
 from runtime.step import CycleRecord, State
 
 MOMENT_S: Final = 1.0
 """So often the map and the objects are recorded, as changes."""
+BOOKMARK_MAX: Final = 500
+"""Characters."""
 
 
 def made_by() -> dict[str, str]:
@@ -72,6 +74,8 @@ class Recorder:
         Items that may wait; what does not fit is dropped and counted.
     emulated : bool
         Whether the settings' world is what the robot meets.
+    on : bool
+        Whether to record from the beginning; `switch` may do so later.
     """
 
     def __init__(
@@ -82,12 +86,15 @@ class Recorder:
         queue_max: int = QUEUE_MAX,
         *,
         emulated: bool = False,
+        on: bool = True,
     ) -> None:
         self._clock = clock
         self._queue_max = queue_max
         self._moment_cycles = max(1, round(MOMENT_S * settings.cycle.rate_hz))
         self._keyframe_s = settings.recording.keyframe_period_s
-        self._writer = RecordingWriter(place, about(settings, clock, emulated=emulated))
+        self._writer = RecordingWriter(place, about(settings, clock, emulated=emulated), on=on)
+        self._on = on
+        self._begins = False
         self._last_keyframe_s: float | None = None
         self._gap = False
         self._cycle = 0
@@ -110,11 +117,39 @@ class Recorder:
         """Say how its thread ended; None while it runs. See `runtime.health`."""
         return self._writer.probe()
 
+    @property
+    def is_on(self) -> bool:
+        """Whether a recording is wanted."""
+        return self._on
+
+    def switch(self, *, on: bool) -> None:
+        """Begin another file with the next cycle, or end the one under way; nothing where it is so already."""
+        if on == self._on:
+            return
+        self._on = self._begins = on
+        self._writer.queue.append(Item(CYCLE, self._clock(), Switch(on)))
+
+    def bookmark(self, text: str) -> str | None:
+        """Put a mark into the recording; returns why not."""
+        if not self._writer.standing.under_way or not self._on:
+            return "nothing is being recorded: switch the recording on first"
+        words = " ".join(text.split())
+        if not words or len(words) > BOOKMARK_MAX:
+            return f"a bookmark has from 1 to {BOOKMARK_MAX} characters, not {len(words)}"
+        self._hand(BOOKMARK, self._clock(), Bookmark.model_construct(cycle=self._cycle, text=words))
+        return None
+
     def on_cycle(self, record: CycleRecord, state: State) -> None:
         """Take a cycle, just over."""
         now_s = record.inputs.now_s
         self._cycle = record.cycle
-        self._hand(CYCLE, now_s, record)
+        if not self._on:
+            return
+        if self._begins:
+            # What follows is replayed from the state that this one left.
+            self._begins, self._gap = False, True
+        else:
+            self._hand(CYCLE, now_s, record)
         if self._last_keyframe_s is None:
             self._last_keyframe_s = now_s
         room = len(self._writer.queue) < self._queue_max
@@ -152,6 +187,8 @@ class Recorder:
         self._hand(LOG, self._clock(), line)
 
     def _hand(self, topic: str, host_s: float, what: object) -> None:
+        if not self._on or self._begins:
+            return
         if len(self._writer.queue) < self._queue_max:
             self._writer.queue.append(Item(topic, host_s, what))
         else:

@@ -17,12 +17,14 @@ import orjson
 
 from config.settings import Settings
 from perception.pipeline import Perception
+from perception.snapshot import Snapshot
 from runtime.books import Books
 from runtime.recording.channels import ABOUT, CYCLE, KEYFRAME, SETTINGS, Entry, decode, encode
 from runtime.recording.forms import (
     About,
     Cycle,
     Keyframe,
+    Left,
     SettingsChange,
     StateLeft,
     left_by,
@@ -125,7 +127,7 @@ def replay(
         Gets every message on the way.
     """
     begin_ns = keyframe_before(recording, since_s) if since_s > 0.0 else None
-    run = _Replay(recording, on_cycle, begun=begin_ns is None)
+    run = Rerun(recording, on_cycle, begun=begin_ns is None)
     first_ns = None
     began_s = time.perf_counter()
     for entry in recording.entries():
@@ -143,8 +145,18 @@ def replay(
     return run.verdict
 
 
-class _Replay:
-    """A replay under way."""
+class Rerun:
+    """A replay under way.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of the messages.
+    on_cycle : callable, optional
+        Gets each replayed record and the state it left.
+    begun : bool
+        Whether the first message is the run's; else nothing is replayed before a keyframe or `go_on`.
+    """
 
     def __init__(self, recording: Recording, on_cycle: OnCycle | None, *, begun: bool) -> None:
         self.verdict = Verdict()
@@ -164,6 +176,19 @@ class _Replay:
             self._adopt(decode(SettingsChange, entry.data).settings)
         elif entry.topic == ABOUT:  # stands before every keyframe, with what is in force there
             self._adopt(decode(About, entry.data).settings)
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """The settings in force, as the recording tells them."""
+        return self._told
+
+    def go_on(self, told: dict[str, Any], left: Left, memory: Snapshot) -> None:
+        """Go on from what a cycle left under these settings: the next message is the one after that cycle's."""
+        self._adopt(told)
+        self.state = fresh_state(self._settings)
+        self.state.perception.restore(memory)
+        for name, value in left.items():
+            setattr(self.state, name, value)
 
     def _adopt(self, told: dict[str, Any]) -> None:
         """Go on with other settings, as the process did at this place."""

@@ -23,6 +23,8 @@ from mcap.writer import MCAP0_MAGIC
 
 from runtime.recording.channels import CHANNELS, Entry
 
+BEGIN: Final = 8
+"""The first byte after the magic ones."""
 HEAD: Final = 9
 """Bytes of a record before its content: what it is, how long it is."""
 ZSTD: Final = b"\x04\x00\x00\x00zstd"
@@ -64,6 +66,8 @@ class Salvage:
         self.profile = ""
         self.library = ""
         self.is_mcap = bytes(data[:8]) == MCAP0_MAGIC
+        self.chunk_at = BEGIN
+        """Where in the file the messages last yielded are found again."""
         self._topics = dict(enumerate(CHANNELS, start=1))
         """By number; those of this program until the file says otherwise."""
         self._schemas: dict[int, Schema] = {}
@@ -80,12 +84,19 @@ class Salvage:
         except UNREADABLE:
             self.profile = ""
 
-    def chunks(self) -> Iterator[list[Entry]]:
-        """Yield the messages of every chunk that is whole, in the order of the file."""
+    def chunks(self, since: int = BEGIN) -> Iterator[list[Entry]]:
+        """Yield the messages of every chunk that is whole, in the order of the file.
+
+        Parameters
+        ----------
+        since : int
+            Begin at this byte: one that `chunk_at` named earlier.
+        """
         if not self.is_mcap:
             self.damage.append(Damage(0, "the first bytes are not those of an MCAP file"))
-        at, size = 8, len(self._data)
+        at, size = since, len(self._data)
         while at < size:
+            self.chunk_at = at
             head = self._head(at)
             if head is not None and head[0] == Opcode.DATA_END:
                 self._check_end(at, head[1])

@@ -74,6 +74,12 @@ class Reloaded(NamedTuple):
     settings: Settings
 
 
+class Switch(NamedTuple):
+    """From here on a recording is wanted, or none is."""
+
+    on: bool
+
+
 class Moment(NamedTuple):
     """The map, or the objects, as a cycle left them; for a keyframe both and everything else."""
 
@@ -99,6 +105,8 @@ class Standing:
     """The last one with the disk."""
     sync_max_s: float = 0.0
     """The longest that the disk took to confirm."""
+    under_way: bool = False
+    """Whether the file is being written."""
 
 
 class RecordingWriter:
@@ -112,9 +120,13 @@ class RecordingWriter:
         What stands at the beginning of each.
     clock : callable
         Monotonic, s: the thread's own pace.
+    on : bool
+        Whether a recording is wanted from the beginning.
     """
 
-    def __init__(self, place: Place, about: About, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, place: Place, about: About, clock: Callable[[], float] = time.monotonic, *, on: bool = True
+    ) -> None:
         self.queue: deque[Item] = deque()
         self.wants_keyframe = False
         """A file has begun, or something is missing: without a keyframe no replay could go on."""
@@ -124,6 +136,7 @@ class RecordingWriter:
         self._clock = clock
         self._part: Part | None = None
         self._parts = 0
+        self._on = on
         self._retry_s = 0.0
         self._before = 0
         self._unflushed = 0
@@ -161,7 +174,8 @@ class RecordingWriter:
 
     def _work(self) -> None:
         flushed_s = synced_s = tidied_s = self._clock()
-        self._guarded(self._open)
+        if self._on:
+            self._guarded(self._open)
         ending = False
         while not (ending and not self.queue):
             ending = self._ending.wait(POLL_S if len(self.queue) < BATCH else BREATH_S)
@@ -195,7 +209,7 @@ class RecordingWriter:
         self.drop(self._unflushed)
         self._unflushed = 0
         self._retry_s = self._clock() + RETRY_S
-        self.standing = replace(self.standing, trouble=why)
+        self.standing = replace(self.standing, trouble=why, under_way=False)
 
     def _current(self) -> Path:
         return Path() if self._part is None else self._part.path
@@ -208,7 +222,8 @@ class RecordingWriter:
         self._part = Part(self._place.path(self._parts), encode(about), host_ns)
         self._before = self.standing.bytes
         self._mode = None
-        self.standing = replace(self.standing, file=str(self._part.path), files=self.standing.files + 1)
+        path, files = str(self._part.path), self.standing.files + 1
+        self.standing = replace(self.standing, file=path, files=files, under_way=True)
 
     def _finish(self) -> None:
         if self._part is not None:
@@ -216,7 +231,8 @@ class RecordingWriter:
             part, self._part = self._part, None
             try:
                 part.finish()
-                self.standing = replace(self.standing, bytes=self._before + part.path.stat().st_size)
+                size = self._before + part.path.stat().st_size
+                self.standing = replace(self.standing, bytes=size, under_way=False)
                 self._unflushed = 0
             except OSError as error:
                 self._leave(f"{part.path}: {error.strerror or error}")
@@ -229,7 +245,7 @@ class RecordingWriter:
             self.standing = replace(self.standing, bytes=self._before + self._part.bytes)
             if self._place.is_full(self._part.bytes):
                 self.wants_keyframe = True
-        elif self._clock() >= self._retry_s:
+        elif self._on and self._clock() >= self._retry_s:
             self.wants_keyframe = True
 
     def _sync(self) -> None:
@@ -242,6 +258,11 @@ class RecordingWriter:
 
     def _enter(self, item: Item) -> None:
         """Write one item; with a keyframe the next file can begin."""
+        if isinstance(item.what, Switch):
+            self._on, self._retry_s = item.what.on, 0.0
+            if not self._on:
+                self._finish()
+            return
         if item.topic == KEYFRAME:
             if self._part is not None and self._place.is_full(self._part.bytes):
                 self._finish()
@@ -251,7 +272,7 @@ class RecordingWriter:
             settings = item.what.settings.model_dump(mode="json")
             self._about = self._about.model_copy(update={"settings": settings})
         if self._part is None:
-            self.drop()
+            self.drop(int(self._on))
             return
         log_ns = self._log_ns(item.host_s)
         match item.what:

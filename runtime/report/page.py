@@ -44,6 +44,7 @@ def page(trace: Trace, units: Units) -> str:
             _head(trace, units),
             section("Objects", _table_2(trace, units), _others(trace, units)),
             section("Pictures", _pictures(trace, units)),
+            section("Bookmarks", *_bookmarks(trace, units)),
             section("Timing", *_timing(trace)),
             section("Line", *_line(trace)),
             section("Modes and stop reasons", *_modes(trace)),
@@ -158,6 +159,16 @@ def _pictures(trace: Trace, units: Units) -> str:
         for name, (svg, caption) in drawn.items()
     )
     return f'<div class="figures">{figures}</div>'
+
+
+def _bookmarks(trace: Trace, units: Units) -> list[str]:
+    rows = []
+    for number, mark in enumerate(trace.bookmarks, 1):
+        there = None if mark.pose is None else trace.start.compose(mark.pose)
+        rows.append(
+            [str(number), f"{mark.t_s:.2f} s", "" if there is None else place(there.x, there.y, units), mark.text]
+        )
+    return [table(["", "after", f"robot at ({units})", "what"], rows, text=True)] if rows else []
 
 
 def _timing(trace: Trace) -> list[str]:

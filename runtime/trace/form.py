@@ -68,6 +68,15 @@ def _no_rows() -> Floats:
     return np.zeros((0, 7))
 
 
+@dataclass(frozen=True, slots=True)
+class Marked:
+    """A bookmark: when, what it says, and where the robot was."""
+
+    t_s: float
+    text: str
+    pose: Pose | None
+
+
 @dataclass(slots=True, eq=False)
 class Trace:
     """A run, in the odometry's frame; times are seconds after its first cycle or firing."""
@@ -91,6 +100,7 @@ class Trace:
     """(n, 7): the run's own map: first and last seen (s), ends x, y, x, y (m), normal (rad)."""
     modes: list[Entered] = field(default_factory=list)
     log: list[Said] = field(default_factory=list)
+    bookmarks: list[Marked] = field(default_factory=list)
     gaps_s: list[float] = field(default_factory=list)
     """From cycle to cycle."""
     stops: dict[str, int] = field(default_factory=dict)

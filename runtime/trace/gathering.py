@@ -77,6 +77,11 @@ class Gathering:
         if not way or t_s - way[-1][0] >= ODOMETRY_EVERY_S:
             way.append((t_s, odometry))
 
+    @property
+    def pose(self) -> Pose | None:
+        """Where the robot is, as far as it was heard."""
+        return self._pose
+
     def pass_by(self, t_s: float, perception: Perception) -> None:
         """Note a moment where one is due."""
         self._trace.seconds = t_s

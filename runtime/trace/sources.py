@@ -15,14 +15,14 @@ from drivers.denning.robot import DenningRobot
 from drivers.messages import Firing
 from perception.pipeline import Perception
 from runtime.complaint import WRONG_CALL, Complaint
-from runtime.recording.channels import LOG, SERIAL, SUMMARY, Entry, decode
-from runtime.recording.forms import LogLine, RunEnd, SerialBytes
+from runtime.recording.channels import BOOKMARK, LOG, SERIAL, SUMMARY, Entry, decode
+from runtime.recording.forms import Bookmark, LogLine, RunEnd, SerialBytes
 from runtime.recording.reading import Recording, RecordingError, is_recording, open_recording
 from runtime.recording.rerun import replay
 from runtime.replay import replay as replay_firings
 from runtime.ringlog import RingLogError, read_ring_log
 from runtime.step import CycleRecord, State
-from runtime.trace.form import Entered, Said, Trace
+from runtime.trace.form import Entered, Marked, Said, Trace
 from runtime.trace.gathering import Gathering
 
 Told = Callable[[], None]
@@ -117,6 +117,10 @@ class _Listener:
             self._driver.take()
         elif entry.topic == LOG and len(self._said) < SAID_MAX:
             self._said.append((self._recording.host_s(entry.log_ns), decode(LogLine, entry.data)))
+        elif entry.topic == BOOKMARK:
+            host_s = self._recording.host_s(entry.log_ns)
+            t_s = 0.0 if self._begun_s is None else max(0.0, host_s - self._begun_s)
+            self._trace.bookmarks.append(Marked(t_s, decode(Bookmark, entry.data).text, self._gathering.pose))
         elif entry.topic == SUMMARY:
             self._trace.summary = decode(RunEnd, entry.data).summary
 

@@ -28,7 +28,7 @@ async def test_a_cycle_that_fails_halts_the_base_and_ends_in_fault(tmp_path: Pat
             raise ZeroDivisionError("planted")
 
     trace = tmp_path / "trace.csv"
-    async with emulator(["--trace", str(trace)]) as port:
+    async with emulator(["--trace", str(trace)]) as (port, _):
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
             process = RobotProcess(on_port(load_settings("hallway"), port), log, Observers(on_cycle=fail))
             summary = await process.run(arm=True, seconds=PATIENCE_S)

@@ -115,7 +115,7 @@ async def halts(folder: Path, monkeypatch: pytest.MonkeyPatch, trials: int) -> O
             process.request(Request.ARM)
 
     with Recorder(settings, OneFile(folder / "run.mcap")) as recorder:
-        async with emulator(["--trace", str(trace)]) as port:
+        async with emulator(["--trace", str(trace)]) as (port, _):
             with open_log(LogConfig(file=str(folder / "log.jsonl")), terminal=False) as log:
                 process = operator.process = RobotProcess(
                     on_port(settings, port), log, Observers(on_cycle, on_bytes=on_bytes)

@@ -15,6 +15,7 @@ from mcap.reader import NonSeekingReader, make_reader
 
 from runtime.recording.channels import (
     ABOUT,
+    BOOKMARK,
     CHANNELS,
     CYCLE,
     KEYFRAME,
@@ -38,7 +39,7 @@ from tests.recorded import SECONDS, entries_of, hall, record, verdict_of
 def test_everything_that_happened_is_in_it(run: Path) -> None:
     entries = entries_of(run)
     by_topic = {topic: [e for e in entries if e.topic == topic] for topic in CHANNELS}
-    assert [topic for topic, found in by_topic.items() if not found] == [SETTINGS], "it was not reloaded"
+    assert [topic for topic, found in by_topic.items() if not found] == [SETTINGS, BOOKMARK], "nobody asked for it"
     (end,) = by_topic[SUMMARY]
     assert json.loads(end.data) == {"summary": {"mode": "DRIVE", "cycles": 240.0}}
     assert [decode(Cycle, e.data).record.cycle for e in by_topic[CYCLE]] == list(range(1, int(20 * SECONDS) + 1))
@@ -93,7 +94,7 @@ def test_the_stock_reader_reads_it_and_its_own_schemas_hold(run: Path) -> None:
             validators[schema.id].validate(json.loads(message.data))
             seen[channel.topic] = seen.get(channel.topic, 0) + 1
         assert summary.statistics.message_count == sum(seen.values()) == len(entries_of(run))
-    assert set(seen) == set(CHANNELS) - {SETTINGS}
+    assert set(seen) == set(CHANNELS) - {SETTINGS, BOOKMARK}
     with run.open("rb") as file:
         assert sum(1 for _ in NonSeekingReader(file, validate_crcs=True).iter_messages()) == sum(seen.values())
 

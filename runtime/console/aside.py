@@ -1,0 +1,71 @@
+"""Work of the console that must never cost a cycle: done by processes of their own, behind everything else.
+
+A thread would share the interpreter with the cycle. A process does not; and with a lower precedence it gets what the
+robot's process and its emulator leave. What those were granted (a core of their own, real-time priority) is not
+theirs to inherit.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from typing import Final
+
+COMMAND: Final = "runtime.console.aside"
+NICENESS: Final = 10
+"""A tenth of the usual share where there is too little for all."""
+
+
+async def start_aside(program: str, words: Sequence[str], *, talks: bool) -> asyncio.subprocess.Process:
+    """Start a program of ours that steps back.
+
+    Parameters
+    ----------
+    program : str
+        Its module; this one is any call of ``echolocate``.
+    words : sequence of str
+        Its arguments.
+    talks : bool
+        Whether there are pipes to talk through; else there is one for what it complains of.
+    """
+    pipe, nothing = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
+    return await asyncio.create_subprocess_exec(
+        sys.executable, "-m", program, *words,
+        stdin=pipe if talks else nothing, stdout=pipe if talks else nothing, stderr=pipe, start_new_session=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+    )  # fmt: skip
+
+
+async def end_aside(process: asyncio.subprocess.Process) -> None:
+    """End it now: it holds nothing that could be lost."""
+    if process.returncode is None:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(process.pid, signal.SIGKILL)
+    await process.wait()
+
+
+def step_back() -> None:
+    """Take a place behind everything else on this machine, and off a core that is another's own."""
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
+    pinned = os.sched_getaffinity(0)
+    others = set(range(os.cpu_count() or 1)) - pinned
+    if len(pinned) == 1 and others:
+        with contextlib.suppress(OSError):
+            os.sched_setaffinity(0, others)
+
+
+def main(words: Sequence[str]) -> int:
+    """Carry out a call of the command, behind everything else."""
+    from runtime.cli import call
+
+    step_back()
+    return call(list(words))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

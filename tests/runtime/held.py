@@ -1,0 +1,93 @@
+"""A run in virtual time whose time can be held: the emulated robot in memory obeys the same laws as one on a pty."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import deque
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import pytest
+
+from config.load import load_settings
+from config.settings import Settings
+from drivers.emulator.control import Governor
+from drivers.emulator.device import EmulatedRobot
+from drivers.emulator.faults import Fault
+from runtime.clock import PacedClock
+from runtime.time_control import EmulatorControl
+from runtime.wake import LoopTimer
+from tests.runtime.virtual import STEP_S, MemoryLink, VirtualLoop
+
+DEAF_S = 0.001
+"""A law is on its way for so long."""
+
+
+class HeldLink(MemoryLink):
+    """A line to a robot that lives by its governor's time; exchanges go on where that stands still."""
+
+    governor: Governor
+    control: EmulatorControl
+    is_hung = False
+
+    def live(self) -> bytes:
+        now_s = self.governor.now_s(self._loop.time())
+        data = self._robot.advance(now_s - self._begin_s)
+        for line in self.governor.lived(now_s).splitlines():
+            self._loop.call_soon(self.control.heard, line)
+        return data
+
+    def _exchange(self) -> None:
+        if self.is_hung:
+            self._turn = self._loop.call_later(STEP_S, self._exchange)
+        else:
+            super()._exchange()
+            if self._turn is not None and self.is_open:
+                self._turn.cancel()
+                pause_s = STEP_S / max(1.0, self.governor.pace.factor)
+                self._turn = self._loop.call_later(pause_s, self._exchange)
+
+
+class Held(NamedTuple):
+    """What a test holds in its hands."""
+
+    loop: VirtualLoop
+    settings: Settings
+    robot: EmulatedRobot
+    links: list[HeldLink]
+    control: EmulatorControl
+    governor: Governor
+
+
+@contextlib.contextmanager
+def held(monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] = ()) -> Iterator[Held]:
+    """Give a loop in which `RobotProcess` runs by `control.clock`."""
+    settings = load_settings("hallway", ["link.port=memory", *sets])
+    assert settings.world is not None
+    loop, links, governor = VirtualLoop(), list[HeldLink](), Governor()
+    robot = EmulatedRobot(settings, settings.world, 3, faults=faults)
+
+    on_the_way: deque[bytes] = deque()
+
+    def send(line: bytes) -> None:
+        if not links or not links[0].is_hung:
+            on_the_way.append(line)
+            loop.call_later(DEAF_S, lambda: governor.take(on_the_way.popleft()))
+
+    control = EmulatorControl(send, PacedClock(loop.time))
+
+    def link(*args: object) -> HeldLink:
+        made = HeldLink(robot, loop, *args)  # type: ignore[arg-type]
+        made.governor, made.control = governor, control
+        links.append(made)
+        return made
+
+    monkeypatch.setattr("runtime.process.Link", link)
+    monkeypatch.setattr("runtime.wake.best_alarm", LoopTimer)
+    monkeypatch.setattr("runtime.process.ask", lambda _realtime: ())
+    asyncio.set_event_loop(None)
+    try:
+        yield Held(loop, settings, robot, links, control, governor)
+    finally:
+        loop.close()
