@@ -21,7 +21,7 @@ from perception.pipeline import Perception
 from runtime.allowance import enough_quanta
 from runtime.modes import Mode, ModeState, Request
 from runtime.simulate import simulate
-from runtime.step import STANDSTILL, Command, CycleRecord, Inputs, Order, State, step
+from runtime.step import STANDSTILL, Command, CycleRecord, Inputs, Order, State, Wish, step
 
 SETTINGS = load_settings("hallway", ["perception.method=paper"])
 """The paper's method, whose arrays are compared here."""
@@ -52,6 +52,7 @@ class Script:
     now_s: float = 100.0
     robot_s: float = 7.0
     pose: Pose = HERE
+    wish: Wish | None = None
 
     def __post_init__(self) -> None:
         perception = Perceiving(self.settings.ring, self.settings.models, self.settings.perception)
@@ -79,7 +80,7 @@ class Script:
         sensors = len(self.settings.ring.mounts)
         firings = (Firing(self.robot_s, self.pose, 0.0, np.full(sensors, 3.0)),) if firing else ()
         told = Odometry(self.robot_s, self.pose, 0.0, Twist(0.0, 0.0), flags, 0) if odometry else None
-        inputs = Inputs(self.now_s, line, trouble, Heard(firings, told, rebooted), request)
+        inputs = Inputs(self.now_s, line, trouble, Heard(firings, told, rebooted), request, wish=self.wish)
         self.log.clear()
         return step(self.state, inputs, self.settings, lambda c: self.log.append(("command", c)), self.may_refine)
 
