@@ -31,7 +31,7 @@ from runtime.notify import Notifier
 from runtime.phases import Phase
 from runtime.realtime import ask
 from runtime.rhythm import Rhythm
-from runtime.step import Command, CycleRecord, State, step
+from runtime.step import Command, CycleRecord, State, step, take_over
 from runtime.summary import RunSummary, run_summary
 
 if TYPE_CHECKING:
@@ -199,8 +199,7 @@ class RobotProcess:
         if self._next_settings is not None:
             self._settings, self._next_settings = self._next_settings, None
             self._driver.set_firing(self._settings.ring)
-            self._state.perception.adopt(self._settings.perception)
-            self._state.perception.listen_to(self._settings.ring)
+            take_over(self._state, self._settings)
             if self._observers.on_settings is not None:
                 self._observers.on_settings(self._settings)
         if self._arm_when_ready and self._state.mode.mode is Mode.READY:

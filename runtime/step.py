@@ -18,13 +18,27 @@ from behaviors.response import Response
 from config.settings import Settings
 from drivers.driver import Heard, LineState
 from drivers.messages import Flags, Odometry, Twist
+from perception.edits import Edit
 from perception.percept import Percept
 from perception.pipeline import Perception
 from runtime.modes import GAP_MAX_S, Mode, ModeState, Request, Situation, advance
 from runtime.phases import Phase, unmarked
 from runtime.wishes import STANDSTILL, Legs, Wish, after_a_stop, drive, why_not
 
-__all__ = ["STANDSTILL", "Command", "CycleRecord", "Inputs", "Order", "State", "StopCause", "Wish", "step"]
+__all__ = [
+    "STANDSTILL",
+    "Command",
+    "CycleRecord",
+    "Edit",
+    "Inputs",
+    "Order",
+    "Refused",
+    "State",
+    "StopCause",
+    "Wish",
+    "step",
+    "take_over",
+]
 
 
 class Order(Enum):
@@ -58,6 +72,17 @@ class Inputs:
     """Which part of the program has failed; None while all work."""
     wish: Wish | None = None
     """What the operator wants driven from now on; None where that is as before."""
+    edits: tuple[Edit, ...] = ()
+    """What the operator does to what was perceived, in this order."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """What an operator asked for in vain, and why."""
+
+    edit: int | None
+    """Which of the cycle's edits; None: the wish."""
+    why: str
 
 
 @dataclass(slots=True)
@@ -95,6 +120,8 @@ class CycleRecord:
     quanta: int
     iterations: int
     refinement: StopCause
+    refused: tuple[Refused, ...] = ()
+    """What of the operator's wish and edits came to nothing."""
 
 
 def step(
@@ -105,7 +132,7 @@ def step(
     may_refine: Callable[[int], bool],
     mark: Callable[[Phase], None] = unmarked,
 ) -> CycleRecord:
-    """Run one cycle: perceive, decide, command, and then refine for as long as it may.
+    """Run one cycle: perceive, decide, command, do what a person says, and refine for as long as it may.
 
     Parameters
     ----------
@@ -116,7 +143,7 @@ def step(
     settings : Settings
         The run's settings.
     carry_out : callable
-        Gets the command before refinement begins, so that no refinement ever delays a stop.
+        Gets the command before anything is edited or refined, so that neither ever delays a stop.
     may_refine : callable
         Asked with the number of quanta done before each further one.
     mark : callable
@@ -133,13 +160,32 @@ def step(
     mark(Phase.DECIDE)
     carry_out(command)
     mark(Phase.COMMAND)
+    refused = _edit(state, inputs)
     quanta, iterations, refinement = _refine(state.perception, may_refine)
     mark(Phase.REFINE)
     state.cycle += 1
     return CycleRecord(
         state.cycle, inputs, state.mode, command, new_segments, state.perception.living,
-        state.perception.hypotheses, quanta, iterations, refinement,
+        state.perception.hypotheses, quanta, iterations, refinement, refused,
     )  # fmt: skip
+
+
+def take_over(state: State, settings: Settings) -> None:
+    """Let perception go on with other settings, of those that a running process follows (`config.reload`)."""
+    state.perception.adopt(settings.perception)
+    state.perception.recognise(settings.models)
+    state.perception.listen_to(settings.ring)
+
+
+def _edit(state: State, inputs: Inputs) -> tuple[Refused, ...]:
+    """Do what the operator says to what was perceived; return what could not be done."""
+    wish = None if inputs.wish is None else why_not(inputs.wish)
+    refused = [] if wish is None else [Refused(None, wish)]
+    for i, edit in enumerate(inputs.edits):
+        why = state.perception.edit(edit)
+        if why is not None:
+            refused.append(Refused(i, why))
+    return tuple(refused)
 
 
 def _perceive(state: State, inputs: Inputs) -> int:

@@ -30,7 +30,7 @@ from runtime.recording.forms import (
     snapshot_in,
 )
 from runtime.recording.reading import SECOND_NS, Recording, settings_in
-from runtime.step import CycleRecord, State, step
+from runtime.step import CycleRecord, State, step, take_over
 
 OnCycle = Callable[[CycleRecord, State], None]
 ABSENT: Final = "nothing"
@@ -171,7 +171,7 @@ class _Replay:
             return
         self._told, self._settings = told, settings_in(told)
         if self.state is not None:
-            self.state.perception.adopt(self._settings.perception)
+            take_over(self.state, self._settings)
 
     def _cycle(self, record: CycleRecord, data: bytes) -> None:
         verdict, before = self.verdict, self._last

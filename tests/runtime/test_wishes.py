@@ -79,7 +79,8 @@ def test_a_goal_is_gone_to_reached_and_stood_at() -> None:
     script = driving("behaviors.move_to_goal.success_radius_m=0.2")
     assert script.tell(Goal(0.0, 5.0)).command == near(0.0, script.settings.body.turn_max_rad_s)
     to_goal = script.state.vectors[0]
-    assert (to_goal.schema, to_goal.x, to_goal.y) == ("move_to_goal", pytest.approx(0.0), pytest.approx(1.0))
+    assert to_goal.schema == "move_to_goal"
+    assert (to_goal.x, to_goal.y) == pytest.approx((0.0, 1.0))
     assert script.going(Pose(0.0, 1.0, math.pi / 2)).command == near(0.3, 0.0)
     speeds = []
     for y in (4.3, 4.5, 4.7):
