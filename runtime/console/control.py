@@ -16,9 +16,17 @@ PATIENCE_S: Final = 10.0
 class Holder(Protocol):
     """A client, as far as this file cares."""
 
-    number: int
-    name: str
-    has_token: bool
+    @property
+    def number(self) -> int:
+        """Its own among all of this run."""
+
+    @property
+    def name(self) -> str:
+        """For people."""
+
+    @property
+    def has_token(self) -> bool:
+        """Whether it may do more than watch."""
 
 
 class Control:

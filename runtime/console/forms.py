@@ -9,8 +9,8 @@ from __future__ import annotations
 from enum import Enum
 from typing import Annotated, ClassVar, Final, Literal, TypeAlias
 
-import orjson
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic_core import from_json
 
 MESSAGE_MAX: Final = 64 * 1024
 """Bytes."""
@@ -330,8 +330,9 @@ def read_message(text: str | bytes) -> Message:
         return _READER.validate_json(text)
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False, include_input=False)[0]
-        if first["type"] == "union_tag_invalid":
-            raise BadMessage("there is no such message", _id_of(text), "type") from None
+        if first["type"] in {"union_tag_invalid", "union_tag_not_found"}:
+            where = "kind" if first["loc"] == ("wish",) else "type"
+            raise BadMessage("there is no such message", _id_of(text), where) from None
         # Before the place within the message stand the names of its form and, where there are two, of its kind.
         place = [str(key) for key in first["loc"][2 if first["loc"][:1] == ("wish",) else 1 :]]
         if place[:1] == ["value"]:
@@ -342,8 +343,8 @@ def read_message(text: str | bytes) -> Message:
 
 def _id_of(text: str | bytes) -> int | None:
     try:
-        found = orjson.loads(text)
-    except (orjson.JSONDecodeError, UnicodeEncodeError):
+        found = from_json(text)
+    except ValueError:
         return None
     number = found.get("id") if isinstance(found, dict) else None
     return number if type(number) is int and 0 <= number <= ID_MAX else None

@@ -29,6 +29,7 @@ class SegmentTable:
     def __init__(self) -> None:
         self._numbers: Ints = np.zeros(0, dtype=np.int64)
         self._rows: Floats = np.zeros((0, 6))
+        self._there: set[int] = set()
         self._pinned = b"[]"
         self._whole: bytes | None = None
 
@@ -44,11 +45,12 @@ class SegmentTable:
         pinned : (k,) int
             Numbers of those that are pinned.
         """
-        added = ~np.isin(numbers, self._numbers, assume_unique=True)
-        gone = self._numbers[~np.isin(self._numbers, numbers, assume_unique=True)]
-        self._numbers, self._rows, self._whole = numbers, rows, None
+        now = numbers.tolist()
+        before, there = self._there, set(now)
+        added = [k for k, number in enumerate(now) if number not in before]
+        self._numbers, self._rows, self._there, self._whole = numbers, rows, there, None
         self._pinned = orjson.dumps(pinned.tolist())
-        return self._changes(_encoded(numbers[added], rows[added]), orjson.dumps(gone.tolist()))
+        return self._changes(_encoded(numbers[added], rows[added]), orjson.dumps(sorted(before - there)))
 
     def unchanged(self) -> bytes:
         """Return that nothing is other than before."""

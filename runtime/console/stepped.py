@@ -37,6 +37,6 @@ def stepped(timed: Timed, name: str, work: Coroutine[Any, Any, T]) -> Generator[
             try:
                 value, step = (yield waits_for), send
             except BaseException as error:  # noqa: BLE001 - a cancellation as well is the work's own affair
-                value, step = error, throw  # type: ignore[assignment]
+                value, step = error, throw
     finally:
         work.close()

@@ -28,7 +28,7 @@ PRESET: Final = ("ring", "firing", "preset")
 
 
 class Tuning:
-    """The settings in force, and those before them.
+    """The settings in force, and those before them, all with the models of now.
 
     Parameters
     ----------
@@ -83,8 +83,10 @@ class Tuning:
         models = self.current.models
         if len(models) >= MODELS_MAX:
             raise Refusal(f"{MODELS_MAX} models are looked for already: that is the most there may be", "toml")
-        tables = [m.model_dump(mode="json") for m in (*models, model)]
+        before, tables = self._before, [m.model_dump(mode="json") for m in (*models, model)]
         self._try("toml", lambda: with_value(self.current, PAGE, ("models",), tables))
+        # A model cannot be forgotten while the robot runs: what is taken back from now on are other changes.
+        self._before = [settings.model_copy(update={"models": self.current.models}) for settings in before]
         return model
 
     def undo(self) -> tuple[Difference, ...]:
