@@ -246,6 +246,20 @@ class RecordingConfig(Strict):
     """So often the whole state is recorded: a replay can begin there."""
 
 
+class ConsoleConfig(Strict):
+    """The operator console: a page that the robot's own process serves, for watching and for driving."""
+
+    enabled: bool = True
+    host: str = Field(default="127.0.0.1", min_length=1)
+    """Where it listens. Anything but this machine itself lets others reach it: they still need the token."""
+    port: int = Field(default=8765, ge=0, le=65_535)
+    """The next free one where it is taken; 0 = any free one."""
+    watch_without_token: bool = False
+    """Let who has no token watch; to halt, change or drive takes the token of the start URL in any case."""
+    clients_max: int = Field(default=16, ge=1, le=256)
+    """Pages that may be open at a time."""
+
+
 class Settings(RobotConfig):
     """All settings of one run: the robot's sections at the top, then what it recognises and does."""
 
@@ -258,6 +272,7 @@ class Settings(RobotConfig):
     realtime: RealtimeConfig = RealtimeConfig()
     log: LogConfig = LogConfig()
     recording: RecordingConfig = RecordingConfig()
+    console: ConsoleConfig = ConsoleConfig()
 
     @model_validator(mode="after")
     def _distinct_models(self) -> Settings:

@@ -12,12 +12,14 @@ import math
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple
 
 import orjson
 
 from runtime.console.aside import COMMAND, end_aside, start_aside
 from runtime.console.playing import ANSWER, HEADER, SPEED_MAX, SPEED_MIN
+from runtime.console.refusal import Refusal
+from runtime.console.seams import Viewer
 from runtime.recording.folder import in_folder, listing
 from runtime.tables import Units
 
@@ -28,7 +30,7 @@ REPORT_MAX_S: Final = 300.0
 STEP_MAX: Final = 100_000
 
 
-class PlayerError(Exception):
+class PlayerError(Refusal):
     """Something about recordings that cannot be done; its text is one line for the operator."""
 
 
@@ -48,23 +50,6 @@ class PlayedFrame(NamedTuple):
         return b'%b,"segments":%b,"dropped":%d,"controller":%b}' % (
             self.head, segments, dropped, b"true" if controls else b"false"
         )  # fmt: skip
-
-
-class Viewer(Protocol):
-    """A client, as far as this file cares."""
-
-    @property
-    def is_gone(self) -> bool:
-        """Whether it has left."""
-
-    def switch(self, *, live: bool) -> None:
-        """Have it shown the run itself, or only what `show` gives it."""
-
-    def show(self, shot: Any) -> None:  # noqa: ANN401 - frames of a live run are of another type
-        """Have a frame ready for it."""
-
-    def say(self, message: dict[str, Any]) -> None:
-        """Send it a message of its own."""
 
 
 class Playing:

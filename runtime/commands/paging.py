@@ -1,0 +1,96 @@
+"""The operator console of `run`, given whoever holds the run's time, its recording, and the recordings of others."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING, Final
+
+from config.settings import Settings
+from runtime.console.console import Console
+from runtime.console.frames import RecordingNow
+from runtime.console.overtime import Overtime
+from runtime.console.player import Players
+from runtime.recording.folder import recordings_folder
+from runtime.tables import Units
+
+if TYPE_CHECKING:
+    from structlog.typing import FilteringBoundLogger
+
+    from runtime.commands.keeping import Keeping
+    from runtime.console.seams import Run, TimeControl
+
+PLAYED: Final = "runtime.console.played"
+"""The program that plays a recording."""
+
+
+class Recordings:
+    """The run's recording, as the console asks about it.
+
+    Parameters
+    ----------
+    keeping : Keeping
+        Of the run.
+    """
+
+    def __init__(self, keeping: Keeping) -> None:
+        self._keeping = keeping
+
+    @property
+    def now(self) -> RecordingNow | None:
+        """The recording under way, None where there is none."""
+        now = self._keeping.now
+        return None if now is None else RecordingNow(now.file, now.bytes, now.dropped)
+
+    async def record(self, *, on: bool) -> str | None:
+        """Begin or end a recording."""
+        return await self._keeping.record(on=on)
+
+    async def bookmark(self, text: str) -> str | None:
+        """Put a mark into it."""
+        return await self._keeping.bookmark(text)
+
+
+@asynccontextmanager
+async def paged(
+    process: Run,
+    settings: Settings,
+    log: FilteringBoundLogger,
+    take_over: Callable[[Settings], None],
+    keeping: Keeping,
+    control: TimeControl,
+    *,
+    emulated: bool,
+    units: Units,
+) -> AsyncIterator[Console]:
+    """Serve the console while the run lasts; what it began beside the run ends with it.
+
+    Parameters
+    ----------
+    process, settings, log, take_over, emulated, units
+        As of `Console`.
+    keeping : Keeping
+        The run's.
+    control : TimeControl
+        Holds the run's time.
+
+    Raises
+    ------
+    Complaint
+        There is nowhere to listen.
+    """
+    recording = Recordings(keeping)
+
+    def current() -> str | None:
+        return None if recording.now is None else recording.now.file
+
+    players = Players(recordings_folder(settings.recording), PLAYED, current, units)
+    console = Console(
+        process, settings, log, take_over, emulated=emulated, units=units,
+        overtime=Overtime(control, recording, players),
+    )  # fmt: skip
+    try:
+        async with console.open():
+            yield console
+    finally:
+        await players.close()
