@@ -1,7 +1,7 @@
 """A browser for the tests of the page: Debian's chromium, without a screen and drawing in software.
 
-Everything runs in one loop a session, because a browser belongs to the loop that started it. A browser that is missing
-fails the tests: a page that nobody opened works for nobody.
+Everything runs in one loop a session, because a browser belongs to the loop that started it. A browser that is
+missing fails the tests: a page that nobody opened works for nobody.
 """
 
 from __future__ import annotations

@@ -167,18 +167,15 @@ class FakeServer:
         data = None
         if error is None:
             data = self._heed(client, kind, message)
-        await client.socket.send_str(
-            json.dumps(
-                {
-                    "type": "answer",
-                    "id": message["id"],
-                    "ok": error is None,
-                    "error": error,
-                    "field": at,
-                    "data": data,
-                }
-            )  # fmt: skip
-        )
+        answer = {
+            "type": "answer",
+            "id": message["id"],
+            "ok": error is None,
+            "error": error,
+            "field": at,
+            "data": data,
+        }
+        await client.socket.send_str(json.dumps(answer))
 
     def _heed(self, client: Client, kind: str, message: dict[str, Any]) -> Any:
         match kind:

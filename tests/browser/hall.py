@@ -1,4 +1,4 @@
-"""A run as the page gets to see it, made of formulas: the paper's hall, a robot that drives through it, frame by frame.
+"""A run as the page gets to see it, made of formulas: the paper's hall, and a robot that drives through it.
 
 The tests of the page need frames that they can foretell, of any size, and no robot.
 """

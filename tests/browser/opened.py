@@ -15,6 +15,7 @@ from playwright.async_api import Browser, BrowserContext, Page, expect
 from tests.browser.fake import PATIENCE_S
 
 DESK, PHONE, PROJECTOR = (1440, 900), (360, 740), (1920, 1080)
+PROBES = Path(__file__).parent / "probes"
 MODULE = "import('/page/main.js')"
 
 
@@ -49,6 +50,16 @@ class Opened:
     async def until(self, expression: str, what: str) -> None:
         """Wait until such an expression is true."""
         await until(lambda: self.world(f"Boolean({expression})"), what)
+
+    async def probe(self, name: str, *arguments: Any) -> Any:
+        """Return what one of the functions in `probes/` finds on the page."""
+        return await self.page.evaluate((PROBES / f"{name}.js").read_text("utf-8"), *arguments)
+
+    async def drawn(self) -> None:
+        """Wait until whatever waited to be drawn is drawn."""
+        await self.page.evaluate(
+            "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done())))"
+        )
 
     async def steady(self) -> None:
         """Stop the map from being fitted by itself, so that places stay where they are."""

@@ -1,4 +1,4 @@
-"""For everybody: keyboard, contrast, names, words instead of colours, small and large screens, and nothing from outside."""
+"""For everybody: keys, contrast, names, words and not colours alone, screens of any size, nothing from outside."""
 
 from __future__ import annotations
 
@@ -13,42 +13,9 @@ from tests.browser.opened import DESK, PHONE, PROJECTOR, Opened, Opener
 pytestmark = [pytest.mark.realtime, pytest.mark.asyncio(loop_scope="session")]
 
 PANELS = ("Objects", "Drive", "Layers", "Tune", "Time", "Log")
+MODES = ("drive", "ready", "connecting", "safe_stop", "fault")
 AA = 4.5
 AA_LARGE = 3.0
-
-TEXTS = """() => {
-  const parse = (text) => { const n = text.match(/[\\d.]+/g).map(Number); return n.length < 4 ? [...n, 1] : n; };
-  const luminance = ([r, g, b]) => [r, g, b].map((v) => { v /= 255; return v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4; })
-    .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
-  const behind = (element) => {
-    for (let at = element; at; at = at.parentElement) {
-      const colour = parse(getComputedStyle(at).backgroundColor);
-      if (colour[3] === 1) return colour;
-    }
-    return [255, 255, 255, 1];
-  };
-  const found = [];
-  for (const element of document.querySelectorAll('body *')) {
-    const words = [...element.childNodes].filter((n) => n.nodeType === 3).map((n) => n.data).join('').trim();
-    if (words === '' || !element.checkVisibility({ visibilityProperty: true }) || element.closest('.hidden-words, svg, dialog:not([open])')) continue;
-    if (element.matches('option')) continue;
-    const style = getComputedStyle(element);
-    const [a, b] = [luminance(parse(style.color)), luminance(behind(element))].sort((x, y) => y - x);
-    const size = parseFloat(style.fontSize), bold = Number(style.fontWeight) >= 700;
-    found.push([words.slice(0, 40), (a + 0.05) / (b + 0.05), size >= 24 || (bold && size >= 18.66), element.disabled === true]);
-  }
-  return found;
-}"""
-
-UNNAMED = """() => [...document.querySelectorAll('button, input, select, textarea, a[href], [role=tab], [role=application], [role=radio]')]
-  .filter((e) => e.checkVisibility() && !(e.getAttribute('aria-label') || e.textContent.trim() || e.labels?.length || e.getAttribute('aria-labelledby')))
-  .map((e) => e.outerHTML)"""
-
-WIDE = """() => ({
-  page: document.documentElement.scrollWidth - document.documentElement.clientWidth,
-  panel: [...document.querySelectorAll('.panel')].filter((e) => e.checkVisibility()).map((e) => e.scrollWidth - e.clientWidth),
-  tabs: document.getElementById('tabs').scrollWidth - document.getElementById('tabs').clientWidth,
-})"""
 
 
 async def scene(server: FakeServer, opener: Opener, size: tuple[int, int], **more: Any) -> Opened:
@@ -67,9 +34,9 @@ async def test_all_text_has_contrast(server: FakeServer, opener: Opener, scheme:
     opened = await scene(server, opener, DESK, scheme=scheme, calm=True)
     for panel in PANELS:
         await opened.tab(panel)
-        texts = await opened.page.evaluate(TEXTS)
+        texts = await opened.probe("texts")
         assert len(texts) > 30
-        faint = [(words, round(ratio, 2)) for words, ratio, large, _ in texts if ratio < (AA_LARGE if large else AA)]
+        faint = [(words, round(ratio, 2)) for words, ratio, large in texts if ratio < (AA_LARGE if large else AA)]
         assert not faint, (panel, faint)
         await opened.shot(f"{scheme}-{panel.lower()}")
 
@@ -83,8 +50,8 @@ async def test_modes_have_contrast_words_and_a_shape(
     opened = await scene(server, opener, DESK, scheme=scheme, calm=True)
     await opened.says("#mode-name", mode.replace("_", " "))
     assert await opened.page.locator("#mode-icon").get_attribute("href") == f"#m-{mode.lower()}"
-    texts = await opened.page.evaluate(TEXTS)
-    assert not [(words, ratio) for words, ratio, large, _ in texts if ratio < (AA_LARGE if large else AA)]
+    texts = await opened.probe("texts")
+    assert not [(words, ratio) for words, ratio, large in texts if ratio < (AA_LARGE if large else AA)]
     shapes = {
         await opened.page.locator(f"#m-{m}").inner_html()
         for m in ("drive", "ready", "connecting", "safe_stop", "fault")
@@ -96,7 +63,7 @@ async def test_everything_that_can_be_used_has_a_name(server: FakeServer, opener
     opened = await scene(server, opener, DESK)
     for panel in PANELS:
         await opened.tab(panel)
-        assert await opened.page.evaluate(UNNAMED) == []
+        assert await opened.probe("unnamed") == []
 
 
 @pytest.mark.parametrize(
@@ -110,7 +77,7 @@ async def test_it_fits_every_screen(server: FakeServer, opener: Opener, name: st
     assert ("Cycle" in seen) == (name not in {"desk", "projector"})
     for panel in seen:
         await opened.tab(panel)
-        wide = await opened.page.evaluate(WIDE)
+        wide = await opened.probe("too_wide")
         assert wide["page"] <= 0, (panel, wide)
         assert max(wide["panel"]) <= 0, (panel, wide)
         assert wide["tabs"] <= 0, (panel, wide)
@@ -125,9 +92,7 @@ async def test_what_one_touches_is_large_enough(server: FakeServer, opener: Open
     opened = await scene(server, opener, PHONE, touch=True)
     for panel in (*PANELS, "Cycle"):
         await opened.tab(panel)
-        small = await opened.page.evaluate("""() => [...document.querySelectorAll('button, select, [role=tab], input:not([type=checkbox])')]
-            .filter((e) => e.checkVisibility()).map((e) => [e.id || e.textContent, e.getBoundingClientRect()])
-            .filter(([, box]) => box.width < 24 || box.height < 24).map(([name, box]) => [name, box.width, box.height])""")
+        small = await opened.probe("too_small")
         assert not small, (panel, small)
 
 
@@ -150,8 +115,7 @@ async def test_the_focus_goes_round_and_is_always_seen(server: FakeServer, opene
     met = []
     for _ in range(60):
         await page.keyboard.press("Tab")
-        where = await page.evaluate("""() => { const e = document.activeElement, s = getComputedStyle(e);
-            return [e.id, e === document.body || s.outlineStyle !== 'none' && parseFloat(s.outlineWidth) >= 2]; }""")
+        where = await opened.probe("focus")
         met.append(where[0])
         assert where[1], f"{where[0]} has the focus and does not show it"
     assert {"halt", "map-front", "tool-pan", "fit", "tab-drive", "disarm", "pad", "hand-limit", "goal-x"} <= set(met)
@@ -185,20 +149,19 @@ async def test_the_map_has_words(server: FakeServer, opener: Opener) -> None:
 
 async def test_nothing_moves_for_those_who_want_it_calm(server: FakeServer, opener: Opener) -> None:
     opened = await scene(server, opener, DESK, calm=True)
-    moving = await opened.page.evaluate(
-        "() => [...document.querySelectorAll('*')].filter((e) => getComputedStyle(e).transitionDuration !== '0s').length"
+    moving = (
+        "() => [...document.querySelectorAll('*')]"
+        ".filter((e) => getComputedStyle(e).transitionDuration !== '0s').length"
     )
-    assert moving == 0
+    assert await opened.page.evaluate(moving) == 0
 
 
 async def test_dark_and_light_are_followed_at_once(server: FakeServer, opener: Opener) -> None:
     opened = await scene(server, opener, DESK)
-    corner = "() => [...document.getElementById('map-back').getContext('2d').getImageData(0, 300, 40, 1).data].join()"
+    corner = "() => document.getElementById('map-back').toDataURL()"
     light = await opened.page.evaluate(corner)
     await opened.page.emulate_media(color_scheme="dark")
-    await opened.page.evaluate(
-        "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
-    )
+    await opened.drawn()
     assert await opened.page.evaluate(corner) != light
     assert await opened.page.evaluate("() => getComputedStyle(document.body).backgroundColor") == "rgb(25, 31, 38)"
 

@@ -1,4 +1,4 @@
-"""Driving from the page: HALT above all, arming, the dead-man by pad, keys and gamepad, goals, and who has control."""
+"""Driving from the page: HALT above all, arming, the dead-man by pad, keys and gamepad, goals, who has control."""
 
 from __future__ import annotations
 
@@ -13,10 +13,13 @@ from tests.browser.opened import PHONE, Opened, Opener, until
 
 pytestmark = [pytest.mark.realtime, pytest.mark.asyncio(loop_scope="session")]
 
+FOCI = ("body", "#map-front", "#tab-log", "#hand-keys", "#ellipse-scale", "#hand-limit", "#fit")
+
 GAMEPAD = """
 const pad = {connected: true, id: 'a pad', index: 0, axes: [0, 0, 0, 0],
   buttons: Array.from({length: 16}, () => ({pressed: false, value: 0}))};
 window.padUnderTest = pad;
+window.plugIn = () => dispatchEvent(Object.assign(new Event('gamepadconnected'), { gamepad: pad }));
 navigator.getGamepads = () => (pad.connected ? [pad] : []);
 """
 
@@ -70,9 +73,7 @@ async def test_halt_latches_and_says_why(server: FakeServer, opener: Opener) -> 
     await expect(opened.page.locator("#banner-stopped")).to_have_count(0)
 
 
-@pytest.mark.parametrize(
-    "target", ["body", "#map-front", "#tab-log", "#hand-keys", "#ellipse-scale", "#hand-limit", "#fit"]
-)
+@pytest.mark.parametrize("target", FOCI)
 async def test_the_space_bar_halts_wherever_the_focus_is(server: FakeServer, opener: Opener, target: str) -> None:
     opened = await opener.open(server.url)
     if target in {"#hand-keys", "#hand-limit"}:
@@ -100,6 +101,9 @@ async def test_a_halt_without_a_connection_is_told_and_sent_as_soon_as_there_is_
     server: FakeServer, opener: Opener
 ) -> None:
     opened = await opener.open(server.url)
+    await server.wait("recordings")
+    server.received.clear()
+    server.arrived_s.clear()
     await server.drop()
     await opened.page.keyboard.press("Space")
     await opened.says("#toasts", "HALT could not be sent")
@@ -247,9 +251,7 @@ async def test_arrows_drive_on_the_pad_with_a_limit(server: FakeServer, opener: 
 async def test_a_gamepad_drives_only_with_its_shoulder_button(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url, script=GAMEPAD)
     page = opened.page
-    await page.evaluate(
-        "() => { const e = new Event('gamepadconnected'); e.gamepad = padUnderTest; dispatchEvent(e); }"
-    )
+    await page.evaluate("() => plugIn()")
     await opened.tab("Drive")
     await opened.says("#hand-gamepad", "a pad")
     await page.evaluate("() => { padUnderTest.axes[1] = -1; }")

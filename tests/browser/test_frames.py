@@ -1,8 +1,7 @@
 """Drawing keeps up: 500 segments and 40 objects, everything switched on, drawn in software, no card to help.
 
 A browser draws as often as the machine lets it, and here others share it. So the page draws as fast as it can, every
-frame anew, and in turns with that a page that draws a hundred lines does the same: what the machine takes away it takes
-from both.
+frame anew, and in turns with it a page that draws a hundred lines: what the machine takes away it takes from both.
 """
 
 from __future__ import annotations
@@ -24,53 +23,20 @@ ENOUGH = 25
 CONTROL_FRAMES_PER_S = 45.0
 """A machine that cannot show even the control this often is too busy to say anything of frames a second."""
 
-COUNT = """async (mode) => {
-  const { scene, view, world } = await import('/page/main.js');
-  let control = document.getElementById('control-under-test');
-  if (control === null) {
-    control = document.createElement('canvas');
-    control.id = 'control-under-test';
-    control.width = view.width; control.height = view.height;
-    control.style.cssText = 'position:fixed;left:0;top:0;z-index:-1';
-    document.body.append(control);
-  }
-  const ctx = control.getContext('2d');
-  const plain = (n) => {
-    ctx.clearRect(0, 0, control.width, control.height);
-    ctx.beginPath();
-    for (let i = 0; i < 100; i++) { ctx.moveTo(i * 10, n % 7); ctx.lineTo(i * 9, control.height); }
-    ctx.stroke();
-  };
-  const began = performance.now();
-  let drawn = 0;
-  await new Promise((done) => {
-    const frame = () => {
-      if (performance.now() - began > 900) { done(); return; }
-      drawn++;
-      if (mode === 'page') { view.x += 0.001; world.segmentsVersion++; scene.invalidate('back', 'front'); }
-      else plain(drawn);
-      requestAnimationFrame(frame);
-    };
-    requestAnimationFrame(frame);
-  });
-  return drawn / ((performance.now() - began) / 1000);
-}"""
-
 
 @pytest.mark.parametrize("hall", [Hall(segments=500, objects=40, moving=False)], ids=["full"])
 async def test_thirty_frames_a_second(server: FakeServer, opener: Opener, measured: Callable[[str], None]) -> None:
     opened = await opener.open(server.url, DESK)
     await opened.steady()
     await opened.until("world.segments.size === 500 && world.state.objects.length === 40", "the whole scene")
-    renderer = await opened.page.evaluate("""() => { const gl = document.createElement('canvas').getContext('webgl');
-        const info = gl?.getExtension('WEBGL_debug_renderer_info'); return info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : 'none'; }""")
+    renderer = await opened.probe("renderer")
     assert renderer == "none" or "SwiftShader" in renderer or "llvmpipe" in renderer, (
         f"not drawn in software: {renderer}"
     )
     page, control = [], []
     for _ in range(ENOUGH):
-        control.append(await opened.page.evaluate(COUNT, "control"))
-        page.append(await opened.page.evaluate(COUNT, "page"))
+        control.append(await opened.probe("frames_per_s", "control"))
+        page.append(await opened.probe("frames_per_s", "page"))
         if len(page) >= ROUNDS and max(page) >= FRAMES_PER_S:
             break
     await opened.shot("full")
@@ -86,17 +52,6 @@ async def test_it_draws_only_what_changed(server: FakeServer, opener: Opener) ->
     await opened.steady()
     await opened.until("world.segments.size === 500", "the whole scene")
     server.silent = True
-    counts = await opened.page.evaluate("""async () => {
-        const { scene } = await import('/page/main.js');
-        const frame = () => new Promise((done) => requestAnimationFrame(done));
-        for (let i = 0; i < 10; i++) await frame();
-        const drawn = { back: 0, front: 0 };
-        const paint = scene.paint.bind(scene);
-        scene.paint = (name, f) => { drawn[name]++; paint(name, f); };
-        for (let i = 0; i < 10; i++) await frame();
-        const idle = { ...drawn };
-        for (let i = 0; i < 10; i++) { scene.invalidate('front'); scene.invalidate('front'); await frame(); await frame(); }
-        return [idle, drawn];
-    }""")
+    counts = await opened.probe("repaints")
     assert counts[0] == {"back": 0, "front": 0}, "it draws although nothing changed"
     assert counts[1] == {"back": 0, "front": 10}, "once a frame, and the front alone"

@@ -26,9 +26,8 @@ async def still(server: FakeServer, opener: Opener, size: tuple[int, int] | None
 
 async def middle(opened: Opened, number: int) -> tuple[float, float]:
     """Where the middle of a segment is on the screen."""
-    x, y = await opened.world(
-        f"(({{x1, y1, x2, y2}}) => [(x1 + x2) / 2, (y1 + y2) / 2])(world.segments.get({number}))"
-    )
+    s = await opened.world(f"world.segments.get({number})")
+    x, y = (s["x1"] + s["x2"]) / 2, (s["y1"] + s["y2"]) / 2
     return await opened.screen(x, y)
 
 

@@ -1,4 +1,4 @@
-"""What there is to see: the map with its layers, pan, zoom, follow, tape; ring, charts, list, log; data that are old."""
+"""What there is to see: map and layers, pan, zoom, follow, tape; ring, charts, list, log; that data are old."""
 
 from __future__ import annotations
 
@@ -11,21 +11,11 @@ from tests.browser.opened import PHONE, Opened, Opener, until
 
 pytestmark = [pytest.mark.realtime, pytest.mark.asyncio(loop_scope="session")]
 
-INKED = """() => ['map-back', 'map-front'].map((id) => {
-  const canvas = document.getElementById(id);
-  const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
-  let sum = 0;
-  for (let i = 0; i < data.length; i += 4) sum = (sum * 31 + data[i] * 3 + data[i + 1] * 5 + data[i + 2] * 7 + data[i + 3]) >>> 0;
-  return sum;
-}).join()"""
-
 
 async def picture(opened: Opened) -> str:
     """A number for what is drawn on the map now, after whatever waits to be drawn."""
-    await opened.page.evaluate(
-        "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done())))"
-    )
-    return str(await opened.page.evaluate(INKED))
+    await opened.drawn()
+    return str(await opened.probe("inked"))
 
 
 async def still(server: FakeServer, opener: Opener, cycle: int = 170) -> Opened:

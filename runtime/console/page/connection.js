@@ -11,9 +11,10 @@ const MESSAGE_MAX = 65_536;
 const CONGESTED_BYTES = 4096;
 
 export class Refusal extends Error {
-  constructor(message, field = null) {
+  constructor(message, { field = null, answered = true } = {}) {
     super(message);
     this.field = field;
+    this.answered = answered; // or nobody knows whether it arrived
   }
 }
 
@@ -61,7 +62,7 @@ export class Connection extends Emitter {
       this.#socket = null;
       for (const { refuse, timer } of this.#asked.values()) {
         clearTimeout(timer);
-        refuse(new Refusal("the connection was lost before an answer came"));
+        refuse(new Refusal("the connection was lost before an answer came", { answered: false }));
       }
       this.#asked.clear();
       this.emit("closed", { opened, reason: event.reason, code: event.code });
@@ -77,7 +78,7 @@ export class Connection extends Emitter {
       if (id === null) return;
       const timer = setTimeout(() => {
         this.#asked.delete(id);
-        refuse(Object.assign(new Refusal(`no answer to "${message.type}" in ${ANSWER_MAX_MS / 1000} s`), { unanswered: true }));
+        refuse(new Refusal(`no answer to "${message.type}" in ${ANSWER_MAX_MS / 1000} s`, { answered: false }));
       }, ANSWER_MAX_MS);
       this.#asked.set(id, { resolve, refuse, timer });
     });
@@ -88,10 +89,16 @@ export class Connection extends Emitter {
     return this.#put(message, () => {}) !== null;
   }
 
-  // A HALT that cannot be sent now is sent first thing once there is a connection again.
-  halt() {
-    this.#halting = !this.open;
-    return this.ask({ type: "halt" });
+  // A HALT of which nobody knows whether it arrived is sent again, first thing once there is a connection.
+  async halt() {
+    this.#halting = true;
+    try {
+      await this.ask({ type: "halt" });
+      this.#halting = false;
+    } catch (error) {
+      this.#halting = !error.answered;
+      throw error;
+    }
   }
 
   // The status with which the same address answers a plain request; null where nobody answers.
@@ -106,7 +113,7 @@ export class Connection extends Emitter {
 
   #put(message, refuse) {
     if (!this.open) {
-      refuse(new Refusal("there is no connection to the robot's process"));
+      refuse(new Refusal("there is no connection to the robot's process", { answered: false }));
       return null;
     }
     const id = this.#next++;
@@ -134,13 +141,13 @@ export class Connection extends Emitter {
   #settle({ id, ok, error, field, data }) {
     const asked = this.#asked.get(id);
     if (asked === undefined) {
-      if (!ok) this.emit("refused", new Refusal(error ?? "refused", field));
+      if (!ok) this.emit("refused", new Refusal(error ?? "refused", { field }));
       return;
     }
     this.#asked.delete(id);
     clearTimeout(asked.timer);
     if (ok) asked.resolve(data ?? null);
-    else asked.refuse(new Refusal(error ?? "refused", field ?? null));
+    else asked.refuse(new Refusal(error ?? "refused", { field }));
   }
 
   // A laptop that slept leaves a socket that looks open and is not. Silence alone says nothing, a recording may be held:
@@ -150,7 +157,7 @@ export class Connection extends Emitter {
     this.#probing = true;
     const socket = this.#socket;
     this.ask({ type: "save_toml" }).catch((error) => {
-      if (error.unanswered) socket.close();
+      if (!error.answered) socket.close();
     }).finally(() => {
       this.#probing = false;
     });

@@ -4,7 +4,7 @@ import { haloed } from "./scene.js";
 
 const STEPS = [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100];
 const GRID_PX = 44;
-const SCALE_PX = 90;
+const SCALE_PX = 90; // at least, and less where the map is small
 
 function stepOf(f, pixels) {
   const unit = f.units.metres * f.view.scale;
@@ -50,7 +50,7 @@ export function drawGrid(f) {
 
 export function drawScale(f) {
   const { ctx, view, theme } = f;
-  const step = stepOf(f, SCALE_PX);
+  const step = stepOf(f, Math.min(SCALE_PX, view.width / 7));
   const width = step * view.scale;
   const x = view.width - width - 16.5, y = view.height - 21.5;
   f.onScreen();

@@ -1,6 +1,6 @@
 // The robot and what moves it: body and heading, the trail, each schema's vector with its name, their sum, the goal.
 
-import { haloed } from "./scene.js";
+import { haloed, overlap } from "./scene.js";
 
 const UNIT_PX = 70; // a vector of magnitude one; longer where the robot is large, so that it shows beyond the rim
 const LENGTH_MAX = 2; // in units
@@ -78,7 +78,6 @@ export function drawVectors(f) {
   const [x, y] = view.toScreen(world.state.pose[0], world.state.pose[1]);
   f.onScreen();
   ctx.textBaseline = "middle";
-  const taken = [];
   const unit = Math.max(UNIT_PX, 1.7 * (world.hello?.body?.radius ?? 0) * view.scale);
   world.state.vectors.forEach(([name, vx, vy], i) => {
     const size = Math.hypot(vx, vy);
@@ -91,11 +90,15 @@ export function drawVectors(f) {
     ctx.setLineDash(sum ? [] : DASHES[i % DASHES.length]);
     arrow(ctx, x, y, dx, dy, Math.min(sum ? 13 : 10, length));
     ctx.font = theme.font(11.5, sum ? 700 : 600);
-    ctx.textAlign = dx >= 0 ? "left" : "right";
+    ctx.textAlign = "left";
+    const words = `${name.replaceAll("_", "-")} ${size.toFixed(2)}`;
+    const width = ctx.measureText(words).width;
+    const tx = Math.max(4, Math.min(view.width - width - 4, dx >= 0 ? x + dx + 7 : x + dx - 7 - width));
     let ty = y + dy + (sum ? 0 : dy > 0 ? 8 : -8);
-    while (taken.some(([bx, by]) => Math.abs(bx - x - dx) < 120 && Math.abs(by - ty) < 13)) ty += 13;
-    taken.push([x + dx, ty]);
-    haloed(f, `${name.replaceAll("_", "-")} ${size.toFixed(2)}`, x + dx + (dx >= 0 ? 6 : -6), ty, sum ? theme.ink : theme.vector);
+    const box = () => [tx - 2, ty - 7, tx + width + 2, ty + 7];
+    while (f.labels.some((taken) => overlap(taken, box()))) ty += 13;
+    f.labels.push(box());
+    haloed(f, words, tx, ty, sum ? theme.ink : theme.vector);
   });
 }
 

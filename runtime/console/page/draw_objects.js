@@ -1,7 +1,7 @@
 // What was recognised: the model's outline with its label and probability, the 95 % ellipse of its place, the clusters
 // it grew from, and for the one that is picked the readings that speak for and against it.
 
-import { haloed } from "./scene.js";
+import { haloed, overlap } from "./scene.js";
 
 const CHI2_95 = 5.991;
 const SURE = 0.8; // below this the outline is dashed
@@ -129,12 +129,12 @@ export function drawLabels(f) {
     const [x, y] = view.toScreen(object.x, object.y);
     return { object, x, y, r: Math.max(6, (world.model(object.model)?.arc_radius_m ?? 0.1) * view.scale) };
   }).filter(({ x, y }) => x > -50 && y > -50 && x < view.width + 50 && y < view.height + 50);
-  const taken = [];
+  const taken = f.labels;
   const [rx, ry] = view.toScreen(world.state.pose[0], world.state.pose[1]);
   const robot = { x: rx, y: ry, r: (world.hello?.body?.radius ?? 0.2) * view.scale };
   const misses = ({ x, y, r }, [left, top, right, bottom]) =>
     Math.hypot(x - Math.max(left, Math.min(x, right)), y - Math.max(top, Math.min(y, bottom))) > r;
-  const free = (box, own) => taken.every((b) => box[2] < b[0] || box[0] > b[2] || box[3] < b[1] || box[1] > b[3])
+  const free = (box, own) => taken.every((one) => !overlap(one, box))
     && misses(robot, box) && spots.every((spot) => spot === own || misses(spot, box));
   for (const spot of spots) {
     const { object, x, y, r } = spot;

@@ -32,7 +32,7 @@ export class Drive {
   }
 
   halt() {
-    this.connection.halt().catch((error) => this.notices.toast(this.connection.open ? `HALT: ${error.message}`
+    this.connection.halt().catch((error) => this.notices.toast(error.answered ? `HALT: ${error.message}`
       : "HALT could not be sent: no connection. Use the emergency stop on the base; it is sent as soon as there is one."));
     this.hand.stop("HALT");
   }

@@ -97,9 +97,9 @@ export class Ring {
     this.#scale(ctx, cx, cy, reach, ring.range_max);
     this.#heading(ctx, cx, cy, -pose[2]);
     const words = [];
-    if (nearest !== null) words.push(`nearest ${this.#units.length(ranges[nearest])} at ${nearest}`);
+    if (nearest !== null) words.push(`nearest ${this.#units.length(ranges[nearest])}, by sensor ${nearest}`);
     if (faulty.size > 0) words.push(`${faulty.size} not trusted`);
-    say(this.#words, words.join(", ") || "nothing heard");
+    say(this.#words, words.join("; ") || "nothing heard");
   }
 
   #scale(ctx, cx, cy, reach, range_max) {

@@ -77,6 +77,9 @@ function frame(ctx, ratio, shared) {
   };
 }
 
+// Whether two boxes [left, top, right, bottom] do.
+export const overlap = (a, b) => !(a[2] < b[0] || a[0] > b[2] || a[3] < b[1] || a[1] > b[3]);
+
 export function haloed(f, text, x, y, colour) {
   const { ctx } = f;
   ctx.lineJoin = "round";
