@@ -58,6 +58,7 @@ class FakeServer:
     cycle: int = 40
     hello: dict[str, Any] = field(default_factory=dict)
     changed: list[tuple[str, Any]] = field(default_factory=list)
+    flags: list[str] = field(default_factory=list)
     silent: bool = False
     """Send nothing, as a process that hangs."""
     port: int = 0
@@ -112,7 +113,8 @@ class FakeServer:
         client.gone |= set(removed)
         stopped = {} if self.mode == "DRIVE" else {"twist": [0.0, 0.0]}
         return self.hall.frame(self.cycle) | stopped | {
-            "type": "state", "mode": self.mode, "reason": self.reason, "segments": segments, "wish": self.wish,
+            "type": "state", "mode": self.mode,
+            "flags": self.flags, "reason": self.reason, "segments": segments, "wish": self.wish,
             "dropped": 0, "clients": len(self.clients), "controller": self.controller == client.number,
             "recording": self.recording, "paused": self.paused, "speed": self.speed, "playback": self.playback,
         }  # fmt: skip

@@ -49,6 +49,9 @@ async def test_a_click_selects_a_segment_and_delete_removes_it(server: FakeServe
     await page.mouse.click(*await middle(opened, 8))
     chosen = await opened.world("[...selection.segments]")
     assert len(chosen) == 1
+    await page.mouse.move(*await middle(opened, 8))
+    await opened.says("#tip", f"segment {chosen[0]}, ")
+    await opened.says("#tip", " s old")
     await expect(page.locator("#chosen-count")).to_have_text("1 segment")
     await page.keyboard.press("Delete")
     assert await server.wait("delete_segments") == {"numbers": chosen}

@@ -208,7 +208,7 @@ async def test_ring_charts_and_facts(server: FakeServer, opener: Opener) -> None
     opened = await opener.open(server.url)
     server.recording = {"file": "runs/now.mcap", "bytes": 1_200_000, "dropped": 2}
     await opened.says("#ring-words", "nearest")
-    await opened.says("#ring-words", "1 not trusted")
+    await opened.says("#ring-words", "not trusted: 17 (weak)")
     for phase in ("gather", "perceive", "decide", "command", "refine", "observers"):
         await opened.says("#phases-legend", phase)
     server.cycle = 171
@@ -216,6 +216,8 @@ async def test_ring_charts_and_facts(server: FakeServer, opener: Opener) -> None
     await opened.says("#late-legend", "ended by budget")
     assert await opened.world("world.chart.some((one) => one.missed === 1)")
     await opened.says("#fact-link", "1 / 0")
+    server.flags = ["BUMPER"]
+    await opened.says("#fact-flags", "bumper")
     await opened.says("#fact-recording", "2 lost")
     await opened.says("#mode-name", "DRIVE")
     marks = await opened.page.evaluate("""() => {

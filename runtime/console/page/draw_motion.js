@@ -79,6 +79,7 @@ export function drawVectors(f) {
   f.onScreen();
   ctx.textBaseline = "middle";
   const unit = Math.max(UNIT_PX, 1.7 * (world.hello?.body?.radius ?? 0) * view.scale);
+  const roomy = view.width > 480;
   world.state.vectors.forEach(([name, vx, vy], i) => {
     const size = Math.hypot(vx, vy);
     if (!(size > 0.01)) return;
@@ -89,9 +90,9 @@ export function drawVectors(f) {
     ctx.lineWidth = sum ? 3.5 : 2;
     ctx.setLineDash(sum ? [] : DASHES[i % DASHES.length]);
     arrow(ctx, x, y, dx, dy, Math.min(sum ? 13 : 10, length));
-    ctx.font = theme.font(11.5, sum ? 700 : 600);
+    ctx.font = theme.font(roomy ? 11.5 : 10, sum ? 700 : 600);
     ctx.textAlign = "left";
-    const words = `${name.replaceAll("_", "-")} ${size.toFixed(2)}`;
+    const words = `${name.replaceAll("_", "-")}${roomy ? ` ${size.toFixed(2)}` : ""}`;
     const width = ctx.measureText(words).width;
     const tx = Math.max(4, Math.min(view.width - width - 4, dx >= 0 ? x + dx + 7 : x + dx - 7 - width));
     let ty = y + dy + (sum ? 0 : dy > 0 ? 8 : -8);

@@ -21,7 +21,7 @@ export function drawClusters(f) {
   ctx.strokeStyle = theme.cluster;
   ctx.lineWidth = 1.2 * px;
   ctx.stroke(path);
-  if (f.view.scale < 45) return;
+  if (f.view.scale < 70) return;
   f.onScreen();
   ctx.font = theme.font(11, 600);
   ctx.textAlign = "center";

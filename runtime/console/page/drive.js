@@ -125,6 +125,7 @@ export class Drive {
 
 function wishWords(wish, units) {
   if (!wish) return "Nothing is known of it.";
+  if (wish.kind === "goal" && wish.reached) return `At the goal at ${units.place(wish.x, wish.y)}.`;
   if (wish.kind === "goal") return `To the goal at ${units.place(wish.x, wish.y)}.`;
   return wish.kind === "teleoperate" ? "By hand." : "Ahead, as configured.";
 }

@@ -98,7 +98,7 @@ export class Ring {
     this.#heading(ctx, cx, cy, -pose[2]);
     const words = [];
     if (nearest !== null) words.push(`nearest ${this.#units.length(ranges[nearest])}, by sensor ${nearest}`);
-    if (faulty.size > 0) words.push(`${faulty.size} not trusted`);
+    if (sensors.length > 0) words.push(`not trusted: ${sensors.slice(0, 3).map(([index, fault]) => `${index} (${fault})`).join(", ")}${sensors.length > 3 ? "…" : ""}`);
     say(this.#words, words.join("; ") || "nothing heard");
   }
 

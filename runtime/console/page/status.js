@@ -31,7 +31,8 @@ export class Status {
     setInterval(() => this.#age(), 200);
   }
 
-  #mode({ mode, reason }) {
+  #mode({ mode, reason: why, standing, arming }) {
+    const reason = why ?? (arming ? "arming…" : standing);
     mark(byId("mode"), "data-mode", mode);
     mark(byId("mode-icon"), "href", `#m-${mode.toLowerCase()}`);
     say(byId("mode-name"), `${this.#world.watchesRecording ? "then: " : ""}${mode.replace("_", " ")}`);
@@ -40,10 +41,11 @@ export class Status {
   }
 
   #facts() {
-    const { twist, link, dropped, late, missed, clients, controller, recording } = this.#world.state;
+    const { twist, flags, link, dropped, late, missed, clients, controller, recording } = this.#world.state;
     const turn = Math.round((twist[1] * 180) / Math.PI);
     fact("twist", `${this.#units.number(twist[0])} ${this.#units.name}/s ${turn < 0 ? "↻" : turn > 0 ? "↺" : ""} ${Math.abs(turn)}°/s`);
     fact("link", link ? `${link.bad} / ${link.lost}` : "none", this.#grows("link", link ? link.bad + link.lost : 0));
+    fact("flags", flags.join(", ").toLowerCase() || "none", flags.length > 0);
     fact("dropped", String(dropped), this.#grows("dropped", dropped));
     fact("late", `${late} / ${missed}`, this.#grows("late", late + missed));
     fact("clients", String(clients));

@@ -26,6 +26,10 @@ export function objectAt(world, view, { x, y, touch }) {
 }
 
 export function selectTool({ world, view, selection, redraw }) {
+  const tip = byId("tip");
+  const hideTip = () => {
+    tip.hidden = true;
+  };
   let lasso = null;
   let began = null;
 
@@ -44,13 +48,26 @@ export function selectTool({ world, view, selection, redraw }) {
       selection.pick(null);
     }
   };
-  const end = () => {
+  const stop = () => {
     lasso = began = null;
     redraw();
   };
   return {
     id: "select", name: "Select segments and objects", icon: "i-select",
+    // What a segment is, and how old, in words beside the pointer.
+    hover(at) {
+      const segment = nearestSegment(world, at.x, at.y, REACH_PX / view.scale);
+      tip.hidden = segment === null;
+      if (segment === null) return;
+      const age = Number.isFinite(segment.t) ? `${Math.max(0, world.state.t - segment.t).toFixed(1)} s old` : "of unknown age";
+      say(tip, `segment ${segment.number}, ${age}${segment.pinned ? ", pinned" : ""}`);
+      const left = at.sx + 220 > view.width ? at.sx - 190 : at.sx + 14;
+      tip.style.transform = `translate(${left}px, ${Math.max(4, at.sy - 34)}px)`;
+    },
+    leave: hideTip,
+    end: hideTip,
     down(at) {
+      hideTip();
       began = at;
       lasso = [at];
     },
@@ -68,7 +85,7 @@ export function selectTool({ world, view, selection, redraw }) {
         if (began.shift) selection.add(inside);
         else selection.choose(inside);
       }
-      end();
+      stop();
     },
     press: (at) => click({ ...at, shift: true }),
     key(event) {
@@ -81,7 +98,7 @@ export function selectTool({ world, view, selection, redraw }) {
       selection.choose([]);
       selection.pick(null);
     },
-    cancel: end,
+    cancel: stop,
     draw: (f) => lasso && drawLasso(f, lasso),
   };
 }

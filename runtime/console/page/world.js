@@ -9,7 +9,7 @@ const ECHO_AGE_MAX_S = 6;
 const CHART_MAX = 600;
 
 const EMPTY = {
-  cycle: 0, t: 0, mode: "no data", reason: null, pose: [0, 0, 0], ring_yaw: 0, twist: [0, 0], flags: [], firing: [],
+  cycle: 0, t: 0, mode: "no data", reason: null, standing: null, arming: false, pose: [0, 0, 0], ring_yaw: 0, twist: [0, 0], flags: [], firing: [],
   ranges: [], age: [], clusters: [], objects: [], vectors: [], wish: null, phases: {}, cycle_us: 0, late_us: 0,
   missed: 0, late: 0, quanta: 0, refinement: "", link: null, sensors: [], dropped: 0, clients: 0, controller: false,
   recording: null, paused: false, speed: 1, playback: null,
@@ -71,7 +71,7 @@ export class World extends Emitter {
     this.#applyEchoes(state);
     this.#applyChart(state, before, this.fresh && !jumped);
     const changed = !this.fresh || state.mode !== before.mode || state.reason !== before.reason
-      || state.controller !== before.controller || (state.playback === null) !== (before.playback === null);
+      || state.standing !== before.standing || state.arming !== before.arming || state.controller !== before.controller || (state.playback === null) !== (before.playback === null);
     this.fresh = true;
     this.emit("state", state);
     if (changed) this.emit("mode", state, before);
