@@ -259,8 +259,6 @@ async def test_old_data_are_told_to_be_old(server: FakeServer, opener: Opener) -
 async def test_it_connects_again_by_itself_and_takes_the_whole_map(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await opened.steady()
-    for client in server.clients:
-        await server.tell({"type": "state", **server.frame(client), "t": 0.0})  # a jump back in time does no harm
     await server.drop()
     await opened.says("#banners", "No connection")
     server.controller = 2
@@ -296,3 +294,14 @@ async def test_segments_that_left_are_gone(server: FakeServer, opener: Opener) -
     size = await opened.world("world.segments.size")
     server.deleted |= {1, 2, 3}
     await until(lambda: opened.world(f"world.segments.size === {size - 3}"), "three segments fewer")
+
+
+async def test_a_whole_map_after_a_gap_takes_the_place_of_the_old_one(server: FakeServer, opener: Opener) -> None:
+    opened = await still(server, opener)
+    assert await opened.world("world.segments.has(5) && world.segments.has(6)")
+    server.deleted |= {5, 6}
+    for client in server.clients:  # one that missed the frame in which they went
+        client.gone |= {5, 6}
+        client.whole = True
+    await opened.until("!world.segments.has(5) && !world.segments.has(6)", "a map without them")
+    assert await opened.world("world.segments.has(7)")

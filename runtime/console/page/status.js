@@ -2,7 +2,7 @@
 
 import { byId, mark, say } from "./dom.js";
 
-const STALE_S = 1;
+const STALE_S = 2.5; // of a robot that does not answer there are news once a second
 const NEWS_MS = 5000;
 const SILENT_S = 3; // the words change seldom, so that they can be read and are not read out all the time
 
