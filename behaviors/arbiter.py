@@ -1,6 +1,8 @@
 """The arbiter: adds the schemas' vectors and answers with a velocity the base can drive, or with a reason to stop.
 
-A decision that lacks a part is a stop, never a guess: what comes out is either within every limit or no velocity.
+Most schemas wish for a direction (`arbitrate`); an operator's hand asks for a velocity (`limit`), which the echoes
+only ever take from. A decision that lacks a part is a stop, never a guess: what comes out is either within every
+limit or no velocity.
 """
 
 from __future__ import annotations
@@ -8,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -87,11 +89,66 @@ def arbitrate(
     w = max(-body.turn_max_rad_s, min(body.turn_max_rad_s, config.turn_gain_per_s * angle))
     # Not `v > limit or …`: only this form also refuses NaN.
     if not (0.0 <= v <= body.speed_max_m_s and abs(w) <= body.turn_max_rad_s):
-        return Stop(
-            f"the arbiter worked out a velocity outside the base's limits (v {v:g} m/s, w {w:g} rad/s), "
-            "which is a fault of this program: keep the recording of this run and report it"
-        )
+        return _outside(v, w)
     return Drive(Twist(v, w))
+
+
+def limit(
+    asked: Twist,
+    responses: Sequence[Response],
+    percept: Percept,
+    body: BodyConfig,
+    config: ArbiterConfig,
+    expected: Sequence[str],
+) -> Decision:
+    """Return what may be driven of a velocity that is asked for, or why nothing may.
+
+    The vectors of the schemas, the asker's own among them, are added and seen from the robot. What lies along the
+    heading holds the speed to less than asked for, down to a standstill and never into going the other way; what lies
+    across steers a robot that goes forward, the more the faster it goes. Forward or back it is never faster than what
+    it can stop from before the nearest echo that way. One that only turns is left to turn: it needs no room.
+
+    Parameters
+    ----------
+    asked
+        The velocity; its v divided by the base velocity is the asker's vector along the heading.
+    responses, percept, body, config, expected
+        As for `arbitrate`.
+
+    Returns
+    -------
+    Decision
+        `Drive` with abs(v) ≤ `speed_max_m_s` and abs(w) ≤ `turn_max_rad_s`, both finite; or `Stop`.
+    """
+    complaint = _complaint(responses, percept, expected)
+    if complaint is not None:
+        return Stop(complaint)
+    if not (_is_finite(asked.v) and _is_finite(asked.w)):
+        return Stop(f"the velocity asked for ({_shown(asked.v)}, {_shown(asked.w)}) is none: look at who asks for it")
+    c, s = math.cos(percept.pose.theta), math.sin(percept.pose.theta)
+    x, y = sum(r.x for r in responses), sum(r.y for r in responses)
+    along = config.base_velocity_m_s * (c * x + s * y)
+    aside = max(-1.0, min(1.0, c * y - s * x))
+    v, w = 0.0, asked.w
+    if asked.v > 0.0:
+        fastest = min(asked.v, body.speed_max_m_s, stoppable_speed_m_s(percept, body, config.clearance_m))
+        v = max(0.0, min(along, fastest))
+        w += config.turn_gain_per_s * aside * v / config.base_velocity_m_s
+    elif asked.v < 0.0:
+        pose = replace(percept.pose, theta=percept.pose.theta + math.pi)
+        behind = stoppable_speed_m_s(replace(percept, pose=pose), body, config.clearance_m)
+        v = min(0.0, max(along, asked.v, -body.speed_max_m_s, -behind))
+    w = max(-body.turn_max_rad_s, min(body.turn_max_rad_s, w))
+    if not (abs(v) <= body.speed_max_m_s and abs(w) <= body.turn_max_rad_s):
+        return _outside(v, w)
+    return Drive(Twist(v, w))
+
+
+def _outside(v: float, w: float) -> Stop:
+    return Stop(
+        f"the arbiter worked out a velocity outside the base's limits (v {v:g} m/s, w {w:g} rad/s), "
+        "which is a fault of this program: keep the recording of this run and report it"
+    )
 
 
 def _course_speed_m_s(angle_rad: float, config: ArbiterConfig) -> float:

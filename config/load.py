@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from config.files import ConfigError, Kind, dotted, list_shipped, read_document
-from config.layers import Layers, Source
+from config.files import ConfigError, Kind, dotted, list_shipped, one_line, parse_document, read_document
+from config.layers import Layers, Location, PathError, Source
 from config.model import ModelConfig
 from config.overrides import apply_overrides, parse_override
 from config.problems import describe_all, given_type, shown, unknown_key
@@ -31,6 +31,8 @@ __all__ = [
     "load_robot",
     "load_settings",
     "load_world",
+    "model_in",
+    "with_value",
 ]
 
 DEFAULT_RUN = "hallway"
@@ -190,6 +192,49 @@ def changed_settings(settings: Settings, name: str, overrides: Sequence[str]) ->
     if problems:
         raise ConfigError(*problems)
     return _validated(Settings, layers)
+
+
+def with_value(settings: Settings, name: str, location: Location, value: object) -> Settings:
+    """Return settings that are already whole with one value replaced.
+
+    Parameters
+    ----------
+    settings
+        Whole.
+    name
+        Where the value comes from, for complaints.
+    location
+        Where it goes.
+    value
+        As a file would hold it; None where it is not given.
+
+    Raises
+    ------
+    ConfigError
+        With a line for each problem.
+    """
+    source = Source(name)
+    layers = Layers(source)
+    layers.lay(settings.model_dump(mode="json"), source)
+    try:
+        layers.put(location, value, source)
+    except PathError as error:
+        raise ConfigError(f"{name}: {dotted(location)}: {one_line(str(error))}") from None
+    return _validated(Settings, layers)
+
+
+def model_in(text: str, name: str) -> ModelConfig:
+    """Return the object model that a text in TOML describes, named `name` in complaints.
+
+    Raises
+    ------
+    ConfigError
+        Where it is not TOML, or describes no model.
+    """
+    source = Source(name)
+    layers = Layers(source)
+    layers.lay(parse_document(text.encode("utf-8", "surrogatepass"), name), source)
+    return _validated(ModelConfig, layers)
 
 
 def _load(kind: Kind, name: str | os.PathLike[str], model: type[M]) -> M:

@@ -28,15 +28,22 @@ LIVE: Final = frozenset(
         "perception.full.quanta_per_firing",
         "perception.full.report_probability",
         "perception.full.report_probability_near",
+        "perception.clusters.segments_min",
+        "perception.clusters.threshold_m",
         "perception.map.age_max_s",
         "perception.map.contradiction_margin_m",
         "perception.recognition",
+        "perception.relaxation",
+        "perception.segments",
         "ring.firing",
     }
 )
 """Settings, and sections of them, that a running process follows. Everything else sizes an array, opens a port or
 describes a robot that does not change while it drives: it needs a restart, and so does a new setting until it is
-entered here."""
+entered here. Models are followed where further ones come after those from before: see `Difference.live`."""
+
+
+MODELS: Final = ("models",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +61,13 @@ class Difference:
 
     @property
     def live(self) -> bool:
-        """Whether a running process follows the change."""
+        """Whether a running process follows the change.
+
+        Further models are further explanations of what was heard, and nothing that is remembered says otherwise. A
+        model that goes or changes leaves objects behind that are called by it, so that needs a restart.
+        """
+        if self.location == MODELS and isinstance(self.before, tuple) and isinstance(self.after, tuple):
+            return self.before == self.after[: len(self.before)]
         keys = [str(key) for key in self.location]
         return any(".".join(keys[:n]) in LIVE for n in range(1, len(keys) + 1))
 

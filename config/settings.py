@@ -156,6 +156,31 @@ class AvoidStaticObstacleConfig(Strict):
         return self
 
 
+class MoveToGoalConfig(Strict):
+    """The move-to-goal schema (Arkin 1989): a vector towards a place that the operator names."""
+
+    move_to_goal_gain: float = Field(default=1.0, ge=0.0, le=100.0)
+    success_radius_m: float = Field(default=0.1, gt=0.0, le=100.0)
+    """Nearer than this the goal is reached, and the robot stands."""
+    controlled_zone_m: float = Field(default=0.6, gt=0.0, le=100.0)
+    """Nearer than this it goes the slower the nearer it is."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> MoveToGoalConfig:
+        if self.success_radius_m > self.controlled_zone_m:
+            raise ValueError("success_radius_m is above controlled_zone_m")
+        return self
+
+
+class TeleoperationConfig(Strict):
+    """Driving by hand: velocities from an operator's keys, pointer or gamepad, each good for a moment."""
+
+    message_age_max_s: float = Field(default=0.25, ge=0.02, le=2.0)
+    """With no further word from the operator for this long the robot stands, by the host's clock."""
+    avoid: bool = True
+    """Whether avoid-static-obstacle slows and steers; the arbiter's clearance holds in any case."""
+
+
 class ArbiterConfig(Strict):
     """How the sum of the schemas becomes a velocity."""
 
@@ -173,10 +198,12 @@ class ArbiterConfig(Strict):
 
 
 class BehaviorsConfig(Strict):
-    """The motor schemas that are active, and their arbiter."""
+    """The motor schemas and their arbiter; which of them are asked depends on what the operator wants driven."""
 
     move_ahead: MoveAheadConfig = MoveAheadConfig()
     avoid_static_obstacle: AvoidStaticObstacleConfig = AvoidStaticObstacleConfig()
+    move_to_goal: MoveToGoalConfig = MoveToGoalConfig()
+    teleoperation: TeleoperationConfig = TeleoperationConfig()
     arbiter: ArbiterConfig = ArbiterConfig()
 
 
@@ -219,6 +246,20 @@ class RecordingConfig(Strict):
     """So often the whole state is recorded: a replay can begin there."""
 
 
+class ConsoleConfig(Strict):
+    """The operator console: a page that the robot's own process serves, for watching and for driving."""
+
+    enabled: bool = True
+    host: str = Field(default="127.0.0.1", min_length=1)
+    """Where it listens. Anything but this machine itself lets others reach it: they still need the token."""
+    port: int = Field(default=8765, ge=0, le=65_535)
+    """The next free one where it is taken; 0 = any free one."""
+    watch_without_token: bool = False
+    """Let who has no token watch; to halt, change or drive takes the token of the start URL in any case."""
+    clients_max: int = Field(default=16, ge=1, le=256)
+    """Pages that may be open at a time."""
+
+
 class Settings(RobotConfig):
     """All settings of one run: the robot's sections at the top, then what it recognises and does."""
 
@@ -231,6 +272,7 @@ class Settings(RobotConfig):
     realtime: RealtimeConfig = RealtimeConfig()
     log: LogConfig = LogConfig()
     recording: RecordingConfig = RecordingConfig()
+    console: ConsoleConfig = ConsoleConfig()
 
     @model_validator(mode="after")
     def _distinct_models(self) -> Settings:

@@ -7,10 +7,12 @@ A candidate therefore follows its cluster by place, and keeps the pose at which 
 from __future__ import annotations
 
 import math
+from typing import Final
 
 import numpy as np
 
 from config.settings import RelaxationConfig
+from perception.by_hand import Names
 from perception.clusters import Clusters
 from perception.kernel import Floats, Ints, owning_kernel
 from perception.model import ObjectModel
@@ -68,7 +70,12 @@ class Candidates:
         Room for clusters; a cluster of fewer segments gets no candidate.
     reach_m : float
         How far a cluster's centre may move at once and still be the same cluster.
+    names : Names
+        Where candidates get their numbers from.
     """
+
+    LATER: Final = ("numbers", "_numbers_before", "_names")
+    """What recordings of older programs do not hold."""
 
     def __init__(
         self,
@@ -77,8 +84,10 @@ class Candidates:
         clusters_max: int,
         segments_min: int,
         reach_m: float,
+        names: Names,
     ) -> None:
         self._models = models
+        self._names = names
         self._config = config
         self._segments_min = segments_min
         self._reach_m = reach_m
@@ -91,6 +100,9 @@ class Candidates:
         self.rested = np.zeros(shape, dtype=np.int64)
         """(clusters, models): 1 once the candidate has rested since it was placed."""
         self._rested_before = np.zeros_like(self.rested)
+        self.numbers = np.zeros(shape, dtype=np.int64)
+        """(clusters, models): by which each candidate is known; 0 where the cluster has too few segments for any."""
+        self._numbers_before = np.zeros_like(self.numbers)
         self._known = np.zeros((clusters_max, 3))
         self._heir = np.zeros(clusters_max, dtype=np.int64)
         self._count = 0
@@ -115,6 +127,7 @@ class Candidates:
         self._poses_before[:] = self.poses
         self._left_before[:] = self._left
         self._rested_before[:] = self.rested
+        self._numbers_before[:] = self.numbers
         known = self._known[:before].copy()
         for j in range(clusters.count):
             now = (clusters.centres[j, 0], clusters.centres[j, 1], float(clusters.sizes[j]))
@@ -122,9 +135,11 @@ class Candidates:
             if clusters.sizes[j] < self._segments_min:
                 self._left[j] = 0
                 self.rested[j] = 0
-            elif i >= 0 and known[i, 2] >= self._segments_min:
+                self.numbers[j] = 0
+            elif i >= 0 and self._numbers_before[i, 0] > 0:
                 self.poses[j] = self._poses_before[i]
                 self.rested[j] = self._rested_before[i]
+                self.numbers[j] = self._numbers_before[i]
                 unchanged = tuple(known[i]) == now
                 self._left[j] = self._left_before[i] if unchanged else self._config.iterations_max
             else:
@@ -154,17 +169,57 @@ class Candidates:
                 return done
         return 0
 
+    def adopt(self, config: RelaxationConfig, segments_min: int, reach_m: float) -> None:
+        """Go on with other constants; what rested relaxes again where those of relaxation are others."""
+        self._segments_min, self._reach_m = segments_min, reach_m
+        if config != self._config:
+            self._config = config
+            self._left[: self._count][self.numbers[: self._count] > 0] = config.iterations_max
+
+    def extend(self, models: tuple[ObjectModel, ...], clusters: Clusters, outline: OutlineMap) -> None:
+        """Try further models, which come after those from before, at the clusters as they are."""
+        before, self._models = len(self._models), models
+        more = len(models) - before
+        for name in ("poses", "_poses_before", "_left", "_left_before", "rested", "_rested_before", "numbers",
+                     "_numbers_before"):  # fmt: skip
+            array = getattr(self, name)
+            added = np.zeros((array.shape[0], more, *array.shape[2:]), array.dtype)
+            setattr(self, name, np.ascontiguousarray(np.concatenate([array, added], axis=1)))
+        for j in range(self._count):
+            if self.numbers[j, 0] > 0:
+                self._place(j, clusters, outline, before)
+
+    def find(self, number: int) -> tuple[int, int] | None:
+        """Return cluster and model of the candidate of this number, None where there is none."""
+        found = np.argwhere(self.numbers[: self._count] == number)
+        return (int(found[0, 0]), int(found[0, 1])) if len(found) else None
+
+    def rename(self, j: int, m: int) -> None:
+        """Give a candidate another number: its own has gone to something else."""
+        self.numbers[j, m] = self._names.next()
+
     def clear(self) -> None:
         """Forget every candidate."""
         self._count = 0
         self._left[:] = 0
+        self.numbers[:] = 0
 
-    def _place(self, j: int, clusters: Clusters, outline: OutlineMap) -> None:
-        """Put each model at a cluster: its outline's middle on the cluster's centre, bulging towards the sensors."""
+    def restored(self) -> None:
+        """Give numbers to the candidates of a recording that has none."""
+        if self._names.last == 0:
+            for j in range(self._count):
+                if self._known[j, 2] >= self._segments_min:
+                    self.numbers[j] = [self._names.next() for _ in self._models]
+
+    def _place(self, j: int, clusters: Clusters, outline: OutlineMap, first: int = 0) -> None:
+        """Put each model at a cluster: its outline's middle on the cluster's centre, bulging towards the sensors.
+
+        Models before `first` stay where they are.
+        """
         normals = outline.segments[clusters.members(j), 4]
         towards_sensors = math.atan2(-np.sin(normals).sum(), -np.cos(normals).sum())
         along_sides = 0.5 * math.atan2(np.sin(2.0 * normals).sum(), np.cos(2.0 * normals).sum())
-        for m, model in enumerate(self._models):
+        for m, model in list(enumerate(self._models))[first:]:
             theta = along_sides if model.facing is None else towards_sensors - model.facing
             c, s = math.cos(theta), math.sin(theta)
             cx, cy = model.centroid
@@ -173,5 +228,6 @@ class Candidates:
                 clusters.centres[j, 1] - s * cx - c * cy,
                 theta,
             )
-        self._left[j] = self._config.iterations_max
-        self.rested[j] = 0
+            self.numbers[j, m] = self._names.next()
+        self._left[j, first:] = self._config.iterations_max
+        self.rested[j, first:] = 0

@@ -137,6 +137,11 @@ class Clusters:
         self.sizes = np.zeros(config.clusters_max, dtype=np.int64)
         self.count = 0
 
+    def adopt(self, config: ClustersConfig) -> bool:
+        """Go on with another T; the number of clusters stays. Return whether clusters are others under it."""
+        before, self._config = self._config, config
+        return before.threshold_m != config.threshold_m
+
     def update(self, outline: OutlineMap) -> None:
         """Cluster the living segments of `outline`."""
         self.count = cluster_segments(

@@ -15,6 +15,7 @@ from config.robot import RingConfig
 from config.settings import PerceptionConfig
 from drivers.messages import Firing
 from perception.echoes import FreshEchoes
+from perception.edits import Edit, Evidence, MoveObject, PlaceModel, Segments, not_a_number, out_of_place
 from perception.full.method import FullPerception
 from perception.kernel import Floats
 from perception.paper import PaperPerception
@@ -75,12 +76,28 @@ class Method(Protocol):
         """Return the outline segments in the map: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""
         ...
 
+    def segments(self) -> Segments:
+        """Return the outline segments in the map with all that is known of them."""
+        ...
+
+    def edit(self, edit: Edit) -> str | None:
+        """Do what a person says; return None, or why it cannot be done."""
+        ...
+
+    def evidence(self, number: int) -> Evidence | None:
+        """Return why an object is believed, None where there is none of this number; changes nothing."""
+        ...
+
     def forget(self) -> None:
         """Begin anew, as after the odometry did."""
         ...
 
     def adopt(self, config: PerceptionConfig) -> None:
         """Go on with other constants, of those that a running process follows (`config.reload.LIVE`)."""
+        ...
+
+    def recognise(self, models: Sequence[ModelConfig]) -> None:
+        """Look for further models as well, which come after those from before."""
         ...
 
     def restored(self) -> None:
@@ -113,6 +130,7 @@ class Perception:
         self.watch = SensorWatch(ring)
         self._echoes = FreshEchoes(mounts_array(ring.mounts))
         self._sensors = len(ring.mounts)
+        self._models = tuple(models)
 
     @property
     def pending(self) -> bool:
@@ -169,6 +187,24 @@ class Perception:
         """Return the outline segments in the map: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""
         return self.method.segments_now()
 
+    def segments(self) -> Segments:
+        """Return the outline segments in the map with their numbers, times, and which are pinned; copies."""
+        return self.method.segments()
+
+    def edit(self, edit: Edit) -> str | None:
+        """Do what a person says; return None, or why it cannot be done, in words for that person.
+
+        What the robot has to keep clear of is none of a person's affair: the fresh echoes stay whatever is edited.
+        """
+        refused = not_a_number(edit)
+        if refused is None and isinstance(edit, PlaceModel | MoveObject):
+            refused = out_of_place(edit.x, edit.y, edit.theta)
+        return self.method.edit(edit) if refused is None else refused
+
+    def evidence(self, number: int) -> Evidence | None:
+        """Return why an object is believed, None where there is none of this number; changes nothing."""
+        return self.method.evidence(number)
+
     def obstacles(self, t_s: float, age_max_s: float) -> Floats:
         """Return each sensor's last echo not older than that at the robot's time `t_s`: points of shape (k, 2), m."""
         return self._echoes.points(t_s, age_max_s)
@@ -182,6 +218,12 @@ class Perception:
     def adopt(self, config: PerceptionConfig) -> None:
         """Go on with other constants, of those that a running process follows (`config.reload.LIVE`)."""
         self.method.adopt(config)
+
+    def recognise(self, models: Sequence[ModelConfig]) -> None:
+        """Look for these models from now on: those from before, and perhaps further ones after them."""
+        if tuple(models) != self._models:
+            self._models = tuple(models)
+            self.method.recognise(models)
 
     def listen_to(self, ring: RingConfig) -> None:
         """Expect another firing pattern of the same sensors from now on."""

@@ -27,3 +27,9 @@ class SeenObject:
     """That it is what it is called; the paper's method does not know."""
     covariance: tuple[float, float, float] | None = None
     """xx, xy, yy of the position, m²; the paper's method does not know."""
+    number: int | None = None
+    """By which it is known as long as it is there; none is used twice. Walls have none."""
+    confirmed: bool = False
+    """A person said that it is there."""
+    placed: bool = False
+    """A person put it there, and the readings do not bear that out by themselves yet."""

@@ -187,6 +187,10 @@ class SegmentExtractor:
         )  # fmt: skip
         return self._out[:count]
 
+    def adopt(self, config: SegmentsConfig) -> None:
+        """Make pairs of other readings from now on."""
+        self._config = config
+
     def forget(self) -> None:
         """Forget all readings, as after the odometry began anew."""
         self._filled[:] = 0

@@ -2,7 +2,8 @@
 
 The walk is over the objects themselves, so that a field added to a method is remembered here the same day. What a
 method is told and never changes (its configuration, its models, `settings`) is left out, and so is what its class
-lists as `SCRATCH`: that is written anew before each use, also by those who only look on.
+lists as `SCRATCH`: that is written anew before each use, also by those who only look on. What it lists as `LATER`
+older programs did not remember: a snapshot of theirs may lack it.
 """
 
 from __future__ import annotations
@@ -35,6 +36,10 @@ def put_back(thing: object, snapshot: Snapshot) -> None:
         The snapshot is of something else: names or shapes differ.
     """
     mine = snapshot_of(thing)
+    later = _later(thing, "")
+    for name in mine.keys() - snapshot.keys():
+        if any(f"{name}.".startswith(f"{held}.") for held in later):
+            snapshot = {**snapshot, name: np.zeros_like(mine[name])}
     if mine.keys() != snapshot.keys():
         strange = sorted(mine.keys() ^ snapshot.keys())
         raise ValueError(f"the snapshot is of another method or version: {', '.join(strange[:3])}")
@@ -54,6 +59,15 @@ def _take(thing: object, path: str, taken: Snapshot) -> None:
             taken[path + name] = np.array(value)
         else:
             _take(value, f"{path}{name}.", taken)
+
+
+def _later(thing: object, path: str) -> list[str]:
+    """Return the dotted names of what a snapshot may lack, and of what holds such."""
+    found = [path + name for name in getattr(type(thing), "LATER", ())]
+    for name, value in _parts(thing):
+        if not isinstance(value, np.ndarray | bool | int | float):
+            found += _later(value, f"{path}{name}.")
+    return found
 
 
 def _put(thing: object, path: str, snapshot: Snapshot) -> None:

@@ -36,6 +36,7 @@ def run(
     headless: Annotated[bool, Flag] = False,
     record: str | None = None,
     no_record: Annotated[bool, Flag] = False,
+    no_console: Annotated[bool, Flag] = False,
     json: JsonFile = None,
     world: str | None = None,
     seed: Seed = 0,
@@ -64,6 +65,8 @@ def run(
         Record the run into this file, instead of into the folder of recordings; a name in .csv gives a ring log.
     no_record
         Leave no recording.
+    no_console
+        Serve no page to watch and drive it by.
     world
         World of the emulator, a file or a name.
     seed
@@ -78,7 +81,7 @@ def run(
     emulation = Emulation(world=world, seed=seed, trace=trace, faults=faults)
     return run_robot(
         config, sets, port=port, arm=arm, seconds=seconds, headless=headless, record=record,
-        no_record=no_record, json_file=json, emulation=emulation, units=units,
+        no_record=no_record, no_console=no_console, json_file=json, emulation=emulation, units=units,
     )  # fmt: skip
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from drivers.driver import RobotDriver
 from drivers.messages import Twist
+from perception.edits import Edit
 from runtime.modes import GAP_MAX_S, GAP_SHARE, Request
 from runtime.step import Command, Inputs, Order
+from runtime.wishes import Wish
 
 
 def give(driver: RobotDriver, command: Command) -> None:
@@ -27,12 +29,16 @@ def gather(
     echo_age_s: float | None = None,
     overrun: str | None = None,
     unwell: str | None = None,
+    edits: tuple[Edit, ...] = (),
+    wish: Wish | None = None,
 ) -> Inputs:
     """Return everything a cycle that begins at `now_s` is told."""
     driver.tick(now_s)
     gap_max_s = gap_max(driver)
     state, trouble, heard = driver.state, driver.trouble, driver.take()
-    return Inputs(now_s, state, trouble, heard, request, gap_max_s, echo_age_s, overrun, unwell)
+    return Inputs(
+        now_s, state, trouble, heard, request, gap_max_s, echo_age_s, overrun, unwell, edits=edits, wish=wish
+    )
 
 
 def gap_max(driver: RobotDriver) -> float:

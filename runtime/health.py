@@ -88,6 +88,12 @@ class Health:
 
         task.add_done_callback(done)
 
+    def report(self, who: str, error: BaseException) -> None:
+        """Take note of what a part has caught that it should never have met; as of a callback that raised."""
+        what = f"{who} ({told(error)})"
+        self._accident = RAISED.format(what)
+        self._log.error("a part failed", culprit=what, exc_info=error)
+
     def relieve(self) -> None:
         """Let parts end from now on: the run does."""
         self._is_over = True

@@ -11,7 +11,7 @@ import logging
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import orjson
 import structlog
@@ -30,12 +30,18 @@ if TYPE_CHECKING:
     Tap = Callable[[Mapping[str, Any]], None]
 
 
+SECRET: Final = frozenset({"start_url"})
+"""What only the log's own file and the terminal hold: recordings are handed on, and lines are shown to strangers."""
+
+
 class LogStanding:
     """How the log of a run stands, also after its end."""
 
     def __init__(self) -> None:
         self.file: Sink | None = None
         self.terminal: Sink | None = None
+        self.listeners: list[Tap] = []
+        """Get every line, too, but for what is secret in it."""
 
     @property
     def lost(self) -> int:
@@ -82,8 +88,8 @@ class _Tee:
             self._show(logger, "warning", {**warning, "level": "warning", "timestamp": event.get("timestamp")})
 
     def _show(self, logger: Any, name: str, event: Mapping[str, Any]) -> None:  # noqa: ANN401
-        if self._tap is not None:
-            self._tap(dict(event))
+        for listen in (*(() if self._tap is None else (self._tap,)), *self._standing.listeners):
+            listen({name: value for name, value in event.items() if name not in SECRET})
         if self._standing.terminal is not None:
             self._standing.terminal.put((str(self._render(logger, name, dict(event))) + "\n").encode())
 
@@ -147,7 +153,7 @@ def _open_file(config: LogConfig) -> tuple[int | None, str | None]:
     path = Path(config.file or f"{state}/echolocate/echolocate.jsonl").expanduser()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        return os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NOCTTY, 0o644), None
+        return os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NOCTTY, 0o600), None
     except OSError as error:
         if config.file is None:
             return None, f"{path}: {error.strerror}"

@@ -39,6 +39,8 @@ GAP_SHARE: Final = 0.9
 GAP_MAX_S: Final = GAP_SHARE * 0.5
 """That gap for the protocol's usual deadman, used until the robot has said its own."""
 
+HALTED: Final = "halted by the operator; re-arm to go on"
+DISARMED: Final = "disarmed by the operator; re-arm to go on"
 HELD_UP: Final = "the program was held up for {:.1f} s, so commands came too late: check the load, then re-arm"
 
 
@@ -57,6 +59,8 @@ class Request(Enum):
 
     ARM = "arm"
     HALT = "halt"
+    DISARM = "disarm"
+    """Stand, and wait to be armed: from DRIVE back to READY, without the base's latch."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,9 +115,11 @@ def advance(state: ModeState, seen: Situation) -> ModeState:
         return state
     if state.mode is Mode.DRIVE:
         reason = why_stop(state, seen)
-        return state if reason is None else state.enter(Mode.SAFE_STOP, seen.now_s, reason)
+        if reason is not None:
+            return state.enter(Mode.SAFE_STOP, seen.now_s, reason)
+        return state.enter(Mode.READY, seen.now_s, DISARMED) if seen.request is Request.DISARM else state
     if seen.request is Request.HALT:
-        return state.enter(Mode.SAFE_STOP, seen.now_s, "halted by the operator; re-arm to go on")
+        return state.enter(Mode.SAFE_STOP, seen.now_s, HALTED)
     if seen.unwell is not None:
         known = state.mode is Mode.SAFE_STOP and state.reason == seen.unwell and seen.request is None
         return replace(state, arming_s=None) if known else state.enter(Mode.SAFE_STOP, seen.now_s, seen.unwell)
@@ -129,7 +135,7 @@ def advance(state: ModeState, seen: Situation) -> ModeState:
 def why_stop(state: ModeState, seen: Situation) -> str | None:
     """Return the reason why driving must end, None where there is none."""
     if seen.request is Request.HALT:
-        return "halted by the operator; re-arm to go on"
+        return HALTED
     if seen.unwell is not None:
         return seen.unwell
     if seen.line is not LineState.READY:
@@ -158,6 +164,9 @@ def _arm(state: ModeState, seen: Situation) -> ModeState:
         return replace(state, arming_s=seen.now_s)
     if state.arming_s is None:
         return state
+    if seen.request is Request.DISARM:
+        # From SAFE_STOP the latch is open already: it is set again.
+        return state.enter(state.mode, seen.now_s, DISARMED)
     if seen.gap_s > seen.gap_max_s:
         return state.enter(Mode.SAFE_STOP, seen.now_s, HELD_UP.format(seen.gap_s))
     if seen.overrun is not None:

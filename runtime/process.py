@@ -17,6 +17,7 @@ from drivers.denning.robot import DenningRobot
 from drivers.driver import RobotDriver
 from drivers.link import Link
 from drivers.messages import Firing, Twist
+from perception.edits import Edit, Evidence
 from perception.pipeline import Perception
 from runtime.books import Books
 from runtime.commanding import gap_max, gather, give
@@ -31,19 +32,29 @@ from runtime.notify import Notifier
 from runtime.phases import Phase
 from runtime.realtime import ask
 from runtime.rhythm import Rhythm
-from runtime.step import Command, CycleRecord, State, step
+from runtime.step import Command, CycleRecord, State, step, take_over
 from runtime.summary import RunSummary, run_summary
+from runtime.timekeeping import Timekeeper
+from runtime.wishes import Wish
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
 Way: TypeAlias = Literal["in", "out"]
 
+EDITS_MAX: Final = 64
+"""Changes of the map that may wait for the next cycle: more than a person makes in a twentieth of a second."""
+
 LINE_OPENED: Final = "line opened"
 LINK_RECEIVE: Final = "link receive"
 LINE_LOST: Final = "line lost"
 COLLECTION: Final = "garbage collection"
-CALLBACKS: Final = (LINE_OPENED, LINK_RECEIVE, LINE_LOST, COLLECTION)
+CONSOLE_RECEIVE: Final = "console receive"
+CONSOLE_FRAME: Final = "console frame"
+CONSOLE_SEND: Final = "console send"
+CALLBACKS: Final = (
+    LINE_OPENED, LINK_RECEIVE, LINE_LOST, COLLECTION, CONSOLE_RECEIVE, CONSOLE_FRAME, CONSOLE_SEND
+)  # fmt: skip
 """What of ours the loop calls between two cycles."""
 
 
@@ -110,19 +121,51 @@ class RobotProcess:
         self._stop_reasons: list[str] = []
         self._notices = Notices()
         self._request: Request | None = None
+        self._edits: list[Edit] = []
+        self._wish: Wish | None = None
         self._arm_when_ready = False
         self._stop = asyncio.Event()
         self._next_settings: Settings | None = None
 
     def request(self, request: Request) -> None:
-        """Take an operator's request into the next cycle; a HALT is not overruled by an ARM in the same one.
+        """Take an operator's request into the next cycle; what stops is not overruled by an ARM in the same one.
 
         The base is told to halt at once; the next cycle only takes note of it.
         """
-        if self._request is not Request.HALT:
+        if self._request is not Request.HALT and (self._request, request) != (Request.DISARM, Request.ARM):
             self._request = request
         if request is Request.HALT:
             self._halt()
+
+    def wish(self, wish: Wish) -> None:
+        """Take what is to be driven into the next cycle; the newest counts."""
+        self._wish = wish
+
+    def edit(self, edit: Edit) -> bool:
+        """Take a change of the map into the next cycle; return False where too many wait already."""
+        if len(self._edits) >= EDITS_MAX:
+            return False
+        self._edits.append(edit)
+        return True
+
+    def evidence(self, number: int) -> Evidence | None:
+        """Return what speaks for and against an object, None where there is no such object."""
+        return self._state.perception.evidence(number)
+
+    @property
+    def state(self) -> State:
+        """What the last cycle left; whoever looks at it between two cycles must not change it."""
+        return self._state
+
+    @property
+    def keeper(self) -> Timekeeper:
+        """The books of time; whoever adds callbacks to the loop has them timed here."""
+        return self._rhythm.keeper
+
+    @property
+    def name(self) -> str | None:
+        """What the robot calls itself, None until it has."""
+        return None if self._driver.identity is None else self._driver.identity.name
 
     def reconfigure(self, settings: Settings) -> None:
         """Go on with other settings from the next cycle on; only such as `config.reload` lets through."""
@@ -151,8 +194,7 @@ class RobotProcess:
         """
         with self.health.hearing_accidents():
             await self._ends.connect(self._stop.is_set)
-            name = None if self._driver.identity is None else self._driver.identity.name
-            self._log.info("robot ready", port=self._settings.link.port, robot=name)
+            self._log.info("robot ready", port=self._settings.link.port, robot=self.name)
             keeper = asyncio.create_task(self._link.run(), name="link")
             self.health.watch_task("link", keeper)
             for refusal in ask(self._settings.realtime):
@@ -199,8 +241,7 @@ class RobotProcess:
         if self._next_settings is not None:
             self._settings, self._next_settings = self._next_settings, None
             self._driver.set_firing(self._settings.ring)
-            self._state.perception.adopt(self._settings.perception)
-            self._state.perception.listen_to(self._settings.ring)
+            take_over(self._state, self._settings)
             if self._observers.on_settings is not None:
                 self._observers.on_settings(self._settings)
         if self._arm_when_ready and self._state.mode.mode is Mode.READY:
@@ -209,11 +250,14 @@ class RobotProcess:
         rhythm, start_s = self._rhythm, now.wall_s
         mark = rhythm.keeper.mark
         request, self._request = self._request, None
+        wish, self._wish = self._wish, None
+        edits, self._edits = tuple(self._edits), []
         begun = rhythm.begin(now)
         unwell = self.health.unwell()
         inputs = gather(
-            self._driver, start_s, request, echo_age_s=begun.echo_age_s, overrun=rhythm.overrun, unwell=unwell
-        )
+            self._driver, start_s, request, echo_age_s=begun.echo_age_s, overrun=rhythm.overrun, unwell=unwell,
+            edits=edits, wish=wish,
+        )  # fmt: skip
         mark(Phase.GATHER)
         budget_s = self._settings.cycle.perception_budget_s
         before = self._state.mode

@@ -43,6 +43,8 @@ class Reloader:
         self._propose = propose
         self._take_over = take_over
         self._log = log
+        self.on_taken: Callable[[Settings], None] = lambda _settings: None
+        """Told of settings that were taken over from the files."""
         self._under_way: asyncio.Task[None] | None = None
         self._again = False
 
@@ -52,6 +54,11 @@ class Reloader:
             self._again = True
             return
         self._under_way = asyncio.get_running_loop().create_task(self._attempts(), name="reload")
+
+    def supersede(self, settings: Settings) -> None:
+        """Take over settings that came by another way; the next attempt is compared with them."""
+        self._take_over(settings)
+        self.current = settings
 
     async def settled(self) -> None:
         """Wait until no attempt is under way."""
@@ -89,4 +96,5 @@ class Reloader:
         else:
             self._take_over(outcome.settings)
             self.current = outcome.settings
+            self.on_taken(outcome.settings)
             self._log.info("the configuration is taken over", changed=[str(d) for d in outcome.changed])

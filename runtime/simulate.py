@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from config.settings import Settings
@@ -23,10 +23,19 @@ from runtime.allowance import QUANTA_PER_CYCLE, Allowance, Quanta
 from runtime.books import Books
 from runtime.commanding import gather, give
 from runtime.modes import Mode, Request
-from runtime.step import CycleRecord, State, step
+from runtime.step import CycleRecord, Edit, State, Wish, step, take_over
 
 SETTLING_S: Final = 1.0
 """How long a robot that has arrived still listens, so that the last echoes count."""
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What an operator says in a cycle."""
+
+    request: Request | None = None
+    wish: Wish | None = None
+    edits: tuple[Edit, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +65,7 @@ def simulate(
     clock_start_us: int = 0,
     reload: Callable[[int], Settings | None] | None = None,
     on_bytes: OnBytes | None = None,
+    operator: Callable[[int, State], Said] | None = None,
 ) -> Simulated:
     """Drive through `world` until the leg is done, the robot stops for a reason, or the time is up.
 
@@ -81,6 +91,9 @@ def simulate(
         Asked with the number of each cycle for settings to go on with from there, as after a reload.
     on_bytes : callable, optional
         Gets what goes over the line, either way, and when.
+    operator : callable, optional
+        Asked with the number of each cycle, and the state before it, for what an operator says in it. It arms only
+        where it says so, and a drive does not end by itself.
     """
     allowance = Quanta(QUANTA_PER_CYCLE) if allowance is None else allowance
     robot = EmulatedRobot(settings, world, seed, clock_start_us=clock_start_us)
@@ -96,10 +109,11 @@ def simulate(
         if reload is not None and (other := reload(books.cycles + 1)) is not None:
             settings = other
             driver.set_firing(settings.ring)
-            state.perception.adopt(settings.perception)
+            take_over(state, settings)
         line.exchange(now)
         request = Request.ARM if state.mode.mode is Mode.READY else None
-        inputs = gather(driver, now, request)
+        said = Said(request) if operator is None else operator(books.cycles + 1, state)
+        inputs = replace(gather(driver, now, said.request), wish=said.wish, edits=said.edits)
         step_s = time.perf_counter()
         allowance.begin()
         record = step(state, inputs, settings, lambda c: give(driver, c), allowance)
@@ -108,6 +122,6 @@ def simulate(
             on_cycle(record, robot.truth)
         if on_state is not None:
             on_state(record, state, start)
-        if state.mode.mode is Mode.SAFE_STOP or (state.leg is not None and state.leg.done):
+        if operator is None and (state.mode.mode is Mode.SAFE_STOP or (state.leg is not None and state.leg.done)):
             until = min(until, now + SETTLING_S)
     return Simulated(state, start, robot.truth, now, time.perf_counter() - began, books, driver.counts)

@@ -12,18 +12,33 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Literal, TypeAlias
 
-from behaviors.arbiter import Drive, Stop, arbitrate
-from behaviors.avoid_static_obstacle import avoid_static_obstacle
-from behaviors.move_ahead import Leg, move_ahead
+from behaviors.arbiter import Drive, Stop
+from behaviors.move_ahead import Leg
+from behaviors.response import Response
 from config.settings import Settings
 from drivers.driver import Heard, LineState
 from drivers.messages import Flags, Odometry, Twist
+from perception.edits import Edit
 from perception.percept import Percept
 from perception.pipeline import Perception
 from runtime.modes import GAP_MAX_S, Mode, ModeState, Request, Situation, advance
 from runtime.phases import Phase, unmarked
+from runtime.wishes import STANDSTILL, Legs, Wish, after_a_stop, drive, why_not
 
-STANDSTILL = Twist(0.0, 0.0)
+__all__ = [
+    "STANDSTILL",
+    "Command",
+    "CycleRecord",
+    "Edit",
+    "Inputs",
+    "Order",
+    "Refused",
+    "State",
+    "StopCause",
+    "Wish",
+    "step",
+    "take_over",
+]
 
 
 class Order(Enum):
@@ -55,6 +70,19 @@ class Inputs:
     """Why the cycle cannot keep its time any more; None while it can."""
     unwell: str | None = None
     """Which part of the program has failed; None while all work."""
+    wish: Wish | None = None
+    """What the operator wants driven from now on; None where that is as before."""
+    edits: tuple[Edit, ...] = ()
+    """What the operator does to what was perceived, in this order."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """What an operator asked for in vain, and why."""
+
+    edit: int | None
+    """Which of the cycle's edits; None: the wish."""
+    why: str
 
 
 @dataclass(slots=True)
@@ -68,6 +96,14 @@ class State:
     last_firing_s: float = 0.0
     now_s: float | None = None
     cycle: int = 0
+    wish: Wish = field(default_factory=Legs)
+    """What is driven in DRIVE."""
+    wished_s: float = 0.0
+    """When the operator said so, by the host's clock."""
+    vectors: tuple[Response, ...] = ()
+    """What the schemas answered in the last cycle, and their sum; nothing where none was asked."""
+    standing: str | None = None
+    """Why the robot stands though it may drive; None where it does not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +120,8 @@ class CycleRecord:
     quanta: int
     iterations: int
     refinement: StopCause
+    refused: tuple[Refused, ...] = ()
+    """What of the operator's wish and edits came to nothing."""
 
 
 def step(
@@ -94,7 +132,7 @@ def step(
     may_refine: Callable[[int], bool],
     mark: Callable[[Phase], None] = unmarked,
 ) -> CycleRecord:
-    """Run one cycle: perceive, decide, command, and then refine for as long as it may.
+    """Run one cycle: perceive, decide, command, do what a person says, and refine for as long as it may.
 
     Parameters
     ----------
@@ -105,7 +143,7 @@ def step(
     settings : Settings
         The run's settings.
     carry_out : callable
-        Gets the command before refinement begins, so that no refinement ever delays a stop.
+        Gets the command before anything is edited or refined, so that neither ever delays a stop.
     may_refine : callable
         Asked with the number of quanta done before each further one.
     mark : callable
@@ -122,13 +160,32 @@ def step(
     mark(Phase.DECIDE)
     carry_out(command)
     mark(Phase.COMMAND)
+    refused = _edit(state, inputs)
     quanta, iterations, refinement = _refine(state.perception, may_refine)
     mark(Phase.REFINE)
     state.cycle += 1
     return CycleRecord(
         state.cycle, inputs, state.mode, command, new_segments, state.perception.living,
-        state.perception.hypotheses, quanta, iterations, refinement,
+        state.perception.hypotheses, quanta, iterations, refinement, refused,
     )  # fmt: skip
+
+
+def take_over(state: State, settings: Settings) -> None:
+    """Let perception go on with other settings, of those that a running process follows (`config.reload`)."""
+    state.perception.adopt(settings.perception)
+    state.perception.recognise(settings.models)
+    state.perception.listen_to(settings.ring)
+
+
+def _edit(state: State, inputs: Inputs) -> tuple[Refused, ...]:
+    """Do what the operator says to what was perceived; return what could not be done."""
+    wish = None if inputs.wish is None else why_not(inputs.wish)
+    refused = [] if wish is None else [Refused(None, wish)]
+    for i, edit in enumerate(inputs.edits):
+        why = state.perception.edit(edit)
+        if why is not None:
+            refused.append(Refused(i, why))
+    return tuple(refused)
 
 
 def _perceive(state: State, inputs: Inputs) -> int:
@@ -137,6 +194,7 @@ def _perceive(state: State, inputs: Inputs) -> int:
         state.perception.forget()
         state.odometry = None
         state.leg = None
+        state.wish = after_a_stop(state.wish)  # a goal is a place in the odometry that was
         state.last_firing_s = 0.0
     if inputs.heard.odometry is not None:
         state.odometry = inputs.heard.odometry
@@ -147,7 +205,29 @@ def _perceive(state: State, inputs: Inputs) -> int:
     return new_segments
 
 
+def _take_wish(state: State, inputs: Inputs) -> None:
+    """Take over what the operator wants driven; the legs begin anew where they were done."""
+    if inputs.wish is None or why_not(inputs.wish) is not None:
+        return
+    state.wish, state.wished_s = inputs.wish, inputs.now_s
+    if isinstance(inputs.wish, Legs) and state.leg is not None and state.leg.done:
+        state.leg = None
+
+
 def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
+    """Return what the base is told; whatever ends a drive, or refuses one, takes goal and hand away."""
+    before = state.mode
+    state.vectors, state.standing = (), None
+    _take_wish(state, inputs)
+    command = _command(state, inputs, settings)
+    after = state.mode
+    stopped = after.mode in {Mode.SAFE_STOP, Mode.FAULT} and after.entered_since(before)
+    if stopped or (before.mode is Mode.DRIVE and after.mode is not Mode.DRIVE):
+        state.wish = after_a_stop(state.wish)
+    return command
+
+
+def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
     """Go through modes and schemas and return what the base is told."""
     flags = Flags.NONE if state.odometry is None else state.odometry.flags
     before = state.mode
@@ -159,7 +239,7 @@ def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
     )  # fmt: skip
     state.mode = advance(before, situation)
     if state.mode.mode is Mode.DRIVE:
-        decision = _drive(state, settings)
+        decision = _drive(state, inputs.now_s, settings)
         if isinstance(decision, Drive):
             return decision.twist
         state.mode = state.mode.enter(Mode.SAFE_STOP, inputs.now_s, decision.reason)
@@ -170,7 +250,7 @@ def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
     return STANDSTILL if state.mode.mode is Mode.READY else None
 
 
-def _drive(state: State, settings: Settings) -> Drive | Stop:
+def _drive(state: State, now_s: float, settings: Settings) -> Drive | Stop:
     """Ask the schemas and the arbiter."""
     odometry, behaviors = state.odometry, settings.behaviors
     if odometry is None:
@@ -182,10 +262,10 @@ def _drive(state: State, settings: Settings) -> Drive | Stop:
     if state.leg is None:
         state.leg = Leg.starting_at(odometry.pose)
     percept = Percept(odometry.pose, state.perception.obstacles(odometry.t_s, patience))
-    ahead, state.leg = move_ahead(percept, state.leg, behaviors.move_ahead)
-    away = avoid_static_obstacle(percept, settings.body.radius_m, behaviors.avoid_static_obstacle)
-    expected = ("move_ahead", "avoid_static_obstacle")
-    return arbitrate((ahead, away), percept, settings.body, behaviors.arbiter, expected)
+    driven = drive(state.wish, state.wished_s, now_s, state.leg, percept, settings)
+    state.wish, state.leg = driven.wish, driven.leg
+    state.vectors, state.standing = driven.vectors, driven.standing
+    return driven.decision
 
 
 def _refine(perception: Perception, may_refine: Callable[[int], bool]) -> tuple[int, int, StopCause]:

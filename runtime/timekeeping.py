@@ -23,6 +23,8 @@ OUTSIDE: Final = "outside the process"
 THREAD: Final = "another thread of this process"
 UNTIMED: Final = "a callback that is not timed"
 
+_PHASES: Final = frozenset(phase.value for phase in Phase)
+
 MOSTLY: Final = 0.5
 """Of a span of time: a share above this is what it was spent on."""
 
@@ -47,6 +49,15 @@ class Stretch(NamedTuple):
         if self.end.waits == self.begin.waits:
             return _robbed(self.begin, self.end)
         return _beside(self.begin, self.end, self.wall_s)
+
+
+class Latest(NamedTuple):
+    """How the newest cycle went."""
+
+    phases_s: dict[str, float]
+    """What each phase took."""
+    late_s: float
+    """How long after its time it began."""
 
 
 class Timing(TypedDict):
@@ -171,6 +182,11 @@ class Timekeeper:
     def culprit(self) -> str:
         """Who is most often to blame for the overruns in a row; nobody where there are none."""
         return max(self._row, key=lambda name: self._row[name], default="")
+
+    def latest(self) -> Latest:
+        """Return how the newest cycle went, of whose phases those are known that have ended."""
+        phases_s = {s.name: s.wall_s for s in self._stretches if s.name in _PHASES}
+        return Latest(phases_s, 0.0 if self._begun is None else self._begun.late_s)
 
     def timing(self) -> Timing:
         """Return the books."""

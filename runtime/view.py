@@ -20,7 +20,7 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from rich.console import Console, Group
+from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.panel import Panel
 from rich.table import Table
@@ -97,6 +97,8 @@ class View:
         }
         self._ranges = np.full(len(settings.ring.mounts), np.nan)
         self._trail: deque[tuple[float, float]] = deque(maxlen=TRAIL)
+        self.console_url: str | None = None
+        """Where the operator console is, None where there is none."""
         self._slot: Snapshot | None = None
         self._wake = threading.Event()
         self._done = False
@@ -160,7 +162,15 @@ class View:
             )
         rows = [object_row(seen) for seen in snapshot.objects]
         legend = "→ robot   • outline segments   o objects   a arm   space halt   q quit"
-        return Group(head, Panel(plan, subtitle=legend), objects_table(rows, self._units), self._numbers(snapshot))
+        parts: list[RenderableType] = [
+            head,
+            Panel(plan, subtitle=legend),
+            objects_table(rows, self._units),
+            self._numbers(snapshot),
+        ]
+        if self.console_url is not None:
+            parts.append(Text(f"console  {self.console_url}", overflow="fold"))
+        return Group(*parts)
 
     def _numbers(self, snapshot: Snapshot) -> Table:
         grid = Table.grid(padding=(0, 2))

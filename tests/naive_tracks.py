@@ -287,16 +287,23 @@ def claimed_by(q: Array, tracks: Iterable[tuple[int, Array, float, float]], opt:
     return min(fits)[1] if fits and q[4] < SILENT else -1
 
 
-def after_merging(t: int, live: Array, place: Array, rho: Array, llr: Array, merge: float) -> Array:
-    """Return which tracks live once t has met the others in turn: of two in one place the one with more evidence."""
-    live = live.copy()
+def after_merging(
+    t: int, live: Array, place: Array, rho: Array, llr: Array, merge: float, said: Array, number: Array
+) -> tuple[Array, Array]:
+    """Return which tracks live once t has met the others in turn, and their numbers.
+
+    Of two in one place the one stays that a person spoke of; else the one with more evidence, by the older number.
+    """
+    live, number = live.copy(), number.copy()
     for k in np.flatnonzero(live):
         if k != t and math.dist(place[k], place[t]) < max(merge, 0.8 * max(rho[k], rho[t])):
-            loser = t if llr[k] > llr[t] else k
+            loser = t if (bool(said[k]), float(llr[k])) > (bool(said[t]), float(llr[t])) else k
+            if not said[k] and not said[t]:
+                number[k + t - loser] = min(number[k], number[t])
             live[loser] = False
             if loser == t:
                 break
-    return live
+    return live, number
 
 
 def next_in_turn(

@@ -18,7 +18,8 @@ from runtime.recording.part import CHUNK_BYTES, INDEX, PROFILE
 from runtime.recording.reading import open_recording
 from runtime.recording.recorder import Recorder
 from runtime.recording.writer import Standing
-from runtime.simulate import simulate
+from runtime.simulate import Said, simulate
+from runtime.step import State
 
 WAIT_S = 30.0
 
@@ -57,6 +58,7 @@ def record(
     seed: int = 0,
     queue_max: int = 8192,
     reloads: Mapping[int, Settings] = MappingProxyType({}),
+    operator: Callable[[int, State], Said] | None = None,
 ) -> Standing:
     """Record a run in virtual time in which every sixth quantum of refinement is refused for want of time."""
     world = settings.world
@@ -81,6 +83,7 @@ def record(
 
         simulate(
             settings, world, seed, seconds, on_state=on_state, allowance=FiveInSix(seed), reload=reload,
+            operator=operator,
         )  # fmt: skip
         recorder.on_summary({"mode": "DRIVE", "cycles": 20 * seconds})
     return recorder.standing

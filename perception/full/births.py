@@ -14,6 +14,7 @@ from perception.full.contact import HIGH, LOW, fit_circle
 from perception.full.contact import HITS as HIT
 from perception.full.contact import NEAR as NEARBY
 from perception.full.hearing import audible
+from perception.full.marks import give_number, is_barred
 from perception.full.noise_choice import noise_variance
 from perception.full.pairs import map_near
 from perception.full.reservoir import gather, put
@@ -27,6 +28,7 @@ from perception.full.state import (
     FREE,
     KIND,
     LLR,
+    MARK,
     PULLING,
     R00,
     R11,
@@ -75,7 +77,7 @@ def free_track(s: State) -> int:
     for t in range(s.ti.shape[0]):
         if s.ti[t, ST] == FREE:
             return t
-        if s.ti[t, ST] == TENTATIVE and s.tf[t, LLR] < worst:
+        if s.ti[t, ST] == TENTATIVE and s.tf[t, LLR] < worst and s.names[t, MARK] == 0:
             worst = s.tf[t, LLR]
             slot = t
     return slot
@@ -123,6 +125,15 @@ def begin_track(s: State, kind: int, rho: float, x: float, y: float, n: int, now
     t = free_track(s)
     if t < 0:
         return -1
+    begin_at(s, t, kind, rho, x, y, n, now)
+    give_number(s.names, s.tally, t)
+    s.g[BIRTHS] += 1
+    return t
+
+
+@kernel
+def begin_at(s: State, t: int, kind: int, rho: float, x: float, y: float, n: int, now: float) -> None:
+    """Make track `t` a tentative one on the `n` readings in `s.w`."""
     s.ti[t, :] = 0
     s.tf[t, :] = 0.0
     s.comp[t, :] = 0.0
@@ -137,8 +148,6 @@ def begin_track(s: State, kind: int, rho: float, x: float, y: float, n: int, now
     s.tf[t, BORN] = now
     for j in range(n):
         put(s.bins, s.bn, t, x, y, s.w[j])
-    s.g[BIRTHS] += 1
-    return t
 
 
 @kernel
@@ -200,7 +209,7 @@ def birth(s: State, p: Settings, kind: int, sx: float, sy: float, nx: float, ny:
         return 1
     if chosen != kind and best < p.unknown * near + RIVAL_OVER_UNKNOWN:
         return 1
-    if is_known(s, p, bx, by, -1.0, nx, ny):
+    if is_known(s, p, bx, by, -1.0, nx, ny) or is_barred(s, bx, by, chosen, best):
         return 1
     t = begin_track(s, chosen, p.radii[chosen], bx, by, n, now)
     if t < 0:

@@ -71,6 +71,6 @@ def pquantum(h: Handle, threshold: float) -> bool:
 def sure_circles(h: Handle, told: Floats, sure: Ints) -> int:
     """Write the circles that have a name to `sure`, those that changed as ~t, and return how many; see `report`."""
     s = h.s
-    n = report.sure_circles(s.ti, sure)
-    report.mark_changed(s.ti, s.tf, told, n, sure)
+    n = report.sure_circles(s.ti, s.names, sure)
+    report.mark_changed(s.ti, s.tf, s.names, told, n, sure)
     return n

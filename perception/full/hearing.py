@@ -55,6 +55,18 @@ def is_anothers(
 
 
 @kernel
+def speaks(
+    s: State, p: Settings, q: Floats, cx: float, cy: float, rho: float, own: int, var0: float, rel2: float
+) -> bool:  # fmt: skip
+    """Tell whether reading `q` can speak of a circle: nothing hides it, and nobody explains the reading better."""
+    d = math.hypot(cx - q[0], cy - q[1])
+    e = q[4] - (d - rho)
+    if e > p.gate:
+        return not (d > rho and is_hidden(s, q[0], q[1], cx, cy, d, rho, own))
+    return not is_anothers(s, p, q, cx, cy, abs(e), own, var0, rel2)
+
+
+@kernel
 def audible(s: State, p: Settings, n: int, cx: float, cy: float, rho: float, own: int) -> int:
     """Leave out of the `n` readings in `s.w` what cannot speak of a circle; return how many remain.
 
@@ -73,13 +85,7 @@ def audible(s: State, p: Settings, n: int, cx: float, cy: float, rho: float, own
     kept = 0
     for j in range(n):
         q = s.w[j]
-        d = math.hypot(cx - q[0], cy - q[1])
-        e = q[4] - (d - rho)
-        if e > p.gate:
-            leave = d > rho and is_hidden(s, q[0], q[1], cx, cy, d, rho, own)
-        else:
-            leave = is_anothers(s, p, q, cx, cy, abs(e), own, var0, rel2)
-        if not leave:
+        if speaks(s, p, q, cx, cy, rho, own, var0, rel2):
             if kept != j:
                 for z in range(5):
                     s.w[kept, z] = q[z]

@@ -16,9 +16,23 @@ from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import FullConfig, PerceptionConfig
 from drivers.messages import Firing
+from perception.edits import Edit, Evidence, Segments
+from perception.full.editing import edit_memory, row_of
 from perception.full.entry import hold, observe, pquantum, quantum, sure_circles
-from perception.full.report import POLYGON_PROBABILITY, circle, other_things, polygon, sure_polygons
-from perception.full.settings import circle_models, make_settings, tuned
+from perception.full.evidence import evidence_of
+from perception.full.heirs import inherit, number_heirs
+from perception.full.pins import Pins, listed
+from perception.full.report import (
+    POLYGON_PROBABILITY,
+    TOLD,
+    circle,
+    other_things,
+    polygon,
+    rival_label,
+    rival_labels,
+    sure_polygons,
+)
+from perception.full.settings import circle_models, library, make_settings, tuned
 from perception.full.state import KIND, MODEL, PPROB, PROB, PT, SEGMENTS, ST, clear, make_state
 from perception.kernel import Floats
 from perception.seen import SeenObject
@@ -43,6 +57,8 @@ class FullPerception:
 
     SCRATCH: Final = ("_sure", "_told", "_handle")
     """No memory: what reporting works with, and another way to the memory."""
+    LATER: Final = ("_pins", "memory.names", "memory.tally", "memory.stamps", "memory.barred")
+    """What recordings of older programs do not hold."""
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: FullConfig) -> None:
         self._mounts = mounts_array(ring.mounts)
@@ -52,10 +68,10 @@ class FullPerception:
         self.memory = make_state(len(self._mounts), self.settings, config.tracks_max)
         """What they remember."""
         self._handle = hold(self.memory, self.settings)
-        _, self._round = circle_models(models)
-        self._outlines = [m.name for m in models if m.arc_radius_m is None]
+        self._pins = Pins()
+        self._library(models)
         self._sure = np.zeros(max(config.tracks_max, PT), np.int64)
-        self._told = np.full((config.tracks_max, 8), np.nan)
+        self._told = np.full((config.tracks_max, TOLD), np.nan)
         self._circles: dict[int, SeenObject] = {}
         self._objects: tuple[SeenObject, ...] | None = None
         self._left = 0
@@ -101,6 +117,8 @@ class FullPerception:
         self._left = self._config.quanta_per_firing
         self._polygons_left = self._config.polygon_quanta_per_firing
         self._polygons_pending = self.settings.polys > 0
+        if self._pins.count > 0:
+            self._pins.renew(self.memory)
         return made
 
     def refine(self) -> int:
@@ -131,7 +149,7 @@ class FullPerception:
         seen = [self._circles[t] if t >= 0 else self._tell_circle(~t) for t in self._sure[:n].tolist()]
         if p.polys > 0:
             least = min(least, POLYGON_PROBABILITY)
-            n = sure_polygons(s.pi, s.pf, s.pbn, s.pbins, least, self._sure)
+            n = sure_polygons(s.pi, s.pf, s.pbn, s.pbins, s.names, len(s.ti), least, self._sure)
             seen += [
                 polygon(s, p, t, self._outlines[s.pi[t, MODEL]], float(s.pf[t, PPROB]))
                 for t in self._sure[:n].tolist()
@@ -151,15 +169,36 @@ class FullPerception:
 
     def segments_now(self) -> Floats:
         """Return the mapped segments: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""
-        s = self.memory
-        used = np.arange(s.store.shape[1]) < s.fill[:, None]
-        rows = s.store[used]
+        return self.segments().ends
+
+    def segments(self) -> Segments:
+        """Return the outline segments in the map with all that is known of them."""
+        numbers, times, rows = listed(self.memory)
         along = 0.5 * DRAWN_M * np.column_stack([-rows[:, 3], rows[:, 2]])
-        return np.column_stack([rows[:, :2] - along, rows[:, :2] + along, np.arctan2(rows[:, 3], rows[:, 2])])
+        ends = np.column_stack([rows[:, :2] - along, rows[:, :2] + along, np.arctan2(rows[:, 3], rows[:, 2])])
+        return Segments(numbers, ends, times, np.isin(numbers, self._pins.numbers.astype(np.int64)).astype(np.int64))
+
+    def edit(self, edit: Edit) -> str | None:
+        """Do what a person says; return None, or why it cannot be done."""
+        self._objects = None
+        return edit_memory(self.memory, self.settings, self._pins, self._round, self._outlines, edit)
+
+    def evidence(self, number: int) -> Evidence | None:
+        """Return what each reading that an object has kept says of it."""
+        s, p = self.memory, self.settings
+        row = row_of(s, number)
+        if row is None:
+            return None
+        if row >= len(s.ti):
+            name = self._outlines[s.pi[row - len(s.ti), MODEL]]
+        else:
+            name = self._round[s.ti[row, KIND]] if s.ti[row, KIND] < p.models else rival_label(s, row)
+        return evidence_of(s, p, row, number, name, rival_labels(p, self._round))
 
     def forget(self) -> None:
         """Begin anew, as after the odometry did."""
         clear(self.memory)
+        self._pins.clear()
         self._objects = ()
         self._left = 0
         self._polygons_left = 0
@@ -172,6 +211,21 @@ class FullPerception:
         self._handle = hold(self.memory, self.settings)
         self._objects = None
 
-    def restored(self) -> None:
-        """Drop what was worked out before the memory was put back from a snapshot."""
+    def recognise(self, models: Sequence[ModelConfig]) -> None:
+        """Look for further models as well, which come after those from before."""
+        before, self.settings = self.settings, self.settings._replace(**library(models))
+        self.memory = inherit(self.memory, before, self.settings)
+        self._handle = hold(self.memory, self.settings)
+        self._library(models)
+        self._told[:] = np.nan
         self._objects = None
+
+    def restored(self) -> None:
+        """Drop what was worked out before the memory was put back from a snapshot, and make good what it lacks."""
+        number_heirs(self.memory)
+        self._told[:] = np.nan
+        self._objects = None
+
+    def _library(self, models: Sequence[ModelConfig]) -> None:
+        _, self._round = circle_models(models)
+        self._outlines = [m.name for m in models if m.arc_radius_m is None]

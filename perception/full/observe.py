@@ -30,6 +30,9 @@ from perception.full.state import (
     R00,
     SEGMENTS,
     ST,
+    STAMP,
+    STAMP_S,
+    STAMPED,
     TENTATIVE,
     TRHO,
     TX,
@@ -257,7 +260,11 @@ def make_segments(s: State, p: Settings, m: int, now: float) -> int:
             made = pair_in_ring(i, s.cur, m, s.hist, s.hn, now, p.gap, p.cos_half, var, s.segs, made)
     for k in range(made):
         if s.segs[k, 4] > MAPPED_MIN_M:
-            map_add(s.segs[k], CELL_M, s.tags, s.fill, s.store)
+            bucket = map_add(s.segs[k], CELL_M, s.tags, s.fill, s.store)
+            at = (s.fill[bucket] - 1) % s.store.shape[1]
+            s.tally[STAMPED] += 1
+            s.stamps[bucket, at, STAMP] = s.tally[STAMPED]
+            s.stamps[bucket, at, STAMP_S] = now
     s.g[SEGMENTS] += made
     return made
 

@@ -104,8 +104,8 @@ def cell_slot(ix: int, iy: int, slots: int) -> int:
 
 
 @kernel
-def map_add(seg: Floats, cell: float, tags: Ints, fill: Ints, store: Floats) -> None:
-    """Put a segment into its cell's bucket.
+def map_add(seg: Floats, cell: float, tags: Ints, fill: Ints, store: Floats) -> int:
+    """Put a segment into its cell's bucket, and return which one that is.
 
     A full bucket forgets its oldest segment. A bucket that another cell holds is emptied and taken over.
 
@@ -133,6 +133,7 @@ def map_add(seg: Floats, cell: float, tags: Ints, fill: Ints, store: Floats) -> 
     for q in range(4):
         store[k, j, q] = seg[q]
     fill[k] += 1
+    return k
 
 
 @kernel

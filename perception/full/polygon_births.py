@@ -2,7 +2,7 @@
 
 As for circles the paper's relaxation moves the body onto the outline map, and the raw readings that the sensors
 remember decide. Along a side, contact says little, so each side is tried shifted as well. To propose one takes no
-time; to try it is a job. Here is also what keeps a polygon's readings.
+time; to try it is a job.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from typing import Final
 from perception.full.births import CELL_M
 from perception.full.contact import HITS as HIT
 from perception.full.contact import NEAR as NEARBY
+from perception.full.marks import POLYGON as POLYGON_BAR
+from perception.full.marks import give_number, is_barred
 from perception.full.pairs import map_near
 from perception.full.polygon import BEST, THETA, X, Y
 from perception.full.polygon_job import (
@@ -33,6 +35,7 @@ from perception.full.polygon_job import (
     sought,
     weigh_pose,
 )
+from perception.full.polygon_reservoir import collect, pput
 from perception.full.state import (
     CTH,
     CX,
@@ -40,11 +43,9 @@ from perception.full.state import (
     DIRTY,
     ESTABLISHED,
     FREE,
-    HK,
+    MARK,
     MODEL,
     NOISE,
-    PB,
-    PCAP,
     PHITS,
     PLLR,
     PNEAR,
@@ -58,11 +59,10 @@ from perception.full.state import (
     Settings,
     State,
 )  # fmt: skip
-from perception.kernel import Floats, Ints, kernel
+from perception.kernel import Floats, kernel
 from perception.relaxation import relax
 
 FOOT_M: Final = 0.3048
-TWO_PI: Final = 2.0 * math.pi
 LAY, TRY, FINE = range(3)
 """Stages of a birth: a side is laid on the segment, tried, and the best trial is looked at closely."""
 GATHERING: Final = 800
@@ -96,79 +96,6 @@ APART: Final = 0.5
 """… and nothing like it is begun this near, in inner radii; any other one gives way sooner."""
 CHALLENGE_DIRTY: Final = 8
 """A challenger is worth so many unseen readings."""
-
-
-@kernel
-def bears(
-    qx: float, qy: float, ux: float, uy: float, r: float, cx: float, cy: float, bound: float, cos_half: float,
-    sin_half: float, gate: float, reach: float,
-) -> bool:  # fmt: skip
-    """Tell whether a reading says anything for or against a body within a circle.
-
-    Parameters
-    ----------
-    qx, qy, ux, uy, r : float
-        The reading: place (m), unit axis, range (m).
-    cx, cy, bound : float
-        Centre and radius of the circle, m.
-    cos_half, sin_half : float
-        Of half the beam's opening.
-    gate : float
-        A range that ends farther than this before the circle says nothing, m.
-    reach : float
-        Nor does a sensor farther off than this, m.
-    """
-    dx = cx - qx
-    dy = cy - qy
-    dot = dx * ux + dy * uy
-    if dot <= 0.0 or dot > reach:
-        return False
-    # by how much the centre lies outside the nearer edge of the beam
-    if abs(dx * uy - dy * ux) * cos_half - dot * sin_half > bound:
-        return False
-    d = math.sqrt(dx * dx + dy * dy)
-    return d <= reach and r >= d - bound - gate
-
-
-@kernel
-def pput(bins: Floats, bn: Ints, t: int, cx: float, cy: float, q: Floats) -> None:
-    """Keep reading `q` (x, y, axis, range) of polygon `t` at (cx, cy); its direction's oldest makes room."""
-    b = int((math.atan2(q[1] - cy, q[0] - cx) / TWO_PI + 0.5) * PB) % PB
-    k = bn[t, b] % PCAP
-    bn[t, b] += 1
-    for z in range(5):
-        bins[t, b, k, z] = q[z]
-
-
-@kernel
-def pflatten(bins: Floats, bn: Ints, t: int, w: Floats) -> int:
-    """Copy all readings of polygon `t` to `w`, shape (n, 5), and return how many."""
-    n = 0
-    for b in range(PB):
-        for k in range(min(bn[t, b], PCAP)):
-            for z in range(5):
-                w[n, z] = bins[t, b, k, z]
-            n += 1
-    return n
-
-
-@kernel
-def collect(
-    hist: Floats, hn: Ints, cx: float, cy: float, bound: float, cos_half: float, sin_half: float, gate: float,
-    reach: float, w: Floats,
-) -> int:  # fmt: skip
-    """Copy to `w` what the sensors remember that `bears` on a circle; return how many."""
-    n = 0
-    for i in range(hist.shape[0]):
-        for k in range(min(hn[i], HK)):
-            h = hist[i, k]
-            if bears(h[0], h[1], h[2], h[3], h[4], cx, cy, bound, cos_half, sin_half, gate, reach):
-                if n >= w.shape[0]:
-                    return n
-                for z in range(5):
-                    w[n, z] = h[z]
-                n += 1
-    return n
 
 
 @kernel
@@ -242,7 +169,7 @@ def free_polygon(s: State) -> int:
     for t in range(s.pi.shape[0]):
         if s.pi[t, ST] == FREE:
             return t
-        if s.pi[t, ST] == TENTATIVE and s.pf[t, PLLR] < worst:
+        if s.pi[t, ST] == TENTATIVE and s.pf[t, PLLR] < worst and s.names[s.ti.shape[0] + t, MARK] == 0:
             worst = s.pf[t, PLLR]
             slot = t
     return slot
@@ -252,20 +179,28 @@ def free_polygon(s: State) -> int:
 def begin_polygon(s: State, model: int, x: float, y: float, theta: float, llr: float) -> None:
     """Found a tentative track on the job's readings, where there is room."""
     t = free_polygon(s)
-    if t < 0:
-        return
+    if t >= 0:
+        begin_polygon_at(s, t, model, x, y, theta, s.pw, s.job[HEARD])
+        s.pf[t, PLLR] = llr
+        give_number(s.names, s.tally, s.ti.shape[0] + t)
+
+
+@kernel
+def begin_polygon_at(
+    s: State, t: int, model: int, x: float, y: float, theta: float, w: Floats, n: int
+) -> None:  # fmt: skip
+    """Make track `t` a tentative one on `n` readings in `w`."""
     s.pi[t, :] = 0
     s.pf[t, :] = 0.0
     s.pbn[t, :] = 0
     s.pi[t, ST] = TENTATIVE
     s.pi[t, MODEL] = model
-    s.pi[t, DIRTY] = s.job[HEARD]
+    s.pi[t, DIRTY] = n
     s.pf[t, PX] = x
     s.pf[t, PY] = y
     s.pf[t, PTH] = theta
-    s.pf[t, PLLR] = llr
-    for j in range(s.job[HEARD]):
-        pput(s.pbins, s.pbn, t, x, y, s.pw[j])
+    for j in range(n):
+        pput(s.pbins, s.pbn, t, x, y, w[j])
 
 
 @kernel
@@ -386,7 +321,8 @@ def try_polygon(s: State, p: Settings, left: int) -> int:
     if enough:
         t = taken_by(s, p, model, x, y)
         if t < 0:
-            begin_polygon(s, model, x, y, theta, llr)
+            if not is_barred(s, x, y, POLYGON_BAR + model, llr):
+                begin_polygon(s, model, x, y, theta, llr)
         else:
             challenge(s, t, x, y, theta)
     end_job(s)

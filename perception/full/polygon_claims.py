@@ -7,8 +7,9 @@ from typing import Final
 
 from perception.full.noise_choice import noise_variance
 from perception.full.polygon import Ear, predict
-from perception.full.polygon_births import WHOLE, bears, pput
+from perception.full.polygon_births import WHOLE
 from perception.full.polygon_job import HEARD, NEXT, cost, ear_of, sides_of
+from perception.full.polygon_reservoir import bears, pput
 from perception.full.state import (
     DIRTY,
     ESTABLISHED,

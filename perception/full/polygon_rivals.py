@@ -25,6 +25,7 @@ from perception.full.state import (
     LNY,
     LOX,
     LOY,
+    MARK,
     MODEL,
     PHITS,
     PLLR,
@@ -145,7 +146,7 @@ def compare_circles(s: State, p: Settings, t: int) -> None:
     for k in range(s.ti.shape[0]):
         if s.ti[k, ST] != FREE and math.hypot(s.tf[k, TX] - track[PX], s.tf[k, TY] - track[PY]) < around:
             v = s.tf[k, LLR] + (p.prior if s.ti[k, KIND] < p.models else 0.0)
-            if v < own - LEAD and s.pi[t, ST] == ESTABLISHED:
+            if v < own - LEAD and s.pi[t, ST] == ESTABLISHED and s.names[k, MARK] == 0:
                 s.ti[k, ST] = FREE
             elif s.ti[k, ST] == ESTABLISHED:
                 total += bounded_exp(v - own)

@@ -12,8 +12,9 @@ from typing import Final
 
 from perception.full.contact import HITS as HIT
 from perception.full.contact import NEAR as NEARBY
+from perception.full.marks import give_up, outlives
 from perception.full.polygon import BEST, SURE
-from perception.full.polygon_births import next_birth, pflatten, try_polygon
+from perception.full.polygon_births import next_birth, try_polygon
 from perception.full.polygon_claims import OVERLAP, leave_to_next_neighbour
 from perception.full.polygon_job import (
     BY_TURNS,
@@ -39,6 +40,7 @@ from perception.full.polygon_job import (
     weigh_pose,
 )
 from perception.full.polygon_posterior import ATTEMPTS, begin_lattice, lattice_on
+from perception.full.polygon_reservoir import pflatten
 from perception.full.polygon_rivals import compare_circles, is_wall
 from perception.full.polygon_throws import (
     DEAL,
@@ -53,11 +55,14 @@ from perception.full.polygon_throws import (
     search_first,
     throw_next,
 )
+from perception.full.report import POLYGON_PROBABILITY, is_sure_polygon
 from perception.full.selection import choose_polygon
 from perception.full.state import (
+    CONFIRMED,
     DIRTY,
     ESTABLISHED,
     FREE,
+    MARK,
     MODEL,
     NOISE,
     NRES,
@@ -102,7 +107,7 @@ def judge(s: State, p: Settings, t: int) -> None:
     """Establish track `t`, doubt it or end it; what is not placed yet is established once it is."""
     track = s.pf[t]
     if track[PLLR] < EVIDENCE_MIN or track[PLLR] < p.unknown_poly * track[PNEAR] - UNKNOWN_LEAD:
-        s.pi[t, ST] = FREE
+        give_up(s.pi, s.names, t, s.ti.shape[0] + t)
     elif s.pi[t, ST] == TENTATIVE:
         is_fitting = track[PHITS] > FITTING * track[PNEAR]
         sure = ESTABLISH_SURE if track[PHITS] < MANY_HITS else MANY_SURE
@@ -119,8 +124,12 @@ def judge(s: State, p: Settings, t: int) -> None:
 
 @kernel
 def merge_polygons(s: State, p: Settings, t: int) -> None:
-    """Leave one body in a place: twins merge, and of overlapping ones an established and likelier one stands."""
+    """Leave one body in a place: twins merge, and of overlapping ones an established and likelier one stands.
+
+    One that a person spoke of stands in any case.
+    """
     inner = p.inner[s.pi[t, MODEL]]
+    row = s.ti.shape[0]
     for k in range(s.pi.shape[0]):
         if k == t or s.pi[k, ST] == FREE:
             continue
@@ -128,11 +137,15 @@ def merge_polygons(s: State, p: Settings, t: int) -> None:
         is_twin = d < TWIN * inner
         if not is_twin and d >= OVERLAP * inner:
             continue
-        if s.pf[k, PLLR] > s.pf[t, PLLR]:
-            if is_twin or s.pi[k, ST] == ESTABLISHED:
+        has_more = s.pf[k, PLLR] > s.pf[t, PLLR]
+        spoken_of = s.names[row + t, MARK] != 0 or s.names[row + k, MARK] != 0
+        if is_twin or spoken_of:
+            has_more = outlives(s.names, row + k, row + t, has_more)
+        if has_more:
+            if is_twin or spoken_of or s.pi[k, ST] == ESTABLISHED:
                 s.pi[t, ST] = FREE
                 return
-        elif is_twin or s.pi[t, ST] == ESTABLISHED:
+        elif is_twin or spoken_of or s.pi[t, ST] == ESTABLISHED:
             s.pi[k, ST] = FREE
 
 
@@ -176,11 +189,14 @@ def judge_found(s: State, p: Settings, t: int) -> None:
     track[PHITS] = s.stats[HIT]
     track[PNEAR] = s.stats[NEARBY]
     track[PSURE] = s.stats[SURE]
-    if is_wall(s, p, t):
-        s.pi[t, ST] = FREE
+    row = s.ti.shape[0] + t
+    if is_wall(s, p, t) and give_up(s.pi, s.names, t, row):
         return
     compare_circles(s, p, t)
     judge(s, p, t)
+    least = min(p.report, POLYGON_PROBABILITY)
+    if s.names[row, MARK] > CONFIRMED and is_sure_polygon(s.pi, s.pf, s.pbn, s.pbins, least, t):
+        s.names[row, MARK] &= CONFIRMED
     if s.pi[t, ST] != FREE:
         merge_polygons(s, p, t)
 

@@ -16,6 +16,7 @@ from perception.full.contact import CLOSEST, DISPERSION, HIGH, LOW, THROUGHS, fi
 from perception.full.contact import HITS as HIT
 from perception.full.contact import NEAR as NEARBY
 from perception.full.hearing import audible
+from perception.full.marks import give_up, is_barred, outlives
 from perception.full.noise_choice import hear_residuals, noise_variance
 from perception.full.posterior import posterior_circle
 from perception.full.report import call_or_not
@@ -26,6 +27,8 @@ from perception.full.state import (
     C00,
     C01,
     C11,
+    CALLED,
+    CONFIRMED,
     CYC,
     DIRTY,
     ESTABLISHED,
@@ -41,6 +44,7 @@ from perception.full.state import (
     LNY,
     LOX,
     LOY,
+    MARK,
     NEAR,
     NL,
     NOISE,
@@ -191,6 +195,12 @@ def change_kind(s: State, p: Settings, t: int, k: int, v: float) -> None:
 
 
 @kernel
+def may_become(s: State, t: int, k: int, v: float) -> bool:
+    """Tell whether a person's word leaves the track free to become radius `k` at `s.fit`, for which `v` nat speak."""
+    return s.names[t, MARK] == 0 and not is_barred(s, s.fit[0], s.fit[1], k, v)
+
+
+@kernel
 def ask_rivals(s: State, p: Settings, t: int, n: int, prior: float) -> bool:
     """Hear the rivals whose turn it is; return whether the track is still an object.
 
@@ -210,7 +220,7 @@ def ask_rivals(s: State, p: Settings, t: int, n: int, prior: float) -> bool:
         if k < circles:
             v = compete_circle(s, p, n, track[TX], track[TY], track[TRHO], p.radii[k], 4)
             s.comp[t, k] = v - track[LLR]
-            if v + (prior if k < p.models else 0.0) > track[LLR] + own_prior + SWITCH:
+            if v + (prior if k < p.models else 0.0) > track[LLR] + own_prior + SWITCH and may_become(s, t, k, v):
                 change_kind(s, p, t, k, v)
                 break
         elif k == circles:
@@ -275,17 +285,15 @@ def refine(s: State, p: Settings, t: int) -> None:
     s.ti[t, REFS] += 1
     s.g[REFINEMENTS] += 1
     if n < READINGS_MIN:
-        s.ti[t, ST] = FREE
+        give_up(s.ti, s.names, t, t)
         return
     locate(s, p, t, n)
     prior = weigh(s, p, t, n)
-    if not ask_rivals(s, p, t, n, prior):
-        s.ti[t, ST] = FREE
+    if not ask_rivals(s, p, t, n, prior) and give_up(s.ti, s.names, t, t):
         return
     hear_residuals(s, p, t, n)
     track[PROB] = probability(s, p, t, prior)
-    if track[LLR] < 0.0 or track[LLR] < track[UNK] - UNKNOWN_LEAD:
-        s.ti[t, ST] = FREE
+    if (track[LLR] < 0.0 or track[LLR] < track[UNK] - UNKNOWN_LEAD) and give_up(s.ti, s.names, t, t):
         return
     placed = max(track[R00], track[R11]) < ESTABLISH_ROOT_M
     if s.ti[t, ST] == TENTATIVE and track[PROB] > ESTABLISH and track[HITS] >= ESTABLISH_HITS:
@@ -294,17 +302,19 @@ def refine(s: State, p: Settings, t: int) -> None:
     elif s.ti[t, ST] == ESTABLISHED and (track[PROB] < DOUBT or track[SPAN] < 0.5 * p.spread):
         s.ti[t, ST] = TENTATIVE
     call_or_not(s.ti, s.tf, s.comp, p.models, p.report, p.report_near if prior >= p.prior else p.report, t)
+    if s.ti[t, CALLED] == 1:
+        s.names[t, MARK] &= CONFIRMED
     merge_duplicates(s, p, t)
 
 
 @kernel
 def merge_duplicates(s: State, p: Settings, t: int) -> None:
-    """Of two tracks in one place let the one with more evidence stay."""
+    """Of two tracks in one place let the one with more evidence stay, or the one that a person spoke of."""
     for k in range(s.ti.shape[0]):
         if k != t and s.ti[k, ST] != FREE:
             apart = max(p.merge, APART * max(s.tf[t, TRHO], s.tf[k, TRHO]))
             if math.hypot(s.tf[k, TX] - s.tf[t, TX], s.tf[k, TY] - s.tf[t, TY]) < apart:
-                if s.tf[k, LLR] > s.tf[t, LLR]:
+                if outlives(s.names, k, t, s.tf[k, LLR] > s.tf[t, LLR]):
                     s.ti[t, ST] = FREE
                     return
                 s.ti[k, ST] = FREE

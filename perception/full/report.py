@@ -20,6 +20,7 @@ from perception.full.state import (
     C01,
     C11,
     CALLED,
+    CONFIRMED,
     ESTABLISHED,
     FREE,
     HITS,
@@ -36,9 +37,12 @@ from perception.full.state import (
     LOY,
     LP00,
     LP11,
+    MARK,
     MODEL,
+    NUMBER,
     PCAP,
     PHITS,
+    PLACED,
     PPROB,
     PROB,
     PTH,
@@ -60,6 +64,10 @@ from perception.kernel import Floats, Ints, kernel
 from perception.seen import SeenObject
 
 FOOT_M: Final = 0.3048
+TOLD: Final = 10
+"""What makes up a circle as an object, in numbers."""
+BY_HAND_M: Final = 0.15
+"""About how well a person places a thing, m."""
 OVER_UNKNOWN: Final = 1.25
 OVER_UNKNOWN_ALONE: Final = 1.1
 """Evidence over that of an unknown thing: a share of it, less where every rival is far behind."""
@@ -128,25 +136,29 @@ def call_or_not(ti: Ints, tf: Floats, comp: Floats, models: int, sure: float, le
 
 
 @kernel
-def sure_circles(ti: Ints, out: Ints) -> int:
-    """Write the tracks that have a round model's name to `out`, shape (tracks,), and return how many."""
+def sure_circles(ti: Ints, names: Ints, out: Ints) -> int:
+    """Write the tracks that have a round model's name to `out`, shape (tracks,), and return how many.
+
+    They are called so because the readings say it, or because a person does.
+    """
     n = 0
     for t in range(ti.shape[0]):
-        if ti[t, ST] == ESTABLISHED and ti[t, CALLED] == 1:
+        is_called = ti[t, ST] == ESTABLISHED and ti[t, CALLED] == 1
+        if is_called or (ti[t, ST] != FREE and names[t, MARK] != 0):
             out[n] = t
             n += 1
     return n
 
 
 @kernel
-def mark_changed(ti: Ints, tf: Floats, told: Floats, n: int, sure: Ints) -> None:
+def mark_changed(ti: Ints, tf: Floats, names: Ints, told: Floats, n: int, sure: Ints) -> None:
     """Turn the number t of each sure track that is not as it was told last to ~t, and note what is told now.
 
     Parameters
     ----------
-    ti, tf
+    ti, tf, names
         As in `State`.
-    told : (tracks, 8) float
+    told : (tracks, TOLD) float
         What `circle` made an object from. Updated.
     n : int
         Tracks in `sure`.
@@ -155,36 +167,51 @@ def mark_changed(ti: Ints, tf: Floats, told: Floats, n: int, sure: Ints) -> None
     """
     for i in range(n):
         t = sure[i]
-        now = (tf[t, TX], tf[t, TY], tf[t, C00], tf[t, C01], tf[t, C11], tf[t, HITS], tf[t, PROB], float(ti[t, KIND]))
-        for k in range(8):
+        now = (
+            tf[t, TX], tf[t, TY], tf[t, C00], tf[t, C01], tf[t, C11], tf[t, HITS], tf[t, PROB], float(ti[t, KIND]),
+            float(names[t, NUMBER]), float(names[t, MARK]),
+        )  # fmt: skip
+        for k in range(TOLD):
             if told[t, k] != now[k]:
                 told[t, k] = now[k]
                 sure[i] = ~t
 
 
 @kernel
-def sure_polygons(pi: Ints, pf: Floats, pbn: Ints, pbins: Floats, least: float, out: Ints) -> int:
-    """Write the polygon tracks that are sure to `out` and return how many; arguments as in `State`."""
+def is_sure_polygon(pi: Ints, pf: Floats, pbn: Ints, pbins: Floats, least: float, t: int) -> bool:
+    """Tell whether polygon `t` is sure by its readings; the other arguments as in `State`."""
+    if pi[t, ST] != ESTABLISHED or pf[t, PPROB] < least or max(pf[t, PXX], pf[t, PYY]) > POLYGON_SIGMA_MAX_M**2:
+        return False
+    swept = 0
+    nearest = FAR
+    heard = 0
+    x = 0.0
+    y = 0.0
+    for b in range(pbn.shape[1]):
+        swept += min(pbn[t, b], PCAP)
+        for k in range(min(pbn[t, b], PCAP)):
+            if pbins[t, b, k, 4] < FAR:
+                nearest = min(nearest, pbins[t, b, k, 4])
+                x += pbins[t, b, k, 2]
+                y += pbins[t, b, k, 3]
+                heard += 1
+    if pf[t, PHITS] < (POLYGON_HITS_SWEPT if swept >= POLYGON_SWEPT else POLYGON_HITS):
+        return False
+    return heard > 0 and nearest <= POLYGON_NEAR_M and 1.0 - math.hypot(x, y) / heard > POLYGON_SPREAD
+
+
+@kernel
+def sure_polygons(
+    pi: Ints, pf: Floats, pbn: Ints, pbins: Floats, names: Ints, first: int, least: float, out: Ints
+) -> int:  # fmt: skip
+    """Write the polygon tracks that are sure, or that a person spoke of, to `out` and return how many.
+
+    The first polygon's row of `names` is `first`; the other arguments are as in `State`.
+    """
     n = 0
     for t in range(pi.shape[0]):
-        if pi[t, ST] != ESTABLISHED or pf[t, PPROB] < least or max(pf[t, PXX], pf[t, PYY]) > POLYGON_SIGMA_MAX_M**2:
-            continue
-        swept = 0
-        nearest = FAR
-        heard = 0
-        x = 0.0
-        y = 0.0
-        for b in range(pbn.shape[1]):
-            swept += min(pbn[t, b], PCAP)
-            for k in range(min(pbn[t, b], PCAP)):
-                if pbins[t, b, k, 4] < FAR:
-                    nearest = min(nearest, pbins[t, b, k, 4])
-                    x += pbins[t, b, k, 2]
-                    y += pbins[t, b, k, 3]
-                    heard += 1
-        if pf[t, PHITS] < (POLYGON_HITS_SWEPT if swept >= POLYGON_SWEPT else POLYGON_HITS):
-            continue
-        if heard > 0 and nearest <= POLYGON_NEAR_M and 1.0 - math.hypot(x, y) / heard > POLYGON_SPREAD:
+        spoken_of = pi[t, ST] != FREE and names[first + t, MARK] != 0
+        if spoken_of or is_sure_polygon(pi, pf, pbn, pbins, least, t):
             out[n] = t
             n += 1
     return n
@@ -210,7 +237,14 @@ def circle(s: State, p: Settings, t: int, label: str, probability: float) -> See
         probability,
         probability,
         (xx, xy, yy),
+        *said(s, t),
     )
+
+
+def said(s: State, row: int) -> tuple[int | None, bool, bool]:
+    """Return a track's number, whether a person said that it is there, and whether one put it there."""
+    number, mark = s.names[row].tolist()
+    return number or None, bool(mark & CONFIRMED), bool(mark & PLACED)
 
 
 def polygon_covariance(track: Floats) -> Floats:
@@ -228,9 +262,11 @@ def polygon(s: State, p: Settings, t: int, label: str, probability: float) -> Se
     covariance = polygon_covariance(track)
     xx, xy, yy = float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1])
     period = 2.0 * math.pi / int(p.sym[s.pi[t, MODEL]])
+    is_placed = xx > 0.0  # else only a person's word places it so far
     return SeenObject(
         label, float(track[PX]), float(track[PY]), (theta + 0.5 * period) % period - 0.5 * period,
-        worst_sigma(xx, xy, yy), int(track[PHITS]), probability, probability, (xx, xy, yy),
+        worst_sigma(xx, xy, yy) if is_placed else BY_HAND_M, int(track[PHITS]), probability, probability,
+        (xx, xy, yy) if is_placed else None, *said(s, s.ti.shape[0] + t),
     )  # fmt: skip
 
 
@@ -266,6 +302,12 @@ def rival_label(s: State, t: int) -> str:
             if beside and abs(line[LNX] * dx + line[LNY] * dy - line[LC]) < CORNER_M:
                 return "inside corner"
     return "edge"
+
+
+def rival_labels(p: Settings, rounds: Sequence[str]) -> tuple[str, ...]:
+    """Return what the columns of `State.comp` are called: the round models, their rivals, a line and a wedge."""
+    others = ["edge" if rho == 0.0 else "post" if rho < POST_M else "barrel" for rho in p.radii[p.models :].tolist()]
+    return (*rounds, *others, "wall", "corner")
 
 
 def other_things(s: State, p: Settings, least: float, called: Sequence[SeenObject]) -> list[SeenObject]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -123,6 +123,22 @@ def tuned(p: Settings, config: FullConfig) -> Settings:
     )
 
 
+def library(models: Sequence[ModelConfig]) -> dict[str, Any]:
+    """Return what of the kernels' settings depends on the models: round ones by their radius, others by outline."""
+    known, _ = circle_models(models)
+    rivals = [r for r in RIVALS_M if all(abs(r - k) > RIVAL_APART_M for k in known)]
+    if not known:
+        rivals = [*rivals[1:], rivals[0]]  # hypotheses need a body to lie behind a segment, and a point is none
+    radii = np.array([*known, *rivals])
+    outlines = [m for m in models if m.arc_radius_m is None]
+    vertices, count, closed, symmetry, inner, bound, sides, faces = _polygons(outlines)
+    return {
+        "merge": 0.9 * float(radii[0]), "radii": radii, "models": len(known),
+        "sides": np.array([_chords(r) for r in radii]), "polys": len(outlines), "verts": vertices, "nv": count,
+        "closed": closed, "sym": symmetry, "inner": inner, "bound": bound, "psides": sides, "faces": faces,
+    }  # fmt: skip
+
+
 def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: FullConfig) -> Settings:
     """Return the kernels' settings.
 
@@ -143,13 +159,6 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: FullC
     noises = np.array([(a, b) for a in ABSOLUTE_M for b in RELATIVE])
     levels = np.empty((len(noises), max(RANGE_BINS, math.ceil(ring.range_max_m * PER_METRE))), np.int64)
     build_levels(noises, sigmas, levels, PER_METRE)
-    known, _ = circle_models(models)
-    rivals = [r for r in RIVALS_M if all(abs(r - k) > RIVAL_APART_M for k in known)]
-    if not known:
-        rivals = [*rivals[1:], rivals[0]]  # hypotheses need a body to lie behind a segment, and a point is none
-    radii = np.array([*known, *rivals])
-    outlines = [m for m in models if m.arc_radius_m is None]
-    vertices, count, closed, symmetry, inner, bound, sides, faces = _polygons(outlines)
     untuned = Settings(
         half_angle=half_angle,
         cos_half=math.cos(half_angle),
@@ -171,32 +180,20 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: FullC
         spacing=0.2 * FOOT_M,
         gap=30.0,
         per_metre=PER_METRE,
-        merge=0.9 * float(radii[0]),
         all_until=80,
         claim=4.0 * FOOT_M,
         attempts=0,
         hyp_sigma=0.7 * FOOT_M,
-        radii=radii,
-        models=len(known),
-        sides=np.array([_chords(r) for r in radii]),
         table=table,
         inv_step=inv_step,
         sigmas=sigmas,
         noises=noises,
         levels=levels,
-        polys=len(outlines),
-        verts=vertices,
-        nv=count,
-        closed=closed,
-        sym=symmetry,
-        inner=inner,
-        bound=bound,
-        psides=sides,
-        faces=faces,
         inflate=1.1,
         report=0.0,
         report_near=0.0,
         quiet=12,
         polish=6,
+        **library(models),
     )
     return tuned(untuned, config)

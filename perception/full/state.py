@@ -38,6 +38,9 @@ PB: Final = 24
 PCAP: Final = 12
 """Readings in such a bin."""
 
+BARRED: Final = 32
+"""Places where a person said that something does not stand."""
+
 ASKED: Final = 32
 """Segments that wait for a polygon to be tried behind them, and of late did."""
 
@@ -61,6 +64,16 @@ PX, PY, PTH, PLLR, PHITS, PNEAR, PPROB, PSURE, PXX, PXY, PYY, PXT, PYT, PTT, CX,
 NPF: Final = 17
 # Cells of `State.g`; HERE is where the ring last fired.
 NOISE, SEGMENTS, BIRTHS, REFINEMENTS, HERE_X, HERE_Y = range(6)
+
+# Columns of `State.names`, a row a track, the circles' first; the latter a sum of the marks below: a person said that
+# it is there, or put it there and the readings do not bear it out by themselves yet.
+NUMBER, MARK = range(2)
+CONFIRMED: Final = 1
+PLACED: Final = 2
+# Columns of `State.stamps`: a mapped segment's number and time.
+STAMP, STAMP_S = range(2)
+# Cells of `State.tally`: numbers given to objects and to segments, which are never cleared, and places barred.
+NUMBERED, STAMPED, BARS = range(3)
 
 FREE, TENTATIVE, ESTABLISHED = range(3)
 
@@ -217,6 +230,13 @@ class State(NamedTuple):
     """(PT's reservoir, 5) its readings."""
     asked: Floats
     """(ASKED, 6) where polygons shall be tried: model, segment's middle and normal, whether it has been tried."""
+    names: Ints
+    """(NT + PT, 2) number and marks of each track."""
+    tally: Ints
+    stamps: Floats
+    """(slots, bucket, 2) of each segment in `store`."""
+    barred: Floats
+    """(BARRED, 5) what does not stand where: x, y, how far around (m), what, and how much must speak for it (nat)."""
 
 
 def make_state(sensors: int, p: Settings, tracks: int = NT, slots: int = BUCKETS) -> State:
@@ -231,17 +251,19 @@ def make_state(sensors: int, p: Settings, tracks: int = NT, slots: int = BUCKETS
         owner=z(sensors, n), fit=z(12), stats=z(12), segs=z((8 * sensors, 8)), near=z((32, 4)),
         pi=z((PT, NTI), n), pf=z((PT, NPF)), pbins=z((PT, PB, PCAP, 5)), pbn=z((PT, PB), n), stats2=z(12),
         pose=z(3), root=z(3), cov=z(3), pull=z((PULLING, 5)), all_pull=np.arange(PULLING), last=z((sensors, 5)),
-        job=z(24, n), work=z(56), pw=z((PB * PCAP, 5)), asked=z((ASKED, 6)),
+        job=z(24, n), work=z(56), pw=z((PB * PCAP, 5)), asked=z((ASKED, 6)), names=z((tracks + PT, 2), n),
+        tally=z(4, n), stamps=z((slots, BUCKET, 2)), barred=z((BARRED, 5)),
     )  # fmt: skip
     clear(s)
     return s
 
 
 def clear(s: State) -> None:
-    """Forget everything."""
+    """Forget everything but which numbers have been given."""
     for name in s._fields:
-        if name != "all_pull":
+        if name not in {"all_pull", "tally"}:
             getattr(s, name)[...] = 0
+    s.tally[BARS] = 0
     s.last[...] = np.nan
     s.g[NOISE] = START_NOISE
     s.ddl[START_NOISE] = 6.0

@@ -28,8 +28,12 @@ from runtime.tables import Units, objects_table, timing_table, timing_verdict
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
+    from drivers.driver import RobotDriver
+    from runtime.books import Books
+    from runtime.commands.keeping import OnCycle
     from runtime.process import RobotProcess
     from runtime.reload import Reloader
+    from runtime.step import CycleRecord, State
     from runtime.summary import RunSummary
 
 
@@ -65,6 +69,7 @@ def run_robot(
     headless: bool,
     record: str | None,
     no_record: bool,
+    no_console: bool,
     json_file: str | None,
     emulation: Emulation,
     units: Units,
@@ -72,6 +77,8 @@ def run_robot(
     """Carry out the command; see `runtime.cli.run`."""
     settings = load_settings(config, sets, world=emulation.world)
     refuse_impossible_firing(settings.ring)
+    if no_console:
+        settings = without_console(settings)
     if seconds is not None and not seconds > 0.0:
         raise Complaint(f"--seconds {seconds}: must be above 0", WRONG_CALL)
     given, port = port, port if port is not None else settings.link.port
@@ -101,9 +108,10 @@ def run_robot(
                     chosen = on_port(settings, emulated)
                 return await watch(
                     chosen, log, console, live=live, units=units, keeping=keeping, lines=lines,
-                    arm=arm or port is None, seconds=seconds,
+                    arm=arm or port is None, seconds=seconds, emulated=port is None,
                     propose=lambda: proposed(
-                        config, sets, emulation.world, given, None if port else chosen.link.port
+                        config, sets, emulation.world, given, None if port else chosen.link.port,
+                        no_console=no_console,
                     ),
                 )  # fmt: skip
 
@@ -140,14 +148,20 @@ def refuse_unwritable(files: dict[str, str | None]) -> None:
             ) from error
 
 
+def without_console(settings: Settings) -> Settings:
+    """Return the settings with the console left out."""
+    return settings.model_copy(update={"console": settings.console.model_copy(update={"enabled": False})})
+
+
 def on_port(settings: Settings, port: str) -> Settings:
     """Return the settings with the serial port replaced."""
     return settings.model_copy(update={"link": settings.link.model_copy(update={"port": port})})
 
 
 def proposed(
-    config: str | None, sets: Sequence[str], world: str | None, given: str | None, emulated: str | None
-) -> Settings:
+    config: str | None, sets: Sequence[str], world: str | None, given: str | None, emulated: str | None,
+    *, no_console: bool = False,
+) -> Settings:  # fmt: skip
     """Return the settings as the files hold them now, for a run on a port that was given, or is the emulator's.
 
     Raises
@@ -160,6 +174,8 @@ def proposed(
         refuse_impossible_firing(settings.ring)
     except Complaint as complaint:
         raise ConfigError(str(complaint)) from complaint
+    if no_console:
+        settings = without_console(settings)
     port = given or settings.link.port or emulated
     return settings if port is None else on_port(settings, port)
 
@@ -175,18 +191,38 @@ async def watch(
     lines: LogStanding,
     arm: bool,
     seconds: float | None,
+    emulated: bool,
     propose: Callable[[], Settings],
 ) -> RunSummary:
-    """Run the process under the eyes of the live view; it heeds signals and keys, and its parts are watched."""
+    """Run the process under the eyes of view and console; it heeds signals and keys, and its parts are watched."""
     from runtime.process import RobotProcess
     from runtime.reload import Reloader
     from runtime.view import View, keys
 
-    with contextlib.ExitStack() as stack:
+    async with contextlib.AsyncExitStack() as stack:
         view = View(settings, console, units) if live else None
-        observers = keeping.observers(None if view is None else view.on_cycle, log)
+        watchers: list[OnCycle] = [] if view is None else [view.on_cycle]
+
+        def on_cycle(record: CycleRecord, state: State, books: Books, driver: RobotDriver) -> None:
+            for watcher in watchers:
+                watcher(record, state, books, driver)
+
+        observers = keeping.observers(on_cycle, log)
         process = RobotProcess(settings, log, observers, notifier=stack.enter_context(Notifier.from_environment()))
         reloader = Reloader(settings, propose, process.reconfigure, log)
+        if settings.console.enabled:
+            from runtime.console.console import Console as Page
+
+            page = Page(process, settings, log, reloader.supersede, emulated=emulated, units=units)
+            lines.listeners.append(page.hub.on_log)
+            stack.callback(lines.listeners.remove, page.hub.on_log)
+            await stack.enter_async_context(page.open())
+            reloader.on_taken = page.adopt
+            watchers.append(page.on_cycle)
+            if view is not None:
+                for line in page.hints():
+                    console.print(line, markup=False, highlight=False, soft_wrap=True)
+                view.console_url = page.url
         stack.enter_context(signals(process, reloader))
         if view is not None:
             stack.enter_context(view.shown())

@@ -6,7 +6,7 @@ recorded, described in the file's own schema and read back, with no change here.
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import MISSING, Field, fields
 from itertools import accumulate
 from typing import Any, Final, TypeAlias, get_type_hints
 
@@ -126,12 +126,19 @@ class ObjectsSeen(Form):
     objects: list[dict[str, Any]]
 
 
+def _default(of: Field[Any]) -> Any:  # noqa: ANN401 - a field's default is whatever its type allows
+    """Return what stands for a field of the state in a recording that does not know it; … where there must be one."""
+    if of.default_factory is not MISSING:
+        return of.default_factory()
+    return ... if of.default is MISSING else of.default
+
+
 _HINTS: Final = get_type_hints(State)
 StateLeft: Any = create_model(  # type: ignore[call-overload]  # mypy sees no field definitions here
     "StateLeft",
     __base__=Form,
     __doc__="What a cycle leaves to the next one besides perception's memory.",
-    **{f.name: (_HINTS[f.name], ...) for f in fields(State) if f.name != "perception"},
+    **{f.name: (_HINTS[f.name], _default(f)) for f in fields(State) if f.name != "perception"},
 )
 
 

@@ -30,7 +30,7 @@ from runtime.recording.forms import (
     snapshot_in,
 )
 from runtime.recording.reading import SECOND_NS, Recording, settings_in
-from runtime.step import CycleRecord, State, step
+from runtime.step import CycleRecord, State, step, take_over
 
 OnCycle = Callable[[CycleRecord, State], None]
 ABSENT: Final = "nothing"
@@ -171,7 +171,7 @@ class _Replay:
             return
         self._told, self._settings = told, settings_in(told)
         if self.state is not None:
-            self.state.perception.adopt(self._settings.perception)
+            take_over(self.state, self._settings)
 
     def _cycle(self, record: CycleRecord, data: bytes) -> None:
         verdict, before = self.verdict, self._last
@@ -194,8 +194,11 @@ class _Replay:
         if before is not None:
             verdict.recorded_s += record.inputs.now_s - before[1]
         written = encode(Cycle.model_construct(record=replayed))
-        if written != data:
-            self._note(record.cycle, first_difference(orjson.loads(data)["record"], orjson.loads(written)["record"]))
+        # What an older program did not write yet is what it is where nobody says anything.
+        if written != data and written != (recorded := encode(Cycle.model_construct(record=record))):
+            self._note(
+                record.cycle, first_difference(orjson.loads(recorded)["record"], orjson.loads(written)["record"])
+            )
         if self._on_cycle is not None:
             self._on_cycle(replayed, self.state)
 
@@ -212,7 +215,8 @@ class _Replay:
                 where = "" if now is None else str(np.argwhere(np.atleast_1d(now != array)).tolist()[:1])
                 self._note(frame.cycle, (f"memory {name}{where}", "one", "another"))
                 return
-        left = encode(StateLeft.model_construct(**left_by(self.state)))
+        told = frame.left.model_fields_set
+        left = encode(StateLeft.model_construct(**{k: v for k, v in left_by(self.state).items() if k in told}))
         self._note(frame.cycle, first_difference(orjson.loads(encode(frame.left)), orjson.loads(left), "state."))
 
     def _note(self, cycle: int, found: tuple[str, object, object] | None) -> None:

@@ -21,7 +21,7 @@ from runtime.recording.channels import CYCLE, SETTINGS, Entry, decode
 from runtime.recording.forms import Cycle, SettingsChange
 from runtime.recording.reading import Recording, RecordingError, settings_in
 from runtime.recording.rerun import again, fresh_state
-from runtime.step import Command, CycleRecord, State, step
+from runtime.step import Command, CycleRecord, State, step, take_over
 from runtime.summary import ObjectRow, object_row
 
 
@@ -69,7 +69,7 @@ def retell(recording: Recording, settings: Settings, on_entry: Callable[[Entry],
             on_entry(entry)
         if entry.topic == SETTINGS:
             mine = settings_in(decode(SettingsChange, entry.data).settings)
-            was.perception.adopt(mine.perception)
+            take_over(was, mine)
         if entry.topic != CYCLE:
             continue
         record = decode(Cycle, entry.data).record

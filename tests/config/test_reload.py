@@ -40,10 +40,36 @@ def test_whatever_is_declared_live_exists() -> None:
 def test_what_a_process_is_built_from_is_not_live() -> None:
     fixed = """
         link.port link.baud ring.count ring.sensors ring.range_max_m body.radius_m models cycle.rate_hz log.file world
-        perception.method perception.map.capacity perception.full.tracks_max
+        perception.method perception.map.capacity perception.full.tracks_max perception.clusters.clusters_max
     """
     for path in fixed.split():
         assert not Difference(tuple(path.split(".")), 1, 2).live, path
+
+
+def test_what_an_operator_turns_while_it_runs_is_live() -> None:
+    live = """
+        behaviors.move_ahead.move_ahead_gain behaviors.avoid_static_obstacle.avoid_obstacle_gain
+        behaviors.move_to_goal.move_to_goal_gain behaviors.teleoperation.message_age_max_s
+        perception.relaxation.gamma perception.clusters.threshold_m perception.map.age_max_s
+        cycle.perception_budget_s ring.firing.preset ring.firing.step_period_s perception.segments.baseline_min_m
+    """
+    for path in live.split():
+        assert Difference(tuple(path.split(".")), 1, 2).live, path
+
+
+def test_further_models_are_live_and_other_ones_are_not(tmp_path: Path) -> None:
+    before = settings_from(tmp_path, RUN)
+    more = {**RUN, "models": [MODEL, {**MODEL, "name": "b"}]}
+    outcome = reload(before, lambda: settings_from(tmp_path, more))
+    assert (outcome.problems, [m.name for m in outcome.settings.models]) == ((), ["corner", "b"])
+    assert [str(d) for d in outcome.changed] == ["models: [{…}] → [{…}, {…}]"]
+    for models in ([{**MODEL, "name": "b"}], [{**MODEL, "name": "b"}, MODEL], [{**MODEL, "arc_radius_m": 2.0}]):
+        outcome = reload(before, lambda models=models: settings_from(tmp_path, {**RUN, "models": models}))  # type: ignore[misc]
+        assert len(outcome.problems) == 1
+        assert outcome.problems[0].endswith("needs a restart")
+        assert outcome.settings is before
+    fewer = reload(settings_from(tmp_path, more), lambda: settings_from(tmp_path, RUN))
+    assert len(fewer.problems) == 1
 
 
 def test_every_live_change_is_named_and_taken_over(tmp_path: Path) -> None:
@@ -73,7 +99,7 @@ def test_every_live_change_is_named_and_taken_over(tmp_path: Path) -> None:
         (lambda t: t["ring"].update(count=16), "ring.count: 24 → 16: needs a restart"),
         (lambda t: t["cycle"].update(rate_hz=40.0), "cycle.rate_hz: 20.0 → 40.0: needs a restart"),
         (lambda t: t.pop("world"), "world.drum: "),
-        (lambda t: t.update(models=[MODEL, {**MODEL, "name": "b"}]), "models: [{…}] → [{…}, {…}]: needs a restart"),
+        (lambda t: t.update(models=[{**MODEL, "name": "b"}, MODEL]), "models: [{…}] → [{…}, {…}]: needs a restart"),
     ],
 )
 def test_what_needs_a_restart_says_so_by_name(

@@ -11,7 +11,8 @@ from numba.core.errors import NumbaError
 from config.load import load_settings
 from perception.full import entry, observe, polygon_tracks, refine, report
 from perception.full.method import FullPerception
-from perception.full.state import C00, C11, HITS, KIND, NTF, NTI, PROB, TX, TY, make_state
+from perception.full.report import TOLD
+from perception.full.state import C00, C11, HITS, KIND, MARK, NTF, NTI, NUMBER, PROB, TX, TY, make_state
 from perception.kernel import Floats, kernel
 from perception.seen import SeenObject
 from runtime.scenes import halls, readings
@@ -45,7 +46,7 @@ def test_what_goes_in_by_the_handle_comes_to_the_same() -> None:
 def afresh(perception: FullPerception) -> list[SeenObject]:
     """Tell every sure circle from its track, as if for the first time."""
     s, p, sure = perception.memory, perception.settings, np.zeros(len(perception.memory.ti), np.int64)
-    n = report.sure_circles(s.ti, sure)
+    n = report.sure_circles(s.ti, s.names, sure)
     name = SETTINGS.models[0].name
     told = [report.circle(s, p, t, name, float(s.tf[t, PROB])) for t in sure[:n].tolist()]
     return sorted(told, key=lambda o: o.score, reverse=True)
@@ -68,12 +69,13 @@ def test_no_object_is_out_of_date() -> None:
 
 def test_only_what_changed_is_marked() -> None:
     rng = np.random.default_rng(5)
-    ti, tf, told = np.zeros((6, NTI), np.int64), rng.normal(size=(6, NTF)), np.full((6, 8), np.nan)
+    ti, tf, told = np.zeros((6, NTI), np.int64), rng.normal(size=(6, NTF)), np.full((6, TOLD), np.nan)
+    names = np.zeros((6, 2), np.int64)
     ti[:, KIND] = rng.integers(0, 3, 6)
 
     def marked(*tracks: int) -> list[int]:
         sure = np.array([*tracks, 99, 99], np.int64)
-        report.mark_changed(ti, tf, told, len(tracks), sure)
+        report.mark_changed(ti, tf, names, told, len(tracks), sure)
         assert sure[-2:].tolist() == [99, 99]
         return [int(t) for t in sure[:-2]]
 
@@ -85,6 +87,9 @@ def test_only_what_changed_is_marked() -> None:
         assert marked(0, 2, 5) == [0, 2, 5], column
     ti[5, KIND] += 1
     assert marked(2, 5) == [2, ~5]
+    for column in (NUMBER, MARK):
+        names[2, column] += 1
+        assert marked(2, 5) == [~2, 5], column
 
 
 @kernel

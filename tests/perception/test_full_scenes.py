@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -206,11 +207,15 @@ def test_forgetting_is_beginning_anew_to_the_bit() -> None:
     used, new = (Perception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception) for _ in range(2))
     for firing in readings(SETTINGS.ring, hall, 1):
         perceive(used, firing)
+    known = {seen.number for seen in used.things()} - {None}
+    assert len(known) >= 6
     used.forget()
     assert used.objects() == used.things() == ()
     assert (used.living, used.hypotheses, used.pending) == (0, 0, False)
     for firing in readings(SETTINGS.ring, hall, 2):
-        assert perceive(used, firing) == perceive(new, firing)
+        one, other = perceive(used, firing), perceive(new, firing)
+        assert [replace(seen, number=None) for seen in one] == [replace(seen, number=None) for seen in other]
+        assert {seen.number for seen in one}.isdisjoint(known), "no number is used twice"
 
 
 def test_standing_still_says_nothing_new() -> None:

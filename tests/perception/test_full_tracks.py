@@ -22,6 +22,7 @@ from perception.full.state import (
     C11,
     CALLED,
     CAP,
+    CONFIRMED,
     CYC,
     DIRTY,
     ESTABLISHED,
@@ -31,13 +32,16 @@ from perception.full.state import (
     KIND,
     LLR,
     LN,
+    MARK,
     NB,
     NEAR,
     NL,
     NOISE,
     NRES,
+    NUMBER,
     PCAP,
     PHITS,
+    PLACED,
     POLISH,
     PPROB,
     PROB,
@@ -415,17 +419,23 @@ def test_readings_are_claimed_by_the_best_and_kept_by_all_they_bear_on() -> None
     assert kept > 3000
 
 
-def test_of_two_tracks_in_one_place_the_one_with_more_evidence_stays() -> None:
+def test_of_two_tracks_in_one_place_the_one_with_more_evidence_stays_or_that_a_person_spoke_of() -> None:
     rng, s, merged = np.random.default_rng(11), shared(), 0
+    names = s.names[:TRACKS]
     for _ in range(3000):
         for k in range(TRACKS):
             random_track(rng, s, k)
+        names[:, NUMBER] = rng.permutation(TRACKS) + 1
+        names[:, MARK] = rng.choice([0, CONFIRMED, PLACED], TRACKS, p=[0.8, 0.1, 0.1])
         t = int(rng.integers(TRACKS))
         s.ti[t, ST] = TENTATIVE
         live = s.ti[:, ST] != FREE
-        want = naive_tracks.after_merging(t, live, s.tf[:, [TX, TY]], s.tf[:, TRHO], s.tf[:, LLR], P.merge)
+        want, numbers = naive_tracks.after_merging(
+            t, live, s.tf[:, [TX, TY]], s.tf[:, TRHO], s.tf[:, LLR], P.merge, names[:, MARK], names[:, NUMBER]
+        )
         refine.merge_duplicates(s, P, t)
         assert ((s.ti[:, ST] != FREE) == want).all()
+        assert (names[want, NUMBER] == numbers[want]).all()
         merged += int((live != want).sum())
     assert merged > 500
 
@@ -436,7 +446,9 @@ def test_the_next_free_track() -> None:
         for k in range(TRACKS):
             random_track(rng, s, k, int(rng.choice([FREE, TENTATIVE, ESTABLISHED], p=[0.08, 0.32, 0.6])))
         i, f = s.ti, s.tf
-        free, tentative = np.flatnonzero(i[:, ST] == FREE), np.flatnonzero(i[:, ST] == TENTATIVE)
+        s.names[:TRACKS, MARK] = rng.choice([0, PLACED], TRACKS, p=[0.7, 0.3])
+        free = np.flatnonzero(i[:, ST] == FREE)
+        tentative = np.flatnonzero((i[:, ST] == TENTATIVE) & (s.names[:TRACKS, MARK] == 0))
         weakest = int(tentative[np.argmin(f[tentative, LLR])]) if len(tentative) else -1
         assert births.free_track(s) == (free[0] if len(free) else weakest)
 
@@ -540,9 +552,13 @@ def test_what_is_sure_is_reported() -> None:
         ]  # fmt: skip
         for t in range(TRACKS):
             report.call_or_not(s.ti, s.tf, s.comp, P.models, 0.92, 0.7, t)
-        n = report.sure_circles(s.ti, out)
+        s.names[:TRACKS, MARK] = 0
+        n = report.sure_circles(s.ti, s.names, out)
         assert out[:n].tolist() == want
         sure += n
+        s.names[:TRACKS, MARK] = rng.choice([0, CONFIRMED, PLACED], TRACKS)
+        said = [t for t in range(TRACKS) if s.ti[t, ST] != FREE and s.names[t, MARK] > 0]
+        assert out[: report.sure_circles(s.ti, s.names, out)].tolist() == sorted({*want, *said})
     assert sure > 200
 
 
@@ -568,9 +584,13 @@ def test_polygons_are_sure_when_seen_from_near_and_from_two_sides() -> None:
                 s.pi[t, ST] == ESTABLISHED, s.pf[t, PPROB], 0.9, s.pf[t, PHITS], s.pf[t, [PXX, PYY]].tolist(), kept[t]
             )
         ]  # fmt: skip
-        n = report.sure_polygons(s.pi, s.pf, s.pbn, s.pbins, 0.9, out)
+        s.names[:] = 0
+        n = report.sure_polygons(s.pi, s.pf, s.pbn, s.pbins, s.names, TRACKS, 0.9, out)
         assert out[:n].tolist() == want
         sure += n
+        s.names[TRACKS + 5, MARK] = CONFIRMED
+        n = report.sure_polygons(s.pi, s.pf, s.pbn, s.pbins, s.names, TRACKS, 0.9, out)
+        assert out[:n].tolist() == sorted({*want, 5})
     assert sure > 200
 
 

@@ -25,6 +25,7 @@ from runtime.modes import (
 NOW = 100.0
 QUIET = Situation(NOW, LineState.READY, None, Flags.NONE, rebooted=False, request=None)
 ARM, HALT = replace(QUIET, request=Request.ARM), replace(QUIET, request=Request.HALT)
+DISARM = replace(QUIET, request=Request.DISARM)
 
 CONNECTING, READY = ModeState(), ModeState(Mode.READY, 50.0)
 DRIVE, STOPPED = ModeState(Mode.DRIVE, 50.0), ModeState(Mode.SAFE_STOP, 50.0, "a reason")
@@ -100,6 +101,15 @@ TRANSITIONS = [
     (arming(STOPPED, TOO_LONG), flags(Flags.LATCHED), Mode.SAFE_STOP, "latch does not clear", False),
     (arming(STOPPED, WAITED), line(LineState.DOWN), Mode.SAFE_STOP, "a reason", False),
     (arming(STOPPED, WAITED), HALT, Mode.SAFE_STOP, "halted by the operator", False),
+    (CONNECTING, DISARM, Mode.READY, None, False),
+    (READY, DISARM, Mode.READY, None, False),
+    (arming(READY, WAITED), DISARM, Mode.READY, "disarmed by the operator", False),
+    (DRIVE, DISARM, Mode.READY, "disarmed by the operator", False),
+    (DRIVE, replace(DISARM, flags=Flags.BUMPER), Mode.SAFE_STOP, "bumper", False),
+    (DRIVE, replace(DISARM, line=LineState.CLOSED), Mode.SAFE_STOP, "line to the robot is gone", False),
+    (STOPPED, DISARM, Mode.SAFE_STOP, "a reason", False),
+    (arming(STOPPED, WAITED), DISARM, Mode.SAFE_STOP, "disarmed by the operator", False),
+    (FAULT, DISARM, Mode.FAULT, "a fault", False),
     (FAULT, QUIET, Mode.FAULT, "a fault", False),
     (FAULT, ARM, Mode.FAULT, "a fault", False),
     (FAULT, HALT, Mode.FAULT, "a fault", False),
@@ -139,7 +149,7 @@ def test_the_table_shows_every_mode_from_every_other_that_leads_there() -> None:
     everywhere = {
         Mode.CONNECTING: {Mode.CONNECTING, Mode.READY, Mode.SAFE_STOP},
         Mode.READY: {Mode.READY, Mode.CONNECTING, Mode.DRIVE, Mode.SAFE_STOP},
-        Mode.DRIVE: {Mode.DRIVE, Mode.SAFE_STOP},
+        Mode.DRIVE: {Mode.DRIVE, Mode.READY, Mode.SAFE_STOP},
         Mode.SAFE_STOP: {Mode.SAFE_STOP, Mode.DRIVE},
         Mode.FAULT: {Mode.FAULT},
     }
@@ -153,7 +163,7 @@ situations = st.builds(
     trouble=st.sampled_from([None, "some trouble"]),
     flags=st.sampled_from([Flags.NONE] * 6 + list(Flags)),
     rebooted=st.sampled_from([False] * 5 + [True]),
-    request=st.sampled_from([None, None, Request.ARM, Request.ARM, Request.HALT]),
+    request=st.sampled_from([None, None, Request.ARM, Request.ARM, Request.HALT, Request.DISARM]),
 )
 
 
@@ -170,14 +180,15 @@ def test_motion_never_resumes_by_itself(steps: list[Situation], begin: ModeState
         if state.mode is Mode.SAFE_STOP:
             assert state.reason
         if state.mode is Mode.DRIVE:
-            assert seen.request is not Request.HALT
+            assert seen.request not in {Request.HALT, Request.DISARM}
             assert seen.line is LineState.READY
             assert not seen.flags & Flags.LATCHED
             assert seen.gap_s <= GAP_MAX_S, "it drives on what it knew before it was held up"
             assert before.mode is Mode.DRIVE or armed, "DRIVE was entered without an ARM after the last stop"
         if seen.request is Request.ARM:
             armed = True
-        if state.mode is Mode.DRIVE or seen.request is Request.HALT or seen.line is not LineState.READY:
+        taken_back = seen.request in {Request.HALT, Request.DISARM}
+        if state.mode is Mode.DRIVE or taken_back or seen.line is not LineState.READY:
             armed = False
         if before.arming_s is not None and state.mode is Mode.SAFE_STOP and state.since_s == now_s:
             armed = False
@@ -215,7 +226,7 @@ def test_patience_in_seconds() -> None:
 
 def test_modes_and_requests_are_called_what_logs_and_summaries_call_them() -> None:
     assert [mode.value for mode in Mode] == ["CONNECTING", "READY", "DRIVE", "SAFE_STOP", "FAULT"]
-    assert [request.value for request in Request] == ["arm", "halt"]
+    assert [request.value for request in Request] == ["arm", "halt", "disarm"]
 
 
 def test_a_mode_entered_again_is_entered() -> None:

@@ -47,10 +47,11 @@ class ModesMachine(RuleBasedStateMachine):
         if request is Request.HALT:
             assert after.mode is not Mode.DRIVE, "a HALT is never overruled"
         if before.mode is Mode.DRIVE and after.mode is not Mode.DRIVE:
-            assert after.mode is Mode.SAFE_STOP
+            assert after.mode is Mode.SAFE_STOP or (after.mode is Mode.READY and request is Request.DISARM)
             assert after.since_s == now_s
         given_up = before.arming_s is not None and after.arming_s is None
-        if after.mode is Mode.DRIVE or request is Request.HALT or self.seen.line is not LineState.READY or given_up:
+        taken_back = request in {Request.HALT, Request.DISARM}
+        if after.mode is Mode.DRIVE or taken_back or self.seen.line is not LineState.READY or given_up:
             self.armed_s = None
 
     @rule(line=st.sampled_from(LineState), trouble=st.sampled_from([None, "a cable is loose"]))
@@ -82,6 +83,12 @@ class ModesMachine(RuleBasedStateMachine):
         self.cycle(Request.HALT)
         assert self.state.mode is Mode.SAFE_STOP
         assert "halted by the operator" in (self.state.reason or "")
+
+    @rule()
+    def disarm(self) -> None:
+        self.cycle(Request.DISARM)
+        assert self.state.mode is not Mode.DRIVE
+        assert self.state.arming_s is None
 
     @rule()
     def reboot(self) -> None:

@@ -1,0 +1,52 @@
+"""The move-to-goal schema (Arkin 1989): a vector towards a place, whatever the robot sees.
+
+Far off, in the ballistic zone, its magnitude is the gain. Within the controlled zone (Arkin & Murphy 1990, docking)
+it falls with the distance, so that the robot comes in slowly. Within the success radius the goal is reached, and
+stays reached even if the robot is pushed away again: motion does not resume by itself. That it has been reached is
+state, and behaviours hide none: the goal goes in with each call and comes out again.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+from behaviors.response import Response
+from config.settings import MoveToGoalConfig
+from perception.percept import Percept
+
+SCHEMA: Final = "move_to_goal"
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """A place to go to, in the odometry's frame, m."""
+
+    x: float
+    y: float
+    reached: bool = False
+    kind: Literal["goal"] = "goal"
+
+
+def move_to_goal(percept: Percept, goal: Goal, config: MoveToGoalConfig) -> tuple[Response, Goal]:
+    """Return the schema's vector and the goal to hand in next time.
+
+    With d the distance, C the controlled zone, G the gain: magnitude G for d ≥ C, G·d/C below, and nothing from the
+    success radius on.
+
+    Parameters
+    ----------
+    percept
+        Only the pose is used.
+    goal
+        Where to, and whether the robot has been there.
+    config
+        The schema's constants.
+    """
+    dx, dy = goal.x - percept.pose.x, goal.y - percept.pose.y
+    distance = math.hypot(dx, dy)
+    if goal.reached or distance <= config.success_radius_m:
+        return Response(SCHEMA, 0.0, 0.0), goal if goal.reached else replace(goal, reached=True)
+    magnitude = config.move_to_goal_gain * min(1.0, distance / config.controlled_zone_m)
+    return Response(SCHEMA, magnitude * dx / distance, magnitude * dy / distance), goal

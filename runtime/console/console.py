@@ -1,0 +1,297 @@
+"""The console put together: it follows a run, serves its page, and hands on what operators ask for.
+
+In a cycle it does next to nothing. What clients see is put together in a callback of its own after the cycle, and
+only where there are clients; the books of time name it, as they name what is received and what is sent.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING, Any, Final
+
+from config.settings import Settings
+from drivers.driver import RobotDriver
+from runtime.books import Books
+from runtime.console.client import Client
+from runtime.console.desk import Desk
+from runtime.console.door import listen
+from runtime.console.frames import NO_FRAMES, Beside, Frames
+from runtime.console.guard import SCHEME, Guard, in_address, is_loopback, new_token
+from runtime.console.hello import about_run
+from runtime.console.hub import Hub
+from runtime.console.limits import Limits, Refusals
+from runtime.console.overtime import Overtime
+from runtime.console.pages import page_files
+from runtime.console.parameters import parameters
+from runtime.console.seams import Run
+from runtime.console.server import House, Server
+from runtime.console.stepped import stepped
+from runtime.console.tuning import Tuning
+from runtime.health import told
+from runtime.process import CONSOLE_FRAME, CONSOLE_RECEIVE
+from runtime.step import CycleRecord, State
+from runtime.tables import Units
+
+if TYPE_CHECKING:
+    from structlog.typing import FilteringBoundLogger
+
+FRAME_S: Final = 0.05
+"""Frames are at least so far apart, on average."""
+EARLY_S: Final = 0.01
+"""A cycle that ends so much early still has its frame."""
+STILL_S: Final = 1.0
+"""So often there is a frame though no cycle ends: time stands still, or the robot has not answered yet."""
+
+
+class Console:
+    """The operator console of one run.
+
+    Parameters
+    ----------
+    process : Run
+        The run.
+    settings : Settings
+        It was started with.
+    log : structlog logger
+        Told of who comes and goes, and of who was refused what.
+    take_over : callable
+        Gets settings that were changed from the page.
+    emulated : bool
+        Whether the settings' world is what the robot meets.
+    units : {"m", "ft"}
+        In which figures are shown at first.
+    overtime : Overtime
+        Whoever holds time and recordings.
+    limits : Limits, optional
+        What clients may cost.
+    clock : callable
+        The host's: monotonic, s, whatever the run's clock does.
+
+    Attributes
+    ----------
+    url
+        Where it is found, token included; empty before it is open.
+    tunnel
+        The call that brings it to another machine where it is found on this one only.
+    """
+
+    def __init__(
+        self,
+        process: Run,
+        settings: Settings,
+        log: FilteringBoundLogger,
+        take_over: Callable[[Settings], None],
+        *,
+        emulated: bool,
+        units: Units = "m",
+        overtime: Overtime | None = None,
+        limits: Limits | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._process = process
+        self._log = log
+        self._clock = clock
+        self._emulated = emulated
+        self._units: Units = units
+        self._config = settings.console
+        self._overtime = Overtime() if overtime is None else overtime
+        self._limits = Limits(clients=settings.console.clients_max) if limits is None else limits
+        self._frames = Frames(settings)
+        self._refusals = Refusals(log, clock)
+        self._take_over = take_over
+        self._shown = settings
+        self.hub = Hub(self._limits, clock, self._control_left)
+        self.tuning = Tuning(settings, self._tuned, emulated=emulated)
+        self.desk = Desk(process, self.hub, self.tuning, self._overtime, self._refusals, self._spawn, clock)
+        timed = process.keeper.timed
+        self._timed_frame = timed(CONSOLE_FRAME, self._frame)
+        self._timed_tick = timed(CONSOLE_FRAME, self._tick)
+        self._last: tuple[CycleRecord, State, Books, RobotDriver] | None = None
+        self._is_asked_for = False
+        self._due_s = 0.0
+        self._shown_s = 0.0
+        self._ticker: asyncio.TimerHandle | None = None
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._failure: str | None = None
+        self._server: Server | None = None
+        self.url = ""
+        self.tunnel: str | None = None
+
+    def on_cycle(self, record: CycleRecord, state: State, books: Books, driver: RobotDriver) -> None:
+        """Take note of a cycle; what is to be shown of it is put together after it."""
+        self._frames.take(record)
+        if record.inputs.edits:
+            self._frames.touch()
+            refused = {one.edit: one.why for one in record.refused}
+            self.desk.edited([refused.get(k) for k in range(len(record.inputs.edits))])
+        self._last = (record, state, books, driver)
+        if self.hub.clients and not self._is_asked_for:
+            now_s = self._clock()
+            if now_s >= self._due_s - EARLY_S:
+                # From where it was due, so that a frame that comes late does not make all others later.
+                self._due_s = max(self._due_s + FRAME_S, now_s + FRAME_S - 2.0 * EARLY_S)
+                self._is_asked_for = True
+                asyncio.get_running_loop().call_soon(self._timed_frame)
+
+    def adopt(self, settings: Settings) -> None:
+        """Take note of settings that came from elsewhere, as from a file that was read again."""
+        self.tuning.adopt(settings)
+        self._show_settings(settings)
+
+    def probe(self) -> str | None:
+        """Say how it ended; None while it works. See `runtime.health`."""
+        if self._failure is None and self._server is not None and not self._server.is_open:
+            return "it does not listen any more"
+        return self._failure
+
+    @asynccontextmanager
+    async def open(self) -> AsyncIterator[None]:
+        """Serve while the run lasts.
+
+        Raises
+        ------
+        Complaint
+            There is nowhere to listen.
+        """
+        loop = asyncio.get_running_loop()
+        listening = await listen(self._config)
+        address, port = listening.getsockname()[:2]
+        token, host = new_token(), self._config.host
+        own = (socket.gethostname(), f"{socket.gethostname()}.local")
+        names = (host,) if is_loopback(address) else (host, *own)
+        timed = self._process.keeper.timed
+        house = House(
+            guard=Guard(token, names, port), hub=self.hub, limits=self._limits, refusals=self._refusals,
+            files=page_files(), hello=self._hello, on_message=self.desk.take, on_leave=self._left,
+            on_fault=self._process.health.report, report=self._report,
+            watch_without_token=self._config.watch_without_token, timed=timed, clock=self._clock,
+        )  # fmt: skip
+        self.hub.bind(loop)
+        server = Server(house)
+        await server.open(listening)
+        self._server = server
+        shown = own[0] if address in {"0.0.0.0", "::"} else host  # noqa: S104 - recognised, not bound to
+        where = f"{SCHEME}://{in_address(shown)}:{port}/"
+        self.url = f"{where}?token={token}"
+        self.tunnel = f"ssh -L {port}:127.0.0.1:{port} {own[0]}" if is_loopback(address) else None
+        elsewhere = {} if self.tunnel is None else {"from_elsewhere": self.tunnel}
+        self._log.info("console", url=where, start_url=self.url, **elsewhere)
+        if self.tunnel is None:
+            self._log.warning(
+                "the console is open to other machines: whoever has the token can drive, and nothing is encrypted"
+            )
+        self._ticker = loop.call_later(STILL_S, self._timed_tick)
+        self._process.health.watch("console", self.probe)
+        try:
+            yield
+        finally:
+            self._ticker.cancel()
+            for task in self._tasks:
+                task.cancel()
+            await asyncio.gather(*self._tasks, return_exceptions=True)
+            self._server = None
+            await server.close()
+
+    def hints(self) -> list[str]:
+        """Return what an operator at the terminal is told: where the page is, and how to get there from elsewhere."""
+        lines = [f"console: {self.url}"]
+        if self.tunnel is not None:
+            lines.append(f"from another machine: {self.tunnel}, then the same address there")
+        return lines
+
+    def _frame(self) -> None:
+        """Put a frame together and have it ready for every client; none of them is waited for."""
+        self._is_asked_for = False
+        if self._failure is not None:
+            return
+        try:
+            self._show()
+        except Exception as error:  # noqa: BLE001 - it is told by the probe, and the robot stands
+            self._failure = told(error)
+            self._log.error("the console cannot show the run any more", exc_info=error)
+
+    def _show(self) -> None:
+        now_s = self._clock()
+        self._shown_s = now_s
+        for client in self.hub.look_after(now_s):
+            self._refusals.tell(f"nothing was taken for {self._limits.stall_s:g} s", client.name)
+        if not self.hub.clients:
+            return
+        latest = self._process.keeper.latest()
+        record, state, missed, late, link = None, self._process.state, 0, 0, NO_FRAMES
+        if self._last is not None:
+            record, state, books, driver = self._last
+            missed, late, link = books.missed, books.late, driver.counts
+        time_control, recording = self._overtime.time, self._overtime.recording
+        beside = Beside(
+            host_s=now_s, clients=len(self.hub.clients), phases_s=latest.phases_s, late_s=latest.late_s,
+            missed=missed, late=late, link=link, recording=None if recording is None else recording.now,
+            is_paused=time_control is not None and time_control.is_paused,
+            speed=1.0 if time_control is None else time_control.speed,
+        )  # fmt: skip
+        self.hub.publish(self._frames.shot(state, record, beside))
+
+    def _tick(self) -> None:
+        """Have a frame also where no cycle ends."""
+        self._ticker = asyncio.get_running_loop().call_later(STILL_S, self._timed_tick)
+        if self.hub.clients and not self._is_asked_for and self._clock() - self._shown_s > 0.5 * STILL_S:
+            self._frame()
+
+    def _hello(self) -> dict[str, Any]:
+        # The first frame comes with the next cycle, whenever the last one was.
+        self._due_s = 0.0
+        return {
+            **about_run(
+                self.tuning.current, name=self._process.name, emulated=self._emulated, units=self._units
+            ),
+            "recording": self._overtime.recording is not None,
+        }  # fmt: skip
+
+    def _tuned(self, settings: Settings) -> None:
+        self._take_over(settings)
+        self._show_settings(settings)
+
+    def _show_settings(self, settings: Settings) -> None:
+        before, self._shown = self._shown, settings
+        self._frames.adopt(settings)
+        if settings.models != before.models:
+            self.hub.greet(self._hello())
+        else:
+            self.hub.tell({"type": "parameters", "parameters": parameters(settings)})
+
+    def _left(self, client: Client) -> None:
+        """Take note that a client is gone."""
+        if client.task is not None:
+            client.task.cancel()
+        if self._overtime.player is not None:
+            self._overtime.player.leave(client)
+
+    def _control_left(self) -> None:
+        self.desk.hands_off()
+
+    async def _report(self) -> bytes | None:
+        return None if self._overtime.player is None else await self._overtime.player.report()
+
+    def _spawn(self, client: Client, work: Callable[[], Awaitable[None]]) -> None:
+        """Have what takes its time done by a task that is looked after."""
+        name = f"console work {client.number}"
+
+        async def run() -> None:
+            try:
+                await stepped(self._process.keeper.timed, CONSOLE_RECEIVE, _awaited(work))
+            except asyncio.CancelledError:
+                raise
+            except Exception as error:  # noqa: BLE001 - told as a fault of the program
+                self._process.health.report(f"task `{name}`", error)
+
+        task = client.task = asyncio.create_task(run(), name=name)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+
+async def _awaited(work: Callable[[], Awaitable[None]]) -> None:
+    await work()

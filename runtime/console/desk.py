@@ -1,0 +1,247 @@
+"""From a message to what is done about it: may it be said, by this client, now; then it goes to whom it concerns.
+
+Everything that moves or changes becomes an input of the next cycle. Only a HALT does not wait for one, and nobody
+needs the control for it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any, Final, NamedTuple, Protocol
+
+from behaviors.move_to_goal import Goal
+from behaviors.teleoperation import HANDS_OFF, Teleoperate
+from config.reload import Difference
+from runtime.console import forms
+from runtime.console.client import Client
+from runtime.console.editing import EditForm, edit_in
+from runtime.console.forms import BadMessage, Message, Right, read_message
+from runtime.console.hub import Hub
+from runtime.console.limits import Refusals
+from runtime.console.overtime import Overtime, Work
+from runtime.console.refusal import Refusal
+from runtime.console.seams import Robot
+from runtime.console.tuning import Tuning
+from runtime.modes import Request
+from runtime.wishes import Legs, Wish
+
+FORBIDDEN: Final = "this page only watches: open the start URL with its token to do more"
+NOT_IN_CONTROL: Final = "another client has the control: ask for it first"
+
+
+LATER: Final = object()
+"""The answer comes when the thing is done."""
+
+
+class Asked(NamedTuple):
+    """An edit on its way through a cycle, and who waits for what comes of it."""
+
+    client: Client
+    number: int
+
+
+class Spawn(Protocol):
+    """Has work done by a task that is looked after."""
+
+    def __call__(self, client: Client, work: Callable[[], Awaitable[None]], /) -> None:
+        """Begin it."""
+
+
+class Desk:
+    """Takes what clients say.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot's process.
+    hub : Hub
+        All clients.
+    tuning : Tuning
+        The settings.
+    overtime : Overtime
+        Does what takes its time.
+    refusals : Refusals
+        Told of whatever is refused.
+    spawn : Spawn
+        Has that done.
+    clock : callable
+        Monotonic, s.
+    """
+
+    def __init__(
+        self, robot: Robot, hub: Hub, tuning: Tuning, overtime: Overtime, refusals: Refusals, spawn: Spawn,
+        clock: Callable[[], float],
+    ) -> None:  # fmt: skip
+        self._robot = robot
+        self._hub = hub
+        self._tuning = tuning
+        self._overtime = overtime
+        self._refusals = refusals
+        self._spawn = spawn
+        self._clock = clock
+        self._asked: deque[Asked] = deque()
+        self._is_by_hand = False
+
+    def take(self, client: Client, text: str | bytes) -> None:
+        """Do what a message says, or answer why not; never raises for what a client can cause."""
+        number: int | None = None
+        try:
+            message = read_message(text)
+            number = message.id
+            self._allow(client, message)
+            data = self._do(client, message)
+        except BadMessage as bad:
+            self._refuse(client, bad.number, Refusal(str(bad), bad.field))
+        except Refusal as refusal:
+            self._refuse(client, number, refusal)
+        else:
+            if data is not LATER:
+                _answer(client, message.id, data)
+
+    def edited(self, outcomes: Sequence[str | None]) -> None:
+        """Take what came of the edits of a cycle, in the order in which they were asked for."""
+        for why_not in outcomes:
+            if not self._asked:
+                return
+            asked = self._asked.popleft()
+            if why_not is None:
+                _answer(asked.client, asked.number, None)
+            else:
+                self._refuse(asked.client, asked.number, Refusal(why_not))
+
+    def hands_off(self) -> None:
+        """Let nobody's hand be on the stick any more: whoever had the control has it no longer."""
+        if self._is_by_hand:
+            self._is_by_hand = False
+            self._robot.wish(HANDS_OFF)
+
+    def _allow(self, client: Client, message: Message) -> None:
+        if not client.has_token:
+            raise Refusal(FORBIDDEN)
+        if message.right is Right.CONTROL:
+            if not self._hub.control.has(client):
+                raise Refusal(NOT_IN_CONTROL)
+            self._hub.control.used(client, self._clock())
+
+    def _do(self, client: Client, message: Message) -> Any:  # noqa: ANN401 - whatever the page is to have
+        match message:
+            case forms.Halt():
+                self._robot.request(Request.HALT)
+            case forms.Arm():
+                self._robot.request(Request.ARM)
+            case forms.Disarm():
+                self._robot.request(Request.DISARM)
+            case forms.WishLegs() | forms.WishGoal() | forms.Teleoperate():
+                self._wish(message)
+            case forms.TakeControl() | forms.GiveControl() | forms.Grant():
+                self._hand_over(client, message)
+            case forms.Set() | forms.Undo() | forms.LoadModel() | forms.SaveToml():
+                return self._tune(message)
+            case forms.Evidence(object=number):
+                return self._evidence(number)
+            case (
+                forms.ClearMap() | forms.DeleteSegments() | forms.PinSegments() | forms.PlaceModel()
+                | forms.MoveObject() | forms.RejectObject() | forms.ConfirmObject()
+            ):  # fmt: skip
+                return self._edit(client, message)
+            case _:
+                return self._begin(client, message.id, self._overtime.of(client, message))
+        return None
+
+    def _wish(self, message: forms.WishLegs | forms.WishGoal | forms.Teleoperate) -> None:
+        match message:
+            case forms.WishLegs():
+                wish: Wish = Legs()
+            case forms.WishGoal(x=x, y=y):
+                wish = Goal(x, y)
+            case forms.Teleoperate(v=v, w=w):
+                wish = Teleoperate(v, w, self._tuning.current.behaviors.teleoperation.message_age_max_s)
+        self._is_by_hand = isinstance(wish, Teleoperate)
+        self._robot.wish(wish)
+
+    def _hand_over(self, client: Client, message: forms.TakeControl | forms.GiveControl | forms.Grant) -> None:
+        control, why_not = self._hub.control, None
+        match message:
+            case forms.TakeControl():
+                why_not = control.take(client, self._clock())
+            case forms.GiveControl():
+                control.give()
+            case forms.Grant(client=number):
+                why_not = control.grant(number)
+        if why_not is not None:
+            raise Refusal(why_not)
+
+    def _tune(self, message: forms.Set | forms.Undo | forms.LoadModel | forms.SaveToml) -> Any:  # noqa: ANN401
+        match message:
+            case forms.Set(path=path, value=value):
+                return _rows(self._tuning.set(path, value))
+            case forms.Undo():
+                rows = _rows(self._tuning.undo())
+                return rows[0] if len(rows) == 1 else rows
+            case forms.LoadModel(toml=toml):
+                return {"name": self._tuning.add_model(toml).name}
+            case forms.SaveToml():
+                return self._tuning.saved()
+
+    def _evidence(self, number: int) -> dict[str, Any]:
+        found = self._robot.evidence(number)
+        if found is None:
+            raise Refusal(f"object {number} is not there any more")
+        return {
+            "object": found.object,
+            "model": found.model,
+            "for": found.supporting,
+            "against": -found.opposing,
+            "readings": [[a.x, a.y, a.range_m, a.direction, a.nats] for a in found.arcs],
+            "lines": [[line.number, line.x1, line.y1, line.x2, line.y2, line.supports] for line in found.lines],
+            "rivals": found.rivals,
+        }
+
+    def _edit(self, client: Client, message: EditForm) -> object:
+        if not self._robot.edit(edit_in(message)):
+            raise Refusal("too many changes wait for the next cycle: try again")
+        self._asked.append(Asked(client, message.id))
+        return LATER
+
+    def _begin(self, client: Client, number: int, work: Work) -> object:
+        if client.is_busy:
+            raise Refusal("what was asked for before is still under way")
+
+        async def done() -> None:
+            try:
+                data = await work()
+            except Refusal as refusal:
+                self._refuse(client, number, refusal)
+            else:
+                _answer(client, number, data)
+
+        self._spawn(client, done)
+        return LATER
+
+    def _refuse(self, client: Client, number: int | None, refusal: Refusal) -> None:
+        self._refusals.tell(str(refusal), client.name)
+        _say(client, number, None, refusal)
+
+
+def _rows(changed: Sequence[Difference]) -> list[dict[str, Any]]:
+    """Return changes of plain values as the page shows them."""
+    plain = (bool, int, float, str, type(None))
+    return [{"path": d.path, "value": d.after} for d in changed if isinstance(d.after, plain)]
+
+
+def _answer(client: Client, number: int, data: Any) -> None:  # noqa: ANN401 - whatever the page is to have
+    _say(client, number, data, None)
+
+
+def _say(client: Client, number: int | None, data: Any, refusal: Refusal | None) -> None:  # noqa: ANN401
+    client.say(
+        {
+            "type": "answer",
+            "id": number,
+            "ok": refusal is None,
+            "error": None if refusal is None else str(refusal),
+            "field": None if refusal is None else refusal.field,
+            "data": data,
+        }
+    )

@@ -1,0 +1,140 @@
+"""What the console asks of others, as protocols: the robot's process, and whoever holds the run's time.
+
+A part that is not there answers so: a robot on a port has no time that could be held, and a run without a recording
+nothing to mark.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, Protocol
+
+from config.settings import Settings
+from perception.edits import Edit, Evidence
+from runtime.console.frames import RecordingNow, Shot
+from runtime.health import Health
+from runtime.modes import Request
+from runtime.step import State
+from runtime.timekeeping import Timekeeper
+from runtime.wishes import Wish
+
+NOT_HERE: Final = "not available here"
+
+
+class Robot(Protocol):
+    """The robot's process, as far as an operator reaches it."""
+
+    def request(self, request: Request) -> None:
+        """Take a request into the next cycle; a HALT goes out at once."""
+
+    def wish(self, wish: Wish) -> None:
+        """Take what is to be driven into the next cycle; the newest counts."""
+
+    def edit(self, edit: Edit) -> bool:
+        """Take a change of the map into the next cycle; False where too many wait already."""
+
+    def evidence(self, number: int) -> Evidence | None:
+        """Return what speaks for and against an object, None where there is no such object."""
+
+    def reconfigure(self, settings: Settings) -> None:
+        """Go on with other settings from the next cycle on."""
+
+
+class Run(Robot, Protocol):
+    """The same, as far as the console follows it."""
+
+    health: Health
+
+    @property
+    def state(self) -> State:
+        """What the last cycle left."""
+
+    @property
+    def keeper(self) -> Timekeeper:
+        """The books of time."""
+
+    @property
+    def name(self) -> str | None:
+        """What the robot calls itself, None until it has."""
+
+
+class Viewer(Protocol):
+    """A client, to whoever shows it something else than the run itself."""
+
+    @property
+    def is_gone(self) -> bool:
+        """Whether it has left: nothing needs to be shown any more."""
+
+    def switch(self, *, live: bool) -> None:
+        """Have it shown the run itself, or only what `show` gives it."""
+
+    def show(self, shot: Shot) -> None:
+        """Have a frame ready for it."""
+
+    def say(self, message: dict[str, Any]) -> None:
+        """Send it a message of its own."""
+
+
+class TimeControl(Protocol):
+    """Holds the time of an emulated run; every call returns None, or why it cannot be done."""
+
+    @property
+    def is_paused(self) -> bool:
+        """Whether time stands still but for single steps."""
+
+    @property
+    def speed(self) -> float:
+        """How fast time goes while it is not paused."""
+
+    async def pause(self) -> str | None:
+        """Let time stand still."""
+
+    async def resume(self) -> str | None:
+        """Let time go on."""
+
+    async def single_step(self) -> str | None:
+        """Let time go on for one cycle."""
+
+    async def set_speed(self, factor: float) -> str | None:
+        """Let time go by faster or slower."""
+
+
+class RecordingControl(Protocol):
+    """Begins, ends and marks the recording of the run; every call returns None, or why it cannot be done."""
+
+    @property
+    def now(self) -> RecordingNow | None:
+        """The recording under way, None where there is none."""
+
+    async def record(self, *, on: bool) -> str | None:
+        """Begin or end a recording."""
+
+    async def bookmark(self, text: str) -> str | None:
+        """Put a mark into it."""
+
+
+class Player(Protocol):
+    """Shows recordings, to each client its own; what is raised as a `Refusal` is told to who asked."""
+
+    async def recordings(self) -> list[dict[str, Any]]:
+        """Return which recordings there are."""
+
+    async def open(self, viewer: Viewer, file: str) -> dict[str, Any]:
+        """Show a recording to a client from now on; return what there is to know of it."""
+
+    async def scrub(self, viewer: Viewer, s: float) -> None:
+        """Go to a time in it."""
+
+    async def play(self, viewer: Viewer, speed: float) -> None:
+        """Let it go by."""
+
+    async def step(self, viewer: Viewer, cycles: int) -> None:
+        """Go so many cycles on, or back."""
+
+    async def live(self, viewer: Viewer) -> None:
+        """Go back to the run itself."""
+
+    def leave(self, viewer: Viewer) -> None:
+        """Take note that a client is gone."""
+
+    async def report(self) -> bytes | None:
+        """Return the run up to now as a page of its own, None where that is not to be had."""

@@ -1,0 +1,223 @@
+"""A console on a robot that keeps what it is asked for, over real sockets: shared by the tests here."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import AsyncIterator, Callable, Mapping, MutableMapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import aiohttp
+import numpy as np
+import orjson
+import structlog
+from yarl import URL
+
+from config.load import load_settings
+from config.settings import Settings
+from drivers.driver import Heard, LineState
+from drivers.messages import Firing, Flags, LinkCounts, Odometry, Pose, Twist
+from perception.edits import Edit, Evidence
+from perception.pipeline import Perception
+from runtime.books import Books
+from runtime.console.console import Console
+from runtime.console.limits import Limits
+from runtime.console.overtime import Overtime
+from runtime.health import Health
+from runtime.meter import Meter
+from runtime.modes import Mode, ModeState, Request
+from runtime.process import CALLBACKS
+from runtime.step import CycleRecord, Inputs, Refused, State
+from runtime.timekeeping import Timekeeper
+from runtime.wishes import Wish
+
+PATIENCE_S = 20.0
+FREE_PORT = "console.port=0"
+
+
+@dataclass
+class Counted:
+    """A driver, as far as frames tell of it."""
+
+    counts: LinkCounts = field(default_factory=lambda: LinkCounts(7, 1, 2))
+
+
+@dataclass
+class FakeRun:
+    """In place of `RobotProcess`: it does nothing, and keeps what it is asked for."""
+
+    settings: Settings
+    log: Any
+    asked: list[object] = field(default_factory=list)
+    room: int = 8
+    name: str | None = "denning"
+
+    def __post_init__(self) -> None:
+        self.health = Health(self.log)
+        self.books = Books(0.005)
+        self.keeper = Timekeeper(self.books, Meter().read, callbacks=CALLBACKS)
+        self.state = State(Perception(self.settings.ring, self.settings.models, self.settings.perception))
+
+    def request(self, request: Request) -> None:
+        self.asked.append(request)
+
+    def wish(self, wish: Wish) -> None:
+        self.asked.append(wish)
+
+    def edit(self, edit: Edit) -> bool:
+        if self.room == 0:
+            return False
+        self.asked.append(edit)
+        return True
+
+    def evidence(self, number: int) -> Evidence | None:
+        return Evidence(number, "semicircle", supporting=3.5, opposing=-1.0) if number == 1 else None
+
+    def reconfigure(self, settings: Settings) -> None:
+        self.asked.append(settings)
+
+
+class Page:
+    """A page, as far as the server can tell."""
+
+    def __init__(self, socket: aiohttp.ClientWebSocketResponse) -> None:
+        self.socket = socket
+        self.heard: list[dict[str, Any]] = []
+        self._id = 0
+
+    async def next(self, *kinds: str) -> dict[str, Any]:
+        """Return the next message of some kind, keeping all on the way to it."""
+        while True:
+            message = await asyncio.wait_for(self.socket.receive(), PATIENCE_S)
+            assert message.type is aiohttp.WSMsgType.TEXT, message
+            told: dict[str, Any] = orjson.loads(message.data)
+            self.heard.append(told)
+            if told["type"] in kinds:
+                return told
+
+    async def say(self, **message: Any) -> int:
+        self._id += 1
+        await self.socket.send_str(orjson.dumps({"id": self._id, **message}).decode())
+        return self._id
+
+    async def answer(self, number: int) -> dict[str, Any]:
+        while (told := await self.next("answer"))["id"] != number:
+            pass
+        return told
+
+    async def ask(self, **message: Any) -> dict[str, Any]:
+        """Say something and return the answer."""
+        return await self.answer(await self.say(**message))
+
+    async def closed(self) -> int | None:
+        """Wait until the server has closed the connection; return its code."""
+        while True:
+            message = await asyncio.wait_for(self.socket.receive(), PATIENCE_S)
+            if message.type in {aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSED, aiohttp.WSMsgType.CLOSING,
+                                aiohttp.WSMsgType.ERROR}:  # fmt: skip
+                return self.socket.close_code
+
+
+@dataclass
+class Operated:
+    """A console, its robot, and whoever looks at it."""
+
+    run: FakeRun
+    console: Console
+    session: aiohttp.ClientSession
+    log: list[dict[str, Any]]
+    clock: list[float]
+    cycle: int = 0
+
+    @property
+    def url(self) -> URL:
+        return URL(self.console.url)
+
+    @property
+    def origin(self) -> str:
+        return str(self.url.origin())
+
+    @property
+    def token(self) -> str:
+        return self.url.query["token"]
+
+    async def connect(self, *, token: str | None = "", origin: str | None = "", host: str | None = None) -> Page:
+        """Open a page; an empty token or origin is the right one."""
+        query = {} if token is None else {"token": token or self.token}
+        headers = {} if origin is None else {"Origin": origin or self.origin}
+        if host is not None:
+            headers["Host"] = host
+        socket = await self.session.ws_connect(
+            self.url.with_path("/ws").with_query(query), headers=headers, max_msg_size=0
+        )
+        return Page(socket)
+
+    async def page(self) -> Page:
+        """Open a page and hear its greeting."""
+        page = await self.connect()
+        await page.next("hello")
+        return page
+
+    def cycles(
+        self, count: int = 1, *, step_s: float = 0.05, outcomes: tuple[str | None, ...] = (), **inputs: Any
+    ) -> None:
+        """Let cycles end, each with a firing of three sensors."""
+        for _ in range(count):
+            self.cycle += 1
+            self.clock[0] += step_s
+            t_s = 0.05 * self.cycle
+            ranges = np.full(len(self.run.settings.ring.mounts), np.nan)
+            ranges[self.cycle % 8 :: 8] = 1.5, np.inf, 2.5
+            pose = Pose(0.02 * self.cycle, 0.0, 0.0)
+            odometry = Odometry(t_s, pose, 0.0, Twist(0.3, 0.0), Flags.NONE, 0)
+            heard = Heard((Firing(t_s, pose, 0.0, ranges),), odometry, rebooted=False)
+            state = self.run.state
+            state.cycle, state.odometry = self.cycle, odometry
+            refused = tuple(Refused(k, why) for k, why in enumerate(outcomes) if why is not None)
+            made = sum(state.perception.observe(firing) for firing in heard.firings)
+            record = CycleRecord(
+                self.cycle, replace(Inputs(t_s, LineState.READY, None, heard), **inputs), ModeState(Mode.DRIVE),
+                Twist(0.3, 0.0), made, state.perception.living, state.perception.hypotheses, 2, 2, "quota", refused,
+            )  # fmt: skip
+            self.console.on_cycle(record, state, self.run.books, Counted())  # type: ignore[arg-type]
+
+    def refusals(self) -> list[str]:
+        """Return what the log says was refused."""
+        return [str(line["why"]) for line in self.log if line["event"] == "the console refused"]
+
+    async def settled(self, done: Callable[[], bool], what: str) -> None:
+        """Let the loop go on until something is so."""
+        end_s = time.monotonic() + PATIENCE_S
+        while not done():
+            assert time.monotonic() < end_s, f"it never came: {what}"
+            await asyncio.sleep(0.001)
+
+
+@contextlib.asynccontextmanager
+async def operated(
+    *sets: str, overtime: Overtime | None = None, limits: Limits | None = None, emulated: bool = True
+) -> AsyncIterator[Operated]:
+    """Open a console; its clock goes on with cycles only."""
+    lines: list[dict[str, Any]] = []
+    clock = [1000.0]
+
+    def keep(_logger: object, _name: str, event: MutableMapping[str, Any]) -> Mapping[str, Any]:
+        lines.append(dict(event))
+        raise structlog.DropEvent
+
+    log = structlog.wrap_logger(None, processors=[structlog.processors.add_log_level, keep])
+    settings = load_settings("hallway", ["perception.method=paper", FREE_PORT, *sets])
+    run = FakeRun(settings, log)
+    console = Console(
+        run, settings, log, run.reconfigure, emulated=emulated, overtime=overtime, limits=limits,
+        clock=lambda: clock[0],
+    )  # fmt: skip
+    before = asyncio.all_tasks()
+    with run.health.hearing_accidents():
+        async with aiohttp.ClientSession() as session, console.open():
+            yield Operated(run, console, session, lines, clock)
+        left = [task for task in asyncio.all_tasks() - before if "aiohttp.connector" not in repr(task)]
+        assert not left, "a task outlived the console"
+    assert run.health.unwell() is None
