@@ -70,7 +70,13 @@ $(VENV)/run.stamp: pyproject.toml | $(VENV)/bin/python
 	$(PIP) --editable .
 	@touch $@
 
-$(VENV)/test.stamp: pyproject.toml | $(VENV)/bin/python
+# The page of the console is tested in a browser: Debian's.
+$(VENV)/browser.stamp: | $(VENV)/bin/python
+	@command -v chromium >/dev/null || { echo "installing chromium, in which the console's page is tested"; \
+		$$([ $$(id -u) = 0 ] || echo sudo) sh -c "apt-get -qq update && apt-get -qq install -y chromium"; }
+	@touch $@
+
+$(VENV)/test.stamp: pyproject.toml | $(VENV)/bin/python $(VENV)/browser.stamp
 	$(PIP) --editable ".[dev]"
 	@touch $@
 

@@ -51,6 +51,7 @@ def slowed_down() -> str | None:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--promises", metavar="PAGE", help="write what was measured, see tests/promises.py")
+    parser.addoption("--screenshots", metavar="FOLDER", help="keep the browser tests' pictures there")
 
 
 @pytest.hookimpl(tryfirst=True)

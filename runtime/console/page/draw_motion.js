@@ -1,0 +1,139 @@
+// The robot and what moves it: body and heading, the trail, each schema's vector with its name, their sum, the goal.
+
+import { haloed, overlap } from "./scene.js";
+
+const UNIT_PX = 70; // a vector of magnitude one; longer where the robot is large, so that it shows beyond the rim
+const LENGTH_MAX = 2; // in units
+const DASHES = [[7, 4], [2, 3], [10, 3, 2, 3], [4, 6]];
+
+export function trailDrawer() {
+  let version = -1;
+  let path = null;
+  return (f) => {
+    const { ctx, world, px, theme } = f;
+    if (world.trailVersion !== version) {
+      version = world.trailVersion;
+      path = new Path2D();
+      world.trail.forEach(({ x, y }, i) => (i === 0 ? path.moveTo(x, y) : path.lineTo(x, y)));
+    }
+    f.inWorld();
+    ctx.strokeStyle = theme.robot;
+    ctx.lineJoin = "round";
+    ctx.lineWidth = 2 * px;
+    ctx.globalAlpha = 0.8;
+    ctx.stroke(path);
+  };
+}
+
+export function drawRobot(f) {
+  const { ctx, world, px, theme } = f;
+  if (!world.fresh) return;
+  const [x, y, theta] = world.state.pose;
+  const r = world.hello?.body?.radius ?? 0.2;
+  f.inWorld();
+  ctx.beginPath();
+  ctx.arc(x, y, r, 0, 2 * Math.PI);
+  ctx.fillStyle = theme.robotFill;
+  ctx.globalAlpha = 0.8;
+  ctx.fill();
+  ctx.globalAlpha = 1;
+  ctx.strokeStyle = theme.robot;
+  ctx.lineWidth = 2.5 * px;
+  ctx.stroke();
+  const tip = (angle, reach) => [x + reach * Math.cos(theta + angle), y + reach * Math.sin(theta + angle)];
+  ctx.beginPath();
+  ctx.moveTo(...tip(0, 0.78 * r));
+  ctx.lineTo(...tip(2.5, 0.5 * r));
+  ctx.lineTo(...tip(Math.PI, 0.18 * r));
+  ctx.lineTo(...tip(-2.5, 0.5 * r));
+  ctx.closePath();
+  ctx.fillStyle = theme.robot;
+  ctx.fill();
+  const yaw = world.state.ring_yaw; // the ring does not turn with the wheels: its own mark, on the rim
+  ctx.beginPath();
+  ctx.moveTo(x + 0.86 * r * Math.cos(yaw), y + 0.86 * r * Math.sin(yaw));
+  ctx.lineTo(x + 1.12 * r * Math.cos(yaw), y + 1.12 * r * Math.sin(yaw));
+  ctx.lineWidth = 4 * px;
+  ctx.stroke();
+}
+
+function arrow(ctx, x, y, dx, dy, head) {
+  const length = Math.hypot(dx, dy), ux = dx / length, uy = dy / length;
+  ctx.beginPath();
+  ctx.moveTo(x, y);
+  ctx.lineTo(x + dx - ux * head, y + dy - uy * head);
+  ctx.stroke();
+  ctx.setLineDash([]);
+  ctx.beginPath();
+  ctx.moveTo(x + dx, y + dy);
+  ctx.lineTo(x + dx - ux * head - uy * head * 0.5, y + dy - uy * head + ux * head * 0.5);
+  ctx.lineTo(x + dx - ux * head + uy * head * 0.5, y + dy - uy * head - ux * head * 0.5);
+  ctx.closePath();
+  ctx.fill();
+}
+
+export function drawVectors(f) {
+  const { ctx, world, theme, view } = f;
+  if (!world.fresh) return;
+  const [x, y] = view.toScreen(world.state.pose[0], world.state.pose[1]);
+  f.onScreen();
+  ctx.textBaseline = "middle";
+  const unit = Math.max(UNIT_PX, 1.7 * (world.hello?.body?.radius ?? 0) * view.scale);
+  const roomy = view.width > 480;
+  world.state.vectors.forEach(([name, vx, vy], i) => {
+    const size = Math.hypot(vx, vy);
+    if (!(size > 0.01)) return;
+    const length = Math.min(size, LENGTH_MAX) * unit;
+    const dx = (vx / size) * length, dy = (-vy / size) * length;
+    const sum = name === "sum";
+    ctx.strokeStyle = ctx.fillStyle = sum ? theme.ink : theme.vector;
+    ctx.lineWidth = sum ? 3.5 : 2;
+    ctx.setLineDash(sum ? [] : DASHES[i % DASHES.length]);
+    arrow(ctx, x, y, dx, dy, Math.min(sum ? 13 : 10, length));
+    ctx.font = theme.font(roomy ? 11.5 : 10, sum ? 700 : 600);
+    ctx.textAlign = "left";
+    const words = `${name.replaceAll("_", "-")}${roomy ? ` ${size.toFixed(2)}` : ""}`;
+    const width = ctx.measureText(words).width;
+    const tx = Math.max(4, Math.min(view.width - width - 4, dx >= 0 ? x + dx + 7 : x + dx - 7 - width));
+    let ty = y + dy + (sum ? 0 : dy > 0 ? 8 : -8);
+    const box = () => [tx - 2, ty - 7, tx + width + 2, ty + 7];
+    while (f.labels.some((taken) => overlap(taken, box()))) ty += 13;
+    f.labels.push(box());
+    haloed(f, words, tx, ty, sum ? theme.ink : theme.vector);
+  });
+}
+
+export function drawWish(f) {
+  const { ctx, world, theme, view } = f;
+  const wish = world.state.wish;
+  if (wish?.kind !== "goal") return;
+  const [x, y] = view.toScreen(wish.x, wish.y);
+  const [rx, ry] = view.toScreen(world.state.pose[0], world.state.pose[1]);
+  f.onScreen();
+  ctx.strokeStyle = ctx.fillStyle = theme.drive;
+  ctx.lineWidth = 1.5;
+  ctx.setLineDash([3, 5]);
+  ctx.beginPath();
+  ctx.moveTo(rx, ry);
+  ctx.lineTo(x, y);
+  ctx.stroke();
+  ctx.setLineDash([]);
+  ctx.lineWidth = 2.5;
+  ctx.beginPath();
+  ctx.moveTo(x, y);
+  ctx.lineTo(x, y - 26);
+  ctx.stroke();
+  ctx.beginPath();
+  ctx.moveTo(x, y - 26);
+  ctx.lineTo(x + 18, y - 20);
+  ctx.lineTo(x, y - 14);
+  ctx.closePath();
+  ctx.fill();
+  ctx.beginPath();
+  ctx.arc(x, y, 4, 0, 2 * Math.PI);
+  ctx.fill();
+  ctx.font = theme.font(12, 650);
+  ctx.textAlign = "left";
+  ctx.textBaseline = "middle";
+  haloed(f, "goal", x + 21, y - 20, theme.drive);
+}

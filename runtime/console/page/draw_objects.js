@@ -1,0 +1,205 @@
+// What was recognised: the model's outline with its label and probability, the 95 % ellipse of its place, the clusters
+// it grew from, and for the one that is picked the readings that speak for and against it.
+
+import { haloed, overlap } from "./scene.js";
+
+const CHI2_95 = 5.991;
+const SURE = 0.8; // below this the outline is dashed
+
+export function drawClusters(f) {
+  const { ctx, px, theme } = f;
+  const path = new Path2D();
+  for (const [x, y, length, width, angle, , cx = x, cy = y] of f.world.state.clusters) {
+    const c = Math.cos(angle), s = Math.sin(angle);
+    const corner = (a, b) => [x + (a * c * length) / 2 - (b * s * width) / 2, y + (a * s * length) / 2 + (b * c * width) / 2];
+    const corners = [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
+    corners.forEach(([px_, py], i) => (i === 0 ? path.moveTo(px_, py) : path.lineTo(px_, py)));
+    path.closePath();
+    cross(path, cx, cy, 6 * px);
+  }
+  f.inWorld();
+  ctx.strokeStyle = theme.cluster;
+  ctx.lineWidth = 1.2 * px;
+  ctx.stroke(path);
+  if (f.view.scale < 70) return;
+  f.onScreen();
+  ctx.font = theme.font(11, 600);
+  ctx.textAlign = "center";
+  for (const [x, y, , , , count, cx = x, cy = y] of f.world.state.clusters) {
+    const [sx, sy] = f.view.toScreen(cx, cy);
+    haloed(f, String(Math.round(count)), sx + 14, sy + 4, theme.cluster);
+  }
+}
+
+// The outline of a model as it stands somewhere; a lozenge where there is no such model here.
+export function outlinePath(path, model, x, y, theta, px) {
+  if (!model) {
+    const r = 9 * px;
+    path.moveTo(x + r, y);
+    path.lineTo(x, y + r);
+    path.lineTo(x - r, y);
+    path.lineTo(x, y - r);
+    path.closePath();
+    return;
+  }
+  if (model.arc_radius_m && model.closed) {
+    path.moveTo(x + model.arc_radius_m, y);
+    path.arc(x, y, model.arc_radius_m, 0, 2 * Math.PI);
+    return;
+  }
+  const c = Math.cos(theta), s = Math.sin(theta);
+  model.vertices.forEach(([vx, vy], i) => {
+    const wx = x + c * vx - s * vy, wy = y + s * vx + c * vy;
+    if (i === 0) path.moveTo(wx, wy);
+    else path.lineTo(wx, wy);
+  });
+  if (model.closed) path.closePath();
+}
+
+export function ellipseOf(covariance) {
+  const [xx, xy, yy] = covariance;
+  const mean = (xx + yy) / 2, off = Math.hypot((xx - yy) / 2, xy);
+  return {
+    major: Math.sqrt(CHI2_95 * Math.max(mean + off, 0)),
+    minor: Math.sqrt(CHI2_95 * Math.max(mean - off, 0)),
+    angle: Math.atan2(2 * xy, xx - yy) / 2,
+  };
+}
+
+export const percent = (share) => `${share > 0.995 && share < 1 ? "> 99" : Math.round(100 * share)} %`;
+
+export function drawModels(f) {
+  const { ctx, world, theme, px, selection } = f;
+  const sure = new Path2D(), unsure = new Path2D(), picked = new Path2D();
+  for (const object of world.state.objects) {
+    const model = world.model(object.model);
+    const chance = object.probability ?? object.score;
+    outlinePath(chance >= SURE ? sure : unsure, model, object.x, object.y, object.theta, px);
+    if (object.number !== null && object.number === selection.object) {
+      outlinePath(picked, model, object.x, object.y, object.theta, px);
+    }
+  }
+  f.inWorld();
+  ctx.strokeStyle = theme.ink;
+  ctx.lineWidth = 10 * px;
+  ctx.stroke(picked);
+  ctx.strokeStyle = theme.chosen;
+  ctx.lineWidth = 7 * px;
+  ctx.stroke(picked);
+  ctx.globalAlpha = 0.3;
+  ctx.fillStyle = theme.modelFill;
+  ctx.fill(sure);
+  ctx.globalAlpha = 1;
+  ctx.strokeStyle = theme.model;
+  ctx.lineWidth = 2 * px;
+  ctx.stroke(sure);
+  ctx.setLineDash([6 * px, 4 * px]);
+  ctx.stroke(unsure);
+}
+
+export function drawEllipses(f) {
+  const { ctx, world, theme, px } = f;
+  const times = f.options.ellipseScale;
+  const path = new Path2D(), centres = new Path2D();
+  for (const { x, y, covariance } of world.state.objects) {
+    const arm = 3.5 * px;
+    centres.moveTo(x - arm, y);
+    centres.lineTo(x + arm, y);
+    centres.moveTo(x, y - arm);
+    centres.lineTo(x, y + arm);
+    if (!covariance) continue;
+    const { major, minor, angle } = ellipseOf(covariance);
+    path.moveTo(x + times * major * Math.cos(angle), y + times * major * Math.sin(angle));
+    path.ellipse(x, y, times * major, times * minor, angle, 0, 2 * Math.PI);
+  }
+  f.inWorld();
+  ctx.strokeStyle = theme.ellipse;
+  ctx.lineWidth = 1.4 * px;
+  ctx.stroke(centres);
+  ctx.lineWidth = 1.8 * px;
+  ctx.stroke(path);
+}
+
+// Labels look for a place of their own, within the outline first, and are only a number where none is free.
+export function drawLabels(f) {
+  const { ctx, world, theme, view } = f;
+  f.onScreen();
+  ctx.textBaseline = "middle";
+  const spots = world.state.objects.map((object) => {
+    const [x, y] = view.toScreen(object.x, object.y);
+    return { object, x, y, r: Math.max(6, (world.model(object.model)?.arc_radius_m ?? 0.1) * view.scale) };
+  }).filter(({ x, y }) => x > -50 && y > -50 && x < view.width + 50 && y < view.height + 50);
+  const taken = f.labels;
+  const [rx, ry] = view.toScreen(world.state.pose[0], world.state.pose[1]);
+  const robot = { x: rx, y: ry, r: (world.hello?.body?.radius ?? 0.2) * view.scale };
+  const misses = ({ x, y, r }, [left, top, right, bottom]) =>
+    Math.hypot(x - Math.max(left, Math.min(x, right)), y - Math.max(top, Math.min(y, bottom))) > r;
+  const free = (box, own) => taken.every((one) => !overlap(one, box))
+    && misses(robot, box) && spots.every((spot) => spot === own || misses(spot, box));
+  for (const spot of spots) {
+    const { object, x, y, r } = spot;
+    const numbered = object.number !== null && object.number !== undefined;
+    const chance = percent(object.probability ?? object.score);
+    const words = `${numbered ? `${object.number} ` : ""}${object.model}  ${chance}`;
+    ctx.font = theme.font(12, 650);
+    const half = ctx.measureText(words).width / 2;
+    const inside = Math.hypot(half, 0.45 * r + 8) < r ? [[x, y - 0.45 * r]] : [];
+    const places = [...inside, [x, y + r + 11], [x, y - r - 11], [x + r + 6 + half, y], [x - r - 6 - half, y]];
+    const place = places.find(([tx, ty]) => free([tx - half - 2, ty - 8, tx + half + 2, ty + 8], spot));
+    ctx.textAlign = "center";
+    if (place) {
+      const [tx, ty] = place;
+      taken.push([tx - half - 2, ty - 8, tx + half + 2, ty + 8]);
+      haloed(f, words, tx, ty, theme.model);
+    } else if (numbered) {
+      ctx.font = theme.font(11, 650);
+      haloed(f, String(object.number), x, r > 14 ? y - 0.5 * r : y, theme.model);
+    }
+  }
+}
+
+function cross(path, x, y, arm) {
+  path.moveTo(x - arm, y - arm);
+  path.lineTo(x + arm, y + arm);
+  path.moveTo(x - arm, y + arm);
+  path.lineTo(x + arm, y - arm);
+}
+
+// Readings for an object are whole arcs, those against it are dashed and crossed out in the middle.
+export function drawEvidence(f) {
+  const { ctx, world, theme, px, selection } = f;
+  const evidence = world.evidence;
+  if (!evidence || evidence.object !== selection.object) return;
+  const half = world.hello?.ring?.half_angle ?? 0;
+  const speaks = new Path2D(), against = new Path2D(), crosses = new Path2D(), rays = new Path2D();
+  const reachMax = world.hello?.ring?.range_max ?? 0;
+  for (const { x1, y1, x2, y2, supports } of evidence.lines) {
+    const path = supports ? speaks : against;
+    path.moveTo(x1, y1);
+    path.lineTo(x2, y2);
+    if (!supports) cross(crosses, (x1 + x2) / 2, (y1 + y2) / 2, 4 * px);
+  }
+  for (const { x, y, range: heard, angle, nats } of evidence.readings) {
+    const range = heard ?? reachMax; // nothing heard: it would have been, up to there
+    const path = nats < 0 ? against : speaks;
+    path.moveTo(x + range * Math.cos(angle - half), y + range * Math.sin(angle - half));
+    path.arc(x, y, range, angle - half, angle + half);
+    rays.moveTo(x, y);
+    rays.lineTo(x + range * Math.cos(angle), y + range * Math.sin(angle));
+    if (nats < 0) cross(crosses, x + range * Math.cos(angle), y + range * Math.sin(angle), 4 * px);
+  }
+  f.inWorld();
+  ctx.strokeStyle = theme.muted;
+  ctx.globalAlpha = 0.22;
+  ctx.lineWidth = px;
+  ctx.stroke(rays);
+  ctx.globalAlpha = 0.85;
+  ctx.strokeStyle = theme.model;
+  ctx.lineWidth = 1.4 * px;
+  ctx.stroke(speaks);
+  ctx.strokeStyle = theme.stop;
+  ctx.lineWidth = 2 * px;
+  ctx.stroke(crosses);
+  ctx.setLineDash([5 * px, 4 * px]);
+  ctx.stroke(against);
+}

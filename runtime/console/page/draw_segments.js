@@ -1,0 +1,79 @@
+// Outline segments, the newer the bolder; pinned ones have square ends, selected ones a band behind them.
+
+const AGES = [[2, 1, 2.8], [10, 0.85, 2.2], [30, 0.65, 1.8], [60, 0.5, 1.4], [Infinity, 0.36, 1.1]]; // s, opacity, px
+
+export const AGE_WORDS = "bold: new, thin: old";
+
+// One path for all segments of like age: five strokes draw any number of them.
+class Paths {
+  key = "";
+  paths = [];
+  pins = [];
+
+  refresh(world) {
+    const key = `${world.segmentsVersion} ${Math.floor(world.state.t)}`;
+    if (key === this.key) return;
+    this.key = key;
+    this.paths = AGES.map(() => new Path2D());
+    this.pins = [];
+    for (const s of world.segments.values()) {
+      const age = world.state.t - s.t;
+      const path = this.paths[AGES.findIndex(([until]) => age < until)] ?? this.paths.at(-1);
+      path.moveTo(s.x1, s.y1);
+      path.lineTo(s.x2, s.y2);
+      if (s.pinned) this.pins.push(s);
+    }
+  }
+}
+
+export function segmentsDrawer() {
+  const cache = new Paths();
+  return (f) => {
+    const { ctx, world, px, theme, selection } = f;
+    cache.refresh(world);
+    f.inWorld();
+    if (selection.segments.size > 0) {
+      const chosen = new Path2D();
+      for (const number of selection.segments) {
+        const s = world.segments.get(number);
+        if (s === undefined) continue;
+        chosen.moveTo(s.x1, s.y1);
+        chosen.lineTo(s.x2, s.y2);
+      }
+      ctx.lineCap = "round";
+      ctx.strokeStyle = theme.ink;
+      ctx.lineWidth = 11 * px;
+      ctx.stroke(chosen);
+      ctx.strokeStyle = theme.chosen;
+      ctx.lineWidth = 8 * px;
+      ctx.stroke(chosen);
+      ctx.lineCap = "butt";
+    }
+    ctx.strokeStyle = theme.segment;
+    cache.paths.forEach((path, i) => {
+      ctx.globalAlpha = AGES[i][1];
+      ctx.lineWidth = AGES[i][2] * px;
+      ctx.stroke(path);
+    });
+    ctx.globalAlpha = 1;
+    ctx.fillStyle = theme.segment;
+    const side = 6 * px;
+    for (const s of cache.pins) {
+      ctx.fillRect(s.x1 - side / 2, s.y1 - side / 2, side, side);
+      ctx.fillRect(s.x2 - side / 2, s.y2 - side / 2, side, side);
+    }
+  };
+}
+
+// The segment nearest to a point of the plane, within reach (m).
+export function nearestSegment(world, x, y, reach) {
+  let best = null, nearest = reach;
+  for (const s of world.segments.values()) {
+    const dx = s.x2 - s.x1, dy = s.y2 - s.y1;
+    const square = dx * dx + dy * dy;
+    const along = square > 0 ? Math.max(0, Math.min(1, ((x - s.x1) * dx + (y - s.y1) * dy) / square)) : 0;
+    const away = Math.hypot(x - s.x1 - along * dx, y - s.y1 - along * dy);
+    if (away < nearest) [best, nearest] = [s, away];
+  }
+  return best;
+}

@@ -1,0 +1,104 @@
+// What a person holds to drive: the pad under a pointer, keys, a gamepad's stick with its shoulder button pressed.
+
+import { byId } from "./dom.js";
+
+const PAD_KEYS = { ArrowUp: [1, 0], ArrowDown: [-1, 0], ArrowLeft: [0, 1], ArrowRight: [0, -1] };
+const KEYS = { KeyW: [1, 0], KeyS: [-1, 0], KeyA: [0, 1], KeyD: [0, -1] };
+const SHOULDERS = [4, 5];
+const DEAD_ZONE = 0.12;
+
+export function watchPad(drive) {
+  const pad = byId("pad"), knob = byId("knob");
+  let pointer = null;
+
+  const put = (dx, dy) => {
+    knob.style.transform = dx === 0 && dy === 0 ? "" : `translate(${dx}px, ${dy}px)`;
+  };
+  const pull = (event) => {
+    const box = pad.getBoundingClientRect();
+    const reach = box.width / 2 - 22;
+    let dx = event.clientX - box.left - box.width / 2, dy = event.clientY - box.top - box.height / 2;
+    const far = Math.hypot(dx, dy);
+    if (far > reach) [dx, dy] = [(dx / far) * reach, (dy / far) * reach];
+    if (!drive.hold("pad", -dy / reach, -dx / reach)) return false;
+    put(dx, dy);
+    return true;
+  };
+  const let_go = () => {
+    pointer = null;
+    put(0, 0);
+    drive.release("pad");
+  };
+  pad.addEventListener("pointerdown", (event) => {
+    if (pointer !== null) return;
+    event.preventDefault();
+    pad.focus({ preventScroll: true });
+    if (!pull(event)) return;
+    pointer = event.pointerId;
+    pad.setPointerCapture(pointer);
+  });
+  pad.addEventListener("pointermove", (event) => event.pointerId === pointer && drive.holding && pull(event));
+  for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) {
+    pad.addEventListener(name, (event) => event.pointerId === pointer && let_go());
+  }
+  drive.on("changed", () => !drive.holding && put(0, 0));
+  holdKeys(drive, pad, (event) => PAD_KEYS[event.key], "pad key");
+}
+
+export function watchKeys(drive, enabled, elsewhere) {
+  holdKeys(drive, window, (event) => (enabled() && !elsewhere() ? KEYS[event.code] : undefined), "key");
+}
+
+// Keys count as held from keydown to keyup; one that repeats by itself is one that is held already.
+function holdKeys(drive, target, directionOf, name) {
+  target.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const by = directionOf(event);
+    if (by === undefined) return;
+    event.preventDefault();
+    if (!event.repeat) drive.hold(`${name} ${event.code}`, by[0], by[1]);
+  });
+  window.addEventListener("keyup", (event) => drive.release(`${name} ${event.code}`));
+  if (target !== window) target.addEventListener("blur", () => Object.keys(PAD_KEYS).forEach((code) => drive.release(`${name} ${code}`)));
+}
+
+// A gamepad tells nothing by itself and is looked at once a frame of the screen, while there is one.
+export function watchGamepad(drive, tell) {
+  let known = 0;
+  let looking = false;
+
+  const pads = () => [...(navigator.getGamepads?.() ?? [])].filter((pad) => pad?.connected);
+  const dead = (value) => (Math.abs(value) < DEAD_ZONE ? 0 : value);
+  const look = () => {
+    const found = pads();
+    if (found.length === 0) {
+      looking = false;
+      drive.release("gamepad");
+      tell("no gamepad");
+      return;
+    }
+    const held = found.find((pad) => SHOULDERS.some((button) => pad.buttons[button]?.pressed));
+    if (held && !pressedInVain) {
+      if (!drive.hold("gamepad", -dead(held.axes[1] ?? 0), -dead(held.axes[0] ?? 0))) pressedInVain = true;
+    } else if (!held) {
+      pressedInVain = false;
+      drive.release("gamepad");
+    }
+    requestAnimationFrame(look);
+  };
+  let pressedInVain = false; // refused once, it wants to be let go before it is tried again
+  drive.on("changed", (why) => {
+    if (why !== null) pressedInVain = true;
+  });
+  addEventListener("gamepadconnected", (event) => {
+    known++;
+    tell(`gamepad: hold a shoulder button and use the left stick (${event.gamepad?.id?.slice(0, 40) ?? known})`);
+    if (looking) return;
+    looking = true;
+    requestAnimationFrame(look);
+  });
+  addEventListener("gamepaddisconnected", () => {
+    drive.release("gamepad");
+    if (pads().length === 0) tell("no gamepad");
+  });
+}

@@ -1,0 +1,73 @@
+// Keys that work everywhere. The space bar is HALT wherever one does not write text; what a space bar does otherwise,
+// Enter does: press a button, switch a box.
+
+import { byId, el, writesText } from "./dom.js";
+
+const WORDS = [
+  ["Space", "HALT, wherever you do not write text"],
+  ["Shift+A", "arm, or re-arm"],
+  ["1 … 6", "tools: move the map, select, move an object, place a model, goal, tape"],
+  ["arrows", "on the map: move it, or the crosshair of a tool (Shift: finely)"],
+  ["Enter", "on the map: what a click does; elsewhere: press a button, switch a box"],
+  ["+  −", "zoom"],
+  ["F", "fit everything"],
+  ["L", "follow the robot"],
+  ["U", "feet or metres"],
+  ["A", "with the select tool: everything in view"],
+  ["Delete", "delete the selected segments"],
+  ["P  Shift+P", "pin or unpin the selected segments"],
+  ["[  ]", "turn the picked object or the model to place"],
+  ["arrows, Shift+arrows", "with the move tool: nudge the picked object by 1 cm or 10 cm"],
+  ["W A S D", "drive while held, where that is switched on; arrows on the driving pad"],
+  ["K", "pause the emulator, or let it go on"],
+  ["Ctrl+Z", "undo the last parameter"],
+  ["Escape", "give up what you began; select nothing"],
+  ["?", "this list"],
+];
+
+export function watchKeyboard({ drive, tools, view, fit, units, chosen, time, parameters, notices, drivingByKeys }) {
+  const help = () => notices.ask("Keys", el("dl", { class: "keys" }, ...WORDS.flatMap(([key, words]) =>
+    [el("dt", {}, el("kbd", {}, key)), el("dd", {}, words)])), [["Close", null]]);
+  byId("keys").addEventListener("click", help);
+
+  const acts = {
+    "+": () => view.zoom(1.25), "=": () => view.zoom(1.25), "-": () => view.zoom(0.8), "−": () => view.zoom(0.8),
+    f: fit, l: () => view.setFollow(!view.follow), u: () => units.choose(units.name === "m" ? "ft" : "m"),
+    Delete: chosen.delete, Backspace: chosen.delete, p: chosen.pin, P: chosen.unpin, k: () => time.pause(), "?": help,
+    A: () => drive.arm(),
+  };
+  for (let n = 1; n <= 6; n++) acts[n] = () => tools.chooseNth(n);
+
+  addEventListener("keydown", (event) => {
+    if (event.key !== " " || event.ctrlKey || event.metaKey || event.altKey || writesText(event.target)) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    if (!event.repeat) drive.halt();
+  }, { capture: true });
+  addEventListener("keyup", (event) => {
+    if (event.key === " " && !writesText(event.target)) event.preventDefault(); // or a focused button would be pressed
+  }, { capture: true });
+
+  addEventListener("keydown", (event) => {
+    if (event.defaultPrevented || writesText(event.target)) return;
+    const { target, key } = event;
+    if ((event.ctrlKey || event.metaKey) && key.toLowerCase() === "z") {
+      event.preventDefault();
+      parameters.undo();
+      return;
+    }
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (key === "Enter" && target instanceof HTMLInputElement && target.type === "checkbox") {
+      event.preventDefault();
+      target.click();
+      return;
+    }
+    if (target instanceof HTMLSelectElement) return; // letters and arrows choose there
+    if (key === "Escape") notices.close();
+    if (drivingByKeys() && "wasdWASD".includes(key)) return;
+    const act = acts[key];
+    if (!act) return;
+    event.preventDefault();
+    act();
+  });
+}

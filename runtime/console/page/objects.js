@@ -1,0 +1,167 @@
+// The list of objects in words, and the one that is picked: place, uncertainty, evidence for and against. It is also
+// what a screen reader reads in place of the map.
+
+import { byId, el, mark, say } from "./dom.js";
+import { ellipseOf, percent } from "./draw_objects.js";
+import { degrees } from "./units.js";
+
+const EVIDENCE_EVERY_MS = 1000;
+
+export class Objects {
+  #list = byId("objects");
+  #rows = new Map();
+  #asked_ms = 0;
+  #asking = false;
+
+  constructor({ world, units, selection, connection, notices, tools }) {
+    Object.assign(this, { world, units, selection, connection, notices });
+    world.on("state", () => this.refresh());
+    world.on("evidence", () => this.#tellEvidence());
+    units.on("changed", () => this.refresh());
+    selection.on("object", () => this.#picked());
+    this.#list.addEventListener("keydown", (event) => this.#key(event));
+    const act = (type) => () => connection.ask({ type, object: selection.object }).then(
+      () => notices.toast(`Object ${selection.object}: ${type === "confirm_object" ? "confirmed" : "rejected"}`), notices.refused);
+    byId("object-confirm").addEventListener("click", act("confirm_object"));
+    byId("object-reject").addEventListener("click", act("reject_object"));
+    byId("object-move").addEventListener("click", () => tools.choose("move", { focus: true }));
+  }
+
+  refresh() {
+    const { objects } = this.world.state;
+    say(byId("objects-count"), `${objects.length}`);
+    byId("objects-empty").hidden = objects.length > 0;
+    const seen = new Set();
+    objects.forEach((object, index) => {
+      const key = object.number ?? `-${index}`;
+      seen.add(key);
+      if (!this.#rows.has(key)) this.#rows.set(key, this.#row(object.number));
+      const row = this.#rows.get(key);
+      say(row.number, object.number === null || object.number === undefined ? "–" : `${object.number}`);
+      say(row.name, object.model);
+      say(row.sure, percent(object.probability ?? object.score));
+      say(row.where, `${this.units.place(object.x, object.y)}, ${degrees(object.theta)}`);
+      say(row.off, `± ${this.units.length(object.sigma, 3)}`);
+      const picked = object.number !== null && object.number === this.selection.object;
+      mark(row.element, "aria-selected", picked);
+      if (this.#list.children[index] !== row.element) this.#list.insertBefore(row.element, this.#list.children[index] ?? null);
+    });
+    for (const [key, row] of this.#rows) {
+      if (seen.has(key)) continue;
+      row.element.remove();
+      this.#rows.delete(key);
+    }
+    this.#tellPicked();
+    this.#askEvidence();
+  }
+
+  #row(number) {
+    const parts = { number: el("span", { class: "number" }), name: el("span", { class: "name" }), sure: el("span", { class: "sure" }),
+      where: el("span", { class: "where" }), off: el("span", { class: "off" }) };
+    const element = el("li", { role: "option", id: `object-${number ?? "x"}`, "aria-selected": "false",
+      onclick: () => number !== null && number !== undefined && this.selection.pick(number) }, ...Object.values(parts));
+    return { element, ...parts };
+  }
+
+  #key(event) {
+    const numbers = this.world.state.objects.map(({ number }) => number).filter((number) => number !== null);
+    const at = numbers.indexOf(this.selection.object);
+    const to = { ArrowDown: at + 1, ArrowUp: at < 0 ? numbers.length - 1 : at - 1, Home: 0, End: numbers.length - 1 }[event.key];
+    if (event.key === "Escape") this.selection.pick(null);
+    if (to === undefined || numbers.length === 0) return;
+    event.preventDefault();
+    this.selection.pick(numbers[Math.max(0, Math.min(to, numbers.length - 1))]);
+  }
+
+  #picked() {
+    this.world.evidence = null;
+    this.#asked_ms = 0;
+    byId("evidence").replaceChildren();
+    this.refresh();
+    const { object } = this.selection;
+    if (object === null) this.#list.removeAttribute("aria-activedescendant");
+    else {
+      this.#list.setAttribute("aria-activedescendant", `object-${object}`);
+      byId(`object-${object}`)?.scrollIntoView({ block: "nearest" });
+    }
+  }
+
+  #tellPicked() {
+    const object = this.selection.object === null ? null : this.world.object(this.selection.object);
+    byId("object").hidden = this.selection.object === null;
+    if (this.selection.object === null) return;
+    if (object === null) {
+      say(byId("object-name"), `Object ${this.selection.object} is not known any more`);
+      byId("object-facts").replaceChildren();
+      return;
+    }
+    say(byId("object-name"), `${object.number} ${object.model}`);
+    const facts = [
+      ["certainty", object.probability === null || object.probability === undefined
+        ? `fit ${percent(object.score)}` : `probability ${percent(object.probability)}`],
+      ["place", this.units.place(object.x, object.y, 3)],
+      ["turned by", degrees(object.theta)],
+      ["uncertainty", `± ${this.units.length(object.sigma, 3)}`],
+    ];
+    if (object.covariance) {
+      const { major, minor, angle } = ellipseOf(object.covariance);
+      facts.push(["95 % ellipse", `${this.units.number(major, 3)} × ${this.units.length(minor, 3)} at ${degrees(angle)}`]);
+    }
+    facts.push(["readings", `${object.support}`]);
+    const list = byId("object-facts");
+    if (list.children.length !== 2 * facts.length) list.replaceChildren(...facts.flatMap(() => [el("dt"), el("dd")]));
+    facts.forEach(([name, words], i) => {
+      say(list.children[2 * i], name);
+      say(list.children[2 * i + 1], words);
+    });
+  }
+
+  #askEvidence() {
+    const now = performance.now();
+    const { object } = this.selection;
+    if (object === null || this.#asking || now - this.#asked_ms < EVIDENCE_EVERY_MS) return;
+    this.#asking = true;
+    this.#asked_ms = now;
+    this.connection.ask({ type: "evidence", object }).then((data) => {
+      if (data?.readings) this.hear({ object, ...data });
+    }, (error) => this.#tellWhyNot(error)).finally(() => {
+      this.#asking = false;
+    });
+  }
+
+  // Evidence comes as the answer, or as a message of its own.
+  hear(message) {
+    const readings = message.readings.map(([x, y, range, angle, nats]) => ({ x, y, range, angle, nats }));
+    const lines = (message.lines ?? []).map(([number, x1, y1, x2, y2, supports]) => ({ number, x1, y1, x2, y2, supports }));
+    this.world.evidence = { object: message.object, pro: message.for, contra: message.against, readings, lines, rivals: message.rivals ?? [] };
+    this.world.emit("evidence");
+  }
+
+  #tellWhyNot(error) {
+    byId("evidence").replaceChildren(el("p", { class: "hint" }, error.message));
+  }
+
+  #tellEvidence() {
+    const { evidence } = this.world;
+    if (evidence === null || evidence.object !== this.selection.object) return;
+    const most = Math.max(evidence.pro, evidence.contra, 1e-9);
+    const bar = (kind, name, nats) => {
+      const fill = el("span", { class: "fill" });
+      fill.style.width = `${(100 * nats) / most}%`;
+      return el("div", { class: `scale ${kind}` }, el("span", {}, name), el("span", { class: "track" }, fill), el("b", {}, `${nats.toFixed(1)} ${evidence.lines.length > 0 ? "segments" : "nats"}`));
+    };
+    const { readings, lines, rivals } = evidence;
+    const against = readings.filter(({ nats }) => nats < 0).length + lines.filter(({ supports }) => !supports).length;
+    const others = rivals.map(([name, lead]) => `${name} ${lead > 0 ? "+" : "−"}${Math.abs(lead).toFixed(1)}`).join(", ");
+    byId("evidence").replaceChildren(...[bar("for", "for it", evidence.pro), bar("against", "against", evidence.contra),
+      el("p", { class: "hint" }, `${readings.length + lines.length} ${lines.length > 0 ? "segments" : "readings"} on the map, ${against} of them against (dashed, ✕)`),
+      others === "" ? null : el("p", { class: "hint" }, `Other explanations, nats ahead of it: ${others}`)].filter((part) => part !== null));
+  }
+}
+
+// The map in a sentence, for those who cannot see it.
+export function mapWords(world, units) {
+  const { objects, pose } = world.state;
+  const named = objects.slice(0, 12).map((object) => `${object.model} at ${units.place(object.x, object.y, 1)}`).join("; ");
+  return `Robot at ${units.place(pose[0], pose[1], 1)}, heading ${degrees(pose[2])}. ${objects.length} objects${named ? `: ${named}` : ""}. ${world.segments.size} segments.`;
+}

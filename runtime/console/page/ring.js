@@ -1,0 +1,134 @@
+// The ring as it stands: a wedge a sensor, as long as its range. A rim without a wedge: heard nothing; a cross: not to
+// be trusted; nothing: never fired. The outline is bold while it fires.
+
+import { say } from "./dom.js";
+import { fitted } from "./theme.js";
+
+const OLD_S = 1;
+
+export class Ring {
+  #canvas;
+  #words;
+  #world;
+  #theme;
+  #units;
+
+  constructor({ canvas, words, world, theme, units }) {
+    [this.#canvas, this.#words, this.#world, this.#theme, this.#units] = [canvas, words, world, theme, units];
+  }
+
+  draw() {
+    const canvas = this.#canvas;
+    if (canvas.clientWidth === 0) return;
+    const world = this.#world, theme = this.#theme, ring = world.hello?.ring;
+    const { ctx, width, height } = fitted(canvas);
+    ctx.clearRect(0, 0, width, height);
+    if (!ring || !world.fresh) return;
+    const { ranges, age, firing, sensors, ring_yaw, pose } = world.state;
+    const cx = width / 2, cy = height / 2;
+    const rim = Math.min(width, height) / 2 - 15;
+    // What is near matters most: along a radius goes the square root of the range.
+    const reach = (range) => rim * Math.sqrt(Math.min(1, Math.max(0, range) / ring.range_max));
+    const half = Math.min(ring.half_angle, Math.PI / Math.max(ring.mounts.length, 1)) * 0.94;
+    const faulty = new Set(sensors.map(([index]) => index));
+    const fires = new Set(firing);
+
+    ctx.strokeStyle = theme.line;
+    ctx.lineWidth = 1;
+    for (const range of [1, 3, 10, 30].map((step) => step * this.#units.metres).filter((step) => step < ring.range_max).concat(ring.range_max)) {
+      ctx.beginPath();
+      ctx.arc(cx, cy, reach(range), 0, 2 * Math.PI);
+      ctx.stroke();
+    }
+    const fresh = new Path2D(), old = new Path2D(), firesNow = new Path2D(), silent = new Path2D(), crosses = new Path2D();
+    let nearest = null;
+    ctx.font = theme.font(9.5, 600);
+    ctx.textAlign = "center";
+    ctx.textBaseline = "middle";
+    ring.mounts.forEach(([, , angle], index) => {
+      const at = -(ring_yaw + angle); // the screen's y looks down
+      const range = ranges[index];
+      if (fires.has(index)) {
+        firesNow.moveTo(cx, cy);
+        firesNow.arc(cx, cy, range >= 0 ? Math.max(2, reach(range)) : rim, at - half, at + half);
+        firesNow.closePath();
+      }
+      if (faulty.has(index)) {
+        const x = cx + 0.88 * rim * Math.cos(at), y = cy + 0.88 * rim * Math.sin(at);
+        crosses.moveTo(x - 4, y - 4);
+        crosses.lineTo(x + 4, y + 4);
+        crosses.moveTo(x - 4, y + 4);
+        crosses.lineTo(x + 4, y - 4);
+      }
+      ctx.fillStyle = fires.has(index) ? theme.ink : theme.muted;
+      ctx.fillText(String(index), cx + (rim + 8) * Math.cos(at), cy + (rim + 8) * Math.sin(at));
+      if (range === null || range === undefined) return;
+      if (range < 0) {
+        silent.moveTo(cx + rim * Math.cos(at - half), cy + rim * Math.sin(at - half));
+        silent.arc(cx, cy, rim, at - half, at + half);
+        return;
+      }
+      if (nearest === null || range < ranges[nearest]) nearest = index;
+      const path = (age[index] ?? Infinity) > OLD_S ? old : fresh;
+      path.moveTo(cx, cy);
+      path.arc(cx, cy, Math.max(2, reach(range)), at - half, at + half);
+      path.closePath();
+    });
+    ctx.fillStyle = theme.echo;
+    ctx.globalAlpha = 0.55;
+    ctx.fill(fresh);
+    ctx.globalAlpha = 0.18;
+    ctx.fill(old);
+    ctx.globalAlpha = 1;
+    ctx.strokeStyle = theme.echo;
+    ctx.lineWidth = 1;
+    ctx.stroke(fresh);
+    ctx.setLineDash([3, 3]);
+    ctx.stroke(old);
+    ctx.setLineDash([]);
+    ctx.lineWidth = 3;
+    ctx.stroke(silent);
+    ctx.strokeStyle = theme.ink;
+    ctx.lineWidth = 1.6;
+    ctx.stroke(firesNow);
+    ctx.strokeStyle = theme.stop;
+    ctx.lineWidth = 2.2;
+    ctx.stroke(crosses);
+    this.#scale(ctx, cx, cy, reach, ring.range_max);
+    this.#heading(ctx, cx, cy, -pose[2]);
+    const words = [];
+    if (nearest !== null) words.push(`nearest ${this.#units.length(ranges[nearest])}, by sensor ${nearest}`);
+    if (sensors.length > 0) words.push(`not trusted: ${sensors.slice(0, 3).map(([index, fault]) => `${index} (${fault})`).join(", ")}${sensors.length > 3 ? "…" : ""}`);
+    say(this.#words, words.join("; ") || "nothing heard");
+  }
+
+  #scale(ctx, cx, cy, reach, range_max) {
+    const theme = this.#theme;
+    ctx.font = theme.font(9, 600);
+    ctx.lineWidth = 3;
+    ctx.strokeStyle = theme.panel;
+    ctx.fillStyle = theme.muted;
+    for (const step of [3, 10]) {
+      const range = step * this.#units.metres;
+      if (range >= range_max) continue;
+      const x = cx + reach(range) * 0.53, y = cy + reach(range) * 0.85;
+      ctx.strokeText(`${step} ${this.#units.name}`, x, y);
+      ctx.fillText(`${step} ${this.#units.name}`, x, y);
+    }
+  }
+
+  #heading(ctx, cx, cy, angle) {
+    const tip = (turn, reach) => [cx + reach * Math.cos(angle + turn), cy + reach * Math.sin(angle + turn)];
+    ctx.beginPath();
+    ctx.moveTo(...tip(0, 15));
+    ctx.lineTo(...tip(2.5, 10));
+    ctx.lineTo(...tip(Math.PI, 4));
+    ctx.lineTo(...tip(-2.5, 10));
+    ctx.closePath();
+    ctx.fillStyle = this.#theme.robot;
+    ctx.fill();
+    ctx.strokeStyle = this.#theme.panel;
+    ctx.lineWidth = 1;
+    ctx.stroke();
+  }
+}

@@ -1,0 +1,40 @@
+// Panels behind tabs, with the keys that tab lists have: arrows, Home, End.
+
+import { byId } from "./dom.js";
+
+export class Tabs {
+  #tabs = [...byId("tabs").querySelectorAll('[role="tab"]')];
+  #changed;
+
+  constructor(changed) {
+    this.#changed = changed;
+    for (const tab of this.#tabs) {
+      tab.addEventListener("click", () => this.show(tab.id.slice(4)));
+      tab.addEventListener("keydown", (event) => this.#key(event, tab));
+    }
+  }
+
+  show(name, { focus = false } = {}) {
+    for (const tab of this.#tabs) {
+      const chosen = tab.id === `tab-${name}`;
+      tab.setAttribute("aria-selected", String(chosen));
+      tab.tabIndex = chosen ? 0 : -1;
+      byId(tab.getAttribute("aria-controls")).hidden = !chosen;
+      if (chosen && focus) tab.focus();
+    }
+    this.#changed(name);
+  }
+
+  get shown() {
+    return this.#tabs.find((tab) => tab.getAttribute("aria-selected") === "true").id.slice(4);
+  }
+
+  #key(event, tab) {
+    const seen = this.#tabs.filter((one) => one.offsetParent !== null);
+    const at = seen.indexOf(tab);
+    const to = { ArrowRight: at + 1, ArrowLeft: at - 1, Home: 0, End: seen.length - 1 }[event.key];
+    if (to === undefined) return;
+    event.preventDefault();
+    this.show(seen[(to + seen.length) % seen.length].id.slice(4), { focus: true });
+  }
+}

@@ -1,0 +1,51 @@
+// Tools that want points: the goal to drive to, and the measuring tape.
+
+import { drawTape, tapeWords } from "./tool_marks.js";
+
+export function goalTool({ sendGoal, after }) {
+  return {
+    id: "goal", name: "Drive to a goal", icon: "i-goal",
+    up(at) {
+      sendGoal(at.x, at.y);
+      after();
+    },
+  };
+}
+
+export function tapeTool({ units, said, redraw }) {
+  let from = null, to = null, pulling = false;
+
+  const tell = () => said(`Tape: ${tapeWords(units, from, to)}`);
+  return {
+    id: "tape", name: "Measuring tape", icon: "i-tape",
+    down(at) {
+      if (from !== null && pulling) return; // the second of two clicks
+      from = to = at;
+      pulling = true;
+    },
+    move(at) {
+      if (pulling) to = at;
+      redraw();
+    },
+    hover(at) {
+      if (pulling) to = at;
+      redraw();
+    },
+    up(at) {
+      if (!pulling) return;
+      to = at;
+      if (Math.hypot(to.sx - from.sx, to.sy - from.sy) > 4) {
+        pulling = false;
+        tell();
+      }
+      redraw();
+    },
+    cancel() {
+      pulling = false;
+    },
+    none() {
+      from = to = null;
+    },
+    drawAlways: (f) => from && to && from !== to && drawTape(f, from, to),
+  };
+}

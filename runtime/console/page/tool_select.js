@@ -1,0 +1,143 @@
+// Pan, and select: a click takes the object or segment under it, a drag lassoes segments; with Shift they are added.
+
+import { byId, say } from "./dom.js";
+import { nearestSegment } from "./draw_segments.js";
+import { drawLasso } from "./tool_marks.js";
+
+const CLICK_PX = 4;
+const REACH_PX = 12;
+const TOUCH_PX = 22;
+
+export const panTool = (view) => ({
+  id: "pan", name: "Move the map", icon: "i-pan",
+  move: (at, was) => view.pan(at.sx - was.sx, at.sy - was.sy),
+});
+
+// The object under a point: inside its outline's circle, or near its middle.
+export function objectAt(world, view, { x, y, touch }) {
+  let best = null, nearest = Infinity;
+  for (const object of world.state.objects) {
+    if (object.number === null || object.number === undefined) continue;
+    const radius = world.model(object.model)?.arc_radius_m ?? 0;
+    const away = Math.hypot(object.x - x, object.y - y);
+    if (away < Math.max(radius, (touch ? TOUCH_PX : REACH_PX) / view.scale) && away < nearest) [best, nearest] = [object, away];
+  }
+  return best;
+}
+
+export function selectTool({ world, view, selection, redraw }) {
+  const tip = byId("tip");
+  const hideTip = () => {
+    tip.hidden = true;
+  };
+  let lasso = null;
+  let began = null;
+
+  const click = (at) => {
+    const reach = (at.touch ? TOUCH_PX : REACH_PX) / view.scale;
+    const segment = nearestSegment(world, at.x, at.y, reach);
+    if (segment !== null) {
+      if (at.shift) selection.toggle(segment.number);
+      else selection.choose([segment.number]);
+      return;
+    }
+    const object = objectAt(world, view, at);
+    if (object !== null) selection.pick(object.number);
+    else if (!at.shift) {
+      selection.choose([]);
+      selection.pick(null);
+    }
+  };
+  const stop = () => {
+    lasso = began = null;
+    redraw();
+  };
+  return {
+    id: "select", name: "Select segments and objects", icon: "i-select",
+    // What a segment is, and how old, in words beside the pointer.
+    hover(at) {
+      const segment = nearestSegment(world, at.x, at.y, REACH_PX / view.scale);
+      tip.hidden = segment === null;
+      if (segment === null) return;
+      const age = Number.isFinite(segment.t) ? `${Math.max(0, world.state.t - segment.t).toFixed(1)} s old` : "of unknown age";
+      say(tip, `segment ${segment.number}, ${age}${segment.pinned ? ", pinned" : ""}`);
+      const left = at.sx + 220 > view.width ? at.sx - 190 : at.sx + 14;
+      tip.style.transform = `translate(${left}px, ${Math.max(4, at.sy - 34)}px)`;
+    },
+    leave: hideTip,
+    end: hideTip,
+    down(at) {
+      hideTip();
+      began = at;
+      lasso = [at];
+    },
+    move(at) {
+      if (began === null) return;
+      lasso.push(at);
+      redraw();
+    },
+    up(at) {
+      if (began === null) return;
+      const moved = lasso.some(({ sx, sy }) => Math.hypot(sx - began.sx, sy - began.sy) > CLICK_PX);
+      if (!moved) click(at);
+      else {
+        const inside = within(world, lasso);
+        if (began.shift) selection.add(inside);
+        else selection.choose(inside);
+      }
+      stop();
+    },
+    press: (at) => click({ ...at, shift: true }),
+    key(event) {
+      if (event.key.toLowerCase() !== "a" || event.shiftKey) return false;
+      const [left, top] = view.toWorld(0, 0), [right, bottom] = view.toWorld(view.width, view.height);
+      selection.choose(within(world, [{ x: left, y: top }, { x: right, y: top }, { x: right, y: bottom }, { x: left, y: bottom }]));
+      return true;
+    },
+    none() {
+      selection.choose([]);
+      selection.pick(null);
+    },
+    cancel: stop,
+    draw: (f) => lasso && drawLasso(f, lasso),
+  };
+}
+
+// The segments whose middle lies within a polygon.
+function within(world, polygon) {
+  const found = [];
+  for (const s of world.segments.values()) {
+    const x = (s.x1 + s.x2) / 2, y = (s.y1 + s.y2) / 2;
+    let inside = false;
+    for (let i = 0, j = polygon.length - 1; i < polygon.length; j = i++) {
+      const a = polygon[i], b = polygon[j];
+      if (a.y > y !== b.y > y && x < ((b.x - a.x) * (y - a.y)) / (b.y - a.y) + a.x) inside = !inside;
+    }
+    if (inside) found.push(s.number);
+  }
+  return found;
+}
+
+// The row of buttons for what is selected.
+export function chosenRow({ world, selection, connection, notices }) {
+  const numbers = () => [...selection.segments];
+  const refresh = () => {
+    const count = selection.segments.size;
+    byId("chosen").hidden = count === 0;
+    say(byId("chosen-count"), `${count} segment${count === 1 ? "" : "s"}`);
+  };
+  const act = (message, done) => {
+    if (selection.segments.size === 0) return;
+    connection.ask({ ...message, numbers: numbers() }).then(done, notices.refused);
+  };
+  const actions = {
+    delete: () => act({ type: "delete_segments" }, () => selection.choose([])),
+    pin: () => act({ type: "pin_segments", pinned: true }),
+    unpin: () => act({ type: "pin_segments", pinned: false }),
+    none: () => selection.choose([]),
+  };
+  for (const [name, action] of Object.entries(actions)) byId(`chosen-${name}`).addEventListener("click", action);
+  selection.on("segments", refresh);
+  world.on("state", refresh);
+  return actions;
+}

@@ -1,0 +1,142 @@
+// What is known of the run: the frames received, put together. Nothing here draws and nothing here sends.
+
+import { Emitter } from "./emitter.js";
+
+const TRAIL_STEP_M = 0.02;
+const TRAIL_MAX = 6000;
+const ECHOES_MAX = 480;
+const ECHO_AGE_MAX_S = 6;
+const CHART_MAX = 600;
+
+const EMPTY = {
+  cycle: 0, t: 0, mode: "no data", reason: null, standing: null, arming: false, pose: [0, 0, 0], ring_yaw: 0, twist: [0, 0], flags: [], firing: [],
+  ranges: [], age: [], clusters: [], objects: [], vectors: [], wish: null, phases: {}, cycle_us: 0, late_us: 0,
+  missed: 0, late: 0, quanta: 0, refinement: "", link: null, sensors: [], dropped: 0, clients: 0, controller: false,
+  recording: null, paused: false, speed: 1, playback: null,
+};
+
+export class World extends Emitter {
+  hello = null;
+  state = EMPTY;
+  fresh = false; // whether a state has come since the last hello
+  heard_ms = 0;
+  segments = new Map();
+  segmentsVersion = 0;
+  trail = [];
+  trailVersion = 0;
+  echoes = []; // {x, y, angle, range, t}: arcs of what was heard lately
+  chart = []; // {phases, late_ms, missed}: a column a frame
+  evidence = null;
+  log = [];
+
+  // A greeting may come again, with other parameters or models; the whole map comes after it, the past stays known.
+  greet(hello) {
+    this.hello = hello;
+    this.fresh = false;
+    this.segments.clear();
+    this.segmentsVersion++;
+    this.emit("hello", hello);
+  }
+
+  get watchesRecording() {
+    return this.state.playback !== null;
+  }
+
+  model(name) {
+    return this.hello?.models?.find((model) => model.name === name) ?? null;
+  }
+
+  object(number) {
+    return this.state.objects.find((object) => object.number === number) ?? null;
+  }
+
+  // The frame of a sensor in the plane, as the ring stands now.
+  sensor(index) {
+    const mount = this.hello?.ring?.mounts?.[index];
+    if (mount === undefined) return null;
+    const [x, y] = this.state.pose;
+    const c = Math.cos(this.state.ring_yaw), s = Math.sin(this.state.ring_yaw);
+    return { x: x + c * mount[0] - s * mount[1], y: y + s * mount[0] + c * mount[1], angle: this.state.ring_yaw + mount[2] };
+  }
+
+  apply(frame, now_ms) {
+    const before = this.state;
+    const state = { ...EMPTY, ...frame };
+    const jumped = state.t < before.t - 1e-9 || (state.playback === null) !== (before.playback === null);
+    this.state = state;
+    this.heard_ms = now_ms;
+    if (jumped) this.#forgetTime();
+    this.#applySegments(frame.segments);
+    this.#applyTrail(state);
+    this.#applyEchoes(state);
+    this.#applyChart(state, before, this.fresh && !jumped);
+    const changed = !this.fresh || state.mode !== before.mode || state.reason !== before.reason
+      || state.standing !== before.standing || state.arming !== before.arming || state.controller !== before.controller || (state.playback === null) !== (before.playback === null);
+    this.fresh = true;
+    this.emit("state", state);
+    if (changed) this.emit("mode", state, before);
+  }
+
+  #forgetTime() {
+    this.trail = [];
+    this.trailVersion++;
+    this.echoes = [];
+    this.chart = [];
+  }
+
+  #applySegments(news) {
+    if (!news) return;
+    if (news.whole) this.segments.clear();
+    for (const number of news.removed ?? []) this.segments.delete(number);
+    for (const [number, x1, y1, x2, y2, normal, t] of news.added ?? []) {
+      this.segments.set(number, { number, x1, y1, x2, y2, normal, t, pinned: false });
+    }
+    const pinned = new Set(news.pinned ?? []);
+    let repinned = false;
+    for (const segment of this.segments.values()) {
+      const now = pinned.has(segment.number);
+      repinned ||= now !== segment.pinned;
+      segment.pinned = now;
+    }
+    if (news.whole || repinned || news.added?.length || news.removed?.length) this.segmentsVersion++;
+  }
+
+  #applyTrail({ pose: [x, y], t }) {
+    const last = this.trail.at(-1);
+    if (last && Math.hypot(x - last.x, y - last.y) < TRAIL_STEP_M) return;
+    if (last && Math.hypot(x - last.x, y - last.y) > 1) this.trail = []; // odometry began anew
+    this.trail.push({ x, y, t });
+    if (this.trail.length > TRAIL_MAX) this.trail.splice(0, TRAIL_MAX / 4);
+    this.trailVersion++;
+  }
+
+  #applyEchoes({ firing, ranges, t }) {
+    for (const index of firing) {
+      const range = ranges[index];
+      const at = this.sensor(index);
+      if (at !== null && range !== null && range !== undefined && range >= 0) this.echoes.push({ ...at, range, t });
+    }
+    let old = Math.max(0, this.echoes.length - ECHOES_MAX);
+    while (old < this.echoes.length && t - this.echoes[old].t > ECHO_AGE_MAX_S) old++;
+    if (old > 0) this.echoes.splice(0, old);
+  }
+
+  #applyChart({ phases, late_us, missed, late, cycle }, before, follows) {
+    if (follows && cycle === before.cycle) return;
+    this.chart.push({
+      phases, late_ms: late_us / 1000, missed: follows ? missed - before.missed : 0, late: follows ? late - before.late : 0,
+    });
+    if (this.chart.length > CHART_MAX) this.chart.splice(0, this.chart.length - CHART_MAX);
+  }
+
+  note(entry) {
+    this.log.push(entry);
+    if (this.log.length > 1000) this.log.splice(0, 200);
+    this.emit("log", entry);
+  }
+
+  // How old what is on screen is, in seconds: since it came, as the page's own clock has it.
+  age(now_ms) {
+    return this.fresh ? (now_ms - this.heard_ms) / 1000 : Infinity;
+  }
+}

@@ -1,0 +1,286 @@
+"""A server that speaks the console's protocol and keeps what a page sent: the page's other end in its tests."""
+
+from __future__ import annotations
+
+import asyncio
+import cmath
+import contextlib
+import json
+from collections.abc import AsyncIterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from aiohttp import WSMsgType, web
+
+from tests.browser.hall import Hall, greeting
+
+PAGE: Final = Path(__file__).parents[2] / "runtime" / "console" / "page"
+POLICY: Final = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
+PATIENCE_S: Final = 30.0
+TOKEN: Final = "right-token"
+TOML: Final = "[cycle]\nperception_budget_s = 0.005\n"
+KINDS: Final = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
+
+HALTED: Final = "halted by the operator; re-arm to go on"
+
+
+@dataclass
+class Client:
+    """A page that is connected."""
+
+    socket: web.WebSocketResponse
+    number: int
+    sent_segments: int = 0
+    gone: set[int] = field(default_factory=set)
+    whole: bool = True
+
+
+@dataclass
+class FakeServer:
+    """A robot's process as far as a page can tell."""
+
+    hall: Hall
+    mode: str = "DRIVE"
+    reason: str | None = None
+    paused: bool = False
+    speed: float = 1.0
+    recording: dict[str, Any] | None = None
+    playback: dict[str, Any] | None = None
+    wish: dict[str, Any] = field(default_factory=lambda: {"kind": "legs"})
+    controller: int | None = 1
+    deleted: set[int] = field(default_factory=set)
+    pinned: set[int] = field(default_factory=set)
+    refusals: dict[str, tuple[str, str | None]] = field(default_factory=dict)
+    received: list[dict[str, Any]] = field(default_factory=list)
+    arrived_s: list[float] = field(default_factory=list)
+    clients: list[Client] = field(default_factory=list)
+    cycle: int = 40
+    hello: dict[str, Any] = field(default_factory=dict)
+    changed: list[tuple[str, Any]] = field(default_factory=list)
+    flags: list[str] = field(default_factory=list)
+    silent: bool = False
+    """Send nothing, as a process that hangs."""
+    port: int = 0
+    _news: asyncio.Event = field(default_factory=asyncio.Event)
+    _counted: int = 0
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}/?token={TOKEN}"
+
+    async def wait(self, kind: str, count: int = 1) -> dict[str, Any]:
+        """Wait for the `count`-th message of a kind, and return it without its id."""
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                while len(self.of(kind)) < count:
+                    self._news.clear()
+                    await self._news.wait()
+        except TimeoutError:
+            raise AssertionError(f"no {kind} came, only {[m['type'] for m in self.received]}") from None
+        return {key: value for key, value in self.of(kind)[count - 1].items() if key not in {"id", "type"}}
+
+    def of(self, kind: str) -> list[dict[str, Any]]:
+        """Return the messages of a kind that came so far."""
+        return [m for m in self.received if m["type"] == kind]
+
+    def times_of(self, kind: str) -> list[float]:
+        """Return when they came, by the loop's clock."""
+        return [t for m, t in zip(self.received, self.arrived_s, strict=True) if m["type"] == kind]
+
+    async def tell(self, message: dict[str, Any]) -> None:
+        """Send a message to every page."""
+        for client in list(self.clients):
+            with contextlib.suppress(ConnectionError):
+                await client.socket.send_str(json.dumps(message))
+
+    async def drop(self) -> None:
+        """Close every connection."""
+        for client in list(self.clients):
+            await client.socket.close()
+
+    def frame(self, client: Client) -> dict[str, Any]:
+        """Return the next state for a page."""
+        known = self.hall.known(self.cycle)
+        t = self.cycle * 0.05
+        numbers = range(1 if client.whole else client.sent_segments + 1, known + 1)
+        removed = sorted(self.deleted - client.gone)
+        segments = {
+            "added": [self.hall.segment(n, t - 0.4 * (known - n)) for n in numbers if n not in self.deleted],
+            "removed": removed, "pinned": sorted(self.pinned), "whole": client.whole,
+        }  # fmt: skip
+        client.sent_segments, client.whole = known, False
+        client.gone |= set(removed)
+        stopped = {} if self.mode == "DRIVE" else {"twist": [0.0, 0.0]}
+        return self.hall.frame(self.cycle) | stopped | {
+            "type": "state", "mode": self.mode,
+            "flags": self.flags, "reason": self.reason, "segments": segments, "wish": self.wish,
+            "dropped": 0, "clients": len(self.clients), "controller": self.controller == client.number,
+            "recording": self.recording, "paused": self.paused, "speed": self.speed, "playback": self.playback,
+        }  # fmt: skip
+
+    async def run(self) -> None:
+        """Send a state to every page, twenty times a second."""
+        while True:
+            if not self.silent:
+                if self.mode == "DRIVE" and not self.paused:
+                    self.cycle += 1
+                for client in list(self.clients):
+                    with contextlib.suppress(ConnectionError):
+                        await client.socket.send_str(json.dumps(self.frame(client)))
+            await asyncio.sleep(0.05)
+
+    async def index(self, _request: web.Request) -> web.StreamResponse:
+        return _file(PAGE / "index.html")
+
+    async def file(self, request: web.Request) -> web.StreamResponse:
+        return _file(PAGE / request.match_info["file"])
+
+    async def report(self, request: web.Request) -> web.StreamResponse:
+        self.received.append({"type": "GET /report", "id": 0, "token": request.query.get("token")})
+        self.arrived_s.append(asyncio.get_running_loop().time())
+        self._news.set()
+        return web.Response(text="<!doctype html><title>report</title><h1>Report</h1>", content_type="text/html")
+
+    async def talk(self, request: web.Request) -> web.StreamResponse:
+        if request.query.get("token") != TOKEN:
+            raise web.HTTPForbidden(text="wrong token")
+        socket = web.WebSocketResponse(max_msg_size=1 << 16)
+        await socket.prepare(request)
+        self._counted += 1
+        client = Client(socket, self._counted)
+        role = "control" if self.controller == client.number else "watch"
+        await socket.send_str(json.dumps((self.hello or greeting()) | {"role": role}))
+        self.clients.append(client)
+        try:
+            async for message in socket:
+                if message.type is WSMsgType.TEXT:
+                    await self._hear(client, json.loads(message.data))
+        finally:
+            self.clients.remove(client)
+        return socket
+
+    async def _hear(self, client: Client, message: dict[str, Any]) -> None:
+        self.received.append(message)
+        self.arrived_s.append(asyncio.get_running_loop().time())
+        self._news.set()
+        kind = message["type"]
+        error, at = self.refusals.get(kind, (None, None))
+        data = None
+        if error is None:
+            data = self._heed(client, kind, message)
+        answer = {
+            "type": "answer",
+            "id": message["id"],
+            "ok": error is None,
+            "error": error,
+            "field": at,
+            "data": data,
+        }
+        await client.socket.send_str(json.dumps(answer))
+
+    def _heed(self, client: Client, kind: str, message: dict[str, Any]) -> Any:
+        match kind:
+            case "halt":
+                self.mode, self.reason = "SAFE_STOP", HALTED
+            case "arm":
+                self.mode, self.reason = "DRIVE", None
+            case "disarm":
+                self.mode, self.reason = "READY", None
+            case "take_control" if self.controller is None:
+                self.controller = client.number
+            case "give_control":
+                self.controller = None
+            case "wish":
+                self.wish = {k: v for k, v in message.items() if k not in {"id", "type"}}
+            case "pause" | "resume":
+                self.paused = kind == "pause"
+            case "single_step":
+                self.cycle += 1
+            case "speed":
+                self.speed = message["factor"]
+            case "record":
+                self.recording = {"file": "runs/now.mcap", "bytes": 120_000, "dropped": 0} if message["on"] else None
+            case "delete_segments":
+                self.deleted |= set(message["numbers"])
+            case "pin_segments":
+                self.pinned = self.pinned | set(message["numbers"]) if message["pinned"] else (
+                    self.pinned - set(message["numbers"]))  # fmt: skip
+            case "evidence":
+                return self._evidence(message["object"])
+            case "set":
+                self.changed.append((message["path"], message["value"]))
+            case "undo":
+                return {"path": self.changed.pop()[0], "value": 1.0} if self.changed else None
+            case "save_toml":
+                return TOML
+            case "recordings":
+                return [
+                    {"file": "now.mcap", "bytes": None, "modified_s": None, "live": True},
+                    {"file": "2026-01-02-first.mcap", "bytes": 1_500_000, "modified_s": 1.0, "live": False},
+                ]
+            case "open":
+                self.playback = {"s": 0.0, "is_playing": False, "speed": 1.0}
+                about = {key: value for key, value in greeting(name="older").items() if key not in {"type", "role"}}
+                return {
+                    "file": message["file"],
+                    "duration_s": 21.5,
+                    "cycles": 430,
+                    "bookmarks": [[4.5, "the corner"]],
+                    "modes": [[0.0, "DRIVE", None], [9.0, "SAFE_STOP", "bumper contact"]],
+                    "about": about,
+                }
+            case "scrub" if self.playback is not None:
+                self.playback["s"] = message["s"]
+            case "play" if self.playback is not None:
+                self.playback["is_playing"] = message["speed"] > 0
+            case "live":
+                self.playback = None
+        return None
+
+    def _evidence(self, number: int) -> dict[str, Any]:
+        x, y = self.hall.places[number - 1]
+        readings: list[list[float | None]] = [[0.0, 0.0, None, 0.0, -0.4]]
+        for i in range(11):
+            px, py = 0.25 * i, 0.0
+            angle, away = _polar(x - px, y - py)
+            readings.append([px, py, away - 0.3 + (0.4 if i % 5 == 4 else 0.0), angle, -1.2 if i % 5 == 4 else 2.1])
+        return {"object": number, "model": "drum", "for": 21.4, "against": 2.4, "readings": readings, "lines": [],
+                "rivals": [["wall", -12.5], ["post", 1.5]]}  # fmt: skip
+
+
+def _polar(x: float, y: float) -> tuple[float, float]:
+    away, angle = cmath.polar(complex(x, y))
+    return angle, away
+
+
+def _file(path: Path) -> web.Response:
+    if not path.is_file():
+        raise web.HTTPNotFound
+    headers = {"Content-Security-Policy": POLICY, "Cache-Control": "no-store"}
+    return web.Response(body=path.read_bytes(), content_type=KINDS[path.suffix], charset="utf-8", headers=headers)
+
+
+@contextlib.asynccontextmanager
+async def serving(hall: Hall) -> AsyncIterator[FakeServer]:
+    """Serve a page of a hall on a free port."""
+    server = FakeServer(hall)
+    app = web.Application()
+    app.add_routes([
+        web.get("/", server.index), web.get("/page/{file}", server.file),
+        web.get("/ws", server.talk), web.get("/report", server.report),
+    ])  # fmt: skip
+    runner = web.AppRunner(app, access_log=None, shutdown_timeout=1.0)
+    await runner.setup()
+    site = web.TCPSite(runner, "127.0.0.1", 0)
+    await site.start()
+    server.port = runner.addresses[0][1]
+    task = asyncio.create_task(server.run())
+    try:
+        yield server
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+        await server.drop()
+        await runner.cleanup()

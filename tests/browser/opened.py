@@ -1,0 +1,135 @@
+"""Pages opened in a browser, with what a person does on them: find places on the map, wait for words."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal, Self
+
+from playwright.async_api import Browser, BrowserContext, Page, expect
+
+from tests.browser.fake import PATIENCE_S
+
+DESK, PHONE, PROJECTOR = (1440, 900), (360, 740), (1920, 1080)
+PROBES = Path(__file__).parent / "probes"
+MODULE = "import('/page/main.js')"
+
+
+@dataclass
+class Opened:
+    """A page, what it complained of, and where its pictures go."""
+
+    page: Page
+    shots: Callable[[str], Path]
+    complaints: list[str] = field(default_factory=list)
+
+    async def screen(self, x: float, y: float) -> tuple[float, float]:
+        """Return where a place of the odometry's frame (m) is on the screen, px."""
+        at: list[float] = await self.page.evaluate(
+            f"""async ([x, y]) => {{
+                const {{ view }} = await {MODULE};
+                const box = document.getElementById('map-front').getBoundingClientRect();
+                const [sx, sy] = view.toScreen(x, y);
+                return [box.left + sx, box.top + sy];
+            }}""",
+            [x, y],
+        )
+        return at[0], at[1]
+
+    async def world(self, expression: str) -> Any:
+        """Return the value of an expression of what the page's main module exports."""
+        return await self.page.evaluate(
+            f"async () => {{ const {{ connection, hand, selection, tools, units, view, world }} = await {MODULE};"
+            f" return {expression}; }}"
+        )
+
+    async def until(self, expression: str, what: str) -> None:
+        """Wait until such an expression is true."""
+        await until(lambda: self.world(f"Boolean({expression})"), what)
+
+    async def probe(self, name: str, *arguments: Any) -> Any:
+        """Return what one of the functions in `probes/` finds on the page."""
+        return await self.page.evaluate((PROBES / f"{name}.js").read_text("utf-8"), *arguments)
+
+    async def drawn(self) -> None:
+        """Wait until whatever waited to be drawn is drawn."""
+        await self.page.evaluate(
+            "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done())))"
+        )
+
+    async def steady(self) -> None:
+        """Stop the map from being fitted by itself, so that places stay where they are."""
+        await self.until("world.fresh && world.state.objects.length > 0", "objects on the map")
+        await self.page.evaluate(f"async () => {{ const {{ view }} = await {MODULE}; view.touched = true; }}")
+
+    async def tab(self, name: str) -> None:
+        """Show a panel."""
+        await self.page.get_by_role("tab", name=name, exact=True).click()
+
+    async def shot(self, name: str) -> None:
+        """Keep a picture of what is on screen."""
+        await self.page.screenshot(path=self.shots(name))
+
+    async def says(self, selector: str, words: str) -> None:
+        """Wait until an element says something."""
+        await expect(self.page.locator(selector)).to_contain_text(words, timeout=1000 * PATIENCE_S)
+
+
+class Opener:
+    """Opens pages, and closes them."""
+
+    def __init__(self, browser: Browser, shots: Callable[[str], Path]) -> None:
+        self._browser = browser
+        self._shots = shots
+        self._contexts: list[BrowserContext] = []
+        self._opened: list[Opened] = []
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for context in self._contexts:
+            await context.close()
+
+    async def open(
+        self, url: str, size: tuple[int, int] = DESK, *, scheme: Literal["dark", "light"] = "light",
+        touch: bool = False, calm: bool = False, script: str | None = None, live: bool = True,
+    ) -> Opened:  # fmt: skip
+        """Open a page and wait for its first state."""
+        context = await self._browser.new_context(
+            viewport={"width": size[0], "height": size[1]}, color_scheme=scheme, has_touch=touch, is_mobile=touch,
+            device_scale_factor=2 if touch else 1, reduced_motion="reduce" if calm else "no-preference",
+            accept_downloads=True,
+        )  # fmt: skip
+        context.set_default_timeout(1000 * PATIENCE_S)
+        self._contexts.append(context)
+        if script is not None:
+            await context.add_init_script(script)
+        page = await context.new_page()
+        opened = Opened(page, self._shots)
+        page.on("pageerror", lambda error: opened.complaints.append(str(error)))
+        page.on("console", lambda said: said.type == "error" and opened.complaints.append(said.text))
+        self._opened.append(opened)
+        await page.goto(url)
+        if live:
+            await opened.until("world.fresh", "a first state")
+        return opened
+
+    def check(self) -> None:
+        """Fail where a page complained of anything."""
+        complaints = [text for opened in self._opened for text in opened.complaints]
+        assert not complaints, complaints
+
+
+async def until(done: Callable[[], Awaitable[object]], what: str) -> None:
+    """Wait until something is so."""
+    end_s = time.monotonic() + PATIENCE_S
+    while not await done():
+        assert time.monotonic() < end_s, f"it never came: {what}"
+        await asyncio.sleep(0.02)

@@ -1,0 +1,392 @@
+"""Driving from the page: HALT above all, arming, the dead-man by pad, keys and gamepad, goals, who has control."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+
+import pytest
+from playwright.async_api import expect
+
+from tests.browser.fake import FakeServer
+from tests.browser.opened import PHONE, Opened, Opener, until
+
+pytestmark = [pytest.mark.realtime, pytest.mark.asyncio(loop_scope="session")]
+
+FOCI = ("body", "#map-front", "#tab-log", "#hand-keys", "#ellipse-scale", "#hand-limit", "#fit")
+
+GAMEPAD = """
+const pad = {connected: true, id: 'a pad', index: 0, axes: [0, 0, 0, 0],
+  buttons: Array.from({length: 16}, () => ({pressed: false, value: 0}))};
+window.padUnderTest = pad;
+window.plugIn = () => dispatchEvent(Object.assign(new Event('gamepadconnected'), { gamepad: pad }));
+navigator.getGamepads = () => (pad.connected ? [pad] : []);
+"""
+
+
+async def still_sends(server: FakeServer) -> None:
+    """Wait until commands keep coming."""
+    count = len(server.of("teleoperate"))
+    await server.wait("teleoperate", count + 5)
+
+
+async def has_let_go(server: FakeServer) -> None:
+    """Wait for the zero, and see that nothing comes after it."""
+    await until(lambda: _last_is_zero(server), "zero at the end")
+    count = len(server.of("teleoperate"))
+    await asyncio.sleep(0.3)  # six times as long as from one command to the next
+    assert len(server.of("teleoperate")) == count, "it goes on sending though nothing is held"
+
+
+async def _last_is_zero(server: FakeServer) -> bool:
+    last = server.of("teleoperate")[-1:]
+    return bool(last) and (last[0]["v"], last[0]["w"]) == (0, 0)
+
+
+async def test_halt_is_on_screen_whatever_is_open(server: FakeServer, opener: Opener) -> None:
+    for size in ((360, 740), (360, 500), (740, 360), (1440, 900), (1920, 1080)):
+        opened = await opener.open(server.url, size)
+        await opened.page.keyboard.press("?")
+        halt = opened.page.get_by_role("button", name="HALT")
+        await expect(halt).to_be_in_viewport(ratio=1.0)
+        await halt.click(timeout=5000)  # what lies over it would take the click
+        await server.wait("halt", 1)
+        server.received.clear()
+        server.arrived_s.clear()
+        await opened.says("#mode-name", "SAFE STOP")
+        server.mode, server.reason = "DRIVE", None
+
+
+async def test_halt_latches_and_says_why(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    await opened.page.get_by_role("button", name="HALT").click()
+    assert await server.wait("halt") == {}
+    await opened.says("#mode-name", "SAFE STOP")
+    await opened.says("#reason", "halted by the operator")
+    await opened.says("#said", "Mode safe stop: halted by the operator")
+    await opened.says("#banner-stopped", "halted by the operator")
+    await opened.shot("halted")
+    assert not server.of("arm"), "nothing arms by itself"
+    await opened.page.locator("#banner-stopped").get_by_role("button", name="Re-arm").click()
+    assert await server.wait("arm") == {}
+    await opened.says("#mode-name", "DRIVE")
+    await expect(opened.page.locator("#banner-stopped")).to_have_count(0)
+
+
+@pytest.mark.parametrize("target", FOCI)
+async def test_the_space_bar_halts_wherever_the_focus_is(server: FakeServer, opener: Opener, target: str) -> None:
+    opened = await opener.open(server.url)
+    if target in {"#hand-keys", "#hand-limit"}:
+        await opened.tab("Drive")
+    elif target == "#ellipse-scale":
+        await opened.tab("Layers")
+    await opened.page.locator(target).focus()
+    scale = await opened.world("view.scale")
+    await opened.page.keyboard.press("Space")
+    await server.wait("halt")
+    assert await opened.page.locator("#hand-keys").is_checked() is False
+    assert await opened.world("view.scale") == scale or target != "#fit", "and presses no button besides"
+    assert len(server.of("halt")) == 1
+
+
+async def test_the_space_bar_is_a_blank_where_one_writes(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    await opened.tab("Time")
+    await opened.page.locator("#bookmark-text").press_sequentially("a b")
+    await expect(opened.page.locator("#bookmark-text")).to_have_value("a b")
+    assert not server.of("halt")
+
+
+async def test_a_halt_without_a_connection_is_told_and_sent_as_soon_as_there_is_one(
+    server: FakeServer, opener: Opener
+) -> None:
+    opened = await opener.open(server.url)
+    await server.wait("recordings")
+    server.received.clear()
+    server.arrived_s.clear()
+    await server.drop()
+    await opened.page.keyboard.press("Space")
+    await opened.says("#toasts", "HALT could not be sent")
+    await server.wait("halt")
+    assert server.received[0]["type"] == "halt", "before anything else"
+
+
+async def test_arm_and_disarm(server: FakeServer, opener: Opener) -> None:
+    server.mode = "READY"
+    opened = await opener.open(server.url)
+    await opened.tab("Drive")
+    await opened.page.get_by_role("button", name="Arm", exact=True).click()
+    await server.wait("arm")
+    await opened.says("#mode-name", "DRIVE")
+    await expect(opened.page.get_by_role("button", name="Arm", exact=True)).to_be_disabled()
+    await opened.page.get_by_role("button", name="Disarm").click()
+    await server.wait("disarm")
+    await opened.says("#mode-name", "READY")
+    await opened.page.locator("#map-front").focus()
+    await opened.page.keyboard.press("Shift+A")
+    await server.wait("arm", 2)
+
+
+async def test_who_watches_can_halt_but_not_drive(server: FakeServer, opener: Opener) -> None:
+    server.controller = 99
+    opened = await opener.open(server.url)
+    await opened.tab("Drive")
+    await opened.says("#role-words", "You watch")
+    await opened.says("#banner-watching", "You are watching")
+    for name in ("Arm", "Disarm", "As configured", "Goal on the map"):
+        await expect(opened.page.get_by_role("button", name=name, exact=True)).to_be_disabled()
+    pad = await opened.page.locator("#pad").bounding_box()
+    assert pad is not None
+    await opened.page.mouse.move(pad["x"] + 70, pad["y"] + 20)
+    await opened.page.mouse.down()
+    await opened.says("#toasts", "ask for control first")
+    await opened.page.mouse.up()
+    assert not server.of("teleoperate")
+    await opened.shot("watching")
+    await opened.page.keyboard.press("Space")
+    await server.wait("halt")
+
+
+async def test_control_is_asked_for_and_handed_over(server: FakeServer, opener: Opener) -> None:
+    first = await opener.open(server.url)
+    second = await opener.open(server.url)
+    server.refusals["take_control"] = ("client 1 has the control and has been asked for it", None)
+    await second.page.locator("#banner-watching").get_by_role("button", name="Ask for control").click()
+    await server.wait("take_control")
+    await second.says("#toasts", "has been asked for it")
+    await server.tell({"type": "role", "role": "control", "asked_by": "client 2 (127.0.0.1)", "client": 2})
+    await first.says("#banner-asked", "client 2 (127.0.0.1) asks for control")
+    await first.shot("asked")
+    await first.page.locator("#banner-asked").get_by_role("button", name="Hand over").click()
+    assert await server.wait("grant") == {"client": 2}
+    server.controller = 2
+    await second.tab("Drive")
+    await second.says("#role-words", "You control")
+    await first.tab("Drive")
+    await first.says("#role-words", "You watch")
+    await second.page.get_by_role("button", name="Give control away").click()
+    await server.wait("give_control")
+    await second.says("#role-words", "You watch")
+
+
+async def press_pad(opened: Opened, x: float, y: float) -> None:
+    """Press the pad in the middle and drag to a place, in shares of its radius."""
+    await opened.tab("Drive")
+    await opened.page.locator("#pad").scroll_into_view_if_needed()
+    box = await opened.page.locator("#pad").bounding_box()
+    assert box is not None
+    cx, cy, r = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, box["width"] / 2 - 22
+    await opened.page.mouse.move(cx, cy)
+    await opened.page.mouse.down()
+    await opened.page.mouse.move(cx + x * r, cy - y * r, steps=3)
+
+
+async def test_the_pad_drives_while_it_is_held(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    await press_pad(opened, -0.5, 1.0)
+    await still_sends(server)
+    last = server.of("teleoperate")[-1]
+    assert last["v"] == pytest.approx(0.5 * 0.5 * 0.894, abs=0.02), (
+        "half the speed at most, as far forward as the knob"
+    )
+    assert last["w"] == pytest.approx(0.5 * 1.0 * 0.447, abs=0.03), "left is counter-clockwise"
+    await opened.says("#hand-state", "held:")
+    await opened.shot("pad")
+    await opened.page.mouse.up()
+    await has_let_go(server)
+    await opened.says("#hand-state", "not held")
+
+
+async def test_commands_come_often_enough(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    await press_pad(opened, 0.0, 1.0)
+    await server.wait("teleoperate", 31)
+    await opened.page.mouse.up()
+    times = server.times_of("teleoperate")[:31]
+    gaps = sorted(after - before for before, after in itertools.pairwise(times))
+    assert gaps[len(gaps) // 2] <= 0.1, f"half of them came later than after {gaps[len(gaps) // 2]:.3f} s"
+
+
+async def test_keys_drive_only_where_that_is_switched_on(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    page = opened.page
+    await page.locator("#map-front").focus()
+    await page.keyboard.down("w")
+    await page.keyboard.up("w")
+    assert not server.of("teleoperate")
+    await opened.tab("Drive")
+    await page.locator("#hand-keys").focus()
+    await page.keyboard.press("Enter")
+    await expect(page.locator("#hand-keys")).to_be_checked()
+    await page.keyboard.down("w")
+    await page.keyboard.down("d")
+    await still_sends(server)
+    assert (server.of("teleoperate")[-1]["v"], server.of("teleoperate")[-1]["w"]) == (0.25, -0.5)
+    await page.keyboard.up("w")
+    await until(lambda: _turns_only(server), "turning alone")
+    await page.keyboard.up("d")
+    await has_let_go(server)
+
+
+async def _turns_only(server: FakeServer) -> bool:
+    last = server.of("teleoperate")[-1]
+    return bool(last["v"] == 0 and last["w"] == -0.5)
+
+
+async def test_arrows_drive_on_the_pad_with_a_limit(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    page = opened.page
+    await opened.tab("Drive")
+    await page.locator("#hand-limit").focus()
+    await page.keyboard.press("End")
+    await opened.says("#hand-limit-value", "100 %")
+    await page.locator("#pad").focus()
+    await page.keyboard.down("ArrowDown")
+    await still_sends(server)
+    assert server.of("teleoperate")[-1]["v"] == -0.5
+    await page.keyboard.up("ArrowDown")
+    await has_let_go(server)
+
+
+async def test_a_gamepad_drives_only_with_its_shoulder_button(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url, script=GAMEPAD)
+    page = opened.page
+    await page.evaluate("() => plugIn()")
+    await opened.tab("Drive")
+    await opened.says("#hand-gamepad", "a pad")
+    await page.evaluate("() => { padUnderTest.axes[1] = -1; }")
+    await asyncio.sleep(0.2)
+    assert not server.of("teleoperate"), "the stick alone moves nothing"
+    await page.evaluate("() => { padUnderTest.buttons[5].pressed = true; }")
+    await still_sends(server)
+    assert server.of("teleoperate")[-1]["v"] == 0.25
+    await page.evaluate("() => { padUnderTest.connected = false; dispatchEvent(new Event('gamepaddisconnected')); }")
+    await has_let_go(server)
+    await opened.says("#hand-gamepad", "no gamepad")
+
+
+LOSSES: dict[str, str] = {
+    "blur": "() => dispatchEvent(new Event('blur'))",
+    "hidden": "() => { Object.defineProperty(document, 'hidden', {value: true});"
+              " document.dispatchEvent(new Event('visibilitychange')); }",
+    "pointercancel": "() => document.getElementById('pad').dispatchEvent("
+                     "new PointerEvent('pointercancel', {pointerId: 1}))",
+    "lostpointercapture": "() => document.getElementById('pad').releasePointerCapture(1)",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+async def test_whatever_is_lost_lets_go(server: FakeServer, opener: Opener, loss: str) -> None:
+    opened = await opener.open(server.url)
+    await press_pad(opened, 0.0, 1.0)
+    await still_sends(server)
+    await opened.page.evaluate(LOSSES[loss])
+    await has_let_go(server)
+    await opened.page.mouse.move(10, 400, steps=3)  # moving on with the button down holds nothing again
+    await has_let_go(server)
+
+
+async def test_a_page_that_is_left_sends_zero(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    await press_pad(opened, 0.0, 1.0)
+    await still_sends(server)
+    await opened.page.goto("about:blank")
+    await has_let_go(server)
+
+
+async def test_halt_and_a_lost_mode_let_go(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    await press_pad(opened, 0.0, 1.0)
+    await still_sends(server)
+    await opened.page.keyboard.press("Space")
+    await has_let_go(server)
+    await opened.page.mouse.up()
+    await opened.says("#mode-name", "SAFE STOP")
+
+    server.mode = "DRIVE"
+    await opened.says("#mode-name", "DRIVE")
+    await press_pad(opened, 0.0, 1.0)
+    await still_sends(server)
+    server.mode, server.reason = "SAFE_STOP", "bumper contact"
+    await has_let_go(server)
+    await opened.says("#hand-state", "let go: the mode is SAFE STOP")
+
+
+async def test_losing_control_lets_go(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    await press_pad(opened, 0.0, 1.0)
+    await still_sends(server)
+    server.controller = None
+    await has_let_go(server)
+
+
+async def test_a_goal_by_click_and_by_numbers(server: FakeServer, opener: Opener) -> None:
+    server.paused = True
+    opened = await opener.open(server.url)
+    await opened.steady()
+    page = opened.page
+    await opened.tab("Drive")
+    await page.get_by_role("button", name="Goal on the map").click()
+    await page.mouse.click(*await opened.screen(3.2, -0.2))
+    goal = await server.wait("wish")
+    assert goal["kind"] == "goal"
+    assert (goal["x"], goal["y"]) == pytest.approx((3.2, -0.2), abs=0.02)
+    await opened.says("#wish-words", "To the goal at 10.5")
+    await opened.shot("goal")
+    await page.locator("#goal-x").fill("10")
+    await page.locator("#goal-y").fill("-1,5")
+    await page.keyboard.press("Enter")
+    typed = await server.wait("wish", 2)
+    assert (typed["x"], typed["y"]) == pytest.approx((3.048, -0.4572))
+    await page.locator("#goal-x").fill("far")
+    await page.locator("#goal-x").press("Enter")
+    await opened.says("#goal-error", "two numbers")
+    server.refusals["wish"] = ("the goal is 90 m away, 50 at most", None)
+    await page.locator("#goal-x").fill("300")
+    await page.locator("#goal-x").press("Enter")
+    await opened.says("#goal-error", "90 m away")
+    server.refusals.clear()
+    await page.get_by_role("button", name="As configured").click()
+    assert await server.wait("wish", 4) == {"kind": "legs"}
+    await opened.says("#wish-words", "as configured")
+
+
+async def test_a_goal_with_the_keyboard_alone(server: FakeServer, opener: Opener) -> None:
+    server.paused = True
+    opened = await opener.open(server.url)
+    await opened.steady()
+    await opened.page.locator("#map-front").focus()
+    await opened.page.keyboard.press("5")
+    for _ in range(3):
+        await opened.page.keyboard.press("ArrowRight")
+    x, y = await opened.world("view.toWorld(view.width / 2 + 72, view.height / 2)")
+    await opened.page.keyboard.press("Enter")
+    goal = await server.wait("wish")
+    assert (goal["x"], goal["y"]) == pytest.approx((x, y), abs=1e-6)
+
+
+async def test_gains_are_set_where_one_drives(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    await opened.tab("Drive")
+    gain = opened.page.locator("#drive-gains").get_by_label("move ahead gain")
+    await gain.fill("0.5")
+    await gain.press("Enter")
+    assert await server.wait("set") == {"path": "behaviors.move_ahead.move_ahead_gain", "value": 0.5}
+
+
+async def test_a_thumb_drives_and_halts_on_a_phone(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url, PHONE, touch=True)
+    await opened.page.get_by_role("tab", name="Drive").tap()
+    await opened.page.locator("#pad").scroll_into_view_if_needed()
+    box = await opened.page.locator("#pad").bounding_box()
+    assert box is not None
+    touch = await opened.page.context.new_cdp_session(opened.page)
+    x, y = box["x"] + box["width"] / 2, box["y"] + 30
+    await touch.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})
+    await still_sends(server)
+    assert server.of("teleoperate")[-1]["v"] > 0.2
+    await opened.shot("phone-driving")
+    await touch.send("Input.dispatchTouchEvent", {"type": "touchCancel", "touchPoints": []})
+    await has_let_go(server)
+    await opened.page.get_by_role("button", name="HALT").tap()
+    await server.wait("halt")

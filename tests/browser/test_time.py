@@ -1,0 +1,134 @@
+"""Time from the page: hold it, let it go a cycle at a time, faster, record it, look at it again."""
+
+from __future__ import annotations
+
+from io import BytesIO
+
+import pytest
+from PIL import Image
+from playwright.async_api import expect
+
+from tests.browser.fake import TOKEN, FakeServer
+from tests.browser.hall import greeting
+from tests.browser.opened import Opener
+
+pytestmark = [pytest.mark.realtime, pytest.mark.asyncio(loop_scope="session")]
+
+
+async def test_pause_single_step_and_speed(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    page = opened.page
+    await opened.tab("Time")
+    await page.get_by_role("button", name="Pause").click()
+    assert await server.wait("pause") == {}
+    await opened.says("#time-words", "paused")
+    await page.get_by_role("button", name="One cycle", exact=True).click()
+    assert await server.wait("single_step") == {}
+    await page.locator("#map-front").focus()
+    await page.keyboard.press("k")
+    await server.wait("resume")
+    await page.locator("#speed").select_option("4")
+    assert await server.wait("speed") == {"factor": 4}
+    await opened.says("#time-words", "× 4")
+
+
+async def test_a_robot_on_a_port_has_no_time_to_hold(server: FakeServer, opener: Opener) -> None:
+    server.hello = greeting(emulated=False, truth=None)
+    opened = await opener.open(server.url)
+    await opened.tab("Time")
+    for name in ("Pause", "One cycle"):
+        await expect(opened.page.get_by_role("button", name=name, exact=True)).to_be_disabled()
+
+
+async def test_record_and_bookmark(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    page = opened.page
+    await opened.tab("Time")
+    record = page.get_by_role("button", name="Record", exact=True)
+    await record.click()
+    assert await server.wait("record") == {"on": True}
+    await expect(record).to_have_attribute("aria-pressed", "true")
+    await opened.says("#record-words", "now.mcap")
+    await page.get_by_label("Bookmark", exact=True).first.fill("here it slipped")
+    await page.keyboard.press("Enter")
+    assert await server.wait("bookmark") == {"text": "here it slipped"}
+    await expect(page.locator("#bookmark-text")).to_have_value("")
+    await record.click()
+    assert await server.wait("record", 2) == {"on": False}
+
+
+async def test_a_recording_is_opened_scrubbed_played_and_left(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    page = opened.page
+    await opened.tab("Time")
+    await page.locator("#recordings").select_option("2026-01-02-first.mcap")
+    await page.get_by_role("button", name="Open").click()
+    assert await server.wait("open") == {"file": "2026-01-02-first.mcap"}
+    await opened.says("#banner-playback", "You look at a recording, not at the robot: 2026-01-02-first.mcap")
+    await opened.says("#mode-name", "then: DRIVE")
+    await opened.says("#robot-name", "older")
+    await page.locator("#scrub").focus()
+    await page.keyboard.press("ArrowRight")
+    assert (await server.wait("scrub"))["s"] == pytest.approx(0.05)
+    await page.keyboard.press("End")
+    await opened.says("#scrub-value", "21.5 s")
+    await page.get_by_role("button", name="✎ the corner").click()
+    await opened.says("#scrub-value", "4.5 s")
+    assert server.of("scrub")[-1]["s"] == 4.5
+    await page.get_by_role("button", name="SAFE STOP: bumper contact").click()
+    await opened.says("#scrub-value", "9.0 s")
+    await page.locator("#play-speed").select_option("4")
+    await page.get_by_role("button", name="Play", exact=True).click()
+    assert await server.wait("play") == {"speed": 4}
+    await page.get_by_role("button", name="Hold").click()
+    assert await server.wait("play", 2) == {"speed": 0}
+    await page.get_by_role("button", name="On one cycle").click()
+    assert await server.wait("step") == {"cycles": 1}
+    await page.get_by_role("button", name="Back one cycle").click()
+    assert await server.wait("step", 2) == {"cycles": -1}
+    await opened.shot("recording")
+    await page.keyboard.press("Space")
+    await server.wait("halt")  # HALT means the robot, whatever is looked at
+    await page.locator("#banner-playback").get_by_role("button", name="Back to the live run").click()
+    await server.wait("live")
+    await expect(page.locator("#banner-playback")).to_have_count(0)
+    await expect(page.locator("#player")).to_be_hidden()
+    await opened.says("#robot-name", "denning")
+
+
+async def test_nothing_is_driven_by_hand_while_one_looks_at_a_recording(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    server.playback = {"s": 1.0, "is_playing": False, "speed": 1.0}
+    await opened.says("#banner-playback", "not at the robot")
+    await opened.tab("Drive")
+    await opened.page.locator("#pad").focus()
+    await opened.page.keyboard.press("ArrowUp")
+    await opened.says("#toasts", "you look at a recording")
+    assert not server.of("teleoperate")
+
+
+async def test_a_screenshot_is_a_picture_of_the_map(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    await opened.steady()
+    await opened.tab("Time")
+    async with opened.page.expect_download() as saved:
+        await opened.page.get_by_role("button", name="Screenshot").click()
+    download = await saved.value
+    assert download.suggested_filename.startswith("echolocate-")
+    data = (await download.path()).read_bytes()
+    opened.shots("saved-screenshot").write_bytes(data)
+    image = Image.open(BytesIO(data)).convert("RGB")
+    width, height = await opened.world("[view.width, view.height]")
+    assert image.size == (2 * width, 2 * (height + 34))
+    colours = image.getcolors(maxcolors=1 << 24)
+    assert colours is not None
+    assert len(colours) > 200, "the picture is empty"
+
+
+async def test_the_report_is_asked_for_with_the_token(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    await opened.tab("Time")
+    async with opened.page.context.expect_page() as shown:
+        await opened.page.get_by_role("link", name="Report").click()
+    await expect((await shown.value).get_by_role("heading")).to_have_text("Report")
+    assert await server.wait("GET /report") == {"token": TOKEN}
