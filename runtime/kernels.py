@@ -74,9 +74,7 @@ def needed(settings: Settings) -> tuple[str, ...]:
 
 
 def missing(folder: Path, parts: Iterable[str]) -> list[str]:
-    """Return those of the parts that were never compiled into `folder`; none where nothing is compiled."""
-    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in {"", "0"}:
-        return []
+    """Return those of the parts that were never compiled into `folder`."""
     return [part for part in parts if not (folder / part).exists()]
 
 
@@ -125,6 +123,8 @@ def ready_kernels(settings: Settings, console: Console, parts: Iterable[str] | N
         Of `PARTS`; what a run with these settings needs where not given.
     """
     folder = use_cache()
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in {"", "0"}:
+        return
     parts = needed(settings) if parts is None else tuple(parts)
     absent = missing(folder, parts)
     if not absent:
