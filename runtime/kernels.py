@@ -95,9 +95,7 @@ def hindrance(running: Settings, proposed: Settings) -> str | None:
 
 
 def missing(folder: Path, parts: Iterable[str]) -> list[str]:
-    """Return those of the parts that were never compiled into `folder`; none where nothing is compiled."""
-    if is_interpreted():
-        return []
+    """Return those of the parts that were never compiled into `folder`."""
     return [part for part in parts if not (folder / part).exists()]
 
 
@@ -148,6 +146,8 @@ def ready_kernels(settings: Settings, console: Console, parts: Iterable[str] | N
         Of `PARTS`; what a run with these settings needs where not given.
     """
     folder = use_cache()
+    if is_interpreted():
+        return
     parts = needed(settings) if parts is None else tuple(parts)
     absent = missing(folder, parts)
     if not absent:
