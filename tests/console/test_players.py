@@ -14,6 +14,7 @@ import orjson
 import pytest
 
 from runtime.console.aside import COMMAND, NICENESS, end_aside, start_aside
+from runtime.console.client import Frame
 from runtime.console.player import PLAYERS_MAX, PlayedFrame, PlayerError, Players, report_of
 from runtime.recording.folder import in_folder, listing
 from tests.hil.machine import PATIENCE_S
@@ -44,7 +45,8 @@ class Page:
     def switch(self, *, live: bool) -> None:
         self.live.append(live)
 
-    def show(self, shot: PlayedFrame) -> None:
+    def show(self, shot: Frame) -> None:
+        assert isinstance(shot, PlayedFrame)
         self.frames.append(shot)
 
     def say(self, message: dict[str, Any]) -> None:

@@ -251,7 +251,7 @@ async def test_halt_from_a_page_in_time(tmp_path: Path, measured: Callable[[str]
         elif mode.arming_s is None and operator.asked_s is None:
             process.request(Request.ARM)
 
-    async with emulator([]) as port:
+    async with emulator([]) as (port, _control):
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
             process = operator.process = RobotProcess(
                 on_port(settings, port), log, Observers(on_cycle, on_bytes=on_bytes)
