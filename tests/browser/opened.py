@@ -114,7 +114,7 @@ class Opener:
         page = await context.new_page()
         opened = Opened(page, self._shots)
         page.on("pageerror", lambda error: opened.complaints.append(str(error)))
-        page.on("console", lambda said: said.type == "error" and opened.complaints.append(said.text))
+        page.on("console", lambda said: opened.complaints.extend([said.text] * (said.type == "error")))
         self._opened.append(opened)
         await page.goto(url)
         if live:

@@ -32,7 +32,7 @@ export function drawClusters(f) {
 }
 
 // The outline of a model as it stands somewhere; a lozenge where there is no such model here.
-export function outlinePath(path, model, x, y, theta, px) {
+export function outlinePath(path, model, { x, y, theta, covariance = null }, px) {
   if (!model) {
     const r = 9 * px;
     path.moveTo(x + r, y);
@@ -42,7 +42,7 @@ export function outlinePath(path, model, x, y, theta, px) {
     path.closePath();
     return;
   }
-  if (model.arc_radius_m && model.closed) {
+  if (model.arc_radius_m && (model.closed || covariance !== null)) { // the full method locates circles, the paper's chords
     path.moveTo(x + model.arc_radius_m, y);
     path.arc(x, y, model.arc_radius_m, 0, 2 * Math.PI);
     return;
@@ -74,10 +74,8 @@ export function drawModels(f) {
   for (const object of world.state.objects) {
     const model = world.model(object.model);
     const chance = object.probability ?? object.score;
-    outlinePath(chance >= SURE ? sure : unsure, model, object.x, object.y, object.theta, px);
-    if (object.number !== null && object.number === selection.object) {
-      outlinePath(picked, model, object.x, object.y, object.theta, px);
-    }
+    outlinePath(chance >= SURE ? sure : unsure, model, object, px);
+    if (object.number !== null && object.number === selection.object) outlinePath(picked, model, object, px);
   }
   f.inWorld();
   ctx.strokeStyle = theme.ink;

@@ -45,10 +45,11 @@ export function drawLasso(f, points) {
 }
 
 // An outline that is not there yet, with the handle that turns it.
-export function drawGhost(f, model, { x, y, theta }, handle) {
+export function drawGhost(f, model, pose, handle) {
+  const { x, y, theta } = pose;
   const { ctx, theme, px } = f;
   const path = new Path2D();
-  outlinePath(path, model, x, y, theta, px);
+  outlinePath(path, model, pose, px);
   ctx.save();
   f.inWorld();
   ctx.strokeStyle = theme.accent;

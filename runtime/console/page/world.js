@@ -63,6 +63,7 @@ export class World extends Emitter {
     const before = this.state;
     const state = { ...EMPTY, ...frame };
     const jumped = state.t < before.t - 1e-9 || (state.playback === null) !== (before.playback === null);
+    state.objects = [...state.objects].sort((a, b) => (a.number ?? Infinity) - (b.number ?? Infinity)); // as they come, they change places
     this.state = state;
     this.heard_ms = now_ms;
     if (jumped) this.#forgetTime();
