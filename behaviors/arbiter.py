@@ -134,7 +134,7 @@ def limit(
         fastest = min(asked.v, body.speed_max_m_s, stoppable_speed_m_s(percept, body, config.clearance_m))
         v = max(0.0, min(along, fastest))
         w += config.turn_gain_per_s * aside * v / config.base_velocity_m_s
-    elif asked.v < 0.0:
+    else:
         pose = replace(percept.pose, theta=percept.pose.theta + math.pi)
         behind = stoppable_speed_m_s(replace(percept, pose=pose), body, config.clearance_m)
         v = min(0.0, max(along, asked.v, -body.speed_max_m_s, -behind))
