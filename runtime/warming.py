@@ -68,8 +68,11 @@ def _edited(settings: Settings, method: str, models: Sequence[ModelConfig]) -> N
         RejectObject,
     )
 
+    from runtime.console.clusters import ClusterView
+
     perception = _perception(settings, method, models)
     _drive(settings, perception)
+    ClusterView(settings.perception).rows(perception.segments().ends)  # of every method's map the console shows them
     numbers = tuple(perception.segments().numbers[:2].tolist())
     perception.edit(PinSegments(numbers, pinned=True))
     for model in models:

@@ -253,6 +253,7 @@ from config.load import load_model
 from perception.edits import (
     ClearMap, ConfirmObject, DeleteSegments, MoveObject, PinSegments, PlaceModel, RejectObject,
 )
+from runtime.console.frames import Beside, Frames
 from runtime.kernels import hindrance
 from runtime.modes import Mode, Request
 from runtime.simulate import Said, simulate
@@ -260,11 +261,14 @@ from runtime.simulate import Said, simulate
 further = settings.model_copy(update={"models": (*settings.models, load_model(sys.argv[3]))})
 assert hindrance(settings, further) is None
 
+frames = Frames(settings)
+
 def by_hand(cycle, state):
     # every half second one thing after the other, also with a model that came late
     perception, arm = state.perception, Request.ARM if state.mode.mode is Mode.READY else None
     if cycle % 10 or state.odometry is None:
         return Said(arm)
+    frames.shot(state, None, Beside(host_s=0.0))
     seen = [o for o in perception.objects() if o.number is not None]
     for known in seen:
         perception.evidence(known.number)
