@@ -67,7 +67,6 @@ def _edited(settings: Settings, method: str, models: Sequence[ModelConfig]) -> N
         PlaceModel,
         RejectObject,
     )
-
     from runtime.console.clusters import ClusterView
 
     perception = _perception(settings, method, models)
