@@ -197,7 +197,7 @@ def _ours(folder: Path, seconds: float, sets: Sequence[str]) -> tuple[dict[str, 
     """Run the command for `seconds`, a bare loop beside it; return the summary, and how late the loop woke, µs."""
     summary, late = folder / "run.json", folder / "late.txt"
     words = [word for text in sets for word in ("--set", text)]
-    with _emulator(folder, words) as port:
+    with emulating(folder, words) as port:
         run = start(
             folder, "run", "runtime.cli", "run", "--headless", "--port", port, "--arm", "--seconds", f"{seconds}",
             "--json", str(summary), *DRIVE_ON, *words,
@@ -231,13 +231,13 @@ def _import_s() -> float:
 
 def _control(folder: Path, seconds: float, sets: Sequence[str]) -> None:
     words = [word for text in sets for word in ("--set", text)]
-    with _emulator(folder, words) as port:
+    with emulating(folder, words) as port:
         process = start(folder, "answer", "tests.bench.bare", "answer", port, f"{seconds}", *words)
         finish(folder, process, "answer", seconds + PATIENCE_S)
 
 
 @contextlib.contextmanager
-def _emulator(folder: Path, words: Sequence[str]) -> Iterator[str]:
+def emulating(folder: Path, words: Sequence[str]) -> Iterator[str]:
     """Run the emulator, with a latency trace that is complete afterwards."""
     port, trace = folder / "robot", folder / "latency.csv"
     process = start(
@@ -258,6 +258,7 @@ def _emulator(folder: Path, words: Sequence[str]) -> Iterator[str]:
 
 
 def start(folder: Path, name: str, module: str, *arguments: str) -> subprocess.Popen[bytes]:
+    """Start a module as a process that keeps its state, and what it has to say, in a folder."""
     env = {**os.environ, "XDG_STATE_HOME": str(folder), "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
     with (folder / f"{name}.err").open("wb") as err:
         command = [sys.executable, "-m", module, *arguments]
@@ -265,6 +266,13 @@ def start(folder: Path, name: str, module: str, *arguments: str) -> subprocess.P
 
 
 def finish(folder: Path, process: subprocess.Popen[bytes], name: str, patience_s: float) -> None:
+    """Wait for the end of such a process.
+
+    Raises
+    ------
+    Complaint
+        It failed; its own words are in the message.
+    """
     try:
         code = process.wait(patience_s)
     except subprocess.TimeoutExpired:
