@@ -590,7 +590,7 @@ def test_every_edit_in_turn_on_the_first_things_seen(begun: Perception, firings:
     other = fresh("full")
     whole = begun.snapshot()
     other.restore({n: a for n, a in whole.items() if not any(f".{part}" in n for part in OLDER["full"])})
-    assert {o.number for o in other.objects()} <= set(range(1, begun.hypotheses + 1))
+    assert {o.number for o in other.objects()} <= set(range(1, begun.tally.hypotheses + 1))
     other.restore(whole)
     assert other.objects() == begun.objects()
     post = load_model("drum").model_copy(update={"name": "bollard", "arc_radius_m": 0.12})
