@@ -129,7 +129,7 @@ def limit(
     x, y = sum(r.x for r in responses), sum(r.y for r in responses)
     along = config.base_velocity_m_s * (c * x + s * y)
     aside = max(-1.0, min(1.0, c * y - s * x))
-    v, w = 0.0, asked.w
+    w = asked.w
     if asked.v > 0.0:
         fastest = min(asked.v, body.speed_max_m_s, stoppable_speed_m_s(percept, body, config.clearance_m))
         v = max(0.0, min(along, fastest))
