@@ -17,7 +17,7 @@ from drivers.messages import Flags
 from tests.browser.opened import Opened, Opener
 from tests.hil.machine import PATIENCE_S, stalls_excused
 from tests.hil.running import Running, running
-from tests.hil.truth import Moment, Truth
+from tests.hil.truth import Row, Truth
 
 pytestmark = [
     pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels"), pytest.mark.asyncio(loop_scope="session"),
@@ -44,7 +44,7 @@ class Run:
     truth: Truth
     recording: Path
 
-    async def sees(self, done: Callable[[Moment], bool], what: str) -> Moment:
+    async def sees(self, done: Callable[[Row], bool], what: str) -> Row:
         """Wait until the base does something."""
         return await asyncio.to_thread(self.truth.wait, done, what)
 
