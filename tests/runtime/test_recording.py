@@ -193,12 +193,12 @@ def test_the_folder_keeps_its_cap_and_every_part_replays(tmp_path: Path) -> None
     assert len(parts) <= 3
     assert not any(path.exists() for path in old)
     assert (tmp_path / "notes.txt").exists()
-    for part in parts:
-        verdict = verdict_of(part)
+    verdicts = [verdict_of(part) for part in parts]
+    for verdict in verdicts:
         assert verdict.first is None, str(verdict.first)
         assert verdict.skipped == 0
-        # How many fit depends on how often the writer's clock has a chunk ended: on the machine.
-        assert verdict.cycles > 0
+    # How many cycles fit into a part depends on when the writer's clock ends a chunk; the last may be left with none.
+    assert sum(verdict.cycles > 0 for verdict in verdicts) >= len(verdicts) - 1
     assert place.is_full(250_001)
     assert not place.is_full(249_999)
 

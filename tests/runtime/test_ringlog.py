@@ -301,6 +301,7 @@ def test_disc_full() -> None:
         write_ring_log(Path(os.devnull).with_name("full"), [firing(float(t), [1.0] * 24) for t in range(1000)])
 
 
+@pytest.mark.realtime
 def test_a_long_recording_is_read_fast(tmp_path: Path) -> None:
     rng = np.random.default_rng(24)
     ranges = rng.uniform(0.3, 5.0, (5456, 24)).round(3)
