@@ -18,10 +18,10 @@ lint: $(VENV)/test.stamp
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-# What watches the clock runs alone, the rest on all processors.
+# What watches the clock mostly waits: two of a kind, and nothing beside them.
 tests: $(VENV)/test.stamp
 	$(BIN)/python -m pytest -q -n auto -m "not realtime and not soak"
-	$(BIN)/python -m pytest -m "realtime and not soak"
+	$(BIN)/python -m pytest -q -n 2 -m "realtime and not soak"
 
 # Compiled code reads beyond an array in silence; this run does not let it.
 boundscheck: $(VENV)/test.stamp

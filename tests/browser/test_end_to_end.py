@@ -134,7 +134,7 @@ async def halted_after(robot: Run, opened: Opened) -> tuple[float, float]:
 async def test_the_space_bar_halts_the_base_in_time(
     tmp_path: Path, opener: Opener, measured: Callable[[str], None]
 ) -> None:
-    waits = []
+    waits: list[float] = []
     async with run(tmp_path) as robot:
         opened = await opener.open(robot.url, script=STAMP)
         failed = 0
