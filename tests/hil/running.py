@@ -20,11 +20,11 @@ ROOT = Path(__file__).parents[2]
 DEADMAN_S = 0.5
 
 
-def wait_for(done: Callable[[], bool], what: str) -> None:
-    """Wait until `done`, and fail where it never is."""
+def wait_for(done: Callable[[], bool], what: str, seen: Callable[[], object] = str) -> None:
+    """Wait until `done`, and fail where it never is, telling what is `seen` by then."""
     end_s = time.monotonic() + PATIENCE_S
     while not done():
-        assert time.monotonic() < end_s, f"it never came: {what}"
+        assert time.monotonic() < end_s, f"it never came: {what}; {seen()}"
         time.sleep(0.01)
 
 
@@ -77,7 +77,7 @@ class Running:
 
     def comes_to(self, mode: str) -> None:
         """Wait until it says that it is in a mode."""
-        wait_for(lambda: self.modes()[-1:] == [mode], f"{mode}, after {self.modes()}")
+        wait_for(lambda: self.modes()[-1:] == [mode], mode, lambda: (self.modes(), self.err))
 
 
 @contextlib.contextmanager
