@@ -53,6 +53,7 @@ bench: $(VENV)/bench.stamp
 	@$(BIN)/python -m tests.bench $(BENCH)
 	@$(BIN)/python -m tests.bench timing $(TIMING)
 	@$(BIN)/python -m tests.bench waking
+	@$(BIN)/python -m tests.bench console
 
 clean:
 	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage

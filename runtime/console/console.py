@@ -13,6 +13,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any, Final
 
+from config.reload import differences
 from config.settings import Settings
 from drivers.driver import RobotDriver
 from runtime.books import Books
@@ -23,7 +24,7 @@ from runtime.console.frames import NO_FRAMES, Beside, Frames
 from runtime.console.guard import SCHEME, Guard, in_address, is_loopback, new_token
 from runtime.console.hello import about_run
 from runtime.console.hub import Hub
-from runtime.console.limits import Limits, Refusals
+from runtime.console.limits import Limits, Notes
 from runtime.console.overtime import Overtime
 from runtime.console.pages import page_files
 from runtime.console.parameters import parameters
@@ -101,12 +102,12 @@ class Console:
         self._overtime = Overtime() if overtime is None else overtime
         self._limits = Limits(clients=settings.console.clients_max) if limits is None else limits
         self._frames = Frames(settings)
-        self._refusals = Refusals(log, clock)
+        self._notes = Notes(log, clock)
         self._take_over = take_over
         self._shown = settings
         self.hub = Hub(self._limits, clock, self._control_left)
         self.tuning = Tuning(settings, self._tuned, emulated=emulated)
-        self.desk = Desk(process, self.hub, self.tuning, self._overtime, self._refusals, self._spawn, clock)
+        self.desk = Desk(process, self.hub, self.tuning, self._overtime, self._notes, self._spawn, clock)
         timed = process.keeper.timed
         self._timed_frame = timed(CONSOLE_FRAME, self._frame)
         self._timed_tick = timed(CONSOLE_FRAME, self._tick)
@@ -128,6 +129,9 @@ class Console:
             self._frames.touch()
             refused = {one.edit: one.why for one in record.refused}
             self.desk.edited([refused.get(k) for k in range(len(record.inputs.edits))])
+        if self._last is None and self.hub.clients:
+            # Now the robot has told its name.
+            self.hub.greet(self._hello())
         self._last = (record, state, books, driver)
         if self.hub.clients and not self._is_asked_for:
             now_s = self._clock()
@@ -165,7 +169,7 @@ class Console:
         names = (host,) if is_loopback(address) else (host, *own)
         timed = self._process.keeper.timed
         house = House(
-            guard=Guard(token, names, port), hub=self.hub, limits=self._limits, refusals=self._refusals,
+            guard=Guard(token, names, port), hub=self.hub, limits=self._limits, notes=self._notes,
             files=page_files(), hello=self._hello, on_message=self.desk.take, on_leave=self._left,
             on_fault=self._process.health.report, report=self._report,
             watch_without_token=self._config.watch_without_token, timed=timed, clock=self._clock,
@@ -218,7 +222,7 @@ class Console:
         now_s = self._clock()
         self._shown_s = now_s
         for client in self.hub.look_after(now_s):
-            self._refusals.tell(f"nothing was taken for {self._limits.stall_s:g} s", client.name)
+            self._notes.refuse(f"nothing was taken for {self._limits.stall_s:g} s", client.name)
         if not self.hub.clients:
             return
         latest = self._process.keeper.latest()
@@ -252,11 +256,14 @@ class Console:
         }  # fmt: skip
 
     def _tuned(self, settings: Settings) -> None:
+        changed = [str(difference) for difference in differences(self._shown, settings)]
+        self._log.info("the configuration is changed from the console", changed=changed)
         self._take_over(settings)
         self._show_settings(settings)
 
     def _show_settings(self, settings: Settings) -> None:
         before, self._shown = self._shown, settings
+        self._due_s = 0.0
         self._frames.adopt(settings)
         if settings.models != before.models:
             self.hub.greet(self._hello())
@@ -287,6 +294,7 @@ class Console:
                 raise
             except Exception as error:  # noqa: BLE001 - told as a fault of the program
                 self._process.health.report(f"task `{name}`", error)
+            self._timed_frame()
 
         task = client.task = asyncio.create_task(run(), name=name)
         self._tasks.add(task)

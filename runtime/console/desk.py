@@ -18,7 +18,7 @@ from runtime.console.client import Client
 from runtime.console.editing import EditForm, edit_in
 from runtime.console.forms import BadMessage, Message, Right, read_message
 from runtime.console.hub import Hub
-from runtime.console.limits import Refusals
+from runtime.console.limits import Notes
 from runtime.console.overtime import Overtime, Work
 from runtime.console.refusal import Refusal
 from runtime.console.seams import Robot
@@ -61,8 +61,8 @@ class Desk:
         The settings.
     overtime : Overtime
         Does what takes its time.
-    refusals : Refusals
-        Told of whatever is refused.
+    notes : Notes
+        Told of who asks the robot for something, and of whatever is refused.
     spawn : Spawn
         Has that done.
     clock : callable
@@ -70,14 +70,14 @@ class Desk:
     """
 
     def __init__(
-        self, robot: Robot, hub: Hub, tuning: Tuning, overtime: Overtime, refusals: Refusals, spawn: Spawn,
+        self, robot: Robot, hub: Hub, tuning: Tuning, overtime: Overtime, notes: Notes, spawn: Spawn,
         clock: Callable[[], float],
     ) -> None:  # fmt: skip
         self._robot = robot
         self._hub = hub
         self._tuning = tuning
         self._overtime = overtime
-        self._refusals = refusals
+        self._notes = notes
         self._spawn = spawn
         self._clock = clock
         self._asked: deque[Asked] = deque()
@@ -126,12 +126,9 @@ class Desk:
 
     def _do(self, client: Client, message: Message) -> Any:  # noqa: ANN401 - whatever the page is to have
         match message:
-            case forms.Halt():
-                self._robot.request(Request.HALT)
-            case forms.Arm():
-                self._robot.request(Request.ARM)
-            case forms.Disarm():
-                self._robot.request(Request.DISARM)
+            case forms.Halt() | forms.Arm() | forms.Disarm():
+                self._robot.request(Request(message.type))
+                self._notes.tell(f"the console asks to {message.type}", client.name)
             case forms.WishLegs() | forms.WishGoal() | forms.Teleoperate():
                 self._wish(message)
             case forms.TakeControl() | forms.GiveControl() | forms.Grant():
@@ -220,7 +217,7 @@ class Desk:
         return LATER
 
     def _refuse(self, client: Client, number: int | None, refusal: Refusal) -> None:
-        self._refusals.tell(str(refusal), client.name)
+        self._notes.refuse(str(refusal), client.name)
         _say(client, number, None, refusal)
 
 

@@ -79,27 +79,44 @@ class Timely(asyncio.Protocol):
     timed : Timed
         Books it.
     lost : callable
-        Called when the connection is over.
+        Told when the connection is over.
     """
 
-    def __init__(self, inner: asyncio.Protocol, timed: Timed, lost: Callable[[], None]) -> None:
-        def connection_lost(error: Exception | None) -> None:
-            lost()
-            inner.connection_lost(error)
-
-        self.connection_made = timed(CONSOLE_RECEIVE, inner.connection_made)  # type: ignore[method-assign]
+    def __init__(self, inner: asyncio.Protocol, timed: Timed, lost: Callable[[Timely], None]) -> None:
+        self._inner = inner
+        self._lost = lost
+        self._transport: asyncio.Transport | None = None
+        self._is_cut = False
+        self.connection_made = timed(CONSOLE_RECEIVE, self._made)  # type: ignore[method-assign]
         self.data_received = timed(CONSOLE_RECEIVE, inner.data_received)  # type: ignore[method-assign]
-        self.connection_lost = timed(CONSOLE_RECEIVE, connection_lost)  # type: ignore[method-assign]
+        self.connection_lost = timed(CONSOLE_RECEIVE, self._over)  # type: ignore[method-assign]
         self.eof_received = inner.eof_received  # type: ignore[method-assign]
         self.pause_writing = inner.pause_writing  # type: ignore[method-assign]
         self.resume_writing = inner.resume_writing  # type: ignore[method-assign]
 
+    def cut(self) -> None:
+        """Cut the connection."""
+        self._is_cut = True
+        if self._transport is not None:
+            self._transport.abort()
+
+    def _made(self, transport: asyncio.BaseTransport) -> None:
+        self._inner.connection_made(transport)
+        if isinstance(transport, asyncio.Transport):
+            self._transport = transport
+        if self._is_cut:
+            self.cut()
+
+    def _over(self, error: Exception | None) -> None:
+        self._lost(self)
+        self._inner.connection_lost(error)
+
 
 class Shut(asyncio.Protocol):
-    """Closes a connection as soon as it is made."""
+    """Cuts a connection as soon as it is made."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Close it."""
+        """Cut it."""
         if isinstance(transport, asyncio.Transport):
             transport.abort()
 
@@ -107,16 +124,19 @@ class Shut(asyncio.Protocol):
 class Door:
     """Makes the protocol of each new connection.
 
+    There may be so many that have not become a websocket yet; a further one has the oldest of them cut, so that
+    nobody keeps others out by holding connections.
+
     Parameters
     ----------
     inner : callable
         Makes the one that does the work.
-    connections_max : int
-        How many connections there may be at a time.
+    young_max : int
+        How many there may be that are no websockets.
     timed : Timed
         Books their time.
     refused : callable
-        Told of a connection that is not let in, and why.
+        Told why a connection is not let in, or cut.
     clock : callable
         Monotonic, s.
     """
@@ -124,14 +144,14 @@ class Door:
     def __init__(
         self,
         inner: Callable[[], asyncio.Protocol],
-        connections_max: int,
+        young_max: int,
         timed: Timed,
         refused: Callable[[str], None],
         clock: Callable[[], float],
     ) -> None:
         self._inner = inner
-        self._connections = 0
-        self._connections_max = connections_max
+        self._young: dict[Timely, None] = {}
+        self._young_max = young_max
         self._timed = timed
         self._refused = refused
         self._clock = clock
@@ -139,14 +159,23 @@ class Door:
 
     def __call__(self) -> asyncio.Protocol:
         """Return the protocol of a new connection."""
-        if self._connections >= self._connections_max:
-            self._refused(f"there are {self._connections_max} connections already")
-        elif not self._bucket.take(self._clock()):
+        if not self._bucket.take(self._clock()):
             self._refused("there are too many new connections")
-        else:
-            self._connections += 1
-            return Timely(self._inner(), self._timed, self._lost)
-        return Shut()
+            return Shut()
+        if len(self._young) >= self._young_max:
+            self._refused("there are too many connections: the oldest is cut")
+            oldest = next(iter(self._young))
+            self._lost(oldest)
+            oldest.cut()
+        one = Timely(self._inner(), self._timed, self._lost)
+        self._young[one] = None
+        return one
 
-    def _lost(self) -> None:
-        self._connections -= 1
+    def settle(self, transport: asyncio.Transport) -> None:
+        """Take note that a connection has become a websocket; those are counted by others."""
+        protocol = transport.get_protocol()
+        if isinstance(protocol, Timely):
+            self._lost(protocol)
+
+    def _lost(self, one: Timely) -> None:
+        self._young.pop(one, None)

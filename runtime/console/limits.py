@@ -22,7 +22,7 @@ class Limits:
     clients: int = 16
     """Pages open at a time."""
     connections: int = 64
-    """Connections of any kind at a time; further ones are closed as they come."""
+    """Connections at a time that are no websockets (yet)."""
     message_bytes: int = MESSAGE_MAX
     messages_per_s: float = 200.0
     stall_s: float = 10.0
@@ -58,8 +58,8 @@ class Bucket:
         return True
 
 
-class Refusals:
-    """Tells the log who was refused what, and does not let a stranger fill it.
+class Notes:
+    """Tells the log who came and went, asked and was refused, and does not let anybody fill it.
 
     Parameters
     ----------
@@ -67,22 +67,33 @@ class Refusals:
         Told.
     clock : callable
         Monotonic, s.
+
+    Attributes
+    ----------
+    refusals
+        All refusals, told or not.
     """
 
     def __init__(self, log: FilteringBoundLogger, clock: Callable[[], float]) -> None:
         self._log = log
         self._clock = clock
-        self._bucket = Bucket(LINES_PER_S, LINES_BURST)
-        self.count = 0
-        """All of them, told or not."""
-        self._untold = 0
+        self._lines = {True: Bucket(LINES_PER_S, LINES_BURST), False: Bucket(LINES_PER_S, LINES_BURST)}
+        self._untold = {True: 0, False: 0}
+        self.refusals = 0
 
-    def tell(self, why: str, client: str) -> None:
-        """Take note of one more."""
-        self.count += 1
-        if not self._bucket.take(self._clock()):
-            self._untold += 1
+    def refuse(self, why: str, client: str) -> None:
+        """Take note that somebody was refused something."""
+        self.refusals += 1
+        self._tell("the console refused", is_bad=True, why=why, client=client)
+
+    def tell(self, event: str, client: str) -> None:
+        """Take note of something that somebody did."""
+        self._tell(event, is_bad=False, client=client)
+
+    def _tell(self, event: str, *, is_bad: bool, **fields: str) -> None:
+        if not self._lines[is_bad].take(self._clock()):
+            self._untold[is_bad] += 1
             return
-        more = {"more_before": self._untold} if self._untold else {}
-        self._untold = 0
-        self._log.warning("the console refused", why=why, client=client, **more)
+        more = {"untold_before": self._untold[is_bad]} if self._untold[is_bad] else {}
+        self._untold[is_bad] = 0
+        (self._log.warning if is_bad else self._log.info)(event, **fields, **more)

@@ -20,7 +20,7 @@ from runtime.console.client import Client
 from runtime.console.door import Door
 from runtime.console.guard import Guard
 from runtime.console.hub import Hub
-from runtime.console.limits import Limits, Refusals
+from runtime.console.limits import Limits, Notes
 from runtime.console.pages import File, headers
 from runtime.console.stepped import Timed, stepped
 from runtime.process import CONSOLE_RECEIVE, CONSOLE_SEND
@@ -41,7 +41,7 @@ class House:
     guard: Guard
     hub: Hub
     limits: Limits
-    refusals: Refusals
+    notes: Notes
     files: Mapping[str, File]
     hello: Callable[[], Mapping[str, Any]]
     """What a new client is told."""
@@ -75,15 +75,15 @@ class _Wire:
 class _Murmur(logging.Handler):
     """Tells of what aiohttp would print with a traceback: a peer that does not speak HTTP, mostly."""
 
-    def __init__(self, refusals: Refusals) -> None:
+    def __init__(self, notes: Notes) -> None:
         super().__init__()
-        self._refusals = refusals
+        self._notes = notes
 
     def emit(self, record: logging.LogRecord) -> None:
         """Take a line."""
         error = record.exc_info[1] if record.exc_info else None
         why = f"{record.getMessage()}{f': {type(error).__name__}' if error else ''}"
-        self._refusals.tell(ascii(why)[1:-1][:200], "a connection")
+        self._notes.refuse(ascii(why)[1:-1][:200], "a connection")
 
 
 class Server:
@@ -100,18 +100,19 @@ class Server:
         self._talks: dict[Client, web.WebSocketResponse] = {}
         self._web: web.Server | None = None
         self._server: asyncio.Server | None = None
+        self._door: Door | None = None
         self._is_closing = False
 
     async def open(self, listening: socket.socket) -> None:
         """Serve whoever comes to a socket that listens."""
         murmur = logging.Logger("console")
-        murmur.addHandler(_Murmur(self._house.refusals))
+        murmur.addHandler(_Murmur(self._house.notes))
         self._web = server = web.Server(
             self._answer, access_log=None, logger=murmur, keepalive_timeout=IDLE_MAX_S, lingering_time=0.0
         )
         house = self._house
-        door = Door(
-            server, house.limits.connections, house.timed, lambda why: house.refusals.tell(why, "a connection"),
+        self._door = door = Door(
+            server, house.limits.connections, house.timed, lambda why: house.notes.refuse(why, "a connection"),
             house.clock,
         )  # fmt: skip
         self._server = await asyncio.get_running_loop().create_server(door, sock=listening)
@@ -193,8 +194,11 @@ class Server:
         if transport is None or self._is_closing:
             return talk
         transport.set_write_buffer_limits(high=0)
+        if self._door is not None:
+            self._door.settle(transport)
         client = house.hub.join(_Wire(talk, transport), str(request.remote), house.hello(), has_token=has_token)
         self._talks[client] = talk
+        house.notes.tell("a page of the console is open", client.name)
         await stepped(house.timed, CONSOLE_RECEIVE, self._stay(client, talk))
         return talk
 
@@ -216,6 +220,7 @@ class Server:
             client.leave()
             house.hub.leave(client)
             house.on_leave(client)
+            house.notes.tell("a page of the console is gone", client.name)
             sender.cancel()
             await asyncio.gather(sender, return_exceptions=True)
 
@@ -225,16 +230,16 @@ class Server:
             message = await talk.receive()
             if message.type is not WSMsgType.TEXT:
                 if message.type is WSMsgType.BINARY:
-                    house.refusals.tell("a message that is no text", client.name)
+                    house.notes.refuse("a message that is no text", client.name)
                     await talk.close(code=WSCloseCode.UNSUPPORTED_DATA, message=b"text only")
                 elif message.type is WSMsgType.ERROR:
-                    house.refusals.tell(f"a message that is none: {message.data}"[:200], client.name)
+                    house.notes.refuse(f"a message that is none: {message.data}"[:200], client.name)
                 return
             is_over = not client.bucket.take(house.clock())
             if not is_over or HALT_WORD in message.data[:200]:
                 house.on_message(client, message.data)
             if is_over:
-                house.refusals.tell(f"more than {house.limits.messages_per_s:g} messages a second", client.name)
+                house.notes.refuse(f"more than {house.limits.messages_per_s:g} messages a second", client.name)
                 await talk.close(code=WSCloseCode.POLICY_VIOLATION, message=b"too many messages")
                 return
 
@@ -258,7 +263,7 @@ class Server:
         return token is not None and self._house.guard.knows(token)
 
     def _refused(self, request: web.BaseRequest, status: HTTPStatus, why: str) -> web.Response:
-        self._house.refusals.tell(why, str(request.remote))
+        self._house.notes.refuse(why, str(request.remote))
         return web.Response(status=status, text=why)
 
 

@@ -11,6 +11,9 @@ from rich.console import Console
 from config.load import load_settings
 from runtime.complaint import Complaint
 from runtime.kernels import ready_kernels, use_cache
+from tests.bench.console import console_table
+from tests.bench.console import figures as figures_of
+from tests.bench.console import measure as measure_console
 from tests.bench.contestant import Peer
 from tests.bench.measure import Plan, measure
 from tests.bench.runners import Method, contestants
@@ -124,6 +127,36 @@ def timing(
     wide = _wide()
     wide.print(quantiles_table(result, earlier))
     wide.print(figures_table(result, earlier))
+    return 0
+
+
+@app.command
+def console(*, json: str = "console.json", seconds: float = 30.0, rounds: int = 5) -> int:
+    """Measure what open pages of the operator console cost a run, in turns with none open.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    seconds
+        How long a run lasts, each turn.
+    rounds
+        How often.
+    """
+    use_cache()
+    from runtime.summary import write_json
+
+    out = Console(stderr=True)
+    seconds, rounds = max(5.0, seconds), max(1, rounds)
+    try:
+        ready_kernels(load_settings("hallway"), out)
+        with out.status("bench") as status:
+            rows = figures_of(measure_console(seconds, rounds, status.update))
+        write_json(json, {"seconds": seconds, "rounds": rounds, "rows": rows})
+    except Complaint as complaint:
+        out.print(f"bench: {complaint}", markup=False)
+        return complaint.exit_code
+    _wide().print(console_table(rows, seconds, rounds))
     return 0
 
 

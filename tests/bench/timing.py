@@ -197,14 +197,14 @@ def _ours(folder: Path, seconds: float, sets: Sequence[str]) -> tuple[dict[str, 
     """Run the command for `seconds`, a bare loop beside it; return the summary, and how late the loop woke, µs."""
     summary, late = folder / "run.json", folder / "late.txt"
     words = [word for text in sets for word in ("--set", text)]
-    with _emulator(folder, words) as port:
-        run = _start(
+    with emulating(folder, words) as port:
+        run = start(
             folder, "run", "runtime.cli", "run", "--headless", "--port", port, "--arm", "--seconds", f"{seconds}",
             "--json", str(summary), *DRIVE_ON, *words,
         )  # fmt: skip
-        beside = _start(folder, "wake", "tests.bench.bare", "wake", f"{PERIOD_S}", f"{seconds}", str(late))
+        beside = start(folder, "wake", "tests.bench.bare", "wake", f"{PERIOD_S}", f"{seconds}", str(late))
         for process, name in ((run, "run"), (beside, "wake")):
-            _finish(folder, process, name, seconds + PATIENCE_S)
+            finish(folder, process, name, seconds + PATIENCE_S)
     found: dict[str, Any] = orjson.loads(summary.read_bytes())
     return found, [float(line) for line in late.read_text().split()]
 
@@ -231,16 +231,16 @@ def _import_s() -> float:
 
 def _control(folder: Path, seconds: float, sets: Sequence[str]) -> None:
     words = [word for text in sets for word in ("--set", text)]
-    with _emulator(folder, words) as port:
-        process = _start(folder, "answer", "tests.bench.bare", "answer", port, f"{seconds}", *words)
-        _finish(folder, process, "answer", seconds + PATIENCE_S)
+    with emulating(folder, words) as port:
+        process = start(folder, "answer", "tests.bench.bare", "answer", port, f"{seconds}", *words)
+        finish(folder, process, "answer", seconds + PATIENCE_S)
 
 
 @contextlib.contextmanager
-def _emulator(folder: Path, words: Sequence[str]) -> Iterator[str]:
+def emulating(folder: Path, words: Sequence[str]) -> Iterator[str]:
     """Run the emulator, with a latency trace that is complete afterwards."""
     port, trace = folder / "robot", folder / "latency.csv"
-    process = _start(
+    process = start(
         folder, "emulate", "runtime.cli", "emulate", "--link", str(port), "--latency", str(trace), *words,
     )  # fmt: skip
     try:
@@ -251,20 +251,28 @@ def _emulator(folder: Path, words: Sequence[str]) -> Iterator[str]:
             time.sleep(0.02)
         yield str(port)
         process.send_signal(signal.SIGTERM)
-        _finish(folder, process, "emulate", PATIENCE_S)
+        finish(folder, process, "emulate", PATIENCE_S)
     finally:
         process.kill()
         process.wait()
 
 
-def _start(folder: Path, name: str, module: str, *arguments: str) -> subprocess.Popen[bytes]:
+def start(folder: Path, name: str, module: str, *arguments: str) -> subprocess.Popen[bytes]:
+    """Start a module as a process that keeps its state, and what it has to say, in a folder."""
     env = {**os.environ, "XDG_STATE_HOME": str(folder), "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
     with (folder / f"{name}.err").open("wb") as err:
         command = [sys.executable, "-m", module, *arguments]
         return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=err, env=env)
 
 
-def _finish(folder: Path, process: subprocess.Popen[bytes], name: str, patience_s: float) -> None:
+def finish(folder: Path, process: subprocess.Popen[bytes], name: str, patience_s: float) -> None:
+    """Wait for the end of such a process.
+
+    Raises
+    ------
+    Complaint
+        It failed; its own words are in the message.
+    """
     try:
         code = process.wait(patience_s)
     except subprocess.TimeoutExpired:

@@ -81,7 +81,7 @@ def test_a_run_over_the_pty_is_replayed_to_the_bit(tmp_path: Path) -> None:
     check(tmp_path, 12.0, 2, "--set", "recording.keyframe_period_s=3.0")
     entries = entries_of(tmp_path / "hall.mcap")
     lines = [decode(LogLine, entry.data).event for entry in entries if entry.topic == LOG]
-    assert lines[:2] == ["start", "robot ready"]
+    assert lines[:3] == ["start", "console", "robot ready"]
     for way, least in (("in", 12.0 * 1000.0), ("out", 12.0 * 100.0)):
         pieces = [p for e in entries if e.topic == SERIAL[way] for p in decode(SerialBytes, e.data).pieces()]
         assert sum(len(data) for _, data in pieces) > least

@@ -60,6 +60,16 @@ async def test_on_a_port_nobody_knows_the_truth() -> None:
         assert (await case.page()).heard[0]["truth"] is None
 
 
+async def test_who_came_before_the_robot_had_answered_hears_its_name() -> None:
+    async with operated() as case:
+        case.run.name = None
+        page = await case.page()
+        assert page.heard[0]["name"] is None
+        case.run.name = "denning"
+        case.cycles()
+        assert (await page.next("hello"))["name"] == "denning"
+
+
 async def test_a_frame() -> None:
     async with operated() as case:
         page = await case.page()
@@ -165,6 +175,7 @@ class DeafWire:
 
 async def test_a_slow_client_misses_frames_and_gets_the_newest_with_the_whole() -> None:
     async with operated() as case:
+        case.cycles()
         wire = DeafWire(2)
         client = case.console.hub.join(wire, "slow", case.console._hello(), has_token=False)
         sender = asyncio.create_task(client.send_all())
@@ -177,8 +188,8 @@ async def test_a_slow_client_misses_frames_and_gets_the_newest_with_the_whole() 
         wire.more.set()
         await case.settled(lambda: len(wire.sent) == 4, "two more frames")
         behind, newest = orjson.loads(wire.sent[2]), orjson.loads(wire.sent[3])
-        assert behind["cycle"] == 2, "was on its way"
-        assert newest["cycle"] == 30
+        assert behind["cycle"] == 3, "was on its way"
+        assert newest["cycle"] == 31
         assert newest["dropped"] == 27
         assert newest["segments"]["whole"]
         case.console.hub.leave(client)

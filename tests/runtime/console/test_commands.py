@@ -246,6 +246,7 @@ BOX = 'name = "crate"\nclosed = true\nvertices_m = [[0.4, 0.3], [-0.4, 0.3], [-0
 
 async def test_a_further_model_is_greeted_and_not_taken_back() -> None:
     async with operated() as case:
+        case.cycles()
         page, other = await case.page(), await case.page()
         case.cycles()
         await other.next("state")

@@ -192,10 +192,11 @@ async def test_more_pages_than_there_may_be() -> None:
 async def test_more_connections_than_there_may_be() -> None:
     async with operated(limits=Limits(connections=8)) as case:
         page = await case.page()
-        held = [socket.create_connection(("127.0.0.1", case.url.port or 0)) for _ in range(20)]
-        await case.settled(lambda: len(case.refusals()) >= 10, "refusals")
-        assert "there are 8 connections already" in case.refusals()
+        held = [socket.create_connection(("127.0.0.1", case.url.port or 0)) for _ in range(18)]
+        await case.settled(lambda: len(case.refusals()) == 10, "ten that are cut")
+        assert set(case.refusals()) == {"there are too many connections: the oldest is cut"}
         assert (await page.ask(type="halt"))["ok"]
+        assert (await case.page()).heard[0]["role"] == "watch", "nobody is kept out"
         for one in held:
             one.close()
 
