@@ -101,9 +101,6 @@ async def test_a_halt_without_a_connection_is_told_and_sent_as_soon_as_there_is_
     server: FakeServer, opener: Opener
 ) -> None:
     opened = await opener.open(server.url)
-    await server.wait("recordings")
-    server.received.clear()
-    server.arrived_s.clear()
     await server.drop()
     await opened.page.keyboard.press("Space")
     await opened.says("#toasts", "HALT could not be sent")

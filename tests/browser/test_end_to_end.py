@@ -17,6 +17,7 @@ from drivers.messages import Flags
 from tests.browser.opened import Opened, Opener
 from tests.hil.machine import PATIENCE_S, stalls_excused
 from tests.hil.running import Running, running
+from tests.hil.test_console import start_url
 from tests.hil.truth import Moment, Truth
 
 pytestmark = [
@@ -49,23 +50,12 @@ class Run:
         return await asyncio.to_thread(self.truth.wait, done, what)
 
 
-def start_url(log: Path) -> str | None:
-    """Return the page's address as the log has it, None where it is not there yet."""
-    lines = log.read_text("utf-8").split("\n")[:-1] if log.exists() else []
-    events = [json.loads(line) for line in lines]
-    return next((str(event["start_url"]) for event in events if event["event"] == "console"), None)
-
-
 @contextlib.asynccontextmanager
 async def run(folder: Path, *arguments: str) -> AsyncIterator[Run]:
     trace, recording = folder / "trace.csv", folder / "run.mcap"
     more = ["--set", "console.port=0", "--trace", str(trace), "--record", str(recording), *arguments]
     with running(folder, "run", "run", *more) as command:
-        end_s = time.monotonic() + PATIENCE_S
-        while (url := start_url(folder / "run.jsonl")) is None:
-            assert time.monotonic() < end_s, command.err
-            assert command.process.poll() is None, command.err
-            await asyncio.sleep(0.02)
+        url = await asyncio.to_thread(start_url, command)
         yield Run(command, url, Truth(trace), recording)
 
 

@@ -84,7 +84,10 @@ const time = new Time({ world, connection, notices, shoot: () => screenshot({ sc
 const ring = new Ring({ canvas: byId("ring"), words: byId("ring-words"), world, theme, units });
 const charts = new Charts({ phases: byId("phases"), late: byId("late"), legend: byId("phases-legend"), lateLegend: byId("late-legend"), world, theme });
 const chosen = chosenRow({ world, selection, connection, notices });
-const tabs = new Tabs(() => drawInstruments());
+const tabs = new Tabs((name) => {
+  drawInstruments();
+  if (name === "time") time.shown();
+});
 
 let instrumentsAsked = false;
 function drawInstruments() {

@@ -29,7 +29,11 @@ export class Time {
     scrub.addEventListener("input", () => this.#scrub(Number(scrub.value)));
     scrub.addEventListener("change", () => this.#scrub(Number(scrub.value)));
     world.on("state", () => this.#refresh());
-    world.on("hello", () => byId("recordings").options.length === 0 && this.#list());
+  }
+
+  // The list is asked for when somebody looks.
+  shown() {
+    if (byId("recordings").options.length === 0) this.#list();
   }
 
   #ask(message) {
