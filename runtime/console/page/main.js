@@ -45,6 +45,7 @@ const token = takeToken();
 const query = token === "" ? "" : `?token=${encodeURIComponent(token)}`;
 const connection = new Connection(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws${query}`);
 const world = new World(), view = new View(), units = new Units(), notices = new Notices();
+connection.showsRecording = () => world.watchesRecording;
 const selection = new Selection(world);
 const options = { ellipseScale: preferred("ellipse scale", 10) };
 const front = byId("map-front");
