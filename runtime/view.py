@@ -15,7 +15,7 @@ import threading
 import tty
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final
 
@@ -118,8 +118,9 @@ class View:
         pose = None if state.odometry is None else state.odometry.pose
         if pose is not None:
             self._trail.append((pose.x, pose.y))
+        mode = record.mode if state.standing is None else replace(record.mode, reason=state.standing)
         self._slot = Snapshot(
-            record.mode, pose, list(self._trail), state.perception.segments_now(), record.clusters,
+            mode, pose, list(self._trail), state.perception.segments_now(), record.clusters,
             state.perception.things(), self._ranges.copy(), driver.counts,
             books.cycles, books.late, books.cycle_us(), books.lag_us(), books.missed, tuple(books.faults.items()),
             tuple(report.reason for report in state.perception.sensors()),

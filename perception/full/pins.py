@@ -1,8 +1,8 @@
 """Pinned segments of the full method's outline map, and segments taken out of it.
 
 The map forgets by being written over: a cell's newest segments push out its oldest, and a bucket whose hash another
-cell wants changes hands. So what is pinned is kept beside the map as well, and put in again whenever it has gone. Of
-a bucket half may be pinned; the rest goes on as ever.
+cell wants changes hands. So what is pinned is kept beside the map as well, and put in again whenever it has gone. Not
+all of a bucket may be pinned; the rest goes on as ever.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from perception.kernel import Floats, Ints
 
 ROOM: Final = 512
 """Segments pinned at a time."""
+FREE_PLACES: Final = 2
+"""So many of a bucket are never pinned."""
 
 
 class Pins:
@@ -48,7 +50,7 @@ class Pins:
 
     def add(self, s: State, numbers: Collection[int]) -> tuple[set[int], set[int]]:
         """Pin segments; return the numbers that are not in the map, and those for which there is no room."""
-        found = [(k, j) for k, j in np.argwhere(where(s, numbers)).tolist()]
+        found = where(s, numbers).tolist()
         there = {int(s.stamps[k, j, STAMP]) for k, j in found}
         held, full = set(self.numbers.astype(np.int64).tolist()), set[int]()
         for bucket, j in found:
@@ -81,28 +83,28 @@ class Pins:
         self.count = 0
 
     def _has_room(self, s: State, bucket: int, row: Floats) -> bool:
-        """Tell whether another segment can be pinned in a bucket: half of it, and of one cell only."""
+        """Tell whether another segment can be pinned in a bucket: not the last two, and of one cell only."""
         others = self.rows[: self.count][self.buckets[: self.count] == bucket]
         same = np.floor(others[:, :2] / CELL_M) == np.floor(row[:2] / CELL_M)
-        return len(others) < s.store.shape[1] // 2 and bool(same.all())
+        return len(others) < s.store.shape[1] - FREE_PLACES and bool(same.all())
 
 
-def where(s: State, numbers: Collection[int]) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-    """Return which places of the map hold segments of these numbers; shape (slots, bucket)."""
+def where(s: State, numbers: Collection[int]) -> Ints:
+    """Return the places in the map of the segments of these numbers: bucket and which in it, shape (n, 2)."""
+    places = np.argwhere(np.arange(s.store.shape[1]) < s.fill[:, None])
     wanted = np.array(sorted(numbers), np.float64)
-    held = np.arange(s.store.shape[1]) < s.fill[:, None]
-    return held & np.isin(s.stamps[:, :, STAMP], wanted)
+    return places[np.isin(s.stamps[places[:, 0], places[:, 1], STAMP], wanted)]
 
 
 def delete(s: State, pins: Pins, numbers: Collection[int]) -> set[int]:
     """Take segments out of the map; return the numbers that are not there."""
     doomed = where(s, numbers)
-    gone = set(s.stamps[doomed][:, STAMP].astype(np.int64).tolist())
+    gone = set(s.stamps[doomed[:, 0], doomed[:, 1], STAMP].astype(np.int64).tolist())
     capacity = s.store.shape[1]
-    for k in np.flatnonzero(doomed.any(axis=1)).tolist():
+    for k in np.unique(doomed[:, 0]).tolist():
         held = min(int(s.fill[k]), capacity)
         oldest_first = (int(s.fill[k]) - held + np.arange(held)) % capacity
-        left = oldest_first[~doomed[k, oldest_first]]
+        left = oldest_first[~np.isin(oldest_first, doomed[doomed[:, 0] == k, 1])]
         for array in (s.store, s.stamps):
             array[k, : len(left)] = array[k, left]
         s.fill[k] = len(left)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -96,13 +97,22 @@ def test_missing_schema_stops_and_names_it() -> None:
 @pytest.mark.parametrize("extra", ["move_ahead", "stranger"])
 def test_a_schema_too_many_stops_and_is_named(extra: str) -> None:
     given = [Response("move_ahead", 1.0, 0.0), Response(extra, 1.0, 0.0)]
-    assert extra in reason(arbitrate(given, at(), BODY, CONFIG, ["move_ahead"]))
+    said = reason(arbitrate(given, at(), BODY, CONFIG, ["move_ahead"]))
+    assert said.startswith(f"the schema {extra} answered without being asked")
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_vector_that_is_none_stops_and_is_named(bad: float) -> None:
     assert "schema s1" in reason(decide((1.0, 0.0), (0.0, bad)))
     assert "schema s0" in reason(decide((bad, 0.0), (0.0, 1.0)))
+
+
+@pytest.mark.parametrize(
+    ("bad", "shown"),
+    [(None, "None"), ("ahead" * 9, "'" + "aheadaheadaheadahea"), (10**400, "1" + 19 * "0"), (math.nan, "nan")],
+)
+def test_what_is_no_number_at_all_stops_and_is_shown(bad: Any, shown: str) -> None:
+    assert f"the schema s1 answered (0, {shown})," in reason(decide((1.0, 0.0), (0.0, bad)))
 
 
 def test_vectors_too_large_to_add_stop() -> None:

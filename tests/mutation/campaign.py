@@ -28,7 +28,7 @@ TARGETS: dict[str, tuple[str, ...]] = {
     "drivers/denning/codec.py": ("tests/drivers/test_codec.py", "tests/drivers/test_denning.py"),
     "drivers/denning/frames.py": ("tests/drivers/test_codec.py", "tests/drivers/test_firing.py"),
     "drivers/firing.py": ("tests/drivers/test_firing.py",),
-    "behaviors/arbiter.py": ("tests/behaviors/test_arbiter.py",),
+    "behaviors/arbiter.py": ("tests/behaviors/test_arbiter.py", "tests/behaviors/test_teleoperation.py"),
     "runtime/modes.py": ("tests/runtime/test_modes.py",),
 }
 KILLED_MIN = 0.85

@@ -27,6 +27,8 @@ from perception.pipeline import Perception, SeenObject
 from perception.snapshot import Snapshot
 from tests.perception.halls import FT, drive
 
+EARLY = 61
+"""Firings until the first drums are in sight."""
 SEEN_TO_FT = 6.0
 """The drive ends here, with four drums in sight or just passed."""
 DRUM = (1.0 * FT, 4.0 * FT)
@@ -47,16 +49,22 @@ def firings() -> list[Firing]:
     return [*once, *drive(load_world("hallway"), (-1.0, 3.0), begin_s=once[-1].t_s + 1.0, y_ft=0.5)]
 
 
+@pytest.fixture(scope="module", params=["paper", pytest.param("full", marks=pytest.mark.compiled)])
+def remembered(request: pytest.FixtureRequest, firings: list[Firing]) -> tuple[str, Snapshot]:
+    """Return a method, and what it remembers after that way."""
+    perception = fresh(request.param)
+    for firing in passed(firings):
+        hear(perception, firing)
+    return request.param, perception.snapshot()
+
+
 @pytest.fixture(scope="module")
-def memories(firings: list[Firing]) -> dict[str, Snapshot]:
-    """What each method remembers after that way."""
-    taken = {}
-    for method in METHODS:
-        perception = fresh(method)
-        for firing in passed(firings):
-            hear(perception, firing)
-        taken[method] = perception.snapshot()
-    return taken
+def early(firings: list[Firing]) -> Snapshot:
+    """Return what the full method remembers when it has come to the first drums."""
+    perception = fresh("full")
+    for firing in firings[:EARLY]:
+        hear(perception, firing)
+    return perception.snapshot()
 
 
 def passed(firings: list[Firing]) -> Iterator[Firing]:
@@ -82,10 +90,18 @@ def settle(perception: Perception) -> None:
         pass
 
 
-@pytest.fixture(params=METHODS)
-def seen(request: pytest.FixtureRequest, memories: dict[str, Snapshot]) -> Perception:
-    perception = fresh(request.param)
-    perception.restore(memories[request.param])
+@pytest.fixture
+def seen(remembered: tuple[str, Snapshot]) -> Perception:
+    method, memory = remembered
+    perception = fresh(method)
+    perception.restore(memory)
+    return perception
+
+
+@pytest.fixture
+def begun(early: Snapshot) -> Perception:
+    perception = fresh("full")
+    perception.restore(early)
     return perception
 
 
@@ -306,11 +322,11 @@ def test_a_rejected_object_is_gone_and_only_new_readings_bring_it_back(
         assert back.number != number
 
 
-def test_a_confirmed_object_is_reported_however_little_speaks_for_it(firings: list[Firing]) -> None:
+def test_a_confirmed_object_is_reported_however_little_speaks_for_it(
+    begun: Perception, firings: list[Firing]
+) -> None:
     """The full method, early on: something is about to be a drum, and is not sure enough to be called one."""
-    seen = fresh("full")
-    for firing in firings[:61]:
-        hear(seen, firing)
+    seen = begun
     doubtful = [o for o in seen.things() if o.model == "unknown"]
     assert doubtful
     number = number_of(doubtful[0])
@@ -320,7 +336,7 @@ def test_a_confirmed_object_is_reported_however_little_speaks_for_it(firings: li
     assert (found.model, found.confirmed, found.placed) == ("semicircle", True, False)
     assert found.probability is not None
     assert found.probability < 0.8
-    for firing in firings[61:]:
+    for firing in firings[EARLY:]:
         hear(seen, replace(firing, ranges_m=np.where(np.isfinite(firing.ranges_m), np.inf, firing.ranges_m)))
     (found,) = [o for o in seen.objects() if o.number == number]
     assert found.confirmed
@@ -330,9 +346,9 @@ def test_a_confirmed_object_is_reported_however_little_speaks_for_it(firings: li
     assert number not in {o.number for o in seen.objects()}
 
 
-def test_a_confirmed_object_of_the_papers_method_outlasts_its_segments(memories: dict[str, Snapshot]) -> None:
-    seen = fresh("paper")
-    seen.restore(memories["paper"])
+def test_a_confirmed_object_of_the_papers_method_outlasts_its_segments(seen: Perception) -> None:
+    if is_full(seen):
+        return
     rested = there(seen)
     number = number_of(rested)
     assert seen.edit(ConfirmObject(number)) is None
@@ -446,13 +462,12 @@ def test_evidence_is_what_the_readings_say_and_looking_changes_nothing(seen: Per
     assert all(before[name].tobytes() == after[name].tobytes() for name in before)
 
 
-def test_evidence_on_what_is_no_model(memories: dict[str, Snapshot]) -> None:
+def test_evidence_on_what_is_no_model(begun: Perception) -> None:
     """A track that looks like a post is told as one, and cannot be confirmed as a model."""
     from perception.full.method import FullPerception
     from perception.full.state import ESTABLISHED, KIND, ST
 
-    seen = fresh("full")
-    seen.restore(memories["full"])
+    seen = begun
     method = seen.method
     assert isinstance(method, FullPerception)
     s, p = method.memory, method.settings
@@ -543,3 +558,53 @@ def test_models_are_added_while_it_perceives(seen: Perception, firings: list[Fir
     other = Perception(chosen.ring, models, chosen.perception)
     other.restore(seen.snapshot())
     assert other.objects() == seen.objects(), "its memory is that of one that knew them from the start"
+
+
+def test_every_edit_in_turn_on_the_first_things_seen(begun: Perception, firings: list[Firing]) -> None:
+    """The full method: what each leaves is there, and from its snapshot, or one of an older program, all goes on."""
+    drum = next(o for o in begun.objects() if o.model == "semicircle")
+    numbers = begun.segments().numbers.tolist()
+    pins, doomed = tuple(numbers[:3]), tuple(numbers[3:6])
+    for edit in (
+        PinSegments(pins, pinned=True), DeleteSegments(doomed), PlaceModel("semicircle", -0.3, 0.2, 0.0),
+        PlaceModel("box", -0.2, -0.3, 0.3), MoveObject(number_of(drum), drum.x + 0.05, drum.y, 0.0),
+    ):  # fmt: skip
+        assert begun.edit(edit) is None
+    drums, boxes = (
+        {o.number: o for o in begun.objects() if o.placed and o.model == m} for m in ("semicircle", "box")
+    )
+    (by_hand,) = drums.keys() - {drum.number}
+    (box,) = boxes
+    assert by_hand is not None
+    assert box is not None
+    assert begun.edit(MoveObject(box, -0.1, -0.3, 0.1)) is None
+    assert begun.edit(MoveObject(by_hand, 1.5, 0.0, 0.1)) is None
+    assert begun.edit(MoveObject(box, 1.0, 0.0, 0.1)) is None
+    for firing in firings[EARLY : EARLY + 12]:
+        hear(begun, firing)
+    assert {by_hand, box, drum.number} <= {o.number for o in begun.objects()}
+    for number in (by_hand, box):
+        evidence = begun.evidence(number)
+        assert evidence is not None
+        assert evidence.opposing <= 0.0
+    other = fresh("full")
+    whole = begun.snapshot()
+    other.restore({n: a for n, a in whole.items() if not any(f".{part}" in n for part in OLDER["full"])})
+    assert {o.number for o in other.objects()} <= set(range(1, begun.hypotheses + 1))
+    other.restore(whole)
+    assert other.objects() == begun.objects()
+    post = load_model("drum").model_copy(update={"name": "bollard", "arc_radius_m": 0.12})
+    begun.recognise((*SETTINGS["full"].models, post))
+    assert {o.number for o in begun.objects()} >= {by_hand, box}
+    assert begun.edit(RejectObject(box)) is None
+    assert begun.edit(RejectObject(by_hand)) is None
+    assert {o.number for o in begun.objects()}.isdisjoint({by_hand, box})
+    assert set(pins) <= set(begun.segments().numbers.tolist())
+    assert set(doomed).isdisjoint(begun.segments().numbers.tolist())
+    refused = begun.edit(PlaceModel("chair", 0.0, 0.0, 0.0))
+    assert refused is not None
+    assert [begun.edit(PlaceModel("box", 0.1 * k, 3.0, 0.0)) is None for k in range(30)].count(False) > 0
+    refused = begun.edit(PinSegments((*pins, 10**6), pinned=False))
+    assert refused is not None
+    assert begun.edit(ClearMap()) is None
+    assert begun.things() == ()

@@ -7,14 +7,20 @@ import math
 import numpy as np
 import pytest
 
-from perception.full import marks, polygon_tracks, refine
+from perception.edits import PinSegments
+from perception.full import by_hand, marks, polygon_job, polygon_tracks, refine
+from perception.full.births import CELL_M
+from perception.full.editing import edit_memory
 from perception.full.evidence import weigh_circle
+from perception.full.heirs import inherit
+from perception.full.pairs import map_add
 from perception.full.pins import Pins, delete, listed, where
-from perception.full.settings import make_settings
+from perception.full.settings import library, make_settings
 from perception.full.state import (
     BARRED,
     BARS,
     CONFIRMED,
+    DIRTY,
     ESTABLISHED,
     FREE,
     KIND,
@@ -39,10 +45,12 @@ from perception.full.state import (
     make_state,
 )
 from tests import naive_full
+from tests.naive_tracks import FT
 from tests.perception.test_full_tracks import (
     BOXES,
     COSINES,
     SENSORS,
+    SETTINGS,
     TRACKS,
     P,
     around,
@@ -170,9 +178,6 @@ def test_what_each_reading_says_of_a_circle_equals_its_oracle() -> None:
 
 def test_a_bucket_is_left_in_its_order_and_pins_come_back() -> None:
     """Against a list: which of a bucket's segments are there, oldest first, and which a pin brings back."""
-    from perception.full.births import CELL_M
-    from perception.full.pairs import map_add
-
     rng, s, pins, total = np.random.default_rng(5), make_state(4, P, TRACKS, 8), Pins(), 0
     kept: dict[int, np.ndarray] = {}
     for _ in range(2000):
@@ -195,7 +200,8 @@ def test_a_bucket_is_left_in_its_order_and_pins_come_back() -> None:
             missing, full = pins.add(s, (*some, 10**6))
             assert missing == {10**6}
             for n in set(some) - full:
-                kept[n] = s.store[where(s, (n,))][0].copy()
+                ((k, j),) = where(s, (n,)).tolist()
+                kept[n] = s.store[k, j].copy()
         elif kept:
             n = int(rng.choice(list(kept)))
             assert pins.remove((n, 10**6)) == {10**6}
@@ -212,3 +218,69 @@ def test_a_bucket_is_left_in_its_order_and_pins_come_back() -> None:
     assert total > 1000
     pins.clear()
     assert (pins.count, PT) == (0, 24)
+
+
+def test_a_bucket_is_never_pinned_altogether_and_that_is_said() -> None:
+    s, pins = make_state(4, P, TRACKS, 64), Pins()
+    for number in range(1, 9):
+        bucket = map_add(np.array([0.1, 0.1, 1.0, 0.0]), CELL_M, s.tags, s.fill, s.store)
+        s.stamps[bucket, number - 1] = (number, 0.0)
+    refused = edit_memory(s, P, pins, (), (), PinSegments(tuple(range(1, 9)), pinned=True))
+    assert refused is not None
+    assert refused.startswith("2 of these segments cannot be pinned")
+    assert pins.count == 6
+
+
+def test_relaxation_from_a_hand_stays_near_it() -> None:
+    """Whatever lies in the map; what leads farther away is not what the hand meant."""
+    rng, strayed = np.random.default_rng(4), 0
+    for _ in range(300):
+        s = make_state(SENSORS, BOX_P, TRACKS, 64)
+        for _ in range(int(rng.integers(3, 14))):
+            normal = rng.uniform(-math.pi, math.pi)
+            row = np.array([*rng.uniform(-0.7, 0.7, 2), math.cos(normal), math.sin(normal)])
+            map_add(row, CELL_M, s.tags, s.fill, s.store)
+        by_hand.settle_circle(s, BOX_P, 0, 0.1, -0.1)
+        assert math.hypot(s.pose[0] - 0.1, s.pose[1] + 0.1) <= by_hand.STRAYED_M
+        by_hand.settle_polygon(s, BOX_P, 0, 0.1, -0.1, 0.3)
+        assert math.hypot(s.pose[0] - 0.1, s.pose[1] + 0.1) <= by_hand.STRAYED_M
+        assert abs(s.pose[2] - 0.3) <= by_hand.STRAYED_RAD
+        strayed += s.pose.tolist() == [0.1, -0.1, 0.3]
+    assert strayed > 0
+
+
+def test_a_polygon_under_work_that_is_moved_or_goes_is_worked_on_no_more() -> None:
+    s = make_state(SENSORS, BOX_P, TRACKS, 64)
+    t = by_hand.place_polygon(s, BOX_P, 0, 0.5, 0.5, 0.1)
+    for other, left in ((t + 1, polygon_job.TRACK), (t, polygon_job.NO_JOB)):
+        s.job[polygon_job.JOB], s.job[polygon_job.WHO] = polygon_job.TRACK, other
+        by_hand.move_polygon(s, BOX_P, t, 0.6, 0.5, 0.1)
+        assert s.job[polygon_job.JOB] == left
+    assert s.names[TRACKS + t].tolist() == [1, PLACED]
+    assert s.pf[t, [PX, PY]].tolist() == [0.6, 0.5]
+
+
+def test_a_rival_that_has_become_a_model_is_looked_at_as_one() -> None:
+    """A post of 0.35 ft is a rival of the drums; a model of 0.11 m is that post."""
+    post = SETTINGS.models[0].model_copy(update={"name": "bollard", "arc_radius_m": 0.11})
+    after = P._replace(**library((*SETTINGS.models, post)))
+    rival = int(np.argmin(np.abs(P.radii - 0.35 * FT)))
+    s = shared()
+    for t, kind in enumerate((0, rival, len(P.radii) - 1)):
+        s.ti[t, ST], s.ti[t, KIND], s.tf[t, TRHO] = ESTABLISHED, kind, P.radii[kind]
+        s.comp[t] = np.arange(len(P.radii) + 2) + 10.0 * t
+        s.comp[t, kind] = 0.0
+    s.barred[0] = (1.0, 1.0, 0.3, 0, 40.0)
+    s.tally[BARS] = 1
+    heirs = inherit(s, P, after)
+    assert heirs.comp.shape == (TRACKS, len(after.radii) + 2)
+    kinds = s.ti[:3, KIND].tolist()
+    assert after.radii[kinds].tolist() == s.tf[:3, TRHO].tolist() == [P.radii[0], 0.11, P.radii[-1]]
+    assert kinds[1] < after.models
+    assert (s.ti[:3, DIRTY] > 0).tolist() == [False, True, False]
+    for t, kind in enumerate((0, rival, len(P.radii) - 1)):
+        for k, rho in enumerate(P.radii.tolist()):
+            to = int(np.argmin(np.abs(after.radii - rho)))
+            assert heirs.comp[t, to] == (0.0 if k == kind else k + 10.0 * t)
+        assert heirs.comp[t, -2:].tolist() == [len(P.radii) + 10.0 * t, len(P.radii) + 1 + 10.0 * t]
+    assert after.radii[int(s.barred[0, 3])] == P.radii[0]

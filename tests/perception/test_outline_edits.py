@@ -10,7 +10,10 @@ import pytest
 
 from config.settings import MapConfig
 from drivers.messages import Firing, Pose
+from perception.edits import PinSegments
 from perception.outline_map import OutlineMap
+from perception.paper import PaperPerception
+from tests.perception.halls import settings
 
 CAPACITY = 16
 MOUNTS = np.array([[0.0, 0.0, 0.0]])
@@ -142,3 +145,14 @@ def test_a_recording_without_numbers_gets_them(lost: int) -> None:
     outline.restored()
     np.testing.assert_array_equal(outline.numbers, before)
     assert math.isfinite(outline.times.max())
+
+
+def test_the_papers_method_says_that_no_more_can_be_pinned() -> None:
+    chosen = settings(map=MapConfig(capacity=CAPACITY))
+    perception = PaperPerception(chosen.ring, chosen.models, chosen.perception)
+    for k in range(CAPACITY):
+        perception.outline.add(row(1.0), 0.1 * k)
+    refused = perception.edit(PinSegments(tuple(range(1, CAPACITY)), pinned=True))
+    assert refused is not None
+    assert "half the map" in refused
+    assert perception.segments().pinned.sum() == 0

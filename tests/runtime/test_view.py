@@ -180,6 +180,18 @@ def test_pictures_are_taken_every_few_cycles_only() -> None:
     assert taken == len(records) // EVERY_CYCLES
 
 
+def test_why_it_stands_though_it_may_drive_is_shown() -> None:
+    assert SETTINGS.world is not None
+    records: list[CycleRecord] = []
+    run = simulate(SETTINGS, SETTINGS.world, 0, 2.0, lambda record, _truth: records.append(record))
+    run.state.standing = "the goal is reached"
+    view = View(SETTINGS, Console(file=io.StringIO()), "m")
+    for record in records[:EVERY_CYCLES]:
+        view.on_cycle(record, run.state, Books(0.005), DenningRobot(SETTINGS))
+    assert view._slot is not None
+    assert view._slot.mode.reason == "the goal is reached"
+
+
 @pytest.fixture
 def keyboard(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     master, slave = pty.openpty()

@@ -249,3 +249,12 @@ def test_a_wish_that_is_none_changes_nothing(wish: Wish) -> None:
     assert record.command == near(0.3, 0.0)
     assert script.state.wish == Goal(9.0, 0.0)
     assert record.inputs.wish is wish
+
+
+@pytest.mark.parametrize("wish", [Legs(), Goal(9.0, 0.0), FORWARD], ids=["legs", "goal", "hand"])
+def test_vectors_that_allow_no_decision_are_not_shown(wish: Wish) -> None:
+    script = driving()
+    script.pose = Pose(math.nan, 0.0, 0.0)
+    record = script.tell(wish, firing=False)
+    assert (record.mode.mode, record.command) == (Mode.SAFE_STOP, Order.HALT)
+    assert script.state.vectors == ()
