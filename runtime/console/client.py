@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import orjson
 
-from runtime.console.frames import Shot
+from runtime.console.frames import Told
 from runtime.console.limits import Bucket, Limits
 
 
@@ -66,7 +66,7 @@ class Client:
         self._wire = wire
         self._limits = limits
         self._clock = clock
-        self._slot: Shot | None = None
+        self._slot: Told | None = None
         self._seen: tuple[object, int] = (None, 0)
         self._dropped = 0
         self._waiting: deque[bytes] = deque()
@@ -88,7 +88,7 @@ class Client:
         """Take note that it forgets all that it was shown: the next frame is a whole one."""
         self._slot, self._seen = None, (None, 0)
 
-    def show(self, shot: Shot) -> None:
+    def show(self, shot: Told) -> None:
         """Have a frame ready for it, in place of one it has not taken yet."""
         if self.is_gone:
             return

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 import orjson
@@ -57,8 +57,23 @@ class Beside:
     """Which recording this is of, and where in it; None for the run itself."""
 
 
+class Told(Protocol):
+    """A frame, as far as a client shows it: of the run, or of a recording."""
+
+    @property
+    def source(self) -> object:
+        """Whose frames these are; changes count from the one before of the same source."""
+
+    @property
+    def number(self) -> int:
+        """Which of them this is."""
+
+    def told(self, *, follows: bool, dropped: int, controls: bool) -> bytes:
+        """Return the frame for one client, who has had the one before it or has not."""
+
+
 class Shot(NamedTuple):
-    """A frame, as far as clients share it."""
+    """A frame of the run, as far as clients share it."""
 
     source: object
     """Whose frames these are; changes count from the one before of the same source."""

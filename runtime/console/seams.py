@@ -10,7 +10,7 @@ from typing import Any, Final, Protocol
 
 from config.settings import Settings
 from perception.edits import Edit, Evidence
-from runtime.console.frames import RecordingNow, Shot
+from runtime.console.frames import RecordingNow, Told
 from runtime.health import Health
 from runtime.modes import Request
 from runtime.step import State
@@ -67,7 +67,7 @@ class Viewer(Protocol):
     def switch(self, *, live: bool) -> None:
         """Have it shown the run itself, or only what `show` gives it."""
 
-    def show(self, shot: Shot) -> None:
+    def show(self, shot: Told) -> None:
         """Have a frame ready for it."""
 
     def say(self, message: dict[str, Any]) -> None:
@@ -113,7 +113,7 @@ class RecordingControl(Protocol):
 
 
 class Player(Protocol):
-    """Shows recordings, to each client its own; what is raised as a `Refusal` is told to who asked."""
+    """Shows recordings, to each client its own; a `Refusal` that is raised is told to who asked."""
 
     async def recordings(self) -> list[dict[str, Any]]:
         """Return which recordings there are."""
@@ -136,5 +136,8 @@ class Player(Protocol):
     def leave(self, viewer: Viewer) -> None:
         """Take note that a client is gone."""
 
-    async def report(self) -> bytes | None:
-        """Return the run up to now as a page of its own, None where that is not to be had."""
+    async def report(self) -> bytes:
+        """Return the run up to now as a page of its own."""
+
+    async def close(self) -> None:
+        """End whatever is shown: the run is over."""
