@@ -28,7 +28,8 @@ from runtime.console.limits import Limits, Notes
 from runtime.console.overtime import Overtime
 from runtime.console.pages import page_files
 from runtime.console.parameters import parameters
-from runtime.console.seams import Run
+from runtime.console.refusal import Refusal
+from runtime.console.seams import NOT_HERE, Run
 from runtime.console.server import House, Server
 from runtime.console.stepped import stepped
 from runtime.console.tuning import Tuning
@@ -124,6 +125,13 @@ class Console:
 
     def on_cycle(self, record: CycleRecord, state: State, books: Books, driver: RobotDriver) -> None:
         """Take note of a cycle; what is to be shown of it is put together after it."""
+        if self._failure is None:
+            try:
+                self._note(record, state, books, driver)
+            except Exception as error:  # noqa: BLE001 - told by the probe; the cycle itself has not failed
+                self._fail(error)
+
+    def _note(self, record: CycleRecord, state: State, books: Books, driver: RobotDriver) -> None:
         self._frames.take(record)
         if record.inputs.edits:
             refused = {one.edit: one.why for one in record.refused}
@@ -133,7 +141,8 @@ class Console:
             self.hub.greet(self._hello())
         self._last = (record, state, books, driver)
         now_s = self._clock()
-        if self.hub.clients and now_s >= self._due_s - EARLY_S:
+        # While cycles overrun, what is only looked at comes last: the ticker shows enough.
+        if self.hub.clients and now_s >= self._due_s - EARLY_S and not self._process.keeper.in_a_row:
             # From where it was due, so that a frame that comes late does not make all others later.
             self._due_s = max(self._due_s + FRAME_S, now_s + FRAME_S - 2.0 * EARLY_S)
             self._ask_for_frame()
@@ -162,9 +171,10 @@ class Console:
         Raises
         ------
         Complaint
-            There is nowhere to listen.
+            There is nowhere to listen, or no page to show.
         """
         loop = asyncio.get_running_loop()
+        pages = page_files()
         listening = await listen(self._config)
         address, port = listening.getsockname()[:2]
         token, host = new_token(), self._config.host
@@ -173,7 +183,7 @@ class Console:
         timed = self._process.keeper.timed
         house = House(
             guard=Guard(token, names, port), hub=self.hub, limits=self._limits, notes=self._notes,
-            files=page_files(), hello=self._hello, on_message=self.desk.take, on_leave=self._left,
+            files=pages, hello=self._hello, on_message=self.desk.take, on_leave=self._left,
             on_fault=self._process.health.report, report=self._report,
             watch_without_token=self._config.watch_without_token, timed=timed, clock=self._clock,
         )  # fmt: skip
@@ -202,6 +212,8 @@ class Console:
             await asyncio.gather(*self._tasks, return_exceptions=True)
             self._server = None
             await server.close()
+            if self._overtime.player is not None:
+                await self._overtime.player.close()
 
     def hints(self) -> list[str]:
         """Return what an operator at the terminal is told: where the page is, and how to get there from elsewhere."""
@@ -217,9 +229,12 @@ class Console:
             return
         try:
             self._show()
-        except Exception as error:  # noqa: BLE001 - it is told by the probe, and the robot stands
-            self._failure = told(error)
-            self._log.error("the console cannot show the run any more", exc_info=error)
+        except Exception as error:  # noqa: BLE001 - told by the probe, and the robot stands
+            self._fail(error)
+
+    def _fail(self, error: Exception) -> None:
+        self._failure = told(error)
+        self._log.error("the console cannot show the run any more", exc_info=error)
 
     def _show(self) -> None:
         now_s = self._clock()
@@ -283,8 +298,10 @@ class Console:
     def _control_left(self) -> None:
         self.desk.hands_off()
 
-    async def _report(self) -> bytes | None:
-        return None if self._overtime.player is None else await self._overtime.player.report()
+    async def _report(self) -> bytes:
+        if self._overtime.player is None:
+            raise Refusal(f"report: {NOT_HERE}")
+        return await self._overtime.player.report()
 
     def _spawn(self, client: Client, work: Callable[[], Awaitable[None]]) -> None:
         """Have what takes its time done by a task that is looked after."""

@@ -58,7 +58,7 @@ class Beside:
 
 
 class Shot(NamedTuple):
-    """A frame, as far as clients share it."""
+    """A frame of the run, as far as clients share it."""
 
     source: object
     """Whose frames these are; changes count from the one before of the same source."""

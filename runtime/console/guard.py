@@ -14,7 +14,7 @@ from typing import Final
 
 TOKEN_BYTES: Final = 16
 SCHEME: Final = "http"
-ANYWHERE: Final = ("0.0.0.0", "::")  # noqa: S104 - recognised, not bound to
+HTTP_PORT: Final = 80
 SHOWN_MAX: Final = 80
 """Of what a stranger sent: more does not go into the log."""
 
@@ -62,7 +62,9 @@ class Guard:
         names = {address, *self.names}
         if is_loopback(address):
             names.add("localhost")
-        return tuple(f"{in_address(name)}:{self.port}" for name in names)
+        hosts = tuple(f"{in_address(name)}:{self.port}" for name in names)
+        # A browser leaves out the port that goes without saying.
+        return hosts if self.port != HTTP_PORT else (*hosts, *map(in_address, names))
 
 
 def _shown(text: str | None) -> str:

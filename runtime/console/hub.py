@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import orjson
 
-from runtime.console.client import Client, Wire
+from runtime.console.client import Client, Frame, Wire
 from runtime.console.control import Control, Holder
-from runtime.console.frames import Shot
 from runtime.console.limits import Limits
 
 if TYPE_CHECKING:
@@ -75,7 +74,7 @@ class Hub:
         if self.clients.pop(client.number, None) is not None:
             self.control.leave(client)
 
-    def publish(self, shot: Shot) -> None:
+    def publish(self, shot: Frame) -> None:
         """Show all who watch the run a frame of it."""
         for client in self.clients.values():
             if client.is_live:

@@ -6,6 +6,8 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
+from runtime.complaint import FAILED, Complaint
+
 KINDS: Final = MappingProxyType(
     {
         ".html": "text/html; charset=utf-8",
@@ -30,18 +32,20 @@ def page_files() -> dict[str, File]:
 
     Raises
     ------
-    FileNotFoundError
+    Complaint
         The page is not installed.
     """
-    served = {}
-    for entry in (files("runtime.console") / "page").iterdir():
+    served, folder = {}, files("runtime.console") / "page"
+    for entry in folder.iterdir() if folder.is_dir() else ():
         name = entry.name
         kind = KINDS.get(name[name.rfind(".") :])
         if kind is not None and entry.is_file():
             served[f"/page/{name}"] = File(entry.read_bytes(), kind)
     index = served.get(f"/page/{INDEX}")
     if index is None:
-        raise FileNotFoundError(INDEX)
+        raise Complaint(
+            "the console's page is not installed: install the program again, or run without it (--no-console)", FAILED
+        )
     return {"/": index, **served}
 
 

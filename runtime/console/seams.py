@@ -114,7 +114,7 @@ class RecordingControl(Protocol):
 
 
 class Player(Protocol):
-    """Shows recordings, to each client its own; what is raised as a `Refusal` is told to who asked."""
+    """Shows recordings, to each client its own; a `Refusal` that is raised is told to who asked."""
 
     async def recordings(self) -> list[dict[str, Any]]:
         """Return which recordings there are."""
@@ -137,5 +137,8 @@ class Player(Protocol):
     def leave(self, viewer: Viewer) -> None:
         """Take note that a client is gone."""
 
-    async def report(self) -> bytes | None:
-        """Return the run up to now as a page of its own, None where that is not to be had."""
+    async def report(self) -> bytes:
+        """Return the run up to now as a page of its own."""
+
+    async def close(self) -> None:
+        """End whatever is shown: the run is over."""

@@ -51,7 +51,8 @@ class House:
     on_leave: Callable[[Client], None]
     on_fault: Callable[[str, BaseException], None]
     """Gets the name of a part and what it should never have met."""
-    report: Callable[[], Awaitable[bytes | None]]
+    report: Callable[[], Awaitable[bytes]]
+    """Returns the run up to now as a page; raises a Refusal."""
     watch_without_token: bool
     timed: Timed
     clock: Callable[[], float]
@@ -138,28 +139,35 @@ class Server:
 
     async def _answer(self, request: web.BaseRequest) -> web.StreamResponse:
         """Answer one request."""
+        host = request.headers.get("Host")
+        trouble = self._house.guard.trouble_with_host(host, local_address(request))
+        if trouble is not None or host is None:
+            response: web.StreamResponse = self._refused(
+                request, HTTPStatus.MISDIRECTED_REQUEST, trouble or "no Host"
+            )
+            response.force_close()
+            return response
         try:
-            response = await self._respond(request)
-        except (asyncio.CancelledError, ConnectionError):
+            response = await self._respond(request, host)
+        except ConnectionError:
             raise
+        except web.HTTPException as error:
+            # A handshake that is none, as aiohttp has it.
+            response = self._refused(request, HTTPStatus(error.status), "a request that is none")
         except Exception as error:  # noqa: BLE001 - told as a fault of the program, without ending anything
             self._house.on_fault("the console", error)
             response = web.Response(status=500, text="the console failed: see the log")
         if not isinstance(response, web.WebSocketResponse):
-            response.headers.update(headers(request.headers.get("Host", "")))
+            response.headers.update(headers(host))
             response.force_close()
         return response
 
-    async def _respond(self, request: web.BaseRequest) -> web.StreamResponse:
-        house, host = self._house, request.headers.get("Host")
-        path = request.path
-        trouble = house.guard.trouble_with_host(host, local_address(request))
-        if trouble is not None:
-            return self._refused(request, HTTPStatus.MISDIRECTED_REQUEST, trouble)
+    async def _respond(self, request: web.BaseRequest, host: str) -> web.StreamResponse:
+        house, path = self._house, request.path
         if request.method != "GET":
             return self._refused(request, HTTPStatus.METHOD_NOT_ALLOWED, f"the method {request.method[:20]!a}")
         if path == "/ws":
-            return await self._talk(request)
+            return await self._talk(request, host)
         if path in house.files:
             file = house.files[path]
             return web.Response(body=file.body, headers={"Content-Type": file.kind})
@@ -173,13 +181,11 @@ class Server:
             page = await house.report()
         except Refusal as refusal:
             return web.Response(status=HTTPStatus.CONFLICT, text=str(refusal))
-        if page is None:
-            return web.Response(status=404, text="a report is not available here")
         return web.Response(body=page, content_type="text/html", charset="utf-8")
 
-    async def _talk(self, request: web.BaseRequest) -> web.StreamResponse:
+    async def _talk(self, request: web.BaseRequest, host: str) -> web.StreamResponse:
         """Talk to a client for as long as it stays."""
-        house, host = self._house, request.headers.get("Host")
+        house = self._house
         has_token = self._knows(request)
         if not has_token and not (house.watch_without_token and "token" not in request.query):
             return self._refused(request, HTTPStatus.FORBIDDEN, "a wrong token, or none")
@@ -274,7 +280,8 @@ class Server:
 def local_address(request: web.BaseRequest) -> str:
     """Return the address of ours to which a request came."""
     name = None if request.transport is None else request.transport.get_extra_info("sockname")
-    return str(name[0]) if name else ""
+    # An IPv4 peer of an IPv6 socket asks for the address as it knows it.
+    return str(name[0]).removeprefix("::ffff:") if name else ""
 
 
 async def _bye(talk: web.WebSocketResponse) -> None:

@@ -94,8 +94,12 @@ class Opener:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for context in self._contexts:
-            await context.close()
+        await self.leave()
+
+    async def leave(self) -> None:
+        """Close all pages."""
+        while self._contexts:
+            await self._contexts.pop().close()
 
     async def open(
         self, url: str, size: tuple[int, int] = DESK, *, scheme: Literal["dark", "light"] = "light",

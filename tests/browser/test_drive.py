@@ -15,6 +15,8 @@ pytestmark = [pytest.mark.realtime, pytest.mark.asyncio(loop_scope="session")]
 
 FOCI = ("body", "#map-front", "#tab-log", "#hand-keys", "#ellipse-scale", "#hand-limit", "#fit")
 
+CAPITAL = "() => document.body.dispatchEvent(new KeyboardEvent('keydown', { key: 'A', bubbles: true }))"
+
 GAMEPAD = """
 const pad = {connected: true, id: 'a pad', index: 0, axes: [0, 0, 0, 0],
   buttons: Array.from({length: 16}, () => ({pressed: false, value: 0}))};
@@ -101,9 +103,6 @@ async def test_a_halt_without_a_connection_is_told_and_sent_as_soon_as_there_is_
     server: FakeServer, opener: Opener
 ) -> None:
     opened = await opener.open(server.url)
-    await server.wait("recordings")
-    server.received.clear()
-    server.arrived_s.clear()
     await server.drop()
     await opened.page.keyboard.press("Space")
     await opened.says("#toasts", "HALT could not be sent")
@@ -125,6 +124,12 @@ async def test_arm_and_disarm(server: FakeServer, opener: Opener) -> None:
     await opened.page.locator("#map-front").focus()
     await opened.page.keyboard.press("Shift+A")
     await server.wait("arm", 2)
+    server.mode = "READY"
+    await opened.says("#mode-name", "READY")
+    await opened.page.evaluate(CAPITAL)
+    await opened.page.keyboard.press("u")
+    await opened.says("#units", "m")
+    assert len(server.of("arm")) == 2, "locked capitals arm nothing"
 
 
 async def test_who_watches_can_halt_but_not_drive(server: FakeServer, opener: Opener) -> None:

@@ -105,6 +105,13 @@ async def test_nothing_is_driven_by_hand_while_one_looks_at_a_recording(server: 
     await opened.page.keyboard.press("ArrowUp")
     await opened.says("#toasts", "you look at a recording")
     assert not server.of("teleoperate")
+    await opened.steady()
+    await opened.page.locator("#map-front").focus()
+    for key in ("2", "a", "Delete", "Shift+A"):
+        await opened.page.keyboard.press(key)
+    await opened.says("#toasts", "go back to the live run first")
+    assert not server.of("delete_segments"), "the recording's numbers are not the live map's"
+    assert not server.of("arm")
 
 
 async def test_a_screenshot_is_a_picture_of_the_map(server: FakeServer, opener: Opener) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -116,3 +117,16 @@ def emulated(folder: Path, *arguments: str) -> Iterator[Emulated]:
         yield robot
         emulator.signal(signal.SIGTERM)
         assert emulator.end() == 0
+
+
+def start_url(run: Running) -> str:
+    """Wait for the line that tells where the console is, and return the address."""
+    found: list[str] = []
+
+    def told() -> bool:
+        assert run.process.poll() is None, run.err
+        found[:] = re.findall(r"start_url='?(http[^\s']+)", run.err)
+        return bool(found)
+
+    wait_for(told, "the start URL")
+    return found[0]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import random
-import re
 import signal
 import threading
 import time
@@ -30,7 +29,7 @@ from runtime.recording.channels import LOG
 from runtime.recording.reading import open_recording
 from runtime.step import CycleRecord, State
 from tests.hil.machine import PATIENCE_S, stalls_excused
-from tests.hil.running import Running, emulated, running, wait_for
+from tests.hil.running import emulated, running, start_url
 from tests.hil.truth import Truth
 from tests.rawpage import RawPage
 
@@ -42,19 +41,6 @@ WATCHDOG_S = 0.25
 SLOW_M_S = 0.1
 STOPPING_S = SLOW_M_S / 0.5
 """At the base's own deceleration."""
-
-
-def start_url(run: Running) -> str:
-    """Wait for the line that tells where the console is, and return the address."""
-    found: list[str] = []
-
-    def told() -> bool:
-        assert run.process.poll() is None, run.err
-        found[:] = re.findall(r"start_url='?(http[^\s']+)", run.err)
-        return bool(found)
-
-    wait_for(told, "the start URL")
-    return found[0]
 
 
 @stalls_excused

@@ -7,6 +7,11 @@ const RETRY_MAX_MS = 4000;
 const ANSWER_MAX_MS = 10_000;
 const SILENCE_MAX_MS = 10_000;
 const MESSAGE_MAX = 65_536;
+// Numbers in a recording are not those of the live map, and what it shows is not where the robot is.
+const LIVE_ONLY = new Set([
+  "arm", "wish", "teleoperate", "delete_segments", "pin_segments", "place_model", "move_object", "reject_object",
+  "confirm_object", "clear_map", "evidence",
+]);
 // More than this unsent means that the network stalls: what is sent now would move the robot at some later time.
 const CONGESTED_BYTES = 4096;
 
@@ -28,6 +33,7 @@ export class Connection extends Emitter {
   #heard_ms = 0;
   #halting = false;
   #probing = false;
+  showsRecording = () => false;
 
   constructor(address) {
     super();
@@ -45,7 +51,6 @@ export class Connection extends Emitter {
 
   connect() {
     clearTimeout(this.#timer);
-    this.emit("trying");
     const socket = new WebSocket(this.#address);
     this.#socket = socket;
     this.#heard_ms = performance.now();
@@ -114,6 +119,10 @@ export class Connection extends Emitter {
   #put(message, refuse) {
     if (!this.open) {
       refuse(new Refusal("there is no connection to the robot's process", { answered: false }));
+      return null;
+    }
+    if (LIVE_ONLY.has(message.type) && this.showsRecording() && !(message.v === 0 && message.w === 0)) {
+      refuse(new Refusal("you look at a recording: go back to the live run first"));
       return null;
     }
     const id = this.#next++;

@@ -16,6 +16,9 @@ export class Drive {
     byId("halt").addEventListener("click", () => this.halt());
     byId("wish-goal").addEventListener("click", () => tools.choose("goal", { focus: true }));
     byId("goal-form").addEventListener("submit", (event) => this.#goalByForm(event));
+    world.on("hello", () => {
+      this.controller = undefined; // there may be new fields, to be shut for who watches
+    });
     world.on("state", () => this.#refresh());
     world.on("role", (message) => this.#role(message));
     world.on("mode", (state) => this.#mode(state));

@@ -34,7 +34,7 @@ export function watchKeyboard({ drive, tools, view, fit, units, chosen, time, pa
     "+": () => view.zoom(1.25), "=": () => view.zoom(1.25), "-": () => view.zoom(0.8), "−": () => view.zoom(0.8),
     f: fit, l: () => view.setFollow(!view.follow), u: () => units.choose(units.name === "m" ? "ft" : "m"),
     Delete: chosen.delete, Backspace: chosen.delete, p: chosen.pin, P: chosen.unpin, k: () => time.pause(), "?": help,
-    A: () => drive.arm(),
+    A: (event) => event.shiftKey && drive.arm(), // and not where the capitals are locked
   };
   for (let n = 1; n <= 6; n++) acts[n] = () => tools.chooseNth(n);
 
@@ -68,6 +68,6 @@ export function watchKeyboard({ drive, tools, view, fit, units, chosen, time, pa
     const act = acts[key];
     if (!act) return;
     event.preventDefault();
-    act();
+    act(event);
   });
 }

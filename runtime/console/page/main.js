@@ -29,7 +29,7 @@ import { extent, View } from "./view.js";
 import { World } from "./world.js";
 
 const WORDS_EVERY_MS = 5000;
-const FITTED_MS = 4000;
+const ROOM_M = 0.6;
 
 // The token does not stay in the address bar, where a projector would show it; a reload finds it again.
 function takeToken() {
@@ -45,6 +45,7 @@ const token = takeToken();
 const query = token === "" ? "" : `?token=${encodeURIComponent(token)}`;
 const connection = new Connection(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws${query}`);
 const world = new World(), view = new View(), units = new Units(), notices = new Notices();
+connection.showsRecording = () => world.watchesRecording;
 const selection = new Selection(world);
 const options = { ellipseScale: preferred("ellipse scale", 10) };
 const front = byId("map-front");
@@ -84,7 +85,10 @@ const time = new Time({ world, connection, notices, shoot: () => screenshot({ sc
 const ring = new Ring({ canvas: byId("ring"), words: byId("ring-words"), world, theme, units });
 const charts = new Charts({ phases: byId("phases"), late: byId("late"), legend: byId("phases-legend"), lateLegend: byId("late-legend"), world, theme });
 const chosen = chosenRow({ world, selection, connection, notices });
-const tabs = new Tabs(() => drawInstruments());
+const tabs = new Tabs((name) => {
+  drawInstruments();
+  if (name === "time") time.shown();
+});
 
 let instrumentsAsked = false;
 function drawInstruments() {
@@ -147,17 +151,15 @@ selection.on("object", redraw);
 world.on("evidence", redraw);
 
 // What comes from the robot.
-let firstSeen = null;
 world.on("hello", (hello) => {
   units.choose(unitsGiven || hello.units);
-  firstSeen = null;
   redrawAll();
 });
+let fitted = false;
 let drawnVersion = -1, drawnSecond = -1, words_ms = -Infinity;
 world.on("state", (state) => {
   const now = performance.now();
-  firstSeen ??= now;
-  if (!view.touched && now - firstSeen < FITTED_MS) fitUntouched();
+  if (!view.touched && !(fitted && view.shows(extent(world)))) fitUntouched(fitted ? ROOM_M : 0);
   view.followTo(state.pose[0], state.pose[1]);
   const second = Math.floor(state.t);
   if (world.segmentsVersion !== drawnVersion || second !== drawnSecond) {
@@ -171,9 +173,12 @@ world.on("state", (state) => {
     say(byId("map-words"), mapWords(world, units));
   }
 });
-function fitUntouched() {
-  fit();
+// Until somebody moves the map, everything stays in view; what grew out of it once has room to grow on.
+function fitUntouched(room = 0) {
+  const { left, right, bottom, top } = extent(world);
+  view.fit({ left: left - room, right: right + room, bottom: bottom - room, top: top + room });
   view.touched = false;
+  fitted = true;
 }
 
 connection.on("hello", (hello) => world.greet(hello));

@@ -13,6 +13,7 @@ export class Status {
   #notices;
   #said = byId("said");
   #closed = null;
+  #silent = false;
   #counts = new Map();
 
   constructor({ world, units, connection, notices }) {
@@ -69,8 +70,10 @@ export class Status {
     fact("age", age === Infinity ? "none" : age < 1 ? `${age.toFixed(1)} s` : `${Math.round(age)} s`, quiet);
     if (this.#closed === null) {
       const words = `No news for ${Math.round(age)} s: what you see is old.`;
-      if (quiet && age > SILENT_S && age !== Infinity) this.#notices.banner("stale", "No news: what you see is old.", { bad: true });
-      else this.#notices.banner("stale", null);
+      const silent = quiet && age > SILENT_S && age !== Infinity;
+      if (silent && !this.#silent) say(this.#said, "No news: what you see is old");
+      this.#silent = silent;
+      this.#notices.banner("stale", silent ? "No news: what you see is old." : null, { bad: true });
       this.#notices.retell("stale", words);
     }
   }

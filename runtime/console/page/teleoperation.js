@@ -27,6 +27,7 @@ export class Teleoperation extends Emitter {
 
   whyNot() {
     if (!this.connection.open) return "there is no connection";
+    if (!document.hasFocus()) return "the window has not the focus"; // a gamepad would drive all the same
     if (this.world.watchesRecording) return "you look at a recording: go back to the live run";
     if (!this.world.state.controller) return "you watch: ask for control first";
     if (this.world.state.mode !== "DRIVE") return "it is not armed";

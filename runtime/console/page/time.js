@@ -15,7 +15,7 @@ export class Time {
     on("pause", () => this.pause());
     on("single-step", () => this.#ask({ type: "single_step" }));
     on("record", () => this.#ask({ type: "record", on: world.state.recording === null }));
-    on("recordings-again", () => this.#list());
+    on("recordings-again", () => this.#list(notices.refused));
     on("open", () => this.#open());
     on("play", () => this.#ask({ type: "play", speed: this.#playing ? 0 : Number(byId("play-speed").value) }));
     on("play-step", () => this.#ask({ type: "step", cycles: 1 }));
@@ -29,7 +29,15 @@ export class Time {
     scrub.addEventListener("input", () => this.#scrub(Number(scrub.value)));
     scrub.addEventListener("change", () => this.#scrub(Number(scrub.value)));
     world.on("state", () => this.#refresh());
-    world.on("hello", () => byId("recordings").options.length === 0 && this.#list());
+    connection.on("hello", (hello) => {
+      if (this.#liveHello !== null) this.#liveHello = hello;
+    });
+    connection.on("closed", () => this.#forget()); // whoever comes back is shown the live run
+  }
+
+  // The list is asked for when somebody looks.
+  shown() {
+    if (byId("recordings").options.length === 0) this.#list();
   }
 
   #ask(message) {
@@ -71,19 +79,23 @@ export class Time {
 
   async #backToLive() {
     if ((await this.#ask({ type: "live" })) === undefined) return;
-    this.#file = null;
-    byId("player").hidden = true;
     if (this.#liveHello !== null) this.world.greet(this.#liveHello);
-    this.#liveHello = null;
+    this.#forget();
   }
 
-  async #list() {
+  #forget() {
+    this.#file = this.#liveHello = null;
+    byId("player").hidden = true;
+  }
+
+  async #list(refused = () => {}) {
     const chooser = byId("recordings"), chosen = chooser.value;
     let list;
     try {
       list = await this.connection.ask({ type: "recordings" });
-    } catch {
-      return; // a watcher may not be told; the button tells why
+    } catch (error) {
+      refused(error);
+      return;
     }
     chooser.replaceChildren(...(list ?? []).map(({ file, bytes = null, live = false }) => {
       const size = bytes === null ? "" : `, ${(bytes / 1e6).toFixed(1)} MB`;

@@ -62,6 +62,12 @@ export class View extends Emitter {
     this.emit("changed");
   }
 
+  // Whether a box lies in what is seen.
+  shows({ left, right, bottom, top }) {
+    const [x1, y1] = this.toScreen(left, top), [x2, y2] = this.toScreen(right, bottom);
+    return x1 >= 0 && y1 >= 0 && x2 <= this.width && y2 <= this.height;
+  }
+
   setFollow(on) {
     if (this.follow === on) return;
     this.follow = on;

@@ -128,6 +128,20 @@ async def test_no_more_than_twenty_a_second() -> None:
         await page.next("state")
 
 
+async def test_while_cycles_overrun_nothing_is_shown() -> None:
+    async with operated() as case:
+        page = await case.page()
+        before = case.console._frames._number
+        case.run.keeper.in_a_row = 1
+        for _ in range(10):
+            case.cycles()
+            await asyncio.sleep(0.0)
+        assert case.console._frames._number == before
+        case.run.keeper.in_a_row = 0
+        case.cycles()
+        assert (await page.next("state"))["cycle"] == 11
+
+
 async def test_changes_add_up_to_the_whole() -> None:
     async with operated() as case:
         page, segments = await case.page(), Segments()
@@ -335,11 +349,12 @@ async def test_frames_go_on_while_no_cycle_ends(monkeypatch: pytest.MonkeyPatch)
         assert (await page.next("state"))["cycle"] == 0
 
 
-async def test_a_console_that_fails_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("where", ["shot", "take"])
+async def test_a_console_that_fails_says_so(where: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A display with a fault in it must neither go on in silence nor take the loop with it."""
     async with operated() as case:
         page = await case.page()
-        monkeypatch.setattr(case.console._frames, "shot", lambda *_: 1 / 0)
+        monkeypatch.setattr(case.console._frames, where, lambda *_: 1 / 0)
         assert case.run.health.unwell() is None
         case.cycles(3)
         await asyncio.sleep(0.0)

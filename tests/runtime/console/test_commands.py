@@ -338,8 +338,13 @@ class Held:
     def leave(self, viewer: Viewer) -> None:
         self.left.append(viewer)
 
-    async def report(self) -> bytes | None:
+    async def report(self) -> bytes:
+        if self.why_not is not None:
+            raise Refusal(self.why_not)
         return b"<h1>report</h1>"
+
+    async def close(self) -> None:
+        self.did.append("close")
 
 
 @pytest.mark.parametrize(("message", "done"), OF_TIME, ids=lambda value: str(value)[:30])
@@ -400,3 +405,7 @@ async def test_a_recording_is_shown_to_who_opened_it_only() -> None:
         assert (await page.next("state"))["segments"]["whole"]
         async with case.session.get(case.url.with_path("/report", keep_query=True)) as answer:
             assert await answer.text() == "<h1>report</h1>"
+        held.why_not = "nothing is being recorded"
+        async with case.session.get(case.url.with_path("/report", keep_query=True)) as answer:
+            assert (answer.status, await answer.text()) == (404, held.why_not)
+    assert held.did[-1] == "close"

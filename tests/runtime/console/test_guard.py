@@ -50,6 +50,13 @@ def test_origins_that_are_not_its_own(origin: str | None) -> None:
     assert GUARD.trouble_with_origin(origin, "127.0.0.1:8765") is not None
 
 
+def test_the_port_that_goes_without_saying() -> None:
+    guard = Guard("right", ("robot",), 80)
+    assert guard.trouble_with_host("robot", "10.0.0.7") is None
+    assert guard.trouble_with_host("10.0.0.7:80", "10.0.0.7") is None
+    assert guard.trouble_with_host("evil.example", "10.0.0.7") is not None
+
+
 def test_beyond_this_machine_the_address_it_was_reached_at_is_its_name() -> None:
     guard = Guard("right", ("robot", "robot.local"), 8765)
     assert guard.trouble_with_host("10.0.0.7:8765", "10.0.0.7") is None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import random
 import socket
 
 import aiohttp
@@ -48,7 +49,7 @@ async def raw(case: Operated, *lines: str) -> bytes:
     """Send a request as it is, and return the answer; a connection that is cut has none."""
     reader, writer = await asyncio.open_connection("127.0.0.1", case.url.port)
     try:
-        writer.write("".join(f"{line}\r\n" for line in (*lines, "")).encode("latin-1"))
+        writer.write("".join(f"{line}\r\n" for line in (*lines, "")).encode("latin-1", "replace"))
         return await asyncio.wait_for(reader.read(), PATIENCE_S)
     except ConnectionError:
         return b""
@@ -139,7 +140,7 @@ async def test_the_log_tells_where_it_is_and_only_the_log_has_the_token() -> Non
             assert answer.status == 200
             assert orjson.loads(await answer.read())["fields"] == {"port": "/dev/x"}
         async with case.session.get(case.url.with_path("/report", keep_query=True)) as answer:
-            assert answer.status == 404
+            assert answer.status == 409
         async with case.session.get(case.url.with_path("/ws", keep_query=True)) as answer:
             assert answer.status == 426
 
@@ -222,6 +223,58 @@ async def test_what_is_no_http(garbage: bytes, capfd: pytest.CaptureFixture[str]
         assert (await (await case.page()).ask(type="halt"))["ok"]
     out, err = capfd.readouterr()
     assert (out, err) == ("", "")
+
+
+HANDSHAKES = ["Sec-WebSocket-Key: x", "Sec-WebSocket-Version: 99", "Sec-WebSocket-Version: 13", "Upgrade: websocket"]
+
+
+@pytest.mark.parametrize("header", HANDSHAKES)
+async def test_a_handshake_that_is_none(header: str) -> None:
+    async with operated() as case:
+        answer = await raw(
+            case,
+            f"GET /ws?token={case.token} HTTP/1.1",
+            f"Host: 127.0.0.1:{case.url.port}",
+            f"Origin: {case.origin}",
+            "Upgrade: websocket",
+            "Connection: Upgrade",
+            header,
+        )
+        assert answer.startswith(b"HTTP/1.1 400")
+        assert case.run.health.unwell() is None
+
+
+PIECES = [
+    *RAW, "/ws", "/ws?token=%ff%fe", "/?token=%", "http://[::1/", "http://[", "*", "//", "/%zz", "?", "#", "é",
+    "\xff", "/ws?token=\udcff", "http://127.0.0.1:99999999/", "/" + "%2e" * 300, "javascript:", "/log?token=",
+]  # fmt: skip
+METHODS = ["GET", "GET", "GET", "POST", "G\xcaT", ""]
+NAMES = [
+    "Host", "Origin", "Upgrade", "Connection", "Content-Length", "Transfer-Encoding", "Expect", "Cookie", "Range",
+    "Sec-WebSocket-Key", "If-Modified-Since", "Accept-Encoding", "\xe9", "",
+]  # fmt: skip
+VALUES = [
+    "", "websocket", "Upgrade", "chunked", "-1", "99999999999999999999", "100-continue", "\xff\xfe", "x" * 4000,
+    "gzip", "127.0.0.1:{port}", "bytes=0-", "a=b;" * 100, "evil.example", "[::1", "\x01",
+]  # fmt: skip
+
+
+async def test_requests_that_make_no_sense(capfd: pytest.CaptureFixture[str]) -> None:
+    """Whatever a stranger asks for is no fault of the program, and stops no robot."""
+    rng = random.Random(4)
+    async with operated() as case:
+        port = case.url.port
+        for _ in range(400):
+            lines = [f"{rng.choice(METHODS)} {rng.choice(PIECES)} HTTP/1.{rng.choice('01')}"]
+            if rng.random() < 0.8:
+                lines.append(f"Host: 127.0.0.1:{port}")
+            lines += [f"{rng.choice(NAMES)}: {rng.choice(VALUES)}".replace("{port}", str(port)) for _ in range(3)]
+            case.clock[0] += 1.0
+            # What follows ends whatever still waits for more.
+            await raw(case, *lines, "", "\x00", "")
+            assert case.run.health.unwell() is None, lines
+        assert (await (await case.page()).ask(type="halt"))["ok"]
+    assert capfd.readouterr() == ("", "")
 
 
 async def test_requests_in_a_row_on_one_connection_are_answered_once() -> None:
