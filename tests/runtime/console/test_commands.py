@@ -407,5 +407,5 @@ async def test_a_recording_is_shown_to_who_opened_it_only() -> None:
             assert await answer.text() == "<h1>report</h1>"
         held.why_not = "nothing is being recorded"
         async with case.session.get(case.url.with_path("/report", keep_query=True)) as answer:
-            assert (answer.status, await answer.text()) == (404, held.why_not)
+            assert (answer.status, await answer.text()) == (409, held.why_not)
     assert held.did[-1] == "close"
