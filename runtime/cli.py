@@ -15,8 +15,8 @@ from cyclopts import App, CycloptsError, Parameter
 from runtime import VERSION
 from runtime.cli_shown import export, figures, report
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
+from runtime.experiments.scene_names import SceneName
 from runtime.options import ConfigFile, Flag, JsonFile, ModelFiles, RobotFile, Seed, Sets, Several, UnitsOption
-from runtime.scene_names import SceneName
 
 app = App(
     name="echolocate",

@@ -11,10 +11,10 @@ from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from runtime.clock import PacedClock
 from runtime.complaint import FAILED, WRONG_CALL, Complaint
 from runtime.run_folder import run_folder
-from runtime.time_control import EmulatorControl
+from runtime.timing.clock import PacedClock
+from runtime.timing.time_control import EmulatorControl
 
 READY_WORD: Final = "ready"
 """First word of the one line the emulator prints."""

@@ -19,23 +19,23 @@ from drivers.link import Link
 from drivers.messages import Firing, Twist
 from perception.edits import Edit, Evidence
 from perception.pipeline import Perception
-from runtime.books import Books
-from runtime.clock import run_clock
 from runtime.commanding import gap_max, gather, give
 from runtime.ends import Ends
-from runtime.footprint import Footprint, FootprintRow
 from runtime.health import Health, told
-from runtime.memory import MemoryPolicy, collect_young
-from runtime.meter import Reading
 from runtime.modes import Mode, Request
 from runtime.notices import Notices
 from runtime.notify import Notifier
-from runtime.phases import Phase
-from runtime.realtime import ask
-from runtime.rhythm import Rhythm
 from runtime.step import Command, CycleRecord, State, step, take_over
 from runtime.summary import RunSummary, run_summary
-from runtime.timekeeping import Timekeeper
+from runtime.timing.books import Books
+from runtime.timing.clock import run_clock
+from runtime.timing.footprint import Footprint, FootprintRow
+from runtime.timing.memory import MemoryPolicy, collect_young
+from runtime.timing.meter import Reading
+from runtime.timing.phases import Phase
+from runtime.timing.realtime import ask
+from runtime.timing.rhythm import Rhythm
+from runtime.timing.timekeeping import Timekeeper
 from runtime.wishes import Wish
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ class RobotProcess:
     observers : Observers
         View and recorder.
     clock : callable
-        Monotonic, s. One that can be held holds the run with it: see `runtime.clock`.
+        Monotonic, s. One that can be held holds the run with it: see `runtime.timing.clock`.
     notifier : Notifier, optional
         Tells the service manager that started this process, where one did.
 

@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable
 from config.settings import Settings
 from drivers.messages import Firing
 from perception.pipeline import Perception
-from runtime.allowance import enough_quanta
-from runtime.books import Books
 from runtime.summary import ReplaySummary, object_row
+from runtime.timing.allowance import enough_quanta
+from runtime.timing.books import Books
 
 
 def replay(

@@ -22,7 +22,7 @@ from perception.edits import Edit
 from perception.percept import Percept
 from perception.pipeline import Perception
 from runtime.modes import GAP_MAX_S, Mode, ModeState, Request, Situation, advance
-from runtime.phases import Phase, unmarked
+from runtime.timing.phases import Phase, unmarked
 from runtime.wishes import STANDSTILL, Legs, Wish, after_a_stop, drive, why_not
 
 __all__ = [

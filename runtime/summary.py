@@ -12,11 +12,11 @@ import orjson
 from drivers.driver import RobotDriver
 from drivers.messages import Pose
 from perception.pipeline import SeenObject
-from runtime.books import Books, Quantiles
 from runtime.complaint import FAILED, Complaint
-from runtime.footprint import FootprintRow
 from runtime.step import State
-from runtime.timekeeping import Timekeeper, Timing
+from runtime.timing.books import Books, Quantiles
+from runtime.timing.footprint import FootprintRow
+from runtime.timing.timekeeping import Timekeeper, Timing
 
 
 class ObjectRow(TypedDict):

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from rich.table import Table
 
 from config.units import FOOT_M
-from runtime.first_fix import ASKED_M
+from runtime.experiments.first_fix import ASKED_M
 
 if TYPE_CHECKING:
     # The robot's own process has tables too, and shall not load the emulator for them.
-    from runtime.budgets import BudgetRow
-    from runtime.experiment import DrumRow, Outcome, Spread
-    from runtime.open_loop import BoxRow, SceneOutcome
+    from runtime.experiments.budgets import BudgetRow
+    from runtime.experiments.experiment import DrumRow, Outcome, Spread
+    from runtime.experiments.open_loop import BoxRow, SceneOutcome
     from runtime.summary import ObjectRow, RunSummary
 
 Units: TypeAlias = Literal["m", "ft"]

@@ -12,6 +12,7 @@ from mcap.writer import CompressionType, Writer
 
 from config.load import load_settings
 from config.settings import Settings
+from runtime.experiments.simulate import Said, simulate
 from runtime.recording.channels import CHANNELS, CYCLE, Entry, schema_of
 from runtime.recording.folder import OneFile, Place
 from runtime.recording.part import CHUNK_BYTES, INDEX, PROFILE
@@ -19,7 +20,6 @@ from runtime.recording.reading import open_recording
 from runtime.recording.recorder import Recorder
 from runtime.recording.rerun import Verdict, replay
 from runtime.recording.writer import Standing
-from runtime.simulate import Said, simulate
 from runtime.step import State
 
 WAIT_S = 30.0

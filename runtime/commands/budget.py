@@ -15,8 +15,8 @@ from runtime.complaint import DONE, WRONG_CALL, Complaint
 from runtime.kernels import ready_kernels
 
 if TYPE_CHECKING:
-    from runtime.allowance import Allowance
     from runtime.tables import Units
+    from runtime.timing.allowance import Allowance
 
 
 def run_budgets(
@@ -37,10 +37,10 @@ def run_budgets(
     settings = load_settings("irregular", sets, models=models)
     console = Console(stderr=True)
     ready_kernels(settings, console)
-    from runtime.allowance import ProcessorTime, Quanta
-    from runtime.budgets import drive, in_long_hall
+    from runtime.experiments.budgets import drive, in_long_hall
     from runtime.summary import write_json
     from runtime.tables import budget_table
+    from runtime.timing.allowance import ProcessorTime, Quanta
 
     settings = in_long_hall(settings)
     makers: list[tuple[float, Callable[[], Allowance]]] = (

@@ -14,12 +14,12 @@ from config.settings import Settings
 from runtime.commands.firing import refuse_impossible_firing
 from runtime.commands.showing import folder, read
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
+from runtime.experiments.scene_names import SceneName
 from runtime.kernels import ready_kernels
-from runtime.scene_names import SceneName
 from runtime.tables import Units, boxes_table, scene_verdict, spread_verdict, table_2, verdict
 
 if TYPE_CHECKING:
-    from runtime.experiment import SeedOutcome
+    from runtime.experiments.experiment import SeedOutcome
 
 QUEUE_MAX: Final = 1_000_000
 """Virtual time waits for no disk: everything may wait in memory."""
@@ -47,7 +47,7 @@ def run_experiment(
     refuse_impossible_firing(settings.ring)
     console = Console(stderr=True)
     ready_kernels(settings, console)
-    from runtime.experiment import run_seed, summarise
+    from runtime.experiments.experiment import run_seed, summarise
     from runtime.summary import write_json
 
     place = None if out is None else folder(out)
@@ -82,7 +82,7 @@ def recorded(settings: Settings, seed: int, path: Path) -> SeedOutcome:
         As `run_seed`, or the file cannot be written.
     """
     from drivers.messages import Pose
-    from runtime.experiment import run_seed
+    from runtime.experiments.experiment import run_seed
     from runtime.recording.folder import OneFile
     from runtime.recording.recorder import Recorder
     from runtime.step import CycleRecord, State
@@ -130,7 +130,7 @@ def run_scenes(
     settings = load_settings("hallway", sets, models=models)
     console = Console(stderr=True)
     ready_kernels(settings, console)
-    from runtime.open_loop import run_scene, summarise_scene
+    from runtime.experiments.open_loop import run_scene, summarise_scene
     from runtime.summary import write_json
 
     runs = track(range(seeds), "driving", console=console, transient=True, disable=not console.is_terminal)

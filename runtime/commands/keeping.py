@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
     from drivers.driver import RobotDriver
-    from runtime.books import Books
     from runtime.process import Observers
     from runtime.recording.recorder import Recorder
     from runtime.recording.ringlog_writer import RingLogWriter
     from runtime.recording.writer import Standing
     from runtime.step import CycleRecord, State
     from runtime.summary import RecordingRow
+    from runtime.timing.books import Books
 
     OnCycle = Callable[[CycleRecord, State, Books, RobotDriver], None]
 

@@ -178,10 +178,10 @@ def summarise(recording: Recording, verdict: Verdict) -> ReplaySummary:
 def watching(recording: Recording, span: Span, units: Units) -> Iterator[tuple[OnCycle, OnEntry]]:
     """Hold the replay to its pace, and show it where there is a terminal."""
     from drivers.denning.robot import DenningRobot
-    from runtime.books import Books
     from runtime.recording.channels import SERIAL, decode
     from runtime.recording.forms import SerialBytes
-    from runtime.view import View
+    from runtime.terminal.view import View
+    from runtime.timing.books import Books
 
     settings, console = recording.settings, Console(stderr=True)
     view = View(settings, console, units) if console.is_terminal and not console.is_dumb_terminal else None

@@ -16,7 +16,6 @@ from config.load import ConfigError, load_settings
 from config.settings import Settings
 from runtime import VERSION
 from runtime.advice import advice
-from runtime.clock import PacedClock, RunClock
 from runtime.commands.firing import refuse_impossible_firing
 from runtime.commands.keeping import Keeping, kept
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
@@ -25,18 +24,19 @@ from runtime.logs import LogStanding, open_log
 from runtime.notify import Notifier
 from runtime.ownership import owned
 from runtime.tables import Units, objects_table, timing_table, timing_verdict
+from runtime.timing.clock import PacedClock, RunClock
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
     from drivers.driver import RobotDriver
-    from runtime.books import Books
     from runtime.commands.keeping import OnCycle
     from runtime.process import RobotProcess
     from runtime.reload import Reloader
     from runtime.step import CycleRecord, State
     from runtime.summary import RunSummary
-    from runtime.time_control import TimeControl
+    from runtime.timing.books import Books
+    from runtime.timing.time_control import TimeControl
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ def run_robot(
 
         async def whole() -> RunSummary:
             from runtime.emulated import emulator
-            from runtime.time_control import NoTimeControl
+            from runtime.timing.time_control import NoTimeControl
 
             async with contextlib.AsyncExitStack() as running:
                 chosen = settings
@@ -205,8 +205,8 @@ async def watch(
     """Run the process under the eyes of view and console; it heeds signals and keys, and its parts are watched."""
     from runtime.process import RobotProcess
     from runtime.reload import Reloader
-    from runtime.time_keys import TimeKeys
-    from runtime.view import View, keys
+    from runtime.terminal.time_keys import TimeKeys
+    from runtime.terminal.view import View, keys
 
     async with contextlib.AsyncExitStack() as stack:
         view = View(settings, console, units) if live else None

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, Final
 from config.reload import differences
 from config.settings import Settings
 from drivers.driver import RobotDriver
-from runtime.books import Books
 from runtime.console.client import Client
 from runtime.console.desk import Desk
 from runtime.console.door import listen
@@ -37,6 +36,7 @@ from runtime.health import told
 from runtime.process import CONSOLE_FRAME, CONSOLE_RECEIVE
 from runtime.step import CycleRecord, State
 from runtime.tables import Units
+from runtime.timing.books import Books
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger

@@ -15,7 +15,7 @@ from runtime.console.frames import RecordingNow
 from runtime.health import Health
 from runtime.modes import Request
 from runtime.step import State
-from runtime.timekeeping import Timekeeper
+from runtime.timing.timekeeping import Timekeeper
 from runtime.wishes import Wish
 
 NOT_HERE: Final = "not available here"

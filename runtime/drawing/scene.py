@@ -21,7 +21,7 @@ from drivers.messages import Floats, Pose
 from perception.seen import SeenObject
 from runtime.drawing.geometry import Frame, arcs, ellipse, outline, rotated, things
 from runtime.drawing.style import CLUSTER, ECHO, INK, MODEL, MUTED, PAPER, ROBOT, SEGMENT, THING
-from runtime.experiment import nearest_pairs
+from runtime.experiments.experiment import nearest_pairs
 from runtime.tables import Units, length
 from runtime.trace.form import RANGE, Cluster, Marked, Trace
 

@@ -18,7 +18,6 @@ import orjson
 from config.settings import Settings
 from perception.pipeline import Perception
 from perception.snapshot import Snapshot
-from runtime.books import Books
 from runtime.recording.channels import ABOUT, CYCLE, KEYFRAME, SETTINGS, Entry, decode, encode
 from runtime.recording.forms import (
     About,
@@ -33,6 +32,7 @@ from runtime.recording.forms import (
 )
 from runtime.recording.reading import SECOND_NS, Recording, settings_in
 from runtime.step import CycleRecord, State, step, take_over
+from runtime.timing.books import Books
 
 OnCycle = Callable[[CycleRecord, State], None]
 ABSENT: Final = "nothing"

@@ -14,8 +14,7 @@ from config.settings import Settings
 from config.world import WorldConfig
 from drivers.messages import Pose
 from perception.pipeline import SeenObject
-from runtime.allowance import enough_quanta
-from runtime.experiment import against_truth
+from runtime.experiments.experiment import against_truth
 from runtime.modes import Mode
 from runtime.recording.channels import CYCLE, SETTINGS, Entry, decode
 from runtime.recording.forms import Cycle, SettingsChange
@@ -23,6 +22,7 @@ from runtime.recording.reading import Recording, RecordingError, settings_in
 from runtime.recording.rerun import again, fresh_state
 from runtime.step import Command, CycleRecord, State, step, take_over
 from runtime.summary import ObjectRow, object_row
+from runtime.timing.allowance import enough_quanta
 
 
 @dataclass(slots=True)

@@ -17,8 +17,8 @@ from runtime.drawing.course import course
 from runtime.drawing.files import styled, svg_of
 from runtime.drawing.pictures import paper_figures, pictures
 from runtime.drawing.scene import stand_for
-from runtime.experiment import DrumRow
-from runtime.open_loop import BoxRow, judge
+from runtime.experiments.experiment import DrumRow
+from runtime.experiments.open_loop import BoxRow, judge
 from runtime.report.inline import inlined
 from runtime.report.look import CSS
 from runtime.report.parts import note, section, settings_list, table, tile

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from config.load import load_settings
-from runtime.scenes import Hall, halls, readings
+from runtime.experiments.scenes import Hall, halls, readings
 
 FT: Final = 0.3048
 WITHIN: Final = 0.25

@@ -16,7 +16,7 @@ import numpy as np
 from config.robot import RingConfig
 from config.units import FOOT_M
 from drivers.messages import Firing, Floats
-from runtime.scenes import DRUM_RADIUS_FT
+from runtime.experiments.scenes import DRUM_RADIUS_FT
 
 RADIUS_M: Final = DRUM_RADIUS_FT * FOOT_M
 """Of the drums; every peer is told."""

@@ -15,9 +15,9 @@ from typing import Final, TypedDict
 from config.robot import RingConfig
 from config.units import FOOT_M
 from drivers.messages import Firing
-from runtime.experiment import nearest_pairs
-from runtime.scene_names import SceneName
-from runtime.scenes import READINGS, Hall, halls, readings
+from runtime.experiments.experiment import nearest_pairs
+from runtime.experiments.scene_names import SceneName
+from runtime.experiments.scenes import READINGS, Hall, halls, readings
 from tests.bench.front_end import Place
 from tests.bench.runners import Contestant, Watch
 

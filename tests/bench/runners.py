@@ -13,7 +13,7 @@ from config.robot import RingConfig
 from config.settings import Settings
 from drivers.messages import Firing
 from perception.pipeline import Perception, SeenObject
-from runtime.open_loop import perceive
+from runtime.experiments.open_loop import perceive
 from tests.bench.association import Association
 from tests.bench.contestant import Peer
 from tests.bench.front_end import FrontEnd, Place

@@ -28,7 +28,7 @@ import orjson
 from config.load import load_settings
 from config.robot import SOUND_SPEED_M_S
 from runtime.complaint import FAILED, Complaint
-from runtime.simulate import simulate
+from runtime.experiments.simulate import simulate
 from tests.bench.waking import PERIOD_S, hogs
 
 ECHO_TO_DRIVE: Final = "echo to drive"

@@ -1,4 +1,4 @@
-"""Which way of sleeping wakes a loop on time: the table behind `runtime/wake.py`, measured anew by `make bench`.
+"""Which way of sleeping wakes a loop on time: the table behind `runtime/timing/wake.py`, as `make bench` measures it.
 
 Every contestant sleeps to the same grid of deadlines, a few seconds at a time, in turns with the others, so that
 whatever else the machine does meets all of them alike. The control is a thread that sleeps without any loop.
@@ -20,8 +20,8 @@ from typing import Final, TypeAlias
 import numpy as np
 from rich.table import Table
 
-from runtime.realtime import ask_slice
-from runtime.wake import Waker
+from runtime.timing.realtime import ask_slice
+from runtime.timing.wake import Waker
 
 PERIOD_S: Final = 0.05
 """The cycle's own."""
@@ -118,7 +118,7 @@ def ways() -> list[Way]:
         Way("asyncio.sleep", by_asyncio),
         Way("asyncio.sleep + 1 ms spin", spinning(by_asyncio, SPIN_S)),
         Way("asyncio.sleep on select()", by_asyncio, select_loop),
-        Way("timerfd (runtime/wake.py)", by_waker),
+        Way("timerfd (runtime/timing/wake.py)", by_waker),
         Way("timerfd, realtime.slice_s = 0.0001", by_waker_in_short_turns),
         Way("timerfd + 0.2 ms spin", spinning(by_waker, 0.0002)),
     ]

@@ -14,8 +14,6 @@ import pytest
 from config.load import load_settings
 from config.settings import LogConfig
 from drivers.driver import RobotDriver
-from runtime.books import Books
-from runtime.clock import PacedClock
 from runtime.commands.run import on_port
 from runtime.console.player import Players
 from runtime.emulated import emulator
@@ -23,6 +21,8 @@ from runtime.logs import open_log
 from runtime.modes import Mode
 from runtime.process import Observers, RobotProcess
 from runtime.step import CycleRecord, State
+from runtime.timing.books import Books
+from runtime.timing.clock import PacedClock
 from tests.console.test_players import PROGRAM, Page
 from tests.hil.machine import PATIENCE_S, stalls_excused
 from tests.recorded import hall, record

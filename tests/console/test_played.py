@@ -14,9 +14,9 @@ from runtime.console.playback import Playback
 from runtime.console.played import make
 from runtime.console.player import Players
 from runtime.console.playing import At
+from runtime.experiments.simulate import Said
 from runtime.modes import Mode, Request
 from runtime.recording.reading import open_recording, settings_in
-from runtime.simulate import Said
 from runtime.step import State
 from tests.console.test_players import Page, until
 from tests.recorded import hall, record

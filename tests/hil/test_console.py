@@ -18,7 +18,6 @@ from config.settings import LogConfig
 from drivers.denning.codec import Decoder
 from drivers.denning.frames import Halt
 from drivers.driver import RobotDriver
-from runtime.books import Books
 from runtime.commands.run import on_port
 from runtime.console.console import Console
 from runtime.emulated import emulator
@@ -28,6 +27,7 @@ from runtime.process import Observers, RobotProcess
 from runtime.recording.channels import LOG
 from runtime.recording.reading import open_recording
 from runtime.step import CycleRecord, State
+from runtime.timing.books import Books
 from tests.hil.machine import PATIENCE_S, stalls_excused
 from tests.hil.running import emulated, running, start_url
 from tests.hil.truth import Truth

@@ -9,12 +9,12 @@ import pytest
 from config.load import load_settings
 from config.settings import LogConfig
 from drivers.driver import RobotDriver
-from runtime.books import Books
 from runtime.commands.run import on_port
 from runtime.emulated import emulator
 from runtime.logs import open_log
 from runtime.process import Observers, RobotProcess
 from runtime.step import CycleRecord, State
+from runtime.timing.books import Books
 from tests.hil.machine import PATIENCE_S, stalls_excused
 from tests.hil.truth import rows
 

@@ -19,7 +19,6 @@ from drivers.denning.codec import Decoder
 from drivers.denning.frames import Halt
 from drivers.driver import RobotDriver
 from drivers.messages import Flags
-from runtime.books import Books
 from runtime.commands.run import on_port
 from runtime.emulated import emulator
 from runtime.logs import open_log
@@ -28,6 +27,7 @@ from runtime.process import Observers, RobotProcess
 from runtime.recording.folder import OneFile
 from runtime.recording.recorder import Recorder
 from runtime.step import CycleRecord, State
+from runtime.timing.books import Books
 from tests.hil.machine import PATIENCE_S
 from tests.hil.truth import Truth
 

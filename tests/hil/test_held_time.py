@@ -17,8 +17,6 @@ from config.load import load_settings
 from config.settings import LogConfig
 from drivers.driver import RobotDriver
 from drivers.messages import Flags
-from runtime.books import Books
-from runtime.clock import PacedClock
 from runtime.commands.run import on_port
 from runtime.emulated import emulator
 from runtime.logs import open_log
@@ -30,7 +28,9 @@ from runtime.recording.recorder import Recorder
 from runtime.recording.rerun import replay
 from runtime.step import CycleRecord, State
 from runtime.summary import RunSummary
-from runtime.time_control import GONE, HANGS, EmulatorControl
+from runtime.timing.books import Books
+from runtime.timing.clock import PacedClock
+from runtime.timing.time_control import GONE, HANGS, EmulatorControl
 from tests.hil.machine import PATIENCE_S, stalls_excused
 from tests.hil.truth import rows
 
@@ -146,7 +146,7 @@ async def test_an_emulator_that_is_stopped_and_one_that_is_killed(
         os.kill(pid, signal.SIGSTOP)
         try:
             with monkeypatch.context() as impatient:
-                impatient.setattr("runtime.time_control.ANSWER_MAX_S", 0.3)
+                impatient.setattr("runtime.timing.time_control.ANSWER_MAX_S", 0.3)
                 assert await control.pause() == HANGS
             await until(lambda: records[-1].mode.mode is Mode.SAFE_STOP)
         finally:

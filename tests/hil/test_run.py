@@ -15,9 +15,9 @@ import pytest
 
 from config.load import load_settings
 from drivers.messages import Flags
-from runtime.books import Books
-from runtime.pacing import Pacer
-from runtime.rhythm import LATE_SHARE
+from runtime.timing.books import Books
+from runtime.timing.pacing import Pacer
+from runtime.timing.rhythm import LATE_SHARE
 from tests.hil.machine import BareStarts, stalls_excused
 from tests.hil.running import Emulated, Running, emulated, running, wait_for
 from tests.hil.truth import is_driving, reaches, robot_time, rows

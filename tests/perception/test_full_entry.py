@@ -15,7 +15,7 @@ from perception.full.report import TOLD
 from perception.full.state import C00, C11, HITS, KIND, MARK, NTF, NTI, NUMBER, PROB, TX, TY, make_state
 from perception.kernel import Floats, kernel
 from perception.seen import SeenObject
-from runtime.scenes import halls, readings
+from runtime.experiments.scenes import halls, readings
 
 SETTINGS = load_settings("hallway")
 BOXES = load_settings("hallway", models=["semicircle", "box"])

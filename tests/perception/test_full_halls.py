@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from config.load import load_settings
-from runtime.open_loop import HallOutcome, run_scene
-from runtime.random_halls import random_hall
+from runtime.experiments.open_loop import HallOutcome, run_scene
+from runtime.experiments.random_halls import random_hall
 
 pytestmark = pytest.mark.compiled
 

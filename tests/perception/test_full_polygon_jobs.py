@@ -16,8 +16,8 @@ from perception.full.polygon_tracks import next_track, pquantum, refine_polygon
 from perception.full.settings import make_settings
 from perception.full.state import ASKED, DIRTY, FREE, PB, PCAP, PT, PX, PXX, PY, ST, State, make_state
 from perception.pipeline import Perception
-from runtime.open_loop import perceive
-from runtime.scenes import halls, readings
+from runtime.experiments.open_loop import perceive
+from runtime.experiments.scenes import halls, readings
 
 pytestmark = pytest.mark.compiled
 

@@ -15,8 +15,8 @@ from perception.full.report import polygon_covariance
 from perception.full.state import PX, PY
 from perception.kernel import Floats
 from perception.pipeline import Perception
-from runtime.open_loop import HallOutcome, angle_error, judge, perceive, run_scene
-from runtime.scenes import PLACES_FT, Hall, readings
+from runtime.experiments.open_loop import HallOutcome, angle_error, judge, perceive, run_scene
+from runtime.experiments.scenes import PLACES_FT, Hall, readings
 
 pytestmark = pytest.mark.compiled
 

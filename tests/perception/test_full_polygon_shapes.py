@@ -16,8 +16,8 @@ from config.model import ModelConfig
 from config.world import AcousticsConfig, PolygonConfig, StartConfig, WallConfig, WorldConfig
 from perception.pipeline import Perception
 from perception.seen import SeenObject
-from runtime.open_loop import perceive
-from runtime.scenes import Hall, readings
+from runtime.experiments.open_loop import perceive
+from runtime.experiments.scenes import Hall, readings
 
 pytestmark = pytest.mark.compiled
 

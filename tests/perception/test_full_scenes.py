@@ -16,10 +16,10 @@ from drivers.messages import Firing, Pose
 from perception.full.method import FullPerception
 from perception.full.pairs import map_add
 from perception.pipeline import Perception
-from runtime.first_fix import summarise_fixes
-from runtime.open_loop import HallOutcome, perceive, run_hall, run_scene
-from runtime.scene_names import SceneName
-from runtime.scenes import Hall, halls, readings
+from runtime.experiments.first_fix import summarise_fixes
+from runtime.experiments.open_loop import HallOutcome, perceive, run_hall, run_scene
+from runtime.experiments.scene_names import SceneName
+from runtime.experiments.scenes import Hall, halls, readings
 
 FT = 0.3048
 SETTINGS = load_settings("hallway", ["perception.method=full"])

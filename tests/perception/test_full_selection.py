@@ -32,7 +32,7 @@ from perception.full.state import (
     State,
     make_state,
 )  # fmt: skip
-from runtime.scenes import halls, readings
+from runtime.experiments.scenes import halls, readings
 from tests import naive_tracks
 
 SETTINGS = load_settings("hallway", models=("semicircle", "box"))

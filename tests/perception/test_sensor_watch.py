@@ -20,7 +20,7 @@ from perception.pipeline import Perception
 from perception.sensor_report import SensorFault
 from perception.sensor_trial import FAILURES, RETURNS
 from perception.sensor_watch import SensorWatch
-from runtime.random_halls import random_hall
+from runtime.experiments.random_halls import random_hall
 
 pytestmark = [pytest.mark.compiled]
 promise = pytest.mark.promise("P8")

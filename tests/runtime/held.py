@@ -15,9 +15,9 @@ from config.settings import Settings
 from drivers.emulator.control import Governor
 from drivers.emulator.device import EmulatedRobot
 from drivers.emulator.faults import Fault
-from runtime.clock import PacedClock
-from runtime.time_control import EmulatorControl
-from runtime.wake import LoopTimer
+from runtime.timing.clock import PacedClock
+from runtime.timing.time_control import EmulatorControl
+from runtime.timing.wake import LoopTimer
 from tests.runtime.virtual import STEP_S, MemoryLink, VirtualLoop
 
 DEAF_S = 0.001
@@ -84,7 +84,7 @@ def held(monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] 
         return made
 
     monkeypatch.setattr("runtime.process.Link", link)
-    monkeypatch.setattr("runtime.wake.best_alarm", LoopTimer)
+    monkeypatch.setattr("runtime.timing.wake.best_alarm", LoopTimer)
     monkeypatch.setattr("runtime.process.ask", lambda _realtime: ())
     asyncio.set_event_loop(None)
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from runtime.books import KEPT, Books
+from runtime.timing.books import KEPT, Books
 
 
 def test_empty_books_say_zero() -> None:

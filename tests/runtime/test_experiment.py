@@ -19,7 +19,7 @@ from config.world import WorldConfig
 from runtime.cli import call
 from runtime.commands.experiment import one_way
 from runtime.complaint import DONE, FAILED, WRONG_CALL, Complaint
-from runtime.experiment import run_seed, summarise
+from runtime.experiments.experiment import run_seed, summarise
 from runtime.recording.reading import open_recording
 
 pytestmark = pytest.mark.compiled
@@ -138,7 +138,7 @@ def test_the_irregular_hallway_on_seeds_nobody_chose(seed: int) -> None:
 
 def test_a_robot_that_does_not_come_through_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """A wall across the hallway."""
-    monkeypatch.setattr("runtime.experiment.SECONDS_MAX", 40.0)
+    monkeypatch.setattr("runtime.experiments.experiment.SECONDS_MAX", 40.0)
     settings, world = settings_of("hallway")
     wall = {"wall": [{"x1_m": 0.5, "y1_m": -9.0, "x2_m": 0.5, "y2_m": 9.0}]}
     shut = WorldConfig.model_validate({**world.model_dump(), **wall})

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from config.world import DrumConfig, WorldConfig
-from runtime.books import Quantiles
-from runtime.experiment import GATE_M, SeedOutcome, against_truth, summarise
+from runtime.experiments.experiment import GATE_M, SeedOutcome, against_truth, summarise
+from runtime.timing.books import Quantiles
 
 QUICK: Quantiles = {"p50": 1.0, "p99": 2.0, "max": 9.0}
 SLOW: Quantiles = {"p50": 3.0, "p99": 5.0, "max": 7.0}

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from runtime.footprint import Footprint, age_s, own_mb, peak_mb, rss_mb
-from runtime.memory import MemoryPolicy
+from runtime.timing.footprint import Footprint, age_s, own_mb, peak_mb, rss_mb
+from runtime.timing.memory import MemoryPolicy
 
 ROOT = Path(__file__).parents[2]
 
@@ -19,8 +19,8 @@ ROOT = Path(__file__).parents[2]
 FILLED = """
 import json
 import numpy as np
-from runtime.footprint import Footprint
-from runtime.memory import MemoryPolicy
+from runtime.timing.footprint import Footprint
+from runtime.timing.memory import MemoryPolicy
 books = Footprint(MemoryPolicy())
 block = np.full(8_000_000, 1.0)
 print(json.dumps(books.close()), block[0])
@@ -63,7 +63,7 @@ def test_a_system_that_tells_nothing_is_no_error(monkeypatch: pytest.MonkeyPatch
     def refuse(*_arguments: object, **_named: object) -> str:
         raise FileNotFoundError(2, "no such file")
 
-    monkeypatch.setattr("runtime.footprint.Path.read_text", refuse)
+    monkeypatch.setattr("runtime.timing.footprint.Path.read_text", refuse)
     assert (age_s(), rss_mb(), own_mb(), peak_mb()) == (None, None, None, None)
     row = Footprint(MemoryPolicy()).close()
     assert (row["start_s"], row["rss_mb"], row["growth_mb"]) == (None, None, None)

@@ -13,10 +13,10 @@ from drivers.denning.codec import Decoder
 from drivers.denning.frames import Drive, Frame, Halt
 from drivers.driver import RobotDriver
 from drivers.messages import Flags
-from runtime.books import Books
 from runtime.modes import Mode, Request
 from runtime.process import Observers, RobotProcess
 from runtime.step import CycleRecord, State
+from runtime.timing.books import Books
 from tests.runtime.virtual import in_virtual_time
 
 pytestmark = [pytest.mark.compiled, pytest.mark.promise("P2")]

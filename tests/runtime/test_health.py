@@ -20,7 +20,6 @@ from drivers.denning.codec import Decoder
 from drivers.denning.frames import Drive, Frame
 from drivers.driver import RobotDriver
 from drivers.messages import Flags
-from runtime.books import Books
 from runtime.health import Worker
 from runtime.logs import LogStanding
 from runtime.modes import Mode, Request
@@ -33,7 +32,8 @@ from runtime.reload import Reloader
 from runtime.sinks import Sink
 from runtime.step import CycleRecord, State
 from runtime.summary import RunSummary
-from runtime.view import View
+from runtime.terminal.view import View
+from runtime.timing.books import Books
 from tests.runtime.virtual import VirtualLoop, in_virtual_time
 
 pytestmark = [pytest.mark.compiled, pytest.mark.promise("P10")]

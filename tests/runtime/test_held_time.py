@@ -14,12 +14,12 @@ from config.settings import Settings
 from drivers.driver import RobotDriver
 from drivers.emulator.device import EmulatedRobot
 from drivers.messages import Flags
-from runtime.books import Books
 from runtime.modes import Mode, Request
 from runtime.process import Observers, RobotProcess
 from runtime.step import CycleRecord, State
 from runtime.summary import RunSummary
-from runtime.time_control import GONE, HANGS, LEAD_S, NO_CYCLE, NOT_OURS, EmulatorControl, NoTimeControl
+from runtime.timing.books import Books
+from runtime.timing.time_control import GONE, HANGS, LEAD_S, NO_CYCLE, NOT_OURS, EmulatorControl, NoTimeControl
 from tests.runtime.held import Held, held
 
 pytestmark = pytest.mark.compiled

@@ -256,7 +256,7 @@ from perception.edits import (
 from runtime.console.frames import Beside, Frames
 from runtime.kernels import hindrance
 from runtime.modes import Mode, Request
-from runtime.simulate import Said, simulate
+from runtime.experiments.simulate import Said, simulate
 
 further = settings.model_copy(update={"models": (*settings.models, load_model(sys.argv[3]))})
 assert hindrance(settings, further) is None

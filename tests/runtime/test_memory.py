@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 
-from runtime.memory import EVERY_CYCLES, SLACK_MIN_S, MemoryPolicy
+from runtime.timing.memory import EVERY_CYCLES, SLACK_MIN_S, MemoryPolicy
 
 
 class Ring:

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from runtime.pacing import LOST_STEPS, Begun, Pacer
+from runtime.timing.pacing import LOST_STEPS, Begun, Pacer
 
 BEGIN, PERIOD = 10.0, 0.05
 TINY = 1e-7

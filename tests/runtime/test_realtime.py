@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from config.settings import RealtimeConfig
-from runtime.realtime import ask
+from runtime.timing.realtime import ask
 
 ROOT = Path(__file__).parents[2]
 NOTHING = RealtimeConfig()
@@ -40,10 +40,10 @@ def refusing(monkeypatch: pytest.MonkeyPatch) -> Libc:
     def refuse(*_arguments: object) -> None:
         raise PermissionError(1, "Operation not permitted")
 
-    monkeypatch.setattr("runtime.realtime.ctypes.CDLL", lambda *_a, **_k: libc)
-    monkeypatch.setattr("runtime.realtime.ctypes.get_errno", lambda: 1)
-    monkeypatch.setattr("runtime.realtime.os.sched_setscheduler", refuse)
-    monkeypatch.setattr("runtime.realtime.os.sched_setaffinity", refuse)
+    monkeypatch.setattr("runtime.timing.realtime.ctypes.CDLL", lambda *_a, **_k: libc)
+    monkeypatch.setattr("runtime.timing.realtime.ctypes.get_errno", lambda: 1)
+    monkeypatch.setattr("runtime.timing.realtime.os.sched_setscheduler", refuse)
+    monkeypatch.setattr("runtime.timing.realtime.os.sched_setaffinity", refuse)
     return libc
 
 
@@ -59,7 +59,7 @@ def test_nothing_is_asked_for_by_default() -> None:
 
 @pytest.mark.usefixtures("refusing")
 def test_every_refusal_names_the_setting_the_reason_and_the_way_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("runtime.realtime.platform.machine", lambda: "x86_64")
+    monkeypatch.setattr("runtime.timing.realtime.platform.machine", lambda: "x86_64")
     core = min(os.sched_getaffinity(0))
     refusals = ask(RealtimeConfig(slice_s=0.001, priority=7, core=core, lock_memory=True))
     names = [line.split(" ")[0] for line in refusals]
@@ -79,7 +79,7 @@ def test_a_core_that_is_not_there_is_named_beside_those_that_are() -> None:
 def test_a_machine_whose_system_call_is_not_known_is_left_alone(
     refusing: Libc, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("runtime.realtime.platform.machine", lambda: "abacus")
+    monkeypatch.setattr("runtime.timing.realtime.platform.machine", lambda: "abacus")
     assert ask(RealtimeConfig()) == []
     assert refusing.calls == []
 
@@ -87,7 +87,7 @@ def test_a_machine_whose_system_call_is_not_known_is_left_alone(
 IN_EARNEST = """
 import os, sys
 from config.settings import RealtimeConfig
-from runtime.realtime import ask
+from runtime.timing.realtime import ask
 core = min(os.sched_getaffinity(0))
 refusals = ask(RealtimeConfig(slice_s=0.001, priority=5, core=core, lock_memory=True))
 policy = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK

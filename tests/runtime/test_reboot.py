@@ -19,10 +19,10 @@ from drivers.emulator.faults import Reboot
 from drivers.emulator.memory import MemoryLine
 from drivers.messages import Firing, Pose
 from perception.pipeline import Perception
-from runtime.allowance import enough_quanta
 from runtime.commanding import gather, give
 from runtime.modes import Mode, Request
 from runtime.step import CycleRecord, State, step
+from runtime.timing.allowance import enough_quanta
 
 pytestmark = [pytest.mark.compiled, pytest.mark.promise("P7")]
 

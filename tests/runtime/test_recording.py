@@ -13,6 +13,7 @@ import jsonschema
 import pytest
 from mcap.reader import NonSeekingReader, make_reader
 
+from runtime.experiments.simulate import simulate
 from runtime.recording.channels import (
     ABOUT,
     BOOKMARK,
@@ -32,7 +33,6 @@ from runtime.recording.folder import OneFile, Rotating
 from runtime.recording.forms import Cycle, LogLine, MapChange, SerialBytes
 from runtime.recording.reading import open_recording
 from runtime.recording.recorder import Recorder
-from runtime.simulate import simulate
 from tests.recorded import SECONDS, entries_of, hall, record, verdict_of
 
 

@@ -25,12 +25,12 @@ from perception.edits import (
 )
 from runtime.cli import call
 from runtime.complaint import DONE
+from runtime.experiments.simulate import Said
 from runtime.modes import Mode, Request
 from runtime.recording.channels import CYCLE, KEYFRAME, Entry, decode
 from runtime.recording.forms import Cycle, Keyframe
 from runtime.recording.reading import open_recording
 from runtime.recording.rerun import replay
-from runtime.simulate import Said
 from runtime.step import CycleRecord, Edit, State
 from runtime.wishes import Legs
 from tests.recorded import entries_of, hall, record, rewrite

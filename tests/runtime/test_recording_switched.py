@@ -16,13 +16,13 @@ from drivers.messages import Pose
 from runtime.cli import call
 from runtime.commands.keeping import Keeping, kept
 from runtime.complaint import DONE
+from runtime.experiments.simulate import simulate
 from runtime.recording.channels import ABOUT, BOOKMARK, CYCLE, KEYFRAME, decode
 from runtime.recording.folder import OneFile
 from runtime.recording.forms import Bookmark
 from runtime.recording.reading import open_recording
 from runtime.recording.recorder import BOOKMARK_MAX, Recorder
 from runtime.recording.rerun import Verdict, replay
-from runtime.simulate import simulate
 from runtime.step import CycleRecord, State
 from tests.recorded import FiveInSix, entries_of, hall, record, until
 

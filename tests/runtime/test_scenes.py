@@ -15,9 +15,9 @@ from config.world import BoxConfig, WorldConfig
 from drivers.messages import Firing, Floats
 from perception.pipeline import SeenObject
 from runtime.cli import call
-from runtime.open_loop import angle_error, judge
-from runtime.scene_names import SceneName
-from runtime.scenes import Hall, halls, readings
+from runtime.experiments.open_loop import angle_error, judge
+from runtime.experiments.scene_names import SceneName
+from runtime.experiments.scenes import Hall, halls, readings
 
 FT = 0.3048
 RING = load_robot("denning").ring

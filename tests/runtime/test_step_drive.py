@@ -15,10 +15,10 @@ import pytest
 from drivers.driver import Heard, LineState
 from perception.paper import PaperPerception
 from perception.pipeline import Perception
-from runtime.allowance import enough_quanta
+from runtime.experiments.simulate import simulate
 from runtime.modes import Mode, ModeState
-from runtime.simulate import simulate
 from runtime.step import Command, CycleRecord, Inputs, Order, State, step
+from runtime.timing.allowance import enough_quanta
 from tests.runtime.script import NOTHING, PERIOD_S, SETTINGS, Script
 
 # A drive through the hallway, every input of it on record.

@@ -11,7 +11,7 @@ import pytest
 
 from perception.pipeline import SeenObject
 from runtime.complaint import FAILED, Complaint
-from runtime.experiment import DrumRow, Outcome
+from runtime.experiments.experiment import DrumRow, Outcome
 from runtime.summary import LinkRow, ObjectRow, ReplaySummary, RunSummary, object_row, write_json
 
 SEEN = SeenObject("semicircle", 1.0, -2.0, 0.1 + 0.2, 1e-17, 39, 2.0 / 3.0)

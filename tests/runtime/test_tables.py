@@ -8,12 +8,12 @@ import pytest
 from rich.console import Console
 from rich.table import Table
 
-from runtime.books import Spread
-from runtime.experiment import Outcome
-from runtime.footprint import FootprintRow
+from runtime.experiments.experiment import Outcome
 from runtime.summary import ObjectRow, RunSummary
 from runtime.tables import Units, length, objects_table, place, table_2, timing_table, timing_verdict, verdict
-from runtime.timekeeping import Timing
+from runtime.timing.books import Spread
+from runtime.timing.footprint import FootprintRow
+from runtime.timing.timekeeping import Timing
 
 OUTCOME: Outcome = {
     "drums": [

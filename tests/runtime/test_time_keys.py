@@ -7,8 +7,8 @@ import asyncio
 from structlog import get_logger
 from structlog.testing import capture_logs
 
-from runtime.time_control import NOT_OURS, NoTimeControl
-from runtime.time_keys import TimeKeys
+from runtime.terminal.time_keys import TimeKeys
+from runtime.timing.time_control import NOT_OURS, NoTimeControl
 
 
 class Control:

@@ -16,14 +16,14 @@ from config.load import load_settings
 from drivers.driver import Heard, LineState
 from drivers.messages import Firing, Flags, Odometry, Pose, Twist
 from perception.pipeline import Perception
-from runtime.books import CULPRITS_MAX, OTHERS, Books
-from runtime.meter import Meter, Reading
 from runtime.modes import Request
-from runtime.pacing import Begun, Pacer
-from runtime.phases import Phase
 from runtime.step import Command, Inputs, Order, State, step
-from runtime.timekeeping import OUTSIDE, THREAD, UNTIMED, Timekeeper
-from runtime.watch import Sight, Watch
+from runtime.timing.books import CULPRITS_MAX, OTHERS, Books
+from runtime.timing.meter import Meter, Reading
+from runtime.timing.pacing import Begun, Pacer
+from runtime.timing.phases import Phase
+from runtime.timing.timekeeping import OUTSIDE, THREAD, UNTIMED, Timekeeper
+from runtime.timing.watch import Sight, Watch
 
 US = 1e-6
 PERIOD_US, LATE_US = 50_000, 5_000

@@ -23,12 +23,12 @@ from config.load import load_settings
 from drivers.denning.robot import DenningRobot
 from drivers.messages import Floats, LinkCounts, Pose
 from perception.pipeline import SeenObject
-from runtime.books import Books
+from runtime.experiments.simulate import simulate
 from runtime.modes import Mode, ModeState, Request
-from runtime.plan import ARROWS, MARGIN_M, Plan, draw_plan
-from runtime.simulate import simulate
 from runtime.step import CycleRecord
-from runtime.view import EVERY_CYCLES, SWITCH_INTERVAL_S, Snapshot, View, keys
+from runtime.terminal.plan import ARROWS, MARGIN_M, Plan, draw_plan
+from runtime.terminal.view import EVERY_CYCLES, SWITCH_INTERVAL_S, Snapshot, View, keys
+from runtime.timing.books import Books
 
 SETTINGS = load_settings("hallway")
 NO_SEGMENTS: Floats = np.zeros((0, 5))

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from runtime.wake import Alarm, LoopTimer, TimerFd, Waker, best_alarm
+from runtime.timing.wake import Alarm, LoopTimer, TimerFd, Waker, best_alarm
 
 MakeAlarm = Callable[[Callable[[], None]], Alarm]
 FAR_S = 60.0
@@ -128,7 +128,7 @@ async def test_the_timer_is_given_back() -> None:
 
 
 async def test_a_system_without_timerfd_gets_the_loops_timer(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("runtime.wake.ctypes.CDLL", lambda *_a, **_k: object())
+    monkeypatch.setattr("runtime.timing.wake.ctypes.CDLL", lambda *_a, **_k: object())
     assert isinstance(best_alarm(lambda: None), LoopTimer)
 
 

@@ -19,7 +19,7 @@ from config.robot import LinkConfig
 from config.settings import Settings
 from drivers.emulator.device import EmulatedRobot
 from drivers.emulator.faults import Fault
-from runtime.wake import LoopTimer
+from runtime.timing.wake import LoopTimer
 
 STEP_S = 0.005
 REOPEN_S = 0.05
@@ -147,7 +147,7 @@ def in_virtual_time(
         return links[-1]
 
     monkeypatch.setattr("runtime.process.Link", link)
-    monkeypatch.setattr("runtime.wake.best_alarm", LoopTimer)
+    monkeypatch.setattr("runtime.timing.wake.best_alarm", LoopTimer)
     monkeypatch.setattr("runtime.process.ask", lambda _realtime: ())
     try:
         yield loop, settings, robot, links

@@ -26,14 +26,14 @@ from drivers.emulator.device import EmulatedRobot
 from drivers.emulator.memory import MemoryLine
 from drivers.messages import Floats
 from perception.pipeline import Perception
-from runtime.allowance import ProcessorTime
 from runtime.commanding import gather, give
 from runtime.complaint import DONE, FAILED
 from runtime.kernels import ready_kernels
-from runtime.memory import MemoryPolicy
 from runtime.modes import Mode, Request
-from runtime.phases import Phase
 from runtime.step import Inputs, State, step
+from runtime.timing.allowance import ProcessorTime
+from runtime.timing.memory import MemoryPolicy
+from runtime.timing.phases import Phase
 
 QUANTUM_MAX_US: Final = 500.0
 """Of a quantum's CPU time, at p99.9."""

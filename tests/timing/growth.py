@@ -19,12 +19,12 @@ from rich.console import Console
 from config.load import load_settings
 from drivers.emulator.device import Truth
 from runtime.complaint import DONE, FAILED
-from runtime.footprint import own_mb
+from runtime.experiments.simulate import simulate
 from runtime.kernels import compiled_signatures, ready_kernels
-from runtime.memory import MemoryPolicy
 from runtime.modes import Mode
-from runtime.simulate import simulate
 from runtime.step import CycleRecord
+from runtime.timing.footprint import own_mb
+from runtime.timing.memory import MemoryPolicy
 
 SETTLED_CYCLES: Final = 1000
 """A minute: once down the hall, by when everything that is allocated at first need has been."""

@@ -16,13 +16,13 @@ from typing import Any
 import pytest
 
 from config.load import load_settings
-from runtime.allowance import Allowance, ProcessorTime, Quanta
-from runtime.budgets import BudgetRow, drive, in_long_hall
 from runtime.cli import call
 from runtime.complaint import DONE, WRONG_CALL
-from runtime.long_hall import A_SIDE, long_hall
-from runtime.simulate import simulate
+from runtime.experiments.budgets import BudgetRow, drive, in_long_hall
+from runtime.experiments.long_hall import A_SIDE, long_hall
+from runtime.experiments.simulate import simulate
 from runtime.step import CycleRecord
+from runtime.timing.allowance import Allowance, ProcessorTime, Quanta
 
 ROOT = Path(__file__).parents[2]
 CYCLES = 3000

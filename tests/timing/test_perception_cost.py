@@ -17,9 +17,9 @@ from drivers.messages import Firing
 from perception.full import entry, refine
 from perception.full.method import FullPerception
 from perception.pipeline import Perception
-from runtime.allowance import enough_quanta
-from runtime.simulate import simulate
+from runtime.experiments.simulate import simulate
 from runtime.step import CycleRecord, State, step
+from runtime.timing.allowance import enough_quanta
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 

@@ -14,7 +14,7 @@ from skimage.draw import line
 from skimage.transform import hough_circle, hough_circle_peaks
 
 from config.units import FOOT_M
-from runtime.scenes import FROM_FT, TO_FT
+from runtime.experiments.scenes import FROM_FT, TO_FT
 from tests.bench.association import Evidence
 from tests.bench.contestant import Peer
 from tests.bench.front_end import RADIUS_M, Place

@@ -21,16 +21,16 @@ from drivers.driver import Heard, LineState
 from drivers.messages import Firing, Flags, LinkCounts, Odometry, Pose, Twist
 from perception.edits import Edit, Evidence
 from perception.pipeline import Perception
-from runtime.books import Books
 from runtime.console.console import Console
 from runtime.console.limits import Limits
 from runtime.console.overtime import Overtime
 from runtime.health import Health
-from runtime.meter import Meter
 from runtime.modes import Mode, ModeState, Request
 from runtime.process import CALLBACKS
 from runtime.step import CycleRecord, Inputs, Refused, State
-from runtime.timekeeping import Timekeeper
+from runtime.timing.books import Books
+from runtime.timing.meter import Meter
+from runtime.timing.timekeeping import Timekeeper
 from runtime.wishes import Wish
 
 PATIENCE_S = 20.0

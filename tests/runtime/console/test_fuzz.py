@@ -17,13 +17,13 @@ import structlog
 
 from behaviors.teleoperation import Teleoperate
 from drivers.driver import RobotDriver
-from runtime.books import Books
 from runtime.console.console import Console
 from runtime.console.forms import BadMessage, read_message
 from runtime.console.limits import Limits
 from runtime.modes import Mode, Request
 from runtime.process import Observers, RobotProcess
 from runtime.step import CycleRecord, State
+from runtime.timing.books import Books
 from tests.runtime.console.operated import FREE_PORT, Operated, operated
 from tests.runtime.console.test_commands import ASKED, EDITS, OF_TIME
 from tests.runtime.virtual import in_virtual_time

@@ -10,13 +10,13 @@ from contextlib import AbstractContextManager
 from typing import Final
 
 from config.settings import Settings
-from runtime.books import Books
-from runtime.clock import run_clock
-from runtime.meter import Meter, Reading
-from runtime.pacing import Begun, Pacer
-from runtime.timekeeping import Timekeeper
-from runtime.wake import Waker
-from runtime.watch import Watch
+from runtime.timing.books import Books
+from runtime.timing.clock import run_clock
+from runtime.timing.meter import Meter, Reading
+from runtime.timing.pacing import Begun, Pacer
+from runtime.timing.timekeeping import Timekeeper
+from runtime.timing.wake import Waker
+from runtime.timing.watch import Watch
 
 LATE_SHARE: Final = 0.1
 """A cycle that begins later than this share of its period is late."""

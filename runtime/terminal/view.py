@@ -30,13 +30,13 @@ from config.settings import Settings
 from drivers.driver import RobotDriver
 from drivers.messages import Floats, LinkCounts, Pose
 from perception.pipeline import SeenObject
-from runtime.books import Books, Quantiles
 from runtime.health import Worker
 from runtime.modes import ModeState, Request
-from runtime.plan import draw_plan
 from runtime.step import CycleRecord, State
 from runtime.summary import object_row
 from runtime.tables import Units, objects_table
+from runtime.terminal.plan import draw_plan
+from runtime.timing.books import Books, Quantiles
 
 EVERY_CYCLES: Final = 5
 """Draw every fifth cycle: 4 Hz at 20 Hz."""

@@ -21,8 +21,8 @@ from config.world import AcousticsConfig, BoxConfig, DrumConfig, StartConfig, Wa
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose
-from runtime.random_halls import random_hall
-from runtime.scene_names import SceneName
+from runtime.experiments.random_halls import random_hall
+from runtime.experiments.scene_names import SceneName
 
 PLACES_FT: Final = tuple((x, y) for y in (4.0, -4.0) for x in (1.0, 4.0, 7.0))
 """Where the paper's six drums stand (its Table 2)."""

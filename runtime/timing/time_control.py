@@ -1,7 +1,8 @@
 """The time of a run in somebody's hands: paused, stepped by one cycle, faster, slower.
 
 Pausing the emulator alone would be a robot that has gone silent. So the run's own clock is held together with it:
-`runtime.clock` is this process's side of that, `drivers.emulator.control` the emulator's, and here is who asks both.
+`runtime.timing.clock` is this process's side of that, `drivers.emulator.control` the emulator's, and here is who asks
+both.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Final, Protocol
 
 from drivers.emulator.control import LIVED, REFUSED
 from drivers.emulator.pace import FACTOR_MAX, FACTOR_MIN, Pace
-from runtime.clock import PacedClock
+from runtime.timing.clock import PacedClock
 
 LEAD_S: Final = 0.02
 """Time is held so much later than it is asked for: by then the emulator knows of it, however it was busy."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
-    from runtime.time_control import TimeControl
+    from runtime.timing.time_control import TimeControl
 
 
 class TimeKeys:

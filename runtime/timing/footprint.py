@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final, TypedDict
 
 from runtime.kernels import compiled_signatures
-from runtime.memory import MemoryPolicy
+from runtime.timing.memory import MemoryPolicy
 
 _MEGA: Final = 1e6
 _START_FIELD: Final = 19

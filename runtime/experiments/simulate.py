@@ -19,11 +19,11 @@ from drivers.emulator.device import EmulatedRobot, Truth
 from drivers.emulator.memory import MemoryLine, OnBytes
 from drivers.messages import LinkCounts, Pose
 from perception.pipeline import Perception
-from runtime.allowance import QUANTA_PER_CYCLE, Allowance, Quanta
-from runtime.books import Books
 from runtime.commanding import gather, give
 from runtime.modes import Mode, Request
 from runtime.step import CycleRecord, Edit, State, Wish, step, take_over
+from runtime.timing.allowance import QUANTA_PER_CYCLE, Allowance, Quanta
+from runtime.timing.books import Books
 
 SETTLING_S: Final = 1.0
 """How long a robot that has arrived still listens, so that the last echoes count."""

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-from runtime.clock import run_clock
+from runtime.timing.clock import run_clock
 
 
 class Reading(NamedTuple):

@@ -13,12 +13,12 @@ from config.settings import Settings
 from config.world import BoxConfig, WorldConfig
 from drivers.messages import Firing
 from perception.pipeline import Perception, SeenObject
-from runtime.books import Books, worst_of
 from runtime.drawing.geometry import CHI2_95
-from runtime.experiment import DrumRow, Outcome, against_truth, nearest_pairs
-from runtime.first_fix import FirstFix, FixWatch, summarise_fixes
-from runtime.scene_names import SceneName
-from runtime.scenes import Hall, halls, readings
+from runtime.experiments.experiment import DrumRow, Outcome, against_truth, nearest_pairs
+from runtime.experiments.first_fix import FirstFix, FixWatch, summarise_fixes
+from runtime.experiments.scene_names import SceneName
+from runtime.experiments.scenes import Hall, halls, readings
+from runtime.timing.books import Books, worst_of
 
 _QUARTER_TURN: Final = 0.5 * math.pi
 RADIUS_TOLERANCE_M: Final = 0.01

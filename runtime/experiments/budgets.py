@@ -18,11 +18,11 @@ from config.settings import Settings
 from config.world import WorldConfig
 from drivers.emulator.device import Truth
 from drivers.messages import Pose
-from runtime.allowance import Allowance
-from runtime.experiment import GATE_M, SECONDS_MAX, against_truth, estimates, refuse_unfinished
-from runtime.long_hall import WAY_M, long_hall
-from runtime.simulate import simulate
+from runtime.experiments.experiment import GATE_M, SECONDS_MAX, against_truth, estimates, refuse_unfinished
+from runtime.experiments.long_hall import WAY_M, long_hall
+from runtime.experiments.simulate import simulate
 from runtime.step import CycleRecord, State
+from runtime.timing.allowance import Allowance
 
 QUANTA_PER_FIRING: Final = 50
 """So many that time, and nothing else, ends refinement."""

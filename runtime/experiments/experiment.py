@@ -13,12 +13,12 @@ from config.units import FOOT_M
 from config.world import WorldConfig
 from drivers.emulator.memory import OnBytes
 from drivers.messages import Pose
-from runtime.books import Quantiles, worst_of
 from runtime.complaint import FAILED, Complaint
+from runtime.experiments.simulate import Simulated, simulate
 from runtime.modes import Mode
-from runtime.simulate import Simulated, simulate
 from runtime.step import CycleRecord, State
 from runtime.summary import object_row
+from runtime.timing.books import Quantiles, worst_of
 
 GATE_M: Final = FOOT_M
 """An estimate farther than a foot from every drum is a false one."""

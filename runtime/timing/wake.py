@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from typing import Final, Protocol
 
-from runtime.clock import run_clock
+from runtime.timing.clock import run_clock
 
 _COUNT_BYTES: Final = 8
 """What is read from a timerfd: how often it fired."""

@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, NamedTuple, ParamSpec, TypedDict, TypeVar
 
-from runtime.books import Books, Series, Spread
-from runtime.meter import Reading
-from runtime.pacing import Begun
-from runtime.phases import Phase
-from runtime.watch import Sight
+from runtime.timing.books import Books, Series, Spread
+from runtime.timing.meter import Reading
+from runtime.timing.pacing import Begun
+from runtime.timing.phases import Phase
+from runtime.timing.watch import Sight
 
 P = ParamSpec("P")
 R = TypeVar("R")
