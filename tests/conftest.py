@@ -29,6 +29,9 @@ TERMINAL = ("COLUMNS", "LINES", "FORCE_COLOR", "NO_COLOR", "CLICOLOR", "CLICOLOR
             "TTY_INTERACTIVE", "PY_COLORS", "JUPYTER_COLUMNS", "JUPYTER_LINES")  # fmt: skip
 """What decides how wide and how colourful output is; CI systems like to set it."""
 
+WITH_KERNELS = [Path(__file__).parent / room for room in ("perception", "drivers")]
+"""Where the tests of kernels are."""
+
 for _name in TERMINAL:
     os.environ.pop(_name, None)
 
@@ -57,6 +60,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     promises.collect(config, items)
+    for item in items:
+        if any(item.path.is_relative_to(room) for room in WITH_KERNELS):
+            item.add_marker("kernels")
     slow = slowed_down()
     if slow is None:
         return

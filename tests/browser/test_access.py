@@ -10,7 +10,7 @@ from playwright.async_api import expect
 from tests.browser.fake import PAGE, FakeServer
 from tests.browser.opened import DESK, PHONE, PROJECTOR, Opened, Opener
 
-pytestmark = [pytest.mark.realtime, pytest.mark.asyncio(loop_scope="session")]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 PANELS = ("Objects", "Drive", "Layers", "Tune", "Time", "Log")
 MODES = ("drive", "ready", "connecting", "safe_stop", "fault")

@@ -12,7 +12,7 @@ from tests.browser.fake import FakeServer
 from tests.browser.hall import DRUMS, RADIUS
 from tests.browser.opened import PHONE, Opened, Opener
 
-pytestmark = [pytest.mark.realtime, pytest.mark.asyncio(loop_scope="session")]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 GAIN = "behaviors.avoid_static_obstacle.avoid_obstacle_gain"
 

@@ -9,7 +9,7 @@ from tests.browser.fake import FakeServer
 from tests.browser.hall import DRUMS, Hall, greeting
 from tests.browser.opened import PHONE, Opened, Opener, until
 
-pytestmark = [pytest.mark.realtime, pytest.mark.asyncio(loop_scope="session")]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
 async def picture(opened: Opened) -> str:

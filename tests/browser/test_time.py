@@ -12,7 +12,7 @@ from tests.browser.fake import TOKEN, FakeServer
 from tests.browser.hall import greeting
 from tests.browser.opened import Opener
 
-pytestmark = [pytest.mark.realtime, pytest.mark.asyncio(loop_scope="session")]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
 async def test_pause_single_step_and_speed(server: FakeServer, opener: Opener) -> None:
