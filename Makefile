@@ -21,8 +21,8 @@ lint: $(VENV)/test.stamp
 # Kernels are tested compiled, and once more as plain Python: only so does coverage see into them. What watches the clock
 # mostly waits: two of a kind, and nothing beside them.
 tests: $(VENV)/test.stamp
-	$(BIN)/python -m pytest -q -n auto -m "kernels and not realtime and not soak"
-	$(BIN)/python -m pytest -q -n auto -m "not kernels and not realtime and not soak" --cov --cov-report=
+	$(BIN)/python -m pytest -q -n auto -m "(kernels or compiled) and not realtime and not soak"
+	$(BIN)/python -m pytest -q -n auto -m "not (kernels or compiled) and not realtime and not soak" --cov --cov-report=
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -n auto -m "kernels and not realtime and not compiled and not soak" \
 		--cov --cov-append --cov-report=term:skip-covered --cov-fail-under=90
 	$(BIN)/python -m pytest -q -n 2 -m "realtime and not soak"
