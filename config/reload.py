@@ -87,11 +87,7 @@ class Reload:
     """Why nothing was taken over, one line each; empty where it was."""
 
 
-def reload(
-    current: Settings,
-    propose: Callable[[], Settings],
-    hindrance: Callable[[Settings, Settings], str | None] = lambda _current, _proposed: None,
-) -> Reload:
+def reload(current: Settings, propose: Callable[[], Settings]) -> Reload:
     """Return the settings in force after an attempt to change them.
 
     Parameters
@@ -100,8 +96,6 @@ def reload(
         In force so far; never touched.
     propose
         Loads and validates the new ones whole; raises ConfigError where they are no good.
-    hindrance
-        Says of settings in force and of good new ones why this very process cannot go from one to the other.
     """
     try:
         proposed = propose()
@@ -111,9 +105,6 @@ def reload(
     fixed = tuple(f"{d}: needs a restart" for d in changed if not d.live)
     if fixed:
         return Reload(current, problems=fixed)
-    hindered = hindrance(current, proposed) if changed else None
-    if hindered is not None:
-        return Reload(current, problems=(hindered,))
     return Reload(proposed, changed) if changed else Reload(current)
 
 

@@ -78,22 +78,6 @@ def needed(settings: Settings) -> tuple[str, ...]:
     return (EMULATOR, settings.perception.method, *polygons)
 
 
-def hindrance(running: Settings, proposed: Settings) -> str | None:
-    """Return why a running process cannot go on with other settings: kernels would be compiled while it drives.
-
-    Parameters
-    ----------
-    running, proposed : Settings
-        Those in force, for which everything was compiled or loaded at the start, and those to be taken over.
-    """
-    if is_interpreted() or set(needed(proposed)) <= set(needed(running)):
-        return None
-    return (
-        "models: the first one without arc_radius_m needs kernels that are readied at the start, and compiling them "
-        "now would hold the robot up: start with such a model, e.g. `--set models=box`; then more can be added live"
-    )
-
-
 def missing(folder: Path, parts: Iterable[str]) -> list[str]:
     """Return those of the parts that were never compiled into `folder`."""
     return [part for part in parts if not (folder / part).exists()]

@@ -7,15 +7,17 @@ the start of a cycle (`RobotProcess.reconfigure`).
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Awaitable, Callable
+from typing import TYPE_CHECKING, TypeAlias
 
 from config.reload import Reload, reload
 from config.settings import Settings
-from runtime.kernels import hindrance
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
+
+Ready: TypeAlias = Callable[[Settings, Settings], Awaitable[str | None]]
+"""Has this process readied to go from settings in force to other ones; says why it cannot. See `runtime.readying`."""
 
 
 class Reloader:
@@ -31,6 +33,8 @@ class Reloader:
         Gets settings that are good, differ from the last ones, and need no restart. Called in the loop.
     log : structlog logger
         Told of every attempt.
+    ready : Ready
+        Awaited before anything is taken over.
     """
 
     def __init__(
@@ -39,11 +43,13 @@ class Reloader:
         propose: Callable[[], Settings],
         take_over: Callable[[Settings], None],
         log: FilteringBoundLogger,
+        ready: Ready,
     ) -> None:
         self.current = current
         self._propose = propose
         self._take_over = take_over
         self._log = log
+        self._ready = ready
         self.on_taken: Callable[[Settings], None] = lambda _settings: None
         """Told of settings that were taken over from the files."""
         self._under_way: asyncio.Task[None] | None = None
@@ -80,7 +86,9 @@ class Reloader:
         while True:
             self._again = False
             try:
-                self._conclude(await asyncio.to_thread(reload, self.current, self._propose, hindrance))
+                outcome = await asyncio.to_thread(reload, self.current, self._propose)
+                why_not = await self._ready(self.current, outcome.settings)
+                self._conclude(outcome if why_not is None else Reload(self.current, problems=(why_not,)))
             except Exception as error:  # noqa: BLE001 - a reload that fails must not end a run that goes well
                 self._log.error(
                     "the configuration is kept: reading it failed", error=f"{type(error).__name__}: {error}"

@@ -1,7 +1,8 @@
 """Running every kernel once, part by part: what was never compiled is compiled then, what was is loaded.
 
 Two processes that compile the same kernel do the same work twice, so a helper takes a part that the first process
-comes to last: `python -m runtime.warming full` compiles the refinement of circles, `… polygons` that of polygons.
+comes to last: `python -m runtime.warming full` compiles the refinement of circles, `… polygons` that of polygons,
+`… polygons whole` all that belongs to polygons, for a robot that drives meanwhile.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
-from runtime.kernels import CIRCLES, EMULATOR, PAPER, POLYGONS, use_cache
+from runtime.kernels import CIRCLES, EMULATOR, PAPER, POLYGONS, compile_parts, use_cache
 
 if TYPE_CHECKING:
     from config.model import ModelConfig
@@ -157,6 +158,15 @@ def help_with(part: str) -> None:
     refine(handle, full.fresh_share)
 
 
+def compile_whole(part: str) -> None:
+    """Compile a part for others, in whose way this process is not to be."""
+    from config.load import load_settings
+
+    with contextlib.suppress(OSError):
+        os.nice(19)
+    compile_parts(load_settings(None), use_cache(), [part])
+
+
 if __name__ == "__main__":
     use_cache()
-    help_with(sys.argv[1])
+    (compile_whole if sys.argv[2:] == ["whole"] else help_with)(sys.argv[1])

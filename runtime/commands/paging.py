@@ -12,6 +12,7 @@ from runtime.console.frames import RecordingNow
 from runtime.console.overtime import Overtime
 from runtime.console.player import Players
 from runtime.recording.folder import recordings_folder
+from runtime.reload import Ready
 from runtime.tables import Units
 
 if TYPE_CHECKING:
@@ -57,6 +58,7 @@ async def paged(
     settings: Settings,
     log: FilteringBoundLogger,
     take_over: Callable[[Settings], None],
+    ready: Ready,
     keeping: Keeping,
     control: TimeControl,
     *,
@@ -67,7 +69,7 @@ async def paged(
 
     Parameters
     ----------
-    process, settings, log, take_over, emulated, units
+    process, settings, log, take_over, ready, emulated, units
         As of `Console`.
     keeping : Keeping
         The run's.
@@ -86,7 +88,7 @@ async def paged(
 
     players = Players(recordings_folder(settings.recording), PLAYED, current, units)
     console = Console(
-        process, settings, log, take_over, emulated=emulated, units=units,
+        process, settings, log, take_over, ready, emulated=emulated, units=units,
         overtime=Overtime(control, recording, players),
     )  # fmt: skip
     try:

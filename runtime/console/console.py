@@ -34,6 +34,7 @@ from runtime.console.stepped import stepped
 from runtime.console.tuning import Tuning
 from runtime.health import told
 from runtime.process import CONSOLE_FRAME, CONSOLE_RECEIVE
+from runtime.reload import Ready
 from runtime.step import CycleRecord, State
 from runtime.tables import Units
 from runtime.timing.books import Books
@@ -62,6 +63,8 @@ class Console:
         Told of who comes and goes, and of who was refused what.
     take_over : callable
         Gets settings that were changed from the page.
+    ready : Ready
+        Awaited before a further model is looked for.
     emulated : bool
         Whether the settings' world is what the robot meets.
     units : {"m", "ft"}
@@ -87,6 +90,7 @@ class Console:
         settings: Settings,
         log: FilteringBoundLogger,
         take_over: Callable[[Settings], None],
+        ready: Ready,
         *,
         emulated: bool,
         units: Units = "m",
@@ -107,7 +111,7 @@ class Console:
         self._take_over = take_over
         self._shown = settings
         self.hub = Hub(self._limits, clock, self._control_left)
-        self.tuning = Tuning(settings, self._tuned, emulated=emulated)
+        self.tuning = Tuning(settings, self._tuned, ready, emulated=emulated)
         self.desk = Desk(process, self.hub, self.tuning, self._overtime, self._notes, self._spawn, clock)
         timed = process.keeper.timed
         self._timed_frame = timed(CONSOLE_FRAME, self._frame)

@@ -133,8 +133,10 @@ class Desk:
                 self._wish(message)
             case forms.TakeControl() | forms.GiveControl() | forms.Grant():
                 self._hand_over(client, message)
-            case forms.Set() | forms.Undo() | forms.LoadModel() | forms.SaveToml():
+            case forms.Set() | forms.Undo() | forms.SaveToml():
                 return self._tune(message)
+            case forms.LoadModel(toml=toml):
+                return self._begin(client, message.id, lambda: self._load(toml))
             case forms.Evidence(object=number):
                 return self._evidence(number)
             case (
@@ -169,17 +171,18 @@ class Desk:
         if why_not is not None:
             raise Refusal(why_not)
 
-    def _tune(self, message: forms.Set | forms.Undo | forms.LoadModel | forms.SaveToml) -> Any:  # noqa: ANN401
+    def _tune(self, message: forms.Set | forms.Undo | forms.SaveToml) -> Any:  # noqa: ANN401
         match message:
             case forms.Set(path=path, value=value):
                 return _rows(self._tuning.set(path, value))
             case forms.Undo():
                 rows = _rows(self._tuning.undo())
                 return rows[0] if len(rows) == 1 else rows
-            case forms.LoadModel(toml=toml):
-                return {"name": self._tuning.add_model(toml).name}
             case forms.SaveToml():
                 return self._tuning.saved()
+
+    async def _load(self, toml: str) -> dict[str, str]:
+        return {"name": (await self._tuning.add_model(toml)).name}
 
     def _evidence(self, number: int) -> dict[str, Any]:
         found = self._robot.evidence(number)

@@ -15,12 +15,12 @@ from config.layers import Location
 from config.load import MODELS_MAX, ConfigError, model_in, with_value
 from config.model import ModelConfig
 from config.problems import shown
-from config.reload import Difference, differences, reload
+from config.reload import Difference, Reload, differences, reload
 from config.settings import Settings
 from runtime.commands.firing import refuse_impossible_firing
 from runtime.complaint import Complaint
 from runtime.console.refusal import Refusal
-from runtime.kernels import hindrance
+from runtime.reload import Ready
 
 UNDO_MAX: Final = 100
 PAGE: Final = "page"
@@ -37,14 +37,19 @@ class Tuning:
         What the run was started with.
     take_over : callable
         Gets settings that are good and that a running process follows.
+    ready : Ready
+        Awaited before a further model is looked for.
     emulated : bool
         Whether the port is an emulator's, which nobody wants to find in a file.
     """
 
-    def __init__(self, current: Settings, take_over: Callable[[Settings], None], *, emulated: bool) -> None:
+    def __init__(
+        self, current: Settings, take_over: Callable[[Settings], None], ready: Ready, *, emulated: bool
+    ) -> None:
         self.current = current
         self._first = current
         self._take_over = take_over
+        self._ready = ready
         self._emulated = emulated
         self._before: list[Settings] = []
 
@@ -69,8 +74,8 @@ class Tuning:
             given = value  # type: ignore[assignment]
         return self._try(path, lambda: with_value(self.current, PAGE, location, given), f" = {shown(value)}")
 
-    def add_model(self, toml: str) -> ModelConfig:
-        """Look for a further model; return it.
+    async def add_model(self, toml: str) -> ModelConfig:
+        """Look for a further model, as soon as this process can; return it.
 
         Raises
         ------
@@ -81,11 +86,18 @@ class Tuning:
             model = model_in(toml, "model")
         except ConfigError as error:
             raise Refusal(str(error), "toml") from None
-        models = self.current.models
-        if len(models) >= MODELS_MAX:
-            raise Refusal(f"{MODELS_MAX} models are looked for already: that is the most there may be", "toml")
-        before, tables = self._before, [m.model_dump(mode="json") for m in (*models, model)]
-        self._try("toml", lambda: with_value(self.current, PAGE, ("models",), tables))
+
+        def proposed() -> Settings:
+            models = (*self.current.models, model)
+            if len(models) > MODELS_MAX:
+                raise Refusal(f"{MODELS_MAX} models are looked for already: that is the most there may be", "toml")
+            return with_value(self.current, PAGE, ("models",), [m.model_dump(mode="json") for m in models])
+
+        why_not = await self._ready(self.current, self._weighed("toml", proposed).settings)
+        if why_not is not None:
+            raise Refusal(why_not, "toml")
+        before = self._before
+        self._try("toml", proposed)
         # A model cannot be forgotten while the robot runs: what is taken back from now on are other changes.
         self._before = [settings.model_copy(update={"models": self.current.models}) for settings in before]
         return model
@@ -119,6 +131,16 @@ class Tuning:
         return self.current.ring.firing.model_dump(mode="json")
 
     def _try(self, path: str, propose: Callable[[], Settings], given: str = "") -> tuple[Difference, ...]:
+        outcome = self._weighed(path, propose, given)
+        if outcome.changed:
+            self._before = [*self._before[-UNDO_MAX + 1 :], self.current]
+            self.current = outcome.settings
+            self._take_over(outcome.settings)
+        return outcome.changed
+
+    def _weighed(self, path: str, propose: Callable[[], Settings], given: str = "") -> Reload:
+        """Return what a change comes to, or refuse it; nothing is taken over."""
+
         def proposed() -> Settings:
             settings = propose()
             try:
@@ -127,14 +149,10 @@ class Tuning:
                 raise ConfigError(str(complaint)) from complaint
             return settings
 
-        outcome = reload(self.current, proposed, hindrance)
+        outcome = reload(self.current, proposed)
         if outcome.problems:
             raise Refusal("; ".join(_beside(path, given, line) for line in outcome.problems), path)
-        if outcome.changed:
-            self._before = [*self._before[-UNDO_MAX + 1 :], self.current]
-            self.current = outcome.settings
-            self._take_over(outcome.settings)
-        return outcome.changed
+        return outcome
 
 
 def _beside(path: str, given: str, line: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import random
 import signal
 import threading
@@ -24,6 +25,7 @@ from runtime.emulated import emulator
 from runtime.logs import open_log
 from runtime.modes import Mode, Request
 from runtime.process import Observers, RobotProcess
+from runtime.readying import Readying
 from runtime.recording.channels import LOG
 from runtime.recording.reading import open_recording
 from runtime.step import CycleRecord, State
@@ -242,7 +244,7 @@ async def test_halt_from_a_page_in_time(tmp_path: Path, measured: Callable[[str]
             process = operator.process = RobotProcess(
                 on_port(settings, port), log, Observers(on_cycle, on_bytes=on_bytes)
             )
-            console = Console(process, settings, log, process.reconfigure, emulated=True)
+            console = Console(process, settings, log, process.reconfigure, Readying(log), emulated=True)
             async with console.open():
                 operator.url = console.url
                 deaf = await asyncio.to_thread(RawPage, console.url)
@@ -259,3 +261,28 @@ async def test_halt_from_a_page_in_time(tmp_path: Path, measured: Callable[[str]
         f"{TRIALS} HALTs from a page, cycles busy for {1e3 * BUSY_S:g} ms, another page that never reads: "
         f"on the line ≤ {wait_ms:.1f} ms later (control {control_ms:.1f})"
     )
+
+
+BOX = 'name = "crate"\nclosed = true\nvertices_m = [[0.4, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.4, -0.3]]\n'
+
+
+@stalls_excused
+def test_the_first_model_with_corners_while_it_drives(tmp_path: Path) -> None:
+    """Its kernels are readied beside the cycle: the robot drives on, and none is compiled or loaded later."""
+    summary = tmp_path / "summary.json"
+    with emulated(tmp_path) as robot, running(
+        tmp_path, "run", "run", "--port", robot.port, "--arm", "--no-record", "--json", str(summary), *FREE_PORT
+    ) as run:  # fmt: skip
+        page = RawPage(start_url(run))
+        assert page.ask(type="take_control")["ok"]
+        run.comes_to("DRIVE")
+        assert page.ask(type="load_model", toml=BOX)["data"] == {"name": "crate"}
+        assert page.ask(type="place_model", model="crate", x=2.0, y=1.0, theta=0.3)["ok"]
+        seen = next(o for o in page.next("state")["objects"] if o["model"] == "crate")
+        assert page.ask(type="evidence", object=seen["number"])["ok"]
+        assert page.ask(type="reject_object", object=seen["number"])["ok"]
+        page.close()
+        run.signal(signal.SIGTERM)
+        assert run.end() == 0
+        assert run.modes() == ["READY", "DRIVE"], run.err
+    assert json.loads(summary.read_text("utf-8"))["process"]["compilations"] == 0

@@ -9,6 +9,8 @@ ACCEPTED: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         "drivers/denning/codec.py": {
             "encode: True → False": "a layout's fields and codes are written side by side and are equally many",
+            "encode: low <= value <= high → low < value <= high": "what is on the bound is checked twice, and passes",
+            "encode: low <= value <= high → low <= value < high": "what is on the bound is checked twice, and passes",
         },
         "drivers/firing.py": {
             "_check_step: step_period_s >= needed_s - _TOLERANCE_S → step_period_s > needed_s - _TOLERANCE_S": (

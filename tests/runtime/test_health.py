@@ -25,6 +25,7 @@ from runtime.logs import LogStanding
 from runtime.modes import Mode, Request
 from runtime.notify import Notifier
 from runtime.process import Observers, RobotProcess
+from runtime.readying import Readying
 from runtime.recording.folder import OneFile
 from runtime.recording.recorder import Recorder
 from runtime.recording.writer import RecordingWriter
@@ -303,7 +304,7 @@ def test_the_reload_that_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
     def prepare(process: RobotProcess) -> None:
         from tests.recorded import hall
 
-        reloaders.append(Reloader(hall(), lambda: hall(), process.reconfigure, log))
+        reloaders.append(Reloader(hall(), lambda: hall(), process.reconfigure, log, Readying(log)))
         process.health.watch("reload", reloaders[0].probe)
 
     def plant(_process: RobotProcess, loop: VirtualLoop) -> None:

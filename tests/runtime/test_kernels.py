@@ -18,7 +18,6 @@ from rich.console import Console
 
 import runtime.kernels as kernels
 from config.load import load_settings
-from config.reload import reload
 from config.settings import Settings
 from perception.full import entry
 from runtime import warming
@@ -130,26 +129,6 @@ def test_only_what_a_run_needs_is_compiled() -> None:
     assert set(warming.RUN_ONCE) == set(kernels.PARTS)
 
 
-def test_a_running_process_takes_over_no_model_whose_kernels_it_has_not_readied(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
-    round_one, drums = load_settings("hallway"), load_settings("hallway", models=["semicircle", "drum"])
-    boxes = load_settings("hallway", models=["semicircle", "box"])
-    told = kernels.hindrance(round_one, boxes)
-    assert told is not None
-    assert "start with such a model" in told
-    assert kernels.hindrance(round_one, drums) is None
-    assert kernels.hindrance(boxes, boxes) is None
-    paper = ["perception.method=paper"]
-    assert kernels.hindrance(load_settings("hallway", paper), load_settings("hallway", paper, models=["box"])) is None
-    refused = reload(round_one, lambda: boxes, kernels.hindrance)
-    assert (refused.settings, refused.problems) == (round_one, (told,))
-    assert reload(round_one, lambda: round_one, kernels.hindrance).problems == ()
-    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
-    assert kernels.hindrance(round_one, boxes) is None, "nothing is compiled"
-
-
 def test_each_part_is_compiled_once_and_warmed_up_ever_after(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(home))
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
@@ -238,7 +217,7 @@ def test_a_helper_that_hangs_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
 
 COMPILED_LATER = """
 import sys
-from runtime.kernels import ready_kernels, use_cache
+from runtime.kernels import needed, ready_kernels, use_cache
 use_cache()
 from config.load import load_settings
 from rich.console import Console
@@ -254,12 +233,11 @@ from perception.edits import (
     ClearMap, ConfirmObject, DeleteSegments, MoveObject, PinSegments, PlaceModel, RejectObject,
 )
 from runtime.console.frames import Beside, Frames
-from runtime.kernels import hindrance
 from runtime.modes import Mode, Request
 from runtime.experiments.simulate import Said, simulate
 
 further = settings.model_copy(update={"models": (*settings.models, load_model(sys.argv[3]))})
-assert hindrance(settings, further) is None
+assert set(needed(further)) <= set(needed(settings))
 
 frames = Frames(settings)
 

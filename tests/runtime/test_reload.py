@@ -30,8 +30,14 @@ class Scripted:
         self.threads: set[int] = set()
         self.taken: list[Settings] = []
         self.log = LogCapture()
+        self.readied: list[tuple[Settings, Settings]] = []
+        self.why_not: str | None = None
         logger: Any = structlog.wrap_logger(structlog.PrintLogger(), processors=[self.log])
-        self.reloader = Reloader(BEFORE, self._propose, self.taken.append, logger)
+        self.reloader = Reloader(BEFORE, self._propose, self.taken.append, logger, self._ready)
+
+    async def _ready(self, running: Settings, proposed: Settings) -> str | None:
+        self.readied.append((running, proposed))
+        return self.why_not
 
     def _propose(self) -> Settings:
         self.threads.add(threading.get_ident())
@@ -62,6 +68,16 @@ async def test_the_last_good_one_is_kept_until_a_better_one_comes() -> None:
     assert await script.attempt() == "the configuration is as before"
     assert script.taken == [SLOWER]
     assert threading.get_ident() not in script.threads
+
+
+async def test_what_the_process_cannot_be_readied_for_is_not_taken_over() -> None:
+    script = Scripted(SLOWER, SLOWER)
+    script.why_not = "models: no kernels"
+    assert await script.attempt() == "the configuration is kept"
+    assert (script.log.entries[-1]["problem"], script.taken) == ("models: no kernels", [])
+    script.why_not = None
+    assert await script.attempt() == "the configuration is taken over"
+    assert script.readied == [(BEFORE, SLOWER)] * 2
 
 
 async def test_asked_again_while_it_reads_it_reads_once_more() -> None:

@@ -77,14 +77,14 @@ export class Connection extends Emitter {
   }
 
   // Sends a message and resolves to its answer's data; rejects with a Refusal that says why not.
-  ask(message) {
+  ask(message, patience_ms = ANSWER_MAX_MS) {
     return new Promise((resolve, refuse) => {
       const id = this.#put(message, refuse);
       if (id === null) return;
       const timer = setTimeout(() => {
         this.#asked.delete(id);
-        refuse(new Refusal(`no answer to "${message.type}" in ${ANSWER_MAX_MS / 1000} s`, { answered: false }));
-      }, ANSWER_MAX_MS);
+        refuse(new Refusal(`no answer to "${message.type}" in ${patience_ms / 1000} s`, { answered: false }));
+      }, patience_ms);
       this.#asked.set(id, { resolve, refuse, timer });
     });
   }

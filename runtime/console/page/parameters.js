@@ -5,6 +5,7 @@ import { byId, download, el, mark, say } from "./dom.js";
 
 const GAIN = /^behaviors\.(?!arbiter)[a-z_]+\.[a-z_]*gain$/;
 const MODEL_BYTES_MAX = 60_000;
+const LOADING_MAX_MS = 600_000; // the first model with corners may have to wait for a compiler
 
 export class Parameters {
   #fields = new Map(); // path → the fields that show it
@@ -160,7 +161,7 @@ export class Parameters {
       return;
     }
     try {
-      await this.connection.ask({ type: "load_model", toml: await file.text() });
+      await this.connection.ask({ type: "load_model", toml: await file.text() }, LOADING_MAX_MS);
       this.notices.toast(`${file.name} is loaded`);
     } catch (problem) {
       say(error, problem.message);

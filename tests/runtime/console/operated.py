@@ -27,6 +27,7 @@ from runtime.console.overtime import Overtime
 from runtime.health import Health
 from runtime.modes import Mode, ModeState, Request
 from runtime.process import CALLBACKS
+from runtime.readying import Readying
 from runtime.step import CycleRecord, Inputs, Refused, State
 from runtime.timing.books import Books
 from runtime.timing.meter import Meter
@@ -212,7 +213,7 @@ async def operated(
     settings = load_settings("hallway", ["perception.method=paper", FREE_PORT, *sets])
     run = FakeRun(settings, log)
     console = Console(
-        run, settings, log, run.reconfigure, emulated=emulated, overtime=overtime, limits=limits,
+        run, settings, log, run.reconfigure, Readying(log), emulated=emulated, overtime=overtime, limits=limits,
         clock=lambda: clock[0],
     )  # fmt: skip
     before = asyncio.all_tasks()

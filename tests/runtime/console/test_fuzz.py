@@ -22,6 +22,7 @@ from runtime.console.forms import BadMessage, read_message
 from runtime.console.limits import Limits
 from runtime.modes import Mode, Request
 from runtime.process import Observers, RobotProcess
+from runtime.readying import Readying
 from runtime.step import CycleRecord, State
 from runtime.timing.books import Books
 from tests.runtime.console.operated import FREE_PORT, Operated, operated
@@ -206,8 +207,9 @@ def test_a_whole_process_does_not_move(monkeypatch: pytest.MonkeyPatch, *, armed
         start = robot.truth.pose
         process = RobotProcess(settings, log, Observers(on_cycle), loop.time)
         console = Console(
-            process, settings, log, process.reconfigure, emulated=True, limits=BOUNDLESS, clock=loop.time
-        )
+            process, settings, log, process.reconfigure, Readying(log), emulated=True,
+            limits=BOUNDLESS, clock=loop.time,
+        )  # fmt: skip
         controller, watcher = (console.hub.join(NoWire(), name, {}, has_token=True) for name in ("first", "second"))
         summary = loop.run_until_complete(process.run(arm=False, seconds=None))
         assert robot.truth.pose == start
