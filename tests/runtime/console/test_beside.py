@@ -23,9 +23,9 @@ from runtime.process import Observers, RobotProcess
 from runtime.step import CycleRecord, State
 from runtime.timing.books import Books
 from runtime.timing.clock import PacedClock
-from tests.console.test_players import PROGRAM, Page
 from tests.hil.machine import PATIENCE_S, stalls_excused
 from tests.recorded import hall, record
+from tests.runtime.console.test_players import PROGRAM, Page
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 

@@ -13,8 +13,8 @@ from runtime.console.playback import KEPT_BYTES, LOOK_BACK, Playback
 from runtime.recording.channels import ABOUT, BOOKMARK, CYCLE, KEYFRAME, Entry, encode
 from runtime.recording.forms import Bookmark
 from runtime.recording.reading import RecordingError, open_recording
-from tests.console.building import told
 from tests.recorded import entries_of, hall, record, rewrite
+from tests.runtime.console.building import told
 
 pytestmark = pytest.mark.compiled
 

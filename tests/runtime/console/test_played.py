@@ -18,8 +18,8 @@ from runtime.experiments.simulate import Said
 from runtime.modes import Mode, Request
 from runtime.recording.reading import open_recording, settings_in
 from runtime.step import State
-from tests.console.test_players import Page, until
 from tests.recorded import hall, record
+from tests.runtime.console.test_players import Page, until
 
 SECONDS = 5.0
 

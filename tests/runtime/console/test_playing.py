@@ -14,8 +14,8 @@ import pytest
 from runtime.console.playback import Playback
 from runtime.console.playing import FRAME_S, Picture, Player
 from runtime.recording.reading import open_recording, settings_in
-from tests.console.building import make
 from tests.recorded import hall, record
+from tests.runtime.console.building import make
 
 pytestmark = pytest.mark.compiled
 

@@ -22,7 +22,7 @@ from tests.recorded import hall, record
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
-PROGRAM = "tests.console.building"
+PROGRAM = "tests.runtime.console.building"
 
 
 @pytest.fixture(scope="module")
@@ -146,7 +146,7 @@ async def test_a_player_that_dies_is_told(folder: Path) -> None:
 
 
 async def test_a_program_that_is_none_is_told_in_a_line(folder: Path) -> None:
-    made = Players(folder, "tests.console.no_such", lambda: None)
+    made = Players(folder, "tests.runtime.console.no_such", lambda: None)
     with pytest.raises(PlayerError, match="no_such"):
         await made.open(Page(), "hall.mcap")
 
