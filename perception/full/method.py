@@ -21,7 +21,8 @@ from perception.full.editing import edit_memory, row_of
 from perception.full.entry import hold, observe, pquantum, quantum, sure_circles
 from perception.full.evidence import evidence_of
 from perception.full.heirs import inherit, number_heirs
-from perception.full.pins import Pins, listed
+from perception.full.listing import drawn, listed
+from perception.full.pins import Pins
 from perception.full.report import (
     POLYGON_PROBABILITY,
     TOLD,
@@ -37,9 +38,6 @@ from perception.full.state import KIND, MODEL, PPROB, PROB, PT, SEGMENTS, ST, cl
 from perception.kernel import Floats
 from perception.seen import SeenObject, Tally
 from perception.segments import mounts_array
-
-DRAWN_M: Final = 0.1
-"""Length at which a mapped segment is shown; the map keeps its middle and normal."""
 
 
 class FullPerception:
@@ -162,14 +160,13 @@ class FullPerception:
 
     def segments_now(self) -> Floats:
         """Return the mapped segments: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""
-        return self.segments().ends
+        return drawn(listed(self.memory)[2])
 
     def segments(self) -> Segments:
         """Return the outline segments in the map with all that is known of them."""
         numbers, times, rows = listed(self.memory)
-        along = 0.5 * DRAWN_M * np.column_stack([-rows[:, 3], rows[:, 2]])
-        ends = np.column_stack([rows[:, :2] - along, rows[:, :2] + along, np.arctan2(rows[:, 3], rows[:, 2])])
-        return Segments(numbers, ends, times, np.isin(numbers, self._pins.numbers.astype(np.int64)).astype(np.int64))
+        pinned = np.isin(numbers, self._pins.numbers.astype(np.int64)) if self._pins.count else np.zeros(len(numbers))
+        return Segments(numbers, drawn(rows), times, pinned.astype(np.int64))
 
     def edit(self, edit: Edit) -> str | None:
         """Do what a person says; return None, or why it cannot be done."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from perception.full.births import CELL_M
 from perception.full.pairs import map_add
-from perception.full.state import STAMP, STAMP_S, State
+from perception.full.state import STAMP, State
 from perception.kernel import Floats, Ints
 
 ROOM: Final = 512
@@ -110,10 +110,3 @@ def delete(s: State, pins: Pins, numbers: Collection[int]) -> set[int]:
         s.fill[k] = len(left)
     pins.remove(gone)
     return set(numbers) - gone
-
-
-def listed(s: State) -> tuple[Ints, Floats, Floats]:
-    """Return the numbers, times (s), and middles and normals (n, 4) of the segments in the map."""
-    used = np.arange(s.store.shape[1]) < s.fill[:, None]
-    stamps = s.stamps[used]
-    return stamps[:, STAMP].astype(np.int64), stamps[:, STAMP_S], s.store[used]

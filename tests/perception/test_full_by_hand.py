@@ -13,8 +13,9 @@ from perception.full.births import CELL_M
 from perception.full.editing import edit_memory
 from perception.full.evidence import weigh_circle
 from perception.full.heirs import inherit
+from perception.full.listing import listed
 from perception.full.pairs import map_add
-from perception.full.pins import Pins, delete, listed, where
+from perception.full.pins import Pins, delete, where
 from perception.full.settings import library, make_settings
 from perception.full.state import (
     BARRED,
