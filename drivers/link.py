@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import termios
 import threading
 import traceback
@@ -182,7 +183,26 @@ class Link:
 
 
 class _Transport(serial_asyncio.SerialTransport):  # type: ignore[misc]  # the library has no types
-    """The library's transport, minus two habits: an unplugged cable is no program error, and an end is an end."""
+    """The library's transport, minus three habits.
+
+    What is written leaves at once, as far as the line takes it: bytes that waited for the loop's next turn would
+    leave after whatever holds that turn up, and a command that was right then may be wrong by minutes. An unplugged
+    cable is no program error. And an end is an end.
+    """
+
+    def write(self, data: bytes) -> None:
+        if self._closing:
+            return
+        if not self.get_write_buffer_size():
+            try:
+                data = data[os.write(self._serial.fileno(), data) :]
+            except BlockingIOError:
+                pass  # the peer does not read: it has to wait after all
+            except OSError as e:
+                self._fatal_error(e)
+                return
+        if data:
+            super().write(data)
 
     def _fatal_error(self, exc: BaseException, _message: str = "") -> None:
         self._abort(exc)
