@@ -6,11 +6,11 @@ import asyncio
 import contextlib
 import os
 import signal
-import sys
 from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from runtime.aside import start_aside
 from runtime.complaint import FAILED, WRONG_CALL, Complaint
 from runtime.run_folder import run_folder
 from runtime.timing.clock import PacedClock
@@ -55,11 +55,8 @@ async def emulator(arguments: Sequence[str], clock: PacedClock | None = None) ->
     """
     with contextlib.ExitStack() as stack:
         port = _folder(stack) / "robot"
-        process = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", "runtime.cli", "emulate", "--link", str(port), "--end-with-parent", "--control",
-            *arguments, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
-            start_new_session=True, env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
-        )  # fmt: skip
+        words = ["emulate", "--link", str(port), "--end-with-parent", "--control", *arguments]
+        process = await start_aside("runtime.cli", words, talks=True)
         listener: asyncio.Task[None] | None = None
         try:
             await _wait_until_ready(process)

@@ -2,7 +2,7 @@
 
 What a run needs is warm before its first cycle, and polygons are half of the work, so a run whose models are all
 round leaves them out. Where the first polygon comes later its kernels are readied before the settings are taken over:
-what was never compiled is compiled in a process of its own, at the lowest precedence, and loaded by a thread, which
+what was never compiled is compiled in a process of its own, behind everything else, and loaded by a thread, which
 lets the loop in between any two kernels.
 """
 
@@ -10,19 +10,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import os
-import sys
 from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING, Final
 
 from config.settings import Settings
+from runtime.aside import end_aside, start_aside
 from runtime.kernels import compiled_signatures, is_interpreted, missing, needed, use_cache, warm_up
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
 COMPILING_MAX_S: Final = 600.0
-"""At the lowest precedence, beside a robot that drives: ten times as long as it usually takes."""
+"""Behind everything else, beside a robot that drives: ten times as long as it usually takes."""
 
 
 class Readying:
@@ -71,16 +70,9 @@ class Readying:
 
 
 async def _compiled(part: str) -> None:
-    quiet = asyncio.subprocess.DEVNULL
-    process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "runtime.warming", part, "whole", stdin=quiet, stdout=quiet, stderr=quiet,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
-    )  # fmt: skip
+    process = await start_aside("runtime.warming", [part, "whole"], talks=False)
     try:
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(process.wait(), COMPILING_MAX_S)
+            await asyncio.wait_for(process.communicate(), COMPILING_MAX_S)
     finally:
-        if process.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-            await process.wait()
+        await end_aside(process)

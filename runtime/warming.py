@@ -8,13 +8,13 @@ comes to last: `python -m runtime.warming full` compiles the refinement of circl
 from __future__ import annotations
 
 import contextlib
-import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
+from runtime.aside import step_back, where_we_are
 from runtime.kernels import CIRCLES, EMULATOR, PAPER, POLYGONS, compile_parts, use_cache
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ def helper(part: str) -> Iterator[None]:
     quiet = subprocess.DEVNULL
     process = subprocess.Popen(  # noqa: S603 - this very program
         [sys.executable, "-m", "runtime.warming", part], stdin=quiet, stdout=quiet, stderr=quiet,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+        env=where_we_are(),
     )  # fmt: skip
     try:
         yield
@@ -162,8 +162,7 @@ def compile_whole(part: str) -> None:
     """Compile a part for others, in whose way this process is not to be."""
     from config.load import load_settings
 
-    with contextlib.suppress(OSError):
-        os.nice(19)
+    step_back()
     compile_parts(load_settings(None), use_cache(), [part])
 
 

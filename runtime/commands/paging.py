@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
     from runtime.commands.keeping import Keeping
-    from runtime.console.seams import Run, TimeControl
+    from runtime.console.seams import Run
+    from runtime.timing.time_control import TimeControl
 
 PLAYED: Final = "runtime.console.played"
 """The program that plays a recording."""

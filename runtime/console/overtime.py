@@ -11,7 +11,8 @@ from typing import Any, TypeAlias
 
 from runtime.console import forms
 from runtime.console.refusal import Refusal
-from runtime.console.seams import NOT_HERE, Player, RecordingControl, TimeControl, Viewer
+from runtime.console.seams import NOT_HERE, Player, RecordingControl, Viewer
+from runtime.timing.time_control import TimeControl
 
 Work: TypeAlias = Callable[[], Awaitable[Any]]
 

@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 
 import orjson
 
-from runtime.console.aside import COMMAND, end_aside, start_aside
+from runtime.aside import COMMAND, end_aside, start_aside
 from runtime.console.playing import ANSWER, HEADER, SPEED_MAX, SPEED_MIN
 from runtime.console.refusal import Refusal
 from runtime.console.seams import Viewer

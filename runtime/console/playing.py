@@ -1,6 +1,6 @@
 """The program that plays a recording: commands come in as lines, frames go out, and in between the step is run again.
 
-It is a process of its own (see `runtime.console.aside`), so it may take as long as it takes. Going somewhere is cut
+It is a process of its own (see `runtime.aside`), so it may take as long as it takes. Going somewhere is cut
 into cycles, and between any two of them the next command is heard: whoever drags a slider waits for the last place
 only.
 """
@@ -20,7 +20,7 @@ from typing import Any, Final, NamedTuple, Protocol
 import orjson
 
 from config.settings import Settings
-from runtime.console.aside import step_back
+from runtime.aside import step_back
 from runtime.console.playback import Playback, Shown
 from runtime.recording.reading import RecordingError, open_recording, settings_in
 from runtime.step import CycleRecord

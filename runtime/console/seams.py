@@ -1,4 +1,4 @@
-"""What the console asks of others, as protocols: the robot's process, and whoever holds the run's time.
+"""What the console asks of others, as protocols: the robot's process, and whoever records and plays.
 
 A part that is not there answers so: a robot on a port has no time that could be held, and a run without a recording
 nothing to mark.
@@ -73,30 +73,6 @@ class Viewer(Protocol):
 
     def say(self, message: dict[str, Any]) -> None:
         """Send it a message of its own."""
-
-
-class TimeControl(Protocol):
-    """Holds the time of an emulated run; every call returns None, or why it cannot be done."""
-
-    @property
-    def is_paused(self) -> bool:
-        """Whether time stands still but for single steps."""
-
-    @property
-    def speed(self) -> float:
-        """How fast time goes while it is not paused."""
-
-    async def pause(self) -> str | None:
-        """Let time stand still."""
-
-    async def resume(self) -> str | None:
-        """Let time go on."""
-
-    async def single_step(self) -> str | None:
-        """Let time go on for one cycle."""
-
-    async def set_speed(self, factor: float) -> str | None:
-        """Let time go by faster or slower."""
 
 
 class RecordingControl(Protocol):

@@ -13,7 +13,7 @@ from typing import Any
 import orjson
 import pytest
 
-from runtime.console.aside import COMMAND, NICENESS, end_aside, start_aside
+from runtime.aside import COMMAND, NICENESS, end_aside, start_aside
 from runtime.console.client import Frame
 from runtime.console.player import PLAYERS_MAX, PlayedFrame, PlayerError, Players, report_of
 from runtime.recording.folder import in_folder, listing

@@ -1,4 +1,4 @@
-"""Work of the console that must never cost a cycle: done by processes of their own, behind everything else.
+"""Programs of ours beside the robot's process, for work that must never cost a cycle.
 
 A thread would share the interpreter with the cycle. A process does not; and with a lower precedence it gets what the
 robot's process and its emulator leave. What those were granted (a core of their own, real-time priority) is not
@@ -15,18 +15,23 @@ import sys
 from collections.abc import Sequence
 from typing import Final
 
-COMMAND: Final = "runtime.console.aside"
+COMMAND: Final = "runtime.aside"
 NICENESS: Final = 10
 """A tenth of the usual share where there is too little for all."""
 
 
+def where_we_are() -> dict[str, str]:
+    """Return the environment in which another interpreter finds the same modules as this one."""
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+
+
 async def start_aside(program: str, words: Sequence[str], *, talks: bool) -> asyncio.subprocess.Process:
-    """Start a program of ours that steps back.
+    """Start a program of ours; whether it steps back is its own affair.
 
     Parameters
     ----------
     program : str
-        Its module; this one is any call of ``echolocate``.
+        Its module; this one is any call of ``echolocate``, stepping back.
     words : sequence of str
         Its arguments.
     talks : bool
@@ -36,7 +41,7 @@ async def start_aside(program: str, words: Sequence[str], *, talks: bool) -> asy
     return await asyncio.create_subprocess_exec(
         sys.executable, "-m", program, *words,
         stdin=pipe if talks else nothing, stdout=pipe if talks else nothing, stderr=pipe, start_new_session=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+        env=where_we_are(),
     )  # fmt: skip
 
 
