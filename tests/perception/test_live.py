@@ -12,8 +12,8 @@ from config.settings import PerceptionConfig
 from drivers.messages import Firing
 from perception.edits import PlaceModel
 from perception.paper import PaperPerception
+from tests.perception.edited import settle
 from tests.perception.halls import drive, settings
-from tests.perception.test_edits import settle
 
 SHIPPED = settings()
 

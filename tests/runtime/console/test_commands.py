@@ -1,72 +1,19 @@
-"""Every message there is: what the robot is asked for, what is answered, and why not."""
+"""Messages that are done at once: what the robot is asked for, what is answered, and why not."""
 
 from __future__ import annotations
 
-import asyncio
 from pathlib import Path
 from typing import Any, get_args
 
 import pytest
 
-from behaviors.move_to_goal import Goal
-from behaviors.teleoperation import Teleoperate
 from config.load import load_settings
 from config.settings import Settings
-from perception.edits import (
-    ClearMap,
-    ConfirmObject,
-    DeleteSegments,
-    MoveObject,
-    PinSegments,
-    PlaceModel,
-    RejectObject,
-)
 from runtime.console import forms
-from runtime.console.frames import RecordingNow
-from runtime.console.overtime import Overtime
-from runtime.console.refusal import Refusal
-from runtime.console.seams import Viewer
-from runtime.modes import Request
-from runtime.wishes import Legs
+from tests.runtime.console.messages import ASKED, EDITS, OF_TIME, OTHERS
 from tests.runtime.console.operated import operated
 
 GAIN = "behaviors.avoid_static_obstacle.avoid_obstacle_gain"
-
-ASKED: list[tuple[dict[str, Any], object]] = [
-    ({"type": "halt"}, Request.HALT),
-    ({"type": "arm"}, Request.ARM),
-    ({"type": "disarm"}, Request.DISARM),
-    ({"type": "wish", "kind": "legs"}, Legs()),
-    ({"type": "wish", "kind": "goal", "x": 1, "y": -2.5}, Goal(1.0, -2.5)),
-    ({"type": "teleoperate", "v": 0.2, "w": -1}, Teleoperate(0.2, -1.0, 0.25)),
-]
-EDITS: list[tuple[dict[str, Any], object]] = [
-    ({"type": "clear_map"}, ClearMap()),
-    ({"type": "delete_segments", "numbers": [3, 1]}, DeleteSegments((3, 1))),
-    ({"type": "pin_segments", "numbers": [2], "pinned": True}, PinSegments((2,), pinned=True)),
-    (
-        {"type": "place_model", "model": "semicircle", "x": 1.0, "y": 2.0, "theta": 0.5},
-        PlaceModel("semicircle", 1.0, 2.0, 0.5),
-    ),
-    ({"type": "move_object", "object": 4, "x": 1.0, "y": 2.0, "theta": 0}, MoveObject(4, 1.0, 2.0, 0.0)),
-    ({"type": "reject_object", "object": 4}, RejectObject(4)),
-    ({"type": "confirm_object", "object": 4}, ConfirmObject(4)),
-]
-OTHERS = {"take_control", "give_control", "grant", "evidence", "load_model", "set", "undo", "save_toml"}
-OF_TIME: list[tuple[dict[str, Any], str]] = [
-    ({"type": "pause"}, "pause"),
-    ({"type": "resume"}, "resume"),
-    ({"type": "single_step"}, "single_step"),
-    ({"type": "speed", "factor": 2}, "speed 2.0"),
-    ({"type": "record", "on": True}, "record True"),
-    ({"type": "bookmark", "text": "here"}, "bookmark here"),
-    ({"type": "recordings"}, "recordings"),
-    ({"type": "open", "file": "run.mcap"}, "open run.mcap"),
-    ({"type": "scrub", "s": 1.5}, "scrub 1.5"),
-    ({"type": "play", "speed": 1}, "play 1.0"),
-    ({"type": "step", "cycles": -3}, "step -3"),
-    ({"type": "live"}, "live"),
-]
 
 
 def test_no_message_is_left_out() -> None:
@@ -270,142 +217,3 @@ async def test_why_an_object_is_believed() -> None:
         data = (await page.ask(type="evidence", object=1))["data"]
         assert (data["object"], data["model"], data["for"], data["against"]) == (1, "semicircle", 3.5, 1.0)
         assert (await page.ask(type="evidence", object=2))["error"] == "object 2 is not there any more"
-
-
-class Held:
-    """Time, recording and recordings, held by somebody who keeps what is asked for."""
-
-    def __init__(self) -> None:
-        self.did: list[str] = []
-        self.why_not: str | None = None
-        self.go = asyncio.Event()
-        self.go.set()
-        self.left: list[Viewer] = []
-        self.is_paused = True
-        self.speed = 2.0
-        self.now = RecordingNow("run.mcap", 10, 0)
-
-    async def _do(self, what: str) -> str | None:
-        await self.go.wait()
-        self.did.append(what)
-        return self.why_not
-
-    async def _show(self, what: str) -> None:
-        why_not = await self._do(what)
-        if why_not is not None:
-            raise Refusal(why_not)
-
-    async def pause(self) -> str | None:
-        return await self._do("pause")
-
-    async def resume(self) -> str | None:
-        return await self._do("resume")
-
-    async def single_step(self) -> str | None:
-        return await self._do("single_step")
-
-    async def set_speed(self, factor: float) -> str | None:
-        return await self._do(f"speed {factor}")
-
-    async def record(self, *, on: bool) -> str | None:
-        return await self._do(f"record {on}")
-
-    async def bookmark(self, text: str) -> str | None:
-        return await self._do(f"bookmark {text}")
-
-    async def recordings(self) -> list[dict[str, Any]]:
-        await self._show("recordings")
-        return [{"file": "run.mcap"}]
-
-    async def open(self, viewer: Viewer, file: str) -> dict[str, Any]:
-        await self._show(f"open {file}")
-        viewer.switch(live=False)
-        return {"seconds": 3.0}
-
-    async def scrub(self, _viewer: Viewer, s: float) -> None:
-        await self._show(f"scrub {s}")
-
-    async def play(self, _viewer: Viewer, speed: float) -> None:
-        await self._show(f"play {speed}")
-
-    async def step(self, _viewer: Viewer, cycles: int) -> None:
-        await self._show(f"step {cycles}")
-
-    async def live(self, viewer: Viewer) -> None:
-        await self._show("live")
-        viewer.switch(live=True)
-
-    def leave(self, viewer: Viewer) -> None:
-        self.left.append(viewer)
-
-    async def report(self) -> bytes:
-        if self.why_not is not None:
-            raise Refusal(self.why_not)
-        return b"<h1>report</h1>"
-
-    async def close(self) -> None:
-        self.did.append("close")
-
-
-@pytest.mark.parametrize(("message", "done"), OF_TIME, ids=lambda value: str(value)[:30])
-async def test_what_takes_its_time(message: dict[str, Any], done: str) -> None:
-    held = Held()
-    async with operated(overtime=Overtime(held, held, held)) as case:
-        page = await case.page()
-        assert (await page.ask(**message))["ok"]
-        assert held.did == [done]
-        held.why_not = "not just now"
-        assert (await page.ask(**message))["error"] == "not just now"
-        held.why_not = None
-        held.go.clear()
-        slow = await page.say(**message)
-        assert "still under way" in (await page.ask(**message))["error"]
-        assert (await page.ask(type="halt"))["ok"], "a HALT does not wait behind it"
-        held.go.set()
-        assert (await page.answer(slow))["ok"]
-    async with operated() as case:
-        page = await case.page()
-        assert (await page.ask(**message))["error"] == f"{message['type']}: not available here"
-
-
-async def test_a_page_that_leaves_in_the_middle_of_it() -> None:
-    held = Held()
-    async with operated(overtime=Overtime(held, held, held)) as case:
-        page = await case.page()
-        held.go.clear()
-        await page.say(type="open", file="run.mcap")
-        await case.settled(lambda: bool(case.console._tasks), "the work")
-        await page.socket.close()
-        await case.settled(lambda: not case.console._tasks, "that it is given up")
-        assert len(held.left) == 1
-
-
-async def test_work_that_fails_is_a_fault_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
-    held = Held()
-    monkeypatch.setattr(held, "_do", lambda _what: 1 / 0)
-    async with operated(overtime=Overtime(held, held, held)) as case:
-        page = await case.page()
-        await page.say(type="pause")
-        await case.settled(lambda: any(line["event"] == "a part failed" for line in case.log), "a line in the log")
-        assert "console work 1" in str(case.run.health.unwell())
-
-
-async def test_a_recording_is_shown_to_who_opened_it_only() -> None:
-    held = Held()
-    async with operated(overtime=Overtime(held, held, held)) as case:
-        page, other = await case.page(), await case.page()
-        assert (await page.ask(type="open", file="run.mcap"))["data"] == {"seconds": 3.0}
-        case.cycles()
-        frame = await other.next("state")
-        assert (frame["paused"], frame["speed"]) == (True, 2.0)
-        assert frame["recording"] == {"file": "run.mcap", "bytes": 10, "dropped": 0}
-        assert not [message for message in page.heard if message["type"] == "state"]
-        await page.ask(type="live")
-        case.cycles()
-        assert (await page.next("state"))["segments"]["whole"]
-        async with case.session.get(case.url.with_path("/report", keep_query=True)) as answer:
-            assert await answer.text() == "<h1>report</h1>"
-        held.why_not = "nothing is being recorded"
-        async with case.session.get(case.url.with_path("/report", keep_query=True)) as answer:
-            assert (answer.status, await answer.text()) == (409, held.why_not)
-    assert held.did[-1] == "close"

@@ -25,8 +25,8 @@ from runtime.process import Observers, RobotProcess
 from runtime.readying import Readying
 from runtime.step import CycleRecord, State
 from runtime.timing.books import Books
+from tests.runtime.console.messages import ASKED, EDITS, OF_TIME
 from tests.runtime.console.operated import FREE_PORT, Operated, operated
-from tests.runtime.console.test_commands import ASKED, EDITS, OF_TIME
 from tests.runtime.virtual import in_virtual_time
 
 AT_THE_DESK = 70_000

@@ -1,0 +1,70 @@
+"""A drive past four drums, and perceptions that remember it; shared by the tests of what a person does to them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from config.load import load_settings
+from config.settings import Settings
+from drivers.messages import Firing
+from perception.pipeline import Perception, SeenObject
+from tests.perception.halls import FT
+
+EARLY = 61
+"""Firings until the first drums are in sight."""
+SEEN_TO_FT = 6.0
+"""The drive ends here, with four drums in sight or just passed."""
+DRUM = (1.0 * FT, 4.0 * FT)
+METHODS = ("paper", "full")
+
+
+def settings_of(method: str) -> Settings:
+    return load_settings("hallway", [f"perception.method={method}"], models=("semicircle", "box"))
+
+
+SETTINGS = {method: settings_of(method) for method in METHODS}
+
+
+def passed(firings: list[Firing]) -> Iterator[Firing]:
+    return (f for f in firings if f.pose.y == 0.0)
+
+
+def again(firings: list[Firing]) -> Iterator[Firing]:
+    return (f for f in firings if f.pose.y != 0.0)
+
+
+def fresh(method: str) -> Perception:
+    chosen = SETTINGS[method]
+    return Perception(chosen.ring, chosen.models, chosen.perception)
+
+
+def hear(perception: Perception, firing: Firing) -> None:
+    perception.observe(firing)
+    settle(perception)
+
+
+def settle(perception: Perception) -> None:
+    while perception.pending and perception.refine():
+        pass
+
+
+def at(perception: Perception, place: tuple[float, float], within_m: float = 0.15) -> SeenObject | None:
+    """Return the object at a place, None where there is none."""
+    near = [o for o in perception.objects() if math.dist((o.x, o.y), place) < within_m]
+    return min(near, key=lambda o: math.dist((o.x, o.y), place)) if near else None
+
+
+def there(perception: Perception, place: tuple[float, float] = DRUM) -> SeenObject:
+    found = at(perception, place)
+    assert found is not None, perception.objects()
+    return found
+
+
+def number_of(seen: SeenObject) -> int:
+    assert seen.number is not None
+    return seen.number
+
+
+def is_full(perception: Perception) -> bool:
+    return type(perception.method).__name__ == "FullPerception"

@@ -1,0 +1,55 @@
+"""Every message that a page may send, and what it comes to."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from behaviors.move_to_goal import Goal
+from behaviors.teleoperation import Teleoperate
+from perception.edits import (
+    ClearMap,
+    ConfirmObject,
+    DeleteSegments,
+    MoveObject,
+    PinSegments,
+    PlaceModel,
+    RejectObject,
+)
+from runtime.modes import Request
+from runtime.wishes import Legs
+
+ASKED: list[tuple[dict[str, Any], object]] = [
+    ({"type": "halt"}, Request.HALT),
+    ({"type": "arm"}, Request.ARM),
+    ({"type": "disarm"}, Request.DISARM),
+    ({"type": "wish", "kind": "legs"}, Legs()),
+    ({"type": "wish", "kind": "goal", "x": 1, "y": -2.5}, Goal(1.0, -2.5)),
+    ({"type": "teleoperate", "v": 0.2, "w": -1}, Teleoperate(0.2, -1.0, 0.25)),
+]
+EDITS: list[tuple[dict[str, Any], object]] = [
+    ({"type": "clear_map"}, ClearMap()),
+    ({"type": "delete_segments", "numbers": [3, 1]}, DeleteSegments((3, 1))),
+    ({"type": "pin_segments", "numbers": [2], "pinned": True}, PinSegments((2,), pinned=True)),
+    (
+        {"type": "place_model", "model": "semicircle", "x": 1.0, "y": 2.0, "theta": 0.5},
+        PlaceModel("semicircle", 1.0, 2.0, 0.5),
+    ),
+    ({"type": "move_object", "object": 4, "x": 1.0, "y": 2.0, "theta": 0}, MoveObject(4, 1.0, 2.0, 0.0)),
+    ({"type": "reject_object", "object": 4}, RejectObject(4)),
+    ({"type": "confirm_object", "object": 4}, ConfirmObject(4)),
+]
+OTHERS = {"take_control", "give_control", "grant", "evidence", "load_model", "set", "undo", "save_toml"}
+OF_TIME: list[tuple[dict[str, Any], str]] = [
+    ({"type": "pause"}, "pause"),
+    ({"type": "resume"}, "resume"),
+    ({"type": "single_step"}, "single_step"),
+    ({"type": "speed", "factor": 2}, "speed 2.0"),
+    ({"type": "record", "on": True}, "record True"),
+    ({"type": "bookmark", "text": "here"}, "bookmark here"),
+    ({"type": "recordings"}, "recordings"),
+    ({"type": "open", "file": "run.mcap"}, "open run.mcap"),
+    ({"type": "scrub", "s": 1.5}, "scrub 1.5"),
+    ({"type": "play", "speed": 1}, "play 1.0"),
+    ({"type": "step", "cycles": -3}, "step -3"),
+    ({"type": "live"}, "live"),
+]
