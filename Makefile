@@ -30,7 +30,7 @@ tests: $(VENV)/test.stamp
 # Compiled code reads beyond an array in silence; this run does not let it.
 boundscheck: $(VENV)/test.stamp
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(BIN)/python -m pytest -q -n auto -m "not realtime and not compiled and not soak" \
-		tests/perception tests/drivers/test_acoustics.py tests/drivers/test_emulator*.py
+		tests/perception tests/drivers/emulator/test_acoustics.py tests/drivers/test_emulator*.py
 
 # What is promised, measured again: writes docs/promises.md. (With a blank for the =, pytest takes the page for a test.)
 promises: $(VENV)/test.stamp
@@ -41,8 +41,8 @@ promises: $(VENV)/test.stamp
 soak: $(VENV)/soak.stamp
 	$(BIN)/python -m pytest -q -m hypothesis --hypothesis-profile=explore
 	$(BIN)/python -m pytest -m soak --promises=docs/promises-soak.md
-	@$(BIN)/python -m tests.timing.growth $(SOAK)
-	@$(BIN)/python -m tests.timing.budget $(SOAK)
+	@$(BIN)/python -m bench.growth $(SOAK)
+	@$(BIN)/python -m bench.budget $(SOAK)
 
 # Small lies put into the code, and whether the tests notice: writes docs/mutants.md.
 mutants: $(VENV)/test.stamp
@@ -51,11 +51,11 @@ mutants: $(VENV)/test.stamp
 # Ours against the libraries one would use instead, and against the clock; BENCH=--quick for a small run of the first,
 # TIMING="--against earlier.json" for a comparison.
 bench: $(VENV)/bench.stamp
-	@$(BIN)/python -m tests.bench $(BENCH)
-	@$(BIN)/python -m tests.bench timing $(TIMING)
-	@$(BIN)/python -m tests.bench waking
-	@$(BIN)/python -m tests.bench recording
-	@$(BIN)/python -m tests.bench console
+	@$(BIN)/python -m bench $(BENCH)
+	@$(BIN)/python -m bench timing $(TIMING)
+	@$(BIN)/python -m bench waking
+	@$(BIN)/python -m bench recording
+	@$(BIN)/python -m bench console
 
 clean:
 	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage

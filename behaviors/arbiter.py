@@ -1,6 +1,6 @@
 """The arbiter: adds the schemas' vectors and answers with a velocity the base can drive, or with a reason to stop.
 
-Most schemas wish for a direction (`arbitrate`); an operator's hand asks for a velocity (`limit`), which the echoes
+Most schemas ask for a direction (`arbitrate`); an operator's hand asks for a velocity (`limit`), which the echoes
 only ever take from. A decision that lacks a part is a stop, never a guess: what comes out is either within every
 limit or no velocity.
 """
@@ -22,7 +22,7 @@ from config.settings import ArbiterConfig
 from perception.percept import Percept, Twist, wrap_angle
 
 NEGLIGIBLE: Final = 0.01
-"""A sum below this is no wish to move: schemas in balance leave a residue whose direction is noise."""
+"""A sum below this is no drive_request to move: schemas in balance leave a residue whose direction is noise."""
 
 CAUTIOUS_ANGLE_RAD: Final = math.pi / 4.0
 """Off course by this much the robot goes at its cautious velocity; off by twice this it turns on the spot."""

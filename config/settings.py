@@ -93,8 +93,8 @@ class RecognitionConfig(Strict):
     """Share of the model's outline whose sides have support, at least."""
 
 
-class FullConfig(Strict):
-    """The full method: raw ranges held against every explanation there is."""
+class BayesConfig(Strict):
+    """The Bayesian method: raw ranges held against every explanation there is."""
 
     report_probability: float = Field(default=0.95, gt=0.0, lt=1.0)
     """A model is reported from this probability on."""
@@ -115,9 +115,9 @@ class FullConfig(Strict):
 class PerceptionConfig(Strict):
     """Perception: the method and its constants; the sections below `full` are the paper's steps."""
 
-    method: Literal["paper", "full"] = "full"
+    method: Literal["paper", "bayes"] = "bayes"
     """How objects are recognised: as the paper does it, or exactly."""
-    full: FullConfig = FullConfig()
+    bayes: BayesConfig = BayesConfig()
 
     segments: SegmentsConfig = SegmentsConfig()
     map: MapConfig = MapConfig()

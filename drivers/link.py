@@ -19,7 +19,7 @@ import serial
 import serial_asyncio
 
 from config.robot import LinkConfig
-from drivers.port import OPENING_ERRORS, LinkError, OpenPort, explain, open_port
+from drivers.serial_port import OPENING_ERRORS, LinkError, OpenPort, explain, open_port
 
 __all__ = ["Link", "LinkError"]
 

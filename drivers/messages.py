@@ -14,7 +14,7 @@ from typing import Annotated, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.array_form import NumberList
+from drivers.json_array import NumberList
 
 Floats: TypeAlias = Annotated[NDArray[np.float64], NumberList()]
 

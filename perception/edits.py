@@ -130,7 +130,7 @@ class Evidence:
     model: str
     """What it is compared as: a model's name, or what a rival of the models is called."""
     arcs: tuple[Arc, ...] = ()
-    """The full method's readings."""
+    """The Bayesian method's readings."""
     lines: tuple[Line, ...] = ()
     """The paper's method's segments."""
     supporting: float = 0.0

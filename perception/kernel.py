@@ -29,7 +29,7 @@ def kernel(function: F) -> F:
     """Compile `function` in nopython mode, with numba's file cache.
 
     A kernel allocates nothing and owns nothing: whoever calls it keeps the arrays. So it is compiled without numba's
-    reference counts, which cost two atomic additions for each array of each call, a hundred where the full method's
+    reference counts, which cost two atomic additions for each array of each call, a hundred where the Bayesian method's
     memory is handed on. An allocation in a kernel is an error when it is compiled.
     """
     return cast("F", numba.njit(**BORROWING)(function))

@@ -14,15 +14,15 @@ from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import PerceptionConfig
 from drivers.messages import Firing
-from perception.echoes import FreshEchoes
+from perception.bayes.bayes_method import BayesPerception
 from perception.edits import Edit, Evidence, MoveObject, PlaceModel, Segments, not_a_number, out_of_place
-from perception.full.method import FullPerception
+from perception.fresh_echoes import FreshEchoes
 from perception.kernel import Floats
-from perception.paper import PaperPerception
-from perception.seen import SeenObject, Tally
+from perception.paper.paper_method import PaperPerception
+from perception.seen_object import SeenObject, Tally
 from perception.segments import mounts_array
+from perception.sensor_monitor import SensorWatch
 from perception.sensor_report import SensorReport
-from perception.sensor_watch import SensorWatch
 from perception.snapshot import Snapshot, put_back, snapshot_of
 
 __all__ = ["Method", "Perception", "SeenObject", "method_of"]
@@ -99,7 +99,7 @@ def method_of(ring: RingConfig, models: Sequence[ModelConfig], config: Perceptio
     """Return the method that the configuration names."""
     if config.method == "paper":
         return PaperPerception(ring, models, config)
-    return FullPerception(ring, models, config.full)
+    return BayesPerception(ring, models, config.bayes)
 
 
 class Perception:

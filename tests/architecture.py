@@ -53,7 +53,7 @@ IMPURE_MODULES: Final = frozenset(
 )
 IMPURE_CALLS: Final = frozenset({"print", "open", "input", "exec", "eval"})
 
-MAY_AWAIT: Final = ("runtime/", "drivers/link.py", "drivers/emulator/pty.py")
+MAY_AWAIT: Final = ("runtime/", "drivers/link.py", "drivers/emulator/pty_transport.py")
 SERIAL_DOOR: Final = "drivers/link.py"
 LINES_MAX: Final = 400
 

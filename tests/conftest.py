@@ -20,7 +20,7 @@ from hypothesis import HealthCheck, settings
 from rich.console import Console
 
 from config.load import load_settings
-from runtime.kernels import PARTS, ready_kernels, use_cache
+from runtime.support.kernel_cache import PARTS, ready_kernels, use_cache
 from tests import promises
 
 use_cache()

@@ -1,4 +1,4 @@
-"""Slow, readable oracles of how the full method keeps its tracks, its walls and its noise: plain Python, in metres.
+"""Slow, readable oracles of how the Bayesian method keeps its tracks, its walls and its noise: plain Python, in metres.
 
 Nothing here is called by the product, and nothing of the product is called here; constants are said once more.
 """
@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tests import naive_full
-from tests.naive_full import Noise
+from tests import naive_bayes as naive_full
+from tests.naive_bayes import Noise
 
 Array = NDArray[Any]
 FT = 0.3048

@@ -12,15 +12,15 @@ from mcap.writer import CompressionType, Writer
 
 from config.load import load_settings
 from config.settings import Settings
-from runtime.experiments.simulate import Said, simulate
+from runtime.cycle.step import State
 from runtime.recording.channels import CHANNELS, CYCLE, Entry, schema_of
-from runtime.recording.folder import OneFile, Place
-from runtime.recording.part import CHUNK_BYTES, INDEX, PROFILE
-from runtime.recording.reading import open_recording
+from runtime.recording.mcap_file import CHUNK_BYTES, INDEX, PROFILE
+from runtime.recording.reader import open_recording
 from runtime.recording.recorder import Recorder
-from runtime.recording.rerun import Verdict, replay
-from runtime.recording.writer import Standing
-from runtime.step import State
+from runtime.recording.replayer import ReplayResult, replay
+from runtime.recording.storage import OneFile, Place
+from runtime.recording.writer import RecorderStatus
+from runtime.simulation.closed_loop import Said, simulate
 
 WAIT_S = 30.0
 SECONDS = 12.0
@@ -62,7 +62,7 @@ def record(
     queue_max: int = 8192,
     reloads: Mapping[int, Settings] = MappingProxyType({}),
     operator: Callable[[int, State], Said] | None = None,
-) -> Standing:
+) -> RecorderStatus:
     """Record a run in virtual time in which every sixth quantum of refinement is refused for want of time."""
     world = settings.world
     assert world is not None
@@ -116,7 +116,7 @@ def rewrite(entries: Iterator[Entry] | list[Entry], path: Path, profile: str = f
         writer.finish()
 
 
-def verdict_of(path: Path, **span: float) -> Verdict:
+def verdict_of(path: Path, **span: float) -> ReplayResult:
     """Replay a recording that is whole, or a span of it."""
     with open_recording(path) as recording:
         verdict = replay(recording, **span)  # type: ignore[arg-type]

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from drivers.messages import Firing, Pose
-from runtime.ringlog import write_ring_log
+from runtime.recording.ring_log import write_ring_log
 
 UDACITY_ANGLES_DEG = (-90.0, -37.5, -22.5, -7.5, 7.5, 22.5, 37.5, 90.0)
 UDACITY_RANGE_MAX_MM = 5000

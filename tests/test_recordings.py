@@ -14,7 +14,7 @@ import pytest
 
 from config.robot import RobotConfig
 from drivers.messages import Firing
-from runtime.ringlog import read_ring_log
+from runtime.recording.ring_log import read_ring_log
 from tests import recordings
 
 

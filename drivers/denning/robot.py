@@ -10,14 +10,14 @@ import math
 from collections import deque
 
 from config.robot import RingConfig, RobotConfig
-from drivers.denning import troubles
-from drivers.denning.clock import Jump
+from drivers.denning import diagnostics as troubles
 from drivers.denning.codec import Decoder, encode
-from drivers.denning.commands import Command
 from drivers.denning.frames import Ack, Drive, Echo, Frame, Halt, Hello, Ident, Nak, NakCode, Odom, Pattern, Release
-from drivers.denning.stamping import Stamper
-from drivers.denning.watch import DriveWatch, RingWatch
-from drivers.denning.wire import identity_of, to_wire, wire_pattern
+from drivers.denning.pending_command import Command
+from drivers.denning.pose_stamping import Stamper
+from drivers.denning.robot_clock import Jump
+from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout
+from drivers.denning.wire_units import identity_of, to_wire, wire_pattern
 from drivers.driver import Heard, LineState
 from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
 
@@ -45,7 +45,7 @@ class DenningRobot:
 
     Raises
     ------
-    drivers.firing.FiringError
+    drivers.firing_pattern.FiringError
         The firing pattern is one that the ring cannot carry out or the protocol cannot say.
     """
 
@@ -68,8 +68,8 @@ class DenningRobot:
         self._flush_first = False
         self._commands: dict[str, Command] = {}
         self._drive: Twist | None = None
-        self._watch = DriveWatch()
-        self._ring = RingWatch(config.link.silence_max_s + _STEPS_MISSED * 1e-3 * self._pattern.step_period_ms)
+        self._watch = CommandAckMonitor()
+        self._ring = EchoTimeout(config.link.silence_max_s + _STEPS_MISSED * 1e-3 * self._pattern.step_period_ms)
         self._pattern_s = 0.0
         self._settling_s = 0.0
         self._ask_who = False
@@ -125,7 +125,7 @@ class DenningRobot:
         self.closed()
         self._now_s = self._frame_s = now_s
         self._flush_first = True
-        self._watch = DriveWatch()
+        self._watch = CommandAckMonitor()
         self._greet()
 
     def closed(self) -> None:
@@ -197,7 +197,7 @@ class DenningRobot:
 
         Raises
         ------
-        drivers.firing.FiringError
+        drivers.firing_pattern.FiringError
             The ring cannot carry it out, or the protocol cannot say it; the pattern stays as it was.
         """
         pattern = wire_pattern(ring)
@@ -339,7 +339,7 @@ class DenningRobot:
             self._firings.clear()
             self._odometry = None
             self._rebooted = True
-            self._watch = DriveWatch()
+            self._watch = CommandAckMonitor()
         elif self._jump is not None:
             self._stamper.break_off()
         self._jump = None

@@ -16,28 +16,28 @@ from typing import TYPE_CHECKING, Any, Final
 from config.reload import differences
 from config.settings import Settings
 from drivers.driver import RobotDriver
-from runtime.console.client import Client
-from runtime.console.desk import Desk
-from runtime.console.door import listen
-from runtime.console.frames import NO_FRAMES, Beside, Frames
-from runtime.console.guard import SCHEME, Guard, in_address, is_loopback, new_token
-from runtime.console.hello import about_run
-from runtime.console.hub import Hub
-from runtime.console.limits import Limits, Notes
-from runtime.console.overtime import Overtime
-from runtime.console.pages import page_files
-from runtime.console.parameters import parameters
-from runtime.console.refusal import Refusal
-from runtime.console.seams import NOT_HERE, Run
-from runtime.console.server import House, Server
-from runtime.console.stepped import stepped
-from runtime.console.tuning import Tuning
-from runtime.health import told
-from runtime.process import CONSOLE_FRAME, CONSOLE_RECEIVE
-from runtime.reload import Ready
-from runtime.step import CycleRecord, State
-from runtime.tables import Units
-from runtime.timing.books import Books
+from runtime.analysis.text_tables import Units
+from runtime.console.clients.client import Client
+from runtime.console.clients.client_hub import Hub
+from runtime.console.commands.async_commands import AsyncCommands
+from runtime.console.commands.dispatcher import CommandDispatcher
+from runtime.console.commands.parameters import parameters
+from runtime.console.commands.refusal import Refusal
+from runtime.console.commands.tuning import Tuning
+from runtime.console.frames.frame_encoder import NO_FRAMES, FrameContext, Frames
+from runtime.console.frames.session_info import about_run
+from runtime.console.http.auth import SCHEME, Auth, in_address, is_loopback, new_token
+from runtime.console.http.client_limits import Limits, Notes
+from runtime.console.http.connection_limits import listen
+from runtime.console.http.server import House, Server
+from runtime.console.http.static_files import page_files
+from runtime.console.protocols import NOT_HERE, Run
+from runtime.console.timed_coroutine import stepped
+from runtime.cycle.process import CONSOLE_FRAME, CONSOLE_RECEIVE
+from runtime.cycle.reloader import Ready
+from runtime.cycle.step import CycleRecord, State
+from runtime.support.health import describe_exception
+from runtime.timing.cycle_stats import CycleStats
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
@@ -69,7 +69,7 @@ class Console:
         Whether the settings' world is what the robot meets.
     units : {"m", "ft"}
         In which figures are shown at first.
-    overtime : Overtime
+    overtime : AsyncCommands
         Whoever holds time and recordings.
     limits : Limits, optional
         What clients may cost.
@@ -94,7 +94,7 @@ class Console:
         *,
         emulated: bool,
         units: Units = "m",
-        overtime: Overtime | None = None,
+        overtime: AsyncCommands | None = None,
         limits: Limits | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -104,7 +104,7 @@ class Console:
         self._emulated = emulated
         self._units: Units = units
         self._config = settings.console
-        self._overtime = Overtime() if overtime is None else overtime
+        self._overtime = AsyncCommands() if overtime is None else overtime
         self._limits = Limits(clients=settings.console.clients_max) if limits is None else limits
         self._frames = Frames(settings)
         self._notes = Notes(log, clock)
@@ -112,11 +112,11 @@ class Console:
         self._shown = settings
         self.hub = Hub(self._limits, clock, self._control_left)
         self.tuning = Tuning(settings, self._tuned, ready, emulated=emulated)
-        self.desk = Desk(process, self.hub, self.tuning, self._overtime, self._notes, self._spawn, clock)
+        self.desk = CommandDispatcher(process, self.hub, self.tuning, self._overtime, self._notes, self._spawn, clock)
         timed = process.keeper.timed
         self._timed_frame = timed(CONSOLE_FRAME, self._frame)
         self._timed_tick = timed(CONSOLE_FRAME, self._tick)
-        self._last: tuple[CycleRecord, State, Books, RobotDriver] | None = None
+        self._last: tuple[CycleRecord, State, CycleStats, RobotDriver] | None = None
         self._is_asked_for = False
         self._due_s = 0.0
         self._shown_s = 0.0
@@ -127,7 +127,7 @@ class Console:
         self.url = ""
         self.tunnel: str | None = None
 
-    def on_cycle(self, record: CycleRecord, state: State, books: Books, driver: RobotDriver) -> None:
+    def on_cycle(self, record: CycleRecord, state: State, books: CycleStats, driver: RobotDriver) -> None:
         """Take note of a cycle; what is to be shown of it is put together after it."""
         if self._failure is None:
             try:
@@ -135,7 +135,7 @@ class Console:
             except Exception as error:  # noqa: BLE001 - told by the probe; the cycle itself has not failed
                 self._fail(error)
 
-    def _note(self, record: CycleRecord, state: State, books: Books, driver: RobotDriver) -> None:
+    def _note(self, record: CycleRecord, state: State, books: CycleStats, driver: RobotDriver) -> None:
         self._frames.take(record)
         if record.inputs.edits:
             refused = {one.edit: one.why for one in record.refused}
@@ -163,7 +163,7 @@ class Console:
         self._show_settings(settings)
 
     def probe(self) -> str | None:
-        """Say how it ended; None while it works. See `runtime.health`."""
+        """Say how it ended; None while it works. See `runtime.support.health`."""
         if self._failure is None and self._server is not None and not self._server.is_open:
             return "it does not listen any more"
         return self._failure
@@ -186,7 +186,7 @@ class Console:
         names = (host,) if is_loopback(address) else (host, *own)
         timed = self._process.keeper.timed
         house = House(
-            guard=Guard(token, names, port), hub=self.hub, limits=self._limits, notes=self._notes,
+            guard=Auth(token, names, port), hub=self.hub, limits=self._limits, notes=self._notes,
             files=pages, hello=self._hello, on_message=self.desk.take, on_leave=self._left,
             on_fault=self._process.health.report, report=self._report,
             watch_without_token=self._config.watch_without_token, timed=timed, clock=self._clock,
@@ -237,7 +237,7 @@ class Console:
             self._fail(error)
 
     def _fail(self, error: Exception) -> None:
-        self._failure = told(error)
+        self._failure = describe_exception(error)
         self._log.error("the console cannot show the run any more", exc_info=error)
 
     def _show(self) -> None:
@@ -253,7 +253,7 @@ class Console:
             record, state, books, driver = self._last
             missed, late, link = books.missed, books.late, driver.counts
         time_control, recording = self._overtime.time, self._overtime.recording
-        beside = Beside(
+        beside = FrameContext(
             host_s=now_s, clients=len(self.hub.clients), phases_s=latest.phases_s, late_s=latest.late_s,
             missed=missed, late=late, link=link, recording=None if recording is None else recording.now,
             is_paused=time_control is not None and time_control.is_paused,

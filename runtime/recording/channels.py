@@ -8,7 +8,7 @@ from typing import Final, NamedTuple, TypeVar
 
 import orjson
 
-from runtime.recording.forms import (
+from runtime.recording.schema import (
     About,
     Bookmark,
     Cycle,

@@ -20,12 +20,12 @@ from llvmlite.binding import get_host_cpu_name
 
 from config.settings import Settings
 from runtime import VERSION
-from runtime.kernels import kernels_key
+from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, LOG, OBJECTS, SEGMENTS, SERIAL, SETTINGS, SUMMARY
-from runtime.recording.folder import Place
-from runtime.recording.forms import FORMAT, About, Bookmark, LogLine, RunEnd, left_by
-from runtime.recording.writer import QUEUE_MAX, Item, Moment, RecordingWriter, Reloaded, Standing, Switch
-from runtime.step import CycleRecord, State
+from runtime.recording.schema import FORMAT, About, Bookmark, LogLine, RunEnd, left_by
+from runtime.recording.storage import Place
+from runtime.recording.writer import QUEUE_MAX, Item, MapSnapshot, RecorderStatus, RecordingWriter, Reloaded, Switch
+from runtime.support.kernel_cache import kernels_key
 
 MOMENT_S: Final = 1.0
 """So often the map and the objects are recorded, as changes."""
@@ -109,12 +109,12 @@ class Recorder:
         self._writer.stop()
 
     @property
-    def standing(self) -> Standing:
+    def standing(self) -> RecorderStatus:
         """How the recording stands."""
         return self._writer.standing
 
     def probe(self) -> str | None:
-        """Say how its thread ended; None while it runs. See `runtime.health`."""
+        """Say how its thread ended; None while it runs. See `runtime.support.health`."""
         return self._writer.probe()
 
     @property
@@ -158,12 +158,12 @@ class Recorder:
             self._gap = self._writer.wants_keyframe = False
             self._last_keyframe_s = now_s
             seen = state.perception
-            whole = Moment(record.cycle, seen.segments_now(), seen.objects(), left_by(state), seen.snapshot())
+            whole = MapSnapshot(record.cycle, seen.segments_now(), seen.objects(), left_by(state), seen.snapshot())
             self._hand(KEYFRAME, now_s, whole)
         elif record.cycle % self._moment_cycles == 0:
-            self._hand(SEGMENTS, now_s, Moment(record.cycle, segments=state.perception.segments_now()))
+            self._hand(SEGMENTS, now_s, MapSnapshot(record.cycle, segments=state.perception.segments_now()))
         elif record.cycle % self._moment_cycles == self._moment_cycles // 2:
-            self._hand(OBJECTS, now_s, Moment(record.cycle, objects=state.perception.objects()))
+            self._hand(OBJECTS, now_s, MapSnapshot(record.cycle, objects=state.perception.objects()))
 
     def on_bytes(self, way: str, host_s: float, data: bytes) -> None:
         """Take bytes that came or went over the line."""

@@ -19,11 +19,12 @@ import numpy as np
 
 from config.settings import Settings
 from drivers.messages import Floats
-from runtime.health import Worker
-from runtime.modes import ModeState
+from runtime.cycle.modes import ModeState
+from runtime.cycle.step import CycleRecord
+from runtime.cycle.summary import object_row
 from runtime.recording.channels import ABOUT, CYCLE, KEYFRAME, MODE, OBJECTS, SEGMENTS, SETTINGS, encode
-from runtime.recording.folder import Place
-from runtime.recording.forms import (
+from runtime.recording.mcap_file import McapFile
+from runtime.recording.schema import (
     About,
     Cycle,
     Form,
@@ -35,9 +36,8 @@ from runtime.recording.forms import (
     SettingsChange,
     keyframe,
 )
-from runtime.recording.part import Part
-from runtime.step import CycleRecord
-from runtime.summary import object_row
+from runtime.recording.storage import Place
+from runtime.support.health import Worker
 
 QUEUE_MAX: Final = 8192
 """Handed over and not yet taken, at most: a minute and a half of a disk that does nothing."""
@@ -80,7 +80,7 @@ class Switch(NamedTuple):
     on: bool
 
 
-class Moment(NamedTuple):
+class MapSnapshot(NamedTuple):
     """The map, or the objects, as a cycle left them; for a keyframe both and everything else."""
 
     cycle: int
@@ -91,7 +91,7 @@ class Moment(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class RecorderStatus:
     """How the recording stands."""
 
     file: str | None = None
@@ -130,11 +130,11 @@ class RecordingWriter:
         self.queue: deque[Item] = deque()
         self.wants_keyframe = False
         """A file has begun, or something is missing: without a keyframe no replay could go on."""
-        self.standing = Standing()
+        self.standing = RecorderStatus()
         self._place = place
         self._about = about
         self._clock = clock
-        self._part: Part | None = None
+        self._part: McapFile | None = None
         self._parts = 0
         self._on = on
         self._retry_s = 0.0
@@ -165,7 +165,7 @@ class RecordingWriter:
             self._leave(f"{self.standing.file}: its writer failed: {self._thread.failure}")
 
     def probe(self) -> str | None:
-        """Say how the thread ended; None while it runs. See `runtime.health`."""
+        """Say how the thread ended; None while it runs. See `runtime.support.health`."""
         return self._thread.probe()
 
     def drop(self, count: int = 1) -> None:
@@ -219,7 +219,7 @@ class RecordingWriter:
         about = self._about.model_copy(update={"part": self._parts})
         self._about = about
         host_ns = time.time_ns()
-        self._part = Part(self._place.path(self._parts), encode(about), host_ns)
+        self._part = McapFile(self._place.path(self._parts), encode(about), host_ns)
         self._before = self.standing.bytes
         self._mode = None
         path, files = str(self._part.path), self.standing.files + 1
@@ -243,7 +243,7 @@ class RecordingWriter:
             self._part.flush()
             self._unflushed = 0
             self.standing = replace(self.standing, bytes=self._before + self._part.bytes)
-            if self._place.is_full(self._part.bytes):
+            if self._place.is_bayes(self._part.bytes):
                 self.wants_keyframe = True
         elif self._on and self._clock() >= self._retry_s:
             self.wants_keyframe = True
@@ -264,7 +264,7 @@ class RecordingWriter:
                 self._finish()
             return
         if item.topic == KEYFRAME:
-            if self._part is not None and self._place.is_full(self._part.bytes):
+            if self._part is not None and self._place.is_bayes(self._part.bytes):
                 self._finish()
             if self._part is None and self._clock() >= self._retry_s:
                 self._open()
@@ -278,7 +278,7 @@ class RecordingWriter:
         match item.what:
             case CycleRecord():
                 self._enter_cycle(item.what, log_ns)
-            case Moment():
+            case MapSnapshot():
                 self._enter_moment(item.what, log_ns)
             case Reloaded(cycle, _):
                 change = SettingsChange.model_construct(cycle=cycle, settings=self._about.settings)
@@ -308,7 +308,7 @@ class RecordingWriter:
             self._mode = record.mode
             self._add(MODE, ModeChange.model_construct(cycle=record.cycle, mode=record.mode), log_ns)
 
-    def _enter_moment(self, moment: Moment, log_ns: int) -> None:
+    def _enter_moment(self, moment: MapSnapshot, log_ns: int) -> None:
         if moment.left is not None and moment.memory is not None:
             self._add(ABOUT, self._about, log_ns)
             self._add(KEYFRAME, keyframe(moment.cycle, moment.left, moment.memory), log_ns, moment.cycle)
@@ -318,7 +318,7 @@ class RecordingWriter:
             rows = [_rounded(dict(object_row(seen))) for seen in moment.objects]
             self._add(OBJECTS, ObjectsSeen.model_construct(cycle=moment.cycle, objects=rows), log_ns)
 
-    def _map_change(self, moment: Moment, segments: Floats) -> MapChange:
+    def _map_change(self, moment: MapSnapshot, segments: Floats) -> MapChange:
         """Return what has come and gone since the last moment; a keyframe tells the whole map."""
         whole = moment.memory is not None
         if whole:

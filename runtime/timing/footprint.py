@@ -11,8 +11,8 @@ import time
 from pathlib import Path
 from typing import Final, TypedDict
 
-from runtime.kernels import compiled_signatures
-from runtime.timing.memory import MemoryPolicy
+from runtime.support.kernel_cache import compiled_signatures
+from runtime.timing.memory_policy import MemoryPolicy
 
 _MEGA: Final = 1e6
 _START_FIELD: Final = 19

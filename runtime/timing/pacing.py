@@ -24,7 +24,7 @@ ROUNDING: Final = 1e-9
 """Of times in seconds: a deadline that is a whole number of periods away must count as that many."""
 
 
-class Begun(NamedTuple):
+class CycleStart(NamedTuple):
     """How a cycle began."""
 
     due_s: float
@@ -122,7 +122,7 @@ class Pacer:
         else:
             self._plan(self._begun_s)
 
-    def begin(self, now_s: float) -> Begun:
+    def begin(self, now_s: float) -> CycleStart:
         """Begin a cycle at `now_s`, and plan the next one."""
         due_s = self._deadline_s if self._called_s is None else self._called_s
         # What comes so late that it is too early for the next one to follow takes the next one's place.
@@ -132,7 +132,7 @@ class Pacer:
         self._begun_s = now_s
         self._called_s = self._oldest_s = None
         self._plan(now_s)
-        return Begun(due_s, max(0.0, now_s - due_s), missed, age_s)
+        return CycleStart(due_s, max(0.0, now_s - due_s), missed, age_s)
 
     def advance(self, now_s: float) -> float:
         """End a cycle at `now_s`: leave out deadlines that have passed meanwhile, and return the one ahead."""

@@ -1,7 +1,7 @@
 """The time of a run in somebody's hands: paused, stepped by one cycle, faster, slower.
 
 Pausing the emulator alone would be a robot that has gone silent. So the run's own clock is held together with it:
-`runtime.timing.clock` is this process's side of that, `drivers.emulator.control` the emulator's, and here is who asks
+`runtime.timing.run_clock` is this process's side of that, `drivers.emulator.time_channel` the emulator's, and here is who asks
 both.
 """
 
@@ -12,9 +12,9 @@ import contextlib
 from collections.abc import Callable
 from typing import Final, Protocol
 
-from drivers.emulator.control import LIVED, REFUSED
-from drivers.emulator.pace import FACTOR_MAX, FACTOR_MIN, Pace
-from runtime.timing.clock import PacedClock
+from drivers.emulator.time_channel import LIVED, REFUSED
+from drivers.emulator.time_scale import FACTOR_MAX, FACTOR_MIN, TimeScale
+from runtime.timing.run_clock import PacedClock
 
 LEAD_S: Final = 0.02
 """Time is held so much later than it is asked for: by then the emulator knows of it, however it was busy."""
@@ -188,7 +188,7 @@ class EmulatorControl:
             return HANGS
         return self._trouble
 
-    def _tell(self, pace: Pace) -> None:
+    def _tell(self, pace: TimeScale) -> None:
         self._number += 1
         if self._trouble is None:
             self._send(pace.line(self._number))

@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, NamedTuple, ParamSpec, TypedDict, TypeVar
 
-from runtime.timing.books import Books, Series, Spread
-from runtime.timing.meter import Reading
-from runtime.timing.pacing import Begun
+from runtime.timing.clock_sampler import ClockSample
+from runtime.timing.cycle_stats import CycleStats, Series, Spread
+from runtime.timing.pacing import CycleStart
 from runtime.timing.phases import Phase
-from runtime.timing.watch import Sight
+from runtime.timing.stall_sampler import StackSample
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -32,12 +32,12 @@ STRETCHES_MAX: Final = 256
 """Stretches kept from one cycle to the next; the oldest leave."""
 
 
-class Stretch(NamedTuple):
+class Span(NamedTuple):
     """Something of ours that had the loop."""
 
     name: str
-    begin: Reading
-    end: Reading
+    begin: ClockSample
+    end: ClockSample
 
     @property
     def wall_s(self) -> float:
@@ -81,11 +81,11 @@ class Timing(TypedDict):
 
 
 class Timekeeper:
-    """Books the stretches of a run and judges late cycles.
+    """CycleStats the stretches of a run and judges late cycles.
 
     Parameters
     ----------
-    books : Books
+    books : CycleStats
         Where durations, lateness and culprits go.
     read : callable
         The clocks.
@@ -97,9 +97,9 @@ class Timekeeper:
 
     def __init__(
         self,
-        books: Books,
-        read: Callable[[], Reading],
-        seen: Callable[[], Sight | None] = lambda: None,
+        books: CycleStats,
+        read: Callable[[], ClockSample],
+        seen: Callable[[], StackSample | None] = lambda: None,
         callbacks: tuple[str, ...] = (),
     ) -> None:
         self._books = books
@@ -108,12 +108,12 @@ class Timekeeper:
         self._phases = {phase: Series(is_touched=True) for phase in Phase}
         self._callbacks = {name: Series(is_touched=True) for name in callbacks}
         self._echo_wait = Series(is_touched=True)
-        self._stretches: list[Stretch] = []
+        self._stretches: list[Span] = []
         self._busy_s = 0.0
-        self._begun: Begun | None = None
-        self._begin: Reading | None = None
-        self._mark: Reading | None = None
-        self._last: Reading | None = None
+        self._begun: CycleStart | None = None
+        self._begin: ClockSample | None = None
+        self._mark: ClockSample | None = None
+        self._last: ClockSample | None = None
         self._held_since_s = 0.0
         self._following = 0
         self._period_s = 0.0
@@ -123,7 +123,7 @@ class Timekeeper:
         """Overruns since the last cycle that kept its time."""
         self._row: dict[str, int] = {}
 
-    def begin(self, now: Reading, begun: Begun, period_s: float, *, is_following: bool) -> None:
+    def begin(self, now: ClockSample, begun: CycleStart, period_s: float, *, is_following: bool) -> None:
         """Begin a cycle and judge what came before it."""
         is_late = begun.late_s > self._books.late_after_s
         is_overrun = self._begin is not None and (begun.missed > 0 or self._busy_s >= period_s)
@@ -150,7 +150,7 @@ class Timekeeper:
         now = self._read()
         if self._mark is not None:
             self._phases[phase].add(now.host_s - self._mark.host_s)
-            self._enter(Stretch(phase.value, self._mark, now))
+            self._enter(Span(phase.value, self._mark, now))
             self._mark = now
 
     def end(self) -> None:
@@ -169,7 +169,7 @@ class Timekeeper:
             finally:
                 end = self._read()
                 self._callbacks[name].add(end.host_s - begin.host_s)
-                self._enter(Stretch(name, begin, end))
+                self._enter(Span(name, begin, end))
 
         return stretch
 
@@ -203,13 +203,13 @@ class Timekeeper:
             "faults": dict(sorted(self._books.faults.items(), key=lambda item: -item[1])),
         }
 
-    def _resume(self, now: Reading) -> None:
+    def _resume(self, now: ClockSample) -> None:
         """Take note of a beginning: either the loop has been busy ever since the last end, or it paused."""
         last, self._last = self._last, now
         if last is None or now.thread_s - last.thread_s < MOSTLY * (now.host_s - last.host_s):
             self._held_since_s = now.wall_s
 
-    def _enter(self, stretch: Stretch) -> None:
+    def _enter(self, stretch: Span) -> None:
         if len(self._stretches) == STRETCHES_MAX:
             del self._stretches[0]
         self._stretches.append(stretch)
@@ -217,9 +217,9 @@ class Timekeeper:
         self._busy_s += stretch.end.wall_s - stretch.begin.wall_s
         self._last = stretch.end
 
-    def _judge(self, now: Reading, begun: Begun) -> str:
+    def _judge(self, now: ClockSample, begun: CycleStart) -> str:
         """Return the name of whoever kept the cycle from beginning in time, or left no time for it."""
-        blamed: Stretch | None = None
+        blamed: Span | None = None
         most = (0.0, 0.0)
         is_late = begun.late_s > self._books.late_after_s
         untimed_s = begun.late_s if is_late else 0.0
@@ -244,7 +244,7 @@ class Timekeeper:
         return _beside(last, now, overdue_s) or OUTSIDE
 
 
-def _robbed(begin: Reading, end: Reading) -> str | None:
+def _robbed(begin: ClockSample, end: ClockSample) -> str | None:
     """Return who had the time between two readings, None where the thread had most of it."""
     wall_s = end.host_s - begin.host_s
     if end.thread_s - begin.thread_s > MOSTLY * wall_s:
@@ -252,7 +252,7 @@ def _robbed(begin: Reading, end: Reading) -> str | None:
     return _beside(begin, end, wall_s) or OUTSIDE
 
 
-def _beside(begin: Reading, end: Reading, span_s: float) -> str | None:
+def _beside(begin: ClockSample, end: ClockSample, span_s: float) -> str | None:
     """Return that other threads of ours worked between two readings for most of such a span, None if not."""
     others_s = (end.process_s - begin.process_s) - (end.thread_s - begin.thread_s)
     return THREAD if others_s > MOSTLY * span_s else None

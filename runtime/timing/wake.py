@@ -2,7 +2,7 @@
 
 asyncio hands its timeouts to epoll in whole milliseconds, rounded up, and the kernel may add its timer slack on top:
 a cycle that sleeps that way begins 0.7 ms late at the median. A timerfd is a timer that the loop waits for as for any
-other file: it counts nanoseconds and gets no slack. `tests/bench/waking.py` measures it against what else there is.
+other file: it counts nanoseconds and gets no slack. `bench/waking.py` measures it against what else there is.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from typing import Final, Protocol
 
-from runtime.timing.clock import run_clock
+from runtime.timing.run_clock import run_clock
 
 _COUNT_BYTES: Final = 8
 """What is read from a timerfd: how often it fired."""

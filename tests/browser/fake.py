@@ -47,7 +47,7 @@ class FakeServer:
     speed: float = 1.0
     recording: dict[str, Any] | None = None
     playback: dict[str, Any] | None = None
-    wish: dict[str, Any] = field(default_factory=lambda: {"kind": "legs"})
+    drive_request: dict[str, Any] = field(default_factory=lambda: {"kind": "legs"})
     controller: int | None = 1
     deleted: set[int] = field(default_factory=set)
     pinned: set[int] = field(default_factory=set)
@@ -114,7 +114,7 @@ class FakeServer:
         stopped = {} if self.mode == "DRIVE" else {"twist": [0.0, 0.0]}
         return self.hall.frame(self.cycle) | stopped | {
             "type": "state", "mode": self.mode,
-            "flags": self.flags, "reason": self.reason, "segments": segments, "wish": self.wish,
+            "flags": self.flags, "reason": self.reason, "segments": segments, "drive_request": self.drive_request,
             "dropped": 0, "clients": len(self.clients), "controller": self.controller == client.number,
             "recording": self.recording, "paused": self.paused, "speed": self.speed, "playback": self.playback,
         }  # fmt: skip
@@ -191,8 +191,8 @@ class FakeServer:
                 self.controller = client.number
             case "give_control":
                 self.controller = None
-            case "wish":
-                self.wish = {k: v for k, v in message.items() if k not in {"id", "type"}}
+            case "drive_request":
+                self.drive_request = {k: v for k, v in message.items() if k not in {"id", "type"}}
             case "pause" | "resume":
                 self.paused = kind == "pause"
             case "single_step":

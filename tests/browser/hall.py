@@ -36,7 +36,7 @@ PARAMETERS: Final = (
               help_="Time perception may take in a cycle; refinement stops there and resumes in the next."),
     parameter("perception.clusters.threshold_m", "float", 0.4572, 0.0, 100.0,
               help_="T: a segment farther than this from every cluster's centre founds a new cluster."),
-    parameter("perception.full.quanta_per_firing", "int", 2, 1, 1000),
+    parameter("perception.bayes.quanta_per_firing", "int", 2, 1, 1000),
     parameter("perception.map.age_max_s", "float", 120.0, 0.0, 1e6, help_="Segments leave the map at this age."),
     parameter("perception.relaxation.gamma", "float", 2.0, 0.0, 100.0,
               help_="γ: sphere_i = γ times the length of model segment i."),

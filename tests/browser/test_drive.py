@@ -333,27 +333,27 @@ async def test_a_goal_by_click_and_by_numbers(server: FakeServer, opener: Opener
     await opened.tab("Drive")
     await page.get_by_role("button", name="Goal on the map").click()
     await page.mouse.click(*await opened.screen(3.2, -0.2))
-    goal = await server.wait("wish")
+    goal = await server.wait("drive_request")
     assert goal["kind"] == "goal"
     assert (goal["x"], goal["y"]) == pytest.approx((3.2, -0.2), abs=0.02)
-    await opened.says("#wish-words", "To the goal at 10.5")
+    await opened.says("#drive_request-words", "To the goal at 10.5")
     await opened.shot("goal")
     await page.locator("#goal-x").fill("10")
     await page.locator("#goal-y").fill("-1,5")
     await page.keyboard.press("Enter")
-    typed = await server.wait("wish", 2)
+    typed = await server.wait("drive_request", 2)
     assert (typed["x"], typed["y"]) == pytest.approx((3.048, -0.4572))
     await page.locator("#goal-x").fill("far")
     await page.locator("#goal-x").press("Enter")
     await opened.says("#goal-error", "two numbers")
-    server.refusals["wish"] = ("the goal is 90 m away, 50 at most", None)
+    server.refusals["drive_request"] = ("the goal is 90 m away, 50 at most", None)
     await page.locator("#goal-x").fill("300")
     await page.locator("#goal-x").press("Enter")
     await opened.says("#goal-error", "90 m away")
     server.refusals.clear()
     await page.get_by_role("button", name="As configured").click()
-    assert await server.wait("wish", 4) == {"kind": "legs"}
-    await opened.says("#wish-words", "as configured")
+    assert await server.wait("drive_request", 4) == {"kind": "legs"}
+    await opened.says("#drive_request-words", "as configured")
 
 
 async def test_a_goal_with_the_keyboard_alone(server: FakeServer, opener: Opener) -> None:
@@ -366,7 +366,7 @@ async def test_a_goal_with_the_keyboard_alone(server: FakeServer, opener: Opener
         await opened.page.keyboard.press("ArrowRight")
     x, y = await opened.world("view.toWorld(view.width / 2 + 72, view.height / 2)")
     await opened.page.keyboard.press("Enter")
-    goal = await server.wait("wish")
+    goal = await server.wait("drive_request")
     assert (goal["x"], goal["y"]) == pytest.approx((x, y), abs=1e-6)
 
 

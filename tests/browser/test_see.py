@@ -27,7 +27,7 @@ async def still(server: FakeServer, opener: Opener, cycle: int = 170) -> Opened:
 
 
 async def test_every_layer_draws_something_and_can_be_switched(server: FakeServer, opener: Opener) -> None:
-    server.wish = {"kind": "goal", "x": 3.0, "y": 0.3}
+    server.drive_request = {"kind": "goal", "x": 3.0, "y": 0.3}
     server.cycle = 170
     opened = await opener.open(server.url)
     await opened.until("world.trail.length > 5", "a trail")

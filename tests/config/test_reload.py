@@ -40,7 +40,7 @@ def test_whatever_is_declared_live_exists() -> None:
 def test_what_a_process_is_built_from_is_not_live() -> None:
     fixed = """
         link.port link.baud ring.count ring.sensors ring.range_max_m body.radius_m models cycle.rate_hz log.file world
-        perception.method perception.map.capacity perception.full.tracks_max perception.clusters.clusters_max
+        perception.method perception.map.capacity perception.bayes.tracks_max perception.clusters.clusters_max
     """
     for path in fixed.split():
         assert not Difference(tuple(path.split(".")), 1, 2).live, path
@@ -76,7 +76,7 @@ def test_every_live_change_is_named_and_taken_over(tmp_path: Path) -> None:
     before = settings_from(tmp_path, RUN)
     table = copy.deepcopy(RUN)
     table["behaviors"]["arbiter"] = {"base_velocity_m_s": 0.25}
-    table["perception"]["full"] = {"report_probability": 0.9}
+    table["perception"]["bayes"] = {"report_probability": 0.9}
     table["ring"]["firing"]["preset"] = "quadrants"
     table["perception"]["map"] = {"age_max_s": 60.0}
     outcome = reload(before, lambda: settings_from(tmp_path, table))
@@ -84,7 +84,7 @@ def test_every_live_change_is_named_and_taken_over(tmp_path: Path) -> None:
     assert outcome.settings == settings_from(tmp_path, table)
     assert [str(d) for d in outcome.changed] == [
         'ring.firing.preset: "octets" → "quadrants"',
-        "perception.full.report_probability: 0.95 → 0.9",
+        "perception.bayes.report_probability: 0.95 → 0.9",
         "perception.map.age_max_s: 120.0 → 60.0",
         "behaviors.arbiter.base_velocity_m_s: 0.3 → 0.25",
     ]
@@ -129,7 +129,7 @@ GOOD: dict[Any, tuple[Any, ...]] = {
     int: (0, 1, 2, 5, 16, 24, 300, 9600),
     bool: (True, False),
     str: ("/dev/ttyS0", "elsewhere", "corner"),
-    "name": ("sum", "largest", "stop", "turn_back", "paper", "full", "octets", "quadrants", "info", "cone"),
+    "name": ("sum", "largest", "stop", "turn_back", "paper", "bayes", "octets", "quadrants", "info", "cone"),
     "list": ([], [[0], [1]]),
     "table": ({},),
 }

@@ -7,8 +7,8 @@ from typing import Literal, TypeAlias
 
 from config.robot import BodyConfig, LinkConfig, RobotConfig
 from config.world import DrumConfig, WorldConfig
+from drivers.denning.device import EmulatedRobot
 from drivers.denning.robot import DenningRobot
-from drivers.emulator.device import EmulatedRobot
 from drivers.emulator.faults import Fault
 from drivers.messages import Firing, Twist
 from tests.drivers.ring import RING

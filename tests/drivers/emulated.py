@@ -10,12 +10,12 @@ from typing import Any, TypeVar
 from config.robot import BodyConfig, LinkConfig, RobotConfig
 from config.world import AcousticsConfig, DrumConfig, OdometryConfig, StartConfig, WallConfig, WorldConfig
 from drivers.denning.codec import Decoder, encode
+from drivers.denning.device import EmulatedRobot
 from drivers.denning.frames import (
     Drive,
     Frame,
     Odom,
 )
-from drivers.emulator.device import EmulatedRobot
 from drivers.emulator.faults import Fault, FaultScript
 from drivers.messages import Flags
 from tests.drivers.ring import RING

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.history import OdometryHistory
 from drivers.messages import Flags, Odometry, Pose, Twist
+from drivers.odometry_history import OdometryHistory
 from drivers.se2 import exp, interpolate, log
 
 LENGTH = st.floats(-3.0, 3.0)

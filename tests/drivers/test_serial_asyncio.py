@@ -12,7 +12,7 @@ import serial
 
 from config.robot import LinkConfig
 from drivers.link import Link, LinkError
-from drivers.port import open_port
+from drivers.serial_port import open_port
 from tests.drivers.ends import Ends, Host, running, soon
 from tests.hil.machine import PATIENCE_S
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import atheris
 
-with atheris.instrument_imports(include=["drivers", "runtime.ringlog", "cobs", "csv"]):
+with atheris.instrument_imports(include=["drivers", "runtime.recording.ring_log", "cobs", "csv"]):
     from tests.fuzz.targets import SEEDS, TARGETS
 
 

@@ -19,9 +19,9 @@ from typing import Any
 from config.files import list_shipped
 from config.load import ConfigError, load_any, load_model, load_robot, load_world
 from config.settings import Settings
-from drivers.denning.wire import wire_pattern
-from drivers.firing import FiringError
-from runtime.ringlog import RingLogError, read_ring_log
+from drivers.denning.wire_units import wire_pattern
+from drivers.firing_pattern import FiringError
+from runtime.recording.ring_log import RingLogError, read_ring_log
 from tests.fuzz.mutators import mutated
 
 LINE_MAX = 1000

@@ -12,7 +12,7 @@ from drivers.denning.codec import FRAME_MAX, Decoder, encode
 from drivers.denning.frames import Ack, Frame, Halt, Ident
 from drivers.denning.robot import DenningRobot
 from drivers.messages import Twist
-from runtime.ringlog import RingLogError, read_ring_log
+from runtime.recording.ring_log import RingLogError, read_ring_log
 from tests.drivers.cable import ROBOT
 from tests.drivers.noise import framed
 from tests.drivers.vectors import BAD, GOOD, Side

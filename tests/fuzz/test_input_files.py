@@ -15,9 +15,9 @@ from typing import Any
 import pytest
 
 from config.load import ConfigError, load_settings, load_world
-from drivers.emulator.device import EmulatedRobot
-from runtime.replay import replay
-from runtime.ringlog import RingLogError, read_ring_log
+from drivers.denning.device import EmulatedRobot
+from runtime.recording.ring_log import RingLogError, read_ring_log
+from runtime.recording.ring_log_replay import replay
 from tests.fuzz.campaign import KINDS, shipped
 from tests.fuzz.hazards import HAZARDS
 from tests.fuzz.mutators import mutated
@@ -107,7 +107,7 @@ def wild_log(rng: random.Random, sensors: int) -> str:
 
 @pytest.mark.compiled
 @pytest.mark.promise("P14")
-@pytest.mark.parametrize("method", ["paper", "full"])
+@pytest.mark.parametrize("method", ["paper", "bayes"])
 def test_logs_beyond_all_sense_are_replayed(method: str, tmp_path: Path) -> None:
     settings = load_settings("hallway", [f"perception.method={method}"])
     rng = random.Random(14)

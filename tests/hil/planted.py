@@ -19,8 +19,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from runtime.cli import main
-from runtime.process import RobotProcess
+from runtime.cli.app import main
+from runtime.cycle.process import RobotProcess
 from tests.hil.running import ROOT, Running
 
 LONG_S, SHORT_S = 10.0, 1.2

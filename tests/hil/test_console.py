@@ -19,17 +19,17 @@ from config.settings import LogConfig
 from drivers.denning.codec import Decoder
 from drivers.denning.frames import Halt
 from drivers.driver import RobotDriver
-from runtime.commands.run import on_port
+from runtime.cli.commands.run import on_port
 from runtime.console.console import Console
-from runtime.emulated import emulator
-from runtime.logs import open_log
-from runtime.modes import Mode, Request
-from runtime.process import Observers, RobotProcess
-from runtime.readying import Readying
+from runtime.cycle.modes import Mode, Request
+from runtime.cycle.process import Observers, RobotProcess
+from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import LOG
-from runtime.recording.reading import open_recording
-from runtime.step import CycleRecord, State
-from runtime.timing.books import Books
+from runtime.recording.reader import open_recording
+from runtime.simulation.emulator_process import emulator
+from runtime.support.kernel_loader import KernelLoader
+from runtime.support.logs import open_log
+from runtime.timing.cycle_stats import CycleStats
 from tests.hil.machine import PATIENCE_S, stalls_excused
 from tests.hil.running import emulated, running, start_url
 from tests.hil.truth import Truth
@@ -228,7 +228,7 @@ async def test_halt_from_a_page_in_time(tmp_path: Path, measured: Callable[[str]
             operator.asked_s, operator.halted_s = None, host_s
             operator.halted.set()
 
-    def on_cycle(record: CycleRecord, state: State, books: Books, driver: RobotDriver) -> None:
+    def on_cycle(record: CycleRecord, state: State, books: CycleStats, driver: RobotDriver) -> None:
         console.on_cycle(record, state, books, driver)
         mode = record.mode
         if mode.mode is Mode.DRIVE:
@@ -244,7 +244,7 @@ async def test_halt_from_a_page_in_time(tmp_path: Path, measured: Callable[[str]
             process = operator.process = RobotProcess(
                 on_port(settings, port), log, Observers(on_cycle, on_bytes=on_bytes)
             )
-            console = Console(process, settings, log, process.reconfigure, Readying(log), emulated=True)
+            console = Console(process, settings, log, process.reconfigure, KernelLoader(log), emulated=True)
             async with console.open():
                 operator.url = console.url
                 deaf = await asyncio.to_thread(RawPage, console.url)

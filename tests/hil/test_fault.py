@@ -9,12 +9,12 @@ import pytest
 from config.load import load_settings
 from config.settings import LogConfig
 from drivers.driver import RobotDriver
-from runtime.commands.run import on_port
-from runtime.emulated import emulator
-from runtime.logs import open_log
-from runtime.process import Observers, RobotProcess
-from runtime.step import CycleRecord, State
-from runtime.timing.books import Books
+from runtime.cli.commands.run import on_port
+from runtime.cycle.process import Observers, RobotProcess
+from runtime.cycle.step import CycleRecord, State
+from runtime.simulation.emulator_process import emulator
+from runtime.support.logs import open_log
+from runtime.timing.cycle_stats import CycleStats
 from tests.hil.machine import PATIENCE_S, stalls_excused
 from tests.hil.truth import rows
 
@@ -23,7 +23,7 @@ from tests.hil.truth import rows
 @pytest.mark.realtime
 @pytest.mark.usefixtures("warm_kernels")
 async def test_a_cycle_that_fails_halts_the_base_and_ends_in_fault(tmp_path: Path) -> None:
-    def fail(record: CycleRecord, *_: State | Books | RobotDriver) -> None:
+    def fail(record: CycleRecord, *_: State | CycleStats | RobotDriver) -> None:
         if record.cycle == 40:
             raise ZeroDivisionError("planted")
 

@@ -19,15 +19,15 @@ from drivers.denning.codec import Decoder
 from drivers.denning.frames import Halt
 from drivers.driver import RobotDriver
 from drivers.messages import Flags
-from runtime.commands.run import on_port
-from runtime.emulated import emulator
-from runtime.logs import open_log
-from runtime.modes import Mode, Request
-from runtime.process import Observers, RobotProcess
-from runtime.recording.folder import OneFile
+from runtime.cli.commands.run import on_port
+from runtime.cycle.modes import Mode, Request
+from runtime.cycle.process import Observers, RobotProcess
+from runtime.cycle.step import CycleRecord, State
 from runtime.recording.recorder import Recorder
-from runtime.step import CycleRecord, State
-from runtime.timing.books import Books
+from runtime.recording.storage import OneFile
+from runtime.simulation.emulator_process import emulator
+from runtime.support.logs import open_log
+from runtime.timing.cycle_stats import CycleStats
 from tests.hil.machine import PATIENCE_S
 from tests.hil.truth import Truth
 
@@ -103,7 +103,7 @@ async def halts(folder: Path, monkeypatch: pytest.MonkeyPatch, trials: int) -> O
             operator.asked_s, operator.halted_s = None, host_s
             operator.halted.set()
 
-    def on_cycle(record: CycleRecord, state: State, _books: Books, _driver: RobotDriver) -> None:
+    def on_cycle(record: CycleRecord, state: State, _books: CycleStats, _driver: RobotDriver) -> None:
         recorder.on_cycle(record, state)
         mode = record.mode
         if mode.mode is Mode.DRIVE:

@@ -17,19 +17,19 @@ from config.load import load_settings
 from config.settings import LogConfig
 from drivers.driver import RobotDriver
 from drivers.messages import Flags
-from runtime.commands.run import on_port
-from runtime.emulated import emulator
-from runtime.logs import open_log
-from runtime.modes import Mode, Request
-from runtime.process import Observers, RobotProcess
-from runtime.recording.folder import OneFile
-from runtime.recording.reading import open_recording
+from runtime.cli.commands.run import on_port
+from runtime.cycle.modes import Mode, Request
+from runtime.cycle.process import Observers, RobotProcess
+from runtime.cycle.step import CycleRecord, State
+from runtime.cycle.summary import RunSummary
+from runtime.recording.reader import open_recording
 from runtime.recording.recorder import Recorder
-from runtime.recording.rerun import replay
-from runtime.step import CycleRecord, State
-from runtime.summary import RunSummary
-from runtime.timing.books import Books
-from runtime.timing.clock import PacedClock
+from runtime.recording.replayer import replay
+from runtime.recording.storage import OneFile
+from runtime.simulation.emulator_process import emulator
+from runtime.support.logs import open_log
+from runtime.timing.cycle_stats import CycleStats
+from runtime.timing.run_clock import PacedClock
 from runtime.timing.time_control import GONE, HANGS, EmulatorControl
 from tests.hil.machine import PATIENCE_S, stalls_excused
 from tests.hil.truth import rows
@@ -60,7 +60,7 @@ async def run(folder: Path, act: Act) -> tuple[RunSummary, list[CycleRecord], Pa
             Recorder(SETTINGS, OneFile(recorded), clock, emulated=True) as recorder,
         ):
 
-            def on_cycle(record: CycleRecord, state: State, _books: Books, _driver: RobotDriver) -> None:
+            def on_cycle(record: CycleRecord, state: State, _books: CycleStats, _driver: RobotDriver) -> None:
                 records.append(record)
                 recorder.on_cycle(record, state)
 

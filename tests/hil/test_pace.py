@@ -18,13 +18,13 @@ import pytest
 from config.load import load_settings
 from config.settings import LogConfig
 from drivers.driver import RobotDriver
-from runtime.commands.run import on_port
-from runtime.emulated import emulator
-from runtime.logs import open_log
-from runtime.modes import Mode
-from runtime.process import Observers, RobotProcess
-from runtime.step import CycleRecord, State
-from runtime.timing.books import Books
+from runtime.cli.commands.run import on_port
+from runtime.cycle.modes import Mode
+from runtime.cycle.process import Observers, RobotProcess
+from runtime.cycle.step import CycleRecord, State
+from runtime.simulation.emulator_process import emulator
+from runtime.support.logs import open_log
+from runtime.timing.cycle_stats import CycleStats
 from tests.hil.machine import PATIENCE_S, stalls_excused
 from tests.hil.running import ROOT
 
@@ -34,8 +34,8 @@ EMULATOR = """
 import sys, time
 from drivers.denning.codec import Decoder
 from drivers.denning.frames import Echo
-from drivers.emulator.pty import PtyPort
-from runtime.cli import main
+from drivers.emulator.pty_transport import PtyPort
+from runtime.cli.app import main
 decoder, write, log = Decoder("robot"), PtyPort.write, open(sys.argv[1], "w", buffering=1)
 def told(port, data):
     now_s = time.monotonic()
@@ -109,7 +109,7 @@ async def test_an_echo_waits_for_no_timer(tmp_path: Path) -> None:
     waited_s: list[float] = []
     control_s: list[float] = []
 
-    def note(record: CycleRecord, *_: State | Books | RobotDriver) -> None:
+    def note(record: CycleRecord, *_: State | CycleStats | RobotDriver) -> None:
         for firing in record.inputs.heard.firings:
             began[round(firing.t_s * 1e6)] = record.inputs.now_s
         if record.inputs.echo_age_s is not None:
@@ -149,7 +149,7 @@ async def test_overruns_in_a_row_end_in_a_safe_stop_that_names_the_callback(tmp_
         while time.monotonic() < end_s:
             pass
 
-    def plant(record: CycleRecord, *_: State | Books | RobotDriver) -> None:
+    def plant(record: CycleRecord, *_: State | CycleStats | RobotDriver) -> None:
         if record.cycle > PLANTED_FROM:
             asyncio.get_running_loop().call_later(0.002, hold_the_loop)
         if record.mode.mode is Mode.SAFE_STOP:

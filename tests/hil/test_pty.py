@@ -20,8 +20,8 @@ import pytest
 
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Ack, Drive, Echo, Frame, Hello, Ident, Odom, Pattern
-from drivers.emulator.pty import LAG_MAX_S, LINGER_S, EmulatorError, PtyPort, RealTime
-from drivers.emulator.trace import HEADER
+from drivers.emulator.pty_transport import LAG_MAX_S, LINGER_S, EmulatorError, PtyPort, RealTime
+from drivers.emulator.truth_trace import HEADER
 from tests.hil.machine import PATIENCE_S, AnyTest, stalls_excused
 
 F = TypeVar("F", bound=Frame)
@@ -39,7 +39,7 @@ import asyncio, json, sys
 from config.robot import RobotConfig
 from config.world import WorldConfig
 from drivers.emulator.faults import FaultScript
-from drivers.emulator.pty import EmulatorError, serve
+from drivers.emulator.pty_transport import EmulatorError, serve
 link, trace, baud, faults, orphan = json.loads(sys.argv[1])
 robot = RobotConfig.model_validate({
     "ring": {"count": 24, "radius_m": 0.381, "beam_half_angle_deg": 12.0, "resolution_m": 0.03048,

@@ -15,9 +15,9 @@ import pytest
 
 from config.load import load_settings
 from drivers.messages import Flags
-from runtime.timing.books import Books
+from runtime.timing.cycle_scheduler import LATE_SHARE
+from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.pacing import Pacer
-from runtime.timing.rhythm import LATE_SHARE
 from tests.hil.machine import BareStarts, stalls_excused
 from tests.hil.running import Emulated, Running, emulated, running, wait_for
 from tests.hil.truth import is_driving, reaches, robot_time, rows
@@ -33,9 +33,9 @@ STARTS_MAX = 12
 """So many bare starts of Python with numba, each as slow as the slowest beside it; an idle machine needs five."""
 
 
-async def bare_loop(running_too: Running) -> Books:
+async def bare_loop(running_too: Running) -> CycleStats:
     """Do nothing at all at 20 Hz while the robot drives: what this machine does to any loop just now."""
-    books, pacer = Books(LATE_SHARE * PERIOD_S), Pacer(time.monotonic(), PERIOD_S)
+    books, pacer = CycleStats(LATE_SHARE * PERIOD_S), Pacer(time.monotonic(), PERIOD_S)
     while running_too.process.poll() is None:
         start_s = time.monotonic()
         books.enter(0.0, start_s - pacer.deadline_s)

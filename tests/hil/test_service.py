@@ -18,9 +18,9 @@ from pathlib import Path
 
 import pytest
 
-from runtime.commands.service import quoted
-from runtime.complaint import WRONG_CALL
-from runtime.notify import STATUS_MAX, Notifier
+from runtime.cli.commands.service import quoted
+from runtime.support.errors import WRONG_CALL
+from runtime.support.sd_notify import STATUS_MAX, SdNotifier
 from tests.hil.planted import SHORT_S, planted
 from tests.hil.running import ROOT, emulated, wait_for
 from tests.hil.truth import Truth
@@ -104,9 +104,9 @@ def test_what_a_manager_hears(tmp_path: Path, kind: str) -> None:
 
 def test_nobody_to_tell() -> None:
     for notifier in (
-        Notifier(),
-        Notifier.from_environment({}),
-        Notifier.from_environment({"NOTIFY_SOCKET": "host:9"}),
+        SdNotifier(),
+        SdNotifier.from_environment({}),
+        SdNotifier.from_environment({"NOTIFY_SOCKET": "host:9"}),
     ):
         with notifier:
             notifier.well(1.0)
@@ -118,7 +118,7 @@ def test_nobody_to_tell() -> None:
 def test_a_manager_that_is_gone_or_full_holds_up_nobody(tmp_path: Path) -> None:
     path = str(tmp_path / "notify")
     environment = {"NOTIFY_SOCKET": path, "WATCHDOG_USEC": "400000", "WATCHDOG_PID": str(os.getpid())}
-    with Notifier.from_environment(environment) as notifier:
+    with SdNotifier.from_environment(environment) as notifier:
         notifier.well(0.0)
         assert notifier.lost == 2, "READY and WATCHDOG"
         assert notifier.trouble is not None
@@ -146,7 +146,7 @@ def test_the_watchdog_is_fed_in_time_and_no_more(tmp_path: Path) -> None:
                 while True:
                     told.append(ears.recv(4096).decode())
 
-        with Notifier(path, 2.0) as notifier:
+        with SdNotifier(path, 2.0) as notifier:
             for cycle in range(200):
                 notifier.well(0.05 * cycle)
                 hear()
@@ -162,13 +162,13 @@ def test_the_watchdog_is_fed_in_time_and_no_more(tmp_path: Path) -> None:
 
 def test_another_processs_watchdog_is_not_ours() -> None:
     other = {"NOTIFY_SOCKET": "@nobody", "WATCHDOG_USEC": "1000000", "WATCHDOG_PID": str(os.getpid() + 1)}
-    with Notifier.from_environment(other) as notifier:
+    with SdNotifier.from_environment(other) as notifier:
         notifier.well(0.0)
         assert notifier.lost == 1, "READY alone"
 
 
 def service(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "runtime.cli", "service", *arguments]
+    command = [sys.executable, "-m", "runtime.cli.app", "service", *arguments]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)
 
 

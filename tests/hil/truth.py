@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from drivers.emulator.trace import HEADER
+from drivers.emulator.truth_trace import HEADER
 from drivers.messages import Flags
 from tests.hil.machine import PATIENCE_S
 

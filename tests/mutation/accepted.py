@@ -12,14 +12,14 @@ ACCEPTED: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "encode: low <= value <= high → low < value <= high": "what is on the bound is checked twice, and passes",
             "encode: low <= value <= high → low <= value < high": "what is on the bound is checked twice, and passes",
         },
-        "drivers/firing.py": {
+        "drivers/firing_pattern.py": {
             "_check_step: step_period_s >= needed_s - _TOLERANCE_S → step_period_s > needed_s - _TOLERANCE_S": (
                 "they differ where a step is short by exactly the tolerance, a nanosecond: either answer is right"
             ),
         },
         "behaviors/arbiter.py": {
             "arbitrate: magnitude < NEGLIGIBLE → magnitude <= NEGLIGIBLE": (
-                "at exactly a hundredth of a wish, standing still and crawling are both right"
+                "at exactly a hundredth of a drive_request, standing still and crawling are both right"
             ),
             "arbitrate: 0.0 <= v <= body.speed_max_m_s and abs(w) <= body.turn_max_rad_s → "
             "0.0 <= v <= body.speed_max_m_s or abs(w) <= body.turn_max_rad_s": (

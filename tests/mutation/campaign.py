@@ -26,16 +26,16 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "mutants.md"
 TARGETS: dict[str, tuple[str, ...]] = {
     "drivers/denning/codec.py": (
-        "tests/drivers/test_codec.py",
-        "tests/drivers/test_denning.py",
-        "tests/drivers/test_denning_driving.py",
-        "tests/drivers/test_denning_echoes.py",
-        "tests/drivers/test_denning_losses.py",
+        "tests/drivers/denning/test_codec.py",
+        "tests/drivers/denning/test_robot.py",
+        "tests/drivers/denning/test_robot_driving.py",
+        "tests/drivers/denning/test_pose_stamping.py",
+        "tests/drivers/denning/test_diagnostics.py",
     ),
-    "drivers/denning/frames.py": ("tests/drivers/test_codec.py", "tests/drivers/test_firing.py"),
-    "drivers/firing.py": ("tests/drivers/test_firing.py",),
+    "drivers/denning/frames.py": ("tests/drivers/denning/test_codec.py", "tests/drivers/test_firing_pattern.py"),
+    "drivers/firing_pattern.py": ("tests/drivers/test_firing_pattern.py",),
     "behaviors/arbiter.py": ("tests/behaviors/test_arbiter.py", "tests/behaviors/test_teleoperation.py"),
-    "runtime/modes.py": ("tests/runtime/test_modes.py",),
+    "runtime/cycle/modes.py": ("tests/runtime/cycle/test_modes.py",),
 }
 KILLED_MIN = 0.85
 PATIENCE_S = 180

@@ -19,7 +19,7 @@ def firings() -> list[Firing]:
     return [*once, *drive(load_world("hallway"), (-1.0, 3.0), begin_s=once[-1].t_s + 1.0, y_ft=0.5)]
 
 
-@pytest.fixture(scope="module", params=["paper", pytest.param("full", marks=pytest.mark.compiled)])
+@pytest.fixture(scope="module", params=["paper", pytest.param("bayes", marks=pytest.mark.compiled)])
 def remembered(request: pytest.FixtureRequest, firings: list[Firing]) -> tuple[str, Snapshot]:
     """Return a method, and what it remembers after that way."""
     perception = fresh(request.param)
@@ -30,8 +30,8 @@ def remembered(request: pytest.FixtureRequest, firings: list[Firing]) -> tuple[s
 
 @pytest.fixture(scope="module")
 def early(firings: list[Firing]) -> Snapshot:
-    """Return what the full method remembers when it has come to the first drums."""
-    perception = fresh("full")
+    """Return what the Bayesian method remembers when it has come to the first drums."""
+    perception = fresh("bayes")
     for firing in firings[:EARLY]:
         hear(perception, firing)
     return perception.snapshot()
@@ -47,6 +47,6 @@ def seen(remembered: tuple[str, Snapshot]) -> Perception:
 
 @pytest.fixture
 def begun(early: Snapshot) -> Perception:
-    perception = fresh("full")
+    perception = fresh("bayes")
     perception.restore(early)
     return perception

@@ -16,7 +16,7 @@ EARLY = 61
 SEEN_TO_FT = 6.0
 """The drive ends here, with four drums in sight or just passed."""
 DRUM = (1.0 * FT, 4.0 * FT)
-METHODS = ("paper", "full")
+METHODS = ("paper", "bayes")
 
 
 def settings_of(method: str) -> Settings:
@@ -66,5 +66,5 @@ def number_of(seen: SeenObject) -> int:
     return seen.number
 
 
-def is_full(perception: Perception) -> bool:
-    return type(perception.method).__name__ == "FullPerception"
+def is_bayes(perception: Perception) -> bool:
+    return type(perception.method).__name__ == "BayesPerception"

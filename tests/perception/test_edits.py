@@ -25,7 +25,7 @@ from tests.perception.edited import (
     again,
     at,
     hear,
-    is_full,
+    is_bayes,
     number_of,
     passed,
     settle,
@@ -133,7 +133,7 @@ def test_a_model_that_is_placed_relaxes_onto_what_was_heard(seen: Perception, of
     assert seen.edit(RejectObject(number_of(rested))) is None
     settle(seen)
     assert at(seen, DRUM) is None
-    if is_full(seen):
+    if is_bayes(seen):
         return  # it forgot the readings with the object: see below
     assert seen.edit(PlaceModel("semicircle", rested.x + off_x, rested.y + off_y, rested.theta + 0.1)) is None
     settle(seen)
@@ -165,7 +165,7 @@ def test_a_model_that_is_placed_is_there_at_once_and_stays(
     assert evidence is not None
     assert evidence.model == model
     assert evidence.opposing <= 0.0
-    if is_full(seen):
+    if is_bayes(seen):
         assert evidence.opposing < -10.0
         assert still.probability is not None
         assert still.probability < 0.1
@@ -184,7 +184,7 @@ def test_a_moved_object_keeps_its_number_and_relaxes_back(seen: Perception, firi
     (found,) = [o for o in seen.objects() if o.number == number]
     assert math.dist((found.x, found.y), (rested.x, rested.y)) < 0.03
     assert [o for o in seen.objects() if math.dist((o.x, o.y), DRUM) < 0.3] == [found], "there is one there"
-    if is_full(seen):
+    if is_bayes(seen):
         assert not found.placed, "the readings bear it out by themselves"
         assert found.probability is not None
         assert found.probability > 0.9
@@ -224,14 +224,14 @@ def test_a_rejected_object_is_gone_and_only_new_readings_bring_it_back(
         back = back or at(seen, DRUM)
     assert back is not None, "it is there, and is heard again"
     assert seen.edit(RejectObject(number)) is not None
-    if is_full(seen):
+    if is_bayes(seen):
         assert back.number != number
 
 
 def test_a_confirmed_object_is_reported_however_little_speaks_for_it(
     begun: Perception, firings: list[Firing]
 ) -> None:
-    """The full method, early on: something is about to be a drum, and is not sure enough to be called one."""
+    """The Bayesian method, early on: something is about to be a drum, and is not sure enough to be called one."""
     seen = begun
     doubtful = [o for o in seen.things() if o.model == "unknown"]
     assert doubtful
@@ -253,7 +253,7 @@ def test_a_confirmed_object_is_reported_however_little_speaks_for_it(
 
 
 def test_a_confirmed_object_of_the_papers_method_outlasts_its_segments(seen: Perception) -> None:
-    if is_full(seen):
+    if is_bayes(seen):
         return
     rested = there(seen)
     number = number_of(rested)

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from perception.candidates import follow_clusters
-from perception.clusters import cluster_segments, group_by_cluster
 from perception.kernel import Floats, Ints
-from perception.outline_map import erase_contradicted
-from perception.recognition import goodness_of_fit
+from perception.paper.candidates import follow_clusters
+from perception.paper.clusters import cluster_segments, group_by_cluster
+from perception.paper.outline_map import erase_contradicted
+from perception.paper.recognition import goodness_of_fit
 from perception.relaxation import increment, relax
 from perception.segments import pair_readings, tangent
 from tests import naive

@@ -13,7 +13,7 @@ from config.world import WallConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose
-from perception.paper import PaperPerception
+from perception.paper.paper_method import PaperPerception
 from perception.pipeline import Perception, SeenObject
 from tests.perception.halls import FT, drive, drums, settings
 

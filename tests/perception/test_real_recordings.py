@@ -13,8 +13,8 @@ from config.settings import Settings
 from drivers.messages import Firing
 from perception.kernel import Floats
 from perception.segments import SegmentExtractor
-from runtime.replay import replay
-from runtime.ringlog import read_ring_log
+from runtime.recording.ring_log import read_ring_log
+from runtime.recording.ring_log_replay import replay
 from tests import recordings
 
 SIDES = (0, 7)

@@ -1,4 +1,4 @@
-"""Random tracks, lines and readings for what the full method remembers; shared by the tests of its kernels."""
+"""Random tracks, lines and readings for what the Bayesian method remembers; shared by the tests of its kernels."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from config.load import load_settings
-from perception.full.contact import FAR
-from perception.full.settings import make_settings
-from perception.full.state import (
+from perception.bayes.kernel_settings import make_settings
+from perception.bayes.range_fit import FAR
+from perception.bayes.state import (
     KIND,
     LLR,
     NL,
@@ -25,7 +25,7 @@ from perception.full.state import (
     make_state,
 )  # fmt: skip
 from perception.segments import mounts_array
-from tests import naive_full
+from tests import naive_bayes as naive_full
 from tests.naive_tracks import Line
 
 SETTINGS = load_settings("hallway", ["perception.method=full"])
@@ -36,7 +36,7 @@ MOUNTS = mounts_array(SETTINGS.ring.mounts)
 
 SENSORS = len(MOUNTS)
 
-P = make_settings(SETTINGS.ring, SETTINGS.models, SETTINGS.perception.full)
+P = make_settings(SETTINGS.ring, SETTINGS.models, SETTINGS.perception.bayes)
 
 COSINES = (P.cos_opt, P.cos_half, P.cos_in)
 

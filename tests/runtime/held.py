@@ -12,10 +12,10 @@ import pytest
 
 from config.load import load_settings
 from config.settings import Settings
-from drivers.emulator.control import Governor
-from drivers.emulator.device import EmulatedRobot
+from drivers.denning.device import EmulatedRobot
 from drivers.emulator.faults import Fault
-from runtime.timing.clock import PacedClock
+from drivers.emulator.time_channel import Governor
+from runtime.timing.run_clock import PacedClock
 from runtime.timing.time_control import EmulatorControl
 from runtime.timing.wake import LoopTimer
 from tests.runtime.virtual import STEP_S, MemoryLink, VirtualLoop
@@ -83,9 +83,9 @@ def held(monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] 
         links.append(made)
         return made
 
-    monkeypatch.setattr("runtime.process.Link", link)
+    monkeypatch.setattr("runtime.cycle.process.Link", link)
     monkeypatch.setattr("runtime.timing.wake.best_alarm", LoopTimer)
-    monkeypatch.setattr("runtime.process.ask", lambda _realtime: ())
+    monkeypatch.setattr("runtime.cycle.process.ask", lambda _realtime: ())
     asyncio.set_event_loop(None)
     try:
         yield Held(loop, settings, robot, links, control, governor)

@@ -9,16 +9,16 @@ from dataclasses import dataclass, field
 from config.load import load_settings
 from config.settings import Settings
 from config.world import WorldConfig
+from drivers.denning.device import EmulatedRobot
 from drivers.denning.robot import DenningRobot
-from drivers.emulator.device import EmulatedRobot
 from drivers.emulator.faults import Fault
-from drivers.emulator.memory import MemoryLine
+from drivers.emulator.memory_transport import MemoryLine
 from drivers.messages import Firing, Pose
 from perception.pipeline import Perception
-from runtime.commanding import gather, give
-from runtime.modes import Mode, Request
-from runtime.step import CycleRecord, State, step
-from runtime.timing.allowance import enough_quanta
+from runtime.cycle.driver_io import gather, give
+from runtime.cycle.modes import Mode, Request
+from runtime.cycle.step import CycleRecord, State, step
+from runtime.timing.refinement_budget import enough_quanta
 
 FT = 0.3048
 
@@ -84,7 +84,7 @@ class Run:
         return [min(math.dist(seen, drum) for drum in drums) for seen in self.objects_ft()]
 
 
-def hallway(seed: int, *faults: Fault, method: str = "full", sets: Sequence[str] = ()) -> Run:
+def hallway(seed: int, *faults: Fault, method: str = "bayes", sets: Sequence[str] = ()) -> Run:
     settings = load_settings("hallway", [f"perception.method={method}", *sets])
     assert settings.world is not None
     return Run(settings, settings.world, seed, faults)

@@ -11,8 +11,8 @@ from config.settings import Settings
 from drivers.driver import Heard, LineState
 from drivers.messages import Firing, Flags, Odometry, Pose, Twist
 from perception.pipeline import Perception
-from runtime.modes import Mode, Request
-from runtime.step import STANDSTILL, CycleRecord, Inputs, Order, State, Wish, step
+from runtime.cycle.modes import Mode, Request
+from runtime.cycle.step import STANDSTILL, CycleRecord, DriveRequest, Inputs, Order, State, step
 
 SETTINGS = load_settings("hallway", ["perception.method=paper"])
 
@@ -48,7 +48,7 @@ class Script:
     now_s: float = 100.0
     robot_s: float = 7.0
     pose: Pose = HERE
-    wish: Wish | None = None
+    drive_request: DriveRequest | None = None
 
     def __post_init__(self) -> None:
         perception = Perceiving(self.settings.ring, self.settings.models, self.settings.perception)
@@ -76,7 +76,9 @@ class Script:
         sensors = len(self.settings.ring.mounts)
         firings = (Firing(self.robot_s, self.pose, 0.0, np.full(sensors, 3.0)),) if firing else ()
         told = Odometry(self.robot_s, self.pose, 0.0, Twist(0.0, 0.0), flags, 0) if odometry else None
-        inputs = Inputs(self.now_s, line, trouble, Heard(firings, told, rebooted), request, wish=self.wish)
+        inputs = Inputs(
+            self.now_s, line, trouble, Heard(firings, told, rebooted), request, drive_request=self.drive_request
+        )
         self.log.clear()
         return step(self.state, inputs, self.settings, lambda c: self.log.append(("command", c)), self.may_refine)
 

@@ -17,7 +17,7 @@ import pytest
 from config.load import load_settings
 from config.robot import LinkConfig
 from config.settings import Settings
-from drivers.emulator.device import EmulatedRobot
+from drivers.denning.device import EmulatedRobot
 from drivers.emulator.faults import Fault
 from runtime.timing.wake import LoopTimer
 
@@ -146,9 +146,9 @@ def in_virtual_time(
         links.append(MemoryLink(robot, loop, *args))
         return links[-1]
 
-    monkeypatch.setattr("runtime.process.Link", link)
+    monkeypatch.setattr("runtime.cycle.process.Link", link)
     monkeypatch.setattr("runtime.timing.wake.best_alarm", LoopTimer)
-    monkeypatch.setattr("runtime.process.ask", lambda _realtime: ())
+    monkeypatch.setattr("runtime.cycle.process.ask", lambda _realtime: ())
     try:
         yield loop, settings, robot, links
     finally:

@@ -16,20 +16,20 @@ from typing import Any
 import pytest
 
 from config.load import load_settings
-from runtime.cli import call
-from runtime.complaint import DONE, WRONG_CALL
-from runtime.experiments.budgets import BudgetRow, drive, in_long_hall
-from runtime.experiments.long_hall import A_SIDE, long_hall
-from runtime.experiments.simulate import simulate
-from runtime.step import CycleRecord
-from runtime.timing.allowance import Allowance, ProcessorTime, Quanta
+from runtime.cli.app import call
+from runtime.cycle.step import CycleRecord
+from runtime.simulation.budget_sweep import BudgetRow, drive, in_long_hall
+from runtime.simulation.closed_loop import simulate
+from runtime.simulation.long_hall import A_SIDE, long_hall
+from runtime.support.errors import DONE, WRONG_CALL
+from runtime.timing.refinement_budget import ProcessorTime, Quanta, RefinementBudget
 
 ROOT = Path(__file__).parents[2]
 CYCLES = 3000
 SETTINGS = in_long_hall(load_settings("irregular"))
 
 
-def asked(allowance: Allowance, cycles: int) -> list[int]:
+def asked(allowance: RefinementBudget, cycles: int) -> list[int]:
     """Return how many quanta each cycle gets where there is no end of work."""
     counts = []
     for _ in range(cycles):
@@ -85,7 +85,7 @@ def test_tracks_are_not_used_up_in_the_long_hall() -> None:
         held.append(record.clusters)
 
     simulate(SETTINGS, world, 0, 600.0, on_cycle)
-    assert max(held) < SETTINGS.perception.full.tracks_max, max(held)
+    assert max(held) < SETTINGS.perception.bayes.tracks_max, max(held)
 
 
 @pytest.mark.compiled
@@ -154,7 +154,7 @@ def test_a_sweep_that_makes_no_sense_is_refused(words: list[str]) -> None:
 @pytest.mark.usefixtures("warm_kernels")
 def test_no_cycle_takes_more_than_its_budget_and_a_quantum() -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "tests.timing.budget", str(CYCLES)],
+        [sys.executable, "-m", "bench.budget", str(CYCLES)],
         cwd=ROOT, text=True, capture_output=True, timeout=300, check=False,
     )  # fmt: skip
     found = [json.loads(line) for line in done.stdout.splitlines()]

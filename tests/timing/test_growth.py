@@ -17,7 +17,7 @@ CYCLES = 2000
 
 def test_a_drive_grows_by_nothing_and_compiles_and_collects_nothing() -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "tests.timing.growth", str(CYCLES)],
+        [sys.executable, "-m", "bench.growth", str(CYCLES)],
         cwd=ROOT, text=True, capture_output=True, timeout=300, check=False,
     )  # fmt: skip
     assert done.stdout, done.stderr

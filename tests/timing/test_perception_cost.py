@@ -14,12 +14,12 @@ import pytest
 
 from config.load import load_settings
 from drivers.messages import Firing
-from perception.full import entry, refine
-from perception.full.method import FullPerception
+from perception.bayes import entry, refine
+from perception.bayes.bayes_method import BayesPerception
 from perception.pipeline import Perception
-from runtime.experiments.simulate import simulate
-from runtime.step import CycleRecord, State, step
-from runtime.timing.allowance import enough_quanta
+from runtime.cycle.step import CycleRecord, State, step
+from runtime.simulation.closed_loop import simulate
+from runtime.timing.refinement_budget import enough_quanta
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
@@ -99,7 +99,7 @@ def test_the_cost_does_not_grow_with_the_way(records: list[CycleRecord]) -> None
 
 def test_a_handle_goes_over_for_less_than_two_tuples() -> None:
     """A call that finds nothing to do costs what handing over costs: by the handle about a fifth."""
-    perception = FullPerception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception.full)
+    perception = BayesPerception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception.bayes)
     s, p = perception.memory, perception.settings
     handle, never, costs = entry.hold(s, p), 1e9, []
     for _ in range(200):
@@ -135,7 +135,7 @@ class Clocked(Perception):
 
 
 def budgeted(records: list[CycleRecord], budget_s: float, quantum_s: float) -> Iterator[tuple[CycleRecord, float]]:
-    """Play the drive as `runtime.process` does; yield each record and how long refinement took."""
+    """Play the drive as `runtime.cycle.process` does; yield each record and how long refinement took."""
     perception = Clocked(MANY_QUANTA.ring, MANY_QUANTA.models, MANY_QUANTA.perception)
     clock = perception.clock = VirtualClock(quantum_s)
     state = State(perception)

@@ -25,7 +25,7 @@ def drive_on(hours: float, wrap_s: float, patience_s: float) -> dict[str, Any]:
     """Drive for so long in virtual time, in a process of its own, and return what is left behind."""
     cycles = round(hours * 3600 * RATE_HZ)
     done = subprocess.run(
-        [sys.executable, "-X", "dev", "-m", "tests.timing.growth", str(cycles), "--wrap-s", str(wrap_s)],
+        [sys.executable, "-X", "dev", "-m", "bench.growth", str(cycles), "--wrap-s", str(wrap_s)],
         cwd=ROOT, text=True, capture_output=True, timeout=patience_s, check=False,
     )  # fmt: skip
     assert done.stdout, done.stderr

@@ -105,9 +105,9 @@ export function drawVectors(f) {
 
 export function drawWish(f) {
   const { ctx, world, theme, view } = f;
-  const wish = world.state.wish;
-  if (wish?.kind !== "goal") return;
-  const [x, y] = view.toScreen(wish.x, wish.y);
+  const drive_request = world.state.drive_request;
+  if (drive_request?.kind !== "goal") return;
+  const [x, y] = view.toScreen(drive_request.x, drive_request.y);
   const [rx, ry] = view.toScreen(world.state.pose[0], world.state.pose[1]);
   f.onScreen();
   ctx.strokeStyle = ctx.fillStyle = theme.drive;

@@ -42,7 +42,7 @@ export function outlinePath(path, model, { x, y, theta, covariance = null }, px)
     path.closePath();
     return;
   }
-  if (model.arc_radius_m && (model.closed || covariance !== null)) { // the full method locates circles, the paper's chords
+  if (model.arc_radius_m && (model.closed || covariance !== null)) { // the Bayesian method locates circles, the paper's chords
     path.moveTo(x + model.arc_radius_m, y);
     path.arc(x, y, model.arc_radius_m, 0, 2 * Math.PI);
     return;

@@ -8,13 +8,13 @@ export class Drive {
     Object.assign(this, { world, units, connection, notices, hand });
     const asks = {
       arm: () => this.arm(), disarm: { type: "disarm" }, "take-control": { type: "take_control" },
-      "give-control": { type: "give_control" }, "wish-legs": { type: "wish", kind: "legs" },
+      "give-control": { type: "give_control" }, "drive_request-legs": { type: "drive_request", kind: "legs" },
     };
     for (const [id, message] of Object.entries(asks)) {
       byId(id).addEventListener("click", typeof message === "function" ? message : () => this.#ask(message));
     }
     byId("halt").addEventListener("click", () => this.halt());
-    byId("wish-goal").addEventListener("click", () => tools.choose("goal", { focus: true }));
+    byId("drive_request-goal").addEventListener("click", () => tools.choose("goal", { focus: true }));
     byId("goal-form").addEventListener("submit", (event) => this.#goalByForm(event));
     world.on("hello", () => {
       this.controller = undefined; // there may be new fields, to be shut for who watches
@@ -41,7 +41,7 @@ export class Drive {
   }
 
   goal(x, y) {
-    return this.connection.ask({ type: "wish", kind: "goal", x, y });
+    return this.connection.ask({ type: "drive_request", kind: "goal", x, y });
   }
 
   #goalByForm(event) {
@@ -65,7 +65,7 @@ export class Drive {
   }
 
   #refresh() {
-    const { mode, controller, wish, clients } = this.world.state;
+    const { mode, controller, drive_request, clients } = this.world.state;
     if (this.controller !== controller) {
       this.controller = controller;
       for (const element of document.querySelectorAll(".control")) element.disabled = !controller;
@@ -83,9 +83,9 @@ export class Drive {
     mark(byId("pad"), "aria-disabled", this.hand.whyNot() !== null);
     const others = clients - 1;
     say(byId("role-words"), `${controller ? "You control; " : "You watch; "}${others > 0 ? `${others} other${others > 1 ? "s" : ""} connected.` : "nobody else is connected."}`);
-    say(byId("wish-words"), wishWords(wish, this.units));
-    mark(byId("wish-legs"), "aria-pressed", wish?.kind === "legs");
-    mark(byId("wish-goal"), "aria-pressed", wish?.kind === "goal");
+    say(byId("drive_request-words"), wishWords(drive_request, this.units));
+    mark(byId("drive_request-legs"), "aria-pressed", drive_request?.kind === "legs");
+    mark(byId("drive_request-goal"), "aria-pressed", drive_request?.kind === "goal");
   }
 
   #role({ asked_by: name, client }) {
@@ -126,9 +126,9 @@ export class Drive {
   }
 }
 
-function wishWords(wish, units) {
-  if (!wish) return "Nothing is known of it.";
-  if (wish.kind === "goal" && wish.reached) return `At the goal at ${units.place(wish.x, wish.y)}.`;
-  if (wish.kind === "goal") return `To the goal at ${units.place(wish.x, wish.y)}.`;
-  return wish.kind === "teleoperate" ? "By hand." : "Ahead, as configured.";
+function wishWords(drive_request, units) {
+  if (!drive_request) return "Nothing is known of it.";
+  if (drive_request.kind === "goal" && drive_request.reached) return `At the goal at ${units.place(drive_request.x, drive_request.y)}.`;
+  if (drive_request.kind === "goal") return `To the goal at ${units.place(drive_request.x, drive_request.y)}.`;
+  return drive_request.kind === "teleoperate" ? "By hand." : "Ahead, as configured.";
 }

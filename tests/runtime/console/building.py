@@ -10,11 +10,11 @@ import numpy as np
 import orjson
 
 from config.settings import Settings
-from runtime.console.playback import Shown
-from runtime.console.playing import At, Picture, play
+from runtime.console.playback.replay_cursor import Shown
+from runtime.console.playback.replay_worker import At, Picture, play
+from runtime.cycle.step import CycleRecord
 from runtime.recording.channels import encode
-from runtime.recording.forms import Cycle
-from runtime.step import CycleRecord
+from runtime.recording.schema import Cycle
 
 
 def told(shown: Shown) -> dict[str, Any]:

@@ -15,15 +15,15 @@ from perception.edits import (
     PlaceModel,
     RejectObject,
 )
-from runtime.modes import Request
-from runtime.wishes import Legs
+from runtime.cycle.drive_requests import Legs
+from runtime.cycle.modes import Request
 
 ASKED: list[tuple[dict[str, Any], object]] = [
     ({"type": "halt"}, Request.HALT),
     ({"type": "arm"}, Request.ARM),
     ({"type": "disarm"}, Request.DISARM),
-    ({"type": "wish", "kind": "legs"}, Legs()),
-    ({"type": "wish", "kind": "goal", "x": 1, "y": -2.5}, Goal(1.0, -2.5)),
+    ({"type": "drive_request", "kind": "legs"}, Legs()),
+    ({"type": "drive_request", "kind": "goal", "x": 1, "y": -2.5}, Goal(1.0, -2.5)),
     ({"type": "teleoperate", "v": 0.2, "w": -1}, Teleoperate(0.2, -1.0, 0.25)),
 ]
 EDITS: list[tuple[dict[str, Any], object]] = [

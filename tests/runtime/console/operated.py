@@ -21,18 +21,18 @@ from drivers.driver import Heard, LineState
 from drivers.messages import Firing, Flags, LinkCounts, Odometry, Pose, Twist
 from perception.edits import Edit, Evidence
 from perception.pipeline import Perception
+from runtime.console.commands.async_commands import AsyncCommands
 from runtime.console.console import Console
-from runtime.console.limits import Limits
-from runtime.console.overtime import Overtime
-from runtime.health import Health
-from runtime.modes import Mode, ModeState, Request
-from runtime.process import CALLBACKS
-from runtime.readying import Readying
-from runtime.step import CycleRecord, Inputs, Refused, State
-from runtime.timing.books import Books
-from runtime.timing.meter import Meter
+from runtime.console.http.client_limits import Limits
+from runtime.cycle.drive_requests import DriveRequest
+from runtime.cycle.modes import Mode, ModeState, Request
+from runtime.cycle.process import CALLBACKS
+from runtime.cycle.step import CycleRecord, Inputs, Refused, State
+from runtime.support.health import Health
+from runtime.support.kernel_loader import KernelLoader
+from runtime.timing.clock_sampler import ClockSampler
+from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.timekeeping import Timekeeper
-from runtime.wishes import Wish
 
 PATIENCE_S = 20.0
 FREE_PORT = "console.port=0"
@@ -57,15 +57,15 @@ class FakeRun:
 
     def __post_init__(self) -> None:
         self.health = Health(self.log)
-        self.books = Books(0.005)
-        self.keeper = Timekeeper(self.books, Meter().read, callbacks=CALLBACKS)
+        self.books = CycleStats(0.005)
+        self.keeper = Timekeeper(self.books, ClockSampler().read, callbacks=CALLBACKS)
         self.state = State(Perception(self.settings.ring, self.settings.models, self.settings.perception))
 
     def request(self, request: Request) -> None:
         self.asked.append(request)
 
-    def wish(self, wish: Wish) -> None:
-        self.asked.append(wish)
+    def drive_request(self, drive_request: DriveRequest) -> None:
+        self.asked.append(drive_request)
 
     def edit(self, edit: Edit) -> bool:
         if self.room == 0:
@@ -199,7 +199,7 @@ class Operated:
 
 @contextlib.asynccontextmanager
 async def operated(
-    *sets: str, overtime: Overtime | None = None, limits: Limits | None = None, emulated: bool = True
+    *sets: str, overtime: AsyncCommands | None = None, limits: Limits | None = None, emulated: bool = True
 ) -> AsyncIterator[Operated]:
     """Open a console; its clock goes on with cycles only."""
     lines: list[dict[str, Any]] = []
@@ -213,13 +213,13 @@ async def operated(
     settings = load_settings("hallway", ["perception.method=paper", FREE_PORT, *sets])
     run = FakeRun(settings, log)
     console = Console(
-        run, settings, log, run.reconfigure, Readying(log), emulated=emulated, overtime=overtime, limits=limits,
+        run, settings, log, run.reconfigure, KernelLoader(log), emulated=emulated, overtime=overtime, limits=limits,
         clock=lambda: clock[0],
     )  # fmt: skip
     before = asyncio.all_tasks()
-    with run.health.hearing_accidents():
+    with run.health.catching_unhandled_errors():
         async with aiohttp.ClientSession() as session, console.open():
             yield Operated(run, console, session, lines, clock)
         left = [task for task in asyncio.all_tasks() - before if "aiohttp.connector" not in repr(task)]
         assert not left, "a task outlived the console"
-    assert run.health.unwell() is None
+    assert run.health.fault() is None

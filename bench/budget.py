@@ -1,0 +1,163 @@
+"""What a cycle's refinement costs against its budget, in thread CPU time; `make soak` drives 100,000 cycles.
+
+A program of its own, as the growth of a long drive is. Perception's time is that of its base part and of its quanta:
+in no cycle may that be more than the budget and one quantum, for which there is half a millisecond.
+
+A virtual machine whose host takes its processor away books that time to whoever was running. The drive is the same to
+the bit every time, so it is driven twice: what a cycle takes in both drives is its own, the rest is the machine's.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Final
+
+import numpy as np
+import orjson
+from cyclopts import App, Parameter
+from rich.console import Console
+
+from config.load import load_settings
+from config.settings import Settings
+from drivers.denning.device import EmulatedRobot
+from drivers.denning.robot import DenningRobot
+from drivers.emulator.memory_transport import MemoryLine
+from drivers.messages import Floats
+from perception.pipeline import Perception
+from runtime.cycle.driver_io import gather, give
+from runtime.cycle.modes import Mode, Request
+from runtime.cycle.step import Inputs, State, step
+from runtime.support.errors import DONE, FAILED
+from runtime.support.kernel_cache import ready_kernels
+from runtime.timing.memory_policy import MemoryPolicy
+from runtime.timing.phases import Phase
+from runtime.timing.refinement_budget import ProcessorTime
+
+QUANTUM_MAX_US: Final = 500.0
+"""Of a quantum's CPU time, at p99.9."""
+DRIVES: Final = 2
+SETTLED_CYCLES: Final = 200
+"""Until then the robot is being armed, and what is made at first need is made."""
+
+app = App(help="Drive for many cycles in virtual time and set perception's time against its budget.")
+
+
+@dataclass
+class Account:
+    """CPU times of one drive, µs."""
+
+    budget_us: float
+    base_us: list[float] = field(default_factory=list)
+    """Of the part of perception that always runs, a cycle."""
+    spent_us: list[float] = field(default_factory=list)
+    """Of that and the quanta, a cycle."""
+    quanta_us: list[float] = field(default_factory=list)
+    causes: dict[str, int] = field(default_factory=dict)
+
+    def beyond_us(self) -> Floats:
+        """Return by how much each cycle took longer than its budget."""
+        return np.array(self.spent_us) - self.budget_us
+
+    def figures(self) -> dict[str, Any]:
+        """Return what there is to say of this drive alone."""
+        return {
+            "budget_us": self.budget_us,
+            "cycles": len(self.spent_us),
+            "quanta": len(self.quanta_us),
+            "quantum_us": _quantiles(self.quanta_us),
+            "perception_us": _quantiles(self.spent_us),
+            "base_us": _quantiles(self.base_us),
+            "beyond_budget_us_max": round(float(self.beyond_us().max()), 1),
+            "cycles_beyond_a_quantum": int((self.beyond_us() > QUANTUM_MAX_US).sum()),
+            "causes": self.causes,
+        }
+
+
+def _quantiles(taken_us: list[float]) -> dict[str, float]:
+    values = np.quantile(taken_us, [0.5, 0.99, 0.999, 1.0]).tolist()
+    return {name: round(value, 1) for name, value in zip(("p50", "p99", "p99.9", "max"), values, strict=True)}
+
+
+class Timed(Perception):
+    """Perception whose quanta are timed."""
+
+    account: Account
+
+    def refine(self) -> int:
+        """Do one quantum and book it."""
+        begin_ns = time.thread_time_ns()
+        done = super().refine()
+        took_us = 1e-3 * (time.thread_time_ns() - begin_ns)
+        self.account.quanta_us.append(took_us)
+        return done
+
+
+def account_for(settings: Settings, cycles: int, budget_s: float) -> Account:
+    """Drive to and fro for so many cycles under a budget of thread CPU time, as the robot's own process does."""
+    assert settings.world is not None
+    robot = EmulatedRobot(settings, settings.world, 0)
+    driver = DenningRobot(settings)
+    line = MemoryLine(driver, robot)
+    perception = Timed(settings.ring, settings.models, settings.perception)
+    account = perception.account = Account(1e6 * budget_s)
+    state = State(perception)
+    memory = MemoryPolicy()
+    with memory.driving():
+        for cycle in range(1, SETTLED_CYCLES + cycles + 1):
+            now_s = cycle / settings.cycle.rate_hz
+            line.exchange(now_s)
+            inputs = gather(driver, now_s, Request.ARM if state.mode.mode is Mode.READY else None)
+            if cycle == SETTLED_CYCLES + 1:
+                account = perception.account = Account(1e6 * budget_s)
+            _one_cycle(state, inputs, settings, driver, account, budget_s)
+            memory.cycle_done(1.0)
+    return account
+
+
+def _one_cycle(
+    state: State, inputs: Inputs, settings: Settings, driver: DenningRobot, account: Account, budget_s: float
+) -> None:
+    """Run one cycle under the budget and book it."""
+    marks: dict[Phase, float] = {}
+    allowance = ProcessorTime(budget_s)
+    begin_s = time.thread_time()
+    allowance.begin()
+    record = step(
+        state, inputs, settings, lambda command: give(driver, command), allowance,
+        lambda phase: marks.__setitem__(phase, time.thread_time()),
+    )  # fmt: skip
+    base_us = 1e6 * (marks[Phase.PERCEIVE] - begin_s)
+    account.base_us.append(base_us)
+    account.spent_us.append(base_us + 1e6 * (marks[Phase.REFINE] - marks[Phase.COMMAND]))
+    account.causes[record.refinement] = account.causes.get(record.refinement, 0) + 1
+
+
+@app.default
+def main(
+    cycles: Annotated[int, Parameter(help="Cycles to drive.")] = 100_000,
+    /,
+    *,
+    budget_ms: Annotated[tuple[float, ...], Parameter(negative="", consume_multiple=True)] = (5.0, 0.1),
+) -> int:
+    """Print the figures of each budget as JSON; fail where a cycle took more than its budget and a quantum."""
+    settings = load_settings("hallway", ["behaviors.move_ahead.at_end=turn_back"])
+    ready_kernels(settings, Console(stderr=True))
+    kept = True
+    for budget in budget_ms:
+        drives = [account_for(settings, cycles, 1e-3 * budget) for _ in range(DRIVES)]
+        beyond_us = np.min([drive.beyond_us() for drive in drives], axis=0)
+        both = {
+            "beyond_budget_us_max": round(float(beyond_us.max()), 1),
+            "cycles_beyond_a_quantum": int((beyond_us > QUANTUM_MAX_US).sum()),
+        }
+        figures = {"in_every_drive": both, "drives": [drive.figures() for drive in drives]}
+        sys.stdout.write(orjson.dumps(figures).decode() + "\n")
+        kept &= both["cycles_beyond_a_quantum"] == 0
+        kept &= all(drive.figures()["quantum_us"]["p99.9"] <= QUANTUM_MAX_US for drive in drives)
+    return DONE if kept else FAILED
+
+
+if __name__ == "__main__":
+    sys.exit(app(result_action="return_value"))

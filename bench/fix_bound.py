@@ -1,0 +1,90 @@
+"""How early drums could be placed at all: the bound that first sure fixes are set against.
+
+Association is perfect, radius and noise are known, and the centre is the posterior's mean over a grid about the
+truth (no more than a foot off), beams included. Whatever recognition does, it cannot place a drum earlier than this
+from the same ranges; what it does later is spent on telling that it is a drum.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from typing import Final
+
+import numpy as np
+
+from config.load import load_settings
+from runtime.simulation.scenes import Hall, halls, readings
+
+FT: Final = 0.3048
+WITHIN: Final = 0.25
+BEFORE: Final = 4.0
+SIGMA: Final = {"clean": 0.001, "walls": 0.001, "moved": 0.001, "noisy": 0.05, "jit10": 0.03}
+"""Noise of each scene, ft."""
+HALF_BOX: Final = 0.05
+ERF_AT: Final = np.linspace(-6.0, 6.0, 4801)
+ERF: Final = np.array([math.erf(v) for v in ERF_AT])
+
+
+def heard(hall: Hall, seed: int, sigma: float) -> list[list[tuple[float, ...]]]:
+    """Return for each drum the readings that are its own up to `BEFORE`: x, y, range (ft) and axis."""
+    ring = load_settings("hallway", ["perception.method=full"]).ring
+    rows: list[list[tuple[float, ...]]] = [[] for _ in hall.world.drum]
+    for firing in readings(ring, hall, seed):
+        for mount, range_m in zip(ring.mounts, firing.ranges_m, strict=True):
+            x, y, r = (firing.pose.x + mount.x_m) / FT, mount.y_m / FT, float(range_m) / FT
+            ux, uy = math.cos(mount.angle_rad), math.sin(mount.angle_rad)
+            for row, drum in zip(rows, hall.world.drum, strict=True):
+                dx, dy = drum.x_m / FT - x, drum.y_m / FT - y
+                d = math.hypot(dx, dy)
+                near = abs(r - (d - drum.radius_m / FT)) < HALF_BOX + 0.01 + 4.0 * sigma
+                in_time = drum.x_m - firing.pose.x >= (BEFORE - 1e-9) * FT
+                if in_time and near and dx * ux + dy * uy >= math.cos(math.radians(12.0)) * d:
+                    row.append((x, y, r, ux, uy))
+    return rows
+
+
+def error(rows: list[tuple[float, ...]], cx: float, cy: float, radius: float, sigma: float) -> float:
+    """Return how far the posterior's mean lies from the truth, ft; the grid is laid twice, coarse and fine."""
+    ox, oy, half = cx, cy, 1.0
+    for _ in range(2):
+        g = np.linspace(-half, half, 81)
+        px, py = np.meshgrid(ox + g, oy + g)
+        total = np.zeros_like(px)
+        for x, y, r, ux, uy in rows:
+            dx, dy = px - x, py - y
+            d = np.hypot(dx, dy)
+            e = (r - (d - radius)) / (sigma * math.sqrt(2.0))
+            h = HALF_BOX / (sigma * math.sqrt(2.0))
+            box = 0.5 * (np.interp(e + h, ERF_AT, ERF) - np.interp(e - h, ERF_AT, ERF))
+            outside = dx * ux + dy * uy < math.cos(math.radians(12.0)) * d
+            total += np.log(np.maximum(box, 1e-6)) - 1e3 * outside
+        weight = np.exp(total - total.max())
+        weight /= weight.sum()
+        ox, oy = float((weight * px).sum()), float((weight * py).sum())
+        spread = math.sqrt(float((weight * ((px - ox) ** 2 + (py - oy) ** 2)).sum()))
+        half = min(1.0, max(0.05, 5.0 * spread))
+    return math.hypot(ox - cx, oy - cy)
+
+
+def main() -> None:
+    """Print the share of drums that could be placed to `WITHIN` at `BEFORE`."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("scene", choices=sorted(SIGMA))
+    parser.add_argument("--seeds", type=int, default=1)
+    call = parser.parse_args()
+    sigma, errors = SIGMA[call.scene], []
+    for seed in range(call.seeds):
+        for i, hall in enumerate(halls(call.scene, seed)):
+            for drum, rows in zip(hall.world.drum, heard(hall, seed * 1000 + i, sigma), strict=True):
+                place = drum.x_m / FT, drum.y_m / FT
+                errors.append(error(rows, *place, drum.radius_m / FT, sigma) if len(rows) > 1 else math.inf)
+    share = np.mean(np.array(errors) <= WITHIN)
+    sys.stdout.write(
+        f"{call.scene}: {share:.0%} of {len(errors)} within {WITHIN} ft, median {np.median(errors):.3f} ft\n"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,69 @@
+"""The result as a person reads it: one row a contestant, lengths in feet, times in milliseconds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.table import Table
+
+from bench.measure import Plan, Result, SceneScore, Times
+
+
+def results_table(results: Sequence[Result], plan: Plan) -> Table:
+    """Return the table of the whole run."""
+    table = Table(
+        title="Lengths in feet; f/f: found/false; ms: median per ring reading, the peers' own after segments and "
+        "association,\nwhich are common to them and told apart; ours holds everything",
+        title_justify="left",
+    )
+    table.add_column("contestant")
+    headings = (
+        "clean\nmean/max", "moved\nf/f mean/max", "noisy\nf/f (mean)", "walls\nf/f (mean)", "jit10\nf/f (mean)",
+        "boxes false\nfacing, 45°", "ms", "ms of\nassociation", "ms of\nsegments",
+        f"ms\npass {plan.passes}", f"pass\n{plan.passes} / 1",
+    )  # fmt: skip
+    for heading in headings:
+        table.add_column(heading, justify="right")
+    for result in results:
+        scenes = result["scenes"]
+        moved = scenes["moved"]
+        table.add_row(
+            f"{result['name']} ({result['version']})",
+            ("" if scenes["clean"]["found"] == scenes["clean"]["of"] else _counts(scenes["clean"]) + " ")
+            + _mean_max(scenes["clean"]),
+            f"{_counts(moved)} {_mean_max(moved)}",
+            _counted(scenes["noisy"]),
+            _counted(scenes["walls"]),
+            _counted(scenes["jit10"]),
+            f"{scenes['boxes_facing']['false']}, {scenes['boxes_45']['false']}",
+            f"{result['ms']['own']:.3f}",
+            _part(result["ms"]["association"]),
+            _part(result["ms"]["front_end"]),
+            "–" if result["ms_last_pass"] is None else f"{result['ms_last_pass']['own']:.3f}",
+            _growth(result["ms_first_pass"], result["ms_last_pass"]),
+        )
+    return table
+
+
+def _counts(score: SceneScore) -> str:
+    return f"{score['found']}/{score['false']}"
+
+
+def _mean_max(score: SceneScore) -> str:
+    return f"{_length(score['mean_ft'])}/{_length(score['max_ft'])}"
+
+
+def _counted(score: SceneScore) -> str:
+    return f"{_counts(score)} ({_length(score['mean_ft'])})"
+
+
+def _length(feet: float | None) -> str:
+    return "–" if feet is None else f"{feet:.4f}".removeprefix("0")
+
+
+def _part(ms: float) -> str:
+    return f"{ms:.3f}" if ms else "in ms"
+
+
+def _growth(first: Times | None, last: Times | None) -> str:
+    return "–" if first is None or last is None else f"{last['own'] / first['own']:.2f}"

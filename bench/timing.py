@@ -1,0 +1,286 @@
+"""How well a run keeps its time: the real command on the real pseudo-terminal, in turns with bare controls.
+
+What the run's own summary offers is taken as it is, so that books it gains are in the table by themselves. The time
+from an echo to the command that answers it is taken on the robot's side of the line, see
+`drivers/emulator/latency_trace.py`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import math
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+import orjson
+
+from bench.waking import PERIOD_S, hogs
+from config.load import load_settings
+from config.robot import SOUND_SPEED_M_S
+from runtime.simulation.closed_loop import simulate
+from runtime.support.errors import FAILED, UserError
+
+ECHO_TO_DRIVE: Final = "echo to drive"
+LATE: Final = "timing: late"
+"""The row of how long after its time a cycle began."""
+WINDOW_USED: Final = "firing window used, p99 share"
+START_CONTROL: Final = "start_s, bare control"
+VIRTUAL: Final = "a second of virtual time, CPU ms"
+VIRTUAL_S: Final = 20.0
+WAKING: Final = "lag"
+CONTROL: Final = ", bare control"
+PATIENCE_S: Final = 90.0
+QUANTILES: Final = {"p50": 0.5, "p99": 0.99, "p99.9": 0.999}
+RENAMED: Final = MappingProxyType({"p999": "p99.9"})
+DRIVE_ON: Final = ("--set", "behaviors.move_ahead.at_end=turn_back")
+"""The drums shall be driven past again and again, however long the measurement lasts."""
+
+Quantiles = Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class TimingPlan:
+    """How much is measured: `rounds` times `seconds` of ours and of the control, beside so many busy processes."""
+
+    seconds: float
+    rounds: int
+    busy: int
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """What came of it."""
+
+    plan: TimingPlan
+    quantiles_us: dict[str, dict[str, float]]
+    """A row each, µs."""
+    figures: dict[str, float]
+    """Start-up, memory, processor time, and counts; the worst of all rounds."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as written to a file."""
+        plan = {"seconds": self.plan.seconds, "rounds": self.plan.rounds, "busy": self.plan.busy}
+        return {"plan": plan, "quantiles_us": self.quantiles_us, "figures": self.figures}
+
+
+def measure_timing(plan: TimingPlan, sets: Sequence[str], told: Callable[[str], None]) -> Timing:
+    """Run ours and the controls in turns.
+
+    Parameters
+    ----------
+    plan : TimingPlan
+        How long and how often.
+    sets : sequence of str
+        Settings of the run, as after ``--set``.
+    told : callable
+        Hears what is being done.
+
+    Raises
+    ------
+    UserError
+        A process failed; its own words are in the message.
+    """
+    summaries: list[dict[str, Any]] = []
+    samples: dict[str, list[float]] = {
+        name: [] for name in (WAKING + CONTROL, ECHO_TO_DRIVE, ECHO_TO_DRIVE + CONTROL)
+    }
+    unanswered, imports_s = 0, []
+    with tempfile.TemporaryDirectory(prefix="echolocate-bench-") as name, hogs(plan.busy):
+        folder = Path(name)
+        for turn in range(1, plan.rounds + 1):
+            told(f"timing: ours, {plan.seconds:g} s, turn {turn} of {plan.rounds}, {plan.busy} busy processes beside")
+            summary, late_us = _ours(folder, plan.seconds, sets)
+            summaries.append(summary)
+            imports_s.append(_import_s())
+            samples[WAKING + CONTROL] += late_us
+            answers, missing = answers_us(folder / "latency.csv")
+            samples[ECHO_TO_DRIVE] += answers
+            unanswered += missing
+            told(f"timing: control, {plan.seconds:g} s, turn {turn} of {plan.rounds}")
+            _control(folder, plan.seconds, sets)
+            samples[ECHO_TO_DRIVE + CONTROL] += answers_us(folder / "latency.csv")[0]
+    rows = worst_rows(summaries)
+    rows |= {name: quantiles_of(taken) for name, taken in samples.items() if taken}
+    figures = worst_figures(summaries) | {
+        WINDOW_USED: round(rows["cycle"]["p99"] / (1e6 * window_s(sets)), 4),
+        START_CONTROL: round(max(imports_s), 2),
+        VIRTUAL: virtual_ms(sets, plan.rounds),
+        "echoes unanswered": float(unanswered),
+    }
+    return Timing(plan, dict(sorted(rows.items())), figures)
+
+
+def window_s(sets: Sequence[str]) -> float:
+    """Return how long the ring listens after a firing, s: the time there is for a cycle's work."""
+    ring = load_settings("hallway", sets).ring
+    return 2.0 * ring.window_m / SOUND_SPEED_M_S
+
+
+def answers_us(trace: Path) -> tuple[list[float], int]:
+    """Return how long after each echo the first command came, µs, and how many echoes got none before the next.
+
+    The conversation's beginning, before the first command, does not count, and neither does the last echo.
+    """
+    with trace.open(encoding="ascii", newline="") as file:
+        rows = [(float(row["host_s"]), row["frame"]) for row in csv.DictReader(file)]
+    first = next((k for k, (_, frame) in enumerate(rows) if frame == "drive"), len(rows))
+    last = max((k for k, (_, frame) in enumerate(rows) if frame == "drive"), default=0)
+    taken_us: list[float] = []
+    unanswered, echo_s = 0, None
+    for host_s, frame in rows[first : last + 1]:
+        if frame == "echo":
+            unanswered += echo_s is not None
+            echo_s = host_s
+        elif echo_s is not None:
+            taken_us.append(1e6 * (host_s - echo_s))
+            echo_s = None
+    return taken_us, unanswered
+
+
+def quantiles_of(taken_us: Sequence[float]) -> dict[str, float]:
+    """Return the quantiles of samples, µs."""
+    values = np.quantile(taken_us, list(QUANTILES.values()))
+    row = {name: round(float(value), 1) for name, value in zip(QUANTILES, values, strict=True)}
+    return row | {"max": round(float(max(taken_us)), 1)}
+
+
+def quantile_rows(summary: Mapping[str, Any], under: str = "") -> dict[str, dict[str, float]]:
+    """Return whatever in a summary is a row of quantiles in µs, however deep, by its name."""
+    rows: dict[str, dict[str, float]] = {}
+    for key, value in summary.items():
+        if not isinstance(value, dict):
+            continue
+        name = f"{under}{key.removesuffix('_us')}"
+        if "p50" in value:
+            rows[name] = {RENAMED.get(column, column): float(figure) for column, figure in value.items()}
+        else:
+            rows |= quantile_rows(value, f"{name}: ")
+    return rows
+
+
+def worst_rows(summaries: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, float]]:
+    """Return each row's largest figures over all summaries."""
+    rows: dict[str, dict[str, float]] = {}
+    for summary in summaries:
+        for name, row in quantile_rows(summary).items():
+            before = rows.setdefault(name, row)
+            rows[name] = {column: max(figure, before.get(column, figure)) for column, figure in row.items()}
+    return rows
+
+
+def worst_figures(summaries: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """Return the largest of each plain figure of the summaries' process and of their counts."""
+    figures: dict[str, float] = {}
+    for summary in summaries:
+        process = summary["process"]
+        plain = {name: value for name, value in process.items() if isinstance(value, int | float)}
+        plain |= {"full collections": process["collections"][-1], "link lost": summary["link"]["lost"]}
+        plain |= {name: summary[name] for name in ("late", "missed")}
+        plain |= {"stops": len(summary["stop_reasons"]), "gave up driving": summary["mode"] != "DRIVE"}
+        for name, value in plain.items():
+            figures[name] = max(float(value), figures.get(name, float(value)))
+    return figures
+
+
+def _ours(folder: Path, seconds: float, sets: Sequence[str]) -> tuple[dict[str, Any], list[float]]:
+    """Run the command for `seconds`, a bare loop beside it; return the summary, and how late the loop woke, µs."""
+    summary, late = folder / "run.json", folder / "late.txt"
+    words = [word for text in sets for word in ("--set", text)]
+    with emulating(folder, words) as port:
+        run = start(
+            folder, "run", "runtime.cli.app", "run", "--headless", "--port", port, "--arm", "--seconds", f"{seconds}",
+            "--json", str(summary), *DRIVE_ON, *words,
+        )  # fmt: skip
+        beside = start(folder, "wake", "bench.bare", "wake", f"{PERIOD_S}", f"{seconds}", str(late))
+        for process, name in ((run, "run"), (beside, "wake")):
+            finish(folder, process, name, seconds + PATIENCE_S)
+    found: dict[str, Any] = orjson.loads(summary.read_bytes())
+    return found, [float(line) for line in late.read_text().split()]
+
+
+def virtual_ms(sets: Sequence[str], rounds: int) -> float:
+    """Return what a second of the closed loop in virtual time costs, acoustics included, ms of CPU time; the best."""
+    settings = load_settings("hallway", (*sets, DRIVE_ON[1]))
+    if settings.world is None:
+        return math.nan
+    took_s = []
+    for _ in range(1 + rounds):  # the first pays for what is made at first need
+        begin_s = time.thread_time()
+        simulate(settings, settings.world, 0, VIRTUAL_S)
+        took_s.append(time.thread_time() - begin_s)
+    return round(1e3 * min(took_s) / VIRTUAL_S, 2)
+
+
+def _import_s() -> float:
+    """Return how long an interpreter takes that imports numba and does nothing: the least a start can take."""
+    begin_s = time.monotonic()
+    subprocess.run([sys.executable, "-c", "import numba"], check=True, timeout=PATIENCE_S)
+    return time.monotonic() - begin_s
+
+
+def _control(folder: Path, seconds: float, sets: Sequence[str]) -> None:
+    words = [word for text in sets for word in ("--set", text)]
+    with emulating(folder, words) as port:
+        process = start(folder, "answer", "bench.bare", "answer", port, f"{seconds}", *words)
+        finish(folder, process, "answer", seconds + PATIENCE_S)
+
+
+@contextlib.contextmanager
+def emulating(folder: Path, words: Sequence[str]) -> Iterator[str]:
+    """Run the emulator, with a latency trace that is complete afterwards."""
+    port, trace = folder / "robot", folder / "latency.csv"
+    process = start(
+        folder, "emulate", "runtime.cli.app", "emulate", "--link", str(port), "--latency", str(trace), *words,
+    )  # fmt: skip
+    try:
+        end_s = time.monotonic() + PATIENCE_S
+        while not port.exists():
+            if process.poll() is not None or time.monotonic() > end_s:
+                raise UserError(f"the emulator did not start: {_words(folder, 'emulate')}", FAILED)
+            time.sleep(0.02)
+        yield str(port)
+        process.send_signal(signal.SIGTERM)
+        finish(folder, process, "emulate", PATIENCE_S)
+    finally:
+        process.kill()
+        process.wait()
+
+
+def start(folder: Path, name: str, module: str, *arguments: str) -> subprocess.Popen[bytes]:
+    """Start a module as a process that keeps its state, and what it has to say, in a folder."""
+    env = {**os.environ, "XDG_STATE_HOME": str(folder), "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    with (folder / f"{name}.err").open("wb") as err:
+        command = [sys.executable, "-m", module, *arguments]
+        return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=err, env=env)
+
+
+def finish(folder: Path, process: subprocess.Popen[bytes], name: str, patience_s: float) -> None:
+    """Wait for the end of such a process.
+
+    Raises
+    ------
+    UserError
+        It failed; its own words are in the message.
+    """
+    try:
+        code = process.wait(patience_s)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        code = process.wait()
+    if code != 0:
+        raise UserError(f"`{name}` ended with {code}: {_words(folder, name)}", FAILED)
+
+
+def _words(folder: Path, name: str) -> str:
+    return " ".join((folder / f"{name}.err").read_text("utf-8", errors="replace").split()[-40:])

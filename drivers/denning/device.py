@@ -1,0 +1,389 @@
+"""The robot's side of the protocol, without any I/O and in its own time.
+
+The robot lives through events: body ticks, firings, windows that close, odometry, the deadman, faults. `advance`
+lives through all of them up to a moment and returns the bytes that have left the transmitter by then; it makes no
+difference how the time is cut into calls. So the same robot serves a pty in real time and a test in virtual time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from config.robot import RobotConfig
+from config.world import WorldConfig
+from drivers.denning import frames
+from drivers.denning.codec import Decoder, encode
+from drivers.denning.frames import Drive, Halt, Hello, NakCode, Pattern, Release, RobotFrame
+from drivers.denning.wire_units import echo_byte
+from drivers.emulator.acoustics import clearance
+from drivers.emulator.body import BRAKE_S, RAMP_S, Body
+from drivers.emulator.fault_schedule import FaultSchedule, flip_bits
+from drivers.emulator.faults import (
+    BitErrors,
+    Bumper,
+    Deaf,
+    Fault,
+    Garbage,
+    MotorFault,
+    Mute,
+    OdometryJump,
+    Outliers,
+    Reboot,
+    StuckSensor,
+    Unplug,
+)
+from drivers.emulator.pattern_rotation import Rotation, window_us
+from drivers.emulator.scene import compile_scene
+from drivers.emulator.sonar import Sonar
+from drivers.emulator.uart import Uart
+from drivers.messages import Flags, Pose, Twist
+
+DEADMAN_MS = 500
+ODOMETRY_PERIOD_MS = 20
+TICK_US = 5_000
+"""The body moves in steps of at most this length."""
+NAME = "denning"
+_LATCHED, _DEADMAN = int(Flags.LATCHED), int(Flags.DEADMAN)  # asked at every event: an enumeration is slow
+_STILL = Twist(0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """What the emulator knows and no robot does; `t_s` counts from the emulator's start, through reboots."""
+
+    t_s: float
+    pose: Pose
+    ring_yaw: float
+    twist: Twist
+    flags: Flags
+    contacts: int
+
+
+class EmulatedRobot:
+    """A robot that speaks the ring-and-base protocol.
+
+    Parameters
+    ----------
+    robot, world
+        What it is and where it stands.
+    seed
+        Everything random follows from it.
+    faults
+        What goes wrong, and when.
+    clock_start_us
+        What the robot's own clock shows at the first start: 0 on a real one, near 2³² to see it wrap soon.
+
+    Raises
+    ------
+    ValueError
+        The ring has more sensors than the protocol's masks have bits.
+    """
+
+    # What a restart begins anew; see `_boot`.
+    _clock_offset_us: int
+    _decoder: Decoder
+    _seq: int
+    _echoes: deque[tuple[int, frames.Echo]]
+    _rotation: Rotation
+    _flags: Flags
+    _target: Twist
+    _drive_seq: int
+    _deadman_us: int
+    _odometry_us: int
+
+    def __init__(
+        self,
+        robot: RobotConfig,
+        world: WorldConfig,
+        seed: int,
+        faults: Sequence[Fault] = (),
+        clock_start_us: int = 0,
+    ) -> None:
+        mounts = robot.ring.mounts
+        self._sensors, most = len(mounts), frames.SENSORS_MAX
+        if self._sensors > most:
+            raise ValueError(f"the ring has {self._sensors} sensors: the protocol's masks have room for {most}")
+        seeds = np.random.SeedSequence(seed).spawn(6)
+        of_sonar, of_drift, self._boots, *noises = map(np.random.default_rng, seeds)
+        self._output_noise, self._input_noise, self._outliers = noises
+        self._ring_radius_mm = round(1000.0 * max(math.hypot(m.x_m, m.y_m) for m in mounts))
+        scene = compile_scene(world)
+        start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
+        self._body = Body(robot.body, scene, start, world.odometry, of_drift)
+        self._sonar = Sonar(robot.ring, scene, world.acoustics, of_sonar)
+        self._uart = Uart(robot.link.baud)
+        self._outbox = bytearray()
+        self._now_us = self._moved_us = 0
+        self._ahead_us: int | None = None  # the next event, until something happens
+        self._faults = FaultSchedule(faults)
+        self._boot_id = self._new_boot_id()
+        self._boot(clock_start_us)
+        # Load the compiled kernels now: the first firing has no time for it.
+        clearance(start.x, start.y, scene.circles, scene.segments)
+        self._sonar.true_echoes(start, start.theta, np.zeros(self._sensors, dtype=np.bool_))
+
+    @property
+    def truth(self) -> Truth:
+        """The true state at the last event."""
+        body = self._body
+        return Truth(self._moved_us * 1e-6, body.pose, body.ring_yaw, body.twist, self.flags, body.contacts)
+
+    @property
+    def flags(self) -> Flags:
+        """What the base reports of itself; BUMPER and MOTOR_FAULT say why it latched and go with the latch."""
+        return self._flags
+
+    @property
+    def boot_id(self) -> int:
+        """Of this start."""
+        return self._boot_id
+
+    @property
+    def plugged(self) -> bool:
+        """False while the line is pulled out."""
+        return not self._faults.has(Unplug)
+
+    @property
+    def dropped(self) -> int:
+        """Frames that did not fit into the transmitter's queue."""
+        return self._uart.dropped
+
+    def advance(self, to_s: float) -> bytes:
+        """Live until `to_s`, seconds after the start, and return the bytes that have left the robot by then."""
+        to_us = round(to_s * 1e6)
+        while (at_us := self._next_us() if self._ahead_us is None else self._ahead_us) <= to_us:
+            self._now_us, self._ahead_us = at_us, None
+            self._move()
+            self._meet_faults()
+            if not self._faults.has(Reboot):
+                self._do_what_is_due()
+        self._now_us, self._ahead_us = max(self._now_us, to_us), at_us
+        self._collect()
+        if not self._outbox:
+            return b""
+        left = bytes(self._outbox)
+        self._outbox.clear()
+        return left
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes from the host, at the moment to which the robot has advanced."""
+        if not data or not self.plugged or self._faults.has(Deaf) or self._faults.has(Reboot):
+            return
+        self._ahead_us = None
+        for bit_errors in self._faults.all(BitErrors):
+            data = flip_bits(data, bit_errors.rate, self._input_noise)
+        for frame in self._decoder.feed(data):
+            self._move()
+            self._obey(frame)
+        for seq, code in self._decoder.take_rejected():
+            self._send(frames.Nak(0, seq, code))
+
+    # What the host asks for.
+
+    def _obey(self, frame: frames.Frame) -> None:
+        match frame:
+            case Hello() if frame.version != frames.VERSION:
+                self._send(frames.Nak(0, frame.seq, NakCode.VALUE_OUT_OF_RANGE))
+            case Hello():
+                self._send(
+                    frames.Ident(
+                        0,
+                        frames.VERSION,
+                        self._sensors,
+                        self._ring_radius_mm,
+                        DEADMAN_MS,
+                        ODOMETRY_PERIOD_MS,
+                        self._boot_id,
+                        NAME,
+                    )
+                )
+            case Pattern() if self._is_possible(frame):
+                self._rotation.take(frame, self._now_us)
+                self._send(frames.Ack(0, frame.seq))
+            case Pattern():
+                self._send(frames.Nak(0, frame.seq, NakCode.VALUE_OUT_OF_RANGE))
+            case Drive() if Flags.LATCHED in self._flags:
+                self._send(frames.Nak(0, frame.seq, NakCode.LATCHED))
+            case Drive():
+                # The base obeys as far as its limits allow; a command beyond them is no reason to stop.
+                self._target = Twist(frame.v_mm_s * 1e-3, frame.w_mrad_s * 1e-3)
+                self._drive_seq = frame.seq
+                self._deadman_us = self._now_us + 1000 * DEADMAN_MS
+                self._flags &= ~Flags.DEADMAN
+            case Halt():
+                self._latch(Flags.NONE)
+                self._send(frames.Ack(0, frame.seq))
+            case Release():
+                self._flags &= Flags.DEADMAN
+                self._latch_again()
+                self._send(frames.Ack(0, frame.seq))
+
+    def _is_possible(self, pattern: Pattern) -> bool:
+        within_ring = all(mask >> self._sensors == 0 for mask in pattern.masks)
+        long_enough = 1000 * pattern.step_period_ms >= window_us(pattern)
+        return not pattern.masks or (within_ring and long_enough)
+
+    def _latch(self, reason: Flags) -> None:
+        self._flags |= Flags.LATCHED | reason
+        self._target = _STILL
+
+    def _latch_again(self) -> None:
+        """Latch where a bumper is still pressed or a motor still broken: that cannot be released."""
+        if self._faults.has(Bumper):
+            self._latch(Flags.BUMPER)
+        if self._faults.has(MotorFault):
+            self._latch(Flags.MOTOR_FAULT)
+
+    # What the robot does by itself.
+
+    def _next_us(self) -> int:
+        next_us = self._moved_us // TICK_US * TICK_US + TICK_US
+        fault_us = self._faults.next_us
+        if fault_us is not None and fault_us < next_us:
+            next_us = fault_us
+        if not self._faults.has(Reboot):
+            if self._odometry_us < next_us:
+                next_us = self._odometry_us
+            if self._deadman_us < next_us and not self._flags.value & _DEADMAN:
+                next_us = self._deadman_us
+            firing_us = self._rotation.next_us
+            if firing_us is not None and firing_us < next_us:
+                next_us = firing_us
+            if self._echoes and self._echoes[0][0] < next_us:
+                next_us = self._echoes[0][0]
+        return max(self._now_us, next_us)
+
+    def _move(self) -> None:
+        """Move the body up to now."""
+        target, within_s = self._target, None
+        dt_s = (self._now_us - self._moved_us) * 1e-6
+        if dt_s <= 0.0:
+            return
+        flags = self._flags.value
+        if flags & _LATCHED or self._faults.has(Reboot):
+            target, within_s = _STILL, BRAKE_S
+        elif flags & _DEADMAN:
+            target, within_s = _STILL, RAMP_S
+        if self._body.step(dt_s, target, within_s=within_s):
+            self._latch(Flags.BUMPER)
+        self._moved_us = self._now_us
+
+    def _do_what_is_due(self) -> None:
+        now = self._now_us
+        if now >= self._deadman_us and not self._flags.value & _DEADMAN:
+            self._flags |= Flags.DEADMAN
+            self._target = _STILL
+        while self._echoes and self._echoes[0][0] <= now:
+            self._send(self._echoes.popleft()[1])
+        if (step := self._rotation.step(now)) is not None:
+            tenths = self._listen(step.mask, step.window_m)
+            echo = frames.Echo(0, self._clock_us(step.at_us), step.number, step.mask, tenths)
+            self._echoes.append((step.closes_us, echo))
+        if self._odometry_us <= now:
+            self._report_odometry()
+            self._odometry_us += 1000 * ODOMETRY_PERIOD_MS
+        for garbage in self._faults.all(Garbage):
+            if now % TICK_US == 0:
+                count = max(1, round(garbage.bytes_per_s * TICK_US * 1e-6))
+                self._transmit(self._output_noise.bytes(count))
+
+    def _listen(self, mask: int, window_m: float) -> tuple[int, ...]:
+        """Return the echo byte of each sensor in `mask`, lowest first."""
+        fired = [i for i in range(self._sensors) if mask >> i & 1]
+        ranges = self._sonar.fire(self._body.pose, self._body.ring_yaw, fired, window_m)
+        for outliers in self._faults.all(Outliers):
+            wild = self._outliers.random(len(ranges)) < outliers.share
+            ranges[wild] = self._outliers.uniform(0.0, window_m, len(ranges))[wild]
+        stuck = {fault.sensor: fault.range_m for fault in self._faults.all(StuckSensor)}
+        return tuple(echo_byte(stuck[i] if i in stuck else float(ranges[i])) for i in fired)
+
+    def _report_odometry(self) -> None:
+        body = self._body
+        self._send(
+            frames.Odom(
+                0,
+                self._clock_us(self._now_us),
+                round(body.believed.x * 1e4),
+                round(body.believed.y * 1e4),
+                round(body.believed.theta * 1e4),
+                round(body.believed_ring_yaw * 1e4),
+                round(body.twist.v * 1e3),
+                round(body.twist.w * 1e3),
+                int(self._flags),
+                self._drive_seq,
+            )
+        )
+
+    # What goes wrong.
+
+    def _meet_faults(self) -> None:
+        """Let faults begin and end whose time has come."""
+        if self._faults.next_us is None:
+            return
+        for begins, fault in self._faults.due(self._now_us):
+            self._collect()
+            self._faults.turn(fault, on=begins)
+            if begins:
+                self._suffer(fault)
+            elif isinstance(fault, Reboot) and not self._faults.has(Reboot):
+                self._boot_id = self._new_boot_id()
+                self._body.reset_odometry()
+                self._boot(0)
+
+    def _suffer(self, fault: Fault) -> None:
+        match fault:
+            case Reboot():
+                self._boot(0)
+            case Bumper():
+                self._latch(Flags.BUMPER)
+            case MotorFault():
+                self._latch(Flags.MOTOR_FAULT)
+            case OdometryJump():
+                self._body.jump_odometry(fault.dx_m, fault.dy_m, fault.dheading_rad)
+
+    def _boot(self, clock_start_us: int) -> None:
+        """Begin as after power-on, except for the body, which stays where it is."""
+        self._clock_offset_us = clock_start_us - self._now_us
+        self._decoder = Decoder("host")
+        self._seq = 0
+        self._uart.clear()
+        self._echoes = deque()
+        self._rotation = Rotation()
+        self._flags = Flags.NONE
+        self._latch_again()
+        self._target = _STILL
+        self._drive_seq = 0
+        self._deadman_us = self._now_us + 1000 * DEADMAN_MS
+        self._odometry_us = self._now_us + 1000 * ODOMETRY_PERIOD_MS
+
+    def _new_boot_id(self) -> int:
+        return int(self._boots.integers(1, 2**32))
+
+    # The line.
+
+    def _clock_us(self, at_us: int) -> int:
+        return (at_us + self._clock_offset_us) % 2**32
+
+    def _send(self, frame: RobotFrame) -> None:
+        """Queue `frame` under the robot's next sequence number, which is spent even if the frame is lost."""
+        data = encode(frame, self._seq)
+        self._seq = (self._seq + 1) % 256
+        for bit_errors in self._faults.all(BitErrors):
+            data = flip_bits(data, bit_errors.rate, self._output_noise)
+        self._transmit(data)
+
+    def _transmit(self, data: bytes) -> None:
+        self._collect()
+        if not self._faults.has(Mute):
+            self._uart.send(data, self._now_us)
+
+    def _collect(self) -> None:
+        """Take what has left the transmitter; into an unplugged line it leaves for nowhere."""
+        left = self._uart.take(self._now_us)
+        if left and self.plugged:
+            self._outbox += left

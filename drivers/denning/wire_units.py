@@ -1,0 +1,123 @@
+"""The wire's units to ours and back: tenths of a foot, millimetres and microseconds end here."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from config.robot import RingConfig
+from drivers.denning.frames import (
+    FAULT,
+    MASKS_MAX,
+    NO_ECHO,
+    SENSORS_MAX,
+    TENTH_FT_M,
+    TENTHS_MIN,
+    WINDOW_MAX,
+    WINDOW_MIN,
+    Echo,
+    Ident,
+    Odom,
+)
+from drivers.firing_pattern import FiringError, firing_pattern, sensors
+from drivers.messages import Flags, Floats, Identity, Odometry, Pose, Twist
+
+_STEP_MAX_MS = 0xFFFF
+_I16_MAX = 0x7FFF
+
+
+class WirePattern(NamedTuple):
+    """The payload of a PATTERN."""
+
+    step_period_ms: int
+    window: int
+    masks: tuple[int, ...]
+
+
+def wire_pattern(ring: RingConfig) -> WirePattern:
+    """Return the ring's firing pattern as the protocol says it.
+
+    The step is rounded up to whole milliseconds and the window down to whole tenths of a foot, so that a pattern
+    whose steps are long enough stays one.
+
+    Raises
+    ------
+    FiringError
+        The ring cannot carry the pattern out, or the protocol cannot say it.
+    """
+    pattern = firing_pattern(ring)
+    if len(ring.mounts) > SENSORS_MAX:
+        raise FiringError(
+            f"ring: {len(ring.mounts)} sensors, and this robot's protocol knows {SENSORS_MAX} at most; "
+            f"name the sensors of the ring that is there"
+        )
+    if len(pattern.masks) > MASKS_MAX:
+        raise FiringError(
+            f"ring.firing: {len(pattern.masks)} firings before the pattern repeats, and this robot holds "
+            f"{MASKS_MAX}; use fewer sets or rotations"
+        )
+    window = math.floor(pattern.window_m / TENTH_FT_M + 1e-6)
+    if not WINDOW_MIN <= window <= WINDOW_MAX:
+        raise FiringError(
+            f"ring.firing: a window of {pattern.window_m:g} m, and this robot listens for "
+            f"{WINDOW_MIN * TENTH_FT_M:.4f} to {WINDOW_MAX * TENTH_FT_M:.4f} m; "
+            f"set window_m (or ring.range_max_m) accordingly"
+        )
+    step_ms = math.ceil(pattern.step_period_s * 1e3 - 1e-6)
+    if step_ms > _STEP_MAX_MS:  # pragma: no cover - the schema's own limit is below
+        raise FiringError(f"ring.firing: step_period_s {pattern.step_period_s:g}, and this robot's longest is 65.535")
+    return WirePattern(step_ms, window, pattern.masks)
+
+
+def to_wire(value: float, limit: float) -> int:
+    """Return metres or radians a second as signed 16-bit thousandths, never beyond ±`limit`, not even by rounding."""
+    most = min(_I16_MAX, math.floor(limit * 1e3 + 1e-6))
+    held = max(-limit, min(limit, value))  # before it is scaled: a large number times a thousand is none
+    return max(-most, min(most, round(held * 1e3)))
+
+
+def identity_of(ident: Ident) -> Identity:
+    """Return what the robot says of itself in SI."""
+    return Identity(
+        name=ident.name,
+        sensors=ident.sensors,
+        ring_radius_m=ident.ring_radius_mm * 1e-3,
+        deadman_s=ident.deadman_ms * 1e-3,
+        odometry_period_s=ident.odometry_period_ms * 1e-3,
+        boot_id=ident.boot_id,
+    )
+
+
+def odometry_of(odom: Odom, t_us: int) -> Odometry:
+    """Return an odometry sample in SI; `t_us` is its unwrapped time."""
+    return Odometry(
+        t_s=t_us * 1e-6,
+        pose=Pose(odom.x_0p1mm * 1e-4, odom.y_0p1mm * 1e-4, odom.heading_1em4rad * 1e-4),
+        ring_yaw=odom.ring_yaw_1em4rad * 1e-4,
+        twist=Twist(odom.v_mm_s * 1e-3, odom.w_mrad_s * 1e-3),
+        flags=Flags(odom.flags & 0x1F),
+        last_drive_seq=odom.last_drive_seq,
+    )
+
+
+def ranges_of(echo: Echo, count: int) -> Floats:
+    """Return the ranges of a firing, shape (count,), metres: NaN not fired or at fault, +inf nothing heard.
+
+    Bits of the mask beyond the ring's sensors are ignored.
+    """
+    ranges = np.full(count, np.nan)
+    for sensor, tenths in zip(sensors(echo.mask), echo.tenths_ft, strict=True):
+        if sensor < count and tenths != FAULT:
+            ranges[sensor] = math.inf if tenths == NO_ECHO else tenths * TENTH_FT_M
+    return ranges
+
+
+def echo_byte(range_m: float | None) -> int:
+    """Return how an ECHO says the range of a sensor that fired, metres: +inf nothing heard, None a fault."""
+    if range_m is None:
+        return FAULT
+    if not math.isfinite(range_m):
+        return NO_ECHO
+    return min(NO_ECHO, max(TENTHS_MIN, round(range_m / TENTH_FT_M)))

@@ -1,0 +1,42 @@
+"""The truth trace: where the emulated robot really was, for whoever judges the one that was driven.
+
+Rows are flushed as they are written: a test reads the file while the emulator runs, and after it was killed.
+"""
+
+from __future__ import annotations
+
+from typing import TextIO
+
+from drivers.denning.device import Truth
+
+HEADER = "t_s,host_s,x_m,y_m,heading_rad,ring_yaw_rad,v_m_s,w_rad_s,flags"
+PERIOD_S = 0.01
+"""Time from row to row: 100 Hz."""
+
+
+class TruthTrace:
+    """Writes truth as CSV.
+
+    Parameters
+    ----------
+    file
+        Where to; stays the caller's to close.
+    """
+
+    def __init__(self, file: TextIO) -> None:
+        self._file = file
+        self._due_s = 0.0
+        file.write(HEADER + "\n")
+        file.flush()
+
+    def write(self, truth: Truth, host_s: float) -> None:
+        """Write a row if one is due; `host_s` is the host's monotonic clock at `truth.t_s`."""
+        if truth.t_s < self._due_s:
+            return
+        self._due_s = truth.t_s + PERIOD_S
+        pose, twist = truth.pose, truth.twist
+        self._file.write(
+            f"{truth.t_s:.6f},{host_s:.6f},{pose.x:.6f},{pose.y:.6f},{pose.theta:.6f},{truth.ring_yaw:.6f},"
+            f"{twist.v:.6f},{twist.w:.6f},{int(truth.flags)}\n"
+        )
+        self._file.flush()

@@ -1,0 +1,1 @@
+"""The paper's method (Santamaria & Arkin 1995): segments, clusters, relaxation, recognition."""

@@ -1,0 +1,135 @@
+"""A run as tables: echoes, segments, objects, odometry; metres, radians and seconds, in the odometry's frame."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from runtime.analysis.trace import BEARING, RANGE, ROBOT_T, SENSOR, T, Trace, X, Y
+
+Table: TypeAlias = Mapping[str, Sequence[Any]]
+"""Columns by name, all of one length; None stands for what is not known."""
+
+FRAME_NOTE = "metres, radians, seconds after the first cycle; coordinates in the frame of the odometry"
+
+
+def tables(trace: Trace) -> dict[str, Table]:
+    """Return the tables of a run by name."""
+    return {
+        "echoes": _echoes(trace),
+        "segments": _segments(trace),
+        "objects": _objects(trace),
+        "odometry": _odometry(trace),
+    }
+
+
+def _echoes(trace: Trace) -> Table:
+    """Return one row for each sensor that fired; `heard` says whether anything came back."""
+    rows = trace.echoes
+    heard = np.isfinite(rows[:, RANGE])
+    reach = np.where(heard, rows[:, RANGE], np.nan)
+    return {
+        "t_s": rows[:, T].tolist(),
+        "robot_t_s": rows[:, ROBOT_T].tolist(),
+        "sensor": rows[:, SENSOR].astype(int).tolist(),
+        "sensor_x_m": rows[:, X].tolist(),
+        "sensor_y_m": rows[:, Y].tolist(),
+        "bearing_rad": rows[:, BEARING].tolist(),
+        "heard": heard.tolist(),
+        "range_m": _known(reach.tolist()),
+        "echo_x_m": _known((rows[:, X] + reach * np.cos(rows[:, BEARING])).tolist()),
+        "echo_y_m": _known((rows[:, Y] + reach * np.sin(rows[:, BEARING])).tolist()),
+    }
+
+
+def _segments(trace: Trace) -> Table:
+    """Return one row for each outline segment that was in the run's own map when anybody looked."""
+    names = ("first_seen_s", "last_seen_s", "x1_m", "y1_m", "x2_m", "y2_m", "normal_rad")
+    return {name: trace.segments[:, i].tolist() for i, name in enumerate(names)}
+
+
+def _objects(trace: Trace) -> Table:
+    """Return one row for each object at each moment."""
+    seen = [(m.t_s, o) for m in trace.moments for o in m.objects]
+    return {
+        "t_s": [t for t, _ in seen],
+        "model": [o.model for _, o in seen],
+        "x_m": [float(o.x) for _, o in seen],
+        "y_m": [float(o.y) for _, o in seen],
+        "theta_rad": [float(o.theta) for _, o in seen],
+        "sigma_m": [float(o.sigma) for _, o in seen],
+        "support": [int(o.support) for _, o in seen],
+        "score": [float(o.score) for _, o in seen],
+        "probability": [o.probability for _, o in seen],
+        "covariance_xx_m2": [None if o.covariance is None else o.covariance[0] for _, o in seen],
+        "covariance_xy_m2": [None if o.covariance is None else o.covariance[1] for _, o in seen],
+        "covariance_yy_m2": [None if o.covariance is None else o.covariance[2] for _, o in seen],
+    }
+
+
+def _odometry(trace: Trace) -> Table:
+    way = trace.odometry
+    return {
+        "t_s": [t for t, _ in way],
+        "robot_t_s": [o.t_s for _, o in way],
+        "x_m": [o.pose.x for _, o in way],
+        "y_m": [o.pose.y for _, o in way],
+        "heading_rad": [o.pose.theta for _, o in way],
+        "ring_yaw_rad": [o.ring_yaw for _, o in way],
+        "v_m_s": [o.twist.v for _, o in way],
+        "w_rad_s": [o.twist.w for _, o in way],
+        "flags": [int(o.flags) for _, o in way],
+    }
+
+
+def _known(values: list[float]) -> list[float | None]:
+    return [None if math.isnan(value) else value for value in values]
+
+
+def write_csv(trace: Trace, folder: Path) -> list[Path]:
+    """Write a CSV file for each table; what is not known is an empty cell.
+
+    Raises
+    ------
+    OSError
+        A file cannot be written.
+    """
+    paths = []
+    for name, table in tables(trace).items():
+        path = folder / f"{name}.csv"
+        with path.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(table)
+            writer.writerows(zip(*table.values(), strict=True))
+        paths.append(path)
+    return paths
+
+
+def write_parquet(trace: Trace, folder: Path) -> list[Path]:
+    """Write a Parquet file for each table; its metadata says units and frame.
+
+    Raises
+    ------
+    OSError
+        A file cannot be written.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    whole = pa.int64()
+    kinds = {"model": pa.string(), "heard": pa.bool_(), "sensor": whole, "support": whole, "flags": whole}
+    paths = []
+    for name, table in tables(trace).items():
+        schema = pa.schema(
+            [(column, kinds.get(column, pa.float64())) for column in table],
+            metadata={"echolocate": FRAME_NOTE, "begun_unix_ns": str(trace.begun_ns)},
+        )
+        path = folder / f"{name}.parquet"
+        pq.write_table(pa.table(dict(table), schema=schema), path, compression="zstd")
+        paths.append(path)
+    return paths

@@ -1,0 +1,225 @@
+"""A run for Foxglove: an MCAP whose channels have Foxglove's own schemas, through its SDK.
+
+Frames: `world` (where the truth is known) → `odom` → `base`, which turns with the wheels. What the ring hears is in
+`odom` with the pose that the ring had at that very firing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from functools import partial
+from pathlib import Path
+from typing import BinaryIO, Final, TypeVar
+
+import foxglove
+from foxglove import channels as ch
+from foxglove import messages as fx
+
+from drivers.messages import Pose
+from runtime.analysis.export.shapes import (
+    CLUSTER,
+    HEIGHT_M,
+    MODEL,
+    SEGMENT,
+    TRUTH,
+    Colour,
+    Round,
+    even_radius,
+    rounds,
+    turned,
+    whole_ring,
+)
+from runtime.analysis.plots.geometry import outline, things
+from runtime.analysis.trace import BEARING, RANGE, MapMoment, Said, Trace, X, Y
+
+ARC_POINTS: Final = 9
+LINE_PX: Final = 2.0
+CROSS_M: Final = 0.08
+
+T = TypeVar("T")
+Places = Iterable[Iterable[float]]
+
+
+def write_foxglove(trace: Trace, path: Path) -> list[Path]:
+    """Write a run as an MCAP for Foxglove.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written.
+    """
+    context = foxglove.Context()
+    with path.open("wb") as file:
+        disk = _Disk(file)
+        try:
+            with foxglove.open_mcap(disk, context=context):
+                _Teller(trace, context).tell()
+        except RuntimeError:
+            if disk.refusal is None:
+                raise
+            raise disk.refusal from None
+    return [path]
+
+
+class _Disk:
+    """A file that keeps why it would not be written: the SDK tells only that something went wrong."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self.refusal: OSError | None = None
+
+    def write(self, data: bytes | bytearray) -> int:
+        """Write, as a file does."""
+        return self._kept(lambda: self._file.write(data))
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        """Seek, as a file does."""
+        return self._kept(lambda: self._file.seek(offset, whence))
+
+    def flush(self) -> None:
+        """Flush, as a file does."""
+        self._kept(self._file.flush)
+
+    def _kept(self, act: Callable[[], T]) -> T:
+        try:
+            return act()
+        except OSError as error:
+            self.refusal = self.refusal or error
+            raise
+
+
+class _Teller:
+    """Writes a run into channels."""
+
+    def __init__(self, trace: Trace, context: foxglove.Context) -> None:
+        self._trace = trace
+        self._models = {model.name: model for model in trace.settings.models}
+        self._whole = trace.settings.perception.method == "bayes"
+        self._frames = ch.FrameTransformsChannel("/tf", context=context)
+        self._pose = ch.PoseInFrameChannel("/pose", context=context)
+        self._ring = ch.LaserScanChannel("/ring", context=context)
+        self._segments = ch.SceneUpdateChannel("/segments", context=context)
+        self._clusters = ch.SceneUpdateChannel("/clusters", context=context)
+        self._objects = ch.SceneUpdateChannel("/models", context=context)
+        self._truth = ch.SceneUpdateChannel("/truth", context=context)
+        self._log = ch.LogChannel("/log", context=context)
+
+    def tell(self) -> None:
+        """Write everything, in order of time."""
+        trace = self._trace
+        poses = [(t, o.pose) for t, o in trace.odometry] or [(m.t_s, m.pose) for m in trace.moments]
+        items: list[tuple[float, Callable[[int], None]]] = [(0.0, self._tell_truth)]
+        items += [(t, partial(self._tell_pose, pose)) for t, pose in poses]
+        items += [(part.t_s, partial(self._tell_round, part)) for part in rounds(trace)]
+        items += [(moment.t_s, partial(self._tell_moment, moment)) for moment in trace.moments]
+        items += [(max(0.0, said.t_s), partial(self._tell_line, said)) for said in trace.log]
+        for t_s, tell in sorted(items, key=lambda item: item[0]):
+            tell(trace.unix_ns(t_s))
+
+    def _tell_truth(self, at: int) -> None:
+        self._frame("world", "odom", self._trace.start, at)
+        if self._trace.world is None:
+            return
+        closed, lines = things(self._trace.world)
+        loops = [_line(points.tolist(), TRUTH, closed=True) for points in closed]
+        walls = [_line(points.tolist(), TRUTH, closed=False) for points in lines]
+        entity = fx.SceneEntity(timestamp=_stamp(at), frame_id="world", id="truth", lines=[*loops, *walls])
+        self._truth.log(fx.SceneUpdate(entities=[entity]), log_time=at)
+
+    def _frame(self, parent: str, child: str, pose: Pose, at: int) -> None:
+        frame = fx.FrameTransform(
+            timestamp=_stamp(at), parent_frame_id=parent, child_frame_id=child,
+            translation=fx.Vector3(x=pose.x, y=pose.y, z=0.0), rotation=_quaternion(pose.theta),
+        )  # fmt: skip
+        self._frames.log(fx.FrameTransforms(transforms=[frame]), log_time=at)
+
+    def _tell_pose(self, pose: Pose, at: int) -> None:
+        self._frame("odom", "base", pose, at)
+        told = fx.PoseInFrame(timestamp=_stamp(at), frame_id="odom", pose=_placed(pose.x, pose.y, pose.theta))
+        self._pose.log(told, log_time=at)
+
+    def _tell_round(self, part: Round, at: int) -> None:
+        """Write a firing: one scan of an even ring, or of any other an arc for each sensor."""
+        ring = self._trace.settings.ring
+        radius, sensors = even_radius(ring), len(ring.mounts)
+        if radius is not None:
+            scan = fx.LaserScan(
+                timestamp=_stamp(at), frame_id="odom", pose=_placed(part.x, part.y, part.yaw), start_angle=0.0,
+                end_angle=2.0 * math.pi * (sensors - 1) / sensors, ranges=whole_ring(sensors, radius, part),
+            )  # fmt: skip
+            self._ring.log(scan, log_time=at)
+            return
+        half = math.radians(ring.beam_half_angle_deg)
+        for row in part.rows.tolist():
+            scan = fx.LaserScan(
+                timestamp=_stamp(at), frame_id="odom", pose=_placed(row[X], row[Y], row[BEARING]),
+                start_angle=-half, end_angle=half, ranges=[row[RANGE]] * ARC_POINTS,
+            )  # fmt: skip
+            self._ring.log(scan, log_time=at)
+
+    def _tell_moment(self, moment: MapMoment, at: int) -> None:
+        ends = moment.segments.reshape(-1, 2).tolist()
+        many = fx.LinePrimitive(
+            type=fx.LinePrimitiveLineType.LineList, thickness=LINE_PX, scale_invariant=True,
+            points=[fx.Point3(x=x, y=y) for x, y in ends], color=_colour(SEGMENT),
+        )  # fmt: skip
+        _scene(self._segments, "segments", [many] if ends else [], [], at)
+        boxes = []
+        for c in moment.clusters:
+            corners = [(c.left, c.bottom), (c.right, c.bottom), (c.right, c.top), (c.left, c.top)]
+            boxes.append(_line(corners, CLUSTER, closed=True))
+            for up in (CROSS_M, -CROSS_M):
+                stroke = [(c.x - CROSS_M, c.y - up), (c.x + CROSS_M, c.y + up)]
+                boxes.append(_line(stroke, CLUSTER, closed=False))
+        _scene(self._clusters, "clusters", boxes, [], at)
+        shapes, texts = [], []
+        for number, seen in enumerate(moment.objects, 1):
+            points, closed = outline(seen, self._models.get(seen.model), whole=self._whole)
+            shapes.append(_line(points.tolist(), MODEL, closed=closed))
+            text = fx.TextPrimitive(
+                pose=_placed(seen.x, seen.y, 0.0, HEIGHT_M), billboard=True, font_size=0.15, color=_colour(MODEL),
+                text=f"{number} {seen.model} {seen.score:.2f}",
+            )  # fmt: skip
+            texts.append(text)
+        _scene(self._objects, "models", shapes, texts, at)
+
+    def _tell_line(self, said: Said, at: int) -> None:
+        levels = {"debug": fx.LogLevel.Debug, "warning": fx.LogLevel.Warning, "error": fx.LogLevel.Error}
+        level = levels.get(said.level, fx.LogLevel.Info)
+        self._log.log(fx.Log(timestamp=_stamp(at), level=level, message=said.text, name="echolocate"), log_time=at)
+
+
+def _scene(
+    channel: ch.SceneUpdateChannel,
+    name: str,
+    lines: list[fx.LinePrimitive],
+    texts: list[fx.TextPrimitive],
+    at: int,
+) -> None:
+    """Replace an entity as a whole: what is no longer known goes."""
+    entity = fx.SceneEntity(timestamp=_stamp(at), frame_id="odom", id=name, lines=lines, texts=texts)
+    channel.log(fx.SceneUpdate(entities=[entity]), log_time=at)
+
+
+def _line(points: Places, colour: Colour, *, closed: bool) -> fx.LinePrimitive:
+    kind = fx.LinePrimitiveLineType.LineLoop if closed else fx.LinePrimitiveLineType.LineStrip
+    places = [fx.Point3(x=x, y=y) for x, y in points]
+    return fx.LinePrimitive(type=kind, thickness=LINE_PX, scale_invariant=True, points=places, color=_colour(colour))
+
+
+def _stamp(at: int) -> fx.Timestamp:
+    return fx.Timestamp(sec=at // 1_000_000_000, nsec=at % 1_000_000_000)
+
+
+def _quaternion(yaw: float) -> fx.Quaternion:
+    x, y, z, w = turned(yaw)
+    return fx.Quaternion(x=x, y=y, z=z, w=w)
+
+
+def _placed(x: float, y: float, yaw: float, z: float = 0.0) -> fx.Pose:
+    return fx.Pose(position=fx.Vector3(x=x, y=y, z=z), orientation=_quaternion(yaw))
+
+
+def _colour(colour: Colour) -> fx.Color:
+    return fx.Color(r=colour[0], g=colour[1], b=colour[2], a=1.0)

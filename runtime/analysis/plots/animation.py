@@ -1,0 +1,151 @@
+"""The run as a moving picture: everything that was known, as it came to be known.
+
+Frames are drawn one by one and handed to whoever makes a file of them: pillow a GIF, ffmpeg an MP4 where it is there.
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+from PIL import Image
+
+from runtime.analysis.plots.layers import draw_arcs, draw_clusters, draw_objects, draw_segments, draw_things, draw_way
+from runtime.analysis.plots.paper_figures import Canvas, legend
+from runtime.analysis.plots.plot_style import MUTED
+from runtime.analysis.text_tables import Units
+from runtime.analysis.trace import RANGE, MapMoment, Trace
+
+FRAMES_MAX: Final = 72
+SECONDS: Final = 8.0
+"""How long the picture moves, before it rests on the end."""
+REST_S: Final = 2.5
+DPI: Final = 100
+ROOM_IN: Final = 1.45
+"""The legend has everything in it."""
+COLOURS: Final = 128
+NEAR: Final = 8
+ECHOES_SHOWN: Final = 48
+"""The newest: two rounds of a ring of 24."""
+
+Pixels = NDArray[np.uint8]
+
+
+def frames(trace: Trace, units: Units) -> Iterator[Pixels]:
+    """Yield the frames, RGB of shape (height, width, 3), all of one size."""
+    moments = trace.moments[:: max(1, math.ceil(len(trace.moments) / FRAMES_MAX))]
+    if trace.last is not None and moments[-1] is not trace.last:
+        moments.append(trace.last)
+    canvas = Canvas(trace, units)
+    figure, axes = canvas.figure(ROOM_IN)
+    painter: Any = FigureCanvasAgg(figure)  # whose methods have no types
+    figure.set_dpi(DPI)
+    handles = draw_things(axes, trace, canvas.frame)
+    _title(axes, trace.last, trace)
+    still = set(_drawn(axes))
+    if trace.last is not None:  # laid out for everything that will ever be in it
+        legend(figure, [*handles, *_draw(axes, trace, trace.last, canvas)])
+    painter.draw()
+    figure.set_layout_engine("none")
+    for moment in moments:
+        for artist in _drawn(axes):
+            if artist not in still:
+                artist.remove()
+        _draw(axes, trace, moment, canvas)
+        _title(axes, moment, trace)
+        painter.draw()
+        shown: Pixels = np.asarray(painter.buffer_rgba())[: -1 if figure.bbox.height % 2 else None, :, :3].copy()
+        yield shown
+
+
+def _drawn(axes: Axes) -> list[Artist]:
+    return [*axes.lines, *axes.patches, *axes.collections, *axes.texts]
+
+
+def _title(axes: Axes, moment: MapMoment | None, trace: Trace) -> None:
+    if moment is not None:
+        axes.set_title(f"{moment.t_s:5.1f} s of {trace.seconds:.1f} s")
+        words = (
+            f"{len(moment.segments)} segments, {len(moment.clusters)} clusters, {len(moment.objects)} objects known"
+        )
+        axes.set_title(words, loc="right", fontsize=8.5, fontweight="normal", color=MUTED)
+
+
+def _draw(axes: Axes, trace: Trace, moment: MapMoment, canvas: Canvas) -> list[Line2D]:
+    settings, frame = trace.settings, canvas.frame
+    newest = trace.echoes[max(0, moment.echoes - ECHOES_SHOWN) : moment.echoes]
+    newest = newest[np.isfinite(newest[:, RANGE])]
+    poses = [m.pose for m in trace.moments if m.t_s <= moment.t_s]
+    return [
+        *draw_arcs(axes, newest, math.radians(settings.ring.beam_half_angle_deg), frame),
+        *draw_segments(axes, moment.segments, frame, faint=True),
+        *draw_clusters(axes, moment.clusters, settings.perception.clusters.segments_min, frame),
+        *draw_objects(axes, moment.objects, trace, frame, "m", told=False),
+        *draw_way(axes, poses, frame, settings.body.radius_m),
+    ]
+
+
+def save_moving(
+    trace: Trace, units: Units, folder: Path, name: str, on_frame: Callable[[], None] = lambda: None
+) -> list[Path]:
+    """Write the moving picture as a GIF, and as an MP4 where ffmpeg is there; return the files.
+
+    Raises
+    ------
+    OSError
+        A file cannot be written.
+    """
+    shown = []
+    for frame in frames(trace, units):
+        shown.append(frame)
+        on_frame()
+    if not shown:
+        return []
+    step_s = max(0.05, SECONDS / len(shown))
+    paths = [_gif(shown, step_s, folder / f"{name}.gif")]
+    if (ffmpeg := shutil.which("ffmpeg")) is not None:
+        paths += _mp4(shown, step_s, folder / f"{name}.mp4", ffmpeg)
+    return paths
+
+
+def _gif(shown: list[Pixels], step_s: float, path: Path) -> Path:
+    palette = _palette(shown)
+    images = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in shown]
+    step_ms = round(1000.0 * step_s)
+    lasts = [step_ms] * (len(images) - 1) + [step_ms + round(1000.0 * REST_S)]
+    images[0].save(path, save_all=True, append_images=images[1:], duration=lasts, loop=0, optimize=True)
+    return path
+
+
+def _palette(shown: list[Pixels]) -> Image.Image:
+    """Return one palette for all frames, the colours that cover most of two of them: nothing flickers or shifts."""
+    pixels = np.concatenate([shown[len(shown) // 2].reshape(-1, 3), shown[-1].reshape(-1, 3)])
+    colours, counts = np.unique(pixels, axis=0, return_counts=True)
+    colours = colours[np.argsort(-counts)]
+    _, first = np.unique(colours // NEAR, axis=0, return_index=True)  # pillow does not tell nearer ones apart
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(colours[np.sort(first)[:COLOURS]].astype(np.uint8).tobytes())
+    return palette
+
+
+def _mp4(shown: list[Pixels], step_s: float, path: Path, ffmpeg: str) -> list[Path]:
+    height, width, _ = shown[0].shape
+    rest = [shown[-1]] * round(REST_S / step_s)
+    command = [
+        ffmpeg, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
+        "-r", f"{1.0 / step_s:.3f}", "-i", "-", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p",
+        "-movflags", "+faststart", str(path),
+    ]  # fmt: skip
+    pixels = b"".join(frame.tobytes() for frame in [*shown, *rest])
+    done = subprocess.run(command, input=pixels, capture_output=True, check=False)  # noqa: S603 - found by which
+    return [path] if done.returncode == 0 else []

@@ -1,0 +1,189 @@
+"""The parts that pictures of a run are put together from, each drawn into a pair of axes under a name of its own.
+
+The names are the ids of groups in an SVG, so that a reader, or a test, finds what is in it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, PathPatch, Polygon
+from matplotlib.path import Path
+from matplotlib.patheffects import withStroke
+
+from drivers.messages import Floats, Pose
+from perception.seen_object import SeenObject
+from runtime.analysis.plots.geometry import Frame, arcs, ellipse, outline, rotated, things
+from runtime.analysis.plots.plot_style import CLUSTER, ECHO, INK, MODEL, MUTED, PAPER, ROBOT, SEGMENT, THING
+from runtime.analysis.text_tables import Units, length
+from runtime.analysis.trace import RANGE, Cluster, Marked, Trace
+from runtime.simulation.evaluation import nearest_pairs
+
+ARCS_MAX: Final = 4000
+"""Drawn in a picture; more are a grey mass, and megabytes."""
+
+
+def draw_things(axes: Axes, trace: Trace, frame: Frame) -> list[Line2D]:
+    """Draw what stood there, where it is known."""
+    if trace.world is None:
+        return []
+    closed, lines = things(trace.world)
+    outlines = [frame.world(points) for points in closed]
+    polygons = PolyCollection(outlines, facecolor=THING, edgecolor=MUTED, linewidth=1.0, alpha=0.55, zorder=1)
+    polygons.set_gid("truth")
+    axes.add_collection(polygons)
+    if lines:
+        walls = LineCollection([frame.world(points) for points in lines], color=MUTED, linewidth=2.5, zorder=1)
+        walls.set_gid("truth-walls")
+        axes.add_collection(walls)
+    return [Line2D([], [], marker="o", markersize=9, linestyle="", markerfacecolor=THING, markeredgecolor=MUTED,
+                   label="truth")]  # fmt: skip
+
+
+def draw_way(axes: Axes, poses: Sequence[Pose], frame: Frame, radius_m: float) -> list[Line2D]:
+    """Draw the robot at the last pose, and the way to it."""
+    if not poses:
+        return []
+    way = frame.points(np.array([(p.x, p.y) for p in poses]))
+    (line,) = axes.plot(way[:, 0], way[:, 1], color=ROBOT, linewidth=1.6, linestyle=(0, (4, 2)), zorder=2, gid="way")
+    line.set_label("way of the robot")
+    last = poses[-1]
+    body = Circle((way[-1, 0], way[-1, 1]), radius_m / frame.unit_m, facecolor="none", edgecolor=ROBOT,
+                  linewidth=1.6, zorder=5)  # fmt: skip
+    body.set_gid("robot")
+    axes.add_patch(body)
+    nose = frame.points(rotated(np.array([[0.0, 0.0], [radius_m, 0.0]]), last.x, last.y, last.theta))
+    axes.plot(nose[:, 0], nose[:, 1], color=ROBOT, linewidth=1.6, zorder=5, gid="heading")
+    return [line]
+
+
+def draw_bookmarks(axes: Axes, bookmarks: Sequence[Marked], frame: Frame) -> list[Line2D]:
+    """Draw where the robot was when each bookmark was put, under the bookmark's number."""
+    style: Any = {"marker": "D", "markersize": 5, "linestyle": "", "color": PAPER, "markeredgecolor": INK}
+    placed = [(number, mark.pose) for number, mark in enumerate(bookmarks, 1) if mark.pose is not None]
+    for number, pose in placed:
+        x, y = frame.points(np.array([[pose.x, pose.y]]))[0]
+        axes.plot(x, y, zorder=9, gid=f"bookmark-{number}", **style)
+        _label(axes, str(number), (x, y), 0.0, up=True)
+    return [Line2D([], [], label="bookmark", **style)] if placed else []
+
+
+def heard(echoes: Floats) -> Floats:
+    """Return the echoes that came back, thinned evenly where they are too many."""
+    back = echoes[np.isfinite(echoes[:, RANGE])]
+    return back[:: max(1, math.ceil(len(back) / ARCS_MAX))]
+
+
+def draw_arcs(axes: Axes, echoes: Floats, half_angle: float, frame: Frame) -> list[Line2D]:
+    """Draw each echo as the arc from which it may have come."""
+    curves = frame.points(arcs(echoes, half_angle))
+    codes = np.tile([Path.MOVETO, Path.CURVE4, Path.CURVE4, Path.CURVE4], len(curves))
+    if len(curves):
+        patch = PathPatch(Path(curves.reshape(-1, 2), codes), facecolor="none", edgecolor=ECHO, linewidth=0.7,
+                          alpha=0.4, zorder=3)  # fmt: skip
+        patch.set_gid("echoes")
+        axes.add_patch(patch)
+    return [Line2D([], [], color=ECHO, linewidth=1.2, alpha=0.8, label="echo, its arc")]
+
+
+def draw_segments(axes: Axes, segments: Floats, frame: Frame, *, faint: bool = False) -> list[Line2D]:
+    """Draw outline segments, (n, 4) ends."""
+    lines = LineCollection(
+        list(frame.points(segments.reshape(-1, 2, 2))), color=SEGMENT, linewidth=0.9 if faint else 1.3,
+        alpha=0.45 if faint else 0.85, zorder=3,
+    )  # fmt: skip
+    lines.set_gid("segments")
+    axes.add_collection(lines)
+    return [Line2D([], [], color=SEGMENT, linewidth=1.5, label="outline segment")]
+
+
+def draw_clusters(axes: Axes, clusters: Iterable[Cluster], least: int, frame: Frame) -> list[Line2D]:
+    """Draw clusters as the paper does: a rectangle, and an X at the centre; those too small for a model dotted."""
+    handles = {}
+    for number, cluster in enumerate(clusters, 1):
+        large = cluster.segments >= least
+        corners = np.array([[cluster.left, cluster.bottom], [cluster.right, cluster.bottom],
+                            [cluster.right, cluster.top], [cluster.left, cluster.top]])  # fmt: skip
+        style: Any = {"linewidth": 1.7 if large else 1.0, "linestyle": "-" if large else ":"}
+        box = Polygon(frame.points(corners), closed=True, facecolor="none", edgecolor=CLUSTER, zorder=4, **style)
+        box.set_gid(f"cluster-{number}")
+        axes.add_patch(box)
+        centre = frame.points(np.array([[cluster.x, cluster.y]]))[0]
+        axes.plot(*centre, marker="x", color=CLUSTER, markersize=8 if large else 5, zorder=4,
+                  markeredgewidth=style["linewidth"], linestyle="", gid=f"cluster-{number}-centre")  # fmt: skip
+        label = "cluster, X its centre" if large else f"cluster of fewer than {least}"
+        handles[label] = Line2D([], [], color=CLUSTER, marker="x", label=label, **style)
+    return [handles[label] for label in sorted(handles)]
+
+
+def draw_objects(
+    axes: Axes, objects: Sequence[SeenObject], trace: Trace, frame: Frame, units: Units, *, told: bool = True
+) -> list[Line2D]:
+    """Draw the models where they were matched, with the error of each where the truth is known."""
+    models = {model.name: model for model in trace.settings.models}
+    whole = trace.settings.perception.method == "bayes"
+    known = stand_for(objects, trace) if told else {}
+    for number, seen in enumerate(objects, 1):
+        points, closed = outline(seen, models.get(seen.model), whole=whole)
+        shape = Polygon(frame.points(points), closed=closed, facecolor="none", edgecolor=MODEL, linewidth=2.2,
+                        zorder=6)  # fmt: skip
+        shape.set_gid(f"model-{number}")
+        axes.add_patch(shape)
+        around = ellipse(seen)
+        if around is not None:
+            sure = Polygon(frame.points(around), closed=True, facecolor=MODEL, edgecolor=MODEL, alpha=0.6, zorder=6)
+            sure.set_gid(f"ellipse-{number}")
+            axes.add_patch(sure)
+        x, y = frame.points(np.array([[seen.x, seen.y]]))[0]
+        axes.plot(x, y, marker="+", color=INK, markersize=7, markeredgewidth=1.2, zorder=7, linestyle="",
+                  gid=f"centre-{number}")  # fmt: skip
+        if told:
+            model = models.get(seen.model)
+            reach = 0.1 if model is None else model.arc_radius_m or max(math.hypot(*v) for v in model.vertices_m)
+            one = known.get(number - 1)
+            error = "" if one is None else f"\n{length(one.error_m, units, 3)} {units}"
+            _label(
+                axes,
+                f"{number if one is None else one.name}{error}",
+                (x, y),
+                reach / frame.unit_m,
+                up=y >= axes.viewLim.intervaly.mean(),
+            )
+    if not objects:
+        return []
+    kind = "matched model, + its place" + (", its error" if known else "")
+    return [Line2D([], [], color=MODEL, linewidth=2.2, marker="+", markeredgecolor=INK, label=kind)]
+
+
+def _label(axes: Axes, text: str, at: tuple[float, float], reach: float, *, up: bool) -> None:
+    """Write beyond a thing's rim, on the side away from the middle, where there is room."""
+    note = axes.annotate(
+        text, (at[0], at[1] + (reach if up else -reach)), xytext=(0.0, 4.0 if up else -4.0),
+        textcoords="offset points", ha="center", va="bottom" if up else "top", fontsize=8, zorder=8,
+    )  # fmt: skip
+    note.set_path_effects([withStroke(linewidth=2.5, foreground=PAPER)])
+
+
+class Thing(NamedTuple):
+    """Something that stood there and was recognised: its name as in Table 2, and how far off it was seen, m."""
+
+    name: str
+    error_m: float
+
+
+def stand_for(objects: Sequence[SeenObject], trace: Trace) -> dict[int, Thing]:
+    """Return what each object stands for, where that is something that stood there and the truth is known."""
+    if trace.world is None:
+        return {}
+    placed = [trace.start.compose(Pose(o.x, o.y, o.theta)) for o in objects]
+    drums, boxes = trace.world.drum, trace.world.box
+    truth = [(d.x_m, d.y_m) for d in drums] + [(b.x_m, b.y_m) for b in boxes]
+    names = [f"drum {i}" for i in range(1, len(drums) + 1)] + [f"box {i}" for i in range(1, len(boxes) + 1)]
+    pairs = nearest_pairs(truth, [(p.x, p.y) for p in placed])
+    return {j: Thing(names[i], math.dist(truth[i], (placed[j].x, placed[j].y))) for i, j in pairs.items()}

@@ -1,0 +1,132 @@
+"""The four pictures of a run that the paper has of each of its two: raw data, segments, clusters, matched models."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from config.load import load_world
+from config.units import FOOT_M
+from runtime.analysis.plots.geometry import Frame, window
+from runtime.analysis.plots.layers import (
+    draw_arcs,
+    draw_bookmarks,
+    draw_clusters,
+    draw_objects,
+    draw_segments,
+    draw_things,
+    draw_way,
+    heard,
+)
+from runtime.analysis.plots.plot_style import MUTED, WIDTH_IN
+from runtime.analysis.text_tables import Units
+from runtime.analysis.trace import RANGE, Trace
+
+HEIGHT_MIN_IN, HEIGHT_MAX_IN = 3.0, 8.5
+ROOM_IN: Final = 1.2
+"""For title, axis label and legend."""
+
+
+@dataclass(frozen=True, slots=True)
+class Canvas:
+    """Where a picture of a run goes: its plane and its unit."""
+
+    trace: Trace
+    units: Units
+
+    @property
+    def frame(self) -> Frame:
+        """The plane."""
+        return Frame(self.trace.start, FOOT_M if self.units == "ft" else 1.0)
+
+    def figure(self, room_in: float = ROOM_IN) -> tuple[Figure, Axes]:
+        """Return an empty picture, as high as the run's shape asks for, with some room around the plane."""
+        left, right, bottom, top = window(self.trace, self.frame)
+        height = (WIDTH_IN - 0.7) * (top - bottom) / (right - left) + room_in
+        figure = Figure(figsize=(WIDTH_IN, min(max(height, HEIGHT_MIN_IN), HEIGHT_MAX_IN)), layout="constrained")
+        axes = figure.add_subplot()
+        self.prepare(axes)
+        return figure, axes
+
+    def prepare(self, axes: Axes) -> None:
+        """Give axes the run's window, equal scales, and labels."""
+        left, right, bottom, top = window(self.trace, self.frame)
+        axes.set(xlim=(left, right), ylim=(bottom, top), xlabel=f"x ({self.units})", ylabel=f"y ({self.units})")
+        axes.set_aspect("equal", adjustable="box")
+
+
+def paper_figures(trace: Trace) -> tuple[int, int, int, int] | None:
+    """Return the numbers of the paper's figures of the same run, None where it has none."""
+    for name, first in (("hallway", 6), ("irregular", 10)):
+        if trace.world is not None and trace.world == load_world(name):
+            return (first, first + 1, first + 2, first + 3)
+    return None
+
+
+def pictures(trace: Trace, units: Units) -> dict[str, Figure]:
+    """Return the four pictures of a run's end by name, in the paper's order."""
+    canvas, last = Canvas(trace, units), trace.last
+    if last is None:
+        return {}
+    numbers = paper_figures(trace)
+    half = math.radians(trace.settings.ring.beam_half_angle_deg)
+    least = trace.settings.perception.clusters.segments_min
+    arcs_shown = heard(trace.echoes)
+    count, shown = int((trace.echoes[:, RANGE] < math.inf).sum()), len(arcs_shown)
+    few = f", {shown:,} of them drawn" if shown < count else ""
+    method = "the Bayesian method" if trace.settings.perception.method == "bayes" else "relaxation"
+    frame = canvas.frame
+
+    def raw(axes: Axes) -> list[Line2D]:
+        return draw_arcs(axes, arcs_shown, half, frame)
+
+    def segments(axes: Axes) -> list[Line2D]:
+        return draw_segments(axes, last.segments, frame)
+
+    def clusters(axes: Axes) -> list[Line2D]:
+        return draw_segments(axes, last.segments, frame, faint=True) + draw_clusters(
+            axes, last.clusters, least, frame
+        )
+
+    def models(axes: Axes) -> list[Line2D]:
+        return draw_segments(axes, last.segments, frame, faint=True) + draw_objects(
+            axes, last.objects, trace, frame, units
+        )
+
+    told = {
+        "raw": ("Raw data", f"{count:,} echoes in {trace.seconds:.0f} s{few}", raw),
+        "segments": ("Segments", f"{len(last.segments):,} outline segments in the map", segments),
+        "clusters": ("Clusters", f"{len(last.clusters)} clusters of outline segments", clusters),
+        "models": ("Matched models", f"{len(last.objects)} recognised, by {method}", models),
+    }
+    drawn = {}
+    for at, (name, (title, line, draw)) in enumerate(told.items()):
+        like = "" if numbers is None else f", as the paper's Figure {numbers[at]}"
+        drawn[name] = _picture(canvas, f"{title}{like}", line, draw)
+    return drawn
+
+
+def _picture(canvas: Canvas, title: str, line: str, draw: Callable[[Axes], list[Line2D]]) -> Figure:
+    figure, axes = canvas.figure()
+    trace, frame = canvas.trace, canvas.frame
+    handles = draw(axes)
+    handles += draw_things(axes, trace, frame)
+    poses = [m.pose for m in trace.moments]
+    handles += draw_way(axes, poses, frame, trace.settings.body.radius_m)
+    handles += draw_bookmarks(axes, trace.bookmarks, frame)
+    axes.set_title(title)
+    axes.set_title(line, loc="right", fontsize=8.5, fontweight="normal", color=MUTED)
+    legend(figure, handles)
+    return figure
+
+
+def legend(figure: Figure, handles: Sequence[Line2D]) -> None:
+    """Put the legend below the picture, where it hides nothing."""
+    columns = {4: 2, 7: 4}.get(len(handles), min(len(handles), 3))
+    figure.legend(handles=list(handles), loc="outside lower center", ncols=columns)

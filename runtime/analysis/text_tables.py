@@ -1,0 +1,181 @@
+"""Tables for people: the paper's Table 2, objects seen, and how the cycles went."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from rich.table import Table
+
+from config.units import FOOT_M
+from runtime.simulation.first_fix import ASKED_M
+
+if TYPE_CHECKING:
+    # The robot's own process has tables too, and shall not load the emulator for them.
+    from runtime.cycle.summary import ObjectRow, RunSummary
+    from runtime.simulation.budget_sweep import BudgetRow
+    from runtime.simulation.evaluation import DrumRow, Outcome, Spread
+    from runtime.simulation.open_loop import BoxRow, SceneOutcome
+
+Units: TypeAlias = Literal["m", "ft"]
+
+
+def length(metres: float, units: Units, digits: int = 2) -> str:
+    """Return a length as text in the units asked for."""
+    return f"{metres if units == 'm' else metres / FOOT_M:.{digits}f}"
+
+
+def place(x: float, y: float, units: Units) -> str:
+    """Return a place as the paper writes it."""
+    return f"({length(x, units)}, {length(y, units)})"
+
+
+def table_2(outcome: Outcome, units: Units) -> Table:
+    """Return truth, estimate and error of each drum."""
+    table = Table(title="Table 2: drums in world coordinates", title_justify="left")
+    for heading in ("drum", f"truth ({units})", f"estimate ({units})", f"error ({units})"):
+        table.add_column(heading, justify="right")
+    for number, row in enumerate(outcome["drums"], 1):
+        estimate, error = row["estimate"], row["error"]
+        table.add_row(
+            str(number),
+            place(*row["truth"], units),
+            "not found" if estimate is None else place(*estimate, units),
+            "" if error is None else length(error, units, 3),
+        )
+    return table
+
+
+def boxes_table(outcome: SceneOutcome, units: Units) -> Table:
+    """Return truth, estimate and errors of each box."""
+    table = Table(title="Boxes in world coordinates", title_justify="left")
+    for heading in ("box", f"truth ({units})", f"estimate ({units})", f"error ({units})", "angle error (°)"):
+        table.add_column(heading, justify="right")
+    for number, row in enumerate(outcome["boxes"], 1):
+        estimate, error, angle = row["estimate"], row["error"], row["angle_error"]
+        table.add_row(
+            str(number),
+            place(*row["truth"], units),
+            "not found" if estimate is None else place(*estimate, units),
+            "" if error is None else length(error, units, 3),
+            "" if angle is None else f"{math.degrees(angle):.1f}",
+        )
+    return table
+
+
+def verdict(outcome: Outcome, units: Units) -> str:
+    """Return the experiment in one line."""
+    return _verdict(_found("drums", outcome["drums"]), outcome, units)
+
+
+def spread_verdict(spread: Spread, units: Units) -> str:
+    """Return how much the seeds differ, in one line."""
+    return (
+        f"{spread['seeds']} seeds: mean error {length(spread['mean'], units, 4)} ± "
+        f"{length(spread['deviation'], units, 4)} {units} from seed to seed; worst single error "
+        f"{length(spread['worst'], units, 4)} {units} (seed {spread['worst_seed']}); {spread['missed']} drums not "
+        f"found, at most {spread['missed_most']} by one seed; {spread['false']} false"
+    )
+
+
+def scene_verdict(outcome: SceneOutcome, units: Units) -> str:
+    """Return a scene's outcome in one line."""
+    drums, boxes = outcome["drums"], outcome["boxes"]
+    parts = [_found(what, rows) for what, rows in (("drums", drums), ("boxes", boxes)) if rows]
+    line = f"{outcome['scene']}: {_verdict(', '.join(parts) or 'nothing to be found', outcome, units)}"
+    if outcome["inside_95"] is not None:
+        line += f"; {outcome['inside_95']:.1%} of the drums found stand in their 95 % ellipse"
+    if (fix := outcome["first_fix"]) is not None:
+        least = "a drum never" if fix["least"] is None else f"{length(fix['least'], units)} {units}"
+        line += (
+            f"; first sure fix before passing: least {least}, median {length(fix['median'], units)} {units}, "
+            f"{fix['share']:.0%} by {length(ASKED_M, units)} {units}"
+        )
+    if outcome["scene"] == "halls" and drums:
+        recall = sum(row["estimate"] is not None for row in drums) / len(drums)
+        line += f"; recall {recall:.3f}, {outcome['false'] / outcome['halls']:.3f} false a hall"
+    return line
+
+
+def _found(what: str, rows: Sequence[DrumRow | BoxRow]) -> str:
+    return f"{sum(row['estimate'] is not None for row in rows)} of {len(rows)} {what} found"
+
+
+def _verdict(found: str, outcome: Outcome, units: Units) -> str:
+    mean, worst = outcome["mean_error"], outcome["max_error"]
+    errors = "" if mean is None or worst is None else (
+        f", mean error {length(mean, units, 3)} {units}, max {length(worst, units, 3)} {units}"
+    )  # fmt: skip
+    return (
+        f"{found}, {outcome['false']} false{errors}; {outcome['times_real_time']:.0f} times real time; "
+        f"a cycle takes {outcome['cycle_us']['p50'] / 1e3:.2f} ms, p99 {outcome['cycle_us']['p99'] / 1e3:.2f} ms"
+    )
+
+
+def objects_table(objects: list[ObjectRow], units: Units) -> Table:
+    """Return what was seen, in the odometry's frame."""
+    table = Table(title="objects, in the odometry's frame", title_justify="left")
+    for heading in ("model", f"x ({units})", f"y ({units})", "heading (°)", "support", "score"):
+        table.add_column(heading, justify="right")
+    for seen in objects:
+        table.add_row(
+            seen["model"],
+            length(seen["x"], units),
+            length(seen["y"], units),
+            f"{seen['theta'] * 57.29578:.0f}",
+            str(seen["support"]),
+            f"{seen['score']:.2f}",
+        )
+    return table
+
+
+def budget_table(rows: Sequence[BudgetRow], unit: str, units: Units) -> Table:
+    """Return when the answers came under each budget, and what they were in the end."""
+    title = "a hall of 40 drums: when the answers come, and what they are in the end"
+    caption = "first: until a drum was reported; way: the robot's until each was; mean, max: error"
+    table = Table(title=title, title_justify="left", caption=caption, caption_justify="left")
+    for heading, of in zip(
+        ("budget", "quanta", "cut", "first", "way", "found", "false", "mean", "max"),
+        (unit, "a cycle", "short", "s", units, "", "", units, units), strict=True,
+    ):  # fmt: skip
+        table.add_column(f"{heading}\n{of}", justify="right", no_wrap=True)
+    for row in rows:
+        first_s, lengths = row["first_s"], ((row["way_m"], 2), (row["mean_error"], 4), (row["max_error"], 4))
+        way, mean, worst = ("" if v is None else length(v, units, digits) for v, digits in lengths)
+        first = "" if first_s is None else f"{first_s:.2f}"
+        found = f"{row['found']}/{row['drums']}"
+        cut = f"{row['cut_short']:.1%}"
+        table.add_row(
+            f"{row['budget']:g}", f"{row['quanta']:.2f}", cut, first, way, found, str(row["false"]), mean, worst
+        )
+    return table
+
+
+def timing_table(summary: RunSummary) -> Table:
+    """Return where a run's time went, ms: each phase and callback, lateness, and how long echoes waited."""
+    timing = summary["timing"]
+    table = Table(title="where the time went (ms)", title_justify="left")
+    for heading in ("what", "median", "p99", "p99.9", "worst"):
+        table.add_column(heading, justify="left" if heading == "what" else "right")
+    rows = {
+        **timing["phases"],
+        **{f"between cycles: {name}": spread for name, spread in timing["callbacks"].items()},
+        "a cycle begins after it is due by": timing["late"],
+        "an echo waits for its cycle": timing["echo_wait"],
+    }
+    for name, spread in rows.items():
+        figures = (spread["p50"], spread["p99"], spread["p999"], spread["max"])
+        table.add_row(name, *(f"{figure / 1e3:.2f}" for figure in figures))
+    return table
+
+
+def timing_verdict(summary: RunSummary) -> str:
+    """Return how well a run kept its time, and by whose fault it did not, in one line."""
+    timing = summary["timing"]
+    line = (
+        f"{summary['cycles']} cycles, {timing['following']:.0%} of them with the ring; {summary['late']} late, "
+        f"{timing['missed']} missed, {timing['overruns']} overruns"
+    )
+    by = ", ".join(f"{culprit} ({count})" for culprit, count in timing["faults"].items())
+    return f"{line}; by fault of: {by}" if by else line

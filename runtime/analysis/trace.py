@@ -1,0 +1,136 @@
+"""What is known of a run that is over, whether a recording told it or a ring log."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from config.settings import Settings
+from config.world import WorldConfig
+from drivers.messages import Floats, LinkCounts, Odometry, Pose
+from perception.seen_object import SeenObject
+
+T, SENSOR, X, Y, BEARING, RANGE, ROBOT_T = range(7)
+"""Columns of `Trace.echoes`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cluster:
+    """A cluster of outline segments: its centre and the rectangle around it, m."""
+
+    x: float
+    y: float
+    left: float
+    bottom: float
+    right: float
+    top: float
+    segments: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapMoment:
+    """What was known at one time."""
+
+    t_s: float
+    pose: Pose
+    ring_yaw: float
+    echoes: int
+    """Rows of `Trace.echoes` that had come by then."""
+    segments: Floats
+    """(n, 4): outline segments of the paper's front end: ends x, y, x, y, m."""
+    clusters: tuple[Cluster, ...]
+    objects: tuple[SeenObject, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Entered:
+    """A mode that was entered, and why."""
+
+    t_s: float
+    mode: str
+    reason: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """A line of the log."""
+
+    t_s: float
+    level: str
+    text: str
+
+
+def _no_rows() -> Floats:
+    return np.zeros((0, 7))
+
+
+@dataclass(frozen=True, slots=True)
+class Marked:
+    """A bookmark: when, what it says, and where the robot was."""
+
+    t_s: float
+    text: str
+    pose: Pose | None
+
+
+@dataclass(slots=True, eq=False)
+class Trace:
+    """A run, in the odometry's frame; times are seconds after its first cycle or firing."""
+
+    path: Path
+    settings: Settings
+    world: WorldConfig | None
+    """What stood there, where that is known."""
+    begun_ns: int = 0
+    """Unix time of its first cycle; 0 where nobody knows."""
+    seconds: float = 0.0
+    cycles: int = 0
+    echoes: Floats = field(default_factory=_no_rows)
+    """(n, 7): t (s), sensor, where the sensor was x, y (m), where it looked (rad), range (m, inf heard nothing), and
+    the firing's own time by the robot's clock (s)."""
+    odometry: list[tuple[float, Odometry]] = field(default_factory=list)
+    """Thinned to ten a second."""
+    moments: list[MapMoment] = field(default_factory=list)
+    """Evenly over the run; the last is its end."""
+    segments: Floats = field(default_factory=_no_rows)
+    """(n, 7): the run's own map: first and last seen (s), ends x, y, x, y (m), normal (rad)."""
+    modes: list[Entered] = field(default_factory=list)
+    log: list[Said] = field(default_factory=list)
+    bookmarks: list[Marked] = field(default_factory=list)
+    gaps_s: list[float] = field(default_factory=list)
+    """From cycle to cycle."""
+    stops: dict[str, int] = field(default_factory=dict)
+    """How often refinement ended for which cause."""
+    counts: LinkCounts | None = None
+    summary: dict[str, Any] | None = None
+    """What the run said of itself at its end; none where it was cut off."""
+    made_by: dict[str, str] = field(default_factory=dict)
+    started: str | None = None
+    notes: list[str] = field(default_factory=list)
+    """What is missing or damaged, a line each."""
+
+    @property
+    def start(self) -> Pose:
+        """Where the odometry began: in the world's coordinates where the world is known, else in its own."""
+        if self.world is None:
+            return Pose(0.0, 0.0, 0.0)
+        start = self.world.start
+        return Pose(start.x_m, start.y_m, math.radians(start.heading_deg))
+
+    @property
+    def last(self) -> MapMoment | None:
+        """The end of the run."""
+        return self.moments[-1] if self.moments else None
+
+    @property
+    def objects(self) -> tuple[SeenObject, ...]:
+        """What was recognised at the end."""
+        return self.moments[-1].objects if self.moments else ()
+
+    def unix_ns(self, t_s: float) -> int:
+        """Return a time of the run as Unix time, from 0 on where that is not known."""
+        return self.begun_ns + round(1e9 * t_s)

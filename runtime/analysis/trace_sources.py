@@ -1,0 +1,185 @@
+"""Traces from recordings, by a replay, and from ring logs, by perception over them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from config.load import load_settings, load_world
+from config.settings import Settings
+from drivers.denning.robot import DenningRobot
+from drivers.messages import Firing
+from perception.pipeline import Perception
+from runtime.analysis.timeline import Timeline
+from runtime.analysis.trace import Entered, Marked, Said, Trace
+from runtime.cycle.step import CycleRecord, State
+from runtime.recording.channels import BOOKMARK, LOG, SERIAL, SUMMARY, Entry, decode
+from runtime.recording.reader import Recording, RecordingError, is_recording, open_recording
+from runtime.recording.replayer import replay
+from runtime.recording.ring_log import RingLogError, read_ring_log
+from runtime.recording.ring_log_replay import replay as replay_firings
+from runtime.recording.schema import Bookmark, LogLine, RunEnd, SerialBytes
+from runtime.support.errors import WRONG_CALL, UserError
+
+Told = Callable[[], None]
+SAID_MAX: Final = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Which file, and what a ring log does not say of itself."""
+
+    file: str
+    sets: Sequence[str] = ()
+    robot: str | None = None
+    models: Sequence[str] = ()
+    world: str | None = None
+    """What stood there, instead of what a recording knows; coordinates as if the log began at the world's start."""
+
+
+def trace_of(asked: Asked, ready: Callable[[Settings], None], on_step: Told = lambda: None) -> Trace:
+    """Return the trace of a recording or a ring log.
+
+    Parameters
+    ----------
+    asked : Asked
+        The file, and what goes with it.
+    ready : callable
+        Gets the settings before perception begins: compiles kernels.
+    on_step : callable
+        Called now and then, for a progress bar.
+
+    Raises
+    ------
+    UserError
+        The file is none that can be read, or holds nothing to show.
+    """
+    path = Path(asked.file)
+    try:
+        if not is_recording(path):
+            return _of_ring_log(path, asked, ready, on_step)
+        if asked.sets or asked.robot is not None or asked.models:
+            raise UserError(
+                f"{path}: is a recording and knows its settings; --set, --robot and --model are for ring logs",
+                WRONG_CALL,
+            )
+        with open_recording(path) as recording:
+            ready(recording.settings)
+            return _of_recording(recording, asked, on_step)
+    except (RecordingError, RingLogError) as error:
+        raise UserError(str(error), WRONG_CALL) from error
+
+
+def _of_recording(recording: Recording, asked: Asked, on_step: Told) -> Trace:
+    world = recording.world if asked.world is None else load_world(asked.world)
+    about = recording.about
+    trace = Trace(recording.path, recording.settings, world, made_by=about.made_by, started=about.started)
+    listener = _Listener(recording, trace, on_step)
+    verdict = replay(recording, on_cycle=listener.on_cycle, on_entry=listener.on_entry)
+    if verdict.cycles == 0:
+        raise RecordingError(f"{recording.path}: holds no cycle, or none that can be replayed: nothing to show")
+    listener.finish()
+    trace.cycles, trace.stops = verdict.cycles, dict(verdict.refinement)
+    trace.notes += [f"cycles {first} to {last} are missing" for first, last in verdict.missing]
+    trace.notes += [f"at byte {damage.at}: {damage.what}" for damage in recording.damage]
+    if verdict.first is not None:
+        trace.notes.append(f"the replay differs from the run, first in {verdict.first}")
+    return trace
+
+
+class _Listener:
+    """Sits in on the replay of a recording."""
+
+    def __init__(self, recording: Recording, trace: Trace, on_step: Told) -> None:
+        self._recording = recording
+        self._trace = trace
+        self._on_step = on_step
+        self._gathering = Timeline(trace)
+        self._driver = DenningRobot(recording.settings)
+        self._driver.opened(0.0)
+        self._has_bytes = False
+        self._begun_s: float | None = None
+        self._before_s = math.nan
+        self._perception: Perception | None = None
+        self._said: list[tuple[float, LogLine]] = []
+
+    def on_entry(self, entry: Entry) -> None:
+        """Take a message."""
+        self._on_step()
+        if entry.topic == SERIAL["in"]:
+            self._has_bytes = True
+            for t_s, data in decode(SerialBytes, entry.data).pieces():
+                self._driver.receive(data, t_s)
+            self._driver.take()
+        elif entry.topic == LOG and len(self._said) < SAID_MAX:
+            self._said.append((self._recording.host_s(entry.log_ns), decode(LogLine, entry.data)))
+        elif entry.topic == BOOKMARK:
+            host_s = self._recording.host_s(entry.log_ns)
+            t_s = 0.0 if self._begun_s is None else max(0.0, host_s - self._begun_s)
+            self._trace.bookmarks.append(Marked(t_s, decode(Bookmark, entry.data).text, self._gathering.pose))
+        elif entry.topic == SUMMARY:
+            self._trace.summary = decode(RunEnd, entry.data).summary
+
+    def on_cycle(self, record: CycleRecord, state: State) -> None:
+        """Take a cycle, replayed."""
+        now_s = record.inputs.now_s
+        if self._begun_s is None:
+            self._begun_s = now_s
+            self._trace.begun_ns = self._recording.about.unix_minus_host_ns + round(1e9 * now_s)
+        else:
+            self._trace.gaps_s.append(now_s - self._before_s)
+        t_s, self._before_s = now_s - self._begun_s, now_s
+        if record.inputs.heard.rebooted:
+            self._gathering.begin_anew(t_s)
+        for firing in record.inputs.heard.firings:
+            self._gathering.hear(t_s, firing)
+        if state.odometry is not None:
+            self._gathering.move(t_s, state.odometry)
+        modes, mode = self._trace.modes, record.mode
+        if not modes or (modes[-1].mode, modes[-1].reason) != (mode.mode.value, mode.reason):
+            modes.append(Entered(t_s, mode.mode.value, mode.reason))
+        self._perception = state.perception
+        self._gathering.pass_by(t_s, state.perception)
+
+    def finish(self) -> None:
+        """Close the trace."""
+        self._gathering.end(self._perception)
+        begun_s = self._begun_s or 0.0
+        for host_s, line in self._said:
+            more = ", ".join(f"{name} {value}" for name, value in line.fields.items() if name != "settings")
+            self._trace.log.append(
+                Said(host_s - begun_s, line.level, f"{line.event}: {more}" if more else line.event)
+            )
+        if self._has_bytes:
+            self._trace.counts = self._driver.counts
+
+
+def _of_ring_log(path: Path, asked: Asked, ready: Callable[[Settings], None], on_step: Told) -> Trace:
+    settings = load_settings(None, asked.sets, robot=asked.robot, models=asked.models)
+    firings = read_ring_log(path, sensors=len(settings.ring.mounts))
+    first = next(firings)  # complains about a wrong file before anybody waits for kernels
+    ready(settings)
+    trace = Trace(path, settings, None if asked.world is None else load_world(asked.world))
+    gathering = Timeline(trace)
+    begun_s: list[float] = []
+    kept: list[Perception] = []
+
+    def on_firing(firing: Firing, perception: Perception) -> None:
+        on_step()
+        if not begun_s:
+            begun_s.append(firing.t_s)
+            kept.append(perception)
+        elif trace.cycles:
+            trace.gaps_s.append(firing.t_s - begun_s[0] - trace.seconds)
+        t_s = firing.t_s - begun_s[0]
+        gathering.hear(t_s, firing)
+        gathering.pass_by(t_s, perception)
+        trace.cycles += 1
+
+    replay_firings(settings, itertools.chain((first,), firings), on_firing)
+    gathering.end(kept[0] if kept else None)
+    return trace

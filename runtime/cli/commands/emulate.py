@@ -1,0 +1,62 @@
+"""`echolocate emulate`: the robot's side alone, on a pseudo-terminal."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Sequence
+from typing import Final
+
+from config.load import load_settings
+from runtime.support.errors import DONE, FAILED, WRONG_CALL, UserError
+
+PIPES: Final = (0, 1)
+"""Standard input and output: what a program that started this one holds the other ends of."""
+CLOCK_WRAP_S: Final = 2**32 * 1e-6
+"""The robot counts microseconds in 32 bits."""
+
+
+def emulate_robot(
+    config: str | None,
+    sets: Sequence[str],
+    *,
+    world: str | None,
+    robot: str | None,
+    link: str | None,
+    faults: str | None,
+    seed: int,
+    trace: str | None,
+    latency: str | None,
+    clock_s: float,
+    end_with_parent: bool,
+    control: bool,
+) -> int:
+    """Carry out the command; see `runtime.cli.app.emulate`."""
+    settings = load_settings(config, sets, world=world, robot=robot)
+    from drivers.emulator.faults import load_faults
+    from drivers.emulator.pty_transport import EmulatorError, serve
+
+    if settings.world is None:
+        raise UserError("no world is given: name one with --world", WRONG_CALL)
+    if not 0.0 <= clock_s < CLOCK_WRAP_S:
+        raise UserError(f"--clock {clock_s:g}: must be from 0 to below {CLOCK_WRAP_S} s, where it wraps", WRONG_CALL)
+    script = () if faults is None else load_faults(faults)
+
+    def ready(path: str) -> None:
+        sys.stdout.write(f"ready on {path}\n")
+        sys.stdout.flush()
+
+    try:
+        asyncio.run(
+            serve(
+                settings, settings.world, link_path=link, faults=script, seed=seed, trace_path=trace,
+                latency_path=latency, ready=ready, exit_with_parent=end_with_parent,
+                clock_start_us=round(1e6 * clock_s),
+                control=PIPES if control else None,
+            )
+        )  # fmt: skip
+    except EmulatorError as error:
+        raise UserError(str(error), FAILED) from error
+    except ValueError as error:
+        raise UserError(str(error), WRONG_CALL) from error
+    return DONE

@@ -1,0 +1,244 @@
+"""`echolocate replay` of a recording: run again and compared, at a pace to watch, or with other settings."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import Progress
+
+from config.load import changed_settings, load_settings
+from runtime.analysis.text_tables import Units, length, objects_table
+from runtime.cycle.summary import ReplaySummary, object_row, write_json
+from runtime.support.errors import DONE, FAILED, WRONG_CALL, UserError
+from runtime.support.kernel_cache import ready_kernels
+
+if TYPE_CHECKING:
+    from config.settings import Settings
+    from runtime.analysis.comparison import RunOutcome
+    from runtime.cycle.step import CycleRecord, State
+    from runtime.recording.channels import Entry
+    from runtime.recording.reader import Recording
+    from runtime.recording.replayer import ReplayResult
+
+    OnEntry = Callable[[Entry], None]
+    OnCycle = Callable[[CycleRecord, State], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Which part of a recording, in seconds after its first cycle, and how fast."""
+
+    since_s: float
+    until_s: float | None
+    speed: float | None
+
+    def refuse(self) -> None:
+        """Complain where it is no span.
+
+        Raises
+        ------
+        UserError
+            A number makes no sense.
+        """
+        for option, value in (("--from", self.since_s), ("--to", self.until_s), ("--speed", self.speed)):
+            if value is not None and not (value >= 0.0 and math.isfinite(value)):
+                raise UserError(f"{option} {value}: must be a number, 0 or above", WRONG_CALL)
+        if self.speed == 0.0:
+            raise UserError("--speed 0: must be above 0", WRONG_CALL)
+        if self.until_s is not None and self.until_s <= self.since_s:
+            raise UserError(f"--to {self.until_s}: must be after --from {self.since_s}", WRONG_CALL)
+
+
+def replay_recording(
+    log: str,
+    sets: Sequence[str],
+    *,
+    span: Span,
+    verify: bool,
+    other: str | None,
+    robot: str | None,
+    models: Sequence[str],
+    json_file: str | None,
+    units: Units,
+) -> int:
+    """Carry out the command; see `runtime.cli.app.replay`."""
+    from runtime.recording.reader import RecordingError, open_recording
+
+    span.refuse()
+    otherwise = other is not None or bool(sets) or bool(models) or robot is not None
+    if verify and otherwise:
+        raise UserError("--verify compares with the recorded settings: leave out --with, --set, --model, --robot",
+                        WRONG_CALL)  # fmt: skip
+    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    try:
+        with open_recording(Path(log)) as recording:
+            if otherwise:
+                settings = other_settings(recording, other, sets, robot=robot, models=models)
+                return tell_other(recording, settings, console, units)
+            return rerun(recording, console, span=span, verify=verify, json_file=json_file, units=units)
+    except RecordingError as error:
+        raise UserError(str(error), WRONG_CALL) from error
+
+
+def other_settings(
+    recording: Recording, other: str | None, sets: Sequence[str], *, robot: str | None, models: Sequence[str]
+) -> Settings:
+    """Return the settings to replay with: of a run file, or the recorded ones with some overridden."""
+    if other is not None or models or robot is not None:
+        return load_settings(other, sets, robot=robot, models=models)
+    return changed_settings(recording.settings, str(recording.path), sets)
+
+
+@contextlib.contextmanager
+def progress(console: Console, *, shown: bool = True) -> Iterator[OnEntry]:
+    """Show how far the replay has come."""
+    with Progress(console=console, transient=True, disable=not (console.is_terminal and shown)) as bar:
+        task = bar.add_task("replaying", total=None)
+        yield lambda _entry: bar.update(task, advance=1)
+
+
+def rerun(
+    recording: Recording, console: Console, *, span: Span, verify: bool, json_file: str | None, units: Units
+) -> int:
+    """Replay and tell what came out."""
+    from runtime.recording.recorder import made_by
+    from runtime.recording.replayer import replay
+
+    ready_kernels(recording.settings, console)
+    now, then = made_by(), recording.about.made_by
+    others = [f"{name} {then.get(name)} → {now[name]}" for name in now if then.get(name) != now[name]]
+    if others:
+        console.print(f"made by another program or machine: {', '.join(others)}; results may differ from there on")
+    until_s = math.inf if span.until_s is None else span.until_s
+    with contextlib.ExitStack() as stack:
+        on_cycle, on_entry = None, stack.enter_context(progress(console, shown=span.speed is None))
+        if span.speed is not None:
+            on_cycle, on_entry = stack.enter_context(watching(recording, span, units))
+        verdict = replay(recording, since_s=span.since_s, until_s=until_s, on_cycle=on_cycle, on_entry=on_entry)
+    if verdict.cycles == 0:
+        if verdict.skipped or span != Span(0.0, None, span.speed):
+            raise UserError(f"{recording.path}: holds no cycle that can be replayed in this part of it", FAILED)
+        console.print(f"{recording.path}: holds no cycle yet: the run ended before its first one; nothing differs")
+        if json_file is not None:
+            write_json(json_file, summarise(recording, verdict))
+        return DONE
+    summary = summarise(recording, verdict)
+    if json_file is not None:
+        write_json(json_file, summary)
+    out = Console(soft_wrap=True, highlight=False)
+    out.print(objects_table(summary["objects"], units))
+    for damage in recording.damage:
+        console.print(f"at byte {damage.at}: {damage.what}")
+    for first, last in verdict.missing:
+        console.print(f"cycles {first} to {last} are not in the recording; taken up again at the next keyframe")
+    causes = ", ".join(f"{cause} {count}" for cause, count in sorted(verdict.refinement.items()))
+    out.print(
+        f"{verdict.cycles} cycles from cycle {verdict.first_cycle} on, {verdict.different} differences, "
+        f"{verdict.keyframes} keyframes compared; refinement ended by: {causes}; "
+        f"{verdict.times_real_time:.0f} times real time"
+    )
+    if verdict.first is not None:
+        if verify:
+            raise UserError(f"{recording.path}: the replay differs, first in {verdict.first}", FAILED)
+        console.print(f"the replay differs, first in {verdict.first}")
+    return DONE
+
+
+def summarise(recording: Recording, verdict: ReplayResult) -> ReplaySummary:
+    """Return the summary of a replay."""
+    perception = verdict.state.perception if verdict.state is not None else None
+    return {
+        "objects": [] if perception is None else [object_row(seen) for seen in perception.objects()],
+        "segments": 0 if perception is None else perception.tally.total,
+        "clusters": 0 if perception is None else perception.tally.hypotheses,
+        "cycles": verdict.cycles,
+        "cycle_us": verdict.books.cycle_us(),
+        "verify": {
+            "differences": verdict.different,
+            "first": None if verdict.first is None else str(verdict.first),
+            "first_cycle": verdict.first_cycle,
+            "keyframes": verdict.keyframes,
+            "skipped": verdict.skipped,
+            "missing": verdict.missing,
+            "refinement": dict(verdict.refinement),
+            "times_real_time": round(verdict.times_real_time, 1),
+            "damage": [f"at byte {damage.at}: {damage.what}" for damage in recording.damage],
+        },
+    }
+
+
+@contextlib.contextmanager
+def watching(recording: Recording, span: Span, units: Units) -> Iterator[tuple[OnCycle, OnEntry]]:
+    """Hold the replay to its pace, and show it where there is a terminal."""
+    from drivers.denning.robot import DenningRobot
+    from runtime.cli.terminal.view import View
+    from runtime.recording.channels import SERIAL, decode
+    from runtime.recording.schema import SerialBytes
+    from runtime.timing.cycle_stats import CycleStats
+
+    settings, console = recording.settings, Console(stderr=True)
+    view = View(settings, console, units) if console.is_terminal and not console.is_dumb_terminal else None
+    driver, books = DenningRobot(settings), CycleStats(late_after_s=math.inf)
+    driver.opened(0.0)
+    begun: list[tuple[float, float]] = []
+
+    def on_entry(entry: Entry) -> None:
+        if entry.topic == SERIAL["in"]:
+            for t_s, data in decode(SerialBytes, entry.data).pieces():
+                driver.receive(data, t_s)
+            driver.take()
+
+    def on_cycle(record: CycleRecord, state: State) -> None:
+        recorded_s, now_s = record.inputs.now_s, time.monotonic()
+        if not begun:
+            begun.append((recorded_s, now_s))
+        due_s = begun[0][1] + (recorded_s - begun[0][0]) / (span.speed or math.inf)
+        if due_s > now_s:
+            time.sleep(due_s - now_s)
+        books.enter(0.0, max(0.0, now_s - due_s))
+        if view is not None:
+            view.on_cycle(record, state, books, driver)
+
+    with contextlib.ExitStack() as stack:
+        if view is not None:
+            stack.enter_context(view.shown())
+        yield on_cycle, on_entry
+
+
+def tell_other(recording: Recording, settings: Settings, console: Console, units: Units) -> int:
+    """Replay with the recorded settings and with others, and say what is different."""
+    from runtime.analysis.comparison import compare_runs
+
+    ready_kernels(settings, console)
+    with progress(console) as on_entry:
+        told = compare_runs(recording, settings, on_entry)
+    out = Console(soft_wrap=True, highlight=False)
+    for title, story in (("as it was", told.was), ("with the other settings", told.would_be)):
+        out.print(title)
+        out.print(objects_table(story.objects, units))
+        out.print(errors_line(story, units))
+        for at_s, reason in story.stops:
+            out.print(f"stopped after {at_s:.1f} s: {reason}")
+    first = "" if told.first_other_s is None else f", the first after {told.first_other_s:.2f} s"
+    out.print(f"{told.cycles} cycles; {told.other_commands} with another command{first}")
+    return DONE
+
+
+def errors_line(story: RunOutcome, units: Units) -> str:
+    """Return how far the objects are from the drums that were there, where that is known."""
+    if story.errors_m is None:
+        return f"{len(story.objects)} objects"
+    found = [error for error in story.errors_m if error is not None]
+    mean = length(sum(found) / len(found), units, 4) if found else "none"
+    worst = length(max(found), units, 4) if found else "none"
+    return (
+        f"{len(found)} of {len(story.errors_m)} drums, {story.false} false; "
+        f"mean error {mean} {units}, worst {worst} {units}"
+    )

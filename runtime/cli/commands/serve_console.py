@@ -1,0 +1,99 @@
+"""The operator console of `run`, given whoever holds the run's time, its recording, and the recordings of others."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING, Final
+
+from config.settings import Settings
+from runtime.analysis.text_tables import Units
+from runtime.console.commands.async_commands import AsyncCommands
+from runtime.console.console import Console
+from runtime.console.frames.frame_encoder import RecordingNow
+from runtime.console.playback.replay_client import ReplayClient
+from runtime.cycle.reloader import Ready
+from runtime.recording.storage import recordings_folder
+
+if TYPE_CHECKING:
+    from structlog.typing import FilteringBoundLogger
+
+    from runtime.cli.commands.run_recording import RunRecording
+    from runtime.console.protocols import Run
+    from runtime.timing.time_control import TimeControl
+
+PLAYED: Final = "runtime.console.playback.replay_frames"
+"""The program that plays a recording."""
+
+
+class Recordings:
+    """The run's recording, as the console asks about it.
+
+    Parameters
+    ----------
+    keeping : RunRecording
+        Of the run.
+    """
+
+    def __init__(self, keeping: RunRecording) -> None:
+        self._keeping = keeping
+
+    @property
+    def now(self) -> RecordingNow | None:
+        """The recording under way, None where there is none."""
+        now = self._keeping.now
+        return None if now is None else RecordingNow(now.file, now.bytes, now.dropped)
+
+    async def record(self, *, on: bool) -> str | None:
+        """Begin or end a recording."""
+        return await self._keeping.record(on=on)
+
+    async def bookmark(self, text: str) -> str | None:
+        """Put a mark into it."""
+        return await self._keeping.bookmark(text)
+
+
+@asynccontextmanager
+async def paged(
+    process: Run,
+    settings: Settings,
+    log: FilteringBoundLogger,
+    take_over: Callable[[Settings], None],
+    ready: Ready,
+    keeping: RunRecording,
+    control: TimeControl,
+    *,
+    emulated: bool,
+    units: Units,
+) -> AsyncIterator[Console]:
+    """Serve the console while the run lasts; what it began beside the run ends with it.
+
+    Parameters
+    ----------
+    process, settings, log, take_over, ready, emulated, units
+        As of `Console`.
+    keeping : RunRecording
+        The run's.
+    control : TimeControl
+        Holds the run's time.
+
+    Raises
+    ------
+    Complaint
+        There is nowhere to listen.
+    """
+    recording = Recordings(keeping)
+
+    def current() -> str | None:
+        return None if recording.now is None else recording.now.file
+
+    players = ReplayClient(recordings_folder(settings.recording), PLAYED, current, units)
+    console = Console(
+        process, settings, log, take_over, ready, emulated=emulated, units=units,
+        overtime=AsyncCommands(control, recording, players),
+    )  # fmt: skip
+    try:
+        async with console.open():
+            yield console
+    finally:
+        await players.close()

@@ -1,0 +1,248 @@
+"""The live terminal view: mode and reason, the plan, objects, ring, line and timing.
+
+A terminal can be slow or held by Ctrl-S, so the loop only leaves the latest picture's ingredients in a slot; a
+thread draws them. Keys go the other way: a arms, space halts, q quits; p and s hold the time of an emulator.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import sys
+import termios
+import threading
+import tty
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from config.settings import Settings
+from drivers.driver import RobotDriver
+from drivers.messages import Floats, LinkCounts, Pose
+from perception.pipeline import SeenObject
+from runtime.analysis.text_tables import Units, objects_table
+from runtime.cli.terminal.plan import draw_plan
+from runtime.cycle.modes import ModeState, Request
+from runtime.cycle.step import CycleRecord, State
+from runtime.cycle.summary import object_row
+from runtime.support.health import Worker
+from runtime.timing.cycle_stats import CycleStats, Quantiles
+
+EVERY_CYCLES: Final = 5
+"""Draw every fifth cycle: 4 Hz at 20 Hz."""
+TRAIL: Final = 400
+SWITCH_INTERVAL_S: Final = 0.0005
+"""While a thread draws, the loop waits for the interpreter this long at most."""
+STYLES: Final = MappingProxyType(
+    {"DRIVE": "bold white on green", "SAFE_STOP": "bold white on red", "FAULT": "bold white on red"}
+)
+BARS: Final = " ▁▂▃▄▅▆▇█"
+FAULTS_SHOWN: Final = 3
+KEYS_MAX: Final = 64
+KEYS: Final = MappingProxyType({" ": Request.HALT, "h": Request.HALT, "a": Request.ARM})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """What one picture is made from; nothing in it changes any more."""
+
+    mode: ModeState
+    pose: Pose | None
+    trail: list[tuple[float, float]]
+    segments: Floats
+    clusters: int
+    objects: tuple[SeenObject, ...]
+    ranges: Floats
+    counts: LinkCounts
+    cycles: int
+    late: int
+    cycle_us: Quantiles
+    lag_us: Quantiles
+    missed: int = 0
+    faults: tuple[tuple[str, int], ...] = ()
+    """Culprits of late and overrun cycles, and how many each."""
+    sensors: tuple[str, ...] = ()
+    """Why sensors are not believed."""
+
+
+class View:
+    """Draws the run on a terminal.
+
+    Parameters
+    ----------
+    settings : Settings
+        For the ring's reach and the models' sizes.
+    console : Console
+        The terminal.
+    units : {"m", "ft"}
+        For the list of objects.
+    """
+
+    def __init__(self, settings: Settings, console: Console, units: Units) -> None:
+        self._console = console
+        self._units: Units = units
+        self._reach_m = settings.ring.range_max_m
+        self._size_m = {
+            m.name: m.arc_radius_m or max(float(np.hypot(x, y)) for x, y in m.vertices_m) for m in settings.models
+        }
+        self._ranges = np.full(len(settings.ring.mounts), np.nan)
+        self._trail: deque[tuple[float, float]] = deque(maxlen=TRAIL)
+        self.console_url: str | None = None
+        """Where the operator console is, None where there is none."""
+        self._slot: Snapshot | None = None
+        self._wake = threading.Event()
+        self._done = False
+        self._painter = Worker("view", self._paint)
+
+    def probe(self) -> str | None:
+        """Say how its thread ended; None while it draws. See `runtime.support.health`."""
+        return self._painter.probe()
+
+    def on_cycle(self, record: CycleRecord, state: State, books: CycleStats, driver: RobotDriver) -> None:
+        """Leave the ingredients of the next picture in the slot."""
+        for firing in record.inputs.heard.firings:
+            fired = ~np.isnan(firing.ranges_m)
+            self._ranges[fired] = firing.ranges_m[fired]
+        if record.cycle % EVERY_CYCLES:
+            return
+        pose = None if state.odometry is None else state.odometry.pose
+        if pose is not None:
+            self._trail.append((pose.x, pose.y))
+        mode = record.mode if state.standing is None else replace(record.mode, reason=state.standing)
+        self._slot = Snapshot(
+            mode, pose, list(self._trail), state.perception.segments_now(), record.clusters,
+            state.perception.things(), self._ranges.copy(), driver.counts,
+            books.cycles, books.late, books.cycle_us(), books.lag_us(), books.missed, tuple(books.faults.items()),
+            tuple(report.reason for report in state.perception.sensors()),
+        )  # fmt: skip
+        self._wake.set()
+
+    @contextlib.contextmanager
+    def shown(self) -> Iterator[None]:
+        """Own the terminal while the run lasts."""
+        interval_s = sys.getswitchinterval()
+        sys.setswitchinterval(SWITCH_INTERVAL_S)
+        self._painter.start()
+        try:
+            yield
+        finally:
+            self._done = True
+            self._wake.set()
+            self._painter.join(timeout=1.0)
+            sys.setswitchinterval(interval_s)
+
+    def _paint(self) -> None:
+        with Live(console=self._console, auto_refresh=False, screen=False) as live:
+            while not self._done:
+                self._wake.wait()
+                self._wake.clear()
+                snapshot, self._slot = self._slot, None
+                if snapshot is not None:
+                    live.update(self.picture(snapshot), refresh=True)
+
+    def picture(self, snapshot: Snapshot) -> Group:
+        """Return the picture of one moment."""
+        mode = snapshot.mode
+        head = Text.assemble((f" {mode.mode.value} ", STYLES.get(mode.mode.value, "bold black on yellow")))
+        head.append(f"  {mode.reason or ''}")
+        columns = max(20, min(self._console.width - 4, 100))
+        plan: Text | str = "waiting for odometry"
+        if snapshot.pose is not None:
+            plan = draw_plan(
+                snapshot.pose, snapshot.trail, snapshot.segments, snapshot.objects, self._size_m, columns, 18
+            )
+        rows = [object_row(seen) for seen in snapshot.objects]
+        legend = "→ robot   • outline segments   o objects   a arm   space halt   p pause   s step   q quit"
+        parts: list[RenderableType] = [
+            head,
+            Panel(plan, subtitle=legend),
+            objects_table(rows, self._units),
+            self._numbers(snapshot),
+        ]
+        if self.console_url is not None:
+            parts.append(Text(f"console  {self.console_url}", overflow="fold"))
+        return Group(*parts)
+
+    def _numbers(self, snapshot: Snapshot) -> Table:
+        grid = Table.grid(padding=(0, 2))
+        grid.add_row("ring", self._ring(snapshot.ranges))
+        grid.add_row("map", f"{len(snapshot.segments)} segments, {snapshot.clusters} hypotheses")
+        for reason in snapshot.sensors:
+            grid.add_row("masked", reason)
+        counts = snapshot.counts
+        grid.add_row("line", f"{counts.frames} frames, {counts.bad} bad, {counts.lost} lost")
+        took, lag = snapshot.cycle_us, snapshot.lag_us
+        grid.add_row(
+            "cycle",
+            f"{snapshot.cycles}, {snapshot.late} late, {snapshot.missed} missed; takes {millis(took)}; "
+            f"begins {millis(lag)} after it is due",
+        )
+        if snapshot.faults:
+            worst = sorted(snapshot.faults, key=lambda fault: -fault[1])[:FAULTS_SHOWN]
+            grid.add_row("late by", ", ".join(f"{culprit}: {count}" for culprit, count in worst))
+        return grid
+
+    def _ring(self, ranges: Floats) -> str:
+        """Return a bar a sensor: the nearer the echo the higher; a dot heard nothing."""
+        bars = []
+        for r in ranges:
+            near = 0.0 if not np.isfinite(r) else 1.0 - min(float(r) / self._reach_m, 1.0)
+            bars.append("·" if not np.isfinite(r) else BARS[max(1, round(near * (len(BARS) - 1)))])
+        return "".join(bars)
+
+
+def millis(quantiles: Quantiles) -> str:
+    """Return median and 99th percentile as text."""
+    return f"{quantiles['p50'] / 1e3:.2f} ms (p99 {quantiles['p99'] / 1e3:.2f})"
+
+
+@contextlib.contextmanager
+def keys(
+    on_request: Callable[[Request], None],
+    on_quit: Callable[[], None],
+    on_other: Callable[[str], None] = lambda _key: None,
+) -> Iterator[None]:
+    """Read single keys from the terminal while the run lasts; without a terminal there are none."""
+    if not sys.stdin.isatty():
+        yield
+        return
+    fd = sys.stdin.fileno()
+    before = termios.tcgetattr(fd)
+    loop = asyncio.get_running_loop()
+
+    def read() -> None:
+        # Not through sys.stdin: what that keeps in its buffer wakes nobody.
+        try:
+            pressed = os.read(fd, KEYS_MAX)
+        except OSError:
+            pressed = b""
+        if not pressed:
+            # The terminal is gone, and with it whoever could have halted the robot.
+            loop.remove_reader(fd)
+            on_quit()
+        for key in pressed.decode(errors="replace"):
+            if key in KEYS:
+                on_request(KEYS[key])
+            elif key == "q":
+                on_quit()
+            else:
+                on_other(key)
+
+    tty.setcbreak(fd)
+    loop.add_reader(fd, read)
+    try:
+        yield
+    finally:
+        loop.remove_reader(fd)
+        with contextlib.suppress(termios.error):
+            termios.tcsetattr(fd, termios.TCSADRAIN, before)

@@ -1,0 +1,1 @@
+"""Connected browsers: their send queues, the hub, and who holds control."""

@@ -1,0 +1,189 @@
+"""What a run has to show at its end, in the JSON forms of the public surface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import NotRequired, TypedDict
+
+import orjson
+
+from drivers.driver import RobotDriver
+from drivers.messages import Pose
+from perception.pipeline import SeenObject
+from runtime.cycle.step import State
+from runtime.support.errors import FAILED, UserError
+from runtime.timing.cycle_stats import CycleStats, Quantiles
+from runtime.timing.footprint import FootprintRow
+from runtime.timing.timekeeping import Timekeeper, Timing
+
+
+class ObjectRow(TypedDict):
+    """One object: metres and radians, in the odometry's frame."""
+
+    model: str
+    x: float
+    y: float
+    theta: float
+    sigma: float
+    support: int
+    score: float
+    probability: NotRequired[float]
+    """That it is this model."""
+    covariance: NotRequired[tuple[float, float, float]]
+    """xx, xy, yy of the position, m²."""
+
+
+class LinkRow(TypedDict):
+    """Frames heard, frames that were no frames, frames that never came."""
+
+    frames: int
+    bad: int
+    lost: int
+
+
+class SensorRow(TypedDict):
+    """A sensor that is not believed, and why; `fault` as in `perception.sensor_report`."""
+
+    sensor: int
+    fault: str
+    reason: str
+
+
+class RecordingRow(TypedDict):
+    """The recording that a run left: the newest of its files, bytes in all of them, messages that are missing."""
+
+    file: str | None
+    files: int
+    bytes: int
+    dropped: int
+    trouble: str | None
+    sync_max_s: float
+
+
+class LogRow(TypedDict):
+    """Lines of the log that did not get into its file, and why."""
+
+    lost: int
+    trouble: str | None
+
+
+class RunSummary(TypedDict):
+    """Summary of ``echolocate run``."""
+
+    objects: list[ObjectRow]
+    cycles: int
+    cycle_us: Quantiles
+    late: int
+    missed: int
+    lag_us: Quantiles
+    link: LinkRow
+    sensors: list[SensorRow]
+    process: FootprintRow
+    mode: str
+    stop_reasons: list[str]
+    timing: Timing
+    recording: NotRequired[RecordingRow]
+    log: NotRequired[LogRow]
+
+
+class VerifyRow(TypedDict):
+    """What the replay of a recording found: see `runtime.recording.replayer.Verdict`."""
+
+    differences: int
+    first: str | None
+    first_cycle: int | None
+    keyframes: int
+    skipped: int
+    missing: list[tuple[int, int]]
+    refinement: dict[str, int]
+    times_real_time: float
+    damage: list[str]
+
+
+class ReplaySummary(TypedDict):
+    """Summary of ``echolocate replay``."""
+
+    verify: NotRequired[VerifyRow]
+
+    objects: list[ObjectRow]
+    segments: int
+    clusters: int
+    cycles: int
+    cycle_us: Quantiles
+
+
+def object_row(seen: SeenObject) -> ObjectRow:
+    """Return an object in its JSON form."""
+    row: ObjectRow = {
+        "model": seen.model,
+        "x": seen.x,
+        "y": seen.y,
+        "theta": seen.theta,
+        "sigma": seen.sigma,
+        "support": seen.support,
+        "score": seen.score,
+    }
+    if seen.probability is not None:
+        row["probability"] = seen.probability
+    if seen.covariance is not None:
+        row["covariance"] = seen.covariance
+    return row
+
+
+def in_frame(frame: Pose, seen: SeenObject) -> SeenObject:
+    """Return an object of ours in a frame in which our origin is `frame`."""
+    if frame == Pose(0.0, 0.0, 0.0):
+        return seen
+    place = frame.compose(Pose(seen.x, seen.y, seen.theta))
+    covariance = seen.covariance
+    if covariance is not None:
+        xx, xy, yy = covariance
+        c, s = math.cos(frame.theta), math.sin(frame.theta)
+        covariance = (
+            c * c * xx - 2.0 * c * s * xy + s * s * yy,
+            c * s * (xx - yy) + (c * c - s * s) * xy,
+            s * s * xx + 2.0 * c * s * xy + c * c * yy,
+        )
+    return replace(seen, x=place.x, y=place.y, theta=place.theta, covariance=covariance)
+
+
+def run_summary(
+    state: State,
+    books: CycleStats,
+    keeper: Timekeeper,
+    driver: RobotDriver,
+    cost: FootprintRow,
+    stop_reasons: list[str],
+) -> RunSummary:
+    """Return the summary of a run that ends in `state`; objects are in the robot's own odometry, leaps and all."""
+    counts = driver.counts
+    return {
+        "objects": [object_row(in_frame(driver.frame, seen)) for seen in state.perception.objects()],
+        "cycles": books.cycles,
+        "cycle_us": books.cycle_us(),
+        "late": books.late,
+        "missed": books.missed,
+        "lag_us": books.lag_us(),
+        "sensors": [{"sensor": r.sensor, "fault": r.fault, "reason": r.reason} for r in state.perception.sensors()],
+        "link": {"frames": counts.frames, "bad": counts.bad, "lost": counts.lost},
+        "process": cost,
+        "mode": state.mode.mode.value,
+        "stop_reasons": stop_reasons,
+        "timing": keeper.timing(),
+    }
+
+
+def write_json(path: str, summary: object) -> None:
+    """Write a summary where ``--json`` says.
+
+    Raises
+    ------
+    UserError
+        The file cannot be written.
+    """
+    try:
+        Path(path).write_bytes(orjson.dumps(summary, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE))
+    except OSError as error:
+        raise UserError(f"--json {path}: cannot be written: {error.strerror}; choose another file", FAILED) from error

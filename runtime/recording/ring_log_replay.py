@@ -1,0 +1,48 @@
+"""Perception over a ring log, firing by firing, as if the robot were driving there now."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+
+from config.settings import Settings
+from drivers.messages import Firing
+from perception.pipeline import Perception
+from runtime.cycle.summary import ReplaySummary, object_row
+from runtime.timing.cycle_stats import CycleStats
+from runtime.timing.refinement_budget import enough_quanta
+
+
+def replay(
+    settings: Settings, firings: Iterable[Firing], on_firing: Callable[[Firing, Perception], None] | None = None
+) -> ReplaySummary:
+    """Run perception over `firings` and return what it saw.
+
+    Parameters
+    ----------
+    settings : Settings
+        Ring, models and constants.
+    firings : iterable of Firing
+        In the order of their times.
+    on_firing : callable, optional
+        Called after each.
+    """
+    perception = Perception(settings.ring, settings.models, settings.perception)
+    books = CycleStats(late_after_s=float("inf"))
+    for firing in firings:
+        began = time.perf_counter()
+        perception.observe(firing)
+        quanta = 0
+        while perception.pending and enough_quanta(quanta):
+            perception.refine()
+            quanta += 1
+        books.enter(time.perf_counter() - began)
+        if on_firing is not None:
+            on_firing(firing, perception)
+    return {
+        "objects": [object_row(seen) for seen in perception.objects()],
+        "segments": perception.tally.total,
+        "clusters": perception.tally.hypotheses,
+        "cycles": books.cycles,
+        "cycle_us": books.cycle_us(),
+    }

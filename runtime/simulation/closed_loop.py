@@ -1,0 +1,127 @@
+"""The closed loop in virtual time: the same robot, protocol and cycle as on a line, as fast as the machine can.
+
+No wall clock decides anything here, so one seed is one run. Refinement gets a fixed number of quanta a cycle in
+place of a time budget.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+from config.settings import Settings
+from config.world import WorldConfig
+from drivers.denning.device import EmulatedRobot, Truth
+from drivers.denning.robot import DenningRobot
+from drivers.emulator.memory_transport import MemoryLine, OnBytes
+from drivers.messages import LinkCounts, Pose
+from perception.pipeline import Perception
+from runtime.cycle.driver_io import gather, give
+from runtime.cycle.modes import Mode, Request
+from runtime.cycle.step import CycleRecord, DriveRequest, Edit, State, step, take_over
+from runtime.timing.cycle_stats import CycleStats
+from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, Quanta, RefinementBudget
+
+SETTLING_S: Final = 1.0
+"""How long a robot that has arrived still listens, so that the last echoes count."""
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What an operator says in a cycle."""
+
+    request: Request | None = None
+    drive_request: DriveRequest | None = None
+    edits: tuple[Edit, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Simulated:
+    """What a run in virtual time left behind."""
+
+    state: State
+    start: Pose
+    """Where the odometry began, in world coordinates."""
+    truth: Truth
+    virtual_s: float
+    wall_s: float
+    books: CycleStats
+    """What the cycles took."""
+    counts: LinkCounts
+
+
+def simulate(
+    settings: Settings,
+    world: WorldConfig,
+    seed: int,
+    seconds_max: float,
+    on_cycle: Callable[[CycleRecord, Truth], None] | None = None,
+    *,
+    allowance: RefinementBudget | None = None,
+    on_state: Callable[[CycleRecord, State, Pose], None] | None = None,
+    clock_start_us: int = 0,
+    reload: Callable[[int], Settings | None] | None = None,
+    on_bytes: OnBytes | None = None,
+    operator: Callable[[int, State], Said] | None = None,
+) -> Simulated:
+    """Drive through `world` until the leg is done, the robot stops for a reason, or the time is up.
+
+    Parameters
+    ----------
+    settings : Settings
+        The robot and everything it does.
+    world : WorldConfig
+        What it meets.
+    seed : int
+        Of everything random.
+    seconds_max : float
+        Virtual time after which the run ends.
+    on_cycle : callable, optional
+        Gets every record, and the truth of that moment.
+    allowance : RefinementBudget, optional
+        How much refinement a cycle may do; `QUANTA_PER_CYCLE` where not given.
+    on_state : callable, optional
+        Gets every record, the state it left, and where the odometry began.
+    clock_start_us : int
+        What the robot's own clock shows at first, µs; it wraps at 2³².
+    reload : callable, optional
+        Asked with the number of each cycle for settings to go on with from there, as after a reload.
+    on_bytes : callable, optional
+        Gets what goes over the line, either way, and when.
+    operator : callable, optional
+        Asked with the number of each cycle, and the state before it, for what an operator says in it. It arms only
+        where it says so, and a drive does not end by itself.
+    """
+    allowance = Quanta(QUANTA_PER_CYCLE) if allowance is None else allowance
+    robot = EmulatedRobot(settings, world, seed, clock_start_us=clock_start_us)
+    driver = DenningRobot(settings)
+    line = MemoryLine(driver, robot, on_bytes=on_bytes)
+    state = State(Perception(settings.ring, settings.models, settings.perception))
+    start = robot.truth.pose
+    began = time.perf_counter()
+    books = CycleStats(late_after_s=math.inf, is_touched=True)
+    until, now = seconds_max, 0.0
+    while now < until:
+        now = (books.cycles + 1) / settings.cycle.rate_hz
+        if reload is not None and (other := reload(books.cycles + 1)) is not None:
+            settings = other
+            driver.set_firing(settings.ring)
+            take_over(state, settings)
+        line.exchange(now)
+        request = Request.ARM if state.mode.mode is Mode.READY else None
+        said = Said(request) if operator is None else operator(books.cycles + 1, state)
+        inputs = replace(gather(driver, now, said.request), drive_request=said.drive_request, edits=said.edits)
+        step_s = time.perf_counter()
+        allowance.begin()
+        record = step(state, inputs, settings, lambda c: give(driver, c), allowance)
+        books.enter(time.perf_counter() - step_s)
+        if on_cycle is not None:
+            on_cycle(record, robot.truth)
+        if on_state is not None:
+            on_state(record, state, start)
+        if operator is None and (state.mode.mode is Mode.SAFE_STOP or (state.leg is not None and state.leg.done)):
+            until = min(until, now + SETTLING_S)
+    return Simulated(state, start, robot.truth, now, time.perf_counter() - began, books, driver.counts)

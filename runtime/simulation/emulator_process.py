@@ -1,0 +1,126 @@
+"""The emulator as a child process: started, waited for, and ended by the robot's main process."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+from collections.abc import AsyncIterator, Sequence
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from runtime.support.child_process import start_child
+from runtime.support.errors import FAILED, WRONG_CALL, UserError
+from runtime.support.temp_folder import run_folder
+from runtime.timing.run_clock import PacedClock
+from runtime.timing.time_control import EmulatorControl
+
+READY_WORD: Final = "ready"
+"""First word of the one line the emulator prints."""
+
+START_MAX_S: Final = 60.0
+"""Even a machine that compiles the emulator's kernels is through by then."""
+
+END_MAX_S: Final = 2.0
+
+
+class OwnEmulator(NamedTuple):
+    """An emulator of this process's own."""
+
+    port: str
+    """The port it answers on."""
+    control: EmulatorControl
+    """Holds its time; `control.clock` is the clock for the run on it."""
+
+
+@contextlib.asynccontextmanager
+async def emulator(arguments: Sequence[str], clock: PacedClock | None = None) -> AsyncIterator[OwnEmulator]:
+    """Run ``echolocate emulate`` beside this process.
+
+    It gets a session of its own, so that Ctrl-C on the terminal reaches this process only, which then halts the
+    robot before it goes. When this process is killed the emulated base stops by itself and the emulator ends.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Further arguments of the command.
+    clock : PacedClock, optional
+        The run's, where it must be known before the emulator is.
+
+    Raises
+    ------
+    UserError
+        The emulator did not get ready; its own words are in the message.
+    """
+    with contextlib.ExitStack() as stack:
+        port = _folder(stack) / "robot"
+        words = ["emulate", "--link", str(port), "--end-with-parent", "--control", *arguments]
+        process = await start_child("runtime.cli.app", words, talks=True)
+        listener: asyncio.Task[None] | None = None
+        try:
+            await _wait_until_ready(process)
+            control = EmulatorControl(lambda line: _write(process, line), PacedClock() if clock is None else clock)
+            listener = asyncio.create_task(_listen(process, control), name="emulator's time")
+            yield OwnEmulator(str(port), control)
+        finally:
+            if listener is not None:
+                listener.cancel()
+                await asyncio.gather(listener, return_exceptions=True)
+            await _end(process)
+
+
+def _folder(stack: contextlib.ExitStack) -> Path:
+    try:
+        return stack.enter_context(run_folder())
+    except OSError as error:
+        raise UserError(
+            f"no temporary folder can be made for the emulator: {error.strerror or error}; make room, or name "
+            "another place in TMPDIR",
+            FAILED,
+        ) from error
+
+
+async def _listen(process: asyncio.subprocess.Process, control: EmulatorControl) -> None:
+    try:
+        while process.stdout is not None and (line := await process.stdout.readline()):
+            control.heard(line)
+    finally:
+        control.gone()
+
+
+def _write(process: asyncio.subprocess.Process, line: bytes) -> None:
+    if process.stdin is not None and not process.stdin.is_closing():
+        process.stdin.write(line)
+
+
+async def _wait_until_ready(process: asyncio.subprocess.Process) -> None:
+    out, err = process.stdout, process.stderr
+    if out is None or err is None:
+        raise UserError("the emulator was started without pipes: this is a fault of the program", FAILED)
+    try:
+        line = await asyncio.wait_for(out.readline(), START_MAX_S)
+    except TimeoutError:
+        line = b""
+    if not line.startswith(READY_WORD.encode()):
+        _signal(process, signal.SIGKILL)
+        words = (await err.read()).decode(errors="replace").strip()
+        why = words.removeprefix("echolocate: ") or f"no answer within {START_MAX_S:.0f} s"
+        wrong_call = await process.wait() == WRONG_CALL
+        raise UserError(f"the emulator did not start: {why}", WRONG_CALL if wrong_call else FAILED)
+
+
+async def _end(process: asyncio.subprocess.Process) -> None:
+    _signal(process, signal.SIGTERM)
+    try:
+        await asyncio.wait_for(process.wait(), END_MAX_S)
+    except TimeoutError:
+        _signal(process, signal.SIGKILL)
+        await process.wait()
+
+
+def _signal(process: asyncio.subprocess.Process, number: signal.Signals) -> None:
+    """Send a signal past asyncio, whose own way may reap the child first and then complains that it is unknown."""
+    if process.returncode is None:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(process.pid, number)

@@ -1,0 +1,209 @@
+"""The paper's simulated experiment: drive down the hall, and set estimates against truth as its Table 2 does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from statistics import mean, pstdev
+from typing import Any, Final, NotRequired, TypedDict
+
+from config.settings import Settings
+from config.units import FOOT_M
+from config.world import WorldConfig
+from drivers.emulator.memory_transport import OnBytes
+from drivers.messages import Pose
+from runtime.cycle.modes import Mode
+from runtime.cycle.step import CycleRecord, State
+from runtime.cycle.summary import object_row
+from runtime.simulation.closed_loop import Simulated, simulate
+from runtime.support.errors import FAILED, UserError
+from runtime.timing.cycle_stats import Quantiles, worst_of
+
+GATE_M: Final = FOOT_M
+"""An estimate farther than a foot from every drum is a false one."""
+
+SECONDS_MAX: Final = 600.0
+
+
+class DrumRow(TypedDict):
+    """A row of Table 2, metres in world coordinates."""
+
+    truth: tuple[float, float]
+    estimate: tuple[float, float] | None
+    error: float | None
+
+
+class Outcome(TypedDict):
+    """The experiment's summary: the JSON form of the public surface."""
+
+    drums: list[DrumRow]
+    false: int
+    mean_error: float | None
+    max_error: float | None
+    times_real_time: float
+    cycle_us: Quantiles
+    spread: NotRequired[Spread]
+    """Where there was more than one seed."""
+
+
+class Spread(TypedDict):
+    """Errors over many seeds, each seed's drums taken together, m."""
+
+    seeds: int
+    mean: float
+    deviation: float
+    """Of the seeds' mean errors."""
+    worst: float
+    """The largest error of a single drum."""
+    worst_seed: int
+    """The first that had it."""
+    missed: int
+    missed_most: int
+    """Drums not found by the seed that found fewest."""
+    false: int
+
+
+@dataclass(frozen=True, slots=True)
+class SeedOutcome:
+    """One run of the experiment."""
+
+    seed: int
+    rows: list[DrumRow]
+    false: int
+    virtual_s: float
+    wall_s: float
+    cycle_us: Quantiles
+    end: dict[str, Any] = field(default_factory=dict)
+    """What a recording of it says at its end, as a run's summary does."""
+
+
+def run_seed(
+    settings: Settings,
+    world: WorldConfig,
+    seed: int,
+    on_state: Callable[[CycleRecord, State, Pose], None] | None = None,
+    on_bytes: OnBytes | None = None,
+) -> SeedOutcome:
+    """Run the experiment once in virtual time.
+
+    Parameters
+    ----------
+    settings, world, seed
+        The robot, what it meets, and everything random.
+    on_state, on_bytes : callable, optional
+        A recorder's, as `simulate` calls them.
+
+    Raises
+    ------
+    UserError
+        The robot stopped for a reason, touched something, or did not get through in `SECONDS_MAX`.
+    """
+    run = simulate(settings, world, seed, SECONDS_MAX, on_state=on_state, on_bytes=on_bytes)
+    refuse_unfinished(run, seed, SECONDS_MAX)
+    rows, false = against_truth(world, estimates(run))
+    return SeedOutcome(seed, rows, false, run.virtual_s, run.wall_s, run.books.cycle_us(), end_of(run))
+
+
+def refuse_unfinished(run: Simulated, seed: int, seconds_max: float) -> None:
+    """Refuse a drive that did not come through.
+
+    Raises
+    ------
+    UserError
+        The robot stopped for a reason, touched something, or did not get through in `seconds_max`.
+    """
+    if run.state.mode.mode is Mode.SAFE_STOP:
+        raise UserError(
+            f"seed {seed}: the robot stopped after {run.virtual_s:.1f} s: {run.state.mode.reason}", FAILED
+        )
+    if run.truth.contacts:
+        raise UserError(f"seed {seed}: the robot touched something", FAILED)
+    if run.state.leg is None or not run.state.leg.done:
+        raise UserError(
+            f"seed {seed}: the robot did not get through in {seconds_max:.0f} s: look for a way that is too narrow "
+            "for its radius and safety margin",
+            FAILED,
+        )
+
+
+def end_of(run: Simulated) -> dict[str, Any]:
+    """Return the summary of a run in virtual time: what there is of ``echolocate run``'s without a clock."""
+    counts = run.counts
+    return {
+        "objects": [object_row(seen) for seen in run.state.perception.objects()],
+        "cycles": run.books.cycles,
+        "cycle_us": run.books.cycle_us(),
+        "link": {"frames": counts.frames, "bad": counts.bad, "lost": counts.lost},
+        "mode": run.state.mode.mode.value,
+        "stop_reasons": [],
+    }
+
+
+def estimates(run: Simulated) -> list[tuple[float, float]]:
+    """Return where objects were seen, in world coordinates, m."""
+    places = [run.start.compose(Pose(o.x, o.y, o.theta)) for o in run.state.perception.objects()]
+    return [(p.x, p.y) for p in places]
+
+
+def against_truth(world: WorldConfig, seen: list[tuple[float, float]]) -> tuple[list[DrumRow], int]:
+    """Pair drums with estimates, nearest pairs first and each at most once; return the rows and the false ones."""
+    drums = [(d.x_m, d.y_m) for d in world.drum]
+    match = nearest_pairs(drums, seen)
+    rows: list[DrumRow] = []
+    for i, drum in enumerate(drums):
+        estimate = seen[match[i]] if i in match else None
+        error = None if estimate is None else math.dist(drum, estimate)
+        rows.append({"truth": drum, "estimate": estimate, "error": error})
+    return rows, len(seen) - len(match)
+
+
+def nearest_pairs(truth: list[tuple[float, float]], seen: list[tuple[float, float]]) -> dict[int, int]:
+    """Return which seen place belongs to which true one: nearest pairs first, each once, none beyond the gate."""
+    pairs = sorted((math.dist(t, e), i, j) for i, t in enumerate(truth) for j, e in enumerate(seen))
+    match: dict[int, int] = {}
+    for distance, i, j in pairs:
+        if distance <= GATE_M and i not in match and j not in match.values():
+            match[i] = j
+    return match
+
+
+def spread(outcomes: Sequence[SeedOutcome]) -> Spread | None:
+    """Return how much the seeds differ, None where no drum was found by any."""
+    means, worst = [], []
+    for outcome in outcomes:
+        errors = [row["error"] for row in outcome.rows if row["error"] is not None]
+        if errors:
+            means.append(sum(errors) / len(errors))
+            worst.append((max(errors), outcome.seed))
+    if not means:
+        return None
+    missed = [sum(row["error"] is None for row in outcome.rows) for outcome in outcomes]
+    return {
+        "seeds": len(outcomes),
+        "mean": mean(means),
+        "deviation": pstdev(means),
+        "worst": max(worst)[0],
+        "worst_seed": max(worst, key=lambda one: (one[0], -one[1]))[1],
+        "missed": sum(missed),
+        "missed_most": max(missed),
+        "false": sum(outcome.false for outcome in outcomes),
+    }
+
+
+def summarise(outcomes: list[SeedOutcome]) -> Outcome:
+    """Return the summary over all runs: their rows one after another."""
+    rows = [row for outcome in outcomes for row in outcome.rows]
+    errors = [row["error"] for row in rows if row["error"] is not None]
+    wall_s = sum(outcome.wall_s for outcome in outcomes)
+    outcome: Outcome = {
+        "drums": rows,
+        "false": sum(outcome.false for outcome in outcomes),
+        "mean_error": sum(errors) / len(errors) if errors else None,
+        "max_error": max(errors, default=None),
+        "times_real_time": sum(outcome.virtual_s for outcome in outcomes) / wall_s if wall_s else 0.0,
+        "cycle_us": worst_of([outcome.cycle_us for outcome in outcomes]),
+    }
+    if len(outcomes) > 1 and (over := spread(outcomes)) is not None:
+        outcome["spread"] = over
+    return outcome

@@ -1,0 +1,169 @@
+"""The experiment without the robot: perception alone on a scene's readings, and what it saw set against the truth."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final, TypedDict
+
+from config.model import ModelConfig
+from config.settings import Settings
+from config.world import BoxConfig, WorldConfig
+from drivers.messages import Firing
+from perception.pipeline import Perception, SeenObject
+from runtime.analysis.plots.geometry import CHI2_95
+from runtime.simulation.evaluation import DrumRow, Outcome, against_truth, nearest_pairs
+from runtime.simulation.first_fix import FirstFix, FixWatch, summarise_fixes
+from runtime.simulation.scene_names import SceneName
+from runtime.simulation.scenes import Hall, halls, readings
+from runtime.timing.cycle_stats import CycleStats, worst_of
+
+_QUARTER_TURN: Final = 0.5 * math.pi
+RADIUS_TOLERANCE_M: Final = 0.01
+"""A cylinder is a drum to be found where its radius is a model's to within this."""
+
+
+class BoxRow(TypedDict):
+    """A box, metres in world coordinates; its angle error is what remains after turns that leave it as it is."""
+
+    truth: tuple[float, float]
+    estimate: tuple[float, float] | None
+    error: float | None
+    angle_error: float | None
+    """rad"""
+
+
+class SceneOutcome(Outcome):
+    """The experiment's summary, with boxes where the scene holds boxes."""
+
+    scene: SceneName
+    boxes: list[BoxRow]
+    halls: int
+    inside_95: float | None
+    """Share of the drums found that stand inside their 95 % ellipse; without where the method gives none."""
+    first_fix: FirstFix | None
+    """How long before passing drums were fixed; without where the way is not straight or nothing was."""
+
+
+@dataclass(frozen=True, slots=True)
+class HallOutcome:
+    """One drive through one hall."""
+
+    drums: list[DrumRow]
+    boxes: list[BoxRow]
+    false: int
+    virtual_s: float
+    books: CycleStats
+    """What the readings took."""
+    inside: list[bool]
+    """For each drum found with a covariance, whether it stands in the 95 % ellipse."""
+    fixes: list[float | None]
+    """For each drum of a straight hall, how far before it the robot was at its first sure fix, m."""
+
+
+def perceive(perception: Perception, firing: Firing) -> tuple[SeenObject, ...]:
+    """Take in one reading, improve until nothing is left to improve, and return what is recognised then."""
+    perception.observe(firing)
+    while perception.pending and perception.refine():
+        pass
+    return perception.objects()
+
+
+def run_hall(settings: Settings, hall: Hall, seed: int) -> HallOutcome:
+    """Drive through `hall` once and set what was seen against what stands there."""
+    perception = Perception(settings.ring, settings.models, settings.perception)
+    seen: tuple[SeenObject, ...] = ()
+    heard = list(readings(settings.ring, hall, seed))
+    books = CycleStats(late_after_s=math.inf)
+    watch = FixWatch(() if hall.path else hall.world.drum)
+    for firing in heard:
+        begin = time.perf_counter()
+        seen = perceive(perception, firing)
+        books.enter(time.perf_counter() - begin)
+        watch.look(float(firing.pose.x), seen)
+    drums, boxes, false = judge(hall.world, seen, settings.models)
+    return HallOutcome(drums, boxes, false, heard[-1].t_s, books, inside_ellipse(drums, seen), watch.fixes())
+
+
+def inside_ellipse(drums: Iterable[DrumRow], seen: Iterable[SeenObject]) -> list[bool]:
+    """Tell for each drum found with a covariance whether it stands in the 95 % ellipse of its estimate."""
+    by_place = {(s.x, s.y): s.covariance for s in seen}
+    told = []
+    for row in drums:
+        covariance = None if row["estimate"] is None else by_place.get(row["estimate"])
+        if covariance is not None and row["estimate"] is not None:
+            xx, xy, yy = covariance
+            dx, dy = row["truth"][0] - row["estimate"][0], row["truth"][1] - row["estimate"][1]
+            squared = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
+            told.append(squared <= CHI2_95)
+    return told
+
+
+def judge(
+    world: WorldConfig, seen: Iterable[SeenObject], models: Iterable[ModelConfig]
+) -> tuple[list[DrumRow], list[BoxRow], int]:
+    """Set round models against the world's drums and the others against its boxes; count what matches nothing.
+
+    What is named after none of the models, as a wall, claims to be neither and is not judged.
+    """
+    models = list(models)
+    is_round = {model.name: model.arc_radius_m is not None for model in models}
+    known = [s for s in seen if s.model in is_round]
+    radii = [model.arc_radius_m for model in models if model.arc_radius_m is not None]
+    wanted = [d for d in world.drum if not radii or any(abs(d.radius_m - r) < RADIUS_TOLERANCE_M for r in radii)]
+    world = world.model_copy(update={"drum": tuple(wanted)})
+    drums, false_drums = against_truth(world, [(s.x, s.y) for s in known if is_round[s.model]])
+    angular = [s for s in known if not is_round[s.model]]
+    places = [(box.x_m, box.y_m) for box in world.box]
+    match = nearest_pairs(places, [(s.x, s.y) for s in angular])
+    boxes: list[BoxRow] = []
+    for i, place in enumerate(places):
+        found = angular[match[i]] if i in match else None
+        boxes.append(
+            {
+                "truth": place,
+                "estimate": None if found is None else (found.x, found.y),
+                "error": None if found is None else math.dist(place, (found.x, found.y)),
+                "angle_error": None if found is None else angle_error(world.box[i], found.theta),
+            }
+        )
+    return drums, boxes, false_drums + len(angular) - len(match)
+
+
+def angle_error(box: BoxConfig, theta: float) -> float:
+    """Return by how much `theta` misses the nearest of the angles at which the box looks as it does, rad."""
+    period = _QUARTER_TURN if box.width_m == box.depth_m else 2.0 * _QUARTER_TURN
+    return abs((theta - math.radians(box.angle_deg) + 0.5 * period) % period - 0.5 * period)
+
+
+def run_scene(settings: Settings, name: SceneName, seed: int) -> list[HallOutcome]:
+    """Drive through every hall of a scene; halls differ in their noise as well."""
+    return [run_hall(settings, hall, seed * 1000 + i) for i, hall in enumerate(halls(name, seed))]
+
+
+def summarise_scene(name: SceneName, outcomes: list[HallOutcome], models: Iterable[ModelConfig]) -> SceneOutcome:
+    """Return the summary over all drives.
+
+    Boxes have rows only where a model other than a round one was looked for; else they are there to be left alone.
+    """
+    with_boxes = any(model.arc_radius_m is None for model in models)
+    drums = [row for outcome in outcomes for row in outcome.drums]
+    boxes = [row for outcome in outcomes for row in outcome.boxes] if with_boxes else []
+    errors = [e for rows in (drums, boxes) for row in rows if (e := row["error"]) is not None]
+    wall_s = sum(outcome.books.total_s for outcome in outcomes)
+    inside = [told for outcome in outcomes for told in outcome.inside]
+    return {
+        "scene": name,
+        "halls": len(outcomes),
+        "inside_95": sum(inside) / len(inside) if inside else None,
+        "first_fix": summarise_fixes([fix for outcome in outcomes for fix in outcome.fixes]),
+        "drums": drums,
+        "boxes": boxes,
+        "false": sum(outcome.false for outcome in outcomes),
+        "mean_error": sum(errors) / len(errors) if errors else None,
+        "max_error": max(errors, default=None),
+        "times_real_time": sum(outcome.virtual_s for outcome in outcomes) / wall_s if wall_s else 0.0,
+        "cycle_us": worst_of([outcome.books.cycle_us() for outcome in outcomes]),
+    }

@@ -1,0 +1,171 @@
+"""Running every kernel once, part by part: what was never compiled is compiled then, what was is loaded.
+
+Two processes that compile the same kernel do the same work twice, so a helper takes a part that the first process
+comes to last: `python -m runtime.support.kernel_warmup bayes` compiles the refinement of circles, `… polygons` that of polygons,
+`… polygons whole` all that belongs to polygons, for a robot that drives meanwhile.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
+
+from runtime.support.child_process import child_environment, lower_priority
+from runtime.support.kernel_cache import CIRCLES, EMULATOR, PAPER, POLYGONS, compile_parts, use_cache
+
+if TYPE_CHECKING:
+    from config.model import ModelConfig
+    from config.settings import Settings
+    from perception.pipeline import Perception
+
+FIRINGS: Final = 24
+"""So many, past a wall, leave nothing out."""
+HELP_MAX_S: Final = 300.0
+"""A helper slower than this is no help."""
+
+
+def _perception(settings: Settings, method: str, models: Sequence[ModelConfig]) -> Perception:
+    from perception.pipeline import Perception
+
+    eager = settings.perception.clusters.model_copy(update={"segments_min": 1})
+    config = settings.perception.model_copy(update={"clusters": eager, "method": method})
+    return Perception(settings.ring, models, config)
+
+
+def _drive(settings: Settings, perception: Perception, firings: int = FIRINGS) -> None:
+    """Drive past a wall."""
+    import numpy as np
+
+    from drivers.messages import Firing, Pose
+
+    for k in range(firings):
+        ranges = np.full(len(settings.ring.mounts), 2.0)
+        perception.observe(Firing(0.1 * k, Pose(0.1 * k, 0.0, 0.0), 0.0, ranges))
+        while firings > 1 and perception.pending:
+            perception.refine()
+    perception.things()
+
+
+def _square() -> ModelConfig:
+    from config.model import ModelConfig
+
+    corners = ((1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0))
+    return ModelConfig(name="warm-up", closed=True, vertices_m=corners)
+
+
+def _edited(settings: Settings, method: str, models: Sequence[ModelConfig]) -> None:
+    """Drive past a wall, then do every kind of edit with each model: a person's first must not hold up a cycle."""
+    from perception.edits import (
+        ClearMap,
+        ConfirmObject,
+        DeleteSegments,
+        MoveObject,
+        PinSegments,
+        PlaceModel,
+        RejectObject,
+    )
+    from perception.paper.cluster_view import ClusterView
+
+    perception = _perception(settings, method, models)
+    _drive(settings, perception)
+    ClusterView(settings.perception).rows(perception.segments().ends)  # of every method's map the console shows them
+    numbers = tuple(perception.segments().numbers[:2].tolist())
+    perception.edit(PinSegments(numbers, pinned=True))
+    for model in models:
+        perception.edit(PlaceModel(model.name, 1.0, 2.5, 0.0))
+    for seen in perception.objects():
+        if seen.number is not None:
+            perception.evidence(seen.number)
+            perception.edit(MoveObject(seen.number, 1.1, 2.5, 0.0))
+            perception.edit(MoveObject(seen.number, 9.0, 9.0, 0.0))
+            perception.edit(ConfirmObject(seen.number))
+            perception.edit(RejectObject(seen.number))
+    perception.edit(DeleteSegments(numbers))
+    perception.edit(ClearMap())
+
+
+def hear(settings: Settings) -> None:
+    """Take in one firing and refine nothing."""
+    _drive(settings, _perception(settings, CIRCLES, settings.models), 1)
+
+
+def _circles(settings: Settings) -> None:
+    _edited(settings, CIRCLES, settings.models)
+
+
+def _polygons(settings: Settings) -> None:
+    _edited(settings, CIRCLES, (*settings.models, _square()))
+
+
+def _paper(settings: Settings) -> None:
+    _edited(settings, PAPER, (*settings.models, _square()))
+
+
+def _emulator(settings: Settings) -> None:
+    from config.world import DrumConfig, WallConfig, WorldConfig
+    from drivers.denning.device import EmulatedRobot
+
+    for model in ("cone", "specular"):
+        acoustics = WorldConfig().acoustics.model_copy(update={"model": model, "crosstalk": 0.5})
+        world = WorldConfig(
+            drum=(DrumConfig(x_m=2.0, y_m=0.0, radius_m=0.3),),
+            wall=(WallConfig(x1_m=3.0, y1_m=-3.0, x2_m=3.0, y2_m=3.0),),
+            acoustics=acoustics,
+        )
+        EmulatedRobot(settings, world, seed=0).advance(0.5)
+
+
+RUN_ONCE: Final[Mapping[str, Callable[[Settings], None]]] = MappingProxyType(
+    {EMULATOR: _emulator, CIRCLES: _circles, POLYGONS: _polygons, PAPER: _paper}
+)
+"""How each part is run once."""
+
+
+@contextlib.contextmanager
+def helper(part: str) -> Iterator[None]:
+    """Have another process compile the refinement of `part` meanwhile; wait for it at the end."""
+    quiet = subprocess.DEVNULL
+    process = subprocess.Popen(  # noqa: S603 - this very program
+        [sys.executable, "-m", "runtime.support.kernel_warmup", part], stdin=quiet, stdout=quiet, stderr=quiet,
+        env=child_environment(),
+    )  # fmt: skip
+    try:
+        yield
+        # Whatever became of it, what is missing is compiled by whoever needs it.
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(HELP_MAX_S)
+    finally:
+        process.kill()
+        process.wait()
+
+
+def help_with(part: str) -> None:
+    """Compile a part's refinement, on a memory in which nothing waits for it."""
+    from config.load import load_settings
+    from perception.bayes.entry import hold, pquantum, quantum
+    from perception.bayes.kernel_settings import make_settings
+    from perception.bayes.state import make_state
+
+    settings = load_settings(None)
+    bayes = settings.perception.bayes
+    told = make_settings(settings.ring, settings.models, bayes)
+    handle = hold(make_state(len(settings.ring.mounts), told, bayes.tracks_max), told)
+    refine = {CIRCLES: quantum, POLYGONS: pquantum}[part]
+    refine(handle, bayes.fresh_share)
+
+
+def compile_whole(part: str) -> None:
+    """Compile a part for others, in whose way this process is not to be."""
+    from config.load import load_settings
+
+    lower_priority()
+    compile_parts(load_settings(None), use_cache(), [part])
+
+
+if __name__ == "__main__":
+    use_cache()
+    (compile_whole if sys.argv[2:] == ["whole"] else help_with)(sys.argv[1])

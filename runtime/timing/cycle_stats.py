@@ -1,0 +1,131 @@
+"""The timing books: how long cycles took, how late they began and by whose fault, in memory that never grows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, TypedDict
+
+import numpy as np
+
+KEPT: Final = 65_536
+"""Cycles over which quantiles are taken: 55 minutes at 20 Hz."""
+
+CULPRITS_MAX: Final = 32
+OTHERS: Final = "others"
+"""More names than that are one."""
+
+
+class Quantiles(TypedDict):
+    """Microseconds."""
+
+    p50: float
+    p99: float
+    max: float
+
+
+class Spread(Quantiles):
+    """Microseconds, with the tail that a deadline is about."""
+
+    p999: float
+
+
+def worst_of(runs: Sequence[Quantiles]) -> Quantiles:
+    """Return the largest of each figure over several runs."""
+    return {
+        "p50": max(run["p50"] for run in runs),
+        "p99": max(run["p99"] for run in runs),
+        "max": max(run["max"] for run in runs),
+    }
+
+
+class Series:
+    """The newest `KEPT` of a row of times, and the largest of all.
+
+    Parameters
+    ----------
+    is_touched : bool
+        Have the memory now rather than page by page as it is used.
+    """
+
+    def __init__(self, *, is_touched: bool = False) -> None:
+        self._values_s = np.full(KEPT, 0.0) if is_touched else np.zeros(KEPT)
+        self.count = 0
+        self.worst_s = 0.0
+        self.total_s = 0.0
+
+    def add(self, value_s: float) -> None:
+        """Book a time."""
+        self._values_s[self.count % KEPT] = value_s
+        self.count += 1
+        self.worst_s = max(self.worst_s, value_s)
+        self.total_s += value_s
+
+    @property
+    def newest_s(self) -> float:
+        """The last one booked."""
+        return float(self._values_s[(self.count - 1) % KEPT])
+
+    def spread(self) -> Spread:
+        """Return median, tail and worst."""
+        if not self.count:
+            return {"p50": 0.0, "p99": 0.0, "p999": 0.0, "max": 0.0}
+        values = self._values_s[: min(self.count, KEPT)]
+        p50, p99, p999 = (round(float(q), 1) for q in 1e6 * np.quantile(values, [0.5, 0.99, 0.999]))
+        return {"p50": p50, "p99": p99, "p999": p999, "max": round(1e6 * self.worst_s, 1)}
+
+    def quantiles(self) -> Quantiles:
+        """Return the same in the form of the public surface."""
+        spread = self.spread()
+        return {"p50": spread["p50"], "p99": spread["p99"], "max": spread["max"]}
+
+
+class CycleStats:
+    """Durations and lateness of cycles.
+
+    Parameters
+    ----------
+    late_after_s : float
+        A cycle that begins later than this after its deadline is late.
+    is_touched : bool
+        Have all memory now.
+    """
+
+    def __init__(self, late_after_s: float, *, is_touched: bool = False) -> None:
+        self.late_after_s = late_after_s
+        self.took = Series(is_touched=is_touched)
+        self.lag = Series(is_touched=is_touched)
+        self.late = 0
+        self.missed = 0
+        """Cycles that should have been and were not."""
+        self.faults: dict[str, int] = {}
+        """Late and overrun cycles by culprit."""
+
+    @property
+    def cycles(self) -> int:
+        """Cycles booked."""
+        return self.took.count
+
+    @property
+    def total_s(self) -> float:
+        """All cycles together."""
+        return self.took.total_s
+
+    def enter(self, took_s: float, lag_s: float = 0.0) -> None:
+        """Book one cycle: how long it took and how long after its deadline it began."""
+        self.took.add(took_s)
+        self.lag.add(lag_s)
+        self.late += lag_s > self.late_after_s
+
+    def blame(self, culprit: str) -> None:
+        """Book by whose fault a cycle was late or the one before it overran."""
+        known = culprit in self.faults or len(self.faults) < CULPRITS_MAX
+        name = culprit if known else OTHERS
+        self.faults[name] = self.faults.get(name, 0) + 1
+
+    def cycle_us(self) -> Quantiles:
+        """Return how long cycles took."""
+        return self.took.quantiles()
+
+    def lag_us(self) -> Quantiles:
+        """Return how long after their deadlines cycles began."""
+        return self.lag.quantiles()

@@ -1,0 +1,124 @@
+"""What the timing bench makes of a trace and of summaries: the right pairs, the worst figures, nothing invented."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import orjson
+import pytest
+
+from bench.timing import (
+    CONTROL,
+    ECHO_TO_DRIVE,
+    LATE,
+    WAKING,
+    WINDOW_USED,
+    Timing,
+    TimingPlan,
+    answers_us,
+    quantile_rows,
+    quantiles_of,
+    window_s,
+    worst_figures,
+    worst_rows,
+)
+from bench.timing_table import figures_table, quantiles_table, read_earlier, verdicts
+from runtime.support.errors import UserError
+
+PLAN = TimingPlan(1.0, 1, 0)
+
+
+def trace(folder: Path, *rows: str) -> Path:
+    path = folder / "latency.csv"
+    path.write_text("\n".join(("host_s,frame", *rows, "")))
+    return path
+
+
+def test_an_echo_is_answered_by_the_first_command_after_it(tmp_path: Path) -> None:
+    path = trace(
+        tmp_path, "0.5,echo", "0.9,drive", "1.0,echo", "1.002,drive", "1.04,drive", "2.0,echo", "3.0,echo",
+        "3.001,drive", "4.0,echo",
+    )  # fmt: skip
+    taken_us, unanswered = answers_us(path)
+    assert taken_us == pytest.approx([2000.0, 1000.0], abs=0.1)
+    assert unanswered == 1, "the second; the one before the first command and the last one do not count"
+
+
+def test_a_conversation_without_commands_has_no_answers(tmp_path: Path) -> None:
+    assert answers_us(trace(tmp_path, "1.0,echo", "2.0,echo")) == ([], 0)
+
+
+def test_every_row_of_quantiles_in_a_summary_is_found() -> None:
+    row = {"p50": 1.0, "p99": 2.0, "max": 3.0}
+    summary = {"cycle_us": row, "phases_us": {"decide": row}, "link": {"bad": 0}, "mode": "DRIVE", "late": 3}
+    assert quantile_rows(summary) == {"cycle": row, "phases: decide": row}
+    worse = {"cycle_us": {"p50": 0.5, "p99": 9.0, "max": 9.0}}
+    assert worst_rows([summary, worse])["cycle"] == {"p50": 1.0, "p99": 9.0, "max": 9.0}
+
+
+def test_figures_are_the_worst_of_all_runs() -> None:
+    def summary(**process: Any) -> dict[str, Any]:
+        defaults = {"start_s": 1.0, "rss_mb": None, "collections": [0, 5, 0]}
+        return {
+            "process": defaults | process,
+            "link": {"lost": 0},
+            "late": 0,
+            "missed": 2,
+            "stop_reasons": [],
+            "mode": "DRIVE",
+        }
+
+    figures = worst_figures([summary(), summary(start_s=2.0, collections=[0, 0, 1])])
+    assert figures == {
+        "start_s": 2.0, "full collections": 1.0, "link lost": 0.0, "late": 0.0, "missed": 2.0,
+        "stops": 0.0, "gave up driving": 0.0,
+    }  # fmt: skip
+
+
+def timed(p99: float, control: float) -> Timing:
+    rows = {ECHO_TO_DRIVE: quantiles_of([p99]), ECHO_TO_DRIVE + CONTROL: quantiles_of([control])}
+    return Timing(PLAN, rows, {"start_s": 2.0, "cpu_share": 0.07})
+
+
+def test_limits_are_three_milliseconds_beyond_the_control() -> None:
+    asked = {name: (figure, limit) for name, figure, limit in verdicts(timed(3400.0, 500.0))}
+    assert asked[f"{ECHO_TO_DRIVE}, p99 µs"] == pytest.approx((3400.0, 3500.0))
+    assert asked["start_s"] == (2.0, 2.5)
+    assert asked["cpu_share"] == (0.07, 0.06)
+
+
+def test_cycles_may_begin_a_millisecond_later_than_a_bare_loop_wakes() -> None:
+    rows = {LATE: quantiles_of([1900.0]), WAKING + CONTROL: quantiles_of([1000.0])}
+    assert verdicts(Timing(PLAN, rows, {WINDOW_USED: 0.02})) == [
+        (WINDOW_USED, 0.02, 0.03),
+        ("a cycle begins after its time, p99.9 µs", 1900.0, 2000.0),
+    ]
+
+
+def test_the_window_is_the_way_to_the_farthest_echo_and_back() -> None:
+    assert window_s([]) == pytest.approx(0.0453, abs=1e-4)
+
+
+def test_an_earlier_run_stands_beside_this_one(tmp_path: Path) -> None:
+    path = tmp_path / "earlier.json"
+    path.write_bytes(orjson.dumps(timed(3000.0, 400.0).as_json()))
+    earlier = read_earlier(str(path))
+    now = timed(3400.0, 500.0)
+    assert quantiles_table(now, earlier).row_count == 2
+    assert [list(column.cells) for column in figures_table(now, earlier).columns][3][:2] == [
+        "kept",
+        "[bold red]missed[/]",
+    ]
+    before = [list(column.cells) for column in quantiles_table(now, earlier).columns][2]
+    assert before == ["3000", "400"]
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[1]", '{"quantiles_us": 3, "figures": 4}'])
+def test_something_else_is_no_earlier_run(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "earlier.json"
+    path.write_text(text)
+    with pytest.raises(UserError, match="is not what"):
+        read_earlier(str(path))
+    with pytest.raises(UserError, match="cannot be read"):
+        read_earlier(str(tmp_path / "none.json"))

@@ -1,0 +1,259 @@
+"""What a person hears of what was perceived and edited: why not, what speaks for it; and what is kept of it all."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from config.load import load_model
+from drivers.messages import Firing
+from perception.edits import (
+    ClearMap,
+    ConfirmObject,
+    DeleteSegments,
+    Edit,
+    MoveObject,
+    PinSegments,
+    PlaceModel,
+    RejectObject,
+)
+from perception.pipeline import Perception, SeenObject
+from tests.perception.edited import (
+    EARLY,
+    SETTINGS,
+    again,
+    fresh,
+    hear,
+    is_bayes,
+    number_of,
+    settle,
+    there,
+)
+
+NOWHERE = 999_999
+REFUSED: list[tuple[Edit, str]] = [
+    (MoveObject(NOWHERE, 0.0, 0.0, 0.0), "no object 999999"),
+    (RejectObject(NOWHERE), "no object 999999"),
+    (ConfirmObject(NOWHERE), "no object 999999"),
+    (RejectObject(0), "nothing has the number 0"),
+    (ConfirmObject(-3), "nothing has the number -3"),
+    (MoveObject(2**80, 0.0, 0.0, 0.0), "nothing has the number"),
+    (DeleteSegments((1, 2**80)), "nothing has the number"),
+    (PinSegments((-(2**80),), pinned=True), "nothing has the number"),
+    (PlaceModel("chair", 0.0, 0.0, 0.0), "no model is called chair"),
+    (PlaceModel("semicircle", math.nan, 0.0, 0.0), "is no place"),
+    (PlaceModel("box", 0.0, math.inf, 0.0), "is no place"),
+    (PlaceModel("box", 0.0, 1e9, 0.0), "is no place"),
+    (MoveObject(1, 0.0, 0.0, math.nan), "is no place"),
+]
+
+
+@pytest.mark.parametrize(("edit", "why"), REFUSED, ids=lambda v: v if isinstance(v, str) else v.kind)
+def test_what_cannot_be_done_is_said_and_changes_nothing(seen: Perception, edit: Edit, why: str) -> None:
+    before = seen.snapshot()
+    refused = seen.edit(edit)
+    assert refused is not None
+    assert why in refused
+    assert refused.isprintable()
+    after = seen.snapshot()
+    assert all(np.array_equal(before[name], after[name], equal_nan=before[name].dtype.kind == "f") for name in before)
+    assert seen.evidence(NOWHERE) is None
+
+
+def test_there_is_room_for_so_many_and_a_word_on_it(seen: Perception) -> None:
+    refused = [seen.edit(PlaceModel("box", 0.8 * k, -3.0, 0.0)) for k in range(40)]
+    assert refused[0] is None
+    told = [r for r in refused if r is not None]
+    assert told
+    assert all("reject one first" in r for r in told)
+    assert sum(o.placed for o in seen.objects()) == 40 - len(told)
+
+
+# Evidence.
+
+
+def test_evidence_is_what_the_readings_say_and_looking_changes_nothing(seen: Perception) -> None:
+    before = seen.snapshot()
+    for o in seen.objects():
+        evidence = seen.evidence(number_of(o))
+        assert evidence is not None
+        assert (evidence.object, evidence.model) == (o.number, o.model)
+        assert evidence.supporting > 0.0
+        assert evidence.opposing <= 0.0
+        if is_bayes(seen):
+            assert evidence.lines == ()
+            said = [arc.nats for arc in evidence.arcs]
+            assert evidence.supporting == pytest.approx(sum(v for v in said if v > 0.0))
+            assert evidence.opposing == pytest.approx(sum(v for v in said if v < 0.0))
+            heard = [arc for arc in evidence.arcs if arc.range_m is not None and arc.nats > 0.0]
+            for arc in heard:
+                assert arc.range_m is not None
+                end = (
+                    arc.x + arc.range_m * math.cos(arc.direction), arc.y + arc.range_m * math.sin(arc.direction)
+                )  # fmt: skip
+                assert math.dist(end, (o.x, o.y)) < 0.9, "it ends about where the object is"
+            assert len(heard) == pytest.approx(o.support, abs=0.2 * o.support + 3)
+            if o.model == "semicircle":
+                names = [name for name, _ in evidence.rivals]
+                assert set(names) <= {"post", "barrel", "edge", "wall", "corner"}
+                assert len(names) >= 3
+                assert all(lead < 6.0 for _, lead in evidence.rivals)
+        else:
+            assert evidence.arcs == ()
+            assert evidence.supporting == o.support == sum(line.supports for line in evidence.lines)
+            assert evidence.opposing == o.support - len(evidence.lines)
+            assert {line.number for line in evidence.lines} <= set(seen.segments().numbers.tolist())
+    after = seen.snapshot()
+    assert all(before[name].tobytes() == after[name].tobytes() for name in before)
+
+
+def test_evidence_on_what_is_no_model(begun: Perception) -> None:
+    """A track that looks like a post is told as one, and cannot be confirmed as a model."""
+    from perception.bayes.bayes_method import BayesPerception
+    from perception.bayes.state import ESTABLISHED, KIND, ST
+
+    seen = begun
+    method = seen.method
+    assert isinstance(method, BayesPerception)
+    s, p = method.memory, method.settings
+    t = int(np.flatnonzero(s.ti[:, ST] == ESTABLISHED)[0])
+    s.ti[t, KIND] = p.models
+    s.tf[t, 3] = p.radii[p.models]
+    number = int(s.names[t, 0])
+    evidence = seen.evidence(number)
+    assert evidence is not None
+    assert evidence.model in {"post", "barrel", "edge", "inside corner"}
+    refused = seen.edit(ConfirmObject(number))
+    assert refused is not None
+    assert "none of the models" in refused
+
+
+# Memory.
+
+
+def test_a_snapshot_holds_all_that_was_edited(seen: Perception, firings: list[Firing]) -> None:
+    """From a snapshot taken amid edits everything goes on to the bit."""
+    objects, listed = seen.objects(), seen.segments().numbers.tolist()
+    edits: list[Edit] = [
+        DeleteSegments(tuple(listed[:4])), PinSegments(tuple(listed[5:9]), pinned=True),
+        PlaceModel("semicircle", 0.5, 0.2, 0.0), PlaceModel("box", -0.5, 0.3, 0.2),
+        MoveObject(number_of(objects[0]), objects[0].x + 0.05, objects[0].y, 0.0),
+        ConfirmObject(number_of(objects[1])), RejectObject(number_of(objects[2])),
+    ]  # fmt: skip
+    assert [seen.edit(edit) for edit in edits] == [None] * len(edits)
+    method = "bayes" if is_bayes(seen) else "paper"
+    other = fresh(method)
+    other.restore(seen.snapshot())
+    assert other.objects() == seen.objects()
+    for k, firing in enumerate(again(firings)):
+        one, two = ((p.observe(firing), p.refine(), p.refine(), p.objects()) for p in (seen, other))
+        assert one == two, k
+    mine, theirs = seen.snapshot(), other.snapshot()
+    assert mine.keys() == theirs.keys()
+    assert [name for name in mine if mine[name].tobytes() != theirs[name].tobytes()] == []
+
+
+OLDER = {
+    "paper": ("numbers", "pinned", "_names", "placements", "_rejections", "_by_hand"),
+    "bayes": ("_pins", "memory.names", "memory.tally", "memory.stamps", "memory.barred"),
+}
+
+
+def test_a_snapshot_of_an_older_program_is_made_good(seen: Perception, firings: list[Firing]) -> None:
+    """It lacks what edits need: there are numbers all the same, and all goes on as it would have."""
+    method = "bayes" if is_bayes(seen) else "paper"
+    whole = seen.snapshot()
+    old = {n: a for n, a in whole.items() if not any(f".{part}" in n for part in OLDER[method])}
+    assert len(old) < len(whole)
+    other = fresh(method)
+    other.restore(old)
+    assert [replace(o, number=None) for o in other.objects()] == [replace(o, number=None) for o in seen.objects()]
+    assert None not in {o.number for o in other.objects()}
+    assert len(set(other.segments().numbers.tolist())) == other.tally.living == seen.tally.living
+    for firing in again(firings):
+        hear(seen, firing)
+        hear(other, firing)
+    assert [replace(o, number=None) for o in other.objects()] == [replace(o, number=None) for o in seen.objects()]
+    with pytest.raises(ValueError, match="another method or version"):
+        other.restore({n: a for n, a in old.items() if "faults" not in n})
+
+
+def test_models_are_added_while_it_perceives(seen: Perception, firings: list[Firing]) -> None:
+    """Known objects stay what and where they are; the new ones are placed, and compared from then on."""
+    method = "bayes" if is_bayes(seen) else "paper"
+    chosen = SETTINGS[method]
+    post = load_model("drum").model_copy(update={"name": "bollard", "arc_radius_m": 0.12})
+    crate = load_model("box").model_copy(update={"name": "crate"})
+    before = {o.number: o for o in seen.objects()}
+    models = (*chosen.models, post, crate)
+    seen.recognise(chosen.models)
+    assert {o.number: o for o in seen.objects()} == before, "nothing new is nothing"
+    seen.recognise(models)
+    after: dict[Any, SeenObject] = {o.number: o for o in seen.objects()}
+    if is_bayes(seen):
+        assert after == before
+    settle(seen)
+    assert seen.edit(PlaceModel("bollard", 0.5, 0.2, 0.0)) is None
+    assert seen.edit(PlaceModel("crate", -0.5, 0.2, 0.0)) is None
+    for firing in again(firings):
+        hear(seen, firing)
+    found = there(seen)
+    assert found.model in {"semicircle"}
+    assert {o.model for o in seen.objects() if o.placed} == {"bollard", "crate"}
+    other = Perception(chosen.ring, models, chosen.perception)
+    other.restore(seen.snapshot())
+    assert other.objects() == seen.objects(), "its memory is that of one that knew them from the start"
+
+
+def test_every_edit_in_turn_on_the_first_things_seen(begun: Perception, firings: list[Firing]) -> None:
+    """The Bayesian method: what each leaves is there, and from its snapshot, or one of an older program, all goes on."""
+    drum = next(o for o in begun.objects() if o.model == "semicircle")
+    numbers = begun.segments().numbers.tolist()
+    pins, doomed = tuple(numbers[:3]), tuple(numbers[3:6])
+    for edit in (
+        PinSegments(pins, pinned=True), DeleteSegments(doomed), PlaceModel("semicircle", -0.3, 0.2, 0.0),
+        PlaceModel("box", -0.2, -0.3, 0.3), MoveObject(number_of(drum), drum.x + 0.05, drum.y, 0.0),
+    ):  # fmt: skip
+        assert begun.edit(edit) is None
+    drums, boxes = (
+        {o.number: o for o in begun.objects() if o.placed and o.model == m} for m in ("semicircle", "box")
+    )
+    (by_hand,) = drums.keys() - {drum.number}
+    (box,) = boxes
+    assert by_hand is not None
+    assert box is not None
+    assert begun.edit(MoveObject(box, -0.1, -0.3, 0.1)) is None
+    assert begun.edit(MoveObject(by_hand, 1.5, 0.0, 0.1)) is None
+    assert begun.edit(MoveObject(box, 1.0, 0.0, 0.1)) is None
+    for firing in firings[EARLY : EARLY + 12]:
+        hear(begun, firing)
+    assert {by_hand, box, drum.number} <= {o.number for o in begun.objects()}
+    for number in (by_hand, box):
+        evidence = begun.evidence(number)
+        assert evidence is not None
+        assert evidence.opposing <= 0.0
+    other = fresh("bayes")
+    whole = begun.snapshot()
+    other.restore({n: a for n, a in whole.items() if not any(f".{part}" in n for part in OLDER["bayes"])})
+    assert {o.number for o in other.objects()} <= set(range(1, begun.tally.hypotheses + 1))
+    other.restore(whole)
+    assert other.objects() == begun.objects()
+    post = load_model("drum").model_copy(update={"name": "bollard", "arc_radius_m": 0.12})
+    begun.recognise((*SETTINGS["bayes"].models, post))
+    assert {o.number for o in begun.objects()} >= {by_hand, box}
+    assert begun.edit(RejectObject(box)) is None
+    assert begun.edit(RejectObject(by_hand)) is None
+    assert {o.number for o in begun.objects()}.isdisjoint({by_hand, box})
+    assert set(pins) <= set(begun.segments().numbers.tolist())
+    assert set(doomed).isdisjoint(begun.segments().numbers.tolist())
+    refused = begun.edit(PlaceModel("chair", 0.0, 0.0, 0.0))
+    assert refused is not None
+    assert [begun.edit(PlaceModel("box", 0.1 * k, 3.0, 0.0)) is None for k in range(30)].count(False) > 0
+    refused = begun.edit(PinSegments((*pins, 10**6), pinned=False))
+    assert refused is not None
+    assert begun.edit(ClearMap()) is None
+    assert begun.things() == ()

@@ -1,0 +1,98 @@
+"""Constants that change while perception goes on: from then on it is as if they had been those from the start."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from config.load import load_world
+from config.settings import PerceptionConfig
+from drivers.messages import Firing
+from perception.edits import PlaceModel
+from perception.paper.paper_method import PaperPerception
+from tests.perception.edited import settle
+from tests.perception.halls import drive, settings
+
+SHIPPED = settings()
+
+
+@pytest.fixture(scope="module")
+def firings() -> list[Firing]:
+    return list(drive(load_world("hallway"), (-4.0, 6.0)))
+
+
+def perceived(firings: list[Firing], config: PerceptionConfig = SHIPPED.perception) -> PaperPerception:
+    perception = PaperPerception(SHIPPED.ring, SHIPPED.models, config)
+    for firing in firings:
+        perception.observe(firing)
+        settle(perception)  # type: ignore[arg-type]
+    return perception
+
+
+def changed(**sections: dict[str, Any]) -> PerceptionConfig:
+    """Return the shipped constants with some of some sections replaced."""
+    config = SHIPPED.perception
+    return config.model_copy(
+        update={name: getattr(config, name).model_copy(update=values) for name, values in sections.items()}
+    )
+
+
+def test_another_gamma_wakes_what_rested_and_it_rests_elsewhere(firings: list[Firing]) -> None:
+    perception = perceived(firings)
+    assert perception.edit(PlaceModel("semicircle", 0.3, 1.2, 0.0)) is None
+    settle(perception)  # type: ignore[arg-type]
+    rested, placed = perception.candidates.poses.copy(), perception.placements.poses.copy()
+    perception.adopt(SHIPPED.perception)
+    assert not perception.pending, "the same constants wake nobody"
+    perception.adopt(changed(relaxation={"gamma": 3.0}))
+    assert perception.candidates.awake == int((perception.candidates.numbers > 0).sum()) > 0
+    assert perception.placements.pending
+    settle(perception)  # type: ignore[arg-type]
+    many = perception.clusters.count
+    assert np.abs(perception.candidates.poses[:many] - rested[:many]).max() > 1e-4
+    assert np.abs(perception.placements.poses[0] - placed[0]).max() > 1e-5
+    perception.adopt(SHIPPED.perception)
+    settle(perception)  # type: ignore[arg-type]
+    np.testing.assert_allclose(perception.candidates.poses[:many], rested[:many], atol=0.02)
+
+
+def test_another_threshold_makes_the_clusters_that_it_makes_of_the_same_map(firings: list[Firing]) -> None:
+    perception = perceived(firings)
+    other = changed(clusters={"threshold_m": 0.25})
+    before = perception.clusters.count
+    perception.adopt(other)
+    fresh = perceived(firings, other)
+    np.testing.assert_array_equal(perception.outline.segments, fresh.outline.segments)
+    assert perception.clusters.count == fresh.clusters.count != before
+    many = fresh.clusters.count
+    np.testing.assert_array_equal(perception.clusters.centres[:many], fresh.clusters.centres[:many])
+    np.testing.assert_array_equal(perception.clusters.sizes[:many], fresh.clusters.sizes[:many])
+    settle(perception)  # type: ignore[arg-type]
+    assert perception.candidates.awake == 0
+
+
+def test_smaller_clusters_get_models_as_soon_as_they_may(firings: list[Firing]) -> None:
+    perception = perceived(firings[:70])
+    fewer = changed(clusters={"segments_min": 2})
+    few = int((perception.candidates.numbers[: perception.clusters.count] > 0).sum())
+    perception.adopt(fewer)
+    sizes = perception.clusters.sizes[: perception.clusters.count]
+    numbers = perception.candidates.numbers[: perception.clusters.count, 0]
+    assert (numbers > 0).sum() == (sizes >= 2).sum() > few
+    small = np.flatnonzero((sizes >= 2) & (sizes < SHIPPED.perception.clusters.segments_min))
+    for j in small:
+        off = perception.candidates.poses[j, 0, :2] - perception.clusters.centres[j]
+        assert np.hypot(*off) < 0.5, "it is placed at its cluster"
+    perception.adopt(SHIPPED.perception)
+    assert int((perception.candidates.numbers[: perception.clusters.count] > 0).sum()) == few
+
+
+def test_segments_are_made_by_the_constants_of_their_time(firings: list[Firing]) -> None:
+    perception = perceived(firings[:60])
+    perception.adopt(changed(segments={"baseline_min_m": 0.45, "baseline_max_m": 0.5}))
+    total = perception.tally.total
+    for firing in firings[60:]:
+        perception.observe(firing)
+    assert perception.tally.total - total < perceived(firings).tally.total - total, "fewer pairs are that far apart"

@@ -1,0 +1,292 @@
+"""P8: sensors that lie are found out and masked; honest ones never are, whatever the hall."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+
+import numpy as np
+import pytest
+
+from config.load import load_settings
+from config.robot import FiringConfig, Preset, RingConfig
+from config.world import AcousticsConfig, WallConfig, WorldConfig
+from drivers.emulator.scene import compile_scene
+from drivers.emulator.sonar import Sonar
+from drivers.firing_pattern import firing_pattern, sensors
+from drivers.messages import Firing, Pose
+from perception.pipeline import Perception
+from perception.sensor_monitor import SensorWatch
+from perception.sensor_report import SensorFault
+from perception.sensor_tests import FAILURES, RETURNS
+from runtime.simulation.random_halls import random_hall
+
+pytestmark = [pytest.mark.compiled]
+promise = pytest.mark.promise("P8")
+
+SETTINGS = load_settings("hallway")
+RING = SETTINGS.ring
+PERIOD_S = 0.05
+MIRRORS, ROUGH = AcousticsConfig(model="specular"), AcousticsConfig(model="cone")
+NOISY = AcousticsConfig(model="specular", noise_relative=0.01, dropout=0.05, outliers=0.03)
+WILD = AcousticsConfig(outliers=0.2, noise_relative=0.01)
+FAULTY = math.nan
+
+Path = Iterable[tuple[float, float, float]]
+Found = dict[tuple[int, SensorFault], float]
+
+
+def ring(
+    preset: Preset | None = None, sets: tuple[tuple[int, ...], ...] | None = None, half_deg: float = 12.0
+) -> RingConfig:
+    firing = FiringConfig(preset=preset, sets=sets)
+    return RING.model_copy(update={"firing": firing, "beam_half_angle_deg": half_deg})
+
+
+def firings(
+    config: RingConfig, world: WorldConfig, path: Path, lies: Mapping[int, float] | None = None
+) -> Iterator[Firing]:
+    """Yield what the ring hears along a path, one firing a pose; who lies always says the same."""
+    sonar = Sonar(config, compile_scene(world), world.acoustics, np.random.default_rng(1))
+    masks = [sensors(mask) for mask in firing_pattern(config).masks]
+    for k, ((x, y, yaw), fired) in enumerate(zip(path, itertools.cycle(masks), strict=False)):
+        ranges = sonar.fire(Pose(x, y, yaw), yaw, fired)
+        for sensor, lie in (lies or {}).items():
+            if sensor in fired:
+                ranges[sensor] = lie
+        yield Firing(PERIOD_S * k, Pose(x, y, yaw), yaw, ranges)
+
+
+def found(config: RingConfig, heard: Iterable[Firing]) -> Found:
+    """Return everything that was ever reported, and after which way, m."""
+    watch, reports, way, last = SensorWatch(config), dict[tuple[int, SensorFault], float](), 0.0, None
+    for firing in heard:
+        way += 0.0 if last is None else math.hypot(firing.pose.x - last.x, firing.pose.y - last.y)
+        last = firing.pose
+        watch.believe(firing)
+        for report in watch.reports():
+            reports.setdefault((report.sensor, report.fault), way)
+    return reports
+
+
+@promise
+def test_no_honest_sensor_is_masked(measured: Callable[[str], None]) -> None:
+    """Random halls, mirrors and rough walls, with and without noise, on swerving ways, the ring turning or not."""
+    halls = 0
+    presets: tuple[Preset, ...] = ("octets", "alternating", "single")
+    for preset, acoustics in itertools.product(presets, (MIRRORS, ROUGH, NOISY, WILD)):
+        for hall in range(12):
+            world, path = random_hall(hall, acoustics)
+            swing = 0.3 * (hall % 2)
+            turning = [(x, y, yaw + swing * math.sin(k / 200.0)) for k, (x, y, yaw) in enumerate(path)]
+            config = ring(preset)
+            assert found(config, firings(config, world, turning)) == {}, (preset, acoustics, hall)
+            halls += 1
+    measured(f"{halls} drives through random halls: 0 honest sensors masked")
+
+
+@promise
+@pytest.mark.parametrize("acoustics", [MIRRORS, ROUGH])
+def test_equal_readings_are_honest_where_nothing_should_change_them(
+    acoustics: AcousticsConfig, measured: Callable[[str], None]
+) -> None:
+    """At rest before a wall, along one, between two, with slipping wheels, and at whatever angle."""
+    for angle in np.radians(np.arange(0.0, 90.0, 15.0)).tolist():
+        c, s = math.cos(angle), math.sin(angle)
+        walls = tuple(
+            WallConfig(x1_m=-50 * c - d * s, y1_m=-50 * s + d * c, x2_m=50 * c - d * s, y2_m=50 * s + d * c)
+            for d in (1.5, -2.0)
+        )
+        world = WorldConfig(wall=walls, acoustics=acoustics)
+        still = [(0.0, 0.0, 0.0)] * 600
+        along = [(0.015 * k * c, 0.015 * k * s, 0.0) for k in range(1000)]
+        config = ring("octets")
+        assert found(config, firings(config, world, still)) == {}
+        assert found(config, firings(config, world, along)) == {}
+        slipping = (
+            Firing(f.t_s, Pose(x, y, 0.0), 0.0, f.ranges_m)
+            for f, (x, y, _) in zip(firings(config, world, still), along, strict=False)
+        )
+        assert found(config, slipping) == {}, "the base slips, and no sensor is to blame"
+    measured("at rest, along walls at 6 angles and with slipping wheels: 0 masked")
+
+
+@promise
+def test_a_stuck_sensor_is_masked_and_said_to_be(measured: Callable[[str], None]) -> None:
+    ways: list[float] = []
+    for sensor, stuck_m in itertools.product(range(24), (0.1524, 1.2)):
+        world, path = random_hall(sensor, NOISY)
+        got = found(RING, firings(RING, world, path, {sensor: stuck_m}))
+        assert set(got) == {(sensor, "stuck")}
+        ways += got.values()
+    watch = SensorWatch(RING)
+    world, path = random_hall(3, NOISY)
+    for firing in firings(RING, world, path, {7: 1.2}):
+        believed, possible = watch.believe(firing)
+    assert np.isnan(believed.ranges_m[7])
+    assert np.isnan(possible.ranges_m[7])
+    (report,) = watch.reports()
+    assert report.reason.startswith("sensor 7 always answers 1.20 m although the base has moved on: masked; ")
+    measured(
+        f"{len(ways)} drives with a stuck sensor, all 24 of them: {len(ways)} masked, after {min(ways):.1f} to "
+        f"{max(ways):.1f} m (median {np.median(ways):.1f})"
+    )
+
+
+@promise
+def test_a_failing_sensor_is_reported_and_one_that_is_not_to_fire_is_not(measured: Callable[[str], None]) -> None:
+    world, path = random_hall(0, NOISY)
+    for sensor in range(24):
+        got = found(RING, firings(RING, world, path[: FAILURES + 1], {sensor: FAULTY}))
+        assert set(got) == {(sensor, "failing")}
+    sparse = ring(sets=(tuple(range(0, 24, 2)), tuple(range(0, 24, 3))))
+    assert found(sparse, firings(sparse, world, path)) == {}
+    watch = SensorWatch(RING)
+    for firing in firings(sparse, world, path):
+        watch.believe(firing)
+    assert {r.sensor for r in watch.reports()} == {1, 5, 7, 11, 13, 17, 19, 23}
+    watch.listen_to(sparse)
+    for firing in firings(RING, world, path[:6]):
+        watch.believe(firing)
+    assert watch.reports() == ()
+    measured(f"24 sensors that always fail: 24 reported after {FAILURES} firings")
+
+
+@promise
+def test_a_sensor_that_never_hears_keeps_its_silence_to_itself_until_it_hears(
+    measured: Callable[[str], None],
+) -> None:
+    """In a hall of rough things, where both neighbours hear."""
+    caught = 0
+    for sensor in range(24):
+        world, path = random_hall(sensor, ROUGH)
+        got = found(RING, firings(RING, world, path, {sensor: math.inf}))
+        assert set(got) <= {(sensor, "silent")}
+        caught += len(got)
+    assert caught >= 20
+    watch = SensorWatch(RING)
+    world, path = random_hall(0, ROUGH)
+    drive = list(firings(RING, world, path, {0: math.inf}))
+    for firing in drive:
+        believed, _ = watch.believe(firing)
+        if watch.reports() and not np.isnan(firing.ranges_m[0]):
+            assert np.isnan(believed.ranges_m[0])
+            break
+    echo = Firing(firing.t_s + 0.15, firing.pose, firing.ring_yaw, np.where(np.isnan(firing.ranges_m), np.nan, 2.0))
+    believed, _ = watch.believe(echo)
+    assert believed.ranges_m[0] == 2.0
+    assert watch.reports() == ()
+    measured(f"24 sensors that never hear: the silence of {caught} not believed")
+
+
+def test_a_stuck_sensor_comes_back_when_it_behaves() -> None:
+    world, path = random_hall(3, NOISY)
+    watch, config = SensorWatch(RING), RING
+    for firing in firings(config, world, path, {7: 1.2}):
+        watch.believe(firing)
+    assert watch.reports()
+    masked = 0
+    for firing in firings(config, world, path[-200:]):
+        believed, _ = watch.believe(firing)
+        masked += bool(np.isnan(believed.ranges_m[7]) and not np.isnan(firing.ranges_m[7]))
+    assert watch.reports() == ()
+    assert masked <= 3 * RETURNS
+
+
+def crosstalk(config: RingConfig, halls: range) -> tuple[int, int, int, int]:
+    """Return readings that are crosstalk, those that are believed, honest readings, and those that are not."""
+    heard = through = honest = lost = 0
+    for hall in halls:
+        world, path = random_hall(hall, MIRRORS)
+        loud = world.model_copy(update={"acoustics": MIRRORS.model_copy(update={"crosstalk": 1.0})})
+        watch = SensorWatch(config)
+        for firing, true in zip(firings(config, loud, path), firings(config, world, path), strict=True):
+            fired = ~np.isnan(firing.ranges_m)
+            ghosts = fired & (firing.ranges_m < np.nan_to_num(true.ranges_m, nan=0.0) - 0.1)
+            doubted = np.isnan(watch.believe(firing)[0].ranges_m)
+            heard += int(ghosts.sum())
+            through += int((ghosts & ~doubted).sum())
+            honest += int((fired & ~ghosts).sum())
+            lost += int((fired & ~ghosts & doubted).sum())
+    return heard, through, honest, lost
+
+
+THREE = tuple(tuple(range(k, 24, 3)) for k in range(3))
+TWO = tuple(tuple(range(k, 24, 2)) for k in range(2))
+
+
+@promise
+def test_octets_of_the_ring_s_own_beam_hear_no_partner(measured: Callable[[str], None]) -> None:
+    heard, _, honest, _ = crosstalk(ring("octets"), range(6))
+    assert heard == 0
+    measured(f"octets, beams of ±12°: 0 of {honest} readings are crosstalk, by geometry")
+
+
+@promise
+@pytest.mark.parametrize(
+    ("name", "config", "share"),
+    [
+        ("alternating, beams of ±20°", ring("alternating", half_deg=20.0), 0.3),
+        ("every second sensor and octets in turn", ring(sets=(*TWO, *THREE)), 0.1),
+    ],
+)
+def test_another_partner_exposes_crosstalk(
+    name: str, config: RingConfig, share: float, measured: Callable[[str], None]
+) -> None:
+    heard, through, honest, lost = crosstalk(config, range(6))
+    assert heard > 300
+    assert through < share * heard
+    assert lost < 0.06 * honest
+    measured(
+        f"{name}: of {heard} crosstalk readings {through} believed; {lost} of {honest} others doubted for a firing"
+    )
+
+
+@promise
+def test_crosstalk_that_stays_is_masked_and_says_who() -> None:
+    """Two sensors of one set, one of which reads short in it; in the other set it does not."""
+    config = ring(sets=((0, 2), (0, 12)))
+    watch = SensorWatch(config)
+    seen = []
+    for k in range(120):
+        ranges = np.full(24, np.nan)
+        ranges[[0, 2] if k % 2 == 0 else [0, 12]] = 4.0
+        if k % 2 == 0:
+            ranges[0] = 1.0
+        believed, possible = watch.believe(Firing(PERIOD_S * k, Pose(0.0, 0.0, 0.0), 0.0, ranges))
+        seen.append((believed.ranges_m[0], possible.ranges_m[0]))
+    assert [b for b, _ in seen[1::2]] == [4.0] * 60
+    assert np.isnan([b for b, _ in seen[40::2]]).all()
+    assert seen[40][1] == 1.0, "in doubt: kept clear of"
+    assert math.isnan(seen[100][1]), "masked in that set"
+    (report,) = watch.reports()
+    assert report.reason.startswith("sensor 0 reads short when it fires together with 2 and not otherwise: ")
+
+
+def test_sets_without_a_pattern_are_not_compared() -> None:
+    """A log that names whoever has news, say."""
+    watch, rng = SensorWatch(RING), np.random.default_rng(5)
+    for k in range(400):
+        ranges = np.where(rng.random(24) < 0.5, rng.uniform(0.5, 7.0, 24), np.nan)
+        firing = Firing(PERIOD_S * k, Pose(0.0, 0.0, 0.0), 0.0, ranges)
+        assert watch.believe(firing) == (firing, firing)
+
+
+def test_masks_stand_before_map_and_obstacles_and_go_with_the_snapshot() -> None:
+    perception = Perception(RING, SETTINGS.models, SETTINGS.perception)
+    world, path = random_hall(3, NOISY)
+    drive = list(firings(RING, world, path, {7: 1.2}))
+    for firing in drive:
+        perception.observe(firing)
+    (report,) = perception.sensors()
+    assert report.sensor == 7
+    last = drive[-1]
+    points = perception.obstacles(last.t_s, 1.0)
+    away = np.hypot(points[:, 0] - last.pose.x, points[:, 1] - last.pose.y)
+    assert not np.isclose(away, 1.2 + 0.381, atol=0.001).any()
+    other = Perception(RING, SETTINGS.models, SETTINGS.perception)
+    other.restore(perception.snapshot())
+    assert other.sensors() == perception.sensors()
+    other.forget()
+    assert other.sensors() == perception.sensors(), "the robot restarted, the sensor is still broken"

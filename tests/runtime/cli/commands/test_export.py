@@ -1,0 +1,244 @@
+"""Exports, read back by whom they are for: csv, pyarrow, the stock MCAP reader with protobuf, rosbags, ourselves."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drivers.messages import Firing
+from runtime.analysis.trace import Trace
+from runtime.analysis.trace_sources import Asked, trace_of
+from runtime.cli.app import call
+from runtime.cli.commands import export
+from runtime.recording.channels import CYCLE, decode
+from runtime.recording.ring_log import read_ring_log
+from runtime.recording.schema import Cycle
+from runtime.support.errors import DONE, FAILED, WRONG_CALL
+from tests.recorded import entries_of
+
+TABLES = {"echoes", "segments", "objects", "odometry"}
+
+
+@pytest.fixture(scope="module")
+def trace(hall_run: Path) -> Trace:
+    return trace_of(Asked(str(hall_run)), lambda _settings: None)
+
+
+def exported(run: Path, form: str, out: Path, *more: str) -> Path:
+    assert call(["export", str(run), "--to", form, "--out", str(out), *more]) == DONE
+    return out
+
+
+def test_csv(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
+    folder = exported(hall_run, "csv", tmp_path / "new")
+    read = {}
+    for path in folder.iterdir():
+        with path.open(encoding="utf-8", newline="") as file:
+            read[path.stem] = list(csv.DictReader(file))
+    assert set(read) == TABLES
+    assert len(read["echoes"]) == len(trace.echoes)
+    for row, kept in zip(read["echoes"], trace.echoes.tolist(), strict=True):
+        assert float(row["bearing_rad"]) == kept[4], "every digit"
+        assert row["heard"] == str(math.isfinite(kept[5]))
+        assert row["range_m"] == (str(kept[5]) if math.isfinite(kept[5]) else "")
+    last = [row for row in read["objects"] if float(row["t_s"]) == trace.seconds]
+    assert [(r["model"], float(r["x_m"]), float(r["y_m"])) for r in last] == [
+        (o.model, o.x, o.y) for o in trace.objects
+    ]
+    assert all(float(r["first_seen_s"]) <= float(r["last_seen_s"]) for r in read["segments"])
+    assert len(read["odometry"]) > 100
+
+
+def test_parquet(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
+    import pyarrow.parquet as pq
+
+    folder = exported(hall_run, "parquet", tmp_path / "new")
+    read = {path.stem: pq.read_table(path) for path in folder.iterdir()}
+    assert set(read) == TABLES
+    echoes = read["echoes"]
+    assert b"metres" in echoes.schema.metadata[b"echolocate"]
+    assert echoes["sensor"].to_pylist() == trace.echoes[:, 1].astype(int).tolist()
+    assert echoes["range_m"].null_count == int(np.isinf(trace.echoes[:, 5]).sum())
+    assert read["objects"]["x_m"].to_pylist()[-1] == trace.objects[-1].x
+    assert read["segments"].num_rows == len(trace.segments) > 50
+
+
+def test_foxglove(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
+    from mcap.reader import make_reader
+    from mcap_protobuf.decoder import DecoderFactory
+
+    path = exported(hall_run, "foxglove", tmp_path / "fox.mcap")
+    seen: Counter[tuple[str, str]] = Counter()
+    newest: dict[str, Any] = {}
+    first: dict[str, Any] = {}
+    times: list[int] = []
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        for schema, channel, message, proto in reader.iter_decoded_messages():
+            assert schema is not None
+            seen[channel.topic, schema.name] += 1
+            newest[channel.topic] = proto
+            first.setdefault(channel.topic, proto)
+            times.append(message.log_time)
+    assert set(seen) == {
+        ("/tf", "foxglove.FrameTransforms"),
+        ("/pose", "foxglove.PoseInFrame"),
+        ("/ring", "foxglove.LaserScan"),
+        ("/segments", "foxglove.SceneUpdate"),
+        ("/clusters", "foxglove.SceneUpdate"),
+        ("/models", "foxglove.SceneUpdate"),
+        ("/truth", "foxglove.SceneUpdate"),
+        ("/log", "foxglove.Log"),
+    }
+    assert times[0] == trace.begun_ns
+    assert times[-1] <= trace.unix_ns(trace.seconds)
+    assert len(newest["/truth"].entities[0].lines) == 6
+    assert len(newest["/models"].entities[0].lines) == len(trace.objects)
+    assert trace.last is not None
+    assert len(newest["/segments"].entities[0].lines[0].points) == 2 * len(trace.last.segments)
+    assert len(newest["/clusters"].entities[0].lines) == 3 * len(trace.last.clusters)
+    start = first["/tf"].transforms[0]
+    assert (start.parent_frame_id, start.child_frame_id) == ("world", "odom")
+    assert start.translation.x == pytest.approx(-1.8288)
+    scan = newest["/ring"]
+    assert len(scan.ranges) == 24
+    fired = [i for i, r in enumerate(scan.ranges) if not math.isnan(r)]
+    assert fired == sorted(int(row[1]) for row in trace.echoes if row[6] == trace.echoes[-1, 6])
+
+
+def test_a_scan_puts_echoes_where_they_were(trace: Trace) -> None:
+    from runtime.analysis.export.shapes import even_radius, rounds, whole_ring
+
+    radius = even_radius(trace.settings.ring)
+    assert radius is not None
+    assert radius == pytest.approx(0.381)
+    count = 0
+    for part in rounds(trace):
+        ranges = whole_ring(24, radius, part)
+        for row in part.rows:
+            reach = ranges[int(row[1])]
+            if math.isfinite(reach):
+                angle = part.yaw + math.radians(15.0 * row[1])
+                there = (part.x + reach * math.cos(angle), part.y + reach * math.sin(angle))
+                assert there == pytest.approx(
+                    (row[2] + row[5] * math.cos(row[4]), row[3] + row[5] * math.sin(row[4])), abs=1e-9
+                )
+                count += 1
+    assert count > 300
+
+
+def test_rosbag2(hall_run: Path, trace: Trace, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    bag = exported(hall_run, "rosbag2", tmp_path / "bag")
+    kinds: dict[str, str] = {}
+    counts: Counter[str] = Counter()
+    newest: dict[str, Any] = {}
+    with AnyReader([bag], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        for connection, at, data in reader.messages():
+            kinds[connection.topic] = connection.msgtype
+            counts[connection.topic] += 1
+            newest[connection.topic] = reader.deserialize(data, connection.msgtype)
+            assert trace.begun_ns <= at <= trace.unix_ns(trace.seconds)
+    sonars = {topic for topic in kinds if topic.startswith("/sonar/")}
+    assert len(sonars) == 24
+    assert {kinds[topic] for topic in sonars} == {"sensor_msgs/msg/Range"}
+    assert sum(counts[topic] for topic in sonars) == len(trace.echoes)
+    assert kinds["/odom"] == "nav_msgs/msg/Odometry"
+    assert kinds["/markers"] == "visualization_msgs/msg/MarkerArray"
+    sensor = int(trace.echoes[-1, 1])
+    told = newest[f"/sonar/s{sensor:02d}"]
+    assert told.range == pytest.approx(trace.echoes[-1, 5])
+    assert told.header.frame_id == f"sonar_{sensor:02d}"
+    assert told.field_of_view == pytest.approx(math.radians(24.0))
+    odometry = trace.odometry[-1][1]
+    assert newest["/odom"].pose.pose.position.x == odometry.pose.x
+    assert newest["/odom"].twist.twist.linear.x == odometry.twist.v
+    models = [m for m in newest["/markers"].markers if m.ns.startswith("models/")]
+    assert len(models) == len(trace.objects)
+    places = np.array([[(p.x, p.y) for p in m.points[:-1]] for m in models]).mean(axis=1)
+    assert np.allclose(places, [(o.x, o.y) for o in trace.objects])
+    assert len(newest["/tf_static"].transforms) == 25
+    capsys.readouterr()
+    assert call(["export", str(hall_run), "--to", "rosbag2", "--out", str(bag)]) == FAILED
+    assert "is there already" in capsys.readouterr().err
+
+
+def test_a_ring_log_out_and_in(hall_run: Path, hall_log: Path, trace: Trace, tmp_path: Path) -> None:
+    heard: list[Firing] = []
+    for entry in entries_of(hall_run):
+        if entry.topic == CYCLE:
+            heard += decode(Cycle, entry.data).record.inputs.heard.firings
+    back = list(read_ring_log(hall_log))
+    assert len(back) == len(heard) > 100
+    for one, other in zip(heard, back, strict=True):
+        assert (one.t_s, one.pose, one.ring_yaw) == (other.t_s, other.pose, other.ring_yaw)
+        assert one.ranges_m.tobytes() == other.ranges_m.tobytes()
+    summary = tmp_path / "summary.json"
+    assert call(["replay", str(hall_log), "--json", str(summary)]) == DONE
+    seen = json.loads(summary.read_bytes())["objects"]
+    assert len(seen) >= 3
+    for one in seen:
+        assert min(math.hypot(one["x"] - o.x, one["y"] - o.y) for o in trace.objects) < 0.02
+
+
+@pytest.mark.compiled
+def test_a_ring_log_into_the_others(hall_log: Path, tmp_path: Path) -> None:
+    for form in ("csv", "foxglove", "rosbag2"):
+        exported(hall_log, form, tmp_path / form, "--world", "hallway")
+
+
+def test_an_uneven_ring_for_foxglove(tmp_path: Path) -> None:
+    """Each echo as an arc of its own."""
+    from mcap.reader import make_reader
+    from mcap_protobuf.decoder import DecoderFactory
+
+    robot = tmp_path / "robot.toml"
+    robot.write_text(
+        "[ring]\nsensors = [{x_m = 0.1, y_m = 0.0, angle_deg = 0.0}, {x_m = 0.0, y_m = 0.1, angle_deg = 80.0}]\n"
+        "beam_half_angle_deg = 10.0\nresolution_m = 0.01\nrange_min_m = 0.1\nrange_max_m = 5.0\n"
+        "[ring.firing]\nsets = [[0, 1]]\nstep_period_s = 0.1\n"
+        "[body]\nradius_m = 0.2\nspeed_max_m_s = 1.0\nturn_max_rad_s = 2.0\n",
+        encoding="utf-8",
+    )
+    log = tmp_path / "log.csv"
+    log.write_text("t,x,y,theta,r00,r01\n0,0,0,0,1.0,2.0\n0.1,0.1,0,0,0.9,inf\n0.2,0.2,0,0,0.8,\n", encoding="utf-8")
+    path = exported(log, "foxglove", tmp_path / "x.mcap", "--robot", str(robot))
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        scans = [proto for _, channel, _, proto in reader.iter_decoded_messages() if channel.topic == "/ring"]
+    assert [scan.ranges[0] for scan in scans] == [1.0, 2.0, 0.9, math.inf, 0.8]
+    assert scans[1].pose.position.y == pytest.approx(0.1)
+    assert scans[0].end_angle == pytest.approx(math.radians(10.0))
+
+
+@pytest.mark.parametrize("form", sorted(export.NEEDED))
+def test_a_missing_extra_is_one_line(
+    form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import importlib.util
+
+    module, package = export.NEEDED[form]
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *a: None if name == module else find(name, *a))
+    assert call(["export", str(tmp_path / "any.mcap"), "--to", form, "--out", str(tmp_path / "out")]) == FAILED
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert "pip install 'echolocate[export]'" in err
+    assert package in err
+
+
+def test_a_ring_log_is_one_already(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("t,x,y,theta,r00\n0,0,0,0,1\n", encoding="utf-8")
+    assert call(["export", str(log), "--to", "ringlog", "--out", str(tmp_path / "x.csv")]) == WRONG_CALL
+    assert "one already" in capsys.readouterr().err
+    assert call(["export", str(log), "--to", "csv", "--out", str(log)]) == WRONG_CALL

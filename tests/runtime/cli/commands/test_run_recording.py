@@ -1,0 +1,105 @@
+"""What a run leaves behind, where the disk is in trouble: nothing waits, memory is bounded, what is lost is told."""
+
+from __future__ import annotations
+
+import os
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.load import load_settings
+from drivers.messages import Firing, Pose
+from runtime.cli.commands.run_recording import kept
+from runtime.recording import ring_log_writer as ringlog_writer
+from runtime.recording.ring_log import read_ring_log
+from runtime.recording.ring_log_writer import RingLogWriter
+from runtime.support import background_writer as sinks
+from runtime.support.background_writer import BackgroundWriter
+from runtime.support.errors import FAILED, UserError
+from tests.recorded import until
+
+SETTINGS = load_settings("hallway")
+
+
+def firing(number: int) -> Firing:
+    return Firing(0.05 * number, Pose(0.0, 0.0, 0.0), 0.0, np.full(24, 1.5))
+
+
+def stuck(path: Path) -> int:
+    """Make a file that takes nothing until somebody reads it; return what keeps it from being whole."""
+    os.mkfifo(path)
+    return os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+
+
+def test_a_ring_log_on_a_disk_that_stands_still_fills_no_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ringlog_writer, "WAITING_MAX", 64)
+    path, read = tmp_path / "log.csv", bytearray()
+    out = stuck(path)
+    count = 5000
+    with RingLogWriter(path) as writer:
+        for number in range(count):
+            writer.put(firing(number))
+        assert writer._waiting.qsize() <= 64
+        assert writer.standing.dropped > 0
+        assert "more slowly than they come" in str(writer.standing.trouble)
+        assert writer.probe() is None, "a slow disk is no part's end"
+        os.set_blocking(out, True)
+        reader = threading.Thread(target=lambda: read.extend(b"".join(iter(lambda: os.read(out, 65536), b""))))
+        reader.start()
+    reader.join()
+    os.close(out)
+    written = read.count(b"\n") - 1
+    assert (written, written + writer.standing.dropped) == (writer.standing.messages, count)
+
+
+def test_a_full_disk_under_a_ring_log_is_told_and_counted(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.symlink_to("/dev/full")
+    with kept(SETTINGS, str(path), no_record=False, emulated=True) as keeping:
+        put = keeping.observers(None, None).on_firing  # type: ignore[arg-type]
+        assert put is not None
+        for number in range(2000):
+            put(firing(number))
+        until(lambda: keeping.standing is not None and keeping.standing["dropped"] > 0, "trouble")
+        assert keeping.probe() is None, "the drive goes on"
+    with pytest.raises(UserError, match=r"--record: the ring log is not whole: .*log\.csv.* No space left") as caught:
+        keeping.complain()
+    assert caught.value.exit_code == FAILED
+
+
+def test_a_ring_log_that_is_whole_is_no_complaint(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    with kept(SETTINGS, str(path), no_record=False, emulated=True) as keeping:
+        put = keeping.observers(None, None).on_firing  # type: ignore[arg-type]
+        assert put is not None
+        for number in range(100):
+            put(firing(number))
+    keeping.complain()
+    assert len(list(read_ring_log(path))) == 100
+    assert keeping.standing == {
+        "file": str(path), "files": 1, "bytes": path.stat().st_size, "dropped": 0, "trouble": None, "sync_max_s": 0.0,
+    }  # fmt: skip
+
+
+def test_a_log_that_takes_nothing_fills_no_memory_and_tells_what_is_missing() -> None:
+    begun, release, written = threading.Event(), threading.Event(), list[bytes]()
+
+    def write(line: bytes) -> None:
+        begun.set()
+        release.wait()
+        written.append(line)
+
+    with BackgroundWriter("log", write, lambda count: b"%d missing\n" % count) as sink:
+        sink.put(b"0\n")
+        begun.wait()
+        for number in range(1, sinks.WAITING_MAX + 100):
+            sink.put(b"%d\n" % number)
+        assert len(sink._waiting) == sinks.WAITING_MAX
+        assert (sink.lost, sink.trouble) == (100, "it takes lines more slowly than they come")
+        release.set()
+    assert written[:3] == [b"0\n", b"100 missing\n", b"1\n"]
+    assert len(written) == sinks.WAITING_MAX + 1

@@ -1,0 +1,64 @@
+"""The run's time under keys of the terminal."""
+
+from __future__ import annotations
+
+import asyncio
+
+from structlog import get_logger
+from structlog.testing import capture_logs
+
+from runtime.cli.terminal.time_keys import TimeKeys
+from runtime.timing.time_control import NOT_OURS, NoTimeControl
+
+
+class Control:
+    """Keeps what is asked for, and takes a while for each."""
+
+    def __init__(self) -> None:
+        self.is_paused = False
+        self.speed = 1.0
+        self.asked: list[str] = []
+
+    async def pause(self) -> str | None:
+        await asyncio.sleep(0)
+        self.asked.append("pause")
+        self.is_paused = True
+        return None
+
+    async def resume(self) -> str | None:
+        await asyncio.sleep(0)
+        self.asked.append("resume")
+        self.is_paused = False
+        return None
+
+    async def single_step(self) -> str | None:
+        await asyncio.sleep(0)
+        self.asked.append("step")
+        return None
+
+    async def set_speed(self, factor: float) -> str | None:
+        raise AssertionError(factor)
+
+
+async def settle() -> None:
+    for _ in range(5):
+        await asyncio.sleep(0)
+
+
+async def test_keys_hold_time_one_thing_after_the_other() -> None:
+    control = Control()
+    keys = TimeKeys(control, get_logger())
+    for key in ("p", "s", "s", "p", "x", "p"):
+        keys.press(key)
+        keys.press("p")
+        await settle()
+    assert control.asked == ["pause", "step", "step", "resume", "pause", "resume"]
+
+
+async def test_what_cannot_be_done_is_told() -> None:
+    with capture_logs() as lines:
+        keys = TimeKeys(NoTimeControl(), get_logger())
+        for key in ("p", "s"):
+            keys.press(key)
+            await settle()
+    assert [line["reason"] for line in lines] == [NOT_OURS, NOT_OURS]

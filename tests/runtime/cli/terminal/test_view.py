@@ -1,0 +1,226 @@
+"""The live view: a plan that marks what is there, a picture of any moment, and a terminal left as it was."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+import os
+import pty
+import sys
+import termios
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from config.load import load_settings
+from drivers.denning.robot import DenningRobot
+from drivers.messages import Floats, LinkCounts, Pose
+from perception.pipeline import SeenObject
+from runtime.cli.terminal.plan import ARROWS, MARGIN_M, Plan, draw_plan
+from runtime.cli.terminal.view import EVERY_CYCLES, SWITCH_INTERVAL_S, Snapshot, View, keys
+from runtime.cycle.modes import Mode, ModeState, Request
+from runtime.cycle.step import CycleRecord
+from runtime.simulation.closed_loop import simulate
+from runtime.timing.cycle_stats import CycleStats
+
+SETTINGS = load_settings("hallway")
+NO_SEGMENTS: Floats = np.zeros((0, 5))
+EMPTY = Snapshot(
+    ModeState(), None, [], NO_SEGMENTS, 0, (), np.full(24, np.nan), LinkCounts(), 0, 0,
+    {"p50": 0.0, "p99": 0.0, "max": 0.0}, {"p50": 0.0, "p99": 0.0, "max": 0.0},
+)  # fmt: skip
+
+
+def seen(x: float, y: float, model: str = "semicircle") -> SeenObject:
+    return SeenObject(model, x, y, 0.5, 0.01, 39, 0.9)
+
+
+def rows(pose: Pose, *, trail: list[tuple[float, float]] | None = None, segments: Floats = NO_SEGMENTS,
+         objects: tuple[SeenObject, ...] = ()) -> list[str]:  # fmt: skip
+    return draw_plan(pose, trail or [], segments, objects, {"semicircle": 0.3048}, 60, 20).plain.split("\n")
+
+
+def where(lines: list[str], character: str) -> list[tuple[int, int]]:
+    return [(i, j) for i, line in enumerate(lines) for j, c in enumerate(line) if c == character]
+
+
+def test_the_plan_has_its_size_and_x_right_and_y_up() -> None:
+    lines = rows(Pose(0.0, 0.0, 0.0), trail=[(-1.0, 0.0)], objects=(seen(2.0, 1.0), seen(2.0, -1.0)))
+    assert [len(line) for line in lines] == [60] * 20 + [0]
+    ((robot_row, robot_column),) = where(lines, "→")
+    ((first_row, first_column),) = where(lines, "1")
+    ((second_row, second_column),) = where(lines, "2")
+    ((trail_row, trail_column),) = where(lines, "·")
+    assert trail_column < robot_column < first_column == second_column
+    assert first_row < robot_row < second_row
+    assert trail_row == robot_row
+
+
+def test_objects_are_rings_of_their_size() -> None:
+    lines = rows(Pose(0.0, 0.0, 0.0), objects=(seen(2.0, 0.0),))
+    marks = [j for _, j in where(lines, "o")]
+    plan = Plan([(0.0, 0.0), (2.0, 0.0)], 60, 20)
+    assert (max(marks) - min(marks)) * plan.cell_m == pytest.approx(2 * 0.3048, abs=2 * plan.cell_m)
+    rows_of = [i for i, _ in where(lines, "o")]
+    assert (max(rows_of) - min(rows_of)) * 2 * plan.cell_m == pytest.approx(2 * 0.3048, abs=4 * plan.cell_m)
+
+
+def test_segments_are_marked_at_their_middles() -> None:
+    segments = np.array([[0.9, 1.0, 1.1, 1.0, 0.0], [1.9, -1.0, 2.1, -1.0, 0.0]])
+    lines = rows(Pose(0.0, 0.0, 0.0), segments=segments)
+    (upper, lower) = where(lines, "•")
+    assert upper[0] < where(lines, "→")[0][0] < lower[0]
+    assert upper[1] < lower[1]
+
+
+@pytest.mark.parametrize("eighth", range(-9, 10))
+def test_the_arrow_points_where_the_wheels_drive(eighth: int) -> None:
+    lines = rows(Pose(0.0, 0.0, eighth * np.pi / 4 + 0.1))
+    assert len(where(lines, ARROWS[eighth % 8])) == 1
+
+
+def test_the_robot_is_on_top_and_what_is_outside_is_left_out() -> None:
+    lines = rows(Pose(1.0, 0.0, 0.0), trail=[(1.0, 0.0)], objects=(seen(1.0, 0.0),))
+    assert len(where(lines, "→")) == 1
+    assert where(lines, "1") == []
+    plan = Plan([(0.0, 0.0)], 10, 5)
+    for x, y in ((0.0, 1e6), (1e6, 0.0), (-1e6, 0.0), (0.0, -1e6)):
+        plan.mark(x, y, "x", "")
+    assert "x" not in plan.text().plain
+    assert plan.cell_m == pytest.approx(max(2 * MARGIN_M / 10, 2 * MARGIN_M / 10))
+
+
+def printed(snapshot: Snapshot, width: int = 100) -> str:
+    console = Console(record=True, width=width, file=io.StringIO(), color_system=None)
+    view = View(SETTINGS, console, "ft")
+    console.print(view.picture(snapshot))
+    return console.export_text()
+
+
+@pytest.mark.parametrize("width", [20, 30, 80, 250])
+def test_nothing_known_yet_is_a_picture_too(width: int) -> None:
+    text = printed(EMPTY, width)
+    assert "CONNECTING" in text
+    if width >= 80:
+        assert "waiting for odometry" in text
+        assert "0 frames, 0 bad, 0 lost" in text
+        assert "·" * 24 in text
+
+
+def test_a_picture_shows_mode_reason_objects_ring_and_numbers() -> None:
+    snapshot = replace(
+        EMPTY,
+        mode=ModeState(Mode.SAFE_STOP, 1.0, "bumper contact: free the robot, then re-arm"),
+        pose=Pose(1.0, 0.0, 0.0), trail=[(0.0, 0.0)], segments=np.array([[0.9, 1.0, 1.1, 1.0, 0.0]]), clusters=7,
+        objects=(seen(0.3048, 1.2192),),
+        ranges=np.array([np.nan, np.inf, 0.0, SETTINGS.ring.range_max_m] + [1.0] * 20),
+        counts=LinkCounts(1832, 3, 2), cycles=520, late=9,
+        cycle_us={"p50": 478.0, "p99": 2961.0, "max": 5958.0}, lag_us={"p50": 907.0, "p99": 5415.0, "max": 8954.0},
+        missed=4, faults=(("refine", 2), ("outside the process", 7)),
+    )  # fmt: skip
+    text = printed(snapshot)
+    for piece in (
+        "SAFE_STOP", "bumper contact: free the robot", "→", "•", "1 segments, 7 hypotheses",
+        "1832 frames, 3 bad, 2 lost",
+        "520, 9 late, 4 missed", "outside the process: 7, refine: 2",
+        "0.48 ms (p99 2.96)", "0.91 ms (p99 5.42)", "semicircle", "1.00", "4.00", "··█▁",
+    ):  # fmt: skip
+        assert piece in text, piece
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def until(done: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + 60.0
+    while not done():
+        assert time.monotonic() < end_s, "it never came"
+        time.sleep(0.005)
+
+
+def test_a_drive_is_drawn_by_the_thread_and_the_loop_never_waits_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    assert SETTINGS.world is not None
+    records: list[CycleRecord] = []
+    run = simulate(SETTINGS, SETTINGS.world, 0, 8.0, lambda record, _truth: records.append(record))
+    file = Terminal()
+    view = View(SETTINGS, Console(file=file, width=100, force_terminal=True), "m")
+    driver, books = DenningRobot(SETTINGS), CycleStats(0.005)
+    before_s = sys.getswitchinterval()
+    with view.shown():
+        assert sys.getswitchinterval() == pytest.approx(SWITCH_INTERVAL_S, abs=1e-6)
+        for record in records:
+            books.enter(0.001)
+            view.on_cycle(record, run.state, books, driver)
+        until(lambda: "DRIVE" in file.getvalue())
+    assert sys.getswitchinterval() == pytest.approx(before_s)
+    assert all(thread.name != "view" for thread in threading.enumerate())
+    assert "outline segments" in file.getvalue()
+
+
+def test_pictures_are_taken_every_few_cycles_only() -> None:
+    assert SETTINGS.world is not None
+    records: list[CycleRecord] = []
+    run = simulate(SETTINGS, SETTINGS.world, 0, 2.0, lambda record, _truth: records.append(record))
+    view = View(SETTINGS, Console(file=io.StringIO()), "m")
+    driver, books, taken = DenningRobot(SETTINGS), CycleStats(0.005), 0
+    for record in records:
+        view.on_cycle(record, run.state, books, driver)
+        taken += view._slot is not None
+        view._slot = None
+    assert taken == len(records) // EVERY_CYCLES
+
+
+def test_why_it_stands_though_it_may_drive_is_shown() -> None:
+    assert SETTINGS.world is not None
+    records: list[CycleRecord] = []
+    run = simulate(SETTINGS, SETTINGS.world, 0, 2.0, lambda record, _truth: records.append(record))
+    run.state.standing = "the goal is reached"
+    view = View(SETTINGS, Console(file=io.StringIO()), "m")
+    for record in records[:EVERY_CYCLES]:
+        view.on_cycle(record, run.state, CycleStats(0.005), DenningRobot(SETTINGS))
+    assert view._slot is not None
+    assert view._slot.mode.reason == "the goal is reached"
+
+
+@pytest.fixture
+def keyboard(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    master, slave = pty.openpty()
+    with contextlib.ExitStack() as stack:
+        stack.callback(os.close, master)
+        monkeypatch.setattr(sys, "stdin", stack.enter_context(os.fdopen(slave, "r")))
+        yield master
+
+
+async def test_keys_arm_halt_and_quit_and_leave_the_terminal_as_it_was(keyboard: int) -> None:
+    before = termios.tcgetattr(sys.stdin.fileno())
+    asked: list[Request] = []
+    quits = asyncio.Event()
+    with keys(asked.append, quits.set):
+        os.write(keyboard, b"ax h")
+        async with asyncio.timeout(60.0):
+            while len(asked) < 3:  # keys that came together are all taken at once
+                await asyncio.sleep(0.01)
+        os.write(keyboard, b"q")
+        await asyncio.wait_for(quits.wait(), 60.0)
+    assert asked == [Request.ARM, Request.HALT, Request.HALT]
+    assert termios.tcgetattr(sys.stdin.fileno()) == before
+
+
+async def test_without_a_terminal_there_are_no_keys(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "in").write_text("qqq")
+    with (tmp_path / "in").open() as file:
+        monkeypatch.setattr(sys, "stdin", file)
+        asked: list[Request] = []
+        with keys(asked.append, lambda: asked.append(Request.HALT)):
+            await asyncio.sleep(0)
+        assert asked == []

@@ -1,0 +1,154 @@
+"""Messages that take their time: the run's time, recording, recordings; answered when they are done."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from runtime.console.commands.async_commands import AsyncCommands
+from runtime.console.commands.refusal import Refusal
+from runtime.console.frames.frame_encoder import RecordingNow
+from runtime.console.protocols import Viewer
+from tests.runtime.console.messages import OF_TIME
+from tests.runtime.console.operated import operated
+
+
+class Held:
+    """Time, recording and recordings, held by somebody who keeps what is asked for."""
+
+    def __init__(self) -> None:
+        self.did: list[str] = []
+        self.validate: str | None = None
+        self.go = asyncio.Event()
+        self.go.set()
+        self.left: list[Viewer] = []
+        self.is_paused = True
+        self.speed = 2.0
+        self.now = RecordingNow("run.mcap", 10, 0)
+
+    async def _do(self, what: str) -> str | None:
+        await self.go.wait()
+        self.did.append(what)
+        return self.validate
+
+    async def _show(self, what: str) -> None:
+        validate = await self._do(what)
+        if validate is not None:
+            raise Refusal(validate)
+
+    async def pause(self) -> str | None:
+        return await self._do("pause")
+
+    async def resume(self) -> str | None:
+        return await self._do("resume")
+
+    async def single_step(self) -> str | None:
+        return await self._do("single_step")
+
+    async def set_speed(self, factor: float) -> str | None:
+        return await self._do(f"speed {factor}")
+
+    async def record(self, *, on: bool) -> str | None:
+        return await self._do(f"record {on}")
+
+    async def bookmark(self, text: str) -> str | None:
+        return await self._do(f"bookmark {text}")
+
+    async def recordings(self) -> list[dict[str, Any]]:
+        await self._show("recordings")
+        return [{"file": "run.mcap"}]
+
+    async def open(self, viewer: Viewer, file: str) -> dict[str, Any]:
+        await self._show(f"open {file}")
+        viewer.switch(live=False)
+        return {"seconds": 3.0}
+
+    async def scrub(self, _viewer: Viewer, s: float) -> None:
+        await self._show(f"scrub {s}")
+
+    async def play(self, _viewer: Viewer, speed: float) -> None:
+        await self._show(f"play {speed}")
+
+    async def step(self, _viewer: Viewer, cycles: int) -> None:
+        await self._show(f"step {cycles}")
+
+    async def live(self, viewer: Viewer) -> None:
+        await self._show("live")
+        viewer.switch(live=True)
+
+    def leave(self, viewer: Viewer) -> None:
+        self.left.append(viewer)
+
+    async def report(self) -> bytes:
+        if self.validate is not None:
+            raise Refusal(self.validate)
+        return b"<h1>report</h1>"
+
+    async def close(self) -> None:
+        self.did.append("close")
+
+
+@pytest.mark.parametrize(("message", "done"), OF_TIME, ids=lambda value: str(value)[:30])
+async def test_what_takes_its_time(message: dict[str, Any], done: str) -> None:
+    held = Held()
+    async with operated(overtime=AsyncCommands(held, held, held)) as case:
+        page = await case.page()
+        assert (await page.ask(**message))["ok"]
+        assert held.did == [done]
+        held.validate = "not just now"
+        assert (await page.ask(**message))["error"] == "not just now"
+        held.validate = None
+        held.go.clear()
+        slow = await page.say(**message)
+        assert "still under way" in (await page.ask(**message))["error"]
+        assert (await page.ask(type="halt"))["ok"], "a HALT does not wait behind it"
+        held.go.set()
+        assert (await page.answer(slow))["ok"]
+    async with operated() as case:
+        page = await case.page()
+        assert (await page.ask(**message))["error"] == f"{message['type']}: not available here"
+
+
+async def test_a_page_that_leaves_in_the_middle_of_it() -> None:
+    held = Held()
+    async with operated(overtime=AsyncCommands(held, held, held)) as case:
+        page = await case.page()
+        held.go.clear()
+        await page.say(type="open", file="run.mcap")
+        await case.settled(lambda: bool(case.console._tasks), "the work")
+        await page.socket.close()
+        await case.settled(lambda: not case.console._tasks, "that it is given up")
+        assert len(held.left) == 1
+
+
+async def test_work_that_fails_is_a_fault_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    held = Held()
+    monkeypatch.setattr(held, "_do", lambda _what: 1 / 0)
+    async with operated(overtime=AsyncCommands(held, held, held)) as case:
+        page = await case.page()
+        await page.say(type="pause")
+        await case.settled(lambda: any(line["event"] == "a part failed" for line in case.log), "a line in the log")
+        assert "console work 1" in str(case.run.health.fault())
+
+
+async def test_a_recording_is_shown_to_who_opened_it_only() -> None:
+    held = Held()
+    async with operated(overtime=AsyncCommands(held, held, held)) as case:
+        page, other = await case.page(), await case.page()
+        assert (await page.ask(type="open", file="run.mcap"))["data"] == {"seconds": 3.0}
+        case.cycles()
+        frame = await other.next("state")
+        assert (frame["paused"], frame["speed"]) == (True, 2.0)
+        assert frame["recording"] == {"file": "run.mcap", "bytes": 10, "dropped": 0}
+        assert not [message for message in page.heard if message["type"] == "state"]
+        await page.ask(type="live")
+        case.cycles()
+        assert (await page.next("state"))["segments"]["whole"]
+        async with case.session.get(case.url.with_path("/report", keep_query=True)) as answer:
+            assert await answer.text() == "<h1>report</h1>"
+        held.validate = "nothing is being recorded"
+        async with case.session.get(case.url.with_path("/report", keep_query=True)) as answer:
+            assert (answer.status, await answer.text()) == (409, held.validate)
+    assert held.did[-1] == "close"

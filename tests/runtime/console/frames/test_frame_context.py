@@ -1,0 +1,83 @@
+"""A robot drives while somebody drags a slider through a recording and has a report made: no cycle is the later."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import logging
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.load import load_settings
+from config.settings import LogConfig
+from drivers.driver import RobotDriver
+from runtime.cli.commands.run import on_port
+from runtime.console.playback.replay_client import ReplayClient
+from runtime.cycle.modes import Mode
+from runtime.cycle.process import Observers, RobotProcess
+from runtime.cycle.step import CycleRecord, State
+from runtime.simulation.emulator_process import emulator
+from runtime.support.logs import open_log
+from runtime.timing.cycle_stats import CycleStats
+from runtime.timing.run_clock import PacedClock
+from tests.hil.machine import PATIENCE_S, stalls_excused
+from tests.recorded import hall, record
+from tests.runtime.console.playback.test_replay_client import PROGRAM, Page
+
+pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
+
+WINDOWS = 4
+WINDOW_S = 1.25
+
+
+@stalls_excused
+async def test_a_player_and_a_report_beside_a_robot_that_drives(tmp_path: Path) -> None:
+    recorded = tmp_path / "hall.mcap"
+    record(hall("recording.keyframe_period_s=40.0"), recorded, 12.0)
+    settings, rng, page = load_settings("hallway"), random.Random(1), Page()
+    late_s: dict[bool, list[float]] = {False: [], True: []}
+    busy, records = [False], list[CycleRecord]()
+    frames = 0
+
+    def on_cycle(record: CycleRecord, _state: State, books: CycleStats, _driver: RobotDriver) -> None:
+        records.append(record)
+        if books.lag.count:
+            late_s[busy[0]].append(books.lag.newest_s)
+
+    clock = PacedClock()
+    players = ReplayClient(tmp_path, PROGRAM, lambda: str(recorded))
+    async with emulator([], clock) as (port, _):
+        with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
+            process = RobotProcess(on_port(settings, port), log, Observers(on_cycle), clock)
+            running = asyncio.create_task(process.run(arm=True, seconds=None))
+            async with asyncio.timeout(PATIENCE_S):
+                while not (records and records[-1].mode.mode is Mode.DRIVE):
+                    await asyncio.sleep(0.05)
+            await players.open(page, "hall.mcap")
+            report = None
+            for _, busy[0] in itertools.product(range(WINDOWS // 2), (False, True)):
+                if busy[0] and report is None:
+                    report = asyncio.create_task(players.report())
+                end_s = clock() + WINDOW_S
+                while clock() < end_s:
+                    if busy[0]:
+                        await players.scrub(page, rng.uniform(0.0, 12.0))
+                    await asyncio.sleep(0.1)
+                if busy[0] and report is not None:
+                    frames = len(page.frames)
+            process.stop()
+            summary = await running
+    assert report is not None
+    assert (await report).startswith(b"<!doctype html>")
+    await players.close()
+    assert frames > 3, "it was played meanwhile"
+    assert (summary["mode"], summary["stop_reasons"]) == ("DRIVE", [])
+    quiet, beside = np.array(late_s[False]), np.array(late_s[True])
+    told = {name: np.round(1e3 * np.quantile(values, [0.5, 0.9, 0.99]), 2).tolist()
+            for name, values in (("quiet", quiet), ("beside", beside))}  # fmt: skip
+    logging.getLogger(__name__).info("lateness p50, p90, p99, ms: %s; %d frames", told, frames)
+    assert np.quantile(beside, 0.5) <= 2.0 * np.quantile(quiet, 0.5) + 0.001, told
+    assert np.quantile(beside, 0.9) <= 2.0 * np.quantile(quiet, 0.9) + 0.003, told

@@ -1,0 +1,305 @@
+"""What comes over the network: pages from a fixed list, and a websocket for who knows the token; nothing else."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import random
+import socket
+
+import aiohttp
+import orjson
+import pytest
+from aiohttp import WSServerHandshakeError
+
+from runtime.console.commands.async_commands import AsyncCommands
+from runtime.console.http.client_limits import Limits
+from runtime.cycle.modes import Request
+from tests.runtime.console.operated import PATIENCE_S, Operated, operated
+
+
+async def refused(case: Operated, **how: str | None) -> tuple[int, str]:
+    """Return how a page is refused, and what the log says of it."""
+    before = len(case.refusals())
+    with pytest.raises(WSServerHandshakeError) as caught:
+        await case.connect(**how)
+    assert len(case.refusals()) == before + 1
+    assert case.token not in case.refusals()[-1]
+    return caught.value.status, case.refusals()[-1]
+
+
+async def test_the_page_and_what_it_carries() -> None:
+    async with operated() as case, case.session.get(case.url) as answer:
+        assert answer.status == 200
+        assert answer.content_type == "text/html"
+        headers = answer.headers
+        assert headers["Content-Security-Policy"].startswith("default-src 'self'; ")
+        assert headers["Cache-Control"] == "no-store"
+        assert headers["Referrer-Policy"] == "no-referrer"
+        assert headers["X-Content-Type-Options"] == "nosniff"
+        assert case.token not in await answer.text()
+
+
+RAW = ["/page/../console.py", "/page/%2e%2e/console.py", "/page/..%2fconsole.py", "/../../etc/passwd", "//etc/passwd",
+       "/page/", "/page", "/page/index.html%00.js", "/page/index.html/", "/runtime/console/page/index.html",
+       "/page/\\..\\console.py", "/.git/config", "/page//index.html", "/ws/", "/page/./console.py"]  # fmt: skip
+
+
+async def raw(case: Operated, *lines: str) -> bytes:
+    """Send a request as it is, and return the answer; a connection that is cut has none."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", case.url.port)
+    try:
+        writer.write("".join(f"{line}\r\n" for line in (*lines, "")).encode("latin-1", "replace"))
+        return await asyncio.wait_for(reader.read(), PATIENCE_S)
+    except ConnectionError:
+        return b""
+    finally:
+        writer.close()
+        with contextlib.suppress(ConnectionError):
+            await writer.wait_closed()
+
+
+@pytest.mark.parametrize("path", RAW)
+async def test_no_path_leads_out(path: str) -> None:
+    async with operated() as case:
+        answer = await raw(case, f"GET {path} HTTP/1.1", f"Host: 127.0.0.1:{case.url.port}")
+        assert answer.startswith((b"HTTP/1.1 404", b"HTTP/1.1 400"))
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "HEAD", "TRACE", "CONNECT"])
+async def test_nothing_but_get(method: str) -> None:
+    async with operated() as case:
+        answer = await raw(case, f"{method} / HTTP/1.1", f"Host: 127.0.0.1:{case.url.port}")
+        assert answer.startswith(b"HTTP/1.1 4")
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:{port}", "127.0.0.1", "127.0.0.1:80", ""])
+async def test_a_host_of_another_name(host: str) -> None:
+    """As after DNS rebinding: the page of a stranger that is reached under this address."""
+    async with operated() as case:
+        name = host.format(port=case.url.port)
+        answer = await raw(case, "GET / HTTP/1.1", f"Host: {name}")
+        assert answer.startswith(b"HTTP/1.1 421")
+        assert "is not this console's" in case.refusals()[-1]
+        status, _ = await refused(case, host=name or "x")
+        assert status == 421
+
+
+async def test_by_another_name_of_this_machine() -> None:
+    async with operated() as case:
+        name = f"localhost:{case.url.port}"
+        page = await case.connect(host=name, origin=f"http://{name}")
+        assert (await page.next("hello"))["role"] == "control"
+
+
+@pytest.mark.parametrize("token", [None, "wrong", "%00", "x" * 5000])
+async def test_a_wrong_token_or_none(token: str | None) -> None:
+    async with operated() as case:
+        assert await refused(case, token=token) == (403, "a wrong token, or none")
+        for path in ("/log", "/report", "/ws"):
+            async with case.session.get(case.url.with_path(path).with_query({"token": token or ""})) as answer:
+                assert answer.status == 403
+
+
+@pytest.mark.parametrize(
+    "origin", [None, "http://evil.example", "null", "http://127.0.0.1:1", "https://127.0.0.1:{port}"]
+)
+async def test_a_page_from_elsewhere(origin: str | None) -> None:
+    async with operated() as case:
+        given = None if origin is None else origin.format(port=case.url.port)
+        status, why = await refused(case, origin=given)
+        assert status == 403
+        assert why.startswith("Origin ")
+
+
+async def test_who_has_no_token_may_be_let_watch_and_nothing_more() -> None:
+    async with operated("console.watch_without_token=true") as case:
+        page = await case.connect(token=None)
+        hello = await page.next("hello")
+        assert hello["role"] == "watch"
+        assert hello["has_token"] is False
+        for kind in ("halt", "arm", "take_control", "undo", "save_toml", "recordings"):
+            answer = await page.ask(type=kind)
+            assert not answer["ok"]
+            assert "only watches" in answer["error"]
+        assert case.run.asked == []
+        case.cycles()
+        assert (await page.next("state"))["cycle"] == 1
+        assert await refused(case, token="wrong") == (403, "a wrong token, or none")
+        assert "token=" not in orjson.dumps(page.heard).decode()
+        assert case.token not in orjson.dumps(page.heard).decode()
+
+
+async def test_the_log_tells_where_it_is_and_only_the_log_has_the_token() -> None:
+    async with operated() as case:
+        line = next(line for line in case.log if line["event"] == "console")
+        assert line["start_url"] == str(case.url)
+        assert case.token not in str(line["url"])
+        case.console.hub.on_log({"event": "robot ready", "level": "info", "port": "/dev/x"})
+        async with case.session.get(case.url.with_path("/log", keep_query=True)) as answer:
+            assert answer.status == 200
+            assert orjson.loads(await answer.read())["fields"] == {"port": "/dev/x"}
+        async with case.session.get(case.url.with_path("/report", keep_query=True)) as answer:
+            assert answer.status == 409
+        async with case.session.get(case.url.with_path("/ws", keep_query=True)) as answer:
+            assert answer.status == 426
+
+
+async def test_a_message_that_is_too_long() -> None:
+    async with operated() as case:
+        page = await case.page()
+        await page.socket.send_str("x" * 65_537)
+        assert await page.closed() == aiohttp.WSCloseCode.MESSAGE_TOO_BIG
+        await case.settled(lambda: any("a message that is none" in why for why in case.refusals()), "a refusal")
+
+
+async def test_the_longest_message_there_may_be() -> None:
+    async with operated() as case:
+        page = await case.page()
+        await page.socket.send_str(" " * (65_536 - 24) + '{"id": 7, "type":"halt"}')
+        assert (await page.answer(7))["ok"]
+
+
+async def test_bytes_are_no_message() -> None:
+    async with operated() as case:
+        page = await case.page()
+        await page.socket.send_bytes(b'{"id":1,"type":"halt"}')
+        assert await page.closed() == aiohttp.WSCloseCode.UNSUPPORTED_DATA
+        assert case.run.asked == []
+
+
+async def test_too_many_messages_end_it_and_a_halt_among_them_holds() -> None:
+    async with operated(limits=Limits(messages_per_s=50.0)) as case:
+        page = await case.page()
+        for _ in range(50):
+            await page.say(type="take_control")
+        await page.say(type="halt")
+        await page.say(type="halt")
+        assert await page.closed() == aiohttp.WSCloseCode.POLICY_VIOLATION
+        assert case.run.asked == [Request.HALT]
+        assert any("50 messages a second" in why for why in case.refusals())
+        assert (await case.page()).heard[0]["role"] == "control", "the console goes on"
+
+
+async def test_more_pages_than_there_may_be() -> None:
+    async with operated("console.clients_max=2") as case:
+        first, _second = await case.page(), await case.page()
+        assert (await refused(case))[0] == 503
+        await first.socket.close()
+        await case.settled(lambda: len(case.console.hub.clients) == 1, "one of them gone")
+        await case.page()
+
+
+async def test_more_connections_than_there_may_be() -> None:
+    async with operated(limits=Limits(connections=8)) as case:
+        page = await case.page()
+        held = [socket.create_connection(("127.0.0.1", case.url.port or 0)) for _ in range(18)]
+        await case.settled(lambda: len(case.refusals()) == 10, "ten that are cut")
+        assert set(case.refusals()) == {"there are too many connections: the oldest is cut"}
+        assert (await page.ask(type="halt"))["ok"]
+        assert (await case.page()).heard[0]["role"] == "watch", "nobody is kept out"
+        for one in held:
+            one.close()
+
+
+GARBAGE = [
+    b"\x16\x03\x01\x02\x00\x01",
+    b"GET / HTTP/9.9\r\n\r\n",
+    b"\r\n" * 500,
+    bytes(range(256)),
+    b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 500 + b"\r\n",
+    b"GET /" + b"a" * 20_000,
+]
+
+
+@pytest.mark.parametrize("garbage", GARBAGE)
+async def test_what_is_no_http(garbage: bytes, capfd: pytest.CaptureFixture[str]) -> None:
+    async with operated() as case:
+        reader, writer = await asyncio.open_connection("127.0.0.1", case.url.port)
+        writer.write(garbage)
+        writer.write_eof()
+        await asyncio.wait_for(reader.read(), PATIENCE_S)
+        writer.close()
+        assert (await (await case.page()).ask(type="halt"))["ok"]
+    out, err = capfd.readouterr()
+    assert (out, err) == ("", "")
+
+
+HANDSHAKES = ["Sec-WebSocket-Key: x", "Sec-WebSocket-Version: 99", "Sec-WebSocket-Version: 13", "Upgrade: websocket"]
+
+
+@pytest.mark.parametrize("header", HANDSHAKES)
+async def test_a_handshake_that_is_none(header: str) -> None:
+    async with operated() as case:
+        answer = await raw(
+            case,
+            f"GET /ws?token={case.token} HTTP/1.1",
+            f"Host: 127.0.0.1:{case.url.port}",
+            f"Origin: {case.origin}",
+            "Upgrade: websocket",
+            "Connection: Upgrade",
+            header,
+        )
+        assert answer.startswith(b"HTTP/1.1 400")
+        assert case.run.health.fault() is None
+
+
+PIECES = [
+    *RAW, "/ws", "/ws?token=%ff%fe", "/?token=%", "http://[::1/", "http://[", "*", "//", "/%zz", "?", "#", "é",
+    "\xff", "/ws?token=\udcff", "http://127.0.0.1:99999999/", "/" + "%2e" * 300, "javascript:", "/log?token=",
+]  # fmt: skip
+METHODS = ["GET", "GET", "GET", "POST", "G\xcaT", ""]
+NAMES = [
+    "Host", "Origin", "Upgrade", "Connection", "Content-Length", "Transfer-Encoding", "Expect", "Cookie", "Range",
+    "Sec-WebSocket-Key", "If-Modified-Since", "Accept-Encoding", "\xe9", "",
+]  # fmt: skip
+VALUES = [
+    "", "websocket", "Upgrade", "chunked", "-1", "99999999999999999999", "100-continue", "\xff\xfe", "x" * 4000,
+    "gzip", "127.0.0.1:{port}", "bytes=0-", "a=b;" * 100, "evil.example", "[::1", "\x01",
+]  # fmt: skip
+
+
+async def test_requests_that_make_no_sense(capfd: pytest.CaptureFixture[str]) -> None:
+    """Whatever a stranger asks for is no fault of the program, and stops no robot."""
+    rng = random.Random(4)
+    async with operated() as case:
+        port = case.url.port
+        for _ in range(400):
+            lines = [f"{rng.choice(METHODS)} {rng.choice(PIECES)} HTTP/1.{rng.choice('01')}"]
+            if rng.random() < 0.8:
+                lines.append(f"Host: 127.0.0.1:{port}")
+            lines += [f"{rng.choice(NAMES)}: {rng.choice(VALUES)}".replace("{port}", str(port)) for _ in range(3)]
+            case.clock[0] += 1.0
+            # What follows ends whatever still waits for more.
+            await raw(case, *lines, "", "\x00", "")
+            assert case.run.health.fault() is None, lines
+        assert (await (await case.page()).ask(type="halt"))["ok"]
+    assert capfd.readouterr() == ("", "")
+
+
+async def test_requests_in_a_row_on_one_connection_are_answered_once() -> None:
+    async with operated() as case:
+        request = f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{case.url.port}\r\n\r\n"
+        answer = await raw(case, request * 1000)
+        assert answer.count(b"HTTP/1.1 200") <= 1
+
+
+async def test_the_end_is_told_and_leaves_nothing() -> None:
+    async with operated(overtime=AsyncCommands()) as case:
+        pages = [await case.page() for _ in range(3)]
+        codes = asyncio.gather(*(page.closed() for page in pages))
+        await asyncio.sleep(0)
+    assert await codes == [aiohttp.WSCloseCode.GOING_AWAY] * 3
+
+
+async def test_the_next_port_where_one_is_taken() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        async with operated(f"console.port={port}") as case:
+            assert case.url.port is not None
+            assert port < case.url.port <= port + 20
+            async with operated(f"console.port={port}") as another:
+                assert another.url.port not in {port, case.url.port}
+                assert another.token != case.token

@@ -1,0 +1,223 @@
+"""A hundred thousand messages that make no sense, or too much: none raises, none moves the robot.
+
+Most go to the desk itself, where what they do is seen at once; the others over a websocket, and some to a whole
+process in virtual time, whose emulated base tells whether it moved.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Iterator
+from typing import Any
+
+import orjson
+import pytest
+import structlog
+
+from behaviors.teleoperation import Teleoperate
+from drivers.driver import RobotDriver
+from runtime.console.commands.messages import BadMessage, read_message
+from runtime.console.console import Console
+from runtime.console.http.client_limits import Limits
+from runtime.cycle.modes import Mode, Request
+from runtime.cycle.process import Observers, RobotProcess
+from runtime.cycle.step import CycleRecord, State
+from runtime.support.kernel_loader import KernelLoader
+from runtime.timing.cycle_stats import CycleStats
+from tests.runtime.console.messages import ASKED, EDITS, OF_TIME
+from tests.runtime.console.operated import FREE_PORT, Operated, operated
+from tests.runtime.virtual import in_virtual_time
+
+AT_THE_DESK = 70_000
+OVER_THE_WIRE = 30_000
+IN_A_RUN = 4_000
+BOUNDLESS = Limits(messages_per_s=1e9, waiting=10**9, waiting_bytes=10**12)
+
+GOOD: list[dict[str, Any]] = [
+    *(row[0] for row in ASKED), *(row[0] for row in EDITS), *(row[0] for row in OF_TIME),
+    {"type": "take_control"}, {"type": "give_control"}, {"type": "grant", "client": 2},
+    {"type": "evidence", "object": 1}, {"type": "load_model", "toml": "name = 1"}, {"type": "undo"},
+    {"type": "set", "path": "behaviors.arbiter.base_velocity_m_s", "value": 0.4}, {"type": "save_toml"},
+]  # fmt: skip
+ODD: list[Any] = [
+    None, True, -1, 0, 2**53, 2**70, 1e308, -0.0, "", "x", "\x00", "halt", "arm", "🤖" * 50, [], [[]], {},
+    {"type": "arm"}, ["arm"], float("nan"), float("inf"), "NaN", 10**400, "a" * 2000, {"id": 1}, [1.5], "behaviors..",
+    ".", "__class__",
+]  # fmt: skip
+
+
+def mutated(rng: random.Random, message: dict[str, Any]) -> dict[str, Any]:
+    """Return a message with something in it that should not be there, or nothing where something should."""
+    message = {"id": rng.randrange(1000), **message}
+    for _ in range(rng.choice((1, 1, 2, 3))):
+        keys = list(message)
+        match rng.randrange(5):
+            case 0 if keys:
+                del message[rng.choice(keys)]
+            case 1 if keys:
+                message[rng.choice(keys)] = rng.choice(ODD)
+            case 2:
+                message[rng.choice(["", "now", "v", "x", "object", "type", "kind", "numbers", "__proto__"])] = (
+                    rng.choice(ODD)
+                )
+            case 3:
+                message |= rng.choice(GOOD)
+            case _:
+                message[rng.choice(keys) if keys else "id"] = [message.copy()]
+    return message
+
+
+def text_of(value: Any) -> str:
+    """Return JSON, with the numbers in it that JSON does not have."""
+    return json.dumps(value, ensure_ascii=False)
+
+
+def garbled(rng: random.Random, text: str) -> str:
+    """Return a text with some of it gone, doubled or replaced."""
+    for _ in range(rng.randrange(1, 4)):
+        at, length = rng.randrange(len(text) + 1), rng.randrange(1, 8)
+        filling = rng.choice(("", text[at : at + length] * 2, chr(rng.randrange(1, 0xD800)), '"', "}", "[[[[", "\\u"))
+        text = text[:at] + filling + text[at + length :]
+    return text
+
+
+def messages(rng: random.Random, count: int) -> Iterator[str]:
+    for _ in range(count):
+        good = rng.choice(GOOD)
+        match rng.randrange(4):
+            case 0:
+                yield garbled(rng, text_of({"id": 1, **good}))
+            case 1:
+                yield "".join(chr(rng.randrange(1, 0xD800)) for _ in range(rng.randrange(60)))
+            case _:
+                yield text_of(mutated(rng, good))
+
+
+class NoWire:
+    """Takes everything."""
+
+    async def send(self, data: bytes) -> None:
+        """Take it."""
+
+    def abort(self) -> None:
+        """Be cut."""
+        raise AssertionError("cut by its own queue")
+
+
+def has_form(text: str) -> bool:
+    try:
+        read_message(text)
+    except BadMessage:
+        return False
+    return True
+
+
+async def test_at_the_desk() -> None:
+    """What has no form does nothing even from who has the control; from a watcher only a HALT does anything."""
+    rng = random.Random(1)
+    async with operated(limits=BOUNDLESS) as case:
+        hub = case.console.hub
+        controller, watcher = (hub.join(NoWire(), name, {}, has_token=True) for name in ("first", "second"))
+        stranger = hub.join(NoWire(), "third", {}, has_token=False)
+        formed = 0
+        for k, text in enumerate(messages(rng, AT_THE_DESK)):
+            if k % 5000 == 0:
+                for client in (controller, watcher, stranger):
+                    client._waiting.clear()
+            case.console.desk.take(stranger, text)
+            assert case.run.asked == []
+            if has_form(text):
+                formed += 1
+                if '"take_control"' not in text:
+                    case.console.desk.take(watcher, text)
+                    assert set(case.run.asked) <= {Request.HALT}
+            else:
+                case.console.desk.take(controller, text)
+                assert case.run.asked == []
+                assert orjson.loads(controller._waiting[-1])["ok"] is False
+            case.run.asked.clear()
+        assert hub.control.has(controller)
+        assert formed > 0.01 * AT_THE_DESK, "nothing came near a message: this says little"
+        for client in (controller, watcher, stranger):
+            hub.leave(client)
+
+
+async def test_over_the_wire() -> None:
+    rng = random.Random(2)
+    async with operated(limits=BOUNDLESS) as case:
+        first, second = await case.page(), await case.page()
+        sent = {id(first): 0, id(second): 0}
+        for k, text in enumerate(messages(rng, OVER_THE_WIRE)):
+            page = first if not has_form(text) else second
+            if '"take_control"' in text:
+                continue
+            await page.socket.send_str(text)
+            sent[id(page)] += 1
+            if k % 200 == 199:
+                await answered(case, first, sent[id(first)])
+                await answered(case, second, sent[id(second)])
+                sent = dict.fromkeys(sent, 0)
+                assert set(case.run.asked) <= {Request.HALT}
+        assert (await first.ask(type="arm"))["ok"], "it is as it was"
+        assert case.run.asked[-1] is Request.ARM
+
+
+async def answered(case: Operated, page: Any, count: int) -> None:
+    """Hear as many answers as there were messages."""
+    for _ in range(count):
+        await page.next("answer")
+    page.heard.clear()
+    assert case.run.health.fault() is None
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("armed", [False, True])
+def test_a_whole_process_does_not_move(monkeypatch: pytest.MonkeyPatch, *, armed: bool) -> None:
+    """Standing it stays where it is, whatever a watcher says and whatever senseless thing the controller does.
+
+    Armed, with a hand on the stick that asks for standstill, the same: what has no form drives nowhere.
+    """
+    rng = random.Random(3)
+    texts = messages(rng, IN_A_RUN)
+    log = structlog.wrap_logger(None, processors=[_drop])
+    moved: list[float] = []
+    modes: set[Mode] = set()
+
+    def on_cycle(record: CycleRecord, state: State, _books: CycleStats, _driver: RobotDriver) -> None:
+        modes.add(record.mode.mode)
+        if armed and record.cycle == 10:
+            process.request(Request.ARM)
+        if armed:
+            process.drive_request(Teleoperate(0.0, 0.0, 1.0))
+        if record.cycle > 30:
+            if state.odometry is not None:
+                moved.append(abs(state.odometry.twist.v) + abs(state.odometry.twist.w))
+            for text in (next(texts, None) for _ in range(10)):
+                if text is None:
+                    process.stop()
+                    return
+                is_halt = has_form(text) and '"halt"' in text
+                if not is_halt and '"take_control"' not in text:
+                    console.desk.take(watcher if has_form(text) else controller, text)
+            for client in (watcher, controller):
+                client._waiting.clear()
+
+    with in_virtual_time(monkeypatch, "perception.method=paper", FREE_PORT) as (loop, settings, robot, _links):
+        start = robot.truth.pose
+        process = RobotProcess(settings, log, Observers(on_cycle), loop.time)
+        console = Console(
+            process, settings, log, process.reconfigure, KernelLoader(log), emulated=True,
+            limits=BOUNDLESS, clock=loop.time,
+        )  # fmt: skip
+        controller, watcher = (console.hub.join(NoWire(), name, {}, has_token=True) for name in ("first", "second"))
+        summary = loop.run_until_complete(process.run(arm=False, seconds=None))
+        assert robot.truth.pose == start
+    assert moved
+    assert max(moved) == 0.0
+    assert summary["stop_reasons"] == []
+    assert (Mode.DRIVE in modes) == armed
+
+
+def _drop(*_: object) -> dict[str, object]:
+    raise structlog.DropEvent

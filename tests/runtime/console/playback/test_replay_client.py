@@ -1,0 +1,199 @@
+"""ReplayClient as processes of their own: opened, moved about in, closed, and told apart by who looks on."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import shutil
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import orjson
+import pytest
+
+from runtime.console.clients.client import Frame
+from runtime.console.playback.replay_client import PLAYERS_MAX, PlayedFrame, PlayerError, ReplayClient, report_of
+from runtime.recording.storage import in_folder, listing
+from runtime.support.child_process import COMMAND, NICENESS, end_child, start_child
+from tests.hil.machine import PATIENCE_S
+from tests.recorded import hall, record
+
+pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
+
+PROGRAM = "tests.runtime.console.building"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs")
+    record(hall(), folder / "hall.mcap", 5.0)
+    (folder / "broken.mcap").write_bytes(b"\x89MCAP0\r\nno recording")
+    return folder
+
+
+class Page:
+    """A client that keeps what it is shown."""
+
+    def __init__(self) -> None:
+        self.is_gone = False
+        self.live: list[bool] = []
+        self.frames: list[PlayedFrame] = []
+        self.said: list[dict[str, Any]] = []
+
+    def switch(self, *, live: bool) -> None:
+        self.live.append(live)
+
+    def show(self, shot: Frame) -> None:
+        assert isinstance(shot, PlayedFrame)
+        self.frames.append(shot)
+
+    def say(self, message: dict[str, Any]) -> None:
+        self.said.append(message)
+
+    @property
+    def last(self) -> dict[str, Any]:
+        return dict(orjson.loads(self.frames[-1].told(follows=False, dropped=0, controls=True)))
+
+
+async def until(done: Callable[[], bool]) -> None:
+    async with asyncio.timeout(PATIENCE_S):
+        while not done():
+            await asyncio.sleep(0.005)
+
+
+@asynccontextmanager
+async def players(folder: Path, current: str | None = None) -> AsyncIterator[ReplayClient]:
+    made = ReplayClient(folder, PROGRAM, lambda: current)
+    try:
+        yield made
+    finally:
+        await made.close()
+
+
+async def test_a_recording_on_the_page(folder: Path) -> None:
+    page = Page()
+    async with players(folder) as made:
+        about = await made.open(page, "hall.mcap")
+        assert about["about"] == {"sensors": 24, "emulated": True}
+        assert (about["file"], about["cycles"], about["duration_s"]) == ("hall.mcap", 100, 4.95)
+        assert about["modes"][-1][1] == "DRIVE"
+        assert page.live == [False]
+        await until(lambda: bool(page.frames))
+        assert (page.last["cycle"], page.last["segments"]) == (1, {"whole": True})
+        changes = orjson.loads(page.frames[-1].told(follows=True, dropped=3, controls=False))
+        assert (changes["segments"], changes["dropped"], changes["controller"]) == ({"whole": False}, 3, False)
+        await made.scrub(page, 3.0)
+        await until(lambda: page.last["cycle"] == 61)
+        await made.step(page, -1)
+        await until(lambda: page.last["cycle"] == 60)
+        await made.play(page, 50.0)
+        await until(lambda: page.last["cycle"] == 100 and not page.last["playing"])
+        await made.live(page)
+        assert page.live == [False, True]
+        with pytest.raises(PlayerError, match="no recording is open"):
+            await made.scrub(page, 1.0)
+        count = len(page.frames)
+        await asyncio.sleep(0)
+        assert len(page.frames) == count
+
+
+async def test_what_cannot_be_opened(folder: Path) -> None:
+    page = Page()
+    async with players(folder) as made:
+        for name in ("", "none.mcap", "../runs/hall.mcap", str(folder / "hall.mcap"), "hall", "/etc/passwd"):
+            with pytest.raises(PlayerError, match="there is no recording"):
+                await made.open(page, name)
+        with pytest.raises(PlayerError, match=r"broken\.mcap: holds no message"):
+            await made.open(page, "broken.mcap")
+        assert page.live == []
+        with pytest.raises(PlayerError, match="finite"):
+            await made.scrub(page, float("nan"))
+        for speed in (1e9, -1.0, float("nan")):
+            with pytest.raises(PlayerError, match="speed"):
+                await made.play(page, speed)
+
+
+async def test_only_so_many_at_a_time_and_none_is_left_behind(folder: Path) -> None:
+    pages = [Page() for _ in range(PLAYERS_MAX)]
+    async with players(folder) as made:
+        await asyncio.gather(*(made.open(page, "hall.mcap") for page in pages))
+        processes = [playing._process.pid for playing in made._open.values()]
+        assert len(set(processes)) == PLAYERS_MAX
+        assert all(os.getpriority(os.PRIO_PROCESS, pid) >= NICENESS for pid in processes)
+        with pytest.raises(PlayerError, match="open already"):
+            await made.open(Page(), "hall.mcap")
+        made.leave(pages[0])
+        await until(lambda: not made._ending)
+        another = Page()
+        await made.open(another, "hall.mcap")
+    for pid in processes:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+
+
+async def test_a_player_that_dies_is_told(folder: Path) -> None:
+    page = Page()
+    async with players(folder) as made:
+        await made.open(page, "hall.mcap")
+        (playing,) = made._open.values()
+        playing._process.kill()
+        await until(lambda: playing.is_over)
+        with pytest.raises(PlayerError, match="has ended"):
+            await made.scrub(page, 1.0)
+        await made.open(page, "hall.mcap")
+
+
+async def test_a_program_that_is_none_is_told_in_a_line(folder: Path) -> None:
+    made = ReplayClient(folder, "tests.runtime.console.no_such", lambda: None)
+    with pytest.raises(PlayerError, match="no_such"):
+        await made.open(Page(), "hall.mcap")
+
+
+async def test_the_list_and_the_one_under_way(folder: Path, tmp_path: Path) -> None:
+    async with players(folder, str(folder / "hall.mcap")) as made:
+        found = await made.recordings()
+        assert {one["file"]: one["live"] for one in found} == {"hall.mcap": True, "broken.mcap": False}
+    elsewhere = str(tmp_path / "elsewhere.mcap")
+    shutil.copy(folder / "hall.mcap", elsewhere)
+    async with players(folder, elsewhere) as made:
+        found = await made.recordings()
+        assert (found[0]["file"], found[0]["live"]) == (elsewhere, True)
+        assert (await made.open(Page(), elsewhere))["cycles"] == 100
+
+
+def test_a_listing(folder: Path, tmp_path: Path) -> None:
+    assert listing(tmp_path / "none") == []
+    (tmp_path / "folder.mcap").mkdir()
+    assert listing(tmp_path) == []
+    assert [one.file for one in listing(folder)] == ["broken.mcap", "hall.mcap"]
+    assert in_folder(folder, "hall.mcap") == folder / "hall.mcap"
+    assert in_folder(folder, "../hall.mcap") is None
+
+
+async def test_the_page_of_a_run_that_goes_on(folder: Path, tmp_path: Path) -> None:
+    whole = (folder / "hall.mcap").read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: int(0.7 * len(whole))])
+    async with players(folder, str(cut)) as made:
+        first = asyncio.create_task(made.report())
+        await asyncio.sleep(0)
+        with pytest.raises(PlayerError, match="already"):
+            await made.report()
+        page = (await first).decode()
+        assert page.startswith("<!doctype html>")
+        assert "Pictures" in page
+    async with players(folder) as made:
+        with pytest.raises(PlayerError, match="nothing is being recorded"):
+            await made.report()
+    with pytest.raises(PlayerError, match=r"broken\.mcap: holds no message"):
+        await report_of(folder / "broken.mcap", "m")
+    with pytest.raises(PlayerError, match="not done within"):
+        await report_of(cut, "m", patience_s=0.01)
+
+
+async def test_a_process_beside_is_ended_whatever_it_does() -> None:
+    process = await start_child(COMMAND, ["report", "--help"], talks=False)
+    await end_child(process)
+    assert process.returncode is not None

@@ -1,0 +1,79 @@
+"""A recording's frames, made by the program of `run`: as those of a live run, and in order without a gap."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import orjson
+import pytest
+
+from perception.edits import DeleteSegments
+from runtime.cli.commands.serve_console import PLAYED
+from runtime.console.playback.replay_client import ReplayClient
+from runtime.console.playback.replay_cursor import ReplayCursor
+from runtime.console.playback.replay_frames import make
+from runtime.console.playback.replay_worker import At
+from runtime.cycle.modes import Mode, Request
+from runtime.cycle.step import State
+from runtime.recording.reader import open_recording, settings_in
+from runtime.simulation.closed_loop import Said
+from tests.recorded import hall, record
+from tests.runtime.console.playback.test_replay_client import Page, until
+
+SECONDS = 5.0
+
+
+def operator(_cycle: int, state: State) -> Said:
+    """Arm, and take a segment out of the map now and then."""
+    numbers = state.perception.segments().numbers.tolist()
+    edits = (DeleteSegments((numbers[0],)),) if state.cycle % 15 == 0 and numbers else ()
+    return Said(Request.ARM if state.mode.mode is Mode.READY else None, edits=edits)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs")
+    record(hall(), folder / "hall.mcap", SECONDS, operator=operator)
+    return folder
+
+
+def test_the_changes_of_all_frames_come_to_the_map_of_the_last(folder: Path) -> None:
+    seen: dict[int, Any] = {}
+    with open_recording(folder / "hall.mcap") as recording:
+        playback = ReplayCursor(recording)
+        played = make(settings_in(recording.about.settings), emulated=recording.about.emulated)
+        for shown in playback.to(playback.cycles):
+            played.take(shown.record)
+            picture = played.frame(shown, At(playback.t_s, is_playing=True, speed=2.0))
+            changes, whole = orjson.loads(picture.changes), orjson.loads(picture.whole)
+            if changes["whole"]:
+                seen.clear()
+            for number in changes["removed"]:
+                del seen[number]
+            seen |= {row[0]: row for row in changes["added"]}
+            numbers = shown.state.perception.segments().numbers.tolist()
+            assert sorted(seen) == sorted(row[0] for row in whole["added"]) == sorted(numbers)
+        head = orjson.loads(picture.head + b"}")
+    assert len(seen) > 10
+    assert (head["cycle"], head["mode"]) == (playback.cycles, "DRIVE")
+    assert head["playback"] == {"s": playback.t_s, "is_playing": True, "speed": 2.0}
+    assert (head["paused"], head["speed"]) == (False, 1.0), "that is the live run's affair"
+    assert len(head["objects"]) == len(shown.state.perception.things())
+
+
+@pytest.mark.realtime
+@pytest.mark.usefixtures("warm_kernels")
+async def test_a_page_is_shown_a_recording(folder: Path) -> None:
+    page, players = Page(), ReplayClient(folder, PLAYED, lambda: None)
+    try:
+        about = (await players.open(page, "hall.mcap"))["about"]
+        assert (len(about["ring"]["mounts"]), about["emulated"], "units" in about) == (24, True, False)
+        assert len(about["truth"]["drums"]) > 0
+        await players.scrub(page, 4.0)
+        await until(lambda: bool(page.frames) and page.last["playback"]["s"] == pytest.approx(4.0))
+        assert page.last["segments"]["whole"]
+        assert len(page.last["segments"]["added"]) > 10
+        assert page.last["controller"] is True
+    finally:
+        await players.close()

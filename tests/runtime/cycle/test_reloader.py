@@ -1,0 +1,124 @@
+"""Reloading at run time: off the loop, one attempt at a time, the last word counts, every end is told in the log."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from typing import Any
+
+import pytest
+import structlog
+from structlog.testing import LogCapture
+
+from config.load import ConfigError, load_settings
+from config.settings import PerceptionConfig, Settings
+from perception.pipeline import Perception
+from runtime.cycle.reloader import Reloader
+
+BEFORE = load_settings("hallway")
+SLOWER = load_settings("hallway", ["behaviors.arbiter.base_velocity_m_s=0.2"])
+
+
+class Scripted:
+    """Proposes what it is told to; holds back until it is let go on."""
+
+    def __init__(self, *answers: Settings | Exception) -> None:
+        self.answers = list(answers)
+        self.begun = threading.Event()
+        self.go_on = threading.Event()
+        self.go_on.set()
+        self.threads: set[int] = set()
+        self.taken: list[Settings] = []
+        self.log = LogCapture()
+        self.readied: list[tuple[Settings, Settings]] = []
+        self.validate: str | None = None
+        logger: Any = structlog.wrap_logger(structlog.PrintLogger(), processors=[self.log])
+        self.reloader = Reloader(BEFORE, self._propose, self.taken.append, logger, self._ready)
+
+    async def _ready(self, running: Settings, proposed: Settings) -> str | None:
+        self.readied.append((running, proposed))
+        return self.validate
+
+    def _propose(self) -> Settings:
+        self.threads.add(threading.get_ident())
+        self.begun.set()
+        assert self.go_on.wait(30.0)
+        answer = self.answers.pop(0)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    async def attempt(self) -> str:
+        self.reloader.ask()
+        await self.reloader.settled()
+        return str(self.log.entries[-1]["event"])
+
+
+@pytest.mark.promise("P11")
+async def test_the_last_good_one_is_kept_until_a_better_one_comes() -> None:
+    script = Scripted(ConfigError("a", "b"), RuntimeError("of ours"), BEFORE, SLOWER, SLOWER)
+    assert await script.attempt() == "the configuration is kept"
+    assert [entry.get("problem") for entry in script.log.entries] == ["a", "b"]
+    assert await script.attempt() == "the configuration is kept: reading it failed"
+    assert "of ours" in script.log.entries[-1]["error"]
+    assert await script.attempt() == "the configuration is as before"
+    assert script.taken == []
+    assert await script.attempt() == "the configuration is taken over"
+    assert script.log.entries[-1]["changed"] == ["behaviors.arbiter.base_velocity_m_s: 0.3 → 0.2"]
+    assert await script.attempt() == "the configuration is as before"
+    assert script.taken == [SLOWER]
+    assert threading.get_ident() not in script.threads
+
+
+async def test_what_the_process_cannot_be_readied_for_is_not_taken_over() -> None:
+    script = Scripted(SLOWER, SLOWER)
+    script.validate = "models: no kernels"
+    assert await script.attempt() == "the configuration is kept"
+    assert (script.log.entries[-1]["problem"], script.taken) == ("models: no kernels", [])
+    script.validate = None
+    assert await script.attempt() == "the configuration is taken over"
+    assert script.readied == [(BEFORE, SLOWER)] * 2
+
+
+async def test_asked_again_while_it_reads_it_reads_once_more() -> None:
+    script = Scripted(BEFORE, SLOWER)
+    script.go_on.clear()
+    script.reloader.ask()
+    assert await asyncio.to_thread(script.begun.wait, 30.0)
+    for _ in range(4):
+        script.reloader.ask()
+    script.go_on.set()
+    await script.reloader.settled()
+    assert script.answers == [], "five requests are two attempts: one under way, one after it"
+    assert script.taken == [SLOWER]
+
+
+async def test_a_run_that_ends_drops_what_is_under_way() -> None:
+    script = Scripted(SLOWER)
+    script.go_on.clear()
+    script.reloader.ask()
+    assert await asyncio.to_thread(script.begun.wait, 30.0)
+    script.reloader.cancel()
+    script.go_on.set()
+    await script.reloader.settled()
+    assert script.taken == []
+
+
+@pytest.mark.parametrize("method", ["paper", "bayes"])
+def test_perception_goes_on_with_other_constants(method: str) -> None:
+    """Nothing that it remembers is lost, and new values are in force at once."""
+    config = PerceptionConfig.model_validate({"method": method})
+    perception = Perception(BEFORE.ring, BEFORE.models, config)
+    other = PerceptionConfig.model_validate(
+        {"method": method, "bayes": {"attempts_per_firing": 7, "report_probability": 0.5}, "map": {"age_max_s": 3.0}}
+    )
+    inner: Any = perception.method
+    remembered = inner.memory if method == "bayes" else inner.outline.segments
+    perception.adopt(other)
+    if method == "bayes":
+        assert inner.memory is remembered
+        assert inner.settings.attempts == 7
+        assert inner._config.report_probability == 0.5
+    else:
+        assert inner.outline.segments is remembered
+        assert inner.outline._config.age_max_s == 3.0

@@ -1,0 +1,218 @@
+"""Recordings: complete, described by their own schemas, kept within their cap, and never in the way of the loop."""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import time
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+from mcap.reader import NonSeekingReader, make_reader
+
+from runtime.recording.channels import (
+    ABOUT,
+    BOOKMARK,
+    CHANNELS,
+    CYCLE,
+    KEYFRAME,
+    LOG,
+    MODE,
+    SEGMENTS,
+    SERIAL,
+    SETTINGS,
+    SUMMARY,
+    decode,
+    encode,
+)
+from runtime.recording.reader import open_recording
+from runtime.recording.recorder import Recorder
+from runtime.recording.schema import Cycle, LogLine, MapChange, SerialBytes
+from runtime.recording.storage import OneFile, Rotating
+from runtime.simulation.closed_loop import simulate
+from tests.recorded import SECONDS, entries_of, hall, record, verdict_of
+
+
+def test_everything_that_happened_is_in_it(run: Path) -> None:
+    entries = entries_of(run)
+    by_topic = {topic: [e for e in entries if e.topic == topic] for topic in CHANNELS}
+    assert [topic for topic, found in by_topic.items() if not found] == [SETTINGS, BOOKMARK], "nobody asked for it"
+    (end,) = by_topic[SUMMARY]
+    assert json.loads(end.data) == {"summary": {"mode": "DRIVE", "cycles": 240.0}}
+    assert [decode(Cycle, e.data).record.cycle for e in by_topic[CYCLE]] == list(range(1, int(20 * SECONDS) + 1))
+    for topic in SERIAL.values():
+        pieces = [piece for e in by_topic[topic] for piece in decode(SerialBytes, e.data).pieces()]
+        assert {data for _, data in pieces} == {b"\x00bytes\xff"}
+        assert [t for t, _ in pieces] == pytest.approx([0.05 * k for k in range(int(20 * SECONDS))], abs=2e-6)
+    modes = [json.loads(e.data)["mode"]["mode"] for e in by_topic[MODE]]
+    assert modes[-1] == "DRIVE"
+    line = decode(LogLine, by_topic[LOG][0].data)
+    assert (line.level, line.event, line.fields) == ("info", "start", {"why": "None"})
+    with open_recording(run) as recording:
+        assert recording.settings == hall()
+        assert len(list(recording.entries())) == len(entries)
+        assert recording.finished
+
+
+@pytest.mark.compiled
+def test_segments_go_in_as_changes_and_add_up(run: Path) -> None:
+    entries = [decode(MapChange, e.data) for e in entries_of(run) if e.topic == SEGMENTS]
+    held: dict[int, tuple[float, ...]] = {}
+    at_keyframes = 0
+    for change in entries:
+        before, held = held, {} if change.whole else held
+        for number in change.removed:
+            del held[number]
+        held |= {change.first + i: row for i, row in enumerate(change.added)}
+        at_keyframes += change.whole and len(before) > 0
+    assert at_keyframes >= 4
+    state = verdict_of(run).state
+    assert state is not None
+    assert len(held) == pytest.approx(len(state.perception.segments_now()), abs=3)
+    changes = [len(change.added) for change in entries if not change.whole]
+    assert statistics.median(changes) < 0.5 * len(held), "only what is new"
+
+
+def test_the_stock_reader_reads_it_and_its_own_schemas_hold(run: Path) -> None:
+    with run.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        seen: dict[str, int] = {}
+        validators: dict[int, Any] = {}
+        for schema, channel, message in reader.iter_messages():
+            assert schema is not None
+            assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+            if schema.id not in validators:
+                told = json.loads(schema.data)
+                jsonschema.Draft202012Validator.check_schema(told)
+                validators[schema.id] = jsonschema.Draft202012Validator(told)
+            validators[schema.id].validate(json.loads(message.data))
+            seen[channel.topic] = seen.get(channel.topic, 0) + 1
+        assert summary.statistics.message_count == sum(seen.values()) == len(entries_of(run))
+    assert set(seen) == set(CHANNELS) - {SETTINGS, BOOKMARK}
+    with run.open("rb") as file:
+        assert sum(1 for _ in NonSeekingReader(file, validate_crcs=True).iter_messages()) == sum(seen.values())
+
+
+def test_what_does_not_fit_is_dropped_counted_and_got_over(tmp_path: Path) -> None:
+    path = tmp_path / "x.mcap"
+    settings = hall()
+    recorder = Recorder(settings, OneFile(path), clock=lambda: 0.0, queue_max=40)
+    assert settings.world is not None
+    # Nothing takes from the queue until half of the run is over: then a thread does, and the rest gets through.
+    count = 0
+
+    def on_state(cycle: Any, state: Any, _start: Any) -> None:
+        nonlocal count
+        count += 1
+        if count == 100:
+            recorder.__enter__()
+        while count >= 100 and len(recorder._writer.queue) > 20:
+            time.sleep(0.001)
+        recorder.on_cycle(cycle, state)
+
+    simulate(settings, settings.world, 0, 10.0, on_state=on_state)
+    recorder.__exit__(None, None, None)
+    assert recorder.standing.dropped >= 50
+    verdict = verdict_of(path)
+    assert verdict.first is None, str(verdict.first)
+    ((first, last),) = verdict.missing
+    assert first <= 41
+    assert 95 <= last <= 125
+    assert verdict.cycles + verdict.skipped + (last - first + 1) == 200
+    assert verdict.skipped <= 2, "a keyframe follows at once"
+
+
+@pytest.mark.compiled
+def test_the_loop_only_hands_over() -> None:
+    """What the loop does a cycle is less than encoding the record would be."""
+    settings = hall("recording.keyframe_period_s=3600.0")
+    assert settings.world is not None
+    handed, encoded = [], []
+    recorder = Recorder(settings, OneFile(Path("/nowhere/at/all")), clock=lambda: 0.0)
+
+    def on_state(cycle: Any, state: Any, _start: Any) -> None:
+        began = time.perf_counter()
+        recorder.on_cycle(cycle, state)
+        handed.append(time.perf_counter() - began)
+        began = time.perf_counter()
+        encode(Cycle.model_construct(record=cycle))
+        encoded.append(time.perf_counter() - began)
+
+    simulate(settings, settings.world, 0, 5.0, on_state=on_state)
+    assert statistics.median(handed) < statistics.median(encoded), (handed, encoded)
+
+
+class Full(OneFile):
+    """A disk that is full, and stays so."""
+
+    def path(self, part: int) -> Path:  # noqa: ARG002 - always this one
+        return Path("/dev/full")
+
+
+def test_a_full_disk_is_told_and_nothing_waits_for_it() -> None:
+    standing = record(hall(), Full(Path()), 3.0)
+    assert standing.trouble is not None
+    assert "No space left" in standing.trouble
+    assert standing.dropped > 20
+
+
+def test_a_folder_that_is_none_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    settings = hall()
+    standing = record(settings, Rotating(tmp_path / "file", "run", settings.recording), 1.0)
+    assert standing.trouble is not None
+    assert str(tmp_path / "file") in standing.trouble
+    assert standing.file is None
+
+
+def test_the_folder_keeps_its_cap_and_every_part_replays(tmp_path: Path) -> None:
+    settings = hall("recording.cap_mb=1.0", "recording.keep=3", "recording.keyframe_period_s=0.5")
+    old = [tmp_path / f"2000-{k}.mcap" for k in range(5)]
+    for k, path in enumerate(old):
+        path.write_bytes(b"x" * 1000)
+        os.utime(path, (k, k))
+    (tmp_path / "notes.txt").write_text("not a recording")
+    place = Rotating(tmp_path, "run", settings.recording)
+
+    class Unhurried(Rotating):
+        """A run in virtual time is over before a part is full: end one after each twentieth of the cap."""
+
+        def is_bayes(self, part_bytes: int) -> bool:
+            return part_bytes > 50_000
+
+    standing = record(settings, Unhurried(place.folder, place.run, place.config), SECONDS)
+    assert standing.trouble is None
+    parts = sorted(tmp_path.glob("*.mcap"))
+    assert standing.files >= 3
+    assert len(parts) <= 3
+    assert not any(path.exists() for path in old)
+    assert (tmp_path / "notes.txt").exists()
+    verdicts = [verdict_of(part) for part in parts]
+    for verdict in verdicts:
+        assert verdict.first is None, str(verdict.first)
+        assert verdict.skipped == 0
+    # How many cycles fit into a part depends on when the writer's clock ends a chunk; the last may be left with none.
+    assert sum(verdict.cycles > 0 for verdict in verdicts) >= len(verdicts) - 1
+    assert place.is_bayes(250_001)
+    assert not place.is_bayes(249_999)
+
+
+def test_a_recording_under_way_is_not_deleted(tmp_path: Path) -> None:
+    settings = hall("recording.cap_mb=1.0")
+    current = tmp_path / "run-001.mcap"
+    current.write_bytes(b"x" * 2_000_000)
+    Rotating(tmp_path, "run", settings.recording).tidy(current)
+    assert current.exists()
+
+
+def test_about_comes_first_and_with_every_keyframe(run: Path) -> None:
+    entries = entries_of(run)
+    assert entries[0].topic == ABOUT
+    frames = [i for i, entry in enumerate(entries) if entry.topic == KEYFRAME]
+    assert all(entries[i - 1].topic == ABOUT for i in frames)

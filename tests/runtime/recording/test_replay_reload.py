@@ -1,0 +1,91 @@
+"""A reload while a run is recorded: an input like any other, replayed at the very cycle at which it came."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from runtime.analysis.comparison import compare_runs
+from runtime.cli.app import call
+from runtime.recording.channels import ABOUT, CYCLE, KEYFRAME, SETTINGS, decode
+from runtime.recording.reader import open_recording, settings_in
+from runtime.recording.replayer import replay
+from runtime.recording.schema import About, SettingsChange
+from runtime.support.errors import DONE, FAILED
+from tests.recorded import entries_of, hall, record, rewrite
+
+AT = 150
+OTHERS = {
+    "bayes": ("perception.bayes.report_probability=0.5", "perception.bayes.attempts_per_firing=8"),
+    "paper": (
+        "perception.method=paper",
+        "perception.map.age_max_s=2.0",
+        "perception.recognition.support_min=0.1",
+    ),
+}
+FASTER = "behaviors.avoid_static_obstacle.avoid_obstacle_sphere_m=1.5"
+
+
+@pytest.fixture(scope="module", params=["bayes", "paper"])
+def reloaded(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("reloaded") / "hall.mcap"
+    before = hall(f"perception.method={request.param}")
+    after = hall(f"perception.method={request.param}", *OTHERS[request.param], FASTER)
+    standing = record(before, path, 12.0, reloads={AT: after})
+    assert standing.dropped == 0
+    return path
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("since_s", [0.0, 5.0, 7.0, 9.0])
+def test_replayed_to_the_bit_across_it(reloaded: Path, since_s: float) -> None:
+    with open_recording(reloaded) as recording:
+        verdict = replay(recording, since_s=since_s)
+    assert verdict.first is None, str(verdict.first)
+    assert verdict.cycles >= 20 * (12.0 - since_s)
+    assert verdict.missing == []
+
+
+@pytest.mark.compiled
+def test_it_is_in_the_record_and_in_force_from_its_cycle_on(reloaded: Path, tmp_path: Path) -> None:
+    entries = entries_of(reloaded)
+    (change,) = [decode(SettingsChange, e.data) for e in entries if e.topic == SETTINGS]
+    assert change.cycle == AT
+    where = [e.topic for e in entries].index(SETTINGS)
+    assert sum(e.topic == CYCLE for e in entries[:where]) == AT - 1
+    told = [settings_in(decode(About, e.data).settings) for e in entries[where:] if e.topic == ABOUT]
+    assert told
+    assert all(t == settings_in(change.settings) for t in told), "a replay may begin at any keyframe"
+    # Without it the replay goes another way.
+    first = entries[0]
+    deaf = [e._replace(data=first.data) if e.topic == ABOUT else e for e in entries if e.topic != SETTINGS]
+    rewrite(deaf, tmp_path / "deaf.mcap")
+    with open_recording(tmp_path / "deaf.mcap") as recording:
+        verdict = replay(recording)
+    assert verdict.first is not None
+    assert verdict.first.cycle >= AT
+
+
+@pytest.mark.compiled
+def test_a_retelling_knows_of_it(reloaded: Path) -> None:
+    with open_recording(reloaded) as recording:
+        told = compare_runs(recording, recording.settings)
+    assert told.first_other_s is not None
+    assert told.first_other_s >= (AT - 1) / 20.0 - 0.1
+
+
+def test_a_run_without_a_cycle_is_told_plainly(
+    reloaded: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, summary = tmp_path / "none.mcap", tmp_path / "none.json"
+    entries = entries_of(reloaded)
+    rewrite(entries[:1], path)
+    assert call(["replay", str(path), "--verify", "--json", str(summary)]) == DONE
+    assert "holds no cycle yet" in capsys.readouterr().err
+    assert '"cycles": 0' in summary.read_text()
+    assert call(["replay", str(path), "--from", "3"]) == FAILED
+    assert "no cycle that can be replayed" in capsys.readouterr().err
+    last = max(i for i, e in enumerate(entries) if e.topic == KEYFRAME)
+    rewrite([entries[0], *entries[last + 3 :]], path)
+    assert call(["replay", str(path), "--verify"]) == FAILED, "there are cycles, and none can be compared"

@@ -1,0 +1,224 @@
+"""Recording switched on and off during a run, and marks in it: each file is whole, and replays to the bit."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import structlog
+
+from config.load import load_settings
+from drivers.denning.device import Truth
+from drivers.messages import Pose
+from runtime.cli.app import call
+from runtime.cli.commands.run_recording import RunRecording, kept
+from runtime.cycle.step import CycleRecord, State
+from runtime.recording.channels import ABOUT, BOOKMARK, CYCLE, KEYFRAME, decode
+from runtime.recording.reader import open_recording
+from runtime.recording.recorder import BOOKMARK_MAX, Recorder
+from runtime.recording.replayer import ReplayResult, replay
+from runtime.recording.schema import Bookmark
+from runtime.recording.storage import OneFile
+from runtime.simulation.closed_loop import simulate
+from runtime.support.errors import DONE
+from tests.recorded import FiveInSix, entries_of, hall, record, until
+
+
+def switched(place: Path, at: dict[int, Callable[[Recorder], None]], seconds: float, *, on: bool) -> Recorder:
+    """Record a run in virtual time; `at` says what is done after which cycle."""
+    settings, now = hall("perception.method=paper"), [0.0]
+    assert settings.world is not None
+    with Recorder(settings, OneFile(place), clock=lambda: now[0], emulated=True, on=on) as recorder:
+
+        def on_state(record: CycleRecord, state: State, _start: Pose) -> None:
+            recorder.on_cycle(record, state)
+            recorder.on_bytes("in", now[0], b"\x00bytes\xff")
+            now[0] = record.inputs.now_s
+            if record.cycle in at:
+                at[record.cycle](recorder)
+
+        simulate(settings, settings.world, 0, seconds, on_state=on_state, allowance=FiveInSix(0))
+        recorder.on_summary({"mode": "DRIVE"})
+    return recorder
+
+
+def verdict_of(path: Path) -> ReplayResult:
+    with open_recording(path) as recording:
+        return replay(recording)
+
+
+def cycles_of(path: Path) -> list[int]:
+    found = []
+    for entry in entries_of(path):
+        if entry.topic == CYCLE:
+            number = re.match(rb'\{"record":\{"cycle":(\d+),', entry.data)
+            assert number is not None, "what a player counts by"
+            found.append(int(number[1]))
+    return found
+
+
+def opened(recorder: Recorder) -> None:
+    until(lambda: recorder.standing.under_way, "a file")
+
+
+def closed(recorder: Recorder) -> None:
+    until(lambda: not recorder.standing.under_way, "the end of the file")
+
+
+def test_off_and_on_again(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+
+    def off(recorder: Recorder) -> None:
+        recorder.switch(on=False)
+        assert not recorder.is_on
+        closed(recorder)
+
+    recorder = switched(
+        path,
+        {1: opened, 60: off, 100: lambda r: r.switch(on=True), 101: opened, 102: lambda r: r.switch(on=True)},
+        8.0, on=True,
+    )  # fmt: skip
+    assert (recorder.standing.files, recorder.standing.dropped, recorder.standing.trouble) == (2, 0, None)
+    assert cycles_of(path) == list(range(1, 61))
+    second = tmp_path / "run-2.mcap"
+    assert cycles_of(second) == list(range(102, 161))
+    assert next(e.topic for e in entries_of(second) if e.topic != ABOUT) == KEYFRAME, "with it the file begins"
+    for file, count, first in ((path, 60, 1), (second, 59, 102)):
+        verdict = verdict_of(file)
+        assert (verdict.cycles, verdict.first_cycle, verdict.different) == (count, first, 0)
+        assert (verdict.missing, verdict.skipped) == ([], 0)
+        with open_recording(file) as recording:
+            list(recording.entries())
+            assert recording.finished
+
+
+def test_off_from_the_beginning_leaves_nothing(tmp_path: Path) -> None:
+    recorder = switched(tmp_path / "run.mcap", {}, 2.0, on=False)
+    assert (recorder.standing.files, recorder.standing.dropped, recorder.standing.trouble) == (0, 0, None)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_on_in_mid_run(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    switched(path, {30: lambda r: r.switch(on=True), 31: opened}, 4.0, on=False)
+    assert cycles_of(path) == list(range(32, 81))
+    assert verdict_of(path).different == 0
+
+
+def test_bookmarks_are_in_it_and_in_nobody_s_way(tmp_path: Path) -> None:
+    path, refused = tmp_path / "run.mcap", list[str | None]()
+
+    def mark(recorder: Recorder) -> None:
+        assert recorder.bookmark("  here\n it <b>was</b>  ") is None
+        refused.extend(recorder.bookmark(text) for text in ("", " \n ", "x" * (BOOKMARK_MAX + 1)))
+
+    def too_late(recorder: Recorder) -> None:
+        recorder.switch(on=False)
+        refused.append(recorder.bookmark("too late"))
+
+    switched(path, {1: opened, 40: mark, 70: too_late}, 4.0, on=True)
+    assert [why is not None and ("from 1 to" in why) for why in refused[:-1]] == [True] * 3
+    assert "nothing is being recorded" in str(refused[-1])
+    marks = [decode(Bookmark, entry.data) for entry in entries_of(path) if entry.topic == BOOKMARK]
+    assert marks == [Bookmark(cycle=40, text="here it <b>was</b>")]
+    assert verdict_of(path).different == 0
+    recovered = tmp_path / "recovered.mcap"
+    assert call(["recover", str(path), "--out", str(recovered)]) == DONE
+    assert [entry.data for entry in entries_of(recovered) if entry.topic == BOOKMARK] == [
+        entry.data for entry in entries_of(path) if entry.topic == BOOKMARK
+    ]
+
+
+def test_a_recording_of_before_there_were_bookmarks_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    record(hall("perception.method=paper"), path, 2.0)
+    assert all(entry.topic != BOOKMARK for entry in entries_of(path))
+    assert verdict_of(path).different == 0
+
+
+@pytest.mark.compiled
+def test_report_and_figures_show_them(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+
+    def mark(text: str) -> Callable[[Recorder], None]:
+        return lambda recorder: None if recorder.bookmark(text) is None else pytest.fail("refused")
+
+    switched(path, {1: opened, 41: mark("a <drum> & more"), 61: mark("second")}, 5.0, on=True)
+    page = tmp_path / "run.html"
+    assert call(["report", str(path), "--out", str(page)]) == DONE
+    text = page.read_text("utf-8")
+    assert "<h2>Bookmarks</h2>" in text
+    assert "a &lt;drum&gt; &amp; more" in text
+    section = text[text.index("<h2>Bookmarks</h2>") :]
+    assert re.findall(r"<td>(\d\.\d\d) s</td>", section[: section.index("</section>")]) == ["2.00", "3.00"]
+    assert {f"models-bookmark-{n}" for n in (1, 2)} <= set(re.findall(r'id="([^"]*)"', text))
+    assert {f"course-bookmark-{n}" for n in (1, 2)} <= set(re.findall(r'id="([^"]*)"', text))
+    assert call(["figures", str(path), "--out", str(tmp_path / "drawn")]) == DONE
+    assert 'id="bookmark-2"' in (tmp_path / "drawn" / "raw.svg").read_text("utf-8")
+
+
+async def in_folder_of(
+    folder: Path, act: Callable[[RunRecording], object], *, no_record: bool, record: str | None
+) -> RunRecording:
+    """Keep what a short run does, as the command does."""
+    settings = load_settings("hallway", ["perception.method=paper", f"recording.folder={json.dumps(str(folder))}"])
+    assert settings.world is not None
+    with kept(settings, record, no_record=no_record, emulated=True) as keeping:
+        observers = keeping.observers(None, structlog.get_logger())
+
+        def on_cycle(record: CycleRecord, _truth: Truth) -> None:
+            pass
+
+        def on_state(record: CycleRecord, state: State, _start: Pose) -> None:
+            assert observers.on_cycle is not None
+            observers.on_cycle(record, state, None, None)  # type: ignore[arg-type]
+            for firing in record.inputs.heard.firings:
+                if observers.on_firing is not None:
+                    observers.on_firing(firing)
+            if record.cycle == 20:
+                act(keeping)
+            if record.cycle == 21:
+                until(lambda: keeping.now is not None, "a file")
+
+        simulate(settings, settings.world, 0, 2.0, on_cycle, on_state=on_state)
+    return keeping
+
+
+@pytest.mark.parametrize("record", [None, "firings.csv"])
+async def test_a_run_that_records_nothing_may_be_told_to(tmp_path: Path, record: str | None) -> None:
+    log = None if record is None else str(tmp_path / record)
+    folder = tmp_path / "runs"
+
+    def on(keeping: RunRecording) -> None:
+        assert keeping.now is None
+        assert (keeping.standing is None) == (log is None), "a ring log is there from the first"
+        keeping._recorder.switch(on=True)
+
+    keeping = await in_folder_of(folder, on, no_record=True, record=log)
+    assert keeping.standing is not None
+    (path,) = folder.glob("*.mcap")
+    assert keeping.standing["file"] == (str(path) if log is None else log)
+    assert cycles_of(path)[0] == 22
+    keeping.complain()
+
+
+async def test_the_console_s_words() -> None:
+    class Recording:
+        def __init__(self) -> None:
+            self.asked: list[object] = []
+
+        def switch(self, *, on: bool) -> None:
+            self.asked.append(on)
+
+        def bookmark(self, text: str) -> str | None:
+            self.asked.append(text)
+            return "no"
+
+    recorder = Recording()
+    keeping = RunRecording(recorder, None, asked_for=False)  # type: ignore[arg-type]
+    assert await keeping.record(on=True) is None
+    assert await keeping.bookmark("here") == "no"
+    assert recorder.asked == [True, "here"]

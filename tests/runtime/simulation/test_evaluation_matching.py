@@ -1,0 +1,94 @@
+"""Setting estimates against truth: one to one, nearest first, and nothing beyond the gate."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from config.world import DrumConfig, WorldConfig
+from runtime.simulation.evaluation import GATE_M, SeedOutcome, against_truth, summarise
+from runtime.timing.cycle_stats import Quantiles
+
+QUICK: Quantiles = {"p50": 1.0, "p99": 2.0, "max": 9.0}
+SLOW: Quantiles = {"p50": 3.0, "p99": 5.0, "max": 7.0}
+
+
+def world(*places: tuple[float, float]) -> WorldConfig:
+    return WorldConfig(drum=tuple(DrumConfig(x_m=x, y_m=y, radius_m=0.3048) for x, y in places))
+
+
+def test_rows_are_in_the_order_of_the_drums() -> None:
+    rows, false = against_truth(world((0.0, 0.0), (2.0, 0.0)), [(2.1, 0.0), (0.0, 0.2)])
+    assert [row["estimate"] for row in rows] == [(0.0, 0.2), (2.1, 0.0)]
+    assert [row["error"] for row in rows] == pytest.approx([0.2, 0.1])
+    assert false == 0
+
+
+def test_the_nearest_pair_goes_first() -> None:
+    """The first drum would like the estimate too, but the second is nearer to it."""
+    rows, false = against_truth(world((0.0, 0.0), (0.4, 0.0)), [(0.25, 0.0)])
+    assert [row["estimate"] for row in rows] == [None, (0.25, 0.0)]
+    assert [row["error"] for row in rows] == [None, pytest.approx(0.15)]
+    assert false == 0
+
+
+def test_a_second_estimate_of_one_drum_is_false() -> None:
+    rows, false = against_truth(world((0.0, 0.0)), [(0.1, 0.0), (0.05, 0.0)])
+    assert rows[0]["estimate"] == (0.05, 0.0)
+    assert false == 1
+
+
+def test_the_gate_is_a_foot() -> None:
+    assert pytest.approx(0.3048) == GATE_M
+    inside, outside = 0.999 * GATE_M, 1.001 * GATE_M
+    rows, false = against_truth(world((0.0, 0.0)), [(0.0, inside)])
+    assert rows[0]["error"] == pytest.approx(inside)
+    assert false == 0
+    rows, false = against_truth(world((0.0, 0.0)), [(0.0, outside)])
+    assert (rows[0], false) == ({"truth": (0.0, 0.0), "estimate": None, "error": None}, 1)
+
+
+def test_nothing_seen_and_nothing_there() -> None:
+    rows, false = against_truth(world((1.0, 2.0)), [])
+    assert (rows, false) == ([{"truth": (1.0, 2.0), "estimate": None, "error": None}], 0)
+    assert against_truth(world(), [(0.0, 0.0)]) == ([], 1)
+
+
+places = st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), max_size=6)
+
+
+@given(places, places)
+def test_one_to_one_whatever_there_is(drums: list[tuple[float, float]], seen: list[tuple[float, float]]) -> None:
+    rows, false = against_truth(world(*drums), seen)
+    used = [row["estimate"] for row in rows if row["estimate"] is not None]
+    assert len(rows) == len(drums)
+    assert len(used) + false == len(seen)
+    left = list(seen)
+    for estimate in used:
+        left.remove(estimate)  # each at most once
+    for row in rows:
+        if row["estimate"] is None:
+            assert all(math.dist(row["truth"], e) > GATE_M for e in left), "a free estimate lies inside the gate"
+        else:
+            assert row["error"] == math.dist(row["truth"], row["estimate"])
+
+
+def test_summary_over_several_runs() -> None:
+    rows, _ = against_truth(world((0.0, 0.0), (9.0, 9.0)), [(0.0, 0.1)])
+    more, _ = against_truth(world((0.0, 0.0)), [(0.2, 0.0)])
+    got = summarise([SeedOutcome(0, rows, 1, 20.0, 0.5, QUICK), SeedOutcome(1, more, 2, 40.0, 0.5, SLOW)])
+    assert got["drums"] == rows + more
+    assert got["false"] == 3
+    assert got["mean_error"] == pytest.approx(0.15)
+    assert got["max_error"] == pytest.approx(0.2)
+    assert got["times_real_time"] == pytest.approx(60.0)
+    assert got["cycle_us"] == {"p50": 3.0, "p99": 5.0, "max": 9.0}
+
+
+def test_summary_of_nothing_found() -> None:
+    rows, _ = against_truth(world((0.0, 0.0)), [])
+    got = summarise([SeedOutcome(0, rows, 0, 20.0, 0.0, QUICK)])
+    assert (got["mean_error"], got["max_error"], got["times_real_time"]) == (None, None, 0.0)

@@ -1,0 +1,323 @@
+"""The kernels' cache: a folder for each version of the sources, wherever one can be written."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+import runtime.support.kernel_cache as kernels
+from config.load import load_settings
+from config.settings import Settings
+from perception.bayes import entry
+from runtime.support import kernel_warmup as warming
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache of its own, and a machine's folder for temporary files of its own."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "tmp").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
+    return tmp_path / "cache"
+
+
+def packages(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Put two packages in place of the real ones; return a source of the second."""
+    for name in kernels.PACKAGES:
+        (folder / name).mkdir(parents=True)
+        (folder / name / "a.py").write_text("X = 1\n")
+
+    def find(name: str) -> ModuleSpec:
+        spec = ModuleSpec(name, None, is_package=True)
+        spec.submodule_search_locations = [str(folder / name)]
+        return spec
+
+    monkeypatch.setattr(kernels, "find_spec", find)
+    return folder / kernels.PACKAGES[1] / "a.py"
+
+
+def test_it_is_the_same_folder_for_the_same_sources(home: Path) -> None:
+    folder = kernels.cache_folder()
+    assert folder == kernels.cache_folder()
+    assert folder.is_dir()
+    assert folder.is_relative_to(home / "echolocate" / "kernels")
+    assert list(folder.iterdir()) == []
+
+
+def test_one_byte_of_one_source_makes_another_folder(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = packages(home.parent / "sources", monkeypatch)
+    first = kernels.cache_folder()
+    source.write_text("X = 2\n")
+    second = kernels.cache_folder()
+    assert first != second
+    source.write_text("X = 1\n")
+    assert kernels.cache_folder() == first
+    source.with_name("b.py").write_text("")
+    (source.parent / "notes.txt").write_text("no source")
+    assert kernels.cache_folder() == first, "an empty file and a note change no kernel"
+    source.with_name("b.py").write_text("Y = 3\n")
+    assert kernels.cache_folder() not in {first, second}
+
+
+def test_kernels_with_checked_bounds_are_kept_apart(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Numba's own key does not hold this setting: it would load kernels without checks."""
+    monkeypatch.delenv("NUMBA_BOUNDSCHECK", raising=False)
+    plain = kernels.cache_folder()
+    monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
+    assert kernels.cache_folder() != plain
+    assert plain.is_relative_to(home)
+
+
+def test_every_source_with_kernels_counts() -> None:
+    holders = {
+        path.parent
+        for room in ("perception", "drivers", "behaviors", "runtime")
+        for path in (ROOT / room).rglob("*.py")
+        if "@kernel" in path.read_text("utf-8") or "njit" in path.read_text("utf-8")
+    }
+    assert holders == {ROOT.joinpath(*name.split(".")) for name in kernels.PACKAGES}
+
+
+def test_an_unwritable_home_falls_back(home: Path) -> None:
+    home.write_text("a file is no folder, not even for root")
+    folder = kernels.cache_folder()
+    assert folder.is_relative_to(home.parent / "tmp" / f"echolocate-{os.getuid()}")
+    assert folder.is_dir()
+    (home.parent / "tmp").rename(home.parent / "gone")
+    (home.parent / "tmp").mkdir()
+    (home.parent / "tmp" / f"echolocate-{os.getuid()}").write_text("taken by somebody else")
+    last = kernels.cache_folder()
+    assert last.is_dir()
+    assert last.parent == home.parent / "tmp"
+
+
+def test_a_home_without_xdg_is_dot_cache(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setenv("HOME", str(home))
+    assert kernels.cache_folder().is_relative_to(home / ".cache" / "echolocate" / "kernels")
+
+
+def test_an_existing_setting_is_respected(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "/somewhere/else")
+    assert kernels.use_cache() == Path("/somewhere/else")
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    assert kernels.use_cache() == kernels.cache_folder()
+    assert os.environ["NUMBA_CACHE_DIR"] == str(kernels.cache_folder())
+    assert home.exists()
+
+
+def test_only_what_a_run_needs_is_compiled() -> None:
+    hallway = load_settings("hallway")
+    assert kernels.needed(hallway) == (kernels.EMULATOR, kernels.CIRCLES)
+    boxes = load_settings("hallway", models=["semicircle", "box"])
+    assert kernels.needed(boxes) == (kernels.EMULATOR, kernels.CIRCLES, kernels.POLYGONS)
+    paper = load_settings("hallway", ["perception.method=paper"], models=["box"])
+    assert kernels.needed(paper) == (kernels.EMULATOR, kernels.PAPER)
+    assert set(warming.RUN_ONCE) == set(kernels.PARTS)
+
+
+def test_each_part_is_compiled_once_and_warmed_up_ever_after(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(home))
+    monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
+    home.mkdir()
+    happened: list[str] = []
+
+    def compile_parts(_settings: Settings, folder: Path, parts: Sequence[str]) -> None:
+        for part in parts:
+            (folder / part).touch()
+            happened.append(f"compile {part}")
+
+    monkeypatch.setattr(kernels, "compile_parts", compile_parts)
+    monkeypatch.setattr(kernels, "warm_up", lambda _settings, parts: happened.extend(parts))
+    settings, console = load_settings("hallway"), Console(quiet=True)
+    kernels.ready_kernels(settings, console)
+    assert happened == ["compile emulator", "compile full"]
+    happened.clear()
+    kernels.ready_kernels(settings, console)
+    assert happened == ["bayes"], "the emulator is another process"
+    happened.clear()
+    kernels.ready_kernels(load_settings("hallway", models=["box"]), console)
+    assert happened == ["compile polygons", "bayes"]
+    (home / kernels.CIRCLES).unlink()
+    assert kernels.missing(home, kernels.PARTS) == [kernels.CIRCLES, kernels.PAPER]
+    happened.clear()
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    kernels.ready_kernels(settings, console)
+    assert happened == [], "there is nothing to compile"
+
+
+@pytest.mark.parametrize(
+    ("parts", "processors", "helped"),
+    [
+        ((kernels.EMULATOR, kernels.CIRCLES), 2, ["helper full", "hear"]),
+        ((kernels.CIRCLES, kernels.POLYGONS), 2, ["helper polygons", "hear", "bayes"]),
+        ((kernels.POLYGONS,), 2, []),
+        ((kernels.EMULATOR, kernels.CIRCLES), 1, []),
+    ],
+)
+def test_a_helper_takes_what_comes_last(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parts: tuple[str, ...], processors: int, helped: list[str]
+) -> None:
+    happened: list[str] = []
+
+    @contextlib.contextmanager
+    def helper(part: str) -> Iterator[None]:
+        happened.append(f"helper {part}")
+        yield
+        happened.append("waited")
+
+    def noted(name: str) -> Callable[[Settings], None]:
+        return lambda _settings: happened.append(name)
+
+    monkeypatch.setattr(warming, "helper", helper)
+    monkeypatch.setattr(warming, "hear", noted("hear"))
+    monkeypatch.setattr(warming, "RUN_ONCE", {part: noted(part) for part in kernels.PARTS})
+    monkeypatch.setattr(os, "cpu_count", lambda: processors)
+    kernels.compile_parts(load_settings("hallway"), tmp_path, parts)
+    assert happened == [*helped, *(["waited"] if helped else []), *parts]
+    assert {path.name for path in tmp_path.iterdir()} == set(parts)
+
+
+def test_a_helper_compiles_the_refinement_of_either_kind(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On an empty memory that compiles and does nothing."""
+    asked = []
+    for name in ("quantum", "pquantum"):
+        monkeypatch.setattr(entry, name, lambda _handle, _share, name=name: asked.append(name))
+    warming.help_with(kernels.CIRCLES)
+    warming.help_with(kernels.POLYGONS)
+    assert asked == ["quantum", "pquantum"]
+
+
+def test_a_helper_that_hangs_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    real, started = subprocess.Popen, []
+
+    def hanging(_command: list[str], **streams: Any) -> subprocess.Popen[bytes]:
+        started.append(real([sys.executable, "-c", "import time; time.sleep(600)"], **streams))
+        return started[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", hanging)
+    monkeypatch.setattr(warming, "HELP_MAX_S", 0.01)
+    with warming.helper(kernels.CIRCLES):
+        assert started[0].poll() is None
+    assert started[0].returncode is not None
+
+
+COMPILED_LATER = """
+import sys
+from runtime.support.kernel_cache import needed, ready_kernels, use_cache
+use_cache()
+from config.load import load_settings
+from rich.console import Console
+settings = load_settings("hallway", sys.argv[1].split(), models=sys.argv[2].split())
+ready_kernels(settings, Console(quiet=True))
+from numba.core import event
+late = []
+class Listener(event.Listener):
+    def on_start(self, e): late.append(str(e.data["dispatcher"].py_func.__name__))
+    def on_end(self, e): pass
+from config.load import load_model
+from perception.edits import (
+    ClearMap, ConfirmObject, DeleteSegments, MoveObject, PinSegments, PlaceModel, RejectObject,
+)
+from runtime.console.frames.frame_encoder import Beside, Frames
+from runtime.cycle.modes import Mode, Request
+from runtime.simulation.closed_loop import Said, simulate
+
+further = settings.model_copy(update={"models": (*settings.models, load_model(sys.argv[3]))})
+assert set(needed(further)) <= set(needed(settings))
+
+frames = Frames(settings)
+
+def by_hand(cycle, state):
+    # every half second one thing after the other, also with a model that came late
+    perception, arm = state.perception, Request.ARM if state.mode.mode is Mode.READY else None
+    if cycle % 10 or state.odometry is None:
+        return Said(arm)
+    frames.shot(state, None, Beside(host_s=0.0))
+    seen = [o for o in perception.objects() if o.number is not None]
+    for known in seen:
+        perception.evidence(known.number)
+    first = perception.segments().numbers[:4].tolist()
+    x, y = state.odometry.pose.x, state.odometry.pose.y
+    pose = (x + 1.5, y + 0.5, 0.3)
+    edits = (
+        [PlaceModel(m.name, *pose) for m in further.models[: None if cycle > 100 else -1]],
+        [PinSegments(tuple(first), True)], [DeleteSegments(tuple(first[:2]))],
+        [MoveObject(o.number, o.x + 0.2, o.y, 0.1) for o in seen], [ConfirmObject(o.number) for o in seen],
+        [RejectObject(o.number) for o in seen], [ClearMap()] if cycle > 200 else [],
+    )
+    return Said(arm, edits=tuple(edits[cycle // 10 % len(edits)]))
+
+with event.install_listener("numba:compile", Listener()):
+    run = simulate(
+        settings, settings.world, 0, 15.0, operator=by_hand, reload=lambda n: further if n == 100 else None,
+    )
+assert run.state.cycle > 280 and run.state.odometry.pose.x > 1.0, run.state
+sys.exit(" ".join(late))
+"""
+
+
+@pytest.mark.realtime
+@pytest.mark.usefixtures("warm_kernels")
+@pytest.mark.parametrize(
+    ("sets", "models", "further"),
+    [
+        ("perception.method=full", "semicircle", "drum"),
+        ("perception.method=full", "semicircle box", "hexagon.toml"),
+        ("perception.method=paper", "semicircle", "box"),
+    ],
+)
+def test_nothing_of_perception_is_compiled_while_the_robot_drives_and_a_person_edits(
+    tmp_path: Path, sets: str, models: str, further: str
+) -> None:
+    """The emulator's kernels may still load: it is another process when it matters."""
+    hexagon = [[math.cos(a), math.sin(a)] for a in (k * math.pi / 3.0 for k in range(6))]
+    (tmp_path / "hexagon.toml").write_text(f'name = "hexagon"\nclosed = true\nvertices_m = {hexagon}\n')
+    further = str(tmp_path / further) if "." in further else further
+    done = subprocess.run(
+        [sys.executable, "-c", COMPILED_LATER, sets, models, further],
+        cwd=ROOT, text=True, capture_output=True, timeout=120, check=False,
+    )  # fmt: skip
+    sources = "".join(path.read_text("utf-8") for path in (ROOT / "perception").rglob("*.py"))
+    assert "Traceback" not in done.stderr, done.stderr
+    late = [name for name in done.stderr.split() if f"def {name}(" in sources]
+    assert late == [], done.stderr
+
+
+@pytest.mark.realtime
+@pytest.mark.usefixtures("warm_kernels")
+def test_a_kernel_that_comes_to_life_is_counted_once() -> None:
+    """Kernels are imported from file to file; each signature counts once, and one more argument type is one more."""
+    import numpy as np
+
+    from perception import kernel as decorator
+    from perception import relaxation
+
+    before = kernels.compiled_signatures()
+    assert before > 10
+
+    def doubled(values: decorator.Floats) -> float:
+        return 2.0 * float(values[0])
+
+    relaxation.doubled = compiled = decorator.numba.njit(doubled)  # type: ignore[attr-defined]
+    try:
+        assert kernels.compiled_signatures() == before
+        compiled(np.ones(1))
+        assert kernels.compiled_signatures() == before + 1
+        compiled(np.ones(1, dtype=np.float32))
+        assert kernels.compiled_signatures() == before + 2
+    finally:
+        del relaxation.doubled  # type: ignore[attr-defined]

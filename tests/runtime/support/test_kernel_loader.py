@@ -1,0 +1,148 @@
+"""Kernels that are readied while the robot drives: before the change is taken over, and beside the loop."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+import structlog
+from structlog.testing import LogCapture
+
+from config.load import load_settings
+from config.settings import Settings
+from runtime.support import kernel_cache as kernels
+from runtime.support import kernel_loader as readying
+from runtime.support.kernel_cache import POLYGONS
+from runtime.support.kernel_loader import KernelLoader
+from tests.hil.running import ROOT
+
+ROUND = load_settings("hallway")
+DRUMS = load_settings("hallway", models=["semicircle", "drum"])
+BOXES = load_settings("hallway", models=["semicircle", "box"])
+
+
+class Kernels:
+    """Stands for the compiling and loading of kernels, which takes too long for tests."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+        self.folder = folder
+        self.fails = False
+        self.compiled: list[str] = []
+        self.loaded: list[tuple[str, ...]] = []
+        self.threads: set[int] = set()
+        self.log = LogCapture()
+        monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
+        monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
+        monkeypatch.setattr(readying, "warm_up", self._load)
+        monkeypatch.setattr(readying, "compiled_signatures", lambda: 7 * len(self.loaded))
+        self.ready = KernelLoader(structlog.wrap_logger(None, processors=[self.log]), self._compile)
+
+    async def _compile(self, part: str) -> None:
+        await asyncio.sleep(0.0)
+        self.compiled.append(part)
+        if not self.fails:
+            (self.folder / part).touch()
+
+    def _load(self, settings: Settings, parts: Sequence[str]) -> None:
+        assert settings is BOXES
+        self.threads.add(threading.get_ident())
+        self.loaded.append(tuple(parts))
+
+
+@pytest.fixture
+def aside(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Kernels:
+    return Kernels(monkeypatch, tmp_path)
+
+
+async def test_what_was_never_compiled_is_compiled_once_and_loaded_by_a_thread(aside: Kernels) -> None:
+    assert set(await asyncio.gather(aside.ready(ROUND, BOXES), aside.ready(ROUND, BOXES))) == {None}
+    assert aside.compiled == [POLYGONS]
+    assert aside.loaded == [(POLYGONS,), (POLYGONS,)], "by whoever asks: it costs little"
+    assert threading.get_ident() not in aside.threads
+    assert aside.ready.loaded == 14
+    assert [entry["event"] for entry in aside.log.entries] == [
+        "kernels for polygons are being compiled, once; the change is taken over then"
+    ]
+
+
+async def test_what_is_ready_is_left_alone(aside: Kernels, monkeypatch: pytest.MonkeyPatch) -> None:
+    for running, proposed in ((ROUND, ROUND), (ROUND, DRUMS), (BOXES, BOXES), (BOXES, ROUND)):
+        assert await aside.ready(running, proposed) is None
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    assert await aside.ready(ROUND, BOXES) is None
+    assert (aside.compiled, aside.loaded, aside.ready.loaded) == ([], [], 0)
+
+
+async def test_what_cannot_be_compiled_is_refused_with_a_way_out(aside: Kernels) -> None:
+    aside.fails = True
+    told = await aside.ready(ROUND, BOXES)
+    assert told is not None
+    assert "start with such a model" in told
+    assert aside.loaded == []
+
+
+STANDS = "import pathlib, sys, time; pathlib.Path(sys.argv[1]).touch(); time.sleep(600)"
+
+
+async def test_a_run_that_ends_does_not_wait_for_a_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, started = tmp_path / "begun", list[asyncio.subprocess.Process]()
+    spawn = asyncio.create_subprocess_exec
+
+    async def slow(*_command: str, **options: object) -> asyncio.subprocess.Process:
+        started.append(await spawn(sys.executable, "-c", STANDS, str(begun), **options))  # type: ignore[arg-type]
+        return started[0]
+
+    monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(asyncio, "create_subprocess_exec", slow)
+    ready = asyncio.create_task(_ready(structlog.wrap_logger(None, processors=[LogCapture()])))
+    async with asyncio.timeout(60.0):
+        while not begun.exists():
+            await asyncio.sleep(0.01)
+    ready.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await ready
+    assert started[0].returncode is not None, "it would outlive the run"
+
+
+async def _ready(log: structlog.typing.FilteringBoundLogger) -> None:
+    await KernelLoader(log)(ROUND, BOXES)
+
+
+@pytest.mark.soak
+def test_another_process_compiles_all_that_belongs_to_polygons(tmp_path: Path) -> None:
+    """From nothing; and nothing of the part is left to compile for the process that loads it."""
+    env = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    env |= {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path)}
+
+    def run(*words: str) -> str:
+        command = [sys.executable, *words]
+        done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=590, check=False)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    run("-m", "runtime.support.kernel_warmup", POLYGONS, "whole")
+    assert kernels.missing(tmp_path, [POLYGONS]) == []
+    assert run("-c", LOADS) == "[]\n"
+
+
+LOADS = """
+from numba.core import event
+compiled = []
+class Listener(event.Listener):
+    def on_start(self, e): compiled.append(str(e.data["dispatcher"].py_func.__name__))
+    def on_end(self, e): pass
+from config.load import load_settings
+from runtime.support.kernel_cache import CIRCLES, POLYGONS, use_cache, warm_up
+use_cache()
+warm_up(load_settings("hallway"), [CIRCLES])
+with event.install_listener("numba:compile", Listener()):
+    warm_up(load_settings("hallway", models=["semicircle", "box"]), [POLYGONS])
+print(compiled)
+"""

@@ -1,0 +1,109 @@
+"""The log: lines a machine can parse in a file, lines a person can read on the terminal."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from config.settings import LogConfig
+from runtime.support.errors import WRONG_CALL, UserError
+from runtime.support.logs import open_log
+
+
+def lines(path: Path) -> list[dict[str, object]]:
+    return [json.loads(line) for line in path.read_text("utf-8").splitlines()]
+
+
+def test_each_line_of_the_file_is_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "logs" / "run.jsonl"
+    with open_log(LogConfig(file=str(path)), terminal=True) as log:
+        log.info("mode", mode="DRIVE", reason='two\nlines and "quotes"', cycle=3)
+        log.warning("odd", thing=Path("a/b"), number=float("nan"))
+    first, second = lines(path)
+    assert first.pop("timestamp")
+    assert first == {
+        "event": "mode", "level": "info", "mode": "DRIVE", "reason": "two\nlines and \"quotes\"", "cycle": 3,
+    }  # fmt: skip
+    assert (second["event"], second["level"], second["thing"], second["number"]) == ("odd", "warning", "a/b", None)
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert "mode" in shown.err
+    assert "DRIVE" in shown.err
+    assert "\x1b" not in shown.err, "no colours where nobody sees them"
+
+
+def test_level_keeps_lesser_lines_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "run.jsonl"
+    with open_log(LogConfig(file=str(path), level="warning"), terminal=True) as log:
+        log.debug("a")
+        log.info("b")
+        log.warning("c")
+        log.error("d")
+    assert [line["event"] for line in lines(path)] == ["c", "d"]
+    assert len(capsys.readouterr().err.splitlines()) == 2
+
+
+def test_no_line_on_the_terminal_while_a_view_owns_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "run.jsonl"
+    with open_log(LogConfig(file=str(path)), terminal=False) as log:
+        log.error("quiet")
+    assert capsys.readouterr() == ("", "")
+    assert len(lines(path)) == 1
+
+
+def test_a_log_goes_on_where_it_ended(tmp_path: Path) -> None:
+    path = tmp_path / "run.jsonl"
+    for k in range(2):
+        with open_log(LogConfig(file=str(path)), terminal=False) as log:
+            log.info(f"run {k}")
+    assert [line["event"] for line in lines(path)] == ["run 0", "run 1"]
+
+
+def test_an_exception_stays_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "run.jsonl"
+    with open_log(LogConfig(file=str(path)), terminal=False) as log:
+        try:
+            Path("the cause").read_text("utf-8")
+        except FileNotFoundError:
+            log.exception("the cycle failed")
+    (line,) = lines(path)
+    assert line["level"] == "error"
+    assert "FileNotFoundError: " in str(line["exception"])
+
+
+@pytest.mark.parametrize("name", ["", "file/run.jsonl"])
+def test_a_file_that_cannot_be_written_is_a_wrong_configuration(tmp_path: Path, name: str) -> None:
+    (tmp_path / "file").touch()
+    path = tmp_path / name
+    with (
+        ExitStack() as stack,
+        pytest.raises(UserError, match=r"^log\.file = .* cannot be written: .*; choose another file$") as caught,
+    ):
+        stack.enter_context(open_log(LogConfig(file=str(path)), terminal=False))
+    assert caught.value.exit_code == WRONG_CALL
+    assert str(path) in str(caught.value)
+
+
+def test_without_a_file_of_its_own_the_log_goes_where_state_belongs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    with open_log(LogConfig(), terminal=False) as log:
+        log.info("kept")
+    assert [line["event"] for line in lines(tmp_path / "state" / "echolocate" / "echolocate.jsonl")] == ["kept"]
+
+
+def test_a_state_folder_that_cannot_be_written_is_no_reason_not_to_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "state").touch()
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    with open_log(LogConfig(), terminal=True) as log:
+        log.info("still here")
+    warning, line = capsys.readouterr().err.splitlines()
+    assert "no log file is kept" in warning
+    assert str(tmp_path / "state") in warning
+    assert "still here" in line

@@ -1,0 +1,80 @@
+"""A run's folder: gone at its end, or with the next start where the run was killed; nobody else's is touched."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from runtime.support.temp_folder import PREFIX, YOUNG_S, run_folder, sweep
+
+ROOT = Path(__file__).parents[3]
+OWNER = """
+import sys, time
+from runtime.support.temp_folder import run_folder
+with run_folder() as folder:
+    (folder / "robot").symlink_to("/dev/null")
+    sys.stdout.write(f"{folder}\\n")
+    sys.stdout.flush()
+    sys.stdin.read()
+"""
+
+
+@pytest.fixture(autouse=True)
+def _place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+
+
+def aged(folder: Path, by_s: float = 2.0 * YOUNG_S) -> Path:
+    now_s = folder.stat().st_mtime
+    os.utime(folder, (now_s - by_s, now_s - by_s))
+    return folder
+
+
+def owner() -> tuple[subprocess.Popen[str], Path]:
+    process = subprocess.Popen(
+        [sys.executable, "-c", OWNER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT
+    )
+    assert process.stdout is not None
+    return process, Path(process.stdout.readline().strip())
+
+
+def test_it_is_the_user_s_own_and_gone_at_the_end(tmp_path: Path) -> None:
+    with run_folder() as folder:
+        assert folder.parent == tmp_path
+        assert folder.stat().st_mode & 0o777 == 0o700
+        (folder / "robot").symlink_to("/dev/null")
+    assert list(tmp_path.iterdir()) == []
+    assert Path("/dev/null").exists()
+
+
+def test_what_a_killed_run_has_left_goes_with_the_next_start(tmp_path: Path) -> None:
+    process, folder = owner()
+    with process:
+        aged(folder)
+        sweep()
+        assert (folder / "robot").is_symlink(), "its owner lives"
+        process.kill()
+    assert folder.exists()
+    with run_folder() as own:
+        assert list(tmp_path.iterdir()) == [own]
+
+
+def test_what_is_not_ours_stays(tmp_path: Path) -> None:
+    young = tmp_path / f"{PREFIX}young"
+    young.mkdir()
+    link, elsewhere = tmp_path / f"{PREFIX}link", tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    link.symlink_to(aged(elsewhere))
+    os.utime(link, (0.0, 0.0), follow_symlinks=False)
+    file = tmp_path / f"{PREFIX}file"
+    file.touch()
+    os.utime(file, (0.0, 0.0))
+    others = {young, link, file, elsewhere, aged(Path(tempfile.mkdtemp(prefix="echolocate-bench-")))}
+    sweep()
+    assert set(tmp_path.iterdir()) == others

@@ -1,0 +1,74 @@
+"""Garbage while driving: the old is set aside, the young goes in slack only, and the books say who collected."""
+
+from __future__ import annotations
+
+import gc
+
+from runtime.timing.memory_policy import EVERY_CYCLES, SLACK_MIN_S, MemoryPolicy
+
+
+class Ring:
+    """Garbage that only a collection frees."""
+
+    def __init__(self) -> None:
+        self.itself = self
+
+
+def rings() -> int:
+    # Not isinstance: that asks weak proxies, which other libraries leave behind, for the class of what is gone.
+    return sum(type(thing) is Ring for thing in gc.get_objects())
+
+
+def test_nothing_is_collected_without_being_asked_for() -> None:
+    memory = MemoryPolicy()
+    with memory.driving():
+        for _ in range(5000):
+            Ring()
+        assert rings() == 5000
+        assert memory.collections == [0, 0, 0]
+    assert gc.isenabled()
+    gc.collect()
+    assert rings() == 0
+
+
+def test_young_garbage_goes_in_slack_and_only_there() -> None:
+    memory = MemoryPolicy()
+    with memory.driving():
+        for _ in range(3 * EVERY_CYCLES):
+            Ring()
+            memory.cycle_done(0.5 * SLACK_MIN_S)
+        assert memory.collections == [0, 0, 0], "there was no time"
+        memory.cycle_done(2.0 * SLACK_MIN_S)
+        assert memory.collections == [0, 1, 0]
+        assert rings() == 0
+        for _ in range(2 * EVERY_CYCLES):
+            memory.cycle_done(2.0 * SLACK_MIN_S)
+        assert memory.collections == [0, 3, 0]
+
+
+def test_what_lives_at_the_start_is_not_looked_at_again() -> None:
+    memory = MemoryPolicy()
+    old = [Ring() for _ in range(1000)]
+    with memory.driving():
+        assert gc.get_freeze_count() >= len(old)
+        assert len(gc.get_objects()) < len(old)
+    assert gc.get_freeze_count() == 0
+
+
+def test_a_collection_that_somebody_else_asked_for_is_in_the_books() -> None:
+    memory = MemoryPolicy()
+    with memory.driving():
+        gc.collect()
+    assert memory.collections == [0, 0, 1]
+    gc.collect()
+    assert memory.collections == [0, 0, 1], "after the drive it is nobody's business"
+
+
+def test_a_process_that_collects_nothing_by_itself_stays_that_way() -> None:
+    gc.disable()
+    try:
+        with MemoryPolicy().driving():
+            pass
+        assert not gc.isenabled()
+    finally:
+        gc.enable()

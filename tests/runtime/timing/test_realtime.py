@@ -1,0 +1,105 @@
+"""Asking for precedence: granted or refused, the run goes on, and a refusal says what to do."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from config.settings import RealtimeConfig
+from runtime.timing.realtime import ask
+
+ROOT = Path(__file__).parents[3]
+NOTHING = RealtimeConfig()
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="these requests are Linux's own")
+
+
+class Libc:
+    """A C library that refuses everything, and remembers."""
+
+    def __init__(self) -> None:
+        self.calls: list[str] = []
+
+    def mlockall(self, _flags: int) -> int:
+        self.calls.append("mlockall")
+        return -1
+
+    def syscall(self, *_arguments: object) -> int:
+        self.calls.append("syscall")
+        return -1
+
+
+@pytest.fixture
+def refusing(monkeypatch: pytest.MonkeyPatch) -> Libc:
+    libc = Libc()
+
+    def refuse(*_arguments: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr("runtime.timing.realtime.ctypes.CDLL", lambda *_a, **_k: libc)
+    monkeypatch.setattr("runtime.timing.realtime.ctypes.get_errno", lambda: 1)
+    monkeypatch.setattr("runtime.timing.realtime.os.sched_setscheduler", refuse)
+    monkeypatch.setattr("runtime.timing.realtime.os.sched_setaffinity", refuse)
+    return libc
+
+
+def test_nothing_is_asked_for_that_nobody_named(refusing: Libc) -> None:
+    assert ask(NOTHING) == []
+    assert refusing.calls == []
+
+
+def test_nothing_is_asked_for_by_default() -> None:
+    default = RealtimeConfig()
+    assert (default.slice_s, default.priority, default.core, default.lock_memory) == (None, None, None, False)
+
+
+@pytest.mark.usefixtures("refusing")
+def test_every_refusal_names_the_setting_the_reason_and_the_way_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("runtime.timing.realtime.platform.machine", lambda: "x86_64")
+    core = min(os.sched_getaffinity(0))
+    refusals = ask(RealtimeConfig(slice_s=0.001, priority=7, core=core, lock_memory=True))
+    names = [line.split(" ")[0] for line in refusals]
+    assert names == ["realtime.slice_s", "realtime.core", "realtime.lock_memory", "realtime.priority"]
+    assert all("Operation not permitted" in line and "leave it out" in line for line in refusals)
+    assert all("\n" not in line for line in refusals)
+    assert "ulimit -r 7" in refusals[3]
+    assert "ulimit -l" in refusals[2]
+
+
+def test_a_core_that_is_not_there_is_named_beside_those_that_are() -> None:
+    (line,) = ask(RealtimeConfig(core=4_000))
+    assert line.startswith("realtime.core = 4000 is not a core this process may use (")
+    assert str(min(os.sched_getaffinity(0))) in line
+
+
+def test_a_machine_whose_system_call_is_not_known_is_left_alone(
+    refusing: Libc, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("runtime.timing.realtime.platform.machine", lambda: "abacus")
+    assert ask(RealtimeConfig()) == []
+    assert refusing.calls == []
+
+
+IN_EARNEST = """
+import os, sys
+from config.settings import RealtimeConfig
+from runtime.timing.realtime import ask
+core = min(os.sched_getaffinity(0))
+refusals = ask(RealtimeConfig(slice_s=0.001, priority=5, core=core, lock_memory=True))
+policy = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
+named = {line.split(" ")[0] for line in refusals}
+assert ("realtime.priority" in named) == (policy != os.SCHED_FIFO), (refusals, policy)
+assert ("realtime.core" in named) == (os.sched_getaffinity(0) != {core}), refusals
+"""
+
+
+def test_in_earnest_what_is_not_refused_is_so() -> None:
+    """In a process of its own: nothing of it may stay with the tests that follow."""
+    done = subprocess.run(
+        [sys.executable, "-c", IN_EARNEST], cwd=ROOT, text=True, capture_output=True, timeout=60, check=False
+    )
+    assert done.returncode == 0, done.stderr

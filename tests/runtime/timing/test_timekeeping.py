@@ -1,0 +1,344 @@
+"""The timing books in virtual time: every delay is booked to whoever made it, and none is invented."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from config.load import load_settings
+from drivers.driver import Heard, LineState
+from drivers.messages import Firing, Flags, Odometry, Pose, Twist
+from perception.pipeline import Perception
+from runtime.cycle.modes import Request
+from runtime.cycle.step import Command, Inputs, Order, State, step
+from runtime.timing.clock_sampler import ClockSample, ClockSampler
+from runtime.timing.cycle_stats import CULPRITS_MAX, OTHERS, CycleStats
+from runtime.timing.pacing import CycleStart, Pacer
+from runtime.timing.phases import Phase
+from runtime.timing.stall_sampler import StackSample, StallSampler
+from runtime.timing.timekeeping import OUTSIDE, THREAD, UNTIMED, Timekeeper
+
+US = 1e-6
+PERIOD_US, LATE_US = 50_000, 5_000
+PHASE_US, RECEIVE_US = 200, 100
+BEGIN_US = 7_000_000
+
+
+class Machine:
+    """Clocks that only what happens moves; whole microseconds, so that books can be exact."""
+
+    def __init__(self) -> None:
+        self.wall_us, self.thread_us, self.process_us, self.waits = BEGIN_US, 0, 0, 0
+
+    def read(self) -> ClockSample:
+        return ClockSample(self.wall_us * US, self.thread_us * US, self.process_us * US, self.waits)
+
+    def work(self, us: int) -> None:
+        self.wall_us, self.thread_us, self.process_us = self.wall_us + us, self.thread_us + us, self.process_us + us
+
+    def be_put_aside(self, us: int) -> None:
+        self.wall_us += us
+
+    def block(self, us: int) -> None:
+        self.wall_us, self.waits = self.wall_us + us, self.waits + 1
+
+    def wait_for_thread(self, us: int) -> None:
+        self.wall_us, self.process_us, self.waits = self.wall_us + us, self.process_us + us, self.waits + 1
+
+
+@dataclass(frozen=True)
+class Delay:
+    """What goes wrong in one slot."""
+
+    place: str
+    us: int
+    how: Callable[[Machine, int], None]
+    culprit: str
+
+
+def delays(count: int, seed: int) -> list[Delay]:
+    chance = random.Random(seed)
+    made = []
+    for _ in range(count):
+        place = chance.choice([*(phase.value for phase in Phase), "link receive", "untimed", "asleep", "nowhere"])
+        how, culprit = chance.choice(
+            [(Machine.work, place), (Machine.block, place), (Machine.be_put_aside, OUTSIDE),
+             (Machine.wait_for_thread, THREAD)]
+        )  # fmt: skip
+        if place == "untimed":
+            how, culprit = Machine.work, UNTIMED
+        elif place == "asleep":
+            how, culprit = chance.choice([(Machine.block, OUTSIDE), (Machine.wait_for_thread, THREAD)])
+        us = 0 if place == "nowhere" else round(chance.choice([2e3, 60e3, 400e3]) * chance.random()) + 300
+        made.append(Delay(place, us, how, culprit))
+    return made
+
+
+class Run:
+    """A loop on that machine, with one delay a slot, beside an account of its own in whole microseconds."""
+
+    def __init__(self) -> None:
+        self.machine = Machine()
+        self.pacer = Pacer(BEGIN_US * US, PERIOD_US * US)
+        self.books = CycleStats(LATE_US * US)
+        self.keeper = Timekeeper(self.books, self.machine.read, callbacks=("link receive",))
+        self.receive = self.keeper.timed("link receive", self._at_receive)
+        self._delay = Delay("nowhere", 0, Machine.work, "")
+        # The account.
+        self.due_us = self.deadline_us = BEGIN_US
+        self.late = self.missed = self.overruns = 0
+        self.faults: Counter[str] = Counter()
+        self.phase_us = dict.fromkeys((phase.value for phase in Phase), 0)
+
+    def _meet(self, place: str) -> None:
+        if self._delay.place == place:
+            self._delay.how(self.machine, self._delay.us)
+
+    def _at_receive(self) -> None:
+        self.machine.work(RECEIVE_US)
+        self._meet("link receive")
+
+    def slot(self, delay: Delay) -> None:
+        """Run a cycle and what comes after it, up to the next one's beginning."""
+        self._delay, machine, began_us = delay, self.machine, self.machine.wall_us
+        for phase in Phase:
+            machine.work(PHASE_US)
+            self._meet(phase.value)
+            self.phase_us[phase.value] += PHASE_US + (delay.us if delay.place == phase.value else 0)
+            self.keeper.mark(phase)
+        self.keeper.end()
+        ended_us = machine.wall_us
+        self.pacer.advance(ended_us * US)
+        self.receive()
+        self._meet("untimed")
+        busy_us = machine.wall_us - began_us - (delay.us if delay.place == "untimed" else 0)
+        machine.block(max(0, round(self.pacer.deadline_s / US) - machine.wall_us))
+        self._meet("asleep")
+        self._account(ended_us, busy_us)
+        self.begin()
+
+    def _account(self, ended_us: int, busy_us: int) -> None:
+        now_us = self.machine.wall_us
+        while self.deadline_us <= ended_us:
+            self.deadline_us += PERIOD_US
+        missed = 0
+        while self.due_us + PERIOD_US // 2 <= now_us:
+            self.due_us += PERIOD_US
+            missed += 1
+        self.missed += missed
+        overrun = missed > 0 or busy_us >= PERIOD_US
+        late = now_us - self.deadline_us > LATE_US
+        self.late += late
+        self.overruns += overrun
+        if late or overrun:
+            self.faults[self._delay.culprit] += 1
+
+    def begin(self) -> CycleStart:
+        now, period_s = self.machine.read(), self.pacer.period_s
+        begun = self.pacer.begin(now.wall_s)
+        self.keeper.begin(now, begun, period_s, is_following=False)
+        if self.missed or self.machine.wall_us > BEGIN_US:
+            self.due_us += PERIOD_US
+            self.deadline_us = self.due_us
+        else:
+            self.due_us = self.deadline_us = BEGIN_US + PERIOD_US
+        return begun
+
+
+def test_ten_thousand_delays_are_booked_to_whoever_made_them_and_none_is_invented() -> None:
+    run = Run()
+    run.begin()
+    injected = delays(10_000, 11)
+    for number, delay in enumerate(injected):
+        run.slot(delay)
+        assert run.books.faults == dict(run.faults), (number, delay)
+        assert (run.pacer.missed, run.keeper.overruns) == (run.missed, run.overruns), (number, delay)
+    timing = run.keeper.timing()
+    assert (run.books.cycles, run.books.missed, timing["missed"]) == (10_000, run.missed, run.missed)
+    # The lateness of the last cycle, which has not ended, is not booked yet.
+    assert run.late - 1 <= run.books.late <= run.late
+    assert sum(run.faults.values()) > 2_000
+    assert set(run.faults) == {*(phase.value for phase in Phase), "link receive", UNTIMED, OUTSIDE, THREAD}
+    for phase in Phase:
+        total_us = run.keeper._phases[phase].total_s / US
+        assert total_us == pytest.approx(run.phase_us[phase.value], abs=1.0)
+        worst = max((d.us for d in injected if d.place == phase.value), default=0)
+        assert timing["phases"][phase.value]["max"] == pytest.approx(PHASE_US + worst, abs=0.2)
+    assert timing["callbacks"]["link receive"]["p50"] == pytest.approx(RECEIVE_US, abs=0.2)
+
+
+def test_without_delays_there_is_nothing_to_blame() -> None:
+    run = Run()
+    run.begin()
+    for _ in range(2_000):
+        run.slot(Delay("nowhere", 0, Machine.work, ""))
+    timing = run.keeper.timing()
+    assert (timing["faults"], timing["overruns"], timing["missed"], run.books.late) == ({}, 0, 0, 0)
+    assert all(spread["max"] == pytest.approx(PHASE_US, abs=0.2) for spread in timing["phases"].values())
+    assert timing["late"]["max"] == pytest.approx(0.0, abs=0.2)
+
+
+def test_overruns_in_a_row_are_counted_until_a_cycle_keeps_its_time() -> None:
+    run = Run()
+    run.begin()
+    rows = []
+    for us in (60_000, 60_000, 90_000, 10_000, 60_000):
+        run.slot(Delay("refine", us, Machine.work, "refine"))
+        rows.append(run.keeper.in_a_row)
+    assert rows == [1, 2, 3, 0, 1]
+    for culprit in ("perceive", "perceive"):
+        assert run.keeper.culprit == "refine"
+        run.slot(Delay(culprit, 60_000, Machine.work, culprit))
+    assert run.keeper.culprit == "perceive", "the most frequent one of the row"
+    run.slot(Delay("nowhere", 0, Machine.work, ""))
+    assert (run.keeper.in_a_row, run.keeper.culprit) == (0, "")
+
+
+def test_what_the_watch_saw_has_a_name() -> None:
+    run, sights = Run(), [StackSample("Recorder.flush", "fsync"), StackSample("RobotProcess.run", "View.on_cycle")]
+    run.keeper = Timekeeper(run.books, run.machine.read, lambda: sights[0], ("link receive",))
+    run.receive = run.keeper.timed("link receive", run._at_receive)
+    run.begin()
+    run.slot(Delay("untimed", 70_000, Machine.work, ""))
+    run.slot(Delay("untimed", 70_000, Machine.block, ""))
+    assert run.books.faults == {"callback Recorder.flush": 2}
+    sights.pop(0)
+    run.slot(Delay("observers", 70_000, Machine.work, ""))
+    assert run.books.faults["observers (in View.on_cycle)"] == 1
+
+
+def test_names_are_bounded() -> None:
+    books = CycleStats(LATE_US * US)
+    for number in range(1000):
+        books.blame(f"callback {number}")
+    assert len(books.faults) == CULPRITS_MAX + 1
+    assert books.faults[OTHERS] == 1000 - CULPRITS_MAX
+
+
+# The real step.
+
+SETTINGS = load_settings("hallway", ["perception.method=paper"])
+
+
+class Slow(Perception):
+    """Perception whose parts take their time."""
+
+    machine: Machine
+    observe_us = refine_us = 0
+
+    def observe(self, firing: Firing) -> int:
+        self.machine.work(self.observe_us)
+        return super().observe(firing)
+
+    @property
+    def pending(self) -> bool:
+        return self.refine_us > 0
+
+    def refine(self) -> int:
+        self.machine.work(self.refine_us)
+        return 1
+
+
+@pytest.mark.parametrize("observe_us", [0, 7_000])
+@pytest.mark.parametrize("command_us", [0, 9_000])
+@pytest.mark.parametrize("refine_us", [0, 400_000])
+def test_the_step_marks_its_phases_and_no_overrun_delays_a_stop(
+    observe_us: int, command_us: int, refine_us: int
+) -> None:
+    machine = Machine()
+    perception = Slow(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
+    perception.machine, perception.observe_us = machine, observe_us
+    books = CycleStats(LATE_US * US)
+    keeper = Timekeeper(books, machine.read)
+    state, commands = State(perception), list[tuple[Command, int]]()
+
+    def carry_out(command: Command) -> None:
+        commands.append((command, machine.wall_us))
+        machine.work(command_us)
+
+    here = Pose(0.0, 0.0, 0.0)
+    for cycle in range(30):
+        perception.refine_us = refine_us if cycle > 20 else 0
+        began_us = machine.wall_us
+        t_s = 1.0 + 0.05 * cycle
+        heard = Heard(
+            (Firing(t_s, here, 0.0, np.full(24, 3.0)),),
+            Odometry(t_s, here, 0.0, Twist(0.0, 0.0), Flags.NONE, 0),
+            rebooted=False,
+        )
+        request = {1: Request.ARM, 25: Request.HALT}.get(cycle)
+        keeper.begin(machine.read(), CycleStart(began_us * US, 0.0, 0, None), 1e3, is_following=False)
+        inputs = Inputs(t_s, LineState.READY, None, heard, request)
+        record = step(state, inputs, SETTINGS, carry_out, lambda done: done < 1, keeper.mark)
+        keeper.end()
+        assert commands[-1][1] - began_us == observe_us, "the command waits for nothing but the part that always runs"
+        took = {stretch.name: round(stretch.wall_s / US) for stretch in keeper._stretches}
+        assert took == {
+            "perceive": observe_us, "decide": 0, "command": command_us, "refine": perception.refine_us
+        }  # fmt: skip
+        assert record.quanta == (perception.refine_us > 0)
+        assert record.refinement == ("budget" if perception.refine_us else "nothing")
+    assert commands[25][0] is Order.HALT
+    assert isinstance(commands[24][0], Twist)
+
+
+# The real clocks.
+
+
+def test_the_meter_tells_work_from_sleep() -> None:
+    meter = ClockSampler()
+    before = meter.read()
+    time.sleep(0.02)
+    slept = meter.read()
+    assert slept.waits > before.waits
+    assert slept.wall_s - before.wall_s >= 0.02
+    assert slept.thread_s - before.thread_s < 0.5 * (slept.wall_s - before.wall_s)
+    while meter.read().thread_s - slept.thread_s < 0.02:
+        pass
+    worked = meter.read()
+    # The clocks are read one after another.
+    assert worked.thread_s - slept.thread_s <= worked.process_s - slept.process_s + 0.01
+
+
+def hold(watch: StallSampler) -> None:
+    # Set in here: whoever runs when it rings is seen, and a busy machine may let it ring at once.
+    watch.expect(0.01)
+    end_s = time.monotonic() + 60.0
+    while watch.seen is None and time.monotonic() < end_s:
+        pass
+
+
+async def test_the_watch_names_the_callback_that_holds_the_loop() -> None:
+    watch = StallSampler()
+    with watch.on_duty():
+        asyncio.get_running_loop().call_soon(hold, watch)
+        async with asyncio.timeout(60.0):
+            while watch.seen is None:
+                await asyncio.sleep(0.001)
+        assert watch.seen in {("hold", "hold"), ("hold", "StallSampler.expect")}
+        watch.expect(600.0)
+        assert watch.seen is None
+
+
+async def test_the_watch_sees_nobody_where_the_loop_sleeps() -> None:
+    watch, looks = StallSampler(), list[None]()
+    look = watch._look
+
+    def counted(number: int, frame: object) -> None:
+        looks.append(None)
+        look(number, frame)  # type: ignore[arg-type]
+
+    watch._look = counted  # type: ignore[method-assign, assignment]
+    with watch.on_duty():
+        watch.expect(0.005)
+        async with asyncio.timeout(60.0):
+            while not looks:
+                await asyncio.sleep(0.2)
+    assert watch.seen is None or watch.seen.callback.startswith("test_the_watch_sees_nobody")
