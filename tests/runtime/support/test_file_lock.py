@@ -15,7 +15,7 @@ from runtime.support.errors import FAILED, UserError
 from runtime.support.file_lock import file_lock
 
 ROOT = Path(__file__).parents[3]
-HOLD = "import sys, pathlib\nfrom runtime.support.file_lock import owned\n" + (
+HOLD = "import sys, pathlib\nfrom runtime.support.file_lock import file_lock\n" + (
     "with file_lock(pathlib.Path(sys.argv[1]), 'x'):\n    print('held', flush=True)\n    sys.stdin.read()\n"
 )
 KILLS = 20

@@ -144,7 +144,7 @@ def test_each_part_is_compiled_once_and_warmed_up_ever_after(home: Path, monkeyp
     monkeypatch.setattr(kernels, "warm_up", lambda _settings, parts: happened.extend(parts))
     settings, console = load_settings("hallway"), Console(quiet=True)
     kernels.ready_kernels(settings, console)
-    assert happened == ["compile emulator", "compile full"]
+    assert happened == ["compile emulator", "compile bayes"]
     happened.clear()
     kernels.ready_kernels(settings, console)
     assert happened == ["bayes"], "the emulator is another process"
@@ -162,7 +162,7 @@ def test_each_part_is_compiled_once_and_warmed_up_ever_after(home: Path, monkeyp
 @pytest.mark.parametrize(
     ("parts", "processors", "helped"),
     [
-        ((kernels.EMULATOR, kernels.CIRCLES), 2, ["helper full", "hear"]),
+        ((kernels.EMULATOR, kernels.CIRCLES), 2, ["helper bayes", "hear"]),
         ((kernels.CIRCLES, kernels.POLYGONS), 2, ["helper polygons", "hear", "bayes"]),
         ((kernels.POLYGONS,), 2, []),
         ((kernels.EMULATOR, kernels.CIRCLES), 1, []),
@@ -275,8 +275,8 @@ sys.exit(" ".join(late))
 @pytest.mark.parametrize(
     ("sets", "models", "further"),
     [
-        ("perception.method=full", "semicircle", "drum"),
-        ("perception.method=full", "semicircle box", "hexagon.toml"),
+        ("perception.method=bayes", "semicircle", "drum"),
+        ("perception.method=bayes", "semicircle box", "hexagon.toml"),
         ("perception.method=paper", "semicircle", "box"),
     ],
 )

@@ -225,4 +225,4 @@ def test_nobody_else_knows_matplotlib() -> None:
         if re.search(r"^\s*(import|from) (matplotlib|PIL)", path.read_text("utf-8"), re.MULTILINE)
     ]
     assert knows
-    assert all(path.startswith("runtime/drawing/") for path in knows), knows
+    assert all(path.startswith("runtime/analysis/plots/") for path in knows), knows
