@@ -26,7 +26,7 @@ from runtime.support.errors import UserError
 from runtime.support.kernel_cache import PARTS, ready_kernels, use_cache
 
 OURS: Final = (
-    Method("echolocate, full", ("perception.method=full",)),
+    Method("echolocate, bayes", ("perception.method=bayes",)),
     Method("echolocate, paper", ("perception.method=paper",)),
 )
 """Our own methods, a line each."""

@@ -29,7 +29,7 @@ ERF: Final = np.array([math.erf(v) for v in ERF_AT])
 
 def heard(hall: Hall, seed: int, sigma: float) -> list[list[tuple[float, ...]]]:
     """Return for each drum the readings that are its own up to `BEFORE`: x, y, range (ft) and axis."""
-    ring = load_settings("hallway", ["perception.method=full"]).ring
+    ring = load_settings("hallway", ["perception.method=bayes"]).ring
     rows: list[list[tuple[float, ...]]] = [[] for _ in hall.world.drum]
     for firing in readings(ring, hall, seed):
         for mount, range_m in zip(ring.mounts, firing.ranges_m, strict=True):

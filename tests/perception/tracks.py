@@ -28,9 +28,9 @@ from perception.segments import mounts_array
 from tests import naive_bayes as naive_full
 from tests.naive_tracks import Line
 
-SETTINGS = load_settings("hallway", ["perception.method=full"])
+SETTINGS = load_settings("hallway", ["perception.method=bayes"])
 
-BOXES = load_settings("hallway", ["perception.method=full"], models=("semicircle", "box"))
+BOXES = load_settings("hallway", ["perception.method=bayes"], models=("semicircle", "box"))
 
 MOUNTS = mounts_array(SETTINGS.ring.mounts)
 

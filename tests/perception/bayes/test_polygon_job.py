@@ -22,7 +22,7 @@ from runtime.simulation.scenes import halls, readings
 pytestmark = pytest.mark.compiled
 
 FT = 0.3048
-SETTINGS = load_settings("hallway", ["perception.method=full"], models=("semicircle", "box"))
+SETTINGS = load_settings("hallway", ["perception.method=bayes"], models=("semicircle", "box"))
 P = make_settings(SETTINGS.ring, SETTINGS.models, SETTINGS.perception.bayes)
 THRESHOLD = SETTINGS.perception.bayes.fresh_share
 POSE_MAX = cost(PB * PCAP, 1, 4)

@@ -21,7 +21,7 @@ from runtime.simulation.scenes import PLACES_FT, Hall, readings
 pytestmark = pytest.mark.compiled
 
 FT = 0.3048
-SETTINGS = load_settings("hallway", ["perception.method=full"], models=("semicircle", "box"))
+SETTINGS = load_settings("hallway", ["perception.method=bayes"], models=("semicircle", "box"))
 SEEDS = range(6000, 6016)
 
 

@@ -22,7 +22,7 @@ from runtime.simulation.scenes import Hall, readings
 pytestmark = pytest.mark.compiled
 
 FT: Final = 0.3048
-SETTINGS = load_settings("hallway", ["perception.method=full"])
+SETTINGS = load_settings("hallway", ["perception.method=bayes"])
 Acoustics = Literal["cone", "specular"]
 Pose = tuple[float, float, float]
 """x, y, ft; heading, degrees."""

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.compiled
 
 FT = 0.3048
 SEEDS = range(5000, 5016)
-SETTINGS = load_settings("hallway", ["perception.method=full"])
+SETTINGS = load_settings("hallway", ["perception.method=bayes"])
 
 
 @pytest.fixture(scope="module")

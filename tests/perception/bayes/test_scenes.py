@@ -22,8 +22,8 @@ from runtime.simulation.scene_names import SceneName
 from runtime.simulation.scenes import Hall, halls, readings
 
 FT = 0.3048
-SETTINGS = load_settings("hallway", ["perception.method=full"])
-BOXES = load_settings("hallway", ["perception.method=full"], models=("semicircle", "box"))
+SETTINGS = load_settings("hallway", ["perception.method=bayes"])
+BOXES = load_settings("hallway", ["perception.method=bayes"], models=("semicircle", "box"))
 
 
 def result(outcomes: Iterable[HallOutcome]) -> tuple[int, int, int, list[float]]:
