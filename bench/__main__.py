@@ -21,8 +21,8 @@ from bench.timing import Timing, TimingPlan, measure_timing
 from bench.timing_table import figures_table, quantiles_table, read_earlier
 from bench.waking import figures, waking_table
 from bench.waking import measure as measure_waking
+from config.errors import UserError
 from config.load import load_settings
-from runtime.support.errors import UserError
 from runtime.support.kernel_cache import PARTS, ready_kernels, use_cache
 
 OURS: Final = (

@@ -19,6 +19,7 @@ import orjson
 from cyclopts import App, Parameter
 from rich.console import Console
 
+from config.errors import DONE, FAILED
 from config.load import load_settings
 from config.settings import Settings
 from drivers.denning.device import EmulatedRobot
@@ -29,7 +30,6 @@ from perception.pipeline import Perception
 from runtime.cycle.driver_io import gather, give
 from runtime.cycle.modes import Mode, Request
 from runtime.cycle.step import Inputs, State, step
-from runtime.support.errors import DONE, FAILED
 from runtime.support.kernel_cache import ready_kernels
 from runtime.timing.memory_policy import MemoryPolicy
 from runtime.timing.phases import Phase

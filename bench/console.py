@@ -23,7 +23,7 @@ from cyclopts import App
 from rich.table import Table
 
 from bench.timing import DRIVE_ON, PATIENCE_S, emulating, finish, start
-from runtime.support.errors import FAILED, UserError
+from config.errors import FAILED, UserError
 from tests.rawpage import RawPage
 
 PAGES: Final = 5

@@ -16,12 +16,12 @@ import orjson
 from cyclopts import App, Parameter
 from rich.console import Console
 
+from config.errors import DONE, FAILED
 from config.load import load_settings
 from drivers.denning.device import Truth
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord
 from runtime.simulation.closed_loop import simulate
-from runtime.support.errors import DONE, FAILED
 from runtime.support.kernel_cache import compiled_signatures, ready_kernels
 from runtime.timing.footprint import own_mb
 from runtime.timing.memory_policy import MemoryPolicy

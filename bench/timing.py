@@ -26,10 +26,10 @@ import numpy as np
 import orjson
 
 from bench.waking import PERIOD_S, hogs
+from config.errors import FAILED, UserError
 from config.load import load_settings
 from config.robot import SOUND_SPEED_M_S
 from runtime.simulation.closed_loop import simulate
-from runtime.support.errors import FAILED, UserError
 
 ECHO_TO_DRIVE: Final = "echo to drive"
 LATE: Final = "timing: late"

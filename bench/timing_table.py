@@ -11,7 +11,7 @@ from rich.table import Table
 
 from bench.recording import DROPPED, HOUR_MB, LOOP_P99
 from bench.timing import CONTROL, ECHO_TO_DRIVE, LATE, VIRTUAL, WAKING, WINDOW_USED, Timing
-from runtime.support.errors import WRONG_CALL, UserError
+from config.errors import WRONG_CALL, UserError
 
 COLUMNS: Final = ("p50", "p99", "p99.9", "max")
 ANSWER_MAX_US: Final = 3000.0

@@ -15,6 +15,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
+from config.errors import WRONG_CALL, UserError
 from config.layers import Source
 
 Kind: TypeAlias = Literal["robots", "worlds", "models", "runs"]
@@ -35,14 +36,16 @@ _LONG_KEY = re.compile(rf"{_KEY}(?:[ \t]*+\.[ \t]*+{_KEY}){{31}}")
 """A dotted key of 32 parts. Nothing in it backtracks, and parts too long for it are too few to matter."""
 
 
-class ConfigError(Exception):
-    """What is wrong with the settings, one line for each problem, fit to be shown to the user.
+class ConfigError(UserError):
+    """The settings are wrong: one line for each problem, ready to be shown to the user.
 
     Parameters
     ----------
     problems
         One line each; never empty.
     """
+
+    exit_code = WRONG_CALL
 
     def __init__(self, *problems: str) -> None:
         super().__init__("\n".join(problems))

@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from config.errors import WRONG_CALL, UserError
+
 Location: TypeAlias = tuple[str | int, ...]
 """The way from the root to a value: keys of tables, numbers of list entries."""
 
@@ -40,8 +42,10 @@ class Source:
         return location[len(self.mount) :] if inside else location
 
 
-class PathError(Exception):
-    """A dotted path that leads nowhere in the tree; its text says why."""
+class PathError(UserError):
+    """A dotted path names no setting; the text says why."""
+
+    exit_code = WRONG_CALL
 
 
 class Layers:

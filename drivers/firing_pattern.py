@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from config.errors import WRONG_CALL, UserError
 from config.robot import SOUND_SPEED_M_S, Preset, RingConfig
 
 _AT_A_TIME: Mapping[Preset, tuple[int, ...]] = MappingProxyType(
@@ -27,8 +28,10 @@ _AT_A_TIME: Mapping[Preset, tuple[int, ...]] = MappingProxyType(
 _TOLERANCE_S = 1e-9
 
 
-class FiringError(ValueError):
-    """A firing pattern that this ring cannot carry out: what, why, and what would do."""
+class FiringError(UserError):
+    """The ring cannot carry out the firing pattern; the text says why and what would work."""
+
+    exit_code = WRONG_CALL
 
 
 @dataclass(frozen=True, slots=True)

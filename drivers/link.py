@@ -19,7 +19,7 @@ import serial
 import serial_asyncio
 
 from config.robot import LinkConfig
-from drivers.serial_port import OPENING_ERRORS, LinkError, OpenPort, explain, open_port
+from drivers.serial_port import OPENING_ERRORS, LinkError, OpenPort, open_port, opening_error
 
 __all__ = ["Link", "LinkError"]
 
@@ -228,7 +228,7 @@ class _Line(asyncio.Protocol):
             self.transport = _Transport(asyncio.get_running_loop(), self, port)
         except OPENING_ERRORS as e:  # it sets the port up anew, which may be gone again
             port.close()
-            raise LinkError(explain(link.config, e)) from e
+            raise opening_error(link.config, e) from e
         # Any byte that waits counts as not drained.
         self.transport.set_write_buffer_limits(high=0, low=0)
 
@@ -336,9 +336,9 @@ async def _open_off_loop(config: LinkConfig, opener: OpenPort, timeout_s: float)
             port = await opened
         taken = True
     except TimeoutError as e:
-        raise LinkError(explain(config, TimeoutError(f"{timeout_s:g} s so far"))) from e
+        raise opening_error(config, TimeoutError(f"{timeout_s:g} s so far")) from e
     except OPENING_ERRORS as e:
-        raise LinkError(explain(config, e)) from e
+        raise opening_error(config, e) from e
     finally:
         if not taken and opened.done() and not opened.cancelled() and opened.exception() is None:
             opened.result().close()

@@ -13,6 +13,7 @@ from typing import TypeAlias
 
 import serial
 
+from config.errors import FAILED, WRONG_CALL, UserError
 from config.robot import LinkConfig
 
 OpenPort: TypeAlias = Callable[[LinkConfig], serial.Serial]
@@ -22,13 +23,24 @@ OPENING_ERRORS = (OSError, ValueError, OverflowError, termios.error)
 """What the serial library raises where a port cannot be opened or set up."""
 
 
-class LinkError(Exception):
-    """The serial line cannot be had: what happened, likely cause, next action, in one line."""
+class LinkError(UserError):
+    """The serial port cannot be opened: one line with what happened, the likely cause and the next action."""
+
+    exit_code = WRONG_CALL
 
 
 def open_port(config: LinkConfig) -> serial.Serial:
     """Open the port, for this process alone. Blocks."""
     return serial.Serial(config.port, config.baud, exclusive=True, timeout=0, write_timeout=0)
+
+
+_IN_USE = (errno.EAGAIN, errno.EBUSY, errno.EWOULDBLOCK)
+
+
+def opening_error(config: LinkConfig, error: BaseException) -> LinkError:
+    """Return the error for the user: a port in use is a failure, any other cause is a wrong call."""
+    in_use = getattr(error, "errno", None) in _IN_USE
+    return LinkError(explain(config, error), FAILED if in_use else WRONG_CALL)
 
 
 def explain(config: LinkConfig, error: BaseException) -> str:
@@ -46,7 +58,7 @@ def explain(config: LinkConfig, error: BaseException) -> str:
             f"no permission to open {port}; likely this user is not in the port's group (dialout on most systems): "
             f"add the user to it and log in again"
         )
-    if number in (errno.EAGAIN, errno.EBUSY, errno.EWOULDBLOCK):
+    if number in _IN_USE:
         return (
             f"port {port} is in use by another program; find it with `fuser {port}` and end it, or use another port"
         )

@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TextIO
 
+from config.errors import UserError
 from config.robot import RobotConfig
 from config.world import WorldConfig
 from drivers.denning.device import EmulatedRobot
@@ -37,8 +38,8 @@ _READ_MAX = 4096
 _NO_HOST = frozenset({errno.EIO, errno.ENXIO})
 
 
-class EmulatorError(Exception):
-    """The emulator cannot do what it was asked; the message says what and why, in one line."""
+class EmulatorError(UserError):
+    """The emulator cannot start or be controlled; the text is one line with the reason."""
 
 
 class PtyPort:

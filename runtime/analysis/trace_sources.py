@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from config.errors import WRONG_CALL, UserError
 from config.load import load_settings, load_world
 from config.settings import Settings
 from drivers.denning.robot import DenningRobot
@@ -20,10 +21,9 @@ from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import BOOKMARK, LOG, SERIAL, SUMMARY, Entry, decode
 from runtime.recording.reader import Recording, RecordingError, is_recording, open_recording
 from runtime.recording.replayer import replay
-from runtime.recording.ring_log import RingLogError, read_ring_log
+from runtime.recording.ring_log import read_ring_log
 from runtime.recording.ring_log_replay import replay as replay_firings
 from runtime.recording.schema import Bookmark, LogLine, RunEnd, SerialBytes
-from runtime.support.errors import WRONG_CALL, UserError
 
 Told = Callable[[], None]
 SAID_MAX: Final = 1000
@@ -59,19 +59,16 @@ def trace_of(asked: Asked, ready: Callable[[Settings], None], on_step: Told = la
         The file is none that can be read, or holds nothing to show.
     """
     path = Path(asked.file)
-    try:
-        if not is_recording(path):
-            return _of_ring_log(path, asked, ready, on_step)
-        if asked.sets or asked.robot is not None or asked.models:
-            raise UserError(
-                f"{path}: is a recording and knows its settings; --set, --robot and --model are for ring logs",
-                WRONG_CALL,
-            )
-        with open_recording(path) as recording:
-            ready(recording.settings)
-            return _of_recording(recording, asked, on_step)
-    except (RecordingError, RingLogError) as error:
-        raise UserError(str(error), WRONG_CALL) from error
+    if not is_recording(path):
+        return _of_ring_log(path, asked, ready, on_step)
+    if asked.sets or asked.robot is not None or asked.models:
+        raise UserError(
+            f"{path}: is a recording and knows its settings; --set, --robot and --model are for ring logs",
+            WRONG_CALL,
+        )
+    with open_recording(path) as recording:
+        ready(recording.settings)
+        return _of_recording(recording, asked, on_step)
 
 
 def _of_recording(recording: Recording, asked: Asked, on_step: Told) -> Trace:

@@ -12,11 +12,11 @@ from typing import Annotated, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
+from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from runtime import VERSION
 from runtime.cli.app_analysis import export, figures, report
 from runtime.cli.options import ConfigFile, Flag, JsonFile, ModelFiles, RobotFile, Seed, Sets, Several, UnitsOption
 from runtime.simulation.scene_names import SceneName
-from runtime.support.errors import DONE, FAILED, WRONG_CALL, UserError
 
 app = App(
     name="echolocate",
@@ -316,7 +316,6 @@ def main(arguments: list[str] | None = None) -> None:
 
 def call(arguments: list[str]) -> int:
     """Run one command and return its exit code; what a user can cause becomes a line on stderr."""
-    from config.load import ConfigError
     from runtime.support.kernel_cache import use_cache
 
     use_cache()
@@ -325,12 +324,9 @@ def call(arguments: list[str]) -> int:
     except CycloptsError as error:
         complain(f"{' '.join(str(error).split())} See `echolocate --help`.")
         return WRONG_CALL
-    except ConfigError as error:
+    except UserError as error:
         complain(str(error))
-        return WRONG_CALL
-    except UserError as complaint:
-        complain(str(complaint))
-        return complaint.exit_code
+        return error.exit_code
     except KeyboardInterrupt:
         return FAILED
     return result if isinstance(result, int) else DONE

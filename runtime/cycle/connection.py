@@ -6,11 +6,11 @@ import asyncio
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
+from config.errors import FAILED, UserError
 from drivers.driver import LineState, RobotDriver
-from drivers.link import Link, LinkError
+from drivers.link import Link
 from drivers.messages import Flags
 from runtime.cycle.step import STANDSTILL
-from runtime.support.errors import FAILED, WRONG_CALL, UserError
 
 CONNECT_MAX_S: Final = 5.0
 """A robot that has not answered properly by then will not without help."""
@@ -35,15 +35,13 @@ class Connection(NamedTuple):
 
         Raises
         ------
+        LinkError
+            The port cannot be opened.
         UserError
-            The port cannot be opened, or the robot does not answer as it should.
+            The robot does not answer, or answers with errors.
         """
         link, driver = self.link, self.driver
-        try:
-            await link.open_once()
-        except LinkError as error:
-            in_use = "in use" in str(error)
-            raise UserError(str(error), FAILED if in_use else WRONG_CALL) from error
+        await link.open_once()
         give_up_s = self.clock() + CONNECT_MAX_S
         while driver.state is not LineState.READY and not is_stopping():
             now_s = self.clock()

@@ -9,11 +9,11 @@ from typing import NotRequired, TypedDict
 
 import orjson
 
+from config.errors import FAILED, UserError
 from drivers.driver import RobotDriver
 from drivers.messages import Pose
 from perception.pipeline import SeenObject
 from runtime.cycle.step import State
-from runtime.support.errors import FAILED, UserError
 from runtime.timing.cycle_stats import CycleStats, Quantiles
 from runtime.timing.footprint import FootprintRow
 from runtime.timing.timekeeping import Timekeeper, Timing

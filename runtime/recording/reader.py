@@ -13,6 +13,7 @@ from typing import Any, Final
 import orjson
 from pydantic import ValidationError
 
+from config.errors import WRONG_CALL, UserError
 from config.settings import Settings
 from config.world import WorldConfig
 from runtime.recording.channels import ABOUT, Entry, decode
@@ -24,8 +25,10 @@ MAGIC: Final = b"\x89MCAP"
 SECOND_NS: Final = 1_000_000_000
 
 
-class RecordingError(Exception):
-    """A file that is no recording, or none that can be read; its text is one line for the user."""
+class RecordingError(UserError):
+    """The file is not a recording or cannot be read; the text is one line for the user."""
+
+    exit_code = WRONG_CALL
 
 
 @dataclass

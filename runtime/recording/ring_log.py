@@ -16,6 +16,7 @@ from typing import BinaryIO, Final, TextIO
 
 import numpy as np
 
+from config.errors import WRONG_CALL, UserError
 from drivers.messages import Firing, Pose
 
 REQUIRED: Final = ("t", "x", "y", "theta")
@@ -30,8 +31,10 @@ _RANGE: Final = "metres ≥ 0, 'inf' for fired and heard nothing, or nothing for
 _SPELT_INF: Final = re.compile(r"\s*\+?inf(inity)?\s*", re.IGNORECASE)
 
 
-class RingLogError(Exception):
-    """A ring log that cannot be read or written; its text is one line for the user."""
+class RingLogError(UserError):
+    """The ring log cannot be read or written; the text is one line for the user."""
+
+    exit_code = WRONG_CALL
 
 
 def read_ring_log(path: Path, sensors: int | None = None) -> Iterator[Firing]:

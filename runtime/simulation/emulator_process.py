@@ -10,8 +10,8 @@ from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from config.errors import FAILED, WRONG_CALL, UserError
 from runtime.support.child_process import start_child
-from runtime.support.errors import FAILED, WRONG_CALL, UserError
 from runtime.support.temp_folder import run_folder
 from runtime.timing.run_clock import PacedClock
 from runtime.timing.time_control import EmulatorControl

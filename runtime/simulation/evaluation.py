@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from statistics import mean, pstdev
 from typing import Any, Final, NotRequired, TypedDict
 
+from config.errors import FAILED, UserError
 from config.settings import Settings
 from config.units import FOOT_M
 from config.world import WorldConfig
@@ -17,7 +18,6 @@ from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord, State
 from runtime.cycle.summary import object_row
 from runtime.simulation.closed_loop import Simulated, simulate
-from runtime.support.errors import FAILED, UserError
 from runtime.timing.cycle_stats import Quantiles, worst_of
 
 GATE_M: Final = FOOT_M

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from runtime.support.errors import FAILED, UserError
+from config.errors import FAILED, UserError
 
 _TRIES: Final = 10
 

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, Final
 import orjson
 import structlog
 
+from config.errors import WRONG_CALL, UserError
 from runtime.support.background_writer import BackgroundWriter, to_file, to_terminal
-from runtime.support.errors import WRONG_CALL, UserError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, MutableMapping

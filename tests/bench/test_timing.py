@@ -24,7 +24,7 @@ from bench.timing import (
     worst_rows,
 )
 from bench.timing_table import figures_table, quantiles_table, read_earlier, verdicts
-from runtime.support.errors import UserError
+from config.errors import UserError
 
 PLAN = TimingPlan(1.0, 1, 0)
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from runtime.support.errors import DONE, FAILED
+from config.errors import DONE, FAILED
 from tests.hil.planted import planted
 from tests.hil.running import Running
 

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import pytest
 
+from config.errors import FAILED, WRONG_CALL
 from runtime.cycle.connection import CONNECT_MAX_S
-from runtime.support.errors import FAILED, WRONG_CALL
 from tests.hil.machine import BareStarts, stalls_excused
 from tests.hil.running import Running, emulated, running, wait_for
 from tests.hil.truth import is_driving

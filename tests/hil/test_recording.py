@@ -13,11 +13,11 @@ from typing import Any
 
 import pytest
 
+from config.errors import DONE, FAILED
 from runtime.cli.app import call
 from runtime.recording.channels import CYCLE, KEYFRAME, LOG, SERIAL, decode
 from runtime.recording.reader import open_recording
 from runtime.recording.schema import About, Cycle, LogLine, SerialBytes
-from runtime.support.errors import DONE, FAILED
 from tests.hil.machine import stalls_excused
 from tests.hil.running import running
 from tests.recorded import entries_of

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from config.errors import DONE
 from runtime.cli.app import call
 from runtime.recording.channels import SETTINGS
 from runtime.recording.reader import open_recording
-from runtime.support.errors import DONE
 from tests.hil.machine import stalls_excused
 from tests.hil.running import Running, emulated, running, wait_for
 from tests.hil.truth import is_driving, rows

@@ -18,8 +18,8 @@ from pathlib import Path
 
 import pytest
 
+from config.errors import WRONG_CALL
 from runtime.cli.commands.service import quoted
-from runtime.support.errors import WRONG_CALL
 from runtime.support.sd_notify import STATUS_MAX, SdNotifier
 from tests.hil.planted import SHORT_S, planted
 from tests.hil.running import ROOT, emulated, wait_for

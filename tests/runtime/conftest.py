@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from config.errors import DONE
 from runtime.cli.app import call
-from runtime.support.errors import DONE
 from tests.recorded import SECONDS, hall, record
 
 

@@ -15,13 +15,13 @@ from typing import Any
 
 import pytest
 
+from config.errors import DONE, WRONG_CALL
 from config.load import load_settings
 from runtime.cli.app import call
 from runtime.cycle.step import CycleRecord
 from runtime.simulation.budget_sweep import BudgetRow, drive, in_long_hall
 from runtime.simulation.closed_loop import simulate
 from runtime.simulation.long_hall import A_SIDE, long_hall
-from runtime.support.errors import DONE, WRONG_CALL
 from runtime.timing.refinement_budget import ProcessorTime, Quanta, RefinementBudget
 
 ROOT = Path(__file__).parents[2]

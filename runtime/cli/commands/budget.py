@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.progress import track
 
+from config.errors import DONE, WRONG_CALL, UserError
 from config.load import load_settings
-from runtime.support.errors import DONE, WRONG_CALL, UserError
 from runtime.support.kernel_cache import ready_kernels
 
 if TYPE_CHECKING:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
+from config.errors import DONE
 from config.load import load_any
 from config.settings import Settings
 from runtime.cli.commands.firing_check import refuse_impossible_firing
 from runtime.support.config_lint import lint
-from runtime.support.errors import DONE
 
 
 def check_config(config: str, sets: Sequence[str]) -> int:
@@ -19,8 +19,8 @@ def check_config(config: str, sets: Sequence[str]) -> int:
     ------
     ConfigError
         What is wrong, and where.
-    Complaint
-        Every value is good by itself, but the ring cannot fire so.
+    FiringError
+        Each value is valid, but the ring cannot carry out its firing pattern.
     """
     settings = load_any(config, sets)
     if isinstance(settings, Settings):

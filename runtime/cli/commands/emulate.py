@@ -7,8 +7,8 @@ import sys
 from collections.abc import Sequence
 from typing import Final
 
+from config.errors import DONE, WRONG_CALL, UserError
 from config.load import load_settings
-from runtime.support.errors import DONE, FAILED, WRONG_CALL, UserError
 
 PIPES: Final = (0, 1)
 """Standard input and output: what a program that started this one holds the other ends of."""
@@ -34,7 +34,7 @@ def emulate_robot(
     """Carry out the command; see `runtime.cli.app.emulate`."""
     settings = load_settings(config, sets, world=world, robot=robot)
     from drivers.emulator.faults import load_faults
-    from drivers.emulator.pty_transport import EmulatorError, serve
+    from drivers.emulator.pty_transport import serve
 
     if settings.world is None:
         raise UserError("no world is given: name one with --world", WRONG_CALL)
@@ -55,8 +55,6 @@ def emulate_robot(
                 control=PIPES if control else None,
             )
         )  # fmt: skip
-    except EmulatorError as error:
-        raise UserError(str(error), FAILED) from error
     except ValueError as error:
         raise UserError(str(error), WRONG_CALL) from error
     return DONE

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Final
 from rich.console import Console
 from rich.progress import track
 
+from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings
 from config.settings import Settings
 from runtime.analysis.text_tables import Units, boxes_table, scene_verdict, spread_verdict, table_2, verdict
 from runtime.cli.commands.firing_check import refuse_impossible_firing
 from runtime.cli.commands.offline_io import folder, read
 from runtime.simulation.scene_names import SceneName
-from runtime.support.errors import DONE, FAILED, WRONG_CALL, UserError
 from runtime.support.kernel_cache import ready_kernels
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from rich.console import Console
 
+from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from runtime.cli.commands.offline_io import folder, need, progress, read, writing
-from runtime.support.errors import DONE, FAILED, WRONG_CALL, UserError
 
 if TYPE_CHECKING:
     from runtime.analysis.trace import Trace

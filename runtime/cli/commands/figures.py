@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from config.errors import DONE
 from runtime.analysis.text_tables import Units
 from runtime.cli.commands.offline_io import folder, progress, read, writing
-from runtime.support.errors import DONE
 
 if TYPE_CHECKING:
     from runtime.analysis.trace import Trace

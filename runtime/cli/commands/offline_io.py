@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.progress import Progress
 
-from runtime.support.errors import FAILED, WRONG_CALL, UserError
+from config.errors import FAILED, WRONG_CALL, UserError
 from runtime.support.kernel_cache import ready_kernels
 
 if TYPE_CHECKING:

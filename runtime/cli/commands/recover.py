@@ -7,7 +7,7 @@ from typing import Final
 
 from rich.console import Console
 
-from runtime.support.errors import DONE, FAILED, WRONG_CALL, UserError
+from config.errors import DONE, FAILED, WRONG_CALL, UserError
 
 SHOWN: Final = 10
 """Damages told one by one."""
@@ -15,7 +15,6 @@ SHOWN: Final = 10
 
 def recover_recording(source: str, out: str | None) -> int:
     """Carry out the command; see `runtime.cli.app.recover`."""
-    from runtime.recording.reader import RecordingError
     from runtime.recording.recovery import recover
 
     path = Path(source)
@@ -24,8 +23,6 @@ def recover_recording(source: str, out: str | None) -> int:
         raise UserError(f"--out {out}: is the damaged file itself; choose another name", WRONG_CALL)
     try:
         got = recover(path, target)
-    except RecordingError as error:
-        raise UserError(str(error), WRONG_CALL) from error
     except OSError as error:
         raise UserError(
             f"{target}: cannot be written: {error.strerror or error}; choose another place by --out", FAILED

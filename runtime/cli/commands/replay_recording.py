@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.progress import Progress
 
+from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import changed_settings, load_settings
 from runtime.analysis.text_tables import Units, length, objects_table
 from runtime.cycle.summary import ReplaySummary, object_row, write_json
-from runtime.support.errors import DONE, FAILED, WRONG_CALL, UserError
 from runtime.support.kernel_cache import ready_kernels
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def replay_recording(
     units: Units,
 ) -> int:
     """Carry out the command; see `runtime.cli.app.replay`."""
-    from runtime.recording.reader import RecordingError, open_recording
+    from runtime.recording.reader import open_recording
 
     span.refuse()
     otherwise = other is not None or bool(sets) or bool(models) or robot is not None
@@ -77,14 +77,11 @@ def replay_recording(
         raise UserError("--verify compares with the recorded settings: leave out --with, --set, --model, --robot",
                         WRONG_CALL)  # fmt: skip
     console = Console(stderr=True, soft_wrap=True, highlight=False)
-    try:
-        with open_recording(Path(log)) as recording:
-            if otherwise:
-                settings = other_settings(recording, other, sets, robot=robot, models=models)
-                return tell_other(recording, settings, console, units)
-            return rerun(recording, console, span=span, verify=verify, json_file=json_file, units=units)
-    except RecordingError as error:
-        raise UserError(str(error), WRONG_CALL) from error
+    with open_recording(Path(log)) as recording:
+        if otherwise:
+            settings = other_settings(recording, other, sets, robot=robot, models=models)
+            return tell_other(recording, settings, console, units)
+        return rerun(recording, console, span=span, verify=verify, json_file=json_file, units=units)
 
 
 def other_settings(

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.progress import Progress
 
+from config.errors import DONE
 from config.load import load_settings
 from runtime.analysis.text_tables import Units, objects_table
 from runtime.cycle.summary import write_json
-from runtime.support.errors import DONE, WRONG_CALL, UserError
 from runtime.support.kernel_cache import ready_kernels
 
 if TYPE_CHECKING:
@@ -32,15 +32,12 @@ def replay_log(
     settings = load_settings(None, sets, robot=robot, models=models)
     console = Console(stderr=True)
     ready_kernels(settings, console)
-    from runtime.recording.ring_log import RingLogError, read_ring_log
+    from runtime.recording.ring_log import read_ring_log
     from runtime.recording.ring_log_replay import replay
 
-    try:
-        with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
-            firings = read_ring_log(Path(log), sensors=len(settings.ring.mounts))
-            summary = replay(settings, watched(firings, progress))
-    except RingLogError as error:
-        raise UserError(str(error), WRONG_CALL) from error
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+        firings = read_ring_log(Path(log), sensors=len(settings.ring.mounts))
+        summary = replay(settings, watched(firings, progress))
     if json_file is not None:
         write_json(json_file, summary)
     out = Console()

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from config.errors import DONE, WRONG_CALL, UserError
 from runtime.analysis.text_tables import Units
 from runtime.cli.commands.offline_io import progress, read, writing
-from runtime.support.errors import DONE, WRONG_CALL, UserError
 
 if TYPE_CHECKING:
     from runtime.analysis.trace import Trace

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import ConfigError, load_settings
 from config.settings import Settings
 from runtime import VERSION
@@ -19,7 +20,6 @@ from runtime.analysis.text_tables import Units, objects_table, timing_table, tim
 from runtime.cli.commands.firing_check import refuse_impossible_firing
 from runtime.cli.commands.run_recording import RunRecording, kept
 from runtime.support.config_lint import lint
-from runtime.support.errors import DONE, FAILED, WRONG_CALL, UserError
 from runtime.support.file_lock import file_lock
 from runtime.support.kernel_cache import ready_kernels
 from runtime.support.logs import LogStanding, open_log

@@ -14,8 +14,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from config.errors import FAILED, UserError
 from config.settings import Settings
-from runtime.support.errors import FAILED, UserError
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from config.errors import DONE, WRONG_CALL, UserError
 from config.load import load_settings
-from runtime.support.errors import DONE, WRONG_CALL, UserError
 
 UNIT: Final = """\
 # The main process of a robot. It comes up in READY and stands until it is armed, after a failure as after a boot:

@@ -12,6 +12,8 @@ from typing import Annotated, ClassVar, Final, Literal, TypeAlias
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic_core import from_json
 
+from config.errors import UserError
+
 MESSAGE_MAX: Final = 64 * 1024
 """Bytes."""
 TEXT_MAX: Final = 500
@@ -299,7 +301,7 @@ Message: TypeAlias = (
 _READER: Final[TypeAdapter[Message]] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
 
 
-class BadMessage(Exception):  # noqa: N818 - told to a client
+class BadMessage(UserError):  # noqa: N818 - told to a client
     """A message that is none.
 
     Parameters

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from config.errors import UserError
 
-class Refusal(Exception):  # noqa: N818 - it is said to a person
+
+class Refusal(UserError):  # noqa: N818 - it is said to a person
     """Why something is not done.
 
     Parameters

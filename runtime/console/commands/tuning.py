@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import tomli_w
 
+from config.errors import UserError
 from config.layers import Location
 from config.load import MODELS_MAX, ConfigError, model_in, with_value
 from config.model import ModelConfig
@@ -20,7 +21,6 @@ from config.settings import Settings
 from runtime.cli.commands.firing_check import refuse_impossible_firing
 from runtime.console.commands.refusal import Refusal
 from runtime.cycle.reloader import Ready
-from runtime.support.errors import UserError
 
 UNDO_MAX: Final = 100
 PAGE: Final = "page"

@@ -11,11 +11,11 @@ import socket
 from collections.abc import Callable
 from typing import Final
 
+from config.errors import FAILED, WRONG_CALL, UserError
 from config.settings import ConsoleConfig
 from runtime.console.http.client_limits import Bucket
 from runtime.console.timed_coroutine import Timed
 from runtime.cycle.process import CONSOLE_RECEIVE
-from runtime.support.errors import FAILED, WRONG_CALL, UserError
 
 PORTS_TRIED: Final = 20
 ANY_FREE: Final = 0

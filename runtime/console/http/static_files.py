@@ -6,7 +6,7 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from runtime.support.errors import FAILED, UserError
+from config.errors import FAILED, UserError
 
 KINDS: Final = MappingProxyType(
     {

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from config.errors import DONE, FAILED, WRONG_CALL
 from config.load import list_shipped
 from runtime.cli.app import call, main
-from runtime.support.errors import DONE, FAILED, WRONG_CALL
 
 ROOT = Path(__file__).parents[3]
 HEADER = "t,x,y,theta," + ",".join(f"r{i:02d}" for i in range(24))

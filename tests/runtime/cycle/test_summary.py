@@ -9,10 +9,10 @@ from typing import get_type_hints
 
 import pytest
 
+from config.errors import FAILED, UserError
 from perception.pipeline import SeenObject
 from runtime.cycle.summary import LinkRow, ObjectRow, ReplaySummary, RunSummary, object_row, write_json
 from runtime.simulation.evaluation import DrumRow, Outcome
-from runtime.support.errors import FAILED, UserError
 
 SEEN = SeenObject("semicircle", 1.0, -2.0, 0.1 + 0.2, 1e-17, 39, 2.0 / 3.0)
 

@@ -13,6 +13,7 @@ from mcap.opcode import Opcode
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 
+from config.errors import DONE
 from runtime.cli.app import call
 from runtime.recording.channels import CYCLE, Entry, decode
 from runtime.recording.mcap_scanner import McapScanner
@@ -20,7 +21,6 @@ from runtime.recording.reader import open_recording
 from runtime.recording.recovery import recover
 from runtime.recording.replayer import replay
 from runtime.recording.schema import Cycle
-from runtime.support.errors import DONE
 from tests.recorded import entries_of, hall, record, rewrite
 
 

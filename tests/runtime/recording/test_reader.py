@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 from mcap.writer import Writer
 
+from config.errors import DONE, FAILED, WRONG_CALL
 from runtime.cli.app import call
 from runtime.recording.channels import ABOUT, CYCLE, Entry, decode, encode
 from runtime.recording.schema import FORMAT, About
-from runtime.support.errors import DONE, FAILED, WRONG_CALL
 from tests.recorded import entries_of, rewrite
 
 FORMS = ("csv", "parquet", "foxglove", "rosbag2", "ringlog")

@@ -12,6 +12,7 @@ import pytest
 
 from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import Teleoperate
+from config.errors import DONE
 from config.load import load_model
 from drivers.messages import Twist
 from perception.edits import (
@@ -32,7 +33,6 @@ from runtime.recording.reader import open_recording
 from runtime.recording.replayer import replay
 from runtime.recording.schema import Cycle, Keyframe
 from runtime.simulation.closed_loop import Said
-from runtime.support.errors import DONE
 from tests.recorded import entries_of, hall, record, rewrite
 
 SECONDS = 26.0

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from config.errors import DONE, FAILED
 from runtime.analysis.comparison import compare_runs
 from runtime.cli.app import call
 from runtime.recording.channels import ABOUT, CYCLE, KEYFRAME, SETTINGS, decode
 from runtime.recording.reader import open_recording, settings_in
 from runtime.recording.replayer import replay
 from runtime.recording.schema import About, SettingsChange
-from runtime.support.errors import DONE, FAILED
 from tests.recorded import entries_of, hall, record, rewrite
 
 AT = 150

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from config.errors import DONE, FAILED, WRONG_CALL
 from runtime.cli.app import call
 from runtime.recording.channels import (
     CYCLE,
@@ -22,7 +23,6 @@ from runtime.recording.channels import (
 from runtime.recording.reader import RecordingError, open_recording
 from runtime.recording.replayer import fresh_state
 from runtime.recording.schema import FORMAT, About, Cycle, Keyframe, snapshot_in
-from runtime.support.errors import DONE, FAILED, WRONG_CALL
 from tests.recorded import SECONDS, entries_of, hall, record, rewrite, verdict_of
 
 ROOT = Path(__file__).parents[3]

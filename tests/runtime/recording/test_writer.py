@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 import structlog
 
+from config.errors import DONE
 from config.load import load_settings
 from drivers.denning.device import Truth
 from drivers.messages import Pose
@@ -23,7 +24,6 @@ from runtime.recording.replayer import ReplayResult, replay
 from runtime.recording.schema import Bookmark
 from runtime.recording.storage import OneFile
 from runtime.simulation.closed_loop import simulate
-from runtime.support.errors import DONE
 from tests.recorded import FiveInSix, entries_of, hall, record, until
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings
 from config.settings import Settings
 from config.world import WorldConfig
@@ -20,7 +21,6 @@ from runtime.cli.app import call
 from runtime.cli.commands.experiment import one_way
 from runtime.recording.reader import open_recording
 from runtime.simulation.evaluation import run_seed, summarise
-from runtime.support.errors import DONE, FAILED, WRONG_CALL, UserError
 
 pytestmark = pytest.mark.compiled
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from runtime.support.errors import FAILED, UserError
+from config.errors import FAILED, UserError
 from runtime.support.file_lock import file_lock
 
 ROOT = Path(__file__).parents[3]

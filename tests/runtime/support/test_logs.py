@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from config.errors import WRONG_CALL, UserError
 from config.settings import LogConfig
-from runtime.support.errors import WRONG_CALL, UserError
 from runtime.support.logs import open_log
 
 

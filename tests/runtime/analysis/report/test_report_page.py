@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from config.errors import DONE
 from runtime.analysis.report.html_parts import note, table
 from runtime.analysis.report.inline_svg import VARIABLES, inlined
 from runtime.analysis.report.stylesheet import CSS
 from runtime.cli.app import call
-from runtime.support.errors import DONE
 
 VOID = {"meta", "link", "br", "img", "hr", "input", "use", "path"}
 SIZE_MAX = 3_000_000

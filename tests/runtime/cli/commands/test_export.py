@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from config.errors import DONE, FAILED, WRONG_CALL
 from drivers.messages import Firing
 from runtime.analysis.trace import Trace
 from runtime.analysis.trace_sources import Asked, trace_of
@@ -20,7 +21,6 @@ from runtime.cli.commands import export
 from runtime.recording.channels import CYCLE, decode
 from runtime.recording.ring_log import read_ring_log
 from runtime.recording.schema import Cycle
-from runtime.support.errors import DONE, FAILED, WRONG_CALL
 from tests.recorded import entries_of
 
 TABLES = {"echoes", "segments", "objects", "odometry"}

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from config.errors import DONE, FAILED, WRONG_CALL
 from config.load import load_settings, load_world
 from config.units import FOOT_M
 from drivers.messages import Floats, Pose
@@ -20,7 +21,6 @@ from runtime.analysis.plots.geometry import Frame, arcs, outline
 from runtime.analysis.trace import Trace
 from runtime.analysis.trace_sources import Asked, trace_of
 from runtime.cli.app import call
-from runtime.support.errors import DONE, FAILED, WRONG_CALL
 from tests.architecture import ROOMS
 
 PICTURES = ("raw", "segments", "clusters", "models")

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from config.errors import FAILED, UserError
 from config.load import load_settings
 from drivers.messages import Firing, Pose
 from runtime.cli.commands.run_recording import kept
@@ -17,7 +18,6 @@ from runtime.recording.ring_log import read_ring_log
 from runtime.recording.ring_log_writer import RingLogWriter
 from runtime.support import background_writer as sinks
 from runtime.support.background_writer import BackgroundWriter
-from runtime.support.errors import FAILED, UserError
 from tests.recorded import until
 
 SETTINGS = load_settings("hallway")

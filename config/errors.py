@@ -1,0 +1,34 @@
+"""The error base class for everything a user can cause, and the exit codes of every command.
+
+A user error ends as one clear line on stderr and an exit code, never as a traceback. It lives here because every
+package may import `config`.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+DONE: Final = 0
+FAILED: Final = 1
+"""The work failed."""
+WRONG_CALL: Final = 2
+"""The call or the configuration was wrong."""
+
+
+class UserError(Exception):
+    """An error that a user can cause: one line with what happened, the likely cause, and the next action.
+
+    Parameters
+    ----------
+    text : str
+        The line.
+    exit_code : int, optional
+        What the command exits with, if it differs from the class's own `exit_code`.
+    """
+
+    exit_code: int = FAILED
+
+    def __init__(self, text: str, exit_code: int | None = None) -> None:
+        super().__init__(text)
+        if exit_code is not None:
+            self.exit_code = exit_code
