@@ -17,6 +17,8 @@ lint: $(VENV)/test.stamp
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/codespell
 
 # Kernels are tested compiled, and once more as plain Python: only so does coverage see into them. What watches the clock
 # mostly waits: two of a kind, and nothing beside them.
@@ -58,7 +60,7 @@ bench: $(VENV)/bench.stamp
 	@$(BIN)/python -m bench console
 
 clean:
-	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage
+	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .import_linter_cache
 
 $(VENV)/bin/python:
 	@command -v $(PYTHON) >/dev/null || { echo "make: $(PYTHON) is not here; install it, or name another: make PYTHON=python3.12"; exit 1; }

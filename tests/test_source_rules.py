@@ -1,0 +1,141 @@
+"""Rules on the source that neither ruff nor import-linter can state: module length, mutable globals, pure calls.
+
+The import rules are contracts in pyproject.toml. Two of them have to list every module but one; a test here compares
+those lists with the packages, so that a new module cannot slip through.
+"""
+
+from __future__ import annotations
+
+import ast
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+ROOT: Final = Path(__file__).resolve().parents[1]
+PACKAGES: Final = ("config", "drivers", "perception", "behaviors", "runtime")
+PURE: Final = ("perception/", "behaviors/")
+LINES_MAX: Final = 400
+MUTABLE_LITERALS: Final = (ast.List, ast.Dict, ast.Set, ast.ListComp, ast.DictComp, ast.SetComp)
+MUTABLE_CALLS: Final = frozenset(
+    {
+        "list",
+        "dict",
+        "set",
+        "bytearray",
+        "defaultdict",
+        "deque",
+        "Counter",
+        "OrderedDict",
+        "ChainMap",
+        "SimpleNamespace",
+    }
+)
+MODULES: Final = {
+    file.relative_to(ROOT).as_posix(): file.read_text("utf-8")
+    for package in PACKAGES
+    for file in sorted((ROOT / package).rglob("*.py"))
+}
+
+
+def violations(path: str, source: str) -> Iterator[str]:
+    """Yield each rule that a module breaks, with its line."""
+    if (lines := source.count("\n")) > LINES_MAX:
+        yield f"{path}: {lines} lines; at most {LINES_MAX} are allowed"
+    tree = ast.parse(source, path)
+    for statement in module_level(tree.body):
+        if isinstance(statement, ast.Assign | ast.AnnAssign | ast.AugAssign) and is_mutable(statement.value):
+            names = ast.unparse(statement.targets[0] if isinstance(statement, ast.Assign) else statement.target)
+            if names != "__all__":
+                yield f"{path}:{statement.lineno}: mutable global {names}"
+    if path.startswith(PURE):
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and is_impure(node):
+                yield f"{path}:{node.lineno}: impure call {ast.unparse(node.func)}"
+
+
+def module_level(body: list[ast.stmt]) -> Iterator[ast.stmt]:
+    """Yield the statements that run on import, also those inside if, try, with and loops."""
+    for statement in body:
+        yield statement
+        if isinstance(statement, ast.If | ast.Try | ast.With | ast.For | ast.While):
+            for part in ("body", "orelse", "finalbody"):
+                yield from module_level(getattr(statement, part, []))
+            for handler in getattr(statement, "handlers", []):
+                yield from module_level(handler.body)
+
+
+def is_mutable(value: ast.expr | None) -> bool:
+    """Return whether a module-level value can change after import."""
+    if isinstance(value, ast.Call):
+        return ast.unparse(value.func).split(".")[-1] in MUTABLE_CALLS
+    if isinstance(value, ast.Tuple):
+        return any(map(is_mutable, value.elts))
+    return isinstance(value, MUTABLE_LITERALS)
+
+
+def is_impure(call: ast.Call) -> bool:
+    """Return whether a call does I/O, runs text as code, or draws from an unseeded random generator."""
+    name = ast.unparse(call.func)
+    is_seeded = name.endswith(".default_rng") and bool(call.args or call.keywords)
+    is_random = name.startswith(("np.random.", "numpy.random.")) and not is_seeded
+    return is_random or name in {"print", "open", "input", "exec", "eval", "__import__"}
+
+
+@pytest.mark.parametrize("path", MODULES)
+def test_module_keeps_the_rules(path: str) -> None:
+    assert list(violations(path, MODULES[path])) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "source", "expected"),
+    [
+        ("config/x.py", "CACHE = {}", "x.py:1: mutable global CACHE"),
+        ("config/x.py", "CACHE: Final[list[int]] = [1]", "mutable global CACHE"),
+        ("drivers/x.py", "SEEN = set()", "mutable global SEEN"),
+        ("drivers/x.py", "A = B = [i for i in range(3)]", "mutable global A"),
+        ("drivers/x.py", "Q = collections.deque(maxlen=3)", "mutable global Q"),
+        ("drivers/x.py", "PAIR = (1, [])", "mutable global PAIR"),
+        ("runtime/x.py", "try:\n    X = {1}\nexcept OSError:\n    pass", "x.py:2: mutable global X"),
+        ("perception/x.py", "def f():\n    print(1)", "x.py:2: impure call print"),
+        ("behaviors/x.py", "open('f')", "impure call open"),
+        ("perception/x.py", "r = np.random.normal()", "impure call np.random.normal"),
+        ("perception/x.py", "r = numpy.random.default_rng()", "impure call numpy.random.default_rng"),
+        ("runtime/x.py", "X = 1\n" * (LINES_MAX + 1), "401 lines; at most 400"),
+    ],
+)
+def test_violation_is_found(path: str, source: str, expected: str) -> None:
+    (found,) = violations(path, source)
+    assert expected in found
+
+
+@pytest.mark.parametrize(
+    ("path", "source"),
+    [
+        ("drivers/x.py", "__all__ = ['a']\nTABLE: Final = (1, 2)\nNAMES = frozenset({1})\nT = MappingProxyType({})"),
+        ("drivers/x.py", "def f():\n    local = []\n    return local\nclass C:\n    slots = ('a',)"),
+        ("perception/x.py", "def f(r: np.random.Generator) -> float:\n    return r.normal()"),
+        ("perception/x.py", "rng = np.random.default_rng(7)"),
+        ("runtime/x.py", "print(open)"),
+        ("runtime/x.py", "X = 1\n" * LINES_MAX),
+    ],
+)
+def test_allowed_code_is_accepted(path: str, source: str) -> None:
+    assert list(violations(path, source)) == []
+
+
+@pytest.mark.parametrize(
+    ("contract", "package", "allowed"),
+    [
+        ("perception-drivers", "drivers", {"drivers.messages"}),
+        ("behaviors-perception", "perception", {"perception.percept"}),
+    ],
+)
+def test_contract_lists_every_other_module(contract: str, package: str, allowed: set[str]) -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    (rule,) = (one for one in project["tool"]["importlinter"]["contracts"] if one["id"] == contract)
+    children = {path.removesuffix(".py").split("/")[1] for path in MODULES if path.startswith(f"{package}/")}
+    expected = {f"{package}.{child}" for child in children - {"__init__"}} - allowed
+    assert set(rule["forbidden_modules"]) == expected
