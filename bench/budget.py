@@ -22,10 +22,10 @@ from rich.console import Console
 from config.errors import DONE, FAILED
 from config.load import load_settings
 from config.settings import Settings
-from drivers.denning.device import EmulatedRobot
-from drivers.denning.robot import DenningRobot
+from drivers.driver import RobotDriver
 from drivers.emulator.memory_transport import MemoryLine
 from drivers.messages import Floats
+from drivers.registry import make_device, make_driver
 from perception.pipeline import Perception
 from runtime.cycle.driver_io import gather, give
 from runtime.cycle.modes import Mode, Request
@@ -97,8 +97,8 @@ class Timed(Perception):
 def account_for(settings: Settings, cycles: int, budget_s: float) -> Account:
     """Drive to and fro for so many cycles under a budget of thread CPU time, as the robot's own process does."""
     assert settings.world is not None
-    robot = EmulatedRobot(settings, settings.world, 0)
-    driver = DenningRobot(settings)
+    robot = make_device(settings, settings.world, 0)
+    driver = make_driver(settings)
     line = MemoryLine(driver, robot)
     perception = Timed(settings.ring, settings.models, settings.perception)
     account = perception.account = Account(1e6 * budget_s)
@@ -117,7 +117,7 @@ def account_for(settings: Settings, cycles: int, budget_s: float) -> Account:
 
 
 def _one_cycle(
-    state: State, inputs: Inputs, settings: Settings, driver: DenningRobot, account: Account, budget_s: float
+    state: State, inputs: Inputs, settings: Settings, driver: RobotDriver, account: Account, budget_s: float
 ) -> None:
     """Run one cycle under the budget and book it."""
     marks: dict[Phase, float] = {}

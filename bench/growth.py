@@ -18,7 +18,7 @@ from rich.console import Console
 
 from config.errors import DONE, FAILED
 from config.load import load_settings
-from drivers.denning.device import Truth
+from drivers.emulator.robot_device import GroundTruth
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord
 from runtime.simulation.closed_loop import simulate
@@ -56,7 +56,7 @@ class Left:
     samples: list[tuple[float, float]] = field(default_factory=list)
     """Virtual time, s, and memory, MB."""
 
-    def on_cycle(self, record: CycleRecord, _truth: Truth) -> None:
+    def on_cycle(self, record: CycleRecord, _truth: GroundTruth) -> None:
         """Keep the memory policy as a run on a line does."""
         self.memory.cycle_done(SLACK_S)
         if record.cycle == SETTLED_CYCLES:

@@ -45,7 +45,7 @@ MODELS_MAX = 64
 
 COMMAND_LINE = Source("command line")
 NAMES = ("robot", "world", "models")
-"""Keys of a run file that name other files."""
+"""Keys of a run file that name other files; where `robot` is a table, it is a section of a run without a robot file."""
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -141,7 +141,8 @@ def load_settings(
 
     names = Layers(run.source)
     names.lay({"world": DEFAULT_WORLD, "models": [DEFAULT_MODEL]}, run.source)
-    names.lay({key: run.table[key] for key in NAMES if key in run.table}, run.source)
+    section = ("robot",) if isinstance(run.table.get("robot"), dict) else ()
+    names.lay({key: run.table[key] for key in NAMES if key in run.table and key not in section}, run.source)
     asked = {"robot": robot, "world": world, "models": list(models) or None}
     names.lay({key: value for key, value in asked.items() if value is not None}, COMMAND_LINE)
     if isinstance(names.tree["models"], str):
@@ -155,7 +156,7 @@ def load_settings(
     elif "ring" not in run.table and "body" not in run.table:
         known = ", ".join(list_shipped("robots"))
         problems.append(f"{run.source.name}: robot: missing; name a robot or a robot file; known robots: {known}")
-    settings.lay({key: value for key, value in run.table.items() if key not in NAMES}, run.source)
+    settings.lay({key: value for key, value in run.table.items() if key not in NAMES or key in section}, run.source)
     problems += _lay_world(names, settings)
     problems += _lay_models(names, settings)
     problems += apply_overrides([c for c in changes if not c.names_files], settings)

@@ -139,9 +139,17 @@ class LinkConfig(Strict):
     """First and longest wait between attempts to open the port; it doubles in between."""
 
 
-class RobotConfig(Strict):
-    """A robot file: `[ring]`, `[body]` and `[link]`."""
+class DriverConfig(Strict):
+    """Which driver speaks to the robot."""
 
+    driver: str = Field(default="denning", min_length=1, max_length=64)
+    """Name of a shipped driver, or of one that an installed package provides: entry points `echolocate.drivers`."""
+
+
+class RobotConfig(Strict):
+    """A robot file: `[robot]`, `[ring]`, `[body]` and `[link]`."""
+
+    robot: DriverConfig = DriverConfig()
     ring: RingConfig
     body: BodyConfig
     link: LinkConfig = LinkConfig()

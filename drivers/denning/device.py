@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,6 +18,8 @@ from config.world import WorldConfig
 from drivers.denning import frames
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Drive, Halt, Hello, NakCode, Pattern, Release, RobotFrame
+from drivers.denning.pattern_rotation import Rotation, window_us
+from drivers.denning.wire_frame_counter import WireFrameCounter
 from drivers.denning.wire_units import echo_byte
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.body import BRAKE_S, RAMP_S, Body
@@ -37,7 +38,7 @@ from drivers.emulator.faults import (
     StuckSensor,
     Unplug,
 )
-from drivers.emulator.pattern_rotation import Rotation, window_us
+from drivers.emulator.robot_device import GroundTruth
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.emulator.uart import Uart
@@ -52,20 +53,8 @@ _LATCHED, _DEADMAN = int(Flags.LATCHED), int(Flags.DEADMAN)  # asked at every ev
 _STILL = Twist(0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Truth:
-    """What the emulator knows and no robot does; `t_s` counts from the emulator's start, through reboots."""
-
-    t_s: float
-    pose: Pose
-    ring_yaw: float
-    twist: Twist
-    flags: Flags
-    contacts: int
-
-
-class EmulatedRobot:
-    """A robot that speaks the ring-and-base protocol.
+class DenningDevice:
+    """A `drivers.emulator.robot_device.RobotDevice` that speaks the ring-and-base protocol.
 
     Parameters
     ----------
@@ -128,10 +117,10 @@ class EmulatedRobot:
         self._sonar.true_echoes(start, start.theta, np.zeros(self._sensors, dtype=np.bool_))
 
     @property
-    def truth(self) -> Truth:
+    def truth(self) -> GroundTruth:
         """The true state at the last event."""
         body = self._body
-        return Truth(self._moved_us * 1e-6, body.pose, body.ring_yaw, body.twist, self.flags, body.contacts)
+        return GroundTruth(self._moved_us * 1e-6, body.pose, body.ring_yaw, body.twist, self.flags, body.contacts)
 
     @property
     def flags(self) -> Flags:
@@ -169,6 +158,10 @@ class EmulatedRobot:
         left = bytes(self._outbox)
         self._outbox.clear()
         return left
+
+    def frame_counter(self) -> WireFrameCounter:
+        """Return a new counter of this protocol's echoes and drive commands, for a line that is in use already."""
+        return WireFrameCounter()
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the host, at the moment to which the robot has advanced."""

@@ -1,43 +1,47 @@
 """The latency trace: when whole echoes left for the host, and when whole drive commands came back.
 
-Both moments are taken by one clock in one process, on the robot's side of the line, so that what lies between them is
-everything the host took: its kernel, its loop, its cycle. An echo counts from just before its last byte was handed
-over, a command from just after its last byte was read.
+Both times are read from one clock in one process, on the robot's side of the line. The time between them is therefore
+what the host took: its kernel, its event loop, its cycle. An echo's time is just before its last byte is written, a
+command's time just after its last byte is read.
 """
 
 from __future__ import annotations
 
-from typing import TextIO
-
-from drivers.denning.codec import Decoder
-from drivers.denning.frames import Drive, Echo
+from typing import Protocol, TextIO
 
 HEADER = "host_s,frame"
 
 
+class FrameCounter(Protocol):
+    """Counts a protocol's whole frames in the bytes that cross a line; keeps what is incomplete for the next call."""
+
+    def echoes(self, sent: bytes) -> int:
+        """Return how many echo frames the bytes sent to the host complete."""
+
+    def drives(self, received: bytes) -> int:
+        """Return how many drive commands the bytes received from the host complete."""
+
+
 class LatencyTrace:
-    """Writes a row ``host_s,echo`` or ``host_s,drive`` for each such frame that crossed the line.
+    """Writes a row ``host_s,echo`` or ``host_s,drive`` for each such frame that crosses the line.
 
     Parameters
     ----------
     file
-        Where to; stays the caller's to close. It is not flushed: a disk shall not delay the robot.
+        Where to write; the caller closes it. It is not flushed, because a disk must not delay the robot.
+    counter
+        Recognises the protocol's frames.
     """
 
-    def __init__(self, file: TextIO) -> None:
+    def __init__(self, file: TextIO, counter: FrameCounter) -> None:
         self._file = file
-        self._sent = Decoder("robot", midway=True)
-        self._heard = Decoder("host", midway=True)
+        self._counter = counter
         file.write(HEADER + "\n")
 
     def sent(self, data: bytes, host_s: float) -> None:
-        """Take bytes that left for the host."""
-        for frame in self._sent.feed(data):
-            if isinstance(frame, Echo):
-                self._file.write(f"{host_s:.6f},echo\n")
+        """Write a row for each echo that the bytes sent to the host complete."""
+        self._file.write(f"{host_s:.6f},echo\n" * self._counter.echoes(data))
 
-    def heard(self, data: bytes, host_s: float) -> None:
-        """Take bytes that came from the host."""
-        for frame in self._heard.feed(data):
-            if isinstance(frame, Drive):
-                self._file.write(f"{host_s:.6f},drive\n")
+    def received(self, data: bytes, host_s: float) -> None:
+        """Write a row for each drive command that the bytes received from the host complete."""
+        self._file.write(f"{host_s:.6f},drive\n" * self._counter.drives(data))

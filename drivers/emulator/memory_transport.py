@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal, TypeAlias
 
-from drivers.denning.device import EmulatedRobot
 from drivers.driver import RobotDriver
+from drivers.emulator.robot_device import RobotDevice
 
 OnBytes: TypeAlias = Callable[[Literal["in", "out"], float, bytes], None]
 
@@ -34,7 +34,7 @@ class MemoryLine:
     """
 
     def __init__(
-        self, driver: RobotDriver, robot: EmulatedRobot, start_s: float = 0.0, on_bytes: OnBytes | None = None
+        self, driver: RobotDriver, robot: RobotDevice, start_s: float = 0.0, on_bytes: OnBytes | None = None
     ) -> None:
         self._driver = driver
         self._robot = robot

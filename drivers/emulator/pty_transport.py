@@ -21,11 +21,12 @@ from typing import TextIO
 from config.errors import UserError
 from config.robot import RobotConfig
 from config.world import WorldConfig
-from drivers.denning.device import EmulatedRobot
 from drivers.emulator.faults import Fault
 from drivers.emulator.latency_trace import LatencyTrace
+from drivers.emulator.robot_device import RobotDevice
 from drivers.emulator.time_channel import ControlChannel
 from drivers.emulator.truth_trace import TruthTrace
+from drivers.registry import make_device
 
 PERIOD_S = 0.002
 """The robot catches up with the wall clock this often."""
@@ -237,7 +238,7 @@ async def serve(
     Parameters
     ----------
     robot, world, faults, seed
-        As for `EmulatedRobot`.
+        As for `drivers.registry.make_device`.
     link_path
         Where to put a symbolic link to the pty; it is removed at the end.
     trace_path
@@ -249,7 +250,7 @@ async def serve(
     exit_with_parent
         End by itself `LINGER_S` after the process that started this one is gone.
     clock_start_us
-        As for `EmulatedRobot`.
+        As for `drivers.registry.make_device`.
     control
         Two file descriptors: laws of time are read from the one, and how far the robot has lived is written to the
         other, see `ControlChannel`. The truth is then written by the run's clock, which is the host's until it is
@@ -272,9 +273,11 @@ async def serve(
     with contextlib.ExitStack() as stack:
         for number in (signal.SIGTERM, signal.SIGINT):
             stack.callback(loop.remove_signal_handler, number)
-        device = EmulatedRobot(robot, world, seed, faults=faults, clock_start_us=clock_start_us)
+        device = make_device(robot, world, seed, faults=faults, clock_start_us=clock_start_us)
         trace = None if trace_path is None else TruthTrace(_open_trace(trace_path, stack))
-        latency = None if latency_path is None else LatencyTrace(_open_trace(latency_path, stack))
+        latency = (
+            None if latency_path is None else LatencyTrace(_open_trace(latency_path, stack), device.frame_counter())
+        )
         port = PtyPort(link_path)
         stack.callback(port.close)
         channel = None if control is None else _open_channel(control, stack)
@@ -294,7 +297,7 @@ async def serve(
                 _exchange(device, port, robot_s, latency, clock)
                 if trace is not None:
                     truth = device.truth
-                    trace.write(truth, timeline.host_s(truth.t_s))
+                    trace.write(truth, timeline.host_s(truth.emulated_s))
             if channel is not None:
                 if timeline.robot_s == stood_s:
                     # Time stands still, and a HALT is heard nevertheless.
@@ -308,7 +311,7 @@ async def serve(
 
 
 def _exchange(
-    device: EmulatedRobot,
+    device: RobotDevice,
     port: PtyPort,
     robot_s: float,
     latency: LatencyTrace | None,
@@ -322,7 +325,7 @@ def _exchange(
         port.open()
     heard = port.read()
     if heard and latency is not None:
-        latency.heard(heard, clock())
+        latency.received(heard, clock())
     # With no host on the line bytes go nowhere: the pty would keep them for the next one to open it.
     if heard is not None and left:
         sent_s = clock()

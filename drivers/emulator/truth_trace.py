@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TextIO
 
-from drivers.denning.device import Truth
+from drivers.emulator.robot_device import GroundTruth
 
 HEADER = "t_s,host_s,x_m,y_m,heading_rad,ring_yaw_rad,v_m_s,w_rad_s,flags"
 PERIOD_S = 0.01
@@ -29,14 +29,14 @@ class TruthTrace:
         file.write(HEADER + "\n")
         file.flush()
 
-    def write(self, truth: Truth, host_s: float) -> None:
-        """Write a row if one is due; `host_s` is the host's monotonic clock at `truth.t_s`."""
-        if truth.t_s < self._due_s:
+    def write(self, truth: GroundTruth, host_s: float) -> None:
+        """Write a row if one is due; `host_s` is the host's monotonic clock at `truth.emulated_s`."""
+        if truth.emulated_s < self._due_s:
             return
-        self._due_s = truth.t_s + PERIOD_S
+        self._due_s = truth.emulated_s + PERIOD_S
         pose, twist = truth.pose, truth.twist
         self._file.write(
-            f"{truth.t_s:.6f},{host_s:.6f},{pose.x:.6f},{pose.y:.6f},{pose.theta:.6f},{truth.ring_yaw:.6f},"
+            f"{truth.emulated_s:.6f},{host_s:.6f},{pose.x:.6f},{pose.y:.6f},{pose.theta:.6f},{truth.ring_yaw:.6f},"
             f"{twist.v:.6f},{twist.w:.6f},{int(truth.flags)}\n"
         )
         self._file.flush()

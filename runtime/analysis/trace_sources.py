@@ -12,8 +12,8 @@ from typing import Final
 from config.errors import WRONG_CALL, UserError
 from config.load import load_settings, load_world
 from config.settings import Settings
-from drivers.denning.robot import DenningRobot
 from drivers.messages import Firing
+from drivers.registry import make_driver
 from perception.pipeline import Perception
 from runtime.analysis.timeline import Timeline
 from runtime.analysis.trace import Entered, Marked, Said, Trace
@@ -96,7 +96,7 @@ class _Listener:
         self._trace = trace
         self._on_step = on_step
         self._gathering = Timeline(trace)
-        self._driver = DenningRobot(recording.settings)
+        self._driver = make_driver(recording.settings)
         self._driver.opened(0.0)
         self._has_bytes = False
         self._begun_s: float | None = None

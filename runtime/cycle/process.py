@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from config.settings import Settings
-from drivers.denning.robot import DenningRobot
 from drivers.driver import RobotDriver
 from drivers.link import Link
 from drivers.messages import Firing, Twist
+from drivers.registry import make_driver
 from perception.edits import Edit, Evidence
 from perception.pipeline import Perception
 from runtime.cycle.alerts import Alerts
@@ -107,7 +107,7 @@ class RobotProcess:
         self._clock = run_clock(clock)
         self._notifier = SdNotifier() if notifier is None else notifier
         self.health = Health(log)
-        self._driver = DenningRobot(settings)
+        self._driver = make_driver(settings)
         self._state = State(Perception(settings.ring, settings.models, settings.perception))
         self._rhythm = CycleScheduler(settings, self._clock, CALLBACKS)
         timed = self._rhythm.keeper.timed

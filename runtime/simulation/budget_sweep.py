@@ -16,7 +16,7 @@ import numpy as np
 
 from config.settings import Settings
 from config.world import WorldConfig
-from drivers.denning.device import Truth
+from drivers.emulator.robot_device import GroundTruth
 from drivers.messages import Pose
 from runtime.cycle.step import CycleRecord, State
 from runtime.simulation.closed_loop import simulate
@@ -64,7 +64,7 @@ class Answers:
     _before: Pose | None = None
     _told: object = None
 
-    def on_cycle(self, record: CycleRecord, truth: Truth) -> None:
+    def on_cycle(self, record: CycleRecord, truth: GroundTruth) -> None:
         """Count the quanta and measure the way."""
         before, self._before = self._before, truth.pose
         if before is not None:

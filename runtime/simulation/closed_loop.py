@@ -14,10 +14,10 @@ from typing import Final
 
 from config.settings import Settings
 from config.world import WorldConfig
-from drivers.denning.device import EmulatedRobot, Truth
-from drivers.denning.robot import DenningRobot
 from drivers.emulator.memory_transport import MemoryLine, OnBytes
+from drivers.emulator.robot_device import GroundTruth
 from drivers.messages import LinkCounts, Pose
+from drivers.registry import make_device, make_driver
 from perception.pipeline import Perception
 from runtime.cycle.driver_io import gather, give
 from runtime.cycle.modes import Mode, Request
@@ -45,7 +45,7 @@ class Simulated:
     state: State
     start: Pose
     """Where the odometry began, in world coordinates."""
-    truth: Truth
+    truth: GroundTruth
     virtual_s: float
     wall_s: float
     books: CycleStats
@@ -58,7 +58,7 @@ def simulate(
     world: WorldConfig,
     seed: int,
     seconds_max: float,
-    on_cycle: Callable[[CycleRecord, Truth], None] | None = None,
+    on_cycle: Callable[[CycleRecord, GroundTruth], None] | None = None,
     *,
     allowance: RefinementBudget | None = None,
     on_state: Callable[[CycleRecord, State, Pose], None] | None = None,
@@ -96,8 +96,8 @@ def simulate(
         where it says so, and a drive does not end by itself.
     """
     allowance = Quanta(QUANTA_PER_CYCLE) if allowance is None else allowance
-    robot = EmulatedRobot(settings, world, seed, clock_start_us=clock_start_us)
-    driver = DenningRobot(settings)
+    robot = make_device(settings, world, seed, clock_start_us=clock_start_us)
+    driver = make_driver(settings)
     line = MemoryLine(driver, robot, on_bytes=on_bytes)
     state = State(Perception(settings.ring, settings.models, settings.perception))
     start = robot.truth.pose

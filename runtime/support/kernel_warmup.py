@@ -107,7 +107,7 @@ def _paper(settings: Settings) -> None:
 
 def _emulator(settings: Settings) -> None:
     from config.world import DrumConfig, WallConfig, WorldConfig
-    from drivers.denning.device import EmulatedRobot
+    from drivers.registry import make_device
 
     for model in ("cone", "specular"):
         acoustics = WorldConfig().acoustics.model_copy(update={"model": model, "crosstalk": 0.5})
@@ -116,7 +116,7 @@ def _emulator(settings: Settings) -> None:
             wall=(WallConfig(x1_m=3.0, y1_m=-3.0, x2_m=3.0, y2_m=3.0),),
             acoustics=acoustics,
         )
-        EmulatedRobot(settings, world, seed=0).advance(0.5)
+        make_device(settings, world, seed=0).advance(0.5)
 
 
 RUN_ONCE: Final[Mapping[str, Callable[[Settings], None]]] = MappingProxyType(

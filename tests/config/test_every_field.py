@@ -114,6 +114,12 @@ NAMES_FILES = (("models",), ("world",))
 """Settings of a run that may also be names, and have defaults: see test_load."""
 
 
+def is_name_of_a_file(setting: Setting) -> bool:
+    """Return whether the setting may also be a name; `robot` may only in a run file."""
+    return setting.location in NAMES_FILES or (setting.root.startswith("run") and setting.location == ("robot",))
+
+
+
 def holder(table: Any, location: tuple[str | int, ...]) -> Any:
     for key in location[:-1]:
         table = table[key] if isinstance(key, int) else table.setdefault(key, {})
@@ -185,7 +191,7 @@ def test_the_unharmed_table_is_good(root: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.promise("P11")
-@pytest.mark.parametrize("setting", [s for s in SETTINGS if s.location not in NAMES_FILES], ids=str)
+@pytest.mark.parametrize("setting", [s for s in SETTINGS if not is_name_of_a_file(s)], ids=str)
 def test_wrong_type(setting: Setting, tmp_path: Path) -> None:
     for given in WRONG[setting.kind]:
         table = copy.deepcopy(ROOTS[setting.root][1])

@@ -7,10 +7,9 @@ from typing import Literal, TypeAlias
 
 from config.robot import BodyConfig, LinkConfig, RobotConfig
 from config.world import DrumConfig, WorldConfig
-from drivers.denning.device import EmulatedRobot
-from drivers.denning.robot import DenningRobot
 from drivers.emulator.faults import Fault
 from drivers.messages import Firing, Twist
+from drivers.registry import make_device, make_driver
 from tests.drivers.ring import RING
 
 Way: TypeAlias = Literal["to the robot", "to the host"]
@@ -47,8 +46,8 @@ class Cable:
     firings: list[Firing] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.robot = EmulatedRobot(self.config, WORLD, seed=1, faults=self.faults)
-        self.driver = DenningRobot(self.config)
+        self.robot = make_device(self.config, WORLD, seed=1, faults=self.faults)
+        self.driver = make_driver(self.config)
 
     @property
     def now_s(self) -> float:

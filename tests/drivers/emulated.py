@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from config.robot import BodyConfig, LinkConfig, RobotConfig
 from config.world import AcousticsConfig, DrumConfig, OdometryConfig, StartConfig, WallConfig, WorldConfig
 from drivers.denning.codec import Decoder, encode
-from drivers.denning.device import EmulatedRobot
+from drivers.denning.device import DenningDevice
 from drivers.denning.frames import (
     Drive,
     Frame,
@@ -43,7 +43,7 @@ WORLD = WorldConfig(
 )
 
 
-def next_event_s(robot: EmulatedRobot) -> float:
+def next_event_s(robot: DenningDevice) -> float:
     """Return when `advance` will next have something to do."""
     moments = [robot._next_us()]
     if robot._uart.empty_us is not None:
@@ -54,7 +54,7 @@ def next_event_s(robot: EmulatedRobot) -> float:
 class Host:
     """A host's end that writes down everything with the time it came."""
 
-    def __init__(self, robot: EmulatedRobot) -> None:
+    def __init__(self, robot: DenningDevice) -> None:
         self.robot = robot
         self.now = 0.0
         self.decoder = Decoder("robot")
@@ -96,7 +96,7 @@ class Host:
 def host(world: WorldConfig = WORLD, faults: Sequence[Fault] = (), seed: int = 1, **more: Any) -> Host:
     baud = more.pop("baud", 115200)
     clock_start_us = more.pop("clock_start_us", 0)
-    robot = EmulatedRobot(robot_config(baud, **more), world, seed, faults=faults, clock_start_us=clock_start_us)
+    robot = DenningDevice(robot_config(baud, **more), world, seed, faults=faults, clock_start_us=clock_start_us)
     return Host(robot)
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from config.robot import BodyConfig, LinkConfig, RobotConfig
 from drivers.denning.codec import Decoder, encode
+from drivers.denning.driver import DenningDriver
 from drivers.denning.frames import (
     Ack,
     Frame,
@@ -17,7 +18,6 @@ from drivers.denning.frames import (
     Release,
     RobotFrame,
 )
-from drivers.denning.robot import DenningRobot
 from drivers.driver import LineState
 from tests.drivers.ring import RING
 
@@ -38,7 +38,7 @@ class Bench:
     """A robot driver and, on the other side, a device whose every word the test says."""
 
     def __init__(self, config: RobotConfig = CONFIG) -> None:
-        self.robot = DenningRobot(config)
+        self.robot = DenningDriver(config)
         self.now = 100.0
         self.ident = IDENT
         self.last_drive = 0

@@ -11,8 +11,8 @@ import pytest
 
 from config.robot import SOUND_SPEED_M_S, FiringConfig, RingConfig
 from drivers.denning.frames import TENTH_FT_M, Pattern
+from drivers.denning.pattern_rotation import Rotation
 from drivers.denning.wire_units import wire_pattern
-from drivers.emulator.pattern_rotation import Rotation
 from tests.drivers.cable import STEP_S, Cable
 
 FIRINGS = 1_000_000

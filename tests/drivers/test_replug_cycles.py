@@ -17,8 +17,8 @@ import pytest
 
 from config.robot import LinkConfig
 from drivers.denning.codec import Decoder, encode
+from drivers.denning.driver import DenningDriver
 from drivers.denning.frames import Ack, Echo, Hello, Ident, Odom, Pattern, RobotFrame
-from drivers.denning.robot import DenningRobot
 from drivers.driver import LineState
 from drivers.link import Link
 from tests.drivers.cable import ROBOT
@@ -87,9 +87,9 @@ class Footprint(NamedTuple):
 
 
 @contextlib.asynccontextmanager
-async def hosted(config: LinkConfig) -> AsyncIterator[tuple[DenningRobot, asyncio.Queue[None], asyncio.Queue[str]]]:
+async def hosted(config: LinkConfig) -> AsyncIterator[tuple[DenningDriver, asyncio.Queue[None], asyncio.Queue[str]]]:
     """Keep a driver on a line; gives it, a queue told of each firing, and one told of each loss."""
-    driver, firings, lost = DenningRobot(ROBOT), asyncio.Queue[None](), asyncio.Queue[str]()
+    driver, firings, lost = DenningDriver(ROBOT), asyncio.Queue[None](), asyncio.Queue[str]()
     loop = asyncio.get_running_loop()
 
     def send() -> None:

@@ -15,8 +15,8 @@ import pytest
 
 from config.robot import LinkConfig
 from drivers.denning.codec import Decoder, encode
+from drivers.denning.driver import DenningDriver
 from drivers.denning.frames import Ack, Drive, Frame, Halt, Hello, Ident, Odom, Pattern, Release, RobotFrame
-from drivers.denning.robot import DenningRobot
 from drivers.driver import LineState
 from drivers.emulator.faults import Deaf, Fault, Mute
 from drivers.link import Link
@@ -128,7 +128,7 @@ class Host:
     unsent_max: int = 0
     asked: int = 0
     down_s: float | None = None
-    driver: DenningRobot = field(default_factory=lambda: DenningRobot(ROBOT))
+    driver: DenningDriver = field(default_factory=lambda: DenningDriver(ROBOT))
 
     def __post_init__(self) -> None:
         now = time.monotonic

@@ -10,8 +10,8 @@ from types import MappingProxyType
 
 from drivers.denning.codec import FRAME_MAX, Decoder, encode
 from drivers.denning.frames import Ack, Frame, Halt, Ident
-from drivers.denning.robot import DenningRobot
 from drivers.messages import Twist
+from drivers.registry import make_driver
 from runtime.recording.ring_log import RingLogError, read_ring_log
 from tests.drivers.cable import ROBOT
 from tests.drivers.noise import framed
@@ -43,7 +43,7 @@ def decoder(data: bytes) -> None:
 
 def driver(data: bytes) -> None:
     """A robot that says anything at all, in frames with good checksums: the driver believes it or not, and lives."""
-    robot, now_s, rest = DenningRobot(ROBOT), 0.0, data
+    robot, now_s, rest = make_driver(ROBOT), 0.0, data
     robot.opened(now_s)
     while rest:
         length, rest = rest[0] % 48, rest[1:]

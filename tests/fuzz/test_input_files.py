@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from config.load import ConfigError, load_settings, load_world
-from drivers.denning.device import EmulatedRobot
+from drivers.registry import make_device
 from runtime.recording.ring_log import RingLogError, read_ring_log
 from runtime.recording.ring_log_replay import replay
 from tests.fuzz.campaign import KINDS, shipped
@@ -134,6 +134,6 @@ def test_harmed_worlds_that_are_still_good_can_be_driven_in(tmp_path: Path) -> N
             world = load_world(path)
         except ConfigError:
             continue
-        EmulatedRobot(robot, world, seed=1).advance(0.3)
+        make_device(robot, world, seed=1).advance(0.3)
         driven += 1
     assert driven > 40

@@ -27,8 +27,8 @@ PAGE = ROOT / "docs" / "mutants.md"
 TARGETS: dict[str, tuple[str, ...]] = {
     "drivers/denning/codec.py": (
         "tests/drivers/denning/test_codec.py",
-        "tests/drivers/denning/test_robot.py",
-        "tests/drivers/denning/test_robot_driving.py",
+        "tests/drivers/denning/test_driver.py",
+        "tests/drivers/denning/test_driver_commands.py",
         "tests/drivers/denning/test_pose_stamping.py",
         "tests/drivers/denning/test_diagnostics.py",
     ),

@@ -12,9 +12,10 @@ import pytest
 
 from config.load import load_settings
 from config.settings import Settings
-from drivers.denning.device import EmulatedRobot
 from drivers.emulator.faults import Fault
+from drivers.emulator.robot_device import RobotDevice
 from drivers.emulator.time_channel import Governor
+from drivers.registry import make_device
 from runtime.timing.run_clock import PacedClock
 from runtime.timing.time_control import EmulatorControl
 from runtime.timing.wake import LoopTimer
@@ -54,7 +55,7 @@ class Held(NamedTuple):
 
     loop: VirtualLoop
     settings: Settings
-    robot: EmulatedRobot
+    robot: RobotDevice
     links: list[HeldLink]
     control: EmulatorControl
     governor: Governor
@@ -66,7 +67,7 @@ def held(monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] 
     settings = load_settings("hallway", ["link.port=memory", *sets])
     assert settings.world is not None
     loop, links, governor = VirtualLoop(), list[HeldLink](), Governor()
-    robot = EmulatedRobot(settings, settings.world, 3, faults=faults)
+    robot = make_device(settings, settings.world, 3, faults=faults)
 
     on_the_way: deque[bytes] = deque()
 

@@ -9,11 +9,10 @@ from dataclasses import dataclass, field
 from config.load import load_settings
 from config.settings import Settings
 from config.world import WorldConfig
-from drivers.denning.device import EmulatedRobot
-from drivers.denning.robot import DenningRobot
 from drivers.emulator.faults import Fault
 from drivers.emulator.memory_transport import MemoryLine
 from drivers.messages import Firing, Pose
+from drivers.registry import make_device, make_driver
 from perception.pipeline import Perception
 from runtime.cycle.driver_io import gather, give
 from runtime.cycle.modes import Mode, Request
@@ -38,8 +37,8 @@ class Run:
 
     def __post_init__(self) -> None:
         settings = self.settings
-        self.robot = EmulatedRobot(settings, self.world, self.seed, faults=self.faults)
-        self.driver = DenningRobot(settings)
+        self.robot = make_device(settings, self.world, self.seed, faults=self.faults)
+        self.driver = make_driver(settings)
         self.line = MemoryLine(self.driver, self.robot)
         self.state = State(Perception(settings.ring, settings.models, settings.perception))
 

@@ -17,8 +17,9 @@ import pytest
 from config.load import load_settings
 from config.robot import LinkConfig
 from config.settings import Settings
-from drivers.denning.device import EmulatedRobot
 from drivers.emulator.faults import Fault
+from drivers.emulator.robot_device import RobotDevice
+from drivers.registry import make_device
 from runtime.timing.wake import LoopTimer
 
 STEP_S = 0.005
@@ -62,7 +63,7 @@ class MemoryLink:
 
     def __init__(
         self,
-        robot: EmulatedRobot,
+        robot: RobotDevice,
         loop: VirtualLoop,
         config: LinkConfig,
         on_opened: Callable[[], None],
@@ -135,12 +136,12 @@ class MemoryLink:
 @contextlib.contextmanager
 def in_virtual_time(
     monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] = ()
-) -> Iterator[tuple[VirtualLoop, Settings, EmulatedRobot, list[MemoryLink]]]:
+) -> Iterator[tuple[VirtualLoop, Settings, RobotDevice, list[MemoryLink]]]:
     """Give a loop in which `RobotProcess` runs on a robot in memory; the list will hold its link."""
     settings = load_settings("hallway", ["link.port=memory", *sets])
     assert settings.world is not None
     loop, links = VirtualLoop(), list[MemoryLink]()
-    robot = EmulatedRobot(settings, settings.world, 3, faults=faults)
+    robot = make_device(settings, settings.world, 3, faults=faults)
 
     def link(*args: Any) -> MemoryLink:
         links.append(MemoryLink(robot, loop, *args))

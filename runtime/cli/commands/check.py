@@ -24,7 +24,7 @@ def check_config(config: str, sets: Sequence[str]) -> int:
     """
     settings = load_any(config, sets)
     if isinstance(settings, Settings):
-        refuse_impossible_firing(settings.ring)
+        refuse_impossible_firing(settings)
         for text in lint(settings):
             sys.stdout.write(f"{config}: {text}\n")
     sys.stdout.write(f"{config}: good\n")

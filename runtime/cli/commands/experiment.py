@@ -44,7 +44,7 @@ def run_experiment(
     settings = one_way(load_settings(name, sets, world=world, models=models))
     if settings.world is None or not settings.world.drum:
         raise UserError("the world holds no drum: the experiment sets drums seen against drums there", WRONG_CALL)
-    refuse_impossible_firing(settings.ring)
+    refuse_impossible_firing(settings)
     console = Console(stderr=True)
     ready_kernels(settings, console)
     from runtime.cycle.summary import write_json

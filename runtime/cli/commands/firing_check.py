@@ -1,11 +1,11 @@
-"""Refuse firing patterns, valid by schema, that the ring or the wire protocol cannot carry out."""
+"""Refuse robot files, valid by schema, that no driver can carry out."""
 
 from __future__ import annotations
 
-from config.robot import RingConfig
-from drivers.denning.wire_units import wire_pattern
+from config.robot import RobotConfig
+from drivers.registry import make_driver
 
 
-def refuse_impossible_firing(ring: RingConfig) -> None:
-    """Raise `drivers.firing_pattern.FiringError` if the ring cannot carry out its firing pattern."""
-    wire_pattern(ring)
+def refuse_impossible_firing(config: RobotConfig) -> None:
+    """Raise the `config.errors.UserError` of `drivers.registry.make_driver` if no driver can carry out `config`."""
+    make_driver(config)

@@ -174,7 +174,7 @@ def summarise(recording: Recording, verdict: ReplayResult) -> ReplaySummary:
 @contextlib.contextmanager
 def watching(recording: Recording, span: Span, units: Units) -> Iterator[tuple[OnCycle, OnEntry]]:
     """Hold the replay to its pace, and show it where there is a terminal."""
-    from drivers.denning.robot import DenningRobot
+    from drivers.registry import make_driver
     from runtime.cli.terminal.view import View
     from runtime.recording.channels import SERIAL, decode
     from runtime.recording.schema import SerialBytes
@@ -182,7 +182,7 @@ def watching(recording: Recording, span: Span, units: Units) -> Iterator[tuple[O
 
     settings, console = recording.settings, Console(stderr=True)
     view = View(settings, console, units) if console.is_terminal and not console.is_dumb_terminal else None
-    driver, books = DenningRobot(settings), CycleStats(late_after_s=math.inf)
+    driver, books = make_driver(settings), CycleStats(late_after_s=math.inf)
     driver.opened(0.0)
     begun: list[tuple[float, float]] = []
 

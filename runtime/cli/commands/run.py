@@ -78,7 +78,7 @@ def run_robot(
 ) -> int:
     """Carry out the command; see `runtime.cli.app.run`."""
     settings = load_settings(config, sets, world=emulation.world)
-    refuse_impossible_firing(settings.ring)
+    refuse_impossible_firing(settings)
     if no_console:
         settings = without_console(settings)
     if seconds is not None and not seconds > 0.0:
@@ -177,7 +177,7 @@ def proposed(
     """
     settings = load_settings(config, sets, world=world)
     try:
-        refuse_impossible_firing(settings.ring)
+        refuse_impossible_firing(settings)
     except UserError as complaint:
         raise ConfigError(str(complaint)) from complaint
     if no_console:

@@ -144,7 +144,7 @@ class Tuning:
         def proposed() -> Settings:
             settings = propose()
             try:
-                refuse_impossible_firing(settings.ring)
+                refuse_impossible_firing(settings)
             except UserError as complaint:
                 raise ConfigError(str(complaint)) from complaint
             return settings

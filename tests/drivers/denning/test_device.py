@@ -9,7 +9,7 @@ import pytest
 from cobs import cobs
 
 from config.world import StartConfig, WallConfig, WorldConfig
-from drivers.denning.device import EmulatedRobot
+from drivers.denning.device import DenningDevice
 from drivers.denning.frames import (
     Ack,
     Drive,
@@ -89,7 +89,7 @@ def test_step_shorter_than_the_sound_is_refused(
 def test_mask_beyond_the_ring_is_refused() -> None:
     config = robot_config()
     small = config.model_copy(update={"ring": config.ring.model_copy(update={"count": 8})})
-    h = Host(EmulatedRobot(small, WORLD, 1))
+    h = Host(DenningDevice(small, WORLD, 1))
     h.send(Pattern, 50, 255, (1 << 8,))
     h.run(0.01)
     assert h.last(Nak).code == NakCode.VALUE_OUT_OF_RANGE
@@ -99,7 +99,7 @@ def test_ring_too_large_for_the_protocol_is_an_error() -> None:
     config = robot_config()
     large = config.model_copy(update={"ring": config.ring.model_copy(update={"count": 25})})
     with pytest.raises(ValueError, match="25 sensors"):
-        EmulatedRobot(large, WORLD, 1)
+        DenningDevice(large, WORLD, 1)
 
 
 def test_sequence_numbers_run_on() -> None:

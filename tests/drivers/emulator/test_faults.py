@@ -75,7 +75,7 @@ def test_reboot_forgets_everything_but_where_it_stands() -> None:
     assert again[0].seq == 0
     assert h.robot.boot_id == h.last(Ident).boot_id != first
     assert h.robot.truth.pose.x > 0.3
-    assert h.robot.truth.t_s == pytest.approx(3.0)
+    assert h.robot.truth.emulated_s == pytest.approx(3.0)
 
 
 def test_moving_robot_that_reboots_stops() -> None:

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from config.robot import RingConfig
 from config.world import WorldConfig
 from drivers.denning.codec import Decoder, encode
-from drivers.denning.device import EmulatedRobot
 from drivers.denning.frames import (
     Drive,
     Echo,
@@ -27,6 +26,7 @@ from drivers.emulator.faults import Fault
 from drivers.emulator.memory_transport import MemoryLine
 from drivers.emulator.uart import QUEUE_MAX, Uart
 from drivers.messages import Identity, LinkCounts, Pose, Twist
+from drivers.registry import make_device
 from tests.drivers.emulated import ALL, WORLD, host, next_event_s, robot_config, script
 from tests.drivers.vectors import THIRDS
 
@@ -210,7 +210,7 @@ class PlainDriver:
 
 def memory_run(faults: Sequence[Fault] = (), cycle_s: float = 0.05) -> PlainDriver:
     driver = PlainDriver()
-    line = MemoryLine(driver, EmulatedRobot(robot_config(), WORLD, 1, faults=faults), start_s=100.0)
+    line = MemoryLine(driver, make_device(robot_config(), WORLD, 1, faults=faults), start_s=100.0)
     for k in range(round(2.0 / cycle_s) + 1):
         driver.drive(Twist(0.3, 0.0))
         line.exchange(100.0 + k * cycle_s)

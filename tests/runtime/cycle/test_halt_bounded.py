@@ -71,7 +71,7 @@ def test_a_thousand_halts_at_any_moment(monkeypatch: pytest.MonkeyPatch, measure
                 waits_s.append(halted_s - (max(asked_s, links[0].opened_s) if unplugged else asked_s))
                 drives = [at_s for at_s, frame in sent.frames if isinstance(frame, Drive) and at_s > halted_s]
                 assert not drives, "after it nothing but standing still"
-                assert robot.flags & Flags.LATCHED, "one frame stops the whole base"
+                assert robot.truth.flags & Flags.LATCHED, "one frame stops the whole base"
                 sent.frames.clear()
 
         def on_cycle(record: CycleRecord, _state: State, _books: CycleStats, _driver: RobotDriver) -> None:

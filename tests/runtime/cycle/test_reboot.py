@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from config.load import load_settings
-from drivers.denning.device import EmulatedRobot, Truth
-from drivers.denning.robot import DenningRobot
+from drivers.denning.device import DenningDevice
 from drivers.driver import LineState
 from drivers.emulator.faults import Reboot
 from drivers.emulator.memory_transport import MemoryLine
+from drivers.emulator.robot_device import GroundTruth
 from drivers.messages import Firing, Pose
+from drivers.registry import make_driver
 from perception.pipeline import Perception
 from runtime.cycle.driver_io import gather, give
 from runtime.cycle.modes import Mode, Request
@@ -44,16 +45,16 @@ class Run:
     now_s: float = 0.0
     firings: list[Firing] = field(default_factory=list)
     records: list[CycleRecord] = field(default_factory=list)
-    truths: list[Truth] = field(default_factory=list)
+    truths: list[GroundTruth] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         settings = load_settings("hallway", [f"perception.method={self.method}"])
         assert settings.world is not None
         fault = Reboot(kind="reboot", at_s=self.reboot_s, duration_s=self.down_s)
-        self.robot = EmulatedRobot(
+        self.robot = DenningDevice(
             settings, settings.world, seed=7, faults=(fault,), clock_start_us=self.clock_start_us
         )
-        self.driver = DenningRobot(settings)
+        self.driver = make_driver(settings)
         self.line = MemoryLine(self.driver, self.robot)
         self.settings = settings
         self.state = State(Perception(settings.ring, settings.models, settings.perception))
@@ -132,7 +133,7 @@ def test_at_any_phase_it_stands_until_it_is_re_armed(measured: Callable[[str], N
         # It stands, however long nobody arms it.
         run.until(lambda: run.now_s >= run.reboot_s + run.down_s + 3.0, 9.0)  # noqa: B023
         assert run.mode is Mode.SAFE_STOP
-        late = [t for t in run.truths if t.t_s > reboot_s + STANDS_WITHIN_S]
+        late = [t for t in run.truths if t.emulated_s > reboot_s + STANDS_WITHIN_S]
         assert late
         assert all(truth.twist.v == 0.0 and truth.twist.w == 0.0 for truth in late)
         new = run.firings[before:]

@@ -12,7 +12,7 @@ import structlog
 
 from config.errors import DONE
 from config.load import load_settings
-from drivers.denning.device import Truth
+from drivers.emulator.robot_device import GroundTruth
 from drivers.messages import Pose
 from runtime.cli.app import call
 from runtime.cli.commands.run_recording import RunRecording, kept
@@ -169,7 +169,7 @@ async def in_folder_of(
     with kept(settings, record, no_record=no_record, emulated=True) as keeping:
         observers = keeping.observers(None, structlog.get_logger())
 
-        def on_cycle(record: CycleRecord, _truth: Truth) -> None:
+        def on_cycle(record: CycleRecord, _truth: GroundTruth) -> None:
             pass
 
         def on_state(record: CycleRecord, state: State, _start: Pose) -> None:

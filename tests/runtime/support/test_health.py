@@ -106,7 +106,7 @@ class Watched:
                 prepare(process)
                 summary = loop.run_until_complete(process.run(arm=True, seconds=None))
                 links[0].live()
-                self.flags = robot.flags
+                self.flags = robot.truth.flags
         return summary
 
     def stands_because(self, summary: RunSummary, culprit: str) -> None:

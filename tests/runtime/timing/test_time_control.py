@@ -11,8 +11,8 @@ import pytest
 import structlog
 
 from config.settings import Settings
-from drivers.denning.device import EmulatedRobot
 from drivers.driver import RobotDriver
+from drivers.emulator.robot_device import RobotDevice
 from drivers.messages import Flags
 from runtime.cycle.modes import Mode, Request
 from runtime.cycle.process import Observers, RobotProcess
@@ -82,8 +82,8 @@ async def until(done: Callable[[], bool], patience_s: float = 60.0) -> None:
             await asyncio.sleep(0.001)
 
 
-def lived_s(robot: EmulatedRobot) -> float:
-    return robot.truth.t_s
+def lived_s(robot: RobotDevice) -> float:
+    return robot.truth.emulated_s
 
 
 def test_a_pause_of_any_length_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,7 +125,7 @@ def test_the_base_never_notices_a_pause_and_nothing_moves_meanwhile(monkeypatch:
             await asyncio.sleep(LONG_S)
             process.request(Request.HALT)
             await asyncio.sleep(LONG_S)
-            assert it.robot.flags & Flags.LATCHED, "a HALT is heard where time stands still"
+            assert it.robot.truth.flags & Flags.LATCHED, "a HALT is heard where time stands still"
             assert it.robot.truth.pose == before.pose
             assert await it.control.resume() is None
             await until(lambda: watched.records[-1].mode.mode is Mode.SAFE_STOP)
@@ -265,7 +265,7 @@ def test_a_run_that_is_paused_ends_in_good_order(monkeypatch: pytest.MonkeyPatch
             assert await it.control.pause() is None
 
         summary, _ = run(it, act)
-        assert it.robot.flags & Flags.LATCHED
+        assert it.robot.truth.flags & Flags.LATCHED
         assert it.robot.truth.twist.v == 0.0
     assert summary["mode"] == "DRIVE"
 

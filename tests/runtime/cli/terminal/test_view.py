@@ -20,8 +20,8 @@ import pytest
 from rich.console import Console
 
 from config.load import load_settings
-from drivers.denning.robot import DenningRobot
 from drivers.messages import Floats, LinkCounts, Pose
+from drivers.registry import make_driver
 from perception.pipeline import SeenObject
 from runtime.cli.terminal.plan import ARROWS, MARGIN_M, Plan, draw_plan
 from runtime.cli.terminal.view import EVERY_CYCLES, SWITCH_INTERVAL_S, Snapshot, View, keys
@@ -154,7 +154,7 @@ def test_a_drive_is_drawn_by_the_thread_and_the_loop_never_waits_for_it(monkeypa
     run = simulate(SETTINGS, SETTINGS.world, 0, 8.0, lambda record, _truth: records.append(record))
     file = Terminal()
     view = View(SETTINGS, Console(file=file, width=100, force_terminal=True), "m")
-    driver, books = DenningRobot(SETTINGS), CycleStats(0.005)
+    driver, books = make_driver(SETTINGS), CycleStats(0.005)
     before_s = sys.getswitchinterval()
     with view.shown():
         assert sys.getswitchinterval() == pytest.approx(SWITCH_INTERVAL_S, abs=1e-6)
@@ -172,7 +172,7 @@ def test_pictures_are_taken_every_few_cycles_only() -> None:
     records: list[CycleRecord] = []
     run = simulate(SETTINGS, SETTINGS.world, 0, 2.0, lambda record, _truth: records.append(record))
     view = View(SETTINGS, Console(file=io.StringIO()), "m")
-    driver, books, taken = DenningRobot(SETTINGS), CycleStats(0.005), 0
+    driver, books, taken = make_driver(SETTINGS), CycleStats(0.005), 0
     for record in records:
         view.on_cycle(record, run.state, books, driver)
         taken += view._slot is not None
@@ -187,7 +187,7 @@ def test_why_it_stands_though_it_may_drive_is_shown() -> None:
     run.state.standing = "the goal is reached"
     view = View(SETTINGS, Console(file=io.StringIO()), "m")
     for record in records[:EVERY_CYCLES]:
-        view.on_cycle(record, run.state, CycleStats(0.005), DenningRobot(SETTINGS))
+        view.on_cycle(record, run.state, CycleStats(0.005), make_driver(SETTINGS))
     assert view._slot is not None
     assert view._slot.mode.reason == "the goal is reached"
 

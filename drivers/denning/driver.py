@@ -35,7 +35,7 @@ _ORDER = ("HALT", "HELLO", "PATTERN", "RELEASE")
 """What goes on the line first."""
 
 
-class DenningRobot:
+class DenningDriver:
     """A `drivers.driver.RobotDriver` for the ring-and-base protocol.
 
     Parameters

@@ -8,6 +8,7 @@ import pytest
 
 from config.robot import FiringConfig
 from drivers.denning.codec import Decoder, encode
+from drivers.denning.driver import DenningDriver
 from drivers.denning.frames import (
     Ack,
     Echo,
@@ -17,7 +18,6 @@ from drivers.denning.frames import (
     NakCode,
     Pattern,
 )
-from drivers.denning.robot import DenningRobot
 from drivers.driver import LineState, RobotDriver
 from drivers.firing_pattern import FiringError
 from drivers.messages import LinkCounts, Twist
@@ -26,7 +26,7 @@ from tests.drivers.vectors import OCTETS
 
 
 def test_it_is_a_robot_driver() -> None:
-    driver: RobotDriver = DenningRobot(CONFIG)
+    driver: RobotDriver = DenningDriver(CONFIG)
     assert driver.state is LineState.CLOSED
     assert driver.outgoing(writable=True) == b""
 

@@ -1,0 +1,26 @@
+"""The Denning family's entry in the driver registry: fulfils `drivers.registry.DriverFamily`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from config.robot import RobotConfig
+from config.world import WorldConfig
+from drivers.denning.driver import DenningDriver
+from drivers.driver import RobotDriver
+from drivers.emulator.faults import Fault
+from drivers.emulator.robot_device import RobotDevice
+
+
+def make_driver(config: RobotConfig) -> RobotDriver:
+    """Return the host's end; see `drivers.registry.make_driver`."""
+    return DenningDriver(config)
+
+
+def make_device(
+    config: RobotConfig, world: WorldConfig, seed: int, *, faults: Sequence[Fault], clock_start_us: int
+) -> RobotDevice:
+    """Return the robot's end, emulated; see `drivers.registry.make_device`."""
+    from drivers.denning.device import DenningDevice  # it loads compiled kernels, which a real robot does not need
+
+    return DenningDevice(config, world, seed, faults=faults, clock_start_us=clock_start_us)

@@ -1,0 +1,122 @@
+"""Which robot drivers exist: the shipped ones, and those that installed packages add.
+
+This is the only place that knows them. A package adds a driver with an entry point of the group
+`echolocate.drivers`, whose name is what a robot file gives as `[robot] driver`::
+
+    [project.entry-points."echolocate.drivers"]
+    myrobot = "my_package.myrobot"
+
+The entry point names an object with the functions of `DriverFamily`; a module will do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib.metadata import EntryPoint, entry_points
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final, Protocol, cast
+
+from config.errors import WRONG_CALL, UserError
+
+if TYPE_CHECKING:
+    from config.robot import RobotConfig
+    from config.world import WorldConfig
+    from drivers.driver import RobotDriver
+    from drivers.emulator.faults import Fault
+    from drivers.emulator.robot_device import RobotDevice
+
+GROUP: Final = "echolocate.drivers"
+
+SHIPPED: Final[Mapping[str, EntryPoint]] = MappingProxyType(
+    {"denning": EntryPoint("denning", "drivers.denning.family", GROUP)}
+)
+
+
+class DriverError(UserError):
+    """The driver that a robot file names cannot be used: what happened, likely cause, next action."""
+
+    exit_code = WRONG_CALL
+
+
+class DriverFamily(Protocol):
+    """Both ends of one robot family's protocol."""
+
+    def make_driver(self, config: RobotConfig) -> RobotDriver:
+        """Return a driver for the robot that `config` describes.
+
+        Raises
+        ------
+        drivers.firing_pattern.FiringError
+            The robot or its protocol cannot carry out the firing pattern of `config`.
+        """
+
+    def make_device(
+        self, config: RobotConfig, world: WorldConfig, seed: int, *, faults: Sequence[Fault], clock_start_us: int
+    ) -> RobotDevice:
+        """Return an emulated robot; see `make_device` of this module for the parameters.
+
+        A family without an emulator raises `DriverError`.
+        """
+
+
+def known_drivers() -> dict[str, EntryPoint]:
+    """Return all installed drivers by name; a shipped driver takes precedence over another of its name."""
+    return {**{entry.name: entry for entry in entry_points(group=GROUP)}, **SHIPPED}
+
+
+def make_driver(config: RobotConfig) -> RobotDriver:
+    """Return a driver for the robot that `config` describes.
+
+    Raises
+    ------
+    DriverError
+        There is no driver named `config.robot.driver`, or it cannot be loaded.
+    drivers.firing_pattern.FiringError
+        The robot or its protocol cannot carry out the firing pattern of `config`.
+    """
+    return _family(config.robot.driver).make_driver(config)
+
+
+def make_device(
+    config: RobotConfig, world: WorldConfig, seed: int, *, faults: Sequence[Fault] = (), clock_start_us: int = 0
+) -> RobotDevice:
+    """Return an emulated robot that answers the driver of `config`.
+
+    Parameters
+    ----------
+    config
+        The robot.
+    world
+        What surrounds the robot, and where in it the robot starts.
+    seed
+        Seed of all random numbers: the same seed and input give the same output.
+    faults
+        What goes wrong with the robot or its line, and when.
+    clock_start_us
+        First reading of the robot's own clock, µs: 0 on a real robot, near its end to see it wrap soon.
+
+    Raises
+    ------
+    DriverError
+        There is no driver named `config.robot.driver`, it cannot be loaded, or it has no emulator.
+    ValueError
+        The robot's protocol cannot express `config`.
+    """
+    family = _family(config.robot.driver)
+    return family.make_device(config, world, seed, faults=faults, clock_start_us=clock_start_us)
+
+
+def _family(name: str) -> DriverFamily:
+    entry = SHIPPED.get(name) or known_drivers().get(name)
+    if entry is None:
+        raise DriverError(
+            f'robot.driver = "{name}": no such driver; known drivers: {", ".join(sorted(known_drivers()))}; correct '
+            f"the name, or install the package that provides the driver"
+        )
+    try:
+        return cast("DriverFamily", entry.load())
+    except (ImportError, AttributeError) as error:
+        raise DriverError(
+            f'robot.driver = "{name}": cannot be loaded from {entry.value} ({error}); reinstall or update the '
+            f"package that provides it"
+        ) from error
