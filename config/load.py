@@ -45,7 +45,7 @@ MODELS_MAX = 64
 
 COMMAND_LINE = Source("command line")
 NAMES = ("robot", "world", "models")
-"""Keys of a run file that name other files; where `robot` is a table, it is a section of a run without a robot file."""
+"""Keys of a run file that name other files; `robot` may instead be the section of that name."""
 
 M = TypeVar("M", bound=BaseModel)
 

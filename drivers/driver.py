@@ -10,8 +10,15 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
+from config.errors import WRONG_CALL, UserError
 from config.robot import RingConfig
 from drivers.messages import Firing, Identity, LinkCounts, Odometry, Pose, Twist
+
+
+class DriverError(UserError):
+    """The robot file asks for a driver, or of a driver, what is not available: what happened and what would work."""
+
+    exit_code = WRONG_CALL
 
 
 class LineState(Enum):

@@ -16,7 +16,7 @@ from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Protocol, cast
 
-from config.errors import WRONG_CALL, UserError
+from drivers.driver import DriverError
 
 if TYPE_CHECKING:
     from config.robot import RobotConfig
@@ -30,12 +30,6 @@ GROUP: Final = "echolocate.drivers"
 SHIPPED: Final[Mapping[str, EntryPoint]] = MappingProxyType(
     {"denning": EntryPoint("denning", "drivers.denning.family", GROUP)}
 )
-
-
-class DriverError(UserError):
-    """The driver that a robot file names cannot be used: what happened, likely cause, next action."""
-
-    exit_code = WRONG_CALL
 
 
 class DriverFamily(Protocol):
@@ -98,9 +92,8 @@ def make_device(
     Raises
     ------
     DriverError
-        There is no driver named `config.robot.driver`, it cannot be loaded, or it has no emulator.
-    ValueError
-        The robot's protocol cannot express `config`.
+        There is no driver named `config.robot.driver`, it cannot be loaded, it has no emulator, or its
+        protocol cannot express `config`.
     """
     family = _family(config.robot.driver)
     return family.make_device(config, world, seed, faults=faults, clock_start_us=clock_start_us)

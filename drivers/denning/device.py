@@ -21,6 +21,7 @@ from drivers.denning.frames import Drive, Halt, Hello, NakCode, Pattern, Release
 from drivers.denning.pattern_rotation import Rotation, window_us
 from drivers.denning.wire_frame_counter import WireFrameCounter
 from drivers.denning.wire_units import echo_byte
+from drivers.driver import DriverError
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.body import BRAKE_S, RAMP_S, Body
 from drivers.emulator.fault_schedule import FaultSchedule, flip_bits
@@ -69,7 +70,7 @@ class DenningDevice:
 
     Raises
     ------
-    ValueError
+    DriverError
         The ring has more sensors than the protocol's masks have bits.
     """
 
@@ -96,7 +97,7 @@ class DenningDevice:
         mounts = robot.ring.mounts
         self._sensors, most = len(mounts), frames.SENSORS_MAX
         if self._sensors > most:
-            raise ValueError(f"the ring has {self._sensors} sensors: the protocol's masks have room for {most}")
+            raise DriverError(f"the ring has {self._sensors} sensors: the protocol's masks have room for {most}")
         seeds = np.random.SeedSequence(seed).spawn(6)
         of_sonar, of_drift, self._boots, *noises = map(np.random.default_rng, seeds)
         self._output_noise, self._input_noise, self._outliers = noises

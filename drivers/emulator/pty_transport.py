@@ -262,8 +262,8 @@ async def serve(
     ------
     EmulatorError
         The link or the trace cannot be made, or there is no channel to be controlled by.
-    ValueError
-        The robot cannot be spoken to in this protocol.
+    drivers.driver.DriverError
+        See `drivers.registry.make_device`.
     """
     parent = os.getppid()
     stop = asyncio.Event()

@@ -14,7 +14,8 @@ from config.world import WorldConfig
 from drivers import registry
 from drivers.denning.device import DenningDevice
 from drivers.denning.driver import DenningDriver
-from drivers.registry import GROUP, DriverError, known_drivers, make_device, make_driver
+from drivers.driver import DriverError
+from drivers.registry import GROUP, known_drivers, make_device, make_driver
 
 
 def robot_with_driver(name: str) -> RobotConfig:

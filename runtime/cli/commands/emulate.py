@@ -46,15 +46,11 @@ def emulate_robot(
         sys.stdout.write(f"ready on {path}\n")
         sys.stdout.flush()
 
-    try:
-        asyncio.run(
-            serve(
-                settings, settings.world, link_path=link, faults=script, seed=seed, trace_path=trace,
-                latency_path=latency, ready=ready, exit_with_parent=end_with_parent,
-                clock_start_us=round(1e6 * clock_s),
-                control=PIPES if control else None,
-            )
-        )  # fmt: skip
-    except ValueError as error:
-        raise UserError(str(error), WRONG_CALL) from error
+    asyncio.run(
+        serve(
+            settings, settings.world, link_path=link, faults=script, seed=seed, trace_path=trace,
+            latency_path=latency, ready=ready, exit_with_parent=end_with_parent, clock_start_us=round(1e6 * clock_s),
+            control=PIPES if control else None,
+        )
+    )  # fmt: skip
     return DONE

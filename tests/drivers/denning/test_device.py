@@ -23,6 +23,7 @@ from drivers.denning.frames import (
     Pattern,
     Release,
 )
+from drivers.driver import DriverError
 from drivers.messages import Flags, Twist
 from tests.drivers.emulated import ALL, WORLD, Host, host, robot_config
 from tests.drivers.vectors import THIRDS
@@ -98,7 +99,7 @@ def test_mask_beyond_the_ring_is_refused() -> None:
 def test_ring_too_large_for_the_protocol_is_an_error() -> None:
     config = robot_config()
     large = config.model_copy(update={"ring": config.ring.model_copy(update={"count": 25})})
-    with pytest.raises(ValueError, match="25 sensors"):
+    with pytest.raises(DriverError, match="25 sensors"):
         DenningDevice(large, WORLD, 1)
 
 
