@@ -1,141 +1,184 @@
-"""Where lines go that nobody may wait for: a thread writes them, however long it takes."""
+"""A bounded queue and a thread that writes what is put into it, so that the control loop never waits for a disk.
+
+What does not fit, or cannot be written, is counted as lost. The log, the ring log and the recording are written so.
+"""
 
 from __future__ import annotations
 
-import os
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import Final, TextIO
+from typing import Final, Generic, TypeVar
 
 from runtime.support.health import Worker
 
-WAITING_MAX: Final = 4096
-"""Lines that may wait to be written; what does not fit is dropped and counted."""
+Item = TypeVar("Item")
+
+CAPACITY: Final = 4096
+"""Items that may wait: at 20 a second, three minutes of a disk that stands still."""
 CLOSE_MAX_S: Final = 2.0
-"""So long the end waits for what is left to be written."""
+"""Longest wait for the queue to be written when the writer is closed."""
+BATCH: Final = 256
+"""Items written between two pauses while there is a backlog."""
+BATCH_PAUSE_S: Final = 0.002
+"""Pause between batches of a backlog, in which the control loop gets the interpreter."""
 
 
-class BackgroundWriter:
-    """Takes lines and has them written; a context in which the writing goes on.
+class BackgroundWriter(Generic[Item]):
+    """Write items on a thread. As a context manager, start the thread and at the end write what is left.
+
+    All callables but `put`'s caller run on the thread. An OSError or ValueError (a closed stream raises one) from
+    `write` or `write_gap` counts the item as lost; any other exception ends the thread, which `probe` then reports.
 
     Parameters
     ----------
     name : str
-        Of its thread.
+        Name of the thread.
     write : callable
-        Writes a line whole, and waits for as long as that takes.
-    missing : callable, optional
-        Returns what is written in place of so many lost lines, once writing works again.
-    close : callable, optional
-        Called at the end, unless a write is still under way.
+        Writes one item completely; it may block for any time.
+    write_gap : callable, optional
+        Called with the number of items lost since its last call, before the next item is written.
+    begin : callable, optional
+        Called before the first item.
+    tick : callable, optional
+        Called after each batch of items, and with `poll_s` also when there was none.
+    finish : callable, optional
+        Called after the last item, unless the thread failed.
+    poll_s : float, optional
+        Look for items at this interval, s. Without it each `put` wakes the thread at once, which costs more.
+    capacity : int
+        Items that may wait.
+    close_max_s : float
+        Longest wait for the queue to be written when the writer is closed, s.
 
     Attributes
     ----------
-    lost
-        Lines that were not written.
-    trouble
-        Why, the last time.
+    trouble : str or None
+        Why items were lost, the last time.
+    is_stuck : bool
+        Whether the thread was still writing when the writer was closed.
     """
 
     def __init__(
         self,
         name: str,
-        write: Callable[[bytes], None],
-        missing: Callable[[int], bytes] | None = None,
-        close: Callable[[], None] | None = None,
+        write: Callable[[Item], None],
+        *,
+        write_gap: Callable[[int], None] | None = None,
+        begin: Callable[[], None] | None = None,
+        tick: Callable[[], None] | None = None,
+        finish: Callable[[], None] | None = None,
+        poll_s: float | None = None,
+        capacity: int = CAPACITY,
+        close_max_s: float = CLOSE_MAX_S,
     ) -> None:
         self._write = write
-        self._missing = missing
-        self._close = close
-        self._waiting: deque[bytes] = deque()
+        self._write_gap = write_gap
+        self._begin = begin
+        self._tick = tick
+        self._finish = finish
+        self._poll_s = poll_s
+        self._capacity = capacity
+        self._close_max_s = close_max_s
+        self._queue: deque[Item] = deque()
         self._wake = threading.Event()
-        self._ending = False
+        self._is_closing = False
         self._worker = Worker(name, self._work)
-        self._told = 0
-        self.lost = 0
+        # Each is counted by one thread only.
+        self._refused = self._unwritten = self._left = 0
+        self._gap_written = 0
         self.trouble: str | None = None
+        self.is_stuck = False
 
-    def put(self, line: bytes) -> None:
-        """Hand over a line."""
-        if len(self._waiting) >= WAITING_MAX:
-            self._lose("it takes lines more slowly than they come")
-            return
-        self._waiting.append(line)
-        self._wake.set()
+    @property
+    def lost(self) -> int:
+        """Number of items that were not written."""
+        return self._refused + self._unwritten + self._left
+
+    @property
+    def is_full(self) -> bool:
+        """Whether the next item would be lost."""
+        return len(self._queue) >= self._capacity
+
+    @property
+    def failure(self) -> str | None:
+        """The exception that ended the thread, in one line; None if there was none."""
+        return self._worker.failure
+
+    def put(self, item: Item, *, always: bool = False) -> bool:
+        """Queue an item and return True; count it as lost and return False if the queue is full.
+
+        Parameters
+        ----------
+        item : Item
+            What to write; it must not change any more.
+        always : bool
+            Queue it even if the queue is full: for the few items without which later ones cannot be read.
+        """
+        if self.is_full and not always:
+            self._refused += 1
+            self.trouble = "items come faster than they can be written"
+            return False
+        self._queue.append(item)
+        if self._poll_s is None:
+            self._wake.set()
+        return True
 
     def probe(self) -> str | None:
-        """Say how its thread ended; None while it runs. See `runtime.support.health`."""
+        """Return how the thread ended; None while it runs. See `runtime.support.health`."""
         return self._worker.probe()
 
-    def __enter__(self) -> BackgroundWriter:
+    def start(self) -> None:
+        """Start the thread."""
         self._worker.start()
+
+    def close(self) -> None:
+        """Write what is queued and end the thread; give up after `close_max_s`."""
+        self._is_closing = True
+        self._wake.set()
+        self._worker.join(self._close_max_s)
+        self._left = len(self._queue)
+        if self._worker.is_alive():
+            # The thread still holds the item it writes, and the file: nothing may be closed under it.
+            self.is_stuck = True
+            self.trouble = f"the last items were not written within {self._close_max_s:.0f} s"
+        elif self.failure is not None:
+            self.trouble = f"its thread failed: {self.failure}"
+
+    def __enter__(self) -> BackgroundWriter[Item]:
+        self.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._ending = True
-        self._wake.set()
-        self._worker.join(CLOSE_MAX_S)
-        if self._worker.is_alive():
-            # It still holds the line it writes, and the file: nothing may be closed under it.
-            self.lost += len(self._waiting)
-            self.trouble = f"it did not take the last lines within {CLOSE_MAX_S:.0f} s"
-        elif self._close is not None:
-            self._close()
+        self.close()
 
     def _work(self) -> None:
-        while not (self._ending and not self._waiting):
-            self._wake.wait()
+        if self._begin is not None:
+            self._begin()
+        has_backlog = is_closing = False
+        while self._queue or not is_closing:
+            self._wake.wait(BATCH_PAUSE_S if has_backlog else self._poll_s)
             self._wake.clear()
-            while self._waiting:
-                self._enter(self._waiting[0])
-                self._waiting.popleft()
+            is_closing = self._is_closing
+            if is_closing:
+                self._wake.set()  # from here on nothing waits
+            count = len(self._queue)
+            has_backlog = count > BATCH
+            for _ in range(min(BATCH, count)):
+                self._write_one(self._queue[0])
+                self._queue.popleft()
+            if self._tick is not None:
+                self._tick()
+        if self._finish is not None:
+            self._finish()
 
-    def _enter(self, line: bytes) -> None:
+    def _write_one(self, item: Item) -> None:
         try:
-            if self._missing is not None and self.lost > self._told:
-                count = self.lost - self._told
-                self._write(self._missing(count))
-                self._told += count
-            self._write(line)
-        except (OSError, ValueError) as error:  # a ValueError is how a closed stream refuses
-            self._lose(getattr(error, "strerror", None) or str(error))
-
-    def _lose(self, why: str) -> None:
-        self.lost += 1
-        self.trouble = why
-
-
-def to_file(name: str, fd: int, missing: Callable[[int], bytes]) -> BackgroundWriter:
-    """Return a sink into an open file, which it closes; a line that was torn by a full disk is ended."""
-    torn = False
-
-    def write(line: bytes) -> None:
-        nonlocal torn
-        rest = memoryview(b"\n" + line if torn else line)
-        while rest:
-            count = os.write(fd, rest)
-            torn = count < len(rest)
-            rest = rest[count:]
-
-    return BackgroundWriter(name, write, missing, lambda: os.close(fd))
-
-
-def to_terminal(name: str, stream: TextIO) -> BackgroundWriter:
-    """Return a sink onto a stream that stays open; past its buffer, whose lock is no thread's to die with."""
-    try:
-        fd = stream.fileno()
-    except OSError:
-
-        def write(line: bytes) -> None:
-            stream.write(line.decode())
-            stream.flush()
-
-        return BackgroundWriter(name, write)
-
-    def write_whole(line: bytes) -> None:
-        rest = memoryview(line)
-        while rest:
-            rest = rest[os.write(fd, rest) :]
-
-    return BackgroundWriter(name, write_whole)
+            gap = self._refused + self._unwritten - self._gap_written
+            if self._write_gap is not None and gap:
+                self._write_gap(gap)
+                self._gap_written += gap
+            self._write(item)
+        except (OSError, ValueError) as error:
+            self._unwritten += 1
+            self.trouble = getattr(error, "strerror", None) or str(error)

@@ -1,7 +1,7 @@
-"""The log: JSON lines to a file for machines, coloured lines on the terminal for people.
+"""The log: JSON lines in a file for programs, coloured lines on the terminal for people.
 
-A line is handed over and the loop goes on: a disk that stands still, a full one, a terminal held by Ctrl-S or a pipe
-that nobody reads delay no cycle. What is lost is counted, and told wherever a line still arrives.
+Lines are written in the background: a stalled or full disk, a terminal held by Ctrl-S or a pipe without a reader
+delays no cycle. Lost lines are counted and reported wherever lines still arrive.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import orjson
 import structlog
+from platformdirs import user_state_path
 
 from config.errors import WRONG_CALL, UserError
-from runtime.support.background_writer import BackgroundWriter, to_file, to_terminal
+from runtime.support.background_writer import BackgroundWriter
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, MutableMapping
@@ -27,71 +28,71 @@ if TYPE_CHECKING:
 
     from config.settings import LogConfig
 
-    Tap = Callable[[Mapping[str, Any]], None]
+    LogListener = Callable[[Mapping[str, Any]], None]
 
 
 SECRET: Final = frozenset({"start_url"})
-"""What only the log's own file and the terminal hold: recordings are handed on, and lines are shown to strangers."""
+"""Fields written only to the log file and the terminal: recordings are passed on, pages are shown."""
 
 
-class LogStanding:
-    """How the log of a run stands, also after its end."""
+class LogStatus:
+    """The writers of a run's log and what they lost; still valid after the end of the run."""
 
     def __init__(self) -> None:
-        self.file: BackgroundWriter | None = None
-        self.terminal: BackgroundWriter | None = None
-        self.listeners: list[Tap] = []
-        """Get every line, too, but for what is secret in it."""
+        self.file: BackgroundWriter[bytes] | None = None
+        self.terminal: BackgroundWriter[bytes] | None = None
+        self.listeners: list[LogListener] = []
+        """Each is called with every line, without its secret fields."""
 
     @property
     def lost(self) -> int:
-        """Lines that did not get into the file."""
+        """Number of lines that are missing in the file."""
         return 0 if self.file is None else self.file.lost
 
     @property
     def trouble(self) -> str | None:
-        """The last one with the file."""
+        """Why lines are missing in the file, the last time; None if none are."""
         return None if self.file is None else self.file.trouble
 
     def probe(self) -> str | None:
-        """Say which of its threads has ended; None while they run. See `runtime.support.health`."""
-        sinks = (sink for sink in (self.file, self.terminal) if sink is not None)
-        return next((how for sink in sinks if (how := sink.probe()) is not None), None)
+        """Return how one of the writers' threads ended; None while they run. See `runtime.support.health`."""
+        writers = (writer for writer in (self.file, self.terminal) if writer is not None)
+        return next((how for writer in writers if (how := writer.probe()) is not None), None)
 
 
-class _Tee:
-    """The last processor: one line to the file, one to the terminal where it is wanted."""
+class _LineOutput:
+    """The last processor of structlog: send one line to the file, the terminal and the listeners."""
 
-    def __init__(self, standing: LogStanding, terminal: TextIO | None, tap: Tap | None) -> None:
-        self._standing = standing
-        self._tap = tap
-        self._told: str | None = None
+    def __init__(self, status: LogStatus, terminal: TextIO | None, listener: LogListener | None) -> None:
+        self._status = status
+        self._listener = listener
+        self._reported: str | None = None
         colors = terminal is not None and terminal.isatty()
         self._render = structlog.dev.ConsoleRenderer(colors=colors, pad_event_to=0)
 
     def __call__(self, logger: object, name: str, event: MutableMapping[str, Any]) -> Mapping[str, Any]:
         settings = event.pop("settings", None)
-        self._note_trouble(logger, event)
-        if self._standing.file is not None:
+        self._report_trouble(logger, event)
+        if self._status.file is not None:
             if settings is not None:
-                self._standing.file.put(_json({"event": "settings", "settings": settings}))
-            self._standing.file.put(_json(event))
+                self._status.file.put(_json({"event": "settings", "settings": settings}))
+            self._status.file.put(_json(event))
         self._show(logger, name, event)
         raise structlog.DropEvent
 
-    def _note_trouble(self, logger: object, event: Mapping[str, Any]) -> None:
-        """Tell of trouble with the file before the line that finds it, where lines still arrive."""
-        trouble = self._standing.trouble
-        if trouble != self._told:
-            self._told = trouble
-            warning = {"event": "the log has trouble", "reason": trouble, "lost": self._standing.lost}
+    def _report_trouble(self, logger: object, event: Mapping[str, Any]) -> None:
+        """Warn once of each trouble with the file on the terminal and to the listeners."""
+        trouble = self._status.trouble
+        if trouble != self._reported:
+            self._reported = trouble
+            warning = {"event": "log lines are missing in the file", "reason": trouble, "lost": self._status.lost}
             self._show(logger, "warning", {**warning, "level": "warning", "timestamp": event.get("timestamp")})
 
     def _show(self, logger: object, name: str, event: Mapping[str, Any]) -> None:
-        for listen in (*(() if self._tap is None else (self._tap,)), *self._standing.listeners):
-            listen({name: value for name, value in event.items() if name not in SECRET})
-        if self._standing.terminal is not None:
-            self._standing.terminal.put((str(self._render(logger, name, dict(event))) + "\n").encode())
+        for listener in (*(() if self._listener is None else (self._listener,)), *self._status.listeners):
+            listener({name: value for name, value in event.items() if name not in SECRET})
+        if self._status.terminal is not None:
+            self._status.terminal.put((str(self._render(logger, name, dict(event))) + "\n").encode())
 
 
 def _json(event: Mapping[str, Any]) -> bytes:
@@ -100,57 +101,95 @@ def _json(event: Mapping[str, Any]) -> bytes:
 
 @contextlib.contextmanager
 def open_log(
-    config: LogConfig, *, terminal: bool, tap: Tap | None = None, standing: LogStanding | None = None
+    config: LogConfig, *, terminal: bool, listener: LogListener | None = None, status: LogStatus | None = None
 ) -> Iterator[FilteringBoundLogger]:
-    """Give the run's logger; its file is closed at the end.
+    """Yield the logger of the run; at the end, write what is left and close the file.
 
     Parameters
     ----------
     config : LogConfig
         File and level.
     terminal : bool
-        Whether lines also go to stderr; not while a live view owns the screen.
-    tap : callable, optional
-        Gets every line, too: a recording.
-    standing : LogStanding, optional
-        Is kept up to date with how the log stands.
+        Whether lines also go to stderr; False while the live view uses the screen.
+    listener : callable, optional
+        Called with every line: the recording.
+    status : LogStatus, optional
+        Receives the writers, for who reports on them.
 
     Raises
     ------
     UserError
-        The file cannot be opened.
+        The configured file cannot be opened.
     """
-    standing = LogStanding() if standing is None else standing
-    fd, lost = _open_file(config)
+    status = LogStatus() if status is None else status
+    fd, error = _open_file(config)
     with contextlib.ExitStack() as stack:
         if terminal:
-            standing.terminal = stack.enter_context(to_terminal("log on the terminal", sys.stderr))
+            status.terminal = stack.enter_context(terminal_writer("log on the terminal", sys.stderr))
         if fd is not None:
-            standing.file = stack.enter_context(to_file("log", fd, _missing))
+            status.file = stack.enter_context(file_writer("log", fd))
         log: FilteringBoundLogger = structlog.wrap_logger(
             None,
             processors=[
                 structlog.processors.add_log_level,
                 structlog.processors.TimeStamper(fmt="iso", utc=True),
                 structlog.processors.format_exc_info,
-                _Tee(standing, sys.stderr if terminal else None, tap),
+                _LineOutput(status, sys.stderr if terminal else None, listener),
             ],
             wrapper_class=structlog.make_filtering_bound_logger(getattr(logging, config.level.upper())),
         )
-        if lost is not None:
-            log.warning("no log file is kept", reason=lost)
+        if error is not None:
+            log.warning("no log file is written", reason=error)
         yield log
 
 
-def _missing(count: int) -> bytes:
-    """Return the line that stands where lines are missing."""
-    return _json({"event": "lines of the log are missing here", "level": "warning", "lost": count})
+def file_writer(name: str, fd: int) -> BackgroundWriter[bytes]:
+    """Return a writer of lines into an open file, which it closes at the end.
+
+    A line that says how many are missing stands where lines were lost; a line cut off by a full disk is ended first.
+    """
+    is_cut = False
+
+    def write(line: bytes) -> None:
+        nonlocal is_cut
+        rest = memoryview(b"\n" + line if is_cut else line)
+        while rest:
+            count = os.write(fd, rest)
+            is_cut = count < len(rest)
+            rest = rest[count:]
+
+    def write_gap(count: int) -> None:
+        write(_json({"event": "log lines are missing here", "level": "warning", "lost": count}))
+
+    return BackgroundWriter(name, write, write_gap=write_gap, finish=lambda: os.close(fd))
+
+
+def terminal_writer(name: str, stream: TextIO) -> BackgroundWriter[bytes]:
+    """Return a writer of lines to a stream, which stays open.
+
+    It bypasses the stream's buffer: a thread blocked while it holds the lock of that buffer would block the exit.
+    """
+    try:
+        fd = stream.fileno()
+    except OSError:
+
+        def write(line: bytes) -> None:
+            stream.write(line.decode())
+            stream.flush()
+
+        return BackgroundWriter(name, write)
+
+    def write_all(line: bytes) -> None:
+        rest = memoryview(line)
+        while rest:
+            rest = rest[os.write(fd, rest) :]
+
+    return BackgroundWriter(name, write_all)
 
 
 def _open_file(config: LogConfig) -> tuple[int | None, str | None]:
-    """Return the file, or why there is none: only one that was asked for is worth not starting at all."""
-    state = os.environ.get("XDG_STATE_HOME") or "~/.local/state"
-    path = Path(config.file or f"{state}/echolocate/echolocate.jsonl").expanduser()
+    """Return the descriptor of the log file, or None and why the default file cannot be written."""
+    path = Path(config.file).expanduser() if config.file else user_state_path("echolocate") / "echolocate.jsonl"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         return os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NOCTTY, 0o600), None

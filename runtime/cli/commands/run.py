@@ -22,7 +22,7 @@ from runtime.cli.commands.run_recording import RunRecording, kept
 from runtime.support.config_lint import lint
 from runtime.support.file_lock import file_lock
 from runtime.support.kernel_cache import ready_kernels
-from runtime.support.logs import LogStanding, open_log
+from runtime.support.logs import LogStatus, open_log
 from runtime.support.sd_notify import SdNotifier
 from runtime.timing.run_clock import PacedClock, RunClock
 
@@ -90,13 +90,13 @@ def run_robot(
     console = Console(stderr=True)
     ready_kernels(settings, console)
     live = not headless and console.is_terminal and not console.is_dumb_terminal
-    lines = LogStanding()
+    lines = LogStatus()
     with contextlib.ExitStack() as stack:
         if record is not None:
             stack.enter_context(file_lock(Path(record), f"--record {record}"))
         clock = PacedClock() if port is None else RunClock()
         keeping = stack.enter_context(kept(settings, record, no_record=no_record, emulated=port is None, clock=clock))
-        log = stack.enter_context(open_log(settings.log, terminal=not live, tap=keeping.on_log, standing=lines))
+        log = stack.enter_context(open_log(settings.log, terminal=not live, listener=keeping.on_log, status=lines))
         log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
         for text in lint(settings):
             log.warning(text)
@@ -196,7 +196,7 @@ async def watch(
     live: bool,
     units: Units,
     keeping: RunRecording,
-    lines: LogStanding,
+    lines: LogStatus,
     arm: bool,
     seconds: float | None,
     emulated: bool,

@@ -32,7 +32,7 @@ from runtime.recording.writer import RecordingWriter
 from runtime.support.background_writer import BackgroundWriter
 from runtime.support.health import Worker
 from runtime.support.kernel_loader import KernelLoader
-from runtime.support.logs import LogStanding
+from runtime.support.logs import LogStatus
 from runtime.support.sd_notify import SdNotifier
 from runtime.timing.cycle_stats import CycleStats
 from tests.runtime.virtual import VirtualLoop, in_virtual_time
@@ -285,7 +285,7 @@ def test_the_logs_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(_line: bytes) -> None:
         raise ZeroDivisionError("planted")
 
-    standing = LogStanding()
+    standing = LogStatus()
     with BackgroundWriter("log", fail) as standing.file:
 
         def plant(_process: RobotProcess, _loop: VirtualLoop) -> None:

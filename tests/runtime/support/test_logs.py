@@ -104,6 +104,6 @@ def test_a_state_folder_that_cannot_be_written_is_no_reason_not_to_start(
     with open_log(LogConfig(), terminal=True) as log:
         log.info("still here")
     warning, line = capsys.readouterr().err.splitlines()
-    assert "no log file is kept" in warning
+    assert "no log file is written" in warning
     assert str(tmp_path / "state") in warning
     assert "still here" in line

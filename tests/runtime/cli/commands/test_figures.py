@@ -215,7 +215,8 @@ def test_nobody_else_knows_matplotlib() -> None:
     import subprocess
     import sys
 
-    code = "import sys, runtime.cli.app, runtime.cycle.process, runtime.recording.recorder; assert 'matplotlib' not in sys.modules"
+    modules = "sys, runtime.cli.app, runtime.cycle.process, runtime.recording.recorder"
+    code = f"import {modules}; assert 'matplotlib' not in sys.modules"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     top = Path(__file__).resolve().parents[4]

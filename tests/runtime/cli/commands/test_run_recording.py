@@ -16,8 +16,6 @@ from runtime.cli.commands.run_recording import kept
 from runtime.recording import ring_log_writer as ringlog_writer
 from runtime.recording.ring_log import read_ring_log
 from runtime.recording.ring_log_writer import RingLogWriter
-from runtime.support import background_writer as sinks
-from runtime.support.background_writer import BackgroundWriter
 from tests.recorded import until
 
 SETTINGS = load_settings("hallway")
@@ -83,23 +81,3 @@ def test_a_ring_log_that_is_whole_is_no_complaint(tmp_path: Path) -> None:
     assert keeping.standing == {
         "file": str(path), "files": 1, "bytes": path.stat().st_size, "dropped": 0, "trouble": None, "sync_max_s": 0.0,
     }  # fmt: skip
-
-
-def test_a_log_that_takes_nothing_fills_no_memory_and_tells_what_is_missing() -> None:
-    begun, release, written = threading.Event(), threading.Event(), list[bytes]()
-
-    def write(line: bytes) -> None:
-        begun.set()
-        release.wait()
-        written.append(line)
-
-    with BackgroundWriter("log", write, lambda count: b"%d missing\n" % count) as sink:
-        sink.put(b"0\n")
-        begun.wait()
-        for number in range(1, sinks.WAITING_MAX + 100):
-            sink.put(b"%d\n" % number)
-        assert len(sink._waiting) == sinks.WAITING_MAX
-        assert (sink.lost, sink.trouble) == (100, "it takes lines more slowly than they come")
-        release.set()
-    assert written[:3] == [b"0\n", b"100 missing\n", b"1\n"]
-    assert len(written) == sinks.WAITING_MAX + 1
