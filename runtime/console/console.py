@@ -20,19 +20,19 @@ from runtime.analysis.text_tables import Units
 from runtime.console.clients.client import Client
 from runtime.console.clients.client_hub import Hub
 from runtime.console.commands.async_commands import AsyncCommands
+from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.dispatcher import CommandDispatcher
 from runtime.console.commands.parameters import parameters
-from runtime.console.commands.refusal import Refusal
 from runtime.console.commands.tuning import Tuning
-from runtime.console.frames.frame_encoder import NO_FRAMES, FrameContext, Frames
-from runtime.console.frames.session_info import about_run
+from runtime.console.frames.frame_encoder import NO_FRAMES, FrameContext, FrameEncoder
+from runtime.console.frames.session_info import session_info
 from runtime.console.http.auth import SCHEME, Auth, in_address, is_loopback, new_token
-from runtime.console.http.client_limits import Limits, Notes
+from runtime.console.http.client_limits import ConsoleLog, Limits
 from runtime.console.http.connection_limits import listen
-from runtime.console.http.server import House, Server
+from runtime.console.http.server import Server, ServerContext
 from runtime.console.http.static_files import page_files
 from runtime.console.protocols import NOT_HERE, Run
-from runtime.console.timed_coroutine import stepped
+from runtime.console.timed_coroutine import timed_coroutine
 from runtime.cycle.process import CONSOLE_FRAME, CONSOLE_RECEIVE
 from runtime.cycle.reloader import Ready
 from runtime.cycle.step import CycleRecord, State
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
 FRAME_S: Final = 0.05
-"""Frames are at least so far apart, on average."""
+"""FrameEncoder are at least so far apart, on average."""
 EARLY_S: Final = 0.01
 """A cycle that ends so much early still has its frame."""
 STILL_S: Final = 1.0
@@ -69,7 +69,7 @@ class Console:
         Whether the settings' world is what the robot meets.
     units : {"m", "ft"}
         In which figures are shown at first.
-    overtime : AsyncCommands
+    async_commands : AsyncCommands
         Whoever holds time and recordings.
     limits : Limits, optional
         What clients may cost.
@@ -94,7 +94,7 @@ class Console:
         *,
         emulated: bool,
         units: Units = "m",
-        overtime: AsyncCommands | None = None,
+        async_commands: AsyncCommands | None = None,
         limits: Limits | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -104,15 +104,17 @@ class Console:
         self._emulated = emulated
         self._units: Units = units
         self._config = settings.console
-        self._overtime = AsyncCommands() if overtime is None else overtime
+        self._overtime = AsyncCommands() if async_commands is None else async_commands
         self._limits = Limits(clients=settings.console.clients_max) if limits is None else limits
-        self._frames = Frames(settings)
-        self._notes = Notes(log, clock)
+        self._encoder = FrameEncoder(settings)
+        self._notes = ConsoleLog(log, clock)
         self._take_over = take_over
         self._shown = settings
         self.hub = Hub(self._limits, clock, self._control_left)
         self.tuning = Tuning(settings, self._tuned, ready, emulated=emulated)
-        self.desk = CommandDispatcher(process, self.hub, self.tuning, self._overtime, self._notes, self._spawn, clock)
+        self.dispatcher = CommandDispatcher(
+            process, self.hub, self.tuning, self._overtime, self._notes, self._spawn, clock
+        )
         timed = process.keeper.timed
         self._timed_frame = timed(CONSOLE_FRAME, self._frame)
         self._timed_tick = timed(CONSOLE_FRAME, self._tick)
@@ -136,10 +138,10 @@ class Console:
                 self._fail(error)
 
     def _note(self, record: CycleRecord, state: State, books: CycleStats, driver: RobotDriver) -> None:
-        self._frames.take(record)
+        self._encoder.take(record)
         if record.inputs.edits:
             refused = {one.edit: one.why for one in record.refused}
-            self.desk.edited([refused.get(k) for k in range(len(record.inputs.edits))])
+            self.dispatcher.edited([refused.get(k) for k in range(len(record.inputs.edits))])
         if self._last is None and self.hub.clients:
             # Now the robot has told its name.
             self.hub.greet(self._hello())
@@ -185,9 +187,9 @@ class Console:
         own = (socket.gethostname(), f"{socket.gethostname()}.local")
         names = (host,) if is_loopback(address) else (host, *own)
         timed = self._process.keeper.timed
-        house = House(
+        house = ServerContext(
             guard=Auth(token, names, port), hub=self.hub, limits=self._limits, notes=self._notes,
-            files=pages, hello=self._hello, on_message=self.desk.take, on_leave=self._left,
+            files=pages, hello=self._hello, on_message=self.dispatcher.take, on_leave=self._left,
             on_fault=self._process.health.report, report=self._report,
             watch_without_token=self._config.watch_without_token, timed=timed, clock=self._clock,
         )  # fmt: skip
@@ -253,13 +255,13 @@ class Console:
             record, state, books, driver = self._last
             missed, late, link = books.missed, books.late, driver.counts
         time_control, recording = self._overtime.time, self._overtime.recording
-        beside = FrameContext(
+        context = FrameContext(
             host_s=now_s, clients=len(self.hub.clients), phases_s=latest.phases_s, late_s=latest.late_s,
             missed=missed, late=late, link=link, recording=None if recording is None else recording.now,
             is_paused=time_control is not None and time_control.is_paused,
             speed=1.0 if time_control is None else time_control.speed,
         )  # fmt: skip
-        self.hub.publish(self._frames.shot(state, record, beside))
+        self.hub.publish(self._encoder.frame(state, record, context))
 
     def _tick(self) -> None:
         """Have a frame also where no cycle ends."""
@@ -271,7 +273,7 @@ class Console:
         # The first frame comes with the next cycle, whenever the last one was.
         self._due_s = 0.0
         return {
-            **about_run(
+            **session_info(
                 self.tuning.current, name=self._process.name, emulated=self._emulated, units=self._units
             ),
             "recording": self._overtime.recording is not None,
@@ -286,7 +288,7 @@ class Console:
     def _show_settings(self, settings: Settings) -> None:
         before, self._shown = self._shown, settings
         self._due_s = 0.0
-        self._frames.adopt(settings)
+        self._encoder.adopt(settings)
         if settings.models != before.models:
             self.hub.greet(self._hello())
         else:
@@ -300,11 +302,11 @@ class Console:
             self._overtime.player.leave(client)
 
     def _control_left(self) -> None:
-        self.desk.hands_off()
+        self.dispatcher.release_teleoperation()
 
     async def _report(self) -> bytes:
         if self._overtime.player is None:
-            raise Refusal(f"report: {NOT_HERE}")
+            raise CommandError(f"report: {NOT_HERE}")
         return await self._overtime.player.report()
 
     def _spawn(self, client: Client, work: Callable[[], Awaitable[None]]) -> None:
@@ -313,7 +315,7 @@ class Console:
 
         async def run() -> None:
             try:
-                await stepped(self._process.keeper.timed, CONSOLE_RECEIVE, _awaited(work))
+                await timed_coroutine(self._process.keeper.timed, CONSOLE_RECEIVE, _awaited(work))
             except asyncio.CancelledError:
                 raise
             except Exception as error:  # noqa: BLE001 - told as a fault of the program

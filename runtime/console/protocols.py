@@ -11,7 +11,7 @@ from typing import Any, Final, Protocol
 from config.settings import Settings
 from perception.edits import Edit, Evidence
 from runtime.console.clients.client import Frame
-from runtime.console.frames.frame_encoder import RecordingNow
+from runtime.console.frames.frame_encoder import RecordingStatus
 from runtime.cycle.drive_requests import DriveRequest
 from runtime.cycle.modes import Request
 from runtime.cycle.step import State
@@ -68,7 +68,7 @@ class Viewer(Protocol):
     def switch(self, *, live: bool) -> None:
         """Have it shown the run itself, or only what `show` gives it."""
 
-    def show(self, shot: Frame) -> None:
+    def show(self, frame: Frame) -> None:
         """Have a frame ready for it."""
 
     def say(self, message: dict[str, Any]) -> None:
@@ -79,7 +79,7 @@ class RecordingControl(Protocol):
     """Begins, ends and marks the recording of the run; every call returns None, or why it cannot be done."""
 
     @property
-    def now(self) -> RecordingNow | None:
+    def now(self) -> RecordingStatus | None:
         """The recording under way, None where there is none."""
 
     async def record(self, *, on: bool) -> str | None:
@@ -89,8 +89,8 @@ class RecordingControl(Protocol):
         """Put a mark into it."""
 
 
-class Player(Protocol):
-    """Shows recordings, to each client its own; a `Refusal` that is raised is told to who asked."""
+class ReplayControl(Protocol):
+    """Shows recordings, to each client its own; a `CommandError` that is raised is told to who asked."""
 
     async def recordings(self) -> list[dict[str, Any]]:
         """Return which recordings there are."""

@@ -22,7 +22,7 @@ def untimed(_name: str, call: Callable[..., Any], /) -> Callable[..., Any]:
 
 
 @coroutine
-def stepped(timed: Timed, name: str, work: Coroutine[Any, Any, T]) -> Generator[Any, Any, T]:
+def timed_coroutine(timed: Timed, name: str, work: Coroutine[Any, Any, T]) -> Generator[Any, Any, T]:
     """Await `work`, each of its steps timed under `name`."""
     send, throw = timed(name, work.send), timed(name, work.throw)
     step, value = send, None

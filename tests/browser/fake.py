@@ -56,7 +56,7 @@ class FakeServer:
     arrived_s: list[float] = field(default_factory=list)
     clients: list[Client] = field(default_factory=list)
     cycle: int = 40
-    hello: dict[str, Any] = field(default_factory=dict)
+    session: dict[str, Any] = field(default_factory=dict)
     changed: list[tuple[str, Any]] = field(default_factory=list)
     flags: list[str] = field(default_factory=list)
     silent: bool = False
@@ -150,7 +150,7 @@ class FakeServer:
         self._counted += 1
         client = Client(socket, self._counted)
         role = "control" if self.controller == client.number else "watch"
-        await socket.send_str(json.dumps((self.hello or greeting()) | {"role": role}))
+        await socket.send_str(json.dumps((self.session or greeting()) | {"role": role}))
         self.clients.append(client)
         try:
             async for message in socket:
@@ -189,15 +189,15 @@ class FakeServer:
                 self.mode, self.reason = "READY", None
             case "take_control" if self.controller is None:
                 self.controller = client.number
-            case "give_control":
+            case "release_control":
                 self.controller = None
-            case "drive_request":
-                self.drive_request = {k: v for k, v in message.items() if k not in {"id", "type"}}
+            case "legs" | "goal":
+                self.drive_request = {"kind": kind, **{k: v for k, v in message.items() if k not in {"id", "type"}}}
             case "pause" | "resume":
                 self.paused = kind == "pause"
             case "single_step":
                 self.cycle += 1
-            case "speed":
+            case "set_speed":
                 self.speed = message["factor"]
             case "record":
                 self.recording = {"file": "runs/now.mcap", "bytes": 120_000, "dropped": 0} if message["on"] else None
@@ -208,18 +208,18 @@ class FakeServer:
                     self.pinned - set(message["numbers"]))  # fmt: skip
             case "evidence":
                 return self._evidence(message["object"])
-            case "set":
+            case "set_parameter":
                 self.changed.append((message["path"], message["value"]))
-            case "undo":
+            case "undo_parameter":
                 return {"path": self.changed.pop()[0], "value": 1.0} if self.changed else None
             case "save_toml":
                 return TOML
-            case "recordings":
+            case "list_recordings":
                 return [
                     {"file": "now.mcap", "bytes": None, "modified_s": None, "live": True},
                     {"file": "2026-01-02-first.mcap", "bytes": 1_500_000, "modified_s": 1.0, "live": False},
                 ]
-            case "open":
+            case "open_recording":
                 self.playback = {"s": 0.0, "is_playing": False, "speed": 1.0}
                 about = {key: value for key, value in greeting(name="older").items() if key not in {"type", "role"}}
                 return {
@@ -230,11 +230,11 @@ class FakeServer:
                     "modes": [[0.0, "DRIVE", None], [9.0, "SAFE_STOP", "bumper contact"]],
                     "about": about,
                 }
-            case "scrub" if self.playback is not None:
+            case "seek_recording" if self.playback is not None:
                 self.playback["s"] = message["s"]
-            case "play" if self.playback is not None:
+            case "play_recording" if self.playback is not None:
                 self.playback["is_playing"] = message["speed"] > 0
-            case "live":
+            case "close_recording":
                 self.playback = None
         return None
 

@@ -51,7 +51,7 @@ def greeting(role: str = "control", **changes: Any) -> dict[str, Any]:
     drum = [[round(RADIUS * math.cos(a), 6), round(RADIUS * math.sin(a), 6)] for a in turn]
     half = RADIUS
     return {
-        "type": "hello", "version": "0.1.0", "role": role, "name": "denning", "emulated": True, "recording": True,
+        "type": "session", "version": "0.1.0", "role": role, "name": "denning", "emulated": True, "recording": True,
         "units": "ft",
         "ring": {"mounts": [[0.381 * math.cos(a), 0.381 * math.sin(a), a] for a in angles],
                  "half_angle": math.radians(12.0), "range_min": 0.1524, "range_max": 7.7724},
@@ -149,7 +149,7 @@ class Hall:
         clusters = [[x, y - math.copysign(0.25, y), 0.5, 0.22, 0.02 * i, 14 + i]
                     for i, (x, y) in enumerate(self.places)]  # fmt: skip
         return {
-            "cycle": cycle, "t": round(cycle * PERIOD_S, 3), "host_s": round(cycle * PERIOD_S, 3), "pose": pose,
+            "cycle": cycle, "robot_s": round(cycle * PERIOD_S, 3), "host_s": round(cycle * PERIOD_S, 3), "pose": pose,
             "ring_yaw": 0.0, "twist": [0.3 if self.moving else 0.0, 0.02], "flags": [],
             "firing": [(cycle + 3 * k) % 24 for k in range(8)],
             "ranges": self.ranges(pose), "age": [0.05 * ((i - cycle) % 3) for i in range(24)],

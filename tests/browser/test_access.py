@@ -22,10 +22,10 @@ async def scene(server: FakeServer, opener: Opener, size: tuple[int, int], **mor
     server.paused, server.cycle = True, 170
     opened = await opener.open(server.url, size, **more)
     await opened.steady()
-    await server.tell({"type": "log", "t": "2026-01-02T10:11:12Z", "level": "warning", "event": "a sensor hears less",
-                       "fields": {"sensor": "17"}})  # fmt: skip
-    await server.tell({"type": "log", "t": "2026-01-02T10:11:13Z", "level": "error", "event": "the line was lost",
-                       "fields": {}})  # fmt: skip
+    await server.tell({"type": "log", "timestamp": "2026-01-02T10:11:12Z", "level": "warning",
+                       "event": "a sensor hears less", "fields": {"sensor": "17"}})  # fmt: skip
+    await server.tell({"type": "log", "timestamp": "2026-01-02T10:11:13Z", "level": "error",
+                       "event": "the line was lost", "fields": {}})  # fmt: skip
     return opened
 
 

@@ -163,14 +163,14 @@ async def test_control_is_asked_for_and_handed_over(server: FakeServer, opener: 
     await first.says("#banner-asked", "client 2 (127.0.0.1) asks for control")
     await first.shot("asked")
     await first.page.locator("#banner-asked").get_by_role("button", name="Hand over").click()
-    assert await server.wait("grant") == {"client": 2}
+    assert await server.wait("grant_control") == {"client": 2}
     server.controller = 2
     await second.tab("Drive")
     await second.says("#role-words", "You control")
     await first.tab("Drive")
     await first.says("#role-words", "You watch")
     await second.page.get_by_role("button", name="Give control away").click()
-    await server.wait("give_control")
+    await server.wait("release_control")
     await second.says("#role-words", "You watch")
 
 
@@ -333,27 +333,26 @@ async def test_a_goal_by_click_and_by_numbers(server: FakeServer, opener: Opener
     await opened.tab("Drive")
     await page.get_by_role("button", name="Goal on the map").click()
     await page.mouse.click(*await opened.screen(3.2, -0.2))
-    goal = await server.wait("drive_request")
-    assert goal["kind"] == "goal"
+    goal = await server.wait("goal")
     assert (goal["x"], goal["y"]) == pytest.approx((3.2, -0.2), abs=0.02)
-    await opened.says("#drive_request-words", "To the goal at 10.5")
+    await opened.says("#drive-request-words", "To the goal at 10.5")
     await opened.shot("goal")
     await page.locator("#goal-x").fill("10")
     await page.locator("#goal-y").fill("-1,5")
     await page.keyboard.press("Enter")
-    typed = await server.wait("drive_request", 2)
+    typed = await server.wait("goal", 2)
     assert (typed["x"], typed["y"]) == pytest.approx((3.048, -0.4572))
     await page.locator("#goal-x").fill("far")
     await page.locator("#goal-x").press("Enter")
     await opened.says("#goal-error", "two numbers")
-    server.refusals["drive_request"] = ("the goal is 90 m away, 50 at most", None)
+    server.refusals["goal"] = ("the goal is 90 m away, 50 at most", None)
     await page.locator("#goal-x").fill("300")
     await page.locator("#goal-x").press("Enter")
     await opened.says("#goal-error", "90 m away")
     server.refusals.clear()
     await page.get_by_role("button", name="As configured").click()
-    assert await server.wait("drive_request", 4) == {"kind": "legs"}
-    await opened.says("#drive_request-words", "as configured")
+    assert await server.wait("legs") == {}
+    await opened.says("#drive-request-words", "as configured")
 
 
 async def test_a_goal_with_the_keyboard_alone(server: FakeServer, opener: Opener) -> None:
@@ -366,7 +365,7 @@ async def test_a_goal_with_the_keyboard_alone(server: FakeServer, opener: Opener
         await opened.page.keyboard.press("ArrowRight")
     x, y = await opened.world("view.toWorld(view.width / 2 + 72, view.height / 2)")
     await opened.page.keyboard.press("Enter")
-    goal = await server.wait("drive_request")
+    goal = await server.wait("goal")
     assert (goal["x"], goal["y"]) == pytest.approx((x, y), abs=1e-6)
 
 
@@ -376,7 +375,7 @@ async def test_gains_are_set_where_one_drives(server: FakeServer, opener: Opener
     gain = opened.page.locator("#drive-gains").get_by_label("move ahead gain")
     await gain.fill("0.5")
     await gain.press("Enter")
-    assert await server.wait("set") == {"path": "behaviors.move_ahead.move_ahead_gain", "value": 0.5}
+    assert await server.wait("set_parameter") == {"path": "behaviors.move_ahead.move_ahead_gain", "value": 0.5}
 
 
 async def test_a_thumb_drives_and_halts_on_a_phone(server: FakeServer, opener: Opener) -> None:

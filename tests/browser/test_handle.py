@@ -223,11 +223,11 @@ async def test_a_parameter_is_set_and_its_error_stands_beside_it(server: FakeSer
     gain = page.locator("#tune-fields").get_by_label("avoid obstacle gain")
     await gain.fill("2.5")
     await gain.press("Enter")
-    assert await server.wait("set") == {"path": GAIN, "value": 2.5}
+    assert await server.wait("set_parameter") == {"path": GAIN, "value": 2.5}
     await expect(field(opened, GAIN)).to_have_class("field changed")
     assert await page.locator("#drive-gains input").first.input_value() == "2.5", "both places show it"
 
-    server.refusals["set"] = ("must be at most 100", GAIN)
+    server.refusals["set_parameter"] = ("must be at most 100", GAIN)
     await gain.fill("1000")
     await gain.press("Tab")
     await expect(gain).to_have_attribute("aria-invalid", "true")
@@ -238,7 +238,7 @@ async def test_a_parameter_is_set_and_its_error_stands_beside_it(server: FakeSer
     await gain.fill("much")
     await gain.press("Enter")
     await expect(field(opened, GAIN).locator(".error")).to_have_text("a number is wanted")
-    assert len(server.of("set")) == 2
+    assert len(server.of("set_parameter")) == 2
     await gain.press("Escape")
     await expect(gain).to_have_value("2.5")
 
@@ -248,13 +248,13 @@ async def test_choices_are_chosen_and_undo_brings_back(server: FakeServer, opene
     page = opened.page
     await opened.tab("Tune")
     await page.get_by_label("preset").select_option("quadrants")
-    assert await server.wait("set") == {"path": "ring.firing.preset", "value": "quadrants"}
+    assert await server.wait("set_parameter") == {"path": "ring.firing.preset", "value": "quadrants"}
     gain = page.locator("#tune-fields").get_by_label("avoid obstacle gain")
     await gain.fill("2.5")
     await gain.press("Enter")
-    await server.wait("set", 2)
+    await server.wait("set_parameter", 2)
     await page.get_by_role("button", name="Undo").click()
-    assert await server.wait("undo") == {}
+    assert await server.wait("undo_parameter") == {}
     await page.locator("#tune-filter").focus()
     await expect(gain).to_have_value("1")
 

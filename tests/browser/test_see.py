@@ -55,7 +55,7 @@ async def test_every_layer_draws_something_and_can_be_switched(server: FakeServe
 
 
 async def test_truth_is_drawn_only_where_it_is_told(server: FakeServer, opener: Opener) -> None:
-    server.hello = greeting(truth=None)
+    server.session = greeting(truth=None)
     opened = await still(server, opener)
     await opened.tab("Layers")
     server.silent = True
@@ -233,7 +233,7 @@ async def test_ring_charts_and_facts(server: FakeServer, opener: Opener) -> None
 async def test_the_log_can_be_searched_and_is_never_markup(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     for n, level in enumerate(("debug", "info", "warning", "error")):
-        await server.tell({"type": "log", "t": 1.5 + n, "level": level, "event": f"event {level}",
+        await server.tell({"type": "log", "timestamp": 1.5 + n, "level": level, "event": f"event {level}",
                            "fields": {"name": "<img src=x onerror=alert(1)>"}})  # fmt: skip
     await opened.tab("Log")
     lines = opened.page.locator("#log li")

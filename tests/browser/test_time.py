@@ -28,12 +28,12 @@ async def test_pause_single_step_and_speed(server: FakeServer, opener: Opener) -
     await page.keyboard.press("k")
     await server.wait("resume")
     await page.locator("#speed").select_option("4")
-    assert await server.wait("speed") == {"factor": 4}
+    assert await server.wait("set_speed") == {"factor": 4}
     await opened.says("#time-words", "× 4")
 
 
 async def test_a_robot_on_a_port_has_no_time_to_hold(server: FakeServer, opener: Opener) -> None:
-    server.hello = greeting(emulated=False, truth=None)
+    server.session = greeting(emulated=False, truth=None)
     opened = await opener.open(server.url)
     await opened.tab("Time")
     for name in ("Pause", "One cycle"):
@@ -63,34 +63,34 @@ async def test_a_recording_is_opened_scrubbed_played_and_left(server: FakeServer
     await opened.tab("Time")
     await page.locator("#recordings").select_option("2026-01-02-first.mcap")
     await page.get_by_role("button", name="Open").click()
-    assert await server.wait("open") == {"file": "2026-01-02-first.mcap"}
+    assert await server.wait("open_recording") == {"file": "2026-01-02-first.mcap"}
     await opened.says("#banner-playback", "You look at a recording, not at the robot: 2026-01-02-first.mcap")
     await opened.says("#mode-name", "then: DRIVE")
     await opened.says("#robot-name", "older")
     await page.locator("#scrub").focus()
     await page.keyboard.press("ArrowRight")
-    assert (await server.wait("scrub"))["s"] == pytest.approx(0.05)
+    assert (await server.wait("seek_recording"))["s"] == pytest.approx(0.05)
     await page.keyboard.press("End")
     await opened.says("#scrub-value", "21.5 s")
     await page.get_by_role("button", name="✎ the corner").click()
     await opened.says("#scrub-value", "4.5 s")
-    assert server.of("scrub")[-1]["s"] == 4.5
+    assert server.of("seek_recording")[-1]["s"] == 4.5
     await page.get_by_role("button", name="SAFE STOP: bumper contact").click()
     await opened.says("#scrub-value", "9.0 s")
     await page.locator("#play-speed").select_option("4")
     await page.get_by_role("button", name="Play", exact=True).click()
-    assert await server.wait("play") == {"speed": 4}
+    assert await server.wait("play_recording") == {"speed": 4}
     await page.get_by_role("button", name="Hold").click()
-    assert await server.wait("play", 2) == {"speed": 0}
+    assert await server.wait("play_recording", 2) == {"speed": 0}
     await page.get_by_role("button", name="On one cycle").click()
-    assert await server.wait("step") == {"cycles": 1}
+    assert await server.wait("step_recording") == {"cycles": 1}
     await page.get_by_role("button", name="Back one cycle").click()
-    assert await server.wait("step", 2) == {"cycles": -1}
+    assert await server.wait("step_recording", 2) == {"cycles": -1}
     await opened.shot("recording")
     await page.keyboard.press("Space")
     await server.wait("halt")  # HALT means the robot, whatever is looked at
     await page.locator("#banner-playback").get_by_role("button", name="Back to the live run").click()
-    await server.wait("live")
+    await server.wait("close_recording")
     await expect(page.locator("#banner-playback")).to_have_count(0)
     await expect(page.locator("#player")).to_be_hidden()
     await opened.says("#robot-name", "denning")

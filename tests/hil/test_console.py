@@ -56,12 +56,12 @@ def test_from_the_start_url_to_the_end_of_the_run(tmp_path: Path) -> None:
         token = url.partition("token=")[2]
         assert "from_elsewhere='ssh -L " in run.err
         page = RawPage(url)
-        hello = page.next("hello")
-        assert (hello["role"], hello["emulated"], hello["truth"]) == ("control", False, None)
+        session = page.next("session")
+        assert (session["role"], session["emulated"], session["truth"]) == ("control", False, None)
         run.comes_to("READY")
         assert page.ask(type="arm")["ok"]
         run.comes_to("DRIVE")
-        assert page.ask(type="set", path="behaviors.arbiter.base_velocity_m_s", value=0.2)["ok"]
+        assert page.ask(type="set_parameter", path="behaviors.arbiter.base_velocity_m_s", value=0.2)["ok"]
         while (frame := page.next("state"))["mode"] != "DRIVE":
             pass
         assert frame["controller"]

@@ -10,7 +10,7 @@ from config.settings import Settings
 from runtime.analysis.text_tables import Units
 from runtime.console.commands.async_commands import AsyncCommands
 from runtime.console.console import Console
-from runtime.console.frames.frame_encoder import RecordingNow
+from runtime.console.frames.frame_encoder import RecordingStatus
 from runtime.console.playback.replay_client import ReplayClient
 from runtime.cycle.reloader import Ready
 from runtime.recording.storage import recordings_folder
@@ -39,10 +39,10 @@ class Recordings:
         self._keeping = keeping
 
     @property
-    def now(self) -> RecordingNow | None:
+    def now(self) -> RecordingStatus | None:
         """The recording under way, None where there is none."""
         now = self._keeping.now
-        return None if now is None else RecordingNow(now.file, now.bytes, now.dropped)
+        return None if now is None else RecordingStatus(now.file, now.bytes, now.dropped)
 
     async def record(self, *, on: bool) -> str | None:
         """Begin or end a recording."""
@@ -90,7 +90,7 @@ async def paged(
     players = ReplayClient(recordings_folder(settings.recording), PLAYED, current, units)
     console = Console(
         process, settings, log, take_over, ready, emulated=emulated, units=units,
-        overtime=AsyncCommands(control, recording, players),
+        async_commands=AsyncCommands(control, recording, players),
     )  # fmt: skip
     try:
         async with console.open():

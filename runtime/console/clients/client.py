@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import orjson
 
-from runtime.console.http.client_limits import Bucket, Limits
+from runtime.console.http.client_limits import Limits, TokenBucket
 
 
 class Frame(Protocol):
@@ -27,7 +27,7 @@ class Frame(Protocol):
     def number(self) -> int:
         """Its place among them."""
 
-    def told(self, *, follows: bool, dropped: int, controls: bool) -> bytes:
+    def encode(self, *, follows: bool, dropped: int, controls: bool) -> bytes:
         """Return the frame for one client: its changes only where it follows what that one saw last."""
 
 
@@ -74,7 +74,7 @@ class Client:
         self.controls = False
         self.is_live = True
         self.is_gone = False
-        self.bucket = Bucket(limits.messages_per_s, limits.messages_per_s)
+        self.bucket = TokenBucket(limits.messages_per_s, limits.messages_per_s)
         self.task: asyncio.Task[None] | None = None
         """Does what it asked for that takes its time; one thing at once."""
         self._wire = wire
@@ -102,12 +102,12 @@ class Client:
         """Take note that it forgets all that it was shown: the next frame is a whole one."""
         self._slot, self._seen = None, (None, 0)
 
-    def show(self, shot: Frame) -> None:
+    def show(self, frame: Frame) -> None:
         """Have a frame ready for it, in place of one it has not taken yet."""
         if self.is_gone:
             return
         self._dropped += self._slot is not None
-        self._slot = shot
+        self._slot = frame
         self._wake.set()
 
     def say(self, message: dict[str, Any]) -> None:
@@ -168,9 +168,9 @@ class Client:
             data = self._waiting.popleft()
             self._waiting_bytes -= len(data)
             return data
-        shot, self._slot = self._slot, None
-        if shot is None:
+        frame, self._slot = self._slot, None
+        if frame is None:
             return None
-        follows = self._seen == (shot.source, shot.number - 1)
-        self._seen = (shot.source, shot.number)
-        return shot.told(follows=follows, dropped=self._dropped, controls=self.controls)
+        follows = self._seen == (frame.source, frame.number - 1)
+        self._seen = (frame.source, frame.number)
+        return frame.encode(follows=follows, dropped=self._dropped, controls=self.controls)

@@ -52,7 +52,7 @@ class Hub:
         self._loop, self._thread = loop, threading.get_ident()
 
     @property
-    def is_bayes(self) -> bool:
+    def is_full(self) -> bool:
         """Whether there may be no further client."""
         return len(self.clients) >= self._limits.clients
 
@@ -74,11 +74,11 @@ class Hub:
         if self.clients.pop(client.number, None) is not None:
             self.control.leave(client)
 
-    def publish(self, shot: Frame) -> None:
+    def publish(self, frame: Frame) -> None:
         """Show all who watch the run a frame of it."""
         for client in self.clients.values():
             if client.is_live:
-                client.show(shot)
+                client.show(frame)
 
     def tell(self, message: Mapping[str, Any]) -> None:
         """Tell all clients the same."""
@@ -115,7 +115,7 @@ class Hub:
         fields = {name: str(value)[:TEXT_MAX] for name, value in event.items() if name not in known}
         line = {
             "type": "log",
-            "t": str(event.get("timestamp", "")),
+            "timestamp": str(event.get("timestamp", "")),
             "level": str(event.get("level", "info")),
             "event": str(event.get("event", ""))[:TEXT_MAX],
             "fields": fields,

@@ -10,8 +10,8 @@ from collections.abc import Awaitable, Callable
 from typing import Any, TypeAlias
 
 from runtime.console.commands import messages as forms
-from runtime.console.commands.refusal import Refusal
-from runtime.console.protocols import NOT_HERE, Player, RecordingControl, Viewer
+from runtime.console.commands.command_error import CommandError
+from runtime.console.protocols import NOT_HERE, RecordingControl, ReplayControl, Viewer
 from runtime.timing.time_control import TimeControl
 
 Work: TypeAlias = Callable[[], Awaitable[Any]]
@@ -26,12 +26,15 @@ class AsyncCommands:
         Of the emulator.
     recording : RecordingControl, optional
         Of the run.
-    player : Player, optional
+    player : ReplayControl, optional
         Of recordings.
     """
 
     def __init__(
-        self, time: TimeControl | None = None, recording: RecordingControl | None = None, player: Player | None = None
+        self,
+        time: TimeControl | None = None,
+        recording: RecordingControl | None = None,
+        player: ReplayControl | None = None,
     ) -> None:
         self.time = time
         self.recording = recording
@@ -42,7 +45,7 @@ class AsyncCommands:
 
         Raises
         ------
-        Refusal
+        CommandError
             Nobody here can.
         """
         match message:
@@ -58,7 +61,7 @@ class AsyncCommands:
                 forms.Recordings() | forms.Open() | forms.Scrub() | forms.Play() | forms.Step() | forms.Live()
             ) if self.player is not None:  # fmt: skip
                 return _of_player(self.player, viewer, message)
-        raise Refusal(f"{message.type}: {NOT_HERE}")
+        raise CommandError(f"{message.type}: {NOT_HERE}")
 
 
 def _of_emulator(time: TimeControl, message: forms.OfEmulator) -> Callable[[], Awaitable[str | None]]:
@@ -73,7 +76,7 @@ def _of_emulator(time: TimeControl, message: forms.OfEmulator) -> Callable[[], A
             return lambda: time.set_speed(factor)
 
 
-def _of_player(player: Player, viewer: Viewer, message: forms.OfPlayer) -> Work:
+def _of_player(player: ReplayControl, viewer: Viewer, message: forms.OfPlayer) -> Work:
     match message:
         case forms.Recordings():
             return player.recordings
@@ -95,6 +98,6 @@ def _settled(ask: Callable[[], Awaitable[str | None]]) -> Work:
     async def work() -> None:
         validate = await ask()
         if validate is not None:
-            raise Refusal(validate)
+            raise CommandError(validate)
 
     return work

@@ -17,11 +17,11 @@ from runtime.console.clients.client import Client
 from runtime.console.clients.client_hub import Hub
 from runtime.console.commands import messages as forms
 from runtime.console.commands.async_commands import AsyncCommands, Work
+from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.edit_messages import EditForm, edit_in
-from runtime.console.commands.messages import BadMessage, Message, Right, read_message
-from runtime.console.commands.refusal import Refusal
+from runtime.console.commands.messages import MalformedMessage, Message, Right, read_message
 from runtime.console.commands.tuning import Tuning
-from runtime.console.http.client_limits import Notes
+from runtime.console.http.client_limits import ConsoleLog
 from runtime.console.protocols import Robot
 from runtime.cycle.drive_requests import DriveRequest, Legs
 from runtime.cycle.modes import Request
@@ -59,9 +59,9 @@ class CommandDispatcher:
         All clients.
     tuning : Tuning
         The settings.
-    overtime : AsyncCommands
+    async_commands : AsyncCommands
         Does what takes its time.
-    notes : Notes
+    notes : ConsoleLog
         Told of who asks the robot for something, and of whatever is refused.
     spawn : Spawn
         Has that done.
@@ -70,13 +70,13 @@ class CommandDispatcher:
     """
 
     def __init__(
-        self, robot: Robot, hub: Hub, tuning: Tuning, overtime: AsyncCommands, notes: Notes, spawn: Spawn,
+        self, robot: Robot, hub: Hub, tuning: Tuning, async_commands: AsyncCommands, notes: ConsoleLog, spawn: Spawn,
         clock: Callable[[], float],
     ) -> None:  # fmt: skip
         self._robot = robot
         self._hub = hub
         self._tuning = tuning
-        self._overtime = overtime
+        self._overtime = async_commands
         self._notes = notes
         self._spawn = spawn
         self._clock = clock
@@ -91,9 +91,9 @@ class CommandDispatcher:
             number = message.id
             self._allow(client, message)
             data = self._do(client, message)
-        except BadMessage as bad:
-            self._refuse(client, bad.number, Refusal(str(bad), bad.field))
-        except Refusal as refusal:
+        except MalformedMessage as bad:
+            self._refuse(client, bad.number, CommandError(str(bad), bad.field))
+        except CommandError as refusal:
             self._refuse(client, number, refusal)
         else:
             if data is not LATER:
@@ -108,9 +108,9 @@ class CommandDispatcher:
             if validate is None:
                 _answer(asked.client, asked.number, None)
             else:
-                self._refuse(asked.client, asked.number, Refusal(validate))
+                self._refuse(asked.client, asked.number, CommandError(validate))
 
-    def hands_off(self) -> None:
+    def release_teleoperation(self) -> None:
         """Let nobody's hand be on the stick any more: whoever had the control has it no longer."""
         if self._is_by_hand:
             self._is_by_hand = False
@@ -118,10 +118,10 @@ class CommandDispatcher:
 
     def _allow(self, client: Client, message: Message) -> None:
         if not client.has_token:
-            raise Refusal(FORBIDDEN)
+            raise CommandError(FORBIDDEN)
         if message.right is Right.CONTROL:
             if not self._hub.control.has(client):
-                raise Refusal(NOT_IN_CONTROL)
+                raise CommandError(NOT_IN_CONTROL)
             self._hub.control.used(client, self._clock())
 
     def _do(self, client: Client, message: Message) -> Any:  # noqa: ANN401 - whatever the page is to have
@@ -169,7 +169,7 @@ class CommandDispatcher:
             case forms.Grant(client=number):
                 validate = control.grant(number)
         if validate is not None:
-            raise Refusal(validate)
+            raise CommandError(validate)
 
     def _tune(self, message: forms.Set | forms.Undo | forms.SaveToml) -> Any:  # noqa: ANN401
         match message:
@@ -187,7 +187,7 @@ class CommandDispatcher:
     def _evidence(self, number: int) -> dict[str, Any]:
         found = self._robot.evidence(number)
         if found is None:
-            raise Refusal(f"object {number} is not there any more")
+            raise CommandError(f"object {number} is not there any more")
         return {
             "object": found.object,
             "model": found.model,
@@ -200,18 +200,18 @@ class CommandDispatcher:
 
     def _edit(self, client: Client, message: EditForm) -> object:
         if not self._robot.edit(edit_in(message)):
-            raise Refusal("too many changes wait for the next cycle: try again")
+            raise CommandError("too many changes wait for the next cycle: try again")
         self._asked.append(Asked(client, message.id))
         return LATER
 
     def _begin(self, client: Client, number: int, work: Work) -> object:
         if client.is_busy:
-            raise Refusal("what was asked for before is still under way")
+            raise CommandError("what was asked for before is still under way")
 
         async def done() -> None:
             try:
                 data = await work()
-            except Refusal as refusal:
+            except CommandError as refusal:
                 self._refuse(client, number, refusal)
             else:
                 _answer(client, number, data)
@@ -219,7 +219,7 @@ class CommandDispatcher:
         self._spawn(client, done)
         return LATER
 
-    def _refuse(self, client: Client, number: int | None, refusal: Refusal) -> None:
+    def _refuse(self, client: Client, number: int | None, refusal: CommandError) -> None:
         self._notes.refuse(str(refusal), client.name)
         _say(client, number, None, refusal)
 
@@ -234,7 +234,7 @@ def _answer(client: Client, number: int, data: Any) -> None:  # noqa: ANN401 - w
     _say(client, number, data, None)
 
 
-def _say(client: Client, number: int | None, data: Any, refusal: Refusal | None) -> None:  # noqa: ANN401
+def _say(client: Client, number: int | None, data: Any, refusal: CommandError | None) -> None:  # noqa: ANN401
     client.say(
         {
             "type": "answer",

@@ -77,13 +77,13 @@ class TakeControl(Form):
 class GiveControl(Form):
     """Give the control up."""
 
-    type: Literal["give_control"]
+    type: Literal["release_control"]
 
 
 class Grant(Form):
     """Hand the control over to who asked for it."""
 
-    type: Literal["grant"]
+    type: Literal["grant_control"]
     client: Number
 
 
@@ -160,7 +160,7 @@ class LoadModel(Form):
 class Set(Form):
     """Change one parameter."""
 
-    type: Literal["set"]
+    type: Literal["set_parameter"]
     path: Annotated[str, Field(min_length=1, max_length=200)]
     value: Scalar
 
@@ -168,7 +168,7 @@ class Set(Form):
 class Undo(Form):
     """Take the last change of parameters or models back."""
 
-    type: Literal["undo"]
+    type: Literal["undo_parameter"]
 
 
 class SaveToml(Form):
@@ -181,15 +181,13 @@ class SaveToml(Form):
 class RequestLegs(Form):
     """Move ahead as configured."""
 
-    type: Literal["drive_request"]
-    kind: Literal["legs"]
+    type: Literal["legs"]
 
 
 class RequestGoal(Form):
     """Move to a place."""
 
-    type: Literal["drive_request"]
-    kind: Literal["goal"]
+    type: Literal["goal"]
     x: Place
     y: Place
 
@@ -223,7 +221,7 @@ class SingleStep(Form):
 class Speed(Form):
     """Let it go so many times as fast."""
 
-    type: Literal["speed"]
+    type: Literal["set_speed"]
     factor: Annotated[float, Field(ge=0.01, le=100.0)]
 
 
@@ -245,14 +243,14 @@ class Recordings(Form):
     """Ask which recordings there are."""
 
     right: ClassVar[Right] = Right.TOKEN
-    type: Literal["recordings"]
+    type: Literal["list_recordings"]
 
 
 class Open(Form):
     """Show a recording in place of the live run, to this client."""
 
     right: ClassVar[Right] = Right.TOKEN
-    type: Literal["open"]
+    type: Literal["open_recording"]
     file: Annotated[str, Field(min_length=1, max_length=300)]
 
 
@@ -260,7 +258,7 @@ class Scrub(Form):
     """Go to a time in it, seconds from its beginning."""
 
     right: ClassVar[Right] = Right.TOKEN
-    type: Literal["scrub"]
+    type: Literal["seek_recording"]
     s: Annotated[float, Field(ge=0.0, le=1e9)]
 
 
@@ -268,7 +266,7 @@ class Play(Form):
     """Play it so many times as fast; 0 stands still."""
 
     right: ClassVar[Right] = Right.TOKEN
-    type: Literal["play"]
+    type: Literal["play_recording"]
     speed: Annotated[float, Field(ge=0.0, le=100.0)]
 
 
@@ -276,7 +274,7 @@ class Step(Form):
     """Go so many cycles on, or back."""
 
     right: ClassVar[Right] = Right.TOKEN
-    type: Literal["step"]
+    type: Literal["step_recording"]
     cycles: Annotated[int, Field(ge=-10_000, le=10_000)]
 
 
@@ -284,24 +282,23 @@ class Live(Form):
     """Go back to the live run."""
 
     right: ClassVar[Right] = Right.TOKEN
-    type: Literal["live"]
+    type: Literal["close_recording"]
 
 
-Wished: TypeAlias = Annotated[RequestLegs | RequestGoal, Field(discriminator="kind")]
 OfEmulator: TypeAlias = Pause | Resume | SingleStep | Speed
 OfRecorder: TypeAlias = Record | Bookmark
 OfPlayer: TypeAlias = Recordings | Open | Scrub | Play | Step | Live
 OfTime: TypeAlias = OfEmulator | OfRecorder | OfPlayer
 Message: TypeAlias = (
     Halt | Arm | Disarm | TakeControl | GiveControl | Grant | ClearMap | DeleteSegments | PinSegments | PlaceModel
-    | MoveObject | RejectObject | ConfirmObject | Evidence | LoadModel | Set | Undo | SaveToml | Wished | Teleoperate
-    | OfTime
+    | MoveObject | RejectObject | ConfirmObject | Evidence | LoadModel | Set | Undo | SaveToml
+    | RequestLegs | RequestGoal | Teleoperate | OfTime
 )  # fmt: skip
 
 _READER: Final[TypeAdapter[Message]] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
 
 
-class BadMessage(UserError):  # noqa: N818 - told to a client
+class MalformedMessage(UserError):  # noqa: N818 - told to a client
     """A message that is none.
 
     Parameters
@@ -325,7 +322,7 @@ def read_message(text: str | bytes) -> Message:
 
     Raises
     ------
-    BadMessage
+    MalformedMessage
         It has none of the forms above.
     """
     try:
@@ -333,14 +330,14 @@ def read_message(text: str | bytes) -> Message:
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False, include_input=False)[0]
         if first["type"] in {"union_tag_invalid", "union_tag_not_found"}:
-            where = "kind" if first["loc"] == ("drive_request",) else "type"
-            raise BadMessage("there is no such message", _id_of(text), where) from None
-        # Before the place within the message stand the names of its form and, where there are two, of its kind.
-        place = [str(key) for key in first["loc"][2 if first["loc"][:1] == ("drive_request",) else 1 :]]
+            raise MalformedMessage("there is no such message", _id_of(text), "type") from None
+        place = [str(key) for key in first["loc"][1:]]
         if place[:1] == ["value"]:
-            raise BadMessage("must be a number, a text, true, false or null", _id_of(text), "value") from None
+            raise MalformedMessage("must be a number, a text, true, false or null", _id_of(text), "value") from None
         words = first["msg"][:TEXT_MAX]
-        raise BadMessage(words[:1].lower() + words[1:], _id_of(text), ".".join(place)[:FIELD_MAX] or None) from None
+        raise MalformedMessage(
+            words[:1].lower() + words[1:], _id_of(text), ".".join(place)[:FIELD_MAX] or None
+        ) from None
 
 
 def _id_of(text: str | bytes) -> int | None:

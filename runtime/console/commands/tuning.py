@@ -19,7 +19,7 @@ from config.problems import shown
 from config.reload import Difference, Reload, differences, reload
 from config.settings import Settings
 from runtime.cli.commands.firing_check import refuse_impossible_firing
-from runtime.console.commands.refusal import Refusal
+from runtime.console.commands.command_error import CommandError
 from runtime.cycle.reloader import Ready
 
 UNDO_MAX: Final = 100
@@ -63,7 +63,7 @@ class Tuning:
 
         Raises
         ------
-        Refusal
+        CommandError
             Why not; its field is `path`.
         """
         location: Location = tuple(path.split("."))
@@ -79,23 +79,25 @@ class Tuning:
 
         Raises
         ------
-        Refusal
+        CommandError
             Why not.
         """
         try:
             model = model_in(toml, "model")
         except ConfigError as error:
-            raise Refusal(str(error), "toml") from None
+            raise CommandError(str(error), "toml") from None
 
         def proposed() -> Settings:
             models = (*self.current.models, model)
             if len(models) > MODELS_MAX:
-                raise Refusal(f"{MODELS_MAX} models are looked for already: that is the most there may be", "toml")
+                raise CommandError(
+                    f"{MODELS_MAX} models are looked for already: that is the most there may be", "toml"
+                )
             return with_value(self.current, PAGE, ("models",), [m.model_dump(mode="json") for m in models])
 
         validate = await self._ready(self.current, self._weighed("toml", proposed).settings)
         if validate is not None:
-            raise Refusal(validate, "toml")
+            raise CommandError(validate, "toml")
         before = self._before
         self._try("toml", proposed)
         # A model cannot be forgotten while the robot runs: what is taken back from now on are other changes.
@@ -107,11 +109,11 @@ class Tuning:
 
         Raises
         ------
-        Refusal
+        CommandError
             There is nothing to take back.
         """
         if not self._before:
-            raise Refusal("there is no change to take back")
+            raise CommandError("there is no change to take back")
         before = self._before.pop()
         changed = tuple(differences(self.current, before))
         self.current = before
@@ -151,7 +153,7 @@ class Tuning:
 
         outcome = reload(self.current, proposed)
         if outcome.problems:
-            raise Refusal("; ".join(_beside(path, given, line) for line in outcome.problems), path)
+            raise CommandError("; ".join(_beside(path, given, line) for line in outcome.problems), path)
         return outcome
 
 

@@ -7,7 +7,7 @@ head that all share, the segments as changes or whole, and a short tail.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
@@ -29,7 +29,7 @@ NOTHING_HEARD: Final = -1.0
 """Stands for an infinite range, which JSON has no number for."""
 
 
-class RecordingNow(NamedTuple):
+class RecordingStatus(NamedTuple):
     """The recording under way."""
 
     file: str | None
@@ -50,7 +50,7 @@ class FrameContext:
     missed: int = 0
     late: int = 0
     link: LinkCounts = NO_FRAMES
-    recording: RecordingNow | None = None
+    recording: RecordingStatus | None = None
     is_paused: bool = False
     speed: float = 1.0
     playback: Mapping[str, Any] | None = None
@@ -65,18 +65,18 @@ class EncodedFrame(NamedTuple):
     number: int
     head: bytes
     changes: bytes
-    table: SegmentTable
-    """Has the whole; only while this is its newest frame."""
+    whole: Callable[[], bytes]
+    """Returns all segments; valid while this is the newest frame of its source."""
 
-    def told(self, *, follows: bool, dropped: int, controls: bool) -> bytes:
+    def encode(self, *, follows: bool, dropped: int, controls: bool) -> bytes:
         """Return the frame for one client."""
-        segments = self.changes if follows else self.table.whole()
+        segments = self.changes if follows else self.whole()
         return b'%b,"segments":%b,"dropped":%d,"controller":%b}' % (
             self.head, segments, dropped, b"true" if controls else b"false"
         )  # fmt: skip
 
 
-class Frames:
+class FrameEncoder:
     """Follows a run and puts its frames together, be it a live one or one that is played again.
 
     Parameters
@@ -113,21 +113,21 @@ class Frames:
         for firing in heard.firings:
             self._hear(firing)
 
-    def shot(self, state: State, record: CycleRecord | None, beside: FrameContext) -> EncodedFrame:
+    def frame(self, state: State, record: CycleRecord | None, context: FrameContext) -> EncodedFrame:
         """Return the frame of what a cycle left."""
         self._number += 1
         segments = self._segments(state)
         odometry = state.odometry
         t_s = 0.0 if odometry is None else odometry.t_s
-        link, phases_s = beside.link, beside.phases_s or {}
+        link, phases_s = context.link, context.phases_s or {}
         head: dict[str, Any] = {
             "type": "state",
             "cycle": state.cycle,
-            "t": t_s,
-            "host_s": round(beside.host_s, 4),
+            "robot_s": t_s,
+            "host_s": round(context.host_s, 4),
             "mode": state.mode.mode.value,
             "reason": state.mode.reason,
-            "standing": state.standing,
+            "hold_reason": state.standing,
             "arming": state.mode.arming_s is not None,
             "pose": [0.0, 0.0, 0.0],
             "ring_yaw": 0.0,
@@ -142,18 +142,18 @@ class Frames:
             "drive_request": _drive_request(state.drive_request),
             "phases": {name: round(1e6 * s, 1) for name, s in phases_s.items()},
             "cycle_us": round(1e6 * sum(phases_s.values()), 1),
-            "late_us": round(1e6 * beside.late_s, 1),
-            "missed": beside.missed,
-            "late": beside.late,
+            "late_us": round(1e6 * context.late_s, 1),
+            "missed": context.missed,
+            "late": context.late,
             "quanta": 0 if record is None else record.quanta,
             "refinement": "nothing" if record is None else record.refinement,
             "link": {"frames": link.frames, "bad": link.bad, "lost": link.lost},
             "sensors": [[r.sensor, r.fault, r.reason] for r in state.perception.sensors()],
-            "clients": beside.clients,
-            "recording": None if beside.recording is None else beside.recording._asdict(),
-            "paused": beside.is_paused,
-            "speed": beside.speed,
-            "playback": beside.playback,
+            "clients": context.clients,
+            "recording": None if context.recording is None else context.recording._asdict(),
+            "paused": context.is_paused,
+            "speed": context.speed,
+            "playback": context.playback,
         }
         if odometry is not None:
             pose, twist = odometry.pose, odometry.twist
@@ -162,7 +162,7 @@ class Frames:
             head["twist"] = [round(twist.v, 4), round(twist.w, 4)]
             head["flags"] = [flag.name for flag in odometry.flags]
         self._fired.clear()
-        return EncodedFrame(self, self._number, orjson.dumps(head)[:-1], segments, self._table)
+        return EncodedFrame(self, self._number, orjson.dumps(head)[:-1], segments, self._table.whole)
 
     def _hear(self, firing: Firing) -> None:
         fired = np.flatnonzero(~np.isnan(firing.ranges_m))

@@ -13,7 +13,7 @@ from runtime.analysis.text_tables import Units
 from runtime.console.commands.parameters import parameters
 
 
-def about_run(settings: Settings, *, name: str | None, emulated: bool, units: Units) -> dict[str, Any]:
+def session_info(settings: Settings, *, name: str | None, emulated: bool, units: Units) -> dict[str, Any]:
     """Return what every client is greeted with; the greeting of one of them adds its role.
 
     Parameters
@@ -29,7 +29,7 @@ def about_run(settings: Settings, *, name: str | None, emulated: bool, units: Un
     """
     ring, body = settings.ring, settings.body
     return {
-        "type": "hello",
+        "type": "session",
         "version": VERSION,
         "name": name,
         "emulated": emulated,

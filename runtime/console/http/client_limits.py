@@ -32,7 +32,7 @@ class Limits:
     waiting_bytes: int = 1 << 20
 
 
-class Bucket:
+class TokenBucket:
     """So many a second, and so many at once.
 
     Parameters
@@ -58,7 +58,7 @@ class Bucket:
         return True
 
 
-class Notes:
+class ConsoleLog:
     """Tells the log who came and went, asked and was refused, and does not let anybody fill it.
 
     Parameters
@@ -77,7 +77,7 @@ class Notes:
     def __init__(self, log: FilteringBoundLogger, clock: Callable[[], float]) -> None:
         self._log = log
         self._clock = clock
-        self._lines = {True: Bucket(LINES_PER_S, LINES_BURST), False: Bucket(LINES_PER_S, LINES_BURST)}
+        self._lines = {True: TokenBucket(LINES_PER_S, LINES_BURST), False: TokenBucket(LINES_PER_S, LINES_BURST)}
         self._untold = {True: 0, False: 0}
         self.refusals = 0
 

@@ -13,7 +13,7 @@ from typing import Final
 
 from config.errors import FAILED, WRONG_CALL, UserError
 from config.settings import ConsoleConfig
-from runtime.console.http.client_limits import Bucket
+from runtime.console.http.client_limits import TokenBucket
 from runtime.console.timed_coroutine import Timed
 from runtime.cycle.process import CONSOLE_RECEIVE
 
@@ -69,7 +69,7 @@ async def listen(config: ConsoleConfig) -> socket.socket:
     )
 
 
-class Timely(asyncio.Protocol):
+class TimedProtocol(asyncio.Protocol):
     """Hands everything on to another protocol, and has the time it takes booked.
 
     Parameters
@@ -82,7 +82,7 @@ class Timely(asyncio.Protocol):
         Told when the connection is over.
     """
 
-    def __init__(self, inner: asyncio.Protocol, timed: Timed, lost: Callable[[Timely], None]) -> None:
+    def __init__(self, inner: asyncio.Protocol, timed: Timed, lost: Callable[[TimedProtocol], None]) -> None:
         self._inner = inner
         self._lost = lost
         self._transport: asyncio.Transport | None = None
@@ -112,7 +112,7 @@ class Timely(asyncio.Protocol):
         self._inner.connection_lost(error)
 
 
-class Shut(asyncio.Protocol):
+class RejectingProtocol(asyncio.Protocol):
     """Cuts a connection as soon as it is made."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -121,7 +121,7 @@ class Shut(asyncio.Protocol):
             transport.abort()
 
 
-class Door:
+class ConnectionLimiter:
     """Makes the protocol of each new connection.
 
     There may be so many that have not become a websocket yet; a further one has the oldest of them cut, so that
@@ -150,32 +150,32 @@ class Door:
         clock: Callable[[], float],
     ) -> None:
         self._inner = inner
-        self._young: dict[Timely, None] = {}
+        self._young: dict[TimedProtocol, None] = {}
         self._young_max = young_max
         self._timed = timed
         self._refused = refused
         self._clock = clock
-        self._bucket = Bucket(NEW_PER_S, NEW_BURST)
+        self._bucket = TokenBucket(NEW_PER_S, NEW_BURST)
 
     def __call__(self) -> asyncio.Protocol:
         """Return the protocol of a new connection."""
         if not self._bucket.take(self._clock()):
             self._refused("there are too many new connections")
-            return Shut()
+            return RejectingProtocol()
         if len(self._young) >= self._young_max:
             self._refused("there are too many connections: the oldest is cut")
             oldest = next(iter(self._young))
             self._lost(oldest)
             oldest.cut()
-        one = Timely(self._inner(), self._timed, self._lost)
+        one = TimedProtocol(self._inner(), self._timed, self._lost)
         self._young[one] = None
         return one
 
     def settle(self, transport: asyncio.Transport) -> None:
         """Take note that a connection has become a websocket; those are counted by others."""
         protocol = transport.get_protocol()
-        if isinstance(protocol, Timely):
+        if isinstance(protocol, TimedProtocol):
             self._lost(protocol)
 
-    def _lost(self, one: Timely) -> None:
+    def _lost(self, one: TimedProtocol) -> None:
         self._young.pop(one, None)

@@ -18,12 +18,12 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from runtime.console.clients.client import Client
 from runtime.console.clients.client_hub import Hub
-from runtime.console.commands.refusal import Refusal
+from runtime.console.commands.command_error import CommandError
 from runtime.console.http.auth import Auth
-from runtime.console.http.client_limits import Limits, Notes
-from runtime.console.http.connection_limits import Door
+from runtime.console.http.client_limits import ConsoleLog, Limits
+from runtime.console.http.connection_limits import ConnectionLimiter
 from runtime.console.http.static_files import File, headers
-from runtime.console.timed_coroutine import Timed, stepped
+from runtime.console.timed_coroutine import Timed, timed_coroutine
 from runtime.cycle.process import CONSOLE_RECEIVE, CONSOLE_SEND
 
 if TYPE_CHECKING:
@@ -36,13 +36,13 @@ HALT_WORD: Final = '"halt"'
 
 
 @dataclass(frozen=True, slots=True)
-class House:
+class ServerContext:
     """What the server serves, and whom it tells."""
 
     guard: Auth
     hub: Hub
     limits: Limits
-    notes: Notes
+    notes: ConsoleLog
     files: Mapping[str, File]
     hello: Callable[[], Mapping[str, Any]]
     """What a new client is told."""
@@ -52,7 +52,7 @@ class House:
     on_fault: Callable[[str, BaseException], None]
     """Gets the name of a part and what it should never have met."""
     report: Callable[[], Awaitable[bytes]]
-    """Returns the run up to now as a page; raises a Refusal."""
+    """Returns the run up to now as a page; raises a CommandError."""
     watch_without_token: bool
     timed: Timed
     clock: Callable[[], float]
@@ -77,7 +77,7 @@ class _Wire:
 class _Murmur(logging.Handler):
     """Tells of what aiohttp would print with a traceback: a peer that does not speak HTTP, mostly."""
 
-    def __init__(self, notes: Notes) -> None:
+    def __init__(self, notes: ConsoleLog) -> None:
         super().__init__()
         self._notes = notes
 
@@ -93,16 +93,16 @@ class Server:
 
     Parameters
     ----------
-    house : House
+    house : ServerContext
         What it serves.
     """
 
-    def __init__(self, house: House) -> None:
+    def __init__(self, house: ServerContext) -> None:
         self._house = house
         self._talks: dict[Client, web.WebSocketResponse] = {}
         self._web: web.Server | None = None
         self._server: asyncio.Server | None = None
-        self._door: Door | None = None
+        self._door: ConnectionLimiter | None = None
         self._is_closing = False
 
     async def open(self, listening: socket.socket) -> None:
@@ -113,7 +113,7 @@ class Server:
             self._answer, access_log=None, logger=murmur, keepalive_timeout=IDLE_MAX_S, lingering_time=0.0
         )
         house = self._house
-        self._door = door = Door(
+        self._door = door = ConnectionLimiter(
             server, house.limits.connections, house.timed, lambda why: house.notes.refuse(why, "a connection"),
             house.clock,
         )  # fmt: skip
@@ -179,7 +179,7 @@ class Server:
             return web.Response(body=house.hub.lines, content_type="application/x-ndjson")
         try:
             page = await house.report()
-        except Refusal as refusal:
+        except CommandError as refusal:
             return web.Response(status=HTTPStatus.CONFLICT, text=str(refusal))
         return web.Response(body=page, content_type="text/html", charset="utf-8")
 
@@ -194,7 +194,7 @@ class Server:
         trouble = house.guard.trouble_with_origin(request.headers.get("Origin"), host)
         if trouble is not None:
             return self._refused(request, HTTPStatus.FORBIDDEN, trouble)
-        if house.hub.is_bayes:
+        if house.hub.is_full:
             return self._refused(request, HTTPStatus.SERVICE_UNAVAILABLE, "as many pages are open as there may be")
         talk = web.WebSocketResponse(
             compress=False, max_msg_size=house.limits.message_bytes + 1, writer_limit=1, timeout=CLOSE_MAX_S
@@ -209,7 +209,7 @@ class Server:
         client = house.hub.join(_Wire(talk, transport), str(request.remote), house.hello(), has_token=has_token)
         self._talks[client] = talk
         house.notes.tell("a page of the console is open", client.name)
-        await stepped(house.timed, CONSOLE_RECEIVE, self._stay(client, talk))
+        await timed_coroutine(house.timed, CONSOLE_RECEIVE, self._stay(client, talk))
         return talk
 
     async def _stay(self, client: Client, talk: web.WebSocketResponse) -> None:
@@ -256,7 +256,7 @@ class Server:
     async def _send(self, client: Client) -> None:
         """Send to a client; that it is gone is no fault, anything else is."""
         try:
-            await stepped(self._house.timed, CONSOLE_SEND, client.send_all())
+            await timed_coroutine(self._house.timed, CONSOLE_SEND, client.send_all())
         except ConnectionError:
             client.leave()
         except asyncio.CancelledError as error:

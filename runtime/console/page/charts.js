@@ -118,7 +118,7 @@ export class Charts {
   #drawPhases(chart) {
     const strip = this.#phases;
     const names = Object.keys(this.#world.state.phases);
-    const budget = 1000 * (this.#world.hello?.budget_s ?? 0), period = 1000 * (this.#world.hello?.period_s ?? 0);
+    const budget = 1000 * (this.#world.session?.budget_s ?? 0), period = 1000 * (this.#world.session?.period_s ?? 0);
     const shownMax = Math.floor((strip.canvas.clientWidth - LEFT - 6) / COLUMN_PX);
     const shown = chart.slice(-Math.max(1, shownMax));
     const sums = shown.map(({ phases }) => names.reduce((sum, name) => sum + (phases[name] ?? 0) / 1000, 0));

@@ -9,7 +9,7 @@ const SILENCE_MAX_MS = 10_000;
 const MESSAGE_MAX = 65_536;
 // Numbers in a recording are not those of the live map, and what it shows is not where the robot is.
 const LIVE_ONLY = new Set([
-  "arm", "drive_request", "teleoperate", "delete_segments", "pin_segments", "place_model", "move_object", "reject_object",
+  "arm", "legs", "goal", "teleoperate", "delete_segments", "pin_segments", "place_model", "move_object", "reject_object",
   "confirm_object", "clear_map", "evidence",
 ]);
 // More than this unsent means that the network stalls: what is sent now would move the robot at some later time.

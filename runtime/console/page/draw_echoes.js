@@ -6,10 +6,10 @@ const AGES = [[0.3, 0.9, 1.8], [1.5, 0.45, 1.2], [Infinity, 0.2, 1]]; // up to s
 
 export function drawArcs(f) {
   const { ctx, world, px } = f;
-  const half = world.hello?.ring?.half_angle ?? 0;
+  const half = world.session?.ring?.half_angle ?? 0;
   const paths = AGES.map(() => new Path2D());
   for (const echo of world.echoes) {
-    const age = world.state.t - echo.t;
+    const age = world.state.robot_s - echo.t;
     const path = paths[AGES.findIndex(([until]) => age < until)] ?? paths.at(-1);
     const from = echo.angle - half;
     path.moveTo(echo.x + echo.range * Math.cos(from), echo.y + echo.range * Math.sin(from));
@@ -26,7 +26,7 @@ export function drawArcs(f) {
 
 export function drawBeams(f) {
   const { ctx, world, px, theme } = f;
-  const ring = world.hello?.ring;
+  const ring = world.session?.ring;
   if (!ring) return;
   const heard = new Path2D(), unheard = new Path2D();
   const places = [];

@@ -70,7 +70,7 @@ export function drawScale(f) {
 
 export function drawTruth(f) {
   const { ctx, theme, px } = f;
-  const truth = f.world.hello?.truth;
+  const truth = f.world.session?.truth;
   if (!truth) return;
   f.inWorld();
   const closed = new Path2D(), lines = new Path2D();

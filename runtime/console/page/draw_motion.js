@@ -29,7 +29,7 @@ export function drawRobot(f) {
   const { ctx, world, px, theme } = f;
   if (!world.fresh) return;
   const [x, y, theta] = world.state.pose;
-  const r = world.hello?.body?.radius ?? 0.2;
+  const r = world.session?.body?.radius ?? 0.2;
   f.inWorld();
   ctx.beginPath();
   ctx.arc(x, y, r, 0, 2 * Math.PI);
@@ -78,7 +78,7 @@ export function drawVectors(f) {
   const [x, y] = view.toScreen(world.state.pose[0], world.state.pose[1]);
   f.onScreen();
   ctx.textBaseline = "middle";
-  const unit = Math.max(UNIT_PX, 1.7 * (world.hello?.body?.radius ?? 0) * view.scale);
+  const unit = Math.max(UNIT_PX, 1.7 * (world.session?.body?.radius ?? 0) * view.scale);
   const roomy = view.width > 480;
   world.state.vectors.forEach(([name, vx, vy], i) => {
     const size = Math.hypot(vx, vy);

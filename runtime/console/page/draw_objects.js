@@ -129,7 +129,7 @@ export function drawLabels(f) {
   }).filter(({ x, y }) => x > -50 && y > -50 && x < view.width + 50 && y < view.height + 50);
   const taken = f.labels;
   const [rx, ry] = view.toScreen(world.state.pose[0], world.state.pose[1]);
-  const robot = { x: rx, y: ry, r: (world.hello?.body?.radius ?? 0.2) * view.scale };
+  const robot = { x: rx, y: ry, r: (world.session?.body?.radius ?? 0.2) * view.scale };
   const misses = ({ x, y, r }, [left, top, right, bottom]) =>
     Math.hypot(x - Math.max(left, Math.min(x, right)), y - Math.max(top, Math.min(y, bottom))) > r;
   const free = (box, own) => taken.every((one) => !overlap(one, box))
@@ -168,9 +168,9 @@ export function drawEvidence(f) {
   const { ctx, world, theme, px, selection } = f;
   const evidence = world.evidence;
   if (!evidence || evidence.object !== selection.object) return;
-  const half = world.hello?.ring?.half_angle ?? 0;
+  const half = world.session?.ring?.half_angle ?? 0;
   const speaks = new Path2D(), against = new Path2D(), crosses = new Path2D(), rays = new Path2D();
-  const reachMax = world.hello?.ring?.range_max ?? 0;
+  const reachMax = world.session?.ring?.range_max ?? 0;
   for (const { x1, y1, x2, y2, supports } of evidence.lines) {
     const path = supports ? speaks : against;
     path.moveTo(x1, y1);

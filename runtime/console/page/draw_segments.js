@@ -11,13 +11,13 @@ class Paths {
   pins = [];
 
   refresh(world) {
-    const key = `${world.segmentsVersion} ${Math.floor(world.state.t)}`;
+    const key = `${world.segmentsVersion} ${Math.floor(world.state.robot_s)}`;
     if (key === this.key) return;
     this.key = key;
     this.paths = AGES.map(() => new Path2D());
     this.pins = [];
     for (const s of world.segments.values()) {
-      const age = world.state.t - s.t;
+      const age = world.state.robot_s - s.t;
       const path = this.paths[AGES.findIndex(([until]) => age < until)] ?? this.paths.at(-1);
       path.moveTo(s.x1, s.y1);
       path.lineTo(s.x2, s.y2);

@@ -8,15 +8,15 @@ export class Drive {
     Object.assign(this, { world, units, connection, notices, hand });
     const asks = {
       arm: () => this.arm(), disarm: { type: "disarm" }, "take-control": { type: "take_control" },
-      "give-control": { type: "give_control" }, "drive_request-legs": { type: "drive_request", kind: "legs" },
+      "give-control": { type: "release_control" }, "drive-request-legs": { type: "legs" },
     };
     for (const [id, message] of Object.entries(asks)) {
       byId(id).addEventListener("click", typeof message === "function" ? message : () => this.#ask(message));
     }
     byId("halt").addEventListener("click", () => this.halt());
-    byId("drive_request-goal").addEventListener("click", () => tools.choose("goal", { focus: true }));
+    byId("drive-request-goal").addEventListener("click", () => tools.choose("goal", { focus: true }));
     byId("goal-form").addEventListener("submit", (event) => this.#goalByForm(event));
-    world.on("hello", () => {
+    world.on("session", () => {
       this.controller = undefined; // there may be new fields, to be shut for who watches
     });
     world.on("state", () => this.#refresh());
@@ -41,7 +41,7 @@ export class Drive {
   }
 
   goal(x, y) {
-    return this.connection.ask({ type: "drive_request", kind: "goal", x, y });
+    return this.connection.ask({ type: "goal", x, y });
   }
 
   #goalByForm(event) {
@@ -83,9 +83,9 @@ export class Drive {
     mark(byId("pad"), "aria-disabled", this.hand.whyNot() !== null);
     const others = clients - 1;
     say(byId("role-words"), `${controller ? "You control; " : "You watch; "}${others > 0 ? `${others} other${others > 1 ? "s" : ""} connected.` : "nobody else is connected."}`);
-    say(byId("drive_request-words"), wishWords(drive_request, this.units));
-    mark(byId("drive_request-legs"), "aria-pressed", drive_request?.kind === "legs");
-    mark(byId("drive_request-goal"), "aria-pressed", drive_request?.kind === "goal");
+    say(byId("drive-request-words"), driveRequestText(drive_request, this.units));
+    mark(byId("drive-request-legs"), "aria-pressed", drive_request?.kind === "legs");
+    mark(byId("drive-request-goal"), "aria-pressed", drive_request?.kind === "goal");
   }
 
   #role({ asked_by: name, client }) {
@@ -96,7 +96,7 @@ export class Drive {
     this.notices.banner("asked", `${typeof name === "number" ? `Client ${name}` : name} asks for control.`, { buttons: [
       ["Hand over", () => {
         this.notices.banner("asked", null);
-        this.#ask({ type: "grant", client: client ?? name });
+        this.#ask({ type: "grant_control", client: client ?? name });
       }],
       ["Keep it", () => this.notices.banner("asked", null)],
     ] });
@@ -126,7 +126,7 @@ export class Drive {
   }
 }
 
-function wishWords(drive_request, units) {
+function driveRequestText(drive_request, units) {
   if (!drive_request) return "Nothing is known of it.";
   if (drive_request.kind === "goal" && drive_request.reached) return `At the goal at ${units.place(drive_request.x, drive_request.y)}.`;
   if (drive_request.kind === "goal") return `To the goal at ${units.place(drive_request.x, drive_request.y)}.`;

@@ -48,9 +48,9 @@ export class Log {
     this.#list.replaceChildren(...lines.map((entry) => this.#line(entry)));
   }
 
-  #line({ t, level, event, fields }) {
+  #line({ timestamp, level, event, fields }) {
     return el("li", { "data-level": level },
-      el("span", {}, when(t)),
+      el("span", {}, when(timestamp)),
       el("span", { class: "level" }, `${MARKS[level] ?? "○"} ${level}`),
       el("span", {}, `${event} `, el("span", { class: "more" }, told(fields))));
   }

@@ -151,8 +151,8 @@ selection.on("object", redraw);
 world.on("evidence", redraw);
 
 // What comes from the robot.
-world.on("hello", (hello) => {
-  units.choose(unitsGiven || hello.units);
+world.on("session", (session) => {
+  units.choose(unitsGiven || session.units);
   redrawAll();
 });
 let fitted = false;
@@ -161,7 +161,7 @@ world.on("state", (state) => {
   const now = performance.now();
   if (!view.touched && !(fitted && view.shows(extent(world)))) fitUntouched(fitted ? ROOM_M : 0);
   view.followTo(state.pose[0], state.pose[1]);
-  const second = Math.floor(state.t);
+  const second = Math.floor(state.robot_s);
   if (world.segmentsVersion !== drawnVersion || second !== drawnSecond) {
     [drawnVersion, drawnSecond] = [world.segmentsVersion, second];
     scene.invalidate("back");
@@ -181,7 +181,7 @@ function fitUntouched(room = 0) {
   fitted = true;
 }
 
-connection.on("hello", (hello) => world.greet(hello));
+connection.on("session", (session) => world.beginSession(session));
 connection.on("state", (state) => world.apply(state, performance.now()));
 connection.on("log", (entry) => world.note(entry));
 connection.on("role", (message) => world.emit("role", message));

@@ -12,7 +12,7 @@ export class Parameters {
 
   constructor({ world, connection, notices }) {
     Object.assign(this, { world, connection, notices });
-    world.on("hello", ({ parameters }) => this.#list(parameters ?? []));
+    world.on("session", ({ parameters }) => this.#list(parameters ?? []));
     byId("tune-filter").addEventListener("input", () => this.#filter());
     byId("tune-undo").addEventListener("click", () => this.undo());
     byId("tune-save").addEventListener("click", () => this.#save());
@@ -91,7 +91,7 @@ export class Parameters {
       return;
     }
     try {
-      const data = await this.connection.ask({ type: "set", path, value });
+      const data = await this.connection.ask({ type: "set_parameter", path, value });
       for (const one of this.#fields.get(path) ?? []) {
         one.parameter.value = value;
         this.#showIn(one, value);
@@ -115,7 +115,7 @@ export class Parameters {
   }
 
   undo() {
-    return this.connection.ask({ type: "undo" }).then((data) => {
+    return this.connection.ask({ type: "undo_parameter" }).then((data) => {
       this.#heed(data);
       this.notices.toast(data?.path ? `${data.path} is ${data.value} again` : "The last change is undone");
     }, this.notices.refused);

@@ -20,7 +20,7 @@ export class Ring {
   draw() {
     const canvas = this.#canvas;
     if (canvas.clientWidth === 0) return;
-    const world = this.#world, theme = this.#theme, ring = world.hello?.ring;
+    const world = this.#world, theme = this.#theme, ring = world.session?.ring;
     const { ctx, width, height } = fitted(canvas);
     ctx.clearRect(0, 0, width, height);
     if (!ring || !world.fresh) return;

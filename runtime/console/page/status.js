@@ -18,9 +18,9 @@ export class Status {
 
   constructor({ world, units, connection, notices }) {
     [this.#world, this.#units, this.#connection, this.#notices] = [world, units, connection, notices];
-    world.on("hello", (hello) => {
-      say(byId("robot-name"), hello.name || "echolocate");
-      document.title = `${hello.name || "robot"} · echolocate`;
+    world.on("session", (session) => {
+      say(byId("robot-name"), session.name || "echolocate");
+      document.title = `${session.name || "robot"} · echolocate`;
     });
     world.on("state", () => this.#facts());
     world.on("mode", (state) => this.#mode(state));
@@ -32,8 +32,8 @@ export class Status {
     setInterval(() => this.#age(), 200);
   }
 
-  #mode({ mode, reason: why, standing, arming }) {
-    const reason = why ?? (arming ? "arming…" : standing);
+  #mode({ mode, reason: why, hold_reason, arming }) {
+    const reason = why ?? (arming ? "arming…" : hold_reason);
     mark(byId("mode"), "data-mode", mode);
     mark(byId("mode-icon"), "href", `#m-${mode.toLowerCase()}`);
     say(byId("mode-name"), `${this.#world.watchesRecording ? "then: " : ""}${mode.replace("_", " ")}`);

@@ -71,7 +71,7 @@ export class Teleoperation extends Emitter {
   }
 
   velocity() {
-    const { speed_max = 0, turn_max = 0 } = this.world.hello?.body ?? {};
+    const { speed_max = 0, turn_max = 0 } = this.world.session?.body ?? {};
     let v = 0, w = 0;
     for (const held of this.#held.values()) {
       v += held.v;

@@ -6,7 +6,7 @@ const clock = (s) => `${s.toFixed(1)} s`;
 
 export class Time {
   #file = null; // the recording that is open
-  #liveHello = null; // the live run's greeting meanwhile
+  #liveSession = null; // the live run's greeting meanwhile
   #scrubbing = false;
 
   constructor({ world, connection, notices, shoot }) {
@@ -17,20 +17,20 @@ export class Time {
     on("record", () => this.#ask({ type: "record", on: world.state.recording === null }));
     on("recordings-again", () => this.#list(notices.refused));
     on("open", () => this.#open());
-    on("play", () => this.#ask({ type: "play", speed: this.#playing ? 0 : Number(byId("play-speed").value) }));
-    on("play-step", () => this.#ask({ type: "step", cycles: 1 }));
-    on("play-back", () => this.#ask({ type: "step", cycles: -1 }));
+    on("play", () => this.#ask({ type: "play_recording", speed: this.#playing ? 0 : Number(byId("play-speed").value) }));
+    on("play-step", () => this.#ask({ type: "step_recording", cycles: 1 }));
+    on("play-back", () => this.#ask({ type: "step_recording", cycles: -1 }));
     on("live", () => this.#backToLive());
     on("screenshot", () => shoot());
-    byId("speed").addEventListener("change", (event) => this.#ask({ type: "speed", factor: Number(event.target.value) }));
-    byId("play-speed").addEventListener("change", (event) => this.#playing && this.#ask({ type: "play", speed: Number(event.target.value) }));
+    byId("speed").addEventListener("change", (event) => this.#ask({ type: "set_speed", factor: Number(event.target.value) }));
+    byId("play-speed").addEventListener("change", (event) => this.#playing && this.#ask({ type: "play_recording", speed: Number(event.target.value) }));
     byId("bookmark-form").addEventListener("submit", (event) => this.#bookmark(event));
     const scrub = byId("scrub");
     scrub.addEventListener("input", () => this.#scrub(Number(scrub.value)));
     scrub.addEventListener("change", () => this.#scrub(Number(scrub.value)));
     world.on("state", () => this.#refresh());
-    connection.on("hello", (hello) => {
-      if (this.#liveHello !== null) this.#liveHello = hello;
+    connection.on("session", (session) => {
+      if (this.#liveSession !== null) this.#liveSession = session;
     });
     connection.on("closed", () => this.#forget()); // whoever comes back is shown the live run
   }
@@ -53,10 +53,10 @@ export class Time {
   }
 
   #refresh() {
-    const { t, cycle, paused, speed, recording, playback, controller } = this.world.state;
-    const emulated = this.world.hello?.emulated ?? false;
+    const { robot_s, cycle, paused, speed, recording, playback, controller } = this.world.state;
+    const emulated = this.world.session?.emulated ?? false;
     const where = playback ? `Recording ${name(this.#file)}` : emulated ? "Live, in the emulator" : "Live";
-    say(byId("time-words"), `${where}: ${clock(t)}, cycle ${cycle}${paused ? ", paused" : ""}${speed !== 1 ? `, × ${speed}` : ""}`);
+    say(byId("time-words"), `${where}: ${clock(robot_s)}, cycle ${cycle}${paused ? ", paused" : ""}${speed !== 1 ? `, × ${speed}` : ""}`);
     say(byId("pause"), paused ? "Go on" : "Pause");
     for (const id of ["pause", "single-step", "speed"]) byId(id).disabled = !controller || !emulated;
     if (document.activeElement !== byId("speed")) choose(byId("speed"), String(speed));
@@ -78,13 +78,13 @@ export class Time {
   }
 
   async #backToLive() {
-    if ((await this.#ask({ type: "live" })) === undefined) return;
-    if (this.#liveHello !== null) this.world.greet(this.#liveHello);
+    if ((await this.#ask({ type: "close_recording" })) === undefined) return;
+    if (this.#liveSession !== null) this.world.beginSession(this.#liveSession);
     this.#forget();
   }
 
   #forget() {
-    this.#file = this.#liveHello = null;
+    this.#file = this.#liveSession = null;
     byId("player").hidden = true;
   }
 
@@ -92,7 +92,7 @@ export class Time {
     const chooser = byId("recordings"), chosen = chooser.value;
     let list;
     try {
-      list = await this.connection.ask({ type: "recordings" });
+      list = await this.connection.ask({ type: "list_recordings" });
     } catch (error) {
       refused(error);
       return;
@@ -110,7 +110,7 @@ export class Time {
       this.notices.toast("There is no recording to open");
       return;
     }
-    const data = await this.#ask({ type: "open", file });
+    const data = await this.#ask({ type: "open_recording", file });
     if (data === undefined) return;
     this.#file = file;
     byId("player").hidden = false;
@@ -120,8 +120,8 @@ export class Time {
     byId("bookmarks").replaceChildren(...places.sort(([a], [b]) => a - b).map(([s, words]) =>
       el("li", {}, el("button", { type: "button", onclick: () => this.#scrub(s) }, `${clock(s)}  ${words}`))));
     if (data?.about) { // another robot may have driven then, and found other things
-      this.#liveHello ??= this.world.hello;
-      this.world.greet({ ...this.#liveHello, ...data.about, parameters: this.#liveHello.parameters });
+      this.#liveSession ??= this.world.session;
+      this.world.beginSession({ ...this.#liveSession, ...data.about, parameters: this.#liveSession.parameters });
     }
     this.#follow({ s: 0, is_playing: false });
   }
@@ -136,7 +136,7 @@ export class Time {
     while (this.#wanted !== null) {
       const to = this.#wanted;
       this.#wanted = null;
-      await this.#ask({ type: "scrub", s: to });
+      await this.#ask({ type: "seek_recording", s: to });
     }
     this.#scrubbing = false;
   }
@@ -173,8 +173,8 @@ export function screenshot({ scene, view, world, theme, units }) {
   ctx.fillStyle = theme.ink;
   ctx.font = theme.font(13);
   ctx.textBaseline = "middle";
-  const { t, mode, cycle, objects } = world.state;
-  const words = `${world.hello?.name ?? "robot"}, ${clock(t)}, cycle ${cycle}, ${mode}, ${objects.length} objects, in ${units.word}`;
+  const { robot_s, mode, cycle, objects } = world.state;
+  const words = `${world.session?.name ?? "robot"}, ${clock(robot_s)}, cycle ${cycle}, ${mode}, ${objects.length} objects, in ${units.word}`;
   ctx.fillText(words, 12, view.height + foot / 2);
-  canvas.toBlob((blob) => download(`echolocate-${t.toFixed(1)}s.png`, blob));
+  canvas.toBlob((blob) => download(`echolocate-${robot_s.toFixed(1)}s.png`, blob));
 }

@@ -88,7 +88,7 @@ export function placeTool({ world, view, connection, notices, redraw }) {
   let pose = null;
   let last = 0; // the heading of the one before, for a row of like things
 
-  world.on("hello", ({ models }) => {
+  world.on("session", ({ models }) => {
     const chosen = chooser.value;
     chooser.replaceChildren(...models.map(({ name }) => el("option", { value: name }, name)));
     if (models.some(({ name }) => name === chosen)) chooser.value = chosen;

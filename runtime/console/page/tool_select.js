@@ -59,7 +59,7 @@ export function selectTool({ world, view, selection, redraw }) {
       const segment = nearestSegment(world, at.x, at.y, REACH_PX / view.scale);
       tip.hidden = segment === null;
       if (segment === null) return;
-      const age = Number.isFinite(segment.t) ? `${Math.max(0, world.state.t - segment.t).toFixed(1)} s old` : "of unknown age";
+      const age = Number.isFinite(segment.t) ? `${Math.max(0, world.state.robot_s - segment.t).toFixed(1)} s old` : "of unknown age";
       say(tip, `segment ${segment.number}, ${age}${segment.pinned ? ", pinned" : ""}`);
       const left = at.sx + 220 > view.width ? at.sx - 190 : at.sx + 14;
       tip.style.transform = `translate(${left}px, ${Math.max(4, at.sy - 34)}px)`;

@@ -99,7 +99,7 @@ export function extent(world) {
     add(s.x2, s.y2);
   }
   for (const object of world.state.objects) add(object.x, object.y, 0.4);
-  const truth = world.hello?.truth;
+  const truth = world.session?.truth;
   for (const [dx, dy, r] of truth?.drums ?? []) add(dx, dy, r);
   for (const [x1, y1, x2, y2] of truth?.walls ?? []) {
     add(x1, y1);

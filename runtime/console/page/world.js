@@ -9,16 +9,16 @@ const ECHO_AGE_MAX_S = 6;
 const CHART_MAX = 600;
 
 const EMPTY = {
-  cycle: 0, t: 0, mode: "no data", reason: null, standing: null, arming: false, pose: [0, 0, 0], ring_yaw: 0, twist: [0, 0], flags: [], firing: [],
+  cycle: 0, robot_s: 0, mode: "no data", reason: null, hold_reason: null, arming: false, pose: [0, 0, 0], ring_yaw: 0, twist: [0, 0], flags: [], firing: [],
   ranges: [], age: [], clusters: [], objects: [], vectors: [], drive_request: null, phases: {}, cycle_us: 0, late_us: 0,
   missed: 0, late: 0, quanta: 0, refinement: "", link: null, sensors: [], dropped: 0, clients: 0, controller: false,
   recording: null, paused: false, speed: 1, playback: null,
 };
 
 export class World extends Emitter {
-  hello = null;
+  session = null;
   state = EMPTY;
-  fresh = false; // whether a state has come since the last hello
+  fresh = false; // whether a state has come since the last session
   heard_ms = 0;
   segments = new Map();
   segmentsVersion = 0;
@@ -30,12 +30,12 @@ export class World extends Emitter {
   log = [];
 
   // A greeting may come again, with other parameters or models; the whole map comes after it, the past stays known.
-  greet(hello) {
-    this.hello = hello;
+  beginSession(session) {
+    this.session = session;
     this.fresh = false;
     this.segments.clear();
     this.segmentsVersion++;
-    this.emit("hello", hello);
+    this.emit("session", session);
   }
 
   get watchesRecording() {
@@ -43,7 +43,7 @@ export class World extends Emitter {
   }
 
   model(name) {
-    return this.hello?.models?.find((model) => model.name === name) ?? null;
+    return this.session?.models?.find((model) => model.name === name) ?? null;
   }
 
   object(number) {
@@ -52,7 +52,7 @@ export class World extends Emitter {
 
   // The frame of a sensor in the plane, as the ring stands now.
   sensor(index) {
-    const mount = this.hello?.ring?.mounts?.[index];
+    const mount = this.session?.ring?.mounts?.[index];
     if (mount === undefined) return null;
     const [x, y] = this.state.pose;
     const c = Math.cos(this.state.ring_yaw), s = Math.sin(this.state.ring_yaw);
@@ -62,7 +62,7 @@ export class World extends Emitter {
   apply(frame, now_ms) {
     const before = this.state;
     const state = { ...EMPTY, ...frame };
-    const jumped = state.t < before.t - 1e-9 || (state.playback === null) !== (before.playback === null);
+    const jumped = state.robot_s < before.robot_s - 1e-9 || (state.playback === null) !== (before.playback === null);
     state.objects = [...state.objects].sort((a, b) => (a.number ?? Infinity) - (b.number ?? Infinity)); // as they come, they change places
     this.state = state;
     this.heard_ms = now_ms;
@@ -72,7 +72,7 @@ export class World extends Emitter {
     this.#applyEchoes(state);
     this.#applyChart(state, before, this.fresh && !jumped);
     const changed = !this.fresh || state.mode !== before.mode || state.reason !== before.reason
-      || state.standing !== before.standing || state.arming !== before.arming || state.controller !== before.controller || (state.playback === null) !== (before.playback === null);
+      || state.hold_reason !== before.hold_reason || state.arming !== before.arming || state.controller !== before.controller || (state.playback === null) !== (before.playback === null);
     this.fresh = true;
     this.emit("state", state);
     if (changed) this.emit("mode", state, before);
@@ -102,7 +102,7 @@ export class World extends Emitter {
     if (news.whole || repinned || news.added?.length || news.removed?.length) this.segmentsVersion++;
   }
 
-  #applyTrail({ pose: [x, y], t }) {
+  #applyTrail({ pose: [x, y], robot_s: t }) {
     const last = this.trail.at(-1);
     if (last && Math.hypot(x - last.x, y - last.y) < TRAIL_STEP_M) return;
     if (last && Math.hypot(x - last.x, y - last.y) > 1) this.trail = []; // odometry began anew
@@ -111,7 +111,7 @@ export class World extends Emitter {
     this.trailVersion++;
   }
 
-  #applyEchoes({ firing, ranges, t }) {
+  #applyEchoes({ firing, ranges, robot_s: t }) {
     for (const index of firing) {
       const range = ranges[index];
       const at = this.sensor(index);

@@ -1,7 +1,7 @@
 """Recordings on the page: each client may look at one of its own while the robot drives on.
 
-The robot's process only passes on what a process beside it (`runtime.console.playback.replay_worker`) has put together. Nothing here
-runs the step, reads a recording or waits for a disk in the loop.
+The robot's process only forwards what a child process (`replay_worker`) has put together. Nothing
+here runs the step, reads a recording or waits for a disk in the loop.
 """
 
 from __future__ import annotations
@@ -11,45 +11,29 @@ import contextlib
 import math
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import orjson
 
 from runtime.analysis.text_tables import Units
-from runtime.console.commands.refusal import Refusal
+from runtime.console.commands.command_error import CommandError
+from runtime.console.frames.frame_encoder import EncodedFrame
 from runtime.console.playback.replay_worker import ANSWER, HEADER, SPEED_MAX, SPEED_MIN
 from runtime.console.protocols import Viewer
 from runtime.recording.storage import in_folder, listing
 from runtime.support.child_process import COMMAND, end_child, start_child
 
-PLAYERS_MAX: Final = 3
+WORKERS_MAX: Final = 3
 """Recordings open at a time: each is a process with the whole of perception in its memory."""
 OPEN_MAX_S: Final = 30.0
 REPORT_MAX_S: Final = 300.0
 STEP_MAX: Final = 100_000
 
 
-class PlayerError(Refusal):
+class ReplayError(CommandError):
     """Something about recordings that cannot be done; its text is one line for the operator."""
-
-
-class PlayedFrame(NamedTuple):
-    """A frame of a recording, for one client."""
-
-    source: object
-    """Whose frames these are; changes count from the one before of the same source."""
-    number: int
-    head: bytes
-    changes: bytes
-    whole: bytes
-
-    def told(self, *, follows: bool, dropped: int, controls: bool) -> bytes:
-        """Return the frame as it goes over the wire."""
-        segments = self.changes if follows else self.whole
-        return b'%b,"segments":%b,"dropped":%d,"controller":%b}' % (
-            self.head, segments, dropped, b"true" if controls else b"false"
-        )  # fmt: skip
 
 
 class ReplayProcess:
@@ -68,7 +52,7 @@ class ReplayProcess:
     def __init__(
         self,
         process: asyncio.subprocess.Process,
-        show: Callable[[PlayedFrame], None],
+        show: Callable[[EncodedFrame], None],
         tell: Callable[[dict[str, Any]], None],
     ) -> None:
         self._process = process
@@ -81,7 +65,7 @@ class ReplayProcess:
 
         Raises
         ------
-        PlayerError
+        ReplayError
             It cannot be opened; the process is ended then.
         """
         try:
@@ -89,16 +73,16 @@ class ReplayProcess:
                 _, _, (body, _, _) = await self._read()
         except TimeoutError:
             await self.close()
-            raise PlayerError(f"the recording did not open within {OPEN_MAX_S:.0f} s: the machine is busy") from None
+            raise ReplayError(f"the recording did not open within {OPEN_MAX_S:.0f} s: the machine is busy") from None
         except (asyncio.IncompleteReadError, OSError):
             words = b"" if self._process.stderr is None else await self._process.stderr.read()
             await self.close()
             last = words.decode(errors="replace").strip().rpartition("\n")[2]
-            raise PlayerError(f"the recording cannot be played: {last or 'its player has ended'}") from None
+            raise ReplayError(f"the recording cannot be played: {last or 'its player has ended'}") from None
         about: dict[str, Any] = orjson.loads(body)
         if "error" in about:
             await self.close()
-            raise PlayerError(str(about["error"]))
+            raise ReplayError(str(about["error"]))
         self._listener = asyncio.create_task(self._listen(), name="player")
         return about
 
@@ -112,11 +96,11 @@ class ReplayProcess:
 
         Raises
         ------
-        PlayerError
+        ReplayError
             The process has ended.
         """
         if self._process.stdin is None or self.is_over or self._process.stdin.is_closing():
-            raise PlayerError("the recording's player has ended: open the recording again")
+            raise ReplayError("the recording's player has ended: open the recording again")
         self._process.stdin.write(orjson.dumps(command) + b"\n")
 
     async def close(self) -> None:
@@ -133,7 +117,8 @@ class ReplayProcess:
                 if kind == ANSWER:
                     self._tell(orjson.loads(parts[0]))
                 else:
-                    self._show(PlayedFrame((self, source), number, *parts))
+                    head, changes, whole = parts
+                    self._show(EncodedFrame((self, source), number, head, changes, partial(bytes, whole)))
 
     async def _read(self) -> tuple[bytes, tuple[int, int], tuple[bytes, bytes, bytes]]:
         out = self._process.stdout
@@ -183,16 +168,16 @@ class ReplayClient:
 
         Raises
         ------
-        PlayerError
+        ReplayError
             There is none of that name, it cannot be played, or too many are open.
         """
         current = self._current()
         path = Path(file) if file == current else await asyncio.to_thread(in_folder, self._folder, file)
         if path is None:
-            raise PlayerError(f"there is no recording {file!r} in {self._folder}: ask for the list again")
+            raise ReplayError(f"there is no recording {file!r} in {self._folder}: ask for the list again")
         await self._close(viewer)
-        if len(self._open) + self._opening >= PLAYERS_MAX:
-            raise PlayerError(f"{PLAYERS_MAX} recordings are open already, by other pages: have one closed first")
+        if len(self._open) + self._opening >= WORKERS_MAX:
+            raise ReplayError(f"{WORKERS_MAX} recordings are open already, by other pages: have one closed first")
         self._opening += 1
         try:
             process = await start_child(self._program, [str(path)], talks=True)
@@ -202,7 +187,7 @@ class ReplayClient:
             self._opening -= 1
         if viewer.is_gone:
             await playing.close()
-            raise PlayerError("the page is gone")
+            raise ReplayError("the page is gone")
         self._open[id(viewer)] = playing
         viewer.switch(live=False)
         return {"file": file, **about}
@@ -210,19 +195,19 @@ class ReplayClient:
     async def scrub(self, viewer: Viewer, s: float) -> None:
         """Go to a time in the recording, s after its first cycle."""
         if not math.isfinite(s):
-            raise PlayerError("the time must be a finite number")
+            raise ReplayError("the time must be a finite number")
         self._of(viewer).do({"do": "scrub", "s": s})
 
     async def play(self, viewer: Viewer, speed: float) -> None:
         """Let it go by, so many times as fast as it was; 0 stops it."""
         if speed != 0.0 and not SPEED_MIN <= speed <= SPEED_MAX:
-            raise PlayerError(f"the speed must be 0, or from {SPEED_MIN:g} to {SPEED_MAX:g}")
+            raise ReplayError(f"the speed must be 0, or from {SPEED_MIN:g} to {SPEED_MAX:g}")
         self._of(viewer).do({"do": "play", "speed": speed})
 
     async def step(self, viewer: Viewer, cycles: int) -> None:
         """Go so many cycles on, or back."""
         if abs(cycles) > STEP_MAX:
-            raise PlayerError(f"a step has {STEP_MAX} cycles at most")
+            raise ReplayError(f"a step has {STEP_MAX} cycles at most")
         self._of(viewer).do({"do": "step", "cycles": cycles})
 
     async def live(self, viewer: Viewer) -> None:
@@ -246,21 +231,21 @@ class ReplayClient:
 
         Raises
         ------
-        PlayerError
+        ReplayError
             Nothing is being recorded, another report is under way, or it cannot be made.
         """
         current = self._current()
         if current is None:
-            raise PlayerError("nothing is being recorded, and a report is made of a recording: switch it on first")
+            raise ReplayError("nothing is being recorded, and a report is made of a recording: switch it on first")
         if self._reporting.locked():
-            raise PlayerError("a report is being made already: wait for it")
+            raise ReplayError("a report is being made already: wait for it")
         async with self._reporting:
             return await report_of(Path(current), self._units)
 
     def _of(self, viewer: Viewer) -> ReplayProcess:
         playing = self._open.get(id(viewer))
         if playing is None:
-            raise PlayerError("no recording is open: open one first")
+            raise ReplayError("no recording is open: open one first")
         return playing
 
     async def _close(self, viewer: Viewer) -> None:
@@ -268,7 +253,7 @@ class ReplayClient:
         if playing is not None:
             await playing.close()
 
-    def _pass_on(self, viewer: Viewer, frame: PlayedFrame) -> None:
+    def _pass_on(self, viewer: Viewer, frame: EncodedFrame) -> None:
         if not viewer.is_gone:
             viewer.show(frame)
 
@@ -278,7 +263,7 @@ async def report_of(file: Path, units: Units, patience_s: float = REPORT_MAX_S) 
 
     Raises
     ------
-    PlayerError
+    ReplayError
         It cannot be made, or not within `patience_s`.
     """
     with tempfile.TemporaryDirectory(prefix="echolocate-") as folder:
@@ -290,12 +275,12 @@ async def report_of(file: Path, units: Units, patience_s: float = REPORT_MAX_S) 
             async with asyncio.timeout(patience_s):
                 _, words = await process.communicate()
         except TimeoutError:
-            raise PlayerError(
+            raise ReplayError(
                 f"the report was not done within {patience_s:.0f} s: make it later, by `echolocate report {file}`"
             ) from None
         finally:
             await end_child(process)
         if process.returncode:
             last = words.decode(errors="replace").strip().rpartition("\n")[2]
-            raise PlayerError(f"no report: {last.removeprefix('echolocate: ') or 'its process has ended'}")
+            raise ReplayError(f"no report: {last.removeprefix('echolocate: ') or 'its process has ended'}")
         return await asyncio.to_thread(target.read_bytes)

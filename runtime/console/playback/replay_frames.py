@@ -9,8 +9,8 @@ import sys
 from typing import Any
 
 from config.settings import Settings
-from runtime.console.frames.frame_encoder import FrameContext, Frames
-from runtime.console.frames.session_info import about_run
+from runtime.console.frames.frame_encoder import FrameContext, FrameEncoder
+from runtime.console.frames.session_info import session_info
 from runtime.console.playback.replay_cursor import Shown
 from runtime.console.playback.replay_worker import At, Picture, play
 from runtime.cycle.step import CycleRecord
@@ -30,22 +30,22 @@ class ReplayFrames:
     def __init__(self, settings: Settings, *, emulated: bool) -> None:
         self._settings = settings
         self._emulated = emulated
-        self._frames = Frames(settings)
+        self._encoder = FrameEncoder(settings)
 
     def about(self) -> dict[str, Any]:
         """Return what a page is told first; in which units it shows things is its own affair."""
-        told = about_run(self._settings, name=None, emulated=self._emulated, units="m") | {"recording": True}
+        told = session_info(self._settings, name=None, emulated=self._emulated, units="m") | {"recording": True}
         del told["units"]
         return told
 
     def take(self, record: CycleRecord) -> None:
         """Take note of a cycle, whether or not it is shown."""
-        self._frames.take(record)
+        self._encoder.take(record)
 
     def frame(self, shown: Shown, at: At) -> Picture:
         """Return the frame of a cycle."""
-        shot = self._frames.shot(shown.state, shown.record, FrameContext(host_s=at.s, playback=at._asdict()))
-        return Picture(shot.head, shot.changes, shot.table.whole())
+        frame = self._encoder.frame(shown.state, shown.record, FrameContext(host_s=at.s, playback=at._asdict()))
+        return Picture(frame.head, frame.changes, frame.whole())
 
 
 def make(settings: Settings, *, emulated: bool) -> ReplayFrames:

@@ -1,8 +1,7 @@
 """The program that plays a recording: commands come in as lines, frames go out, and in between the step is run again.
 
-It is a process of its own (see `runtime.support.child_process`), so it may take as long as it takes. Going somewhere is cut
-into cycles, and between any two of them the next command is heard: whoever drags a slider waits for the last place
-only.
+It is a process of its own (see `runtime.support.child_process`). Seeking is cut into cycles, and the next command is
+read between any two of them: dragging a slider costs one seek, not one per position.
 """
 
 from __future__ import annotations

@@ -22,8 +22,8 @@ ASKED: list[tuple[dict[str, Any], object]] = [
     ({"type": "halt"}, Request.HALT),
     ({"type": "arm"}, Request.ARM),
     ({"type": "disarm"}, Request.DISARM),
-    ({"type": "drive_request", "kind": "legs"}, Legs()),
-    ({"type": "drive_request", "kind": "goal", "x": 1, "y": -2.5}, Goal(1.0, -2.5)),
+    ({"type": "legs"}, Legs()),
+    ({"type": "goal", "x": 1, "y": -2.5}, Goal(1.0, -2.5)),
     ({"type": "teleoperate", "v": 0.2, "w": -1}, Teleoperate(0.2, -1.0, 0.25)),
 ]
 EDITS: list[tuple[dict[str, Any], object]] = [
@@ -38,18 +38,27 @@ EDITS: list[tuple[dict[str, Any], object]] = [
     ({"type": "reject_object", "object": 4}, RejectObject(4)),
     ({"type": "confirm_object", "object": 4}, ConfirmObject(4)),
 ]
-OTHERS = {"take_control", "give_control", "grant", "evidence", "load_model", "set", "undo", "save_toml"}
+OTHERS = {
+    "take_control",
+    "release_control",
+    "grant_control",
+    "evidence",
+    "load_model",
+    "set_parameter",
+    "undo_parameter",
+    "save_toml",
+}
 OF_TIME: list[tuple[dict[str, Any], str]] = [
     ({"type": "pause"}, "pause"),
     ({"type": "resume"}, "resume"),
     ({"type": "single_step"}, "single_step"),
-    ({"type": "speed", "factor": 2}, "speed 2.0"),
+    ({"type": "set_speed", "factor": 2}, "speed 2.0"),
     ({"type": "record", "on": True}, "record True"),
     ({"type": "bookmark", "text": "here"}, "bookmark here"),
-    ({"type": "recordings"}, "recordings"),
-    ({"type": "open", "file": "run.mcap"}, "open run.mcap"),
-    ({"type": "scrub", "s": 1.5}, "scrub 1.5"),
-    ({"type": "play", "speed": 1}, "play 1.0"),
-    ({"type": "step", "cycles": -3}, "step -3"),
-    ({"type": "live"}, "live"),
+    ({"type": "list_recordings"}, "recordings"),
+    ({"type": "open_recording", "file": "run.mcap"}, "open run.mcap"),
+    ({"type": "seek_recording", "s": 1.5}, "scrub 1.5"),
+    ({"type": "play_recording", "speed": 1}, "play 1.0"),
+    ({"type": "step_recording", "cycles": -3}, "step -3"),
+    ({"type": "close_recording"}, "live"),
 ]

@@ -158,7 +158,7 @@ class Operated:
     async def page(self) -> Page:
         """Open a page and hear its greeting."""
         page = await self.connect()
-        await page.next("hello")
+        await page.next("session")
         return page
 
     def cycles(
@@ -199,7 +199,7 @@ class Operated:
 
 @contextlib.asynccontextmanager
 async def operated(
-    *sets: str, overtime: AsyncCommands | None = None, limits: Limits | None = None, emulated: bool = True
+    *sets: str, async_commands: AsyncCommands | None = None, limits: Limits | None = None, emulated: bool = True
 ) -> AsyncIterator[Operated]:
     """Open a console; its clock goes on with cycles only."""
     lines: list[dict[str, Any]] = []
@@ -213,8 +213,8 @@ async def operated(
     settings = load_settings("hallway", ["perception.method=paper", FREE_PORT, *sets])
     run = FakeRun(settings, log)
     console = Console(
-        run, settings, log, run.reconfigure, KernelLoader(log), emulated=emulated, overtime=overtime, limits=limits,
-        clock=lambda: clock[0],
+        run, settings, log, run.reconfigure, KernelLoader(log), emulated=emulated, async_commands=async_commands,
+        limits=limits, clock=lambda: clock[0],
     )  # fmt: skip
     before = asyncio.all_tasks()
     with run.health.catching_unhandled_errors():

@@ -232,21 +232,21 @@ from config.load import load_model
 from perception.edits import (
     ClearMap, ConfirmObject, DeleteSegments, MoveObject, PinSegments, PlaceModel, RejectObject,
 )
-from runtime.console.frames.frame_encoder import Beside, Frames
+from runtime.console.frames.frame_encoder import FrameContext, FrameEncoder
 from runtime.cycle.modes import Mode, Request
 from runtime.simulation.closed_loop import Said, simulate
 
 further = settings.model_copy(update={"models": (*settings.models, load_model(sys.argv[3]))})
 assert set(needed(further)) <= set(needed(settings))
 
-frames = Frames(settings)
+encoder = FrameEncoder(settings)
 
 def by_hand(cycle, state):
     # every half second one thing after the other, also with a model that came late
     perception, arm = state.perception, Request.ARM if state.mode.mode is Mode.READY else None
     if cycle % 10 or state.odometry is None:
         return Said(arm)
-    frames.shot(state, None, Beside(host_s=0.0))
+    encoder.frame(state, None, FrameContext(host_s=0.0))
     seen = [o for o in perception.objects() if o.number is not None]
     for known in seen:
         perception.evidence(known.number)

@@ -42,15 +42,15 @@ def agree(segments: Segments, case: Operated) -> None:
 async def test_the_greeting() -> None:
     async with operated() as case:
         page = await case.page()
-        hello = page.heard[0]
-        assert hello["role"] == "control"
-        assert hello["name"] == "denning"
-        assert hello["emulated"] is True
-        assert len(hello["ring"]["mounts"]) == 24
-        assert len(hello["truth"]["drums"]) == 6
-        assert hello["models"][0]["name"] == "semicircle"
-        assert hello["period_s"] == 0.05
-        paths = {parameter["path"] for parameter in hello["parameters"]}
+        session = page.heard[0]
+        assert session["role"] == "control"
+        assert session["name"] == "denning"
+        assert session["emulated"] is True
+        assert len(session["ring"]["mounts"]) == 24
+        assert len(session["truth"]["drums"]) == 6
+        assert session["models"][0]["name"] == "semicircle"
+        assert session["period_s"] == 0.05
+        paths = {parameter["path"] for parameter in session["parameters"]}
         assert {"behaviors.avoid_static_obstacle.avoid_obstacle_gain", "cycle.perception_budget_s"} <= paths
         assert (await case.page()).heard[0]["role"] == "watch"
 
@@ -67,7 +67,7 @@ async def test_who_came_before_the_robot_had_answered_hears_its_name() -> None:
         assert page.heard[0]["name"] is None
         case.run.name = "denning"
         case.cycles()
-        assert (await page.next("hello"))["name"] == "denning"
+        assert (await page.next("session"))["name"] == "denning"
 
 
 async def test_a_frame() -> None:
@@ -94,49 +94,49 @@ async def test_a_frame() -> None:
 
 async def test_frames_are_built_only_while_somebody_looks_on(monkeypatch: pytest.MonkeyPatch) -> None:
     async with operated() as case:
-        shots: list[int] = []
-        shot = case.console._frames.shot
+        made: list[int] = []
+        encode = case.console._encoder.frame
 
         def counted(*how: Any) -> EncodedFrame:
-            shots.append(1)
-            return shot(*how)
+            made.append(1)
+            return encode(*how)
 
-        monkeypatch.setattr(case.console._frames, "shot", counted)
+        monkeypatch.setattr(case.console._encoder, "frame", counted)
         case.cycles(50)
         await asyncio.sleep(0.0)
-        assert sum(shots) == 0
+        assert sum(made) == 0
         page, another = await case.page(), await case.page()
         case.cycles()
         await page.next("state")
         await another.next("state")
-        assert sum(shots) == 1, "one for all"
+        assert sum(made) == 1, "one for all"
 
 
 async def test_no_more_than_twenty_a_second() -> None:
     async with operated() as case:
         page = await case.page()
-        before = case.console._frames._number
+        before = case.console._encoder._number
         for _ in range(200):
             case.cycles(step_s=0.005)
             await asyncio.sleep(0.0)
-        assert 19 <= case.console._frames._number - before <= 22
-        before = case.console._frames._number
+        assert 19 <= case.console._encoder._number - before <= 22
+        before = case.console._encoder._number
         for _ in range(40):
             case.cycles(step_s=0.051)
             await asyncio.sleep(0.0)
-        assert case.console._frames._number - before == 40, "a cycle that is a little late has its frame"
+        assert case.console._encoder._number - before == 40, "a cycle that is a little late has its frame"
         await page.next("state")
 
 
 async def test_while_cycles_overrun_nothing_is_shown() -> None:
     async with operated() as case:
         page = await case.page()
-        before = case.console._frames._number
+        before = case.console._encoder._number
         case.run.keeper.in_a_row = 1
         for _ in range(10):
             case.cycles()
             await asyncio.sleep(0.0)
-        assert case.console._frames._number == before
+        assert case.console._encoder._number == before
         case.run.keeper.in_a_row = 0
         case.cycles()
         assert (await page.next("state"))["cycle"] == 11
@@ -265,7 +265,7 @@ async def test_lines_of_the_log_also_for_those_who_come_later() -> None:
         page = await case.page()
         case.console.hub.on_log({"event": "mode", "level": "info", "timestamp": "now", "mode": "READY", "cycle": 3})
         line = await page.next("log")
-        assert line == {"type": "log", "t": "now", "level": "info", "event": "mode",
+        assert line == {"type": "log", "timestamp": "now", "level": "info", "event": "mode",
                         "fields": {"mode": "READY", "cycle": "3"}}  # fmt: skip
         later = await case.connect()
         assert await later.next("log") == line
@@ -284,7 +284,7 @@ async def test_the_control_changes_hands() -> None:
         asked = await first.next("role")
         assert asked["role"] == "control"
         assert asked["asked_by"] == "client 2 (127.0.0.1)"
-        assert (await first.ask(type="grant", client=asked["client"]))["ok"]
+        assert (await first.ask(type="grant_control", client=asked["client"]))["ok"]
         assert (await second.next("role"))["role"] == "control"
         assert not (await first.ask(type="arm"))["ok"]
         assert (await second.ask(type="arm"))["ok"]
@@ -319,7 +319,7 @@ async def test_a_page_that_is_closed_leaves_a_goal_alone() -> None:
     async with operated() as case:
         page = await case.page()
         await page.ask(type="teleoperate", v=0.2, w=0.0)
-        await page.ask(type="drive_request", kind="goal", x=1.0, y=2.0)
+        await page.ask(type="goal", x=1.0, y=2.0)
         await page.socket.close()
         await case.settled(lambda: not case.console.hub.clients, "that it is gone")
         assert len(case.run.asked) == 2
@@ -349,12 +349,12 @@ async def test_frames_go_on_while_no_cycle_ends(monkeypatch: pytest.MonkeyPatch)
         assert (await page.next("state"))["cycle"] == 0
 
 
-@pytest.mark.parametrize("where", ["shot", "take"])
+@pytest.mark.parametrize("where", ["frame", "take"])
 async def test_a_console_that_fails_says_so(where: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A display with a fault in it must neither go on in silence nor take the loop with it."""
     async with operated() as case:
         page = await case.page()
-        monkeypatch.setattr(case.console._frames, where, lambda *_: 1 / 0)
+        monkeypatch.setattr(case.console._encoder, where, lambda *_: 1 / 0)
         assert case.run.health.fault() is None
         case.cycles(3)
         await asyncio.sleep(0.0)
@@ -373,7 +373,7 @@ async def test_a_task_of_a_client_that_is_killed(name: str, monkeypatch: pytest.
     async with operated() as case:
         page = await case.page()
         if name == "console client 1":
-            monkeypatch.setattr(case.console.desk, "_do", lambda *_: 1 / 0)
+            monkeypatch.setattr(case.console.dispatcher, "_do", lambda *_: 1 / 0)
             await page.say(type="halt")
         else:
             (task,) = [task for task in asyncio.all_tasks() if task.get_name() == name]

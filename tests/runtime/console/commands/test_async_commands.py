@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from runtime.console.commands.async_commands import AsyncCommands
-from runtime.console.commands.refusal import Refusal
-from runtime.console.frames.frame_encoder import RecordingNow
+from runtime.console.commands.command_error import CommandError
+from runtime.console.frames.frame_encoder import RecordingStatus
 from runtime.console.protocols import Viewer
 from tests.runtime.console.messages import OF_TIME
 from tests.runtime.console.operated import operated
@@ -26,7 +26,7 @@ class Held:
         self.left: list[Viewer] = []
         self.is_paused = True
         self.speed = 2.0
-        self.now = RecordingNow("run.mcap", 10, 0)
+        self.now = RecordingStatus("run.mcap", 10, 0)
 
     async def _do(self, what: str) -> str | None:
         await self.go.wait()
@@ -36,7 +36,7 @@ class Held:
     async def _show(self, what: str) -> None:
         validate = await self._do(what)
         if validate is not None:
-            raise Refusal(validate)
+            raise CommandError(validate)
 
     async def pause(self) -> str | None:
         return await self._do("pause")
@@ -83,7 +83,7 @@ class Held:
 
     async def report(self) -> bytes:
         if self.validate is not None:
-            raise Refusal(self.validate)
+            raise CommandError(self.validate)
         return b"<h1>report</h1>"
 
     async def close(self) -> None:
@@ -93,7 +93,7 @@ class Held:
 @pytest.mark.parametrize(("message", "done"), OF_TIME, ids=lambda value: str(value)[:30])
 async def test_what_takes_its_time(message: dict[str, Any], done: str) -> None:
     held = Held()
-    async with operated(overtime=AsyncCommands(held, held, held)) as case:
+    async with operated(async_commands=AsyncCommands(held, held, held)) as case:
         page = await case.page()
         assert (await page.ask(**message))["ok"]
         assert held.did == [done]
@@ -113,10 +113,10 @@ async def test_what_takes_its_time(message: dict[str, Any], done: str) -> None:
 
 async def test_a_page_that_leaves_in_the_middle_of_it() -> None:
     held = Held()
-    async with operated(overtime=AsyncCommands(held, held, held)) as case:
+    async with operated(async_commands=AsyncCommands(held, held, held)) as case:
         page = await case.page()
         held.go.clear()
-        await page.say(type="open", file="run.mcap")
+        await page.say(type="open_recording", file="run.mcap")
         await case.settled(lambda: bool(case.console._tasks), "the work")
         await page.socket.close()
         await case.settled(lambda: not case.console._tasks, "that it is given up")
@@ -126,7 +126,7 @@ async def test_a_page_that_leaves_in_the_middle_of_it() -> None:
 async def test_work_that_fails_is_a_fault_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
     held = Held()
     monkeypatch.setattr(held, "_do", lambda _what: 1 / 0)
-    async with operated(overtime=AsyncCommands(held, held, held)) as case:
+    async with operated(async_commands=AsyncCommands(held, held, held)) as case:
         page = await case.page()
         await page.say(type="pause")
         await case.settled(lambda: any(line["event"] == "a part failed" for line in case.log), "a line in the log")
@@ -135,15 +135,15 @@ async def test_work_that_fails_is_a_fault_of_the_program(monkeypatch: pytest.Mon
 
 async def test_a_recording_is_shown_to_who_opened_it_only() -> None:
     held = Held()
-    async with operated(overtime=AsyncCommands(held, held, held)) as case:
+    async with operated(async_commands=AsyncCommands(held, held, held)) as case:
         page, other = await case.page(), await case.page()
-        assert (await page.ask(type="open", file="run.mcap"))["data"] == {"seconds": 3.0}
+        assert (await page.ask(type="open_recording", file="run.mcap"))["data"] == {"seconds": 3.0}
         case.cycles()
         frame = await other.next("state")
         assert (frame["paused"], frame["speed"]) == (True, 2.0)
         assert frame["recording"] == {"file": "run.mcap", "bytes": 10, "dropped": 0}
         assert not [message for message in page.heard if message["type"] == "state"]
-        await page.ask(type="live")
+        await page.ask(type="close_recording")
         case.cycles()
         assert (await page.next("state"))["segments"]["whole"]
         async with case.session.get(case.url.with_path("/report", keep_query=True)) as answer:

@@ -59,14 +59,14 @@ BAD: list[tuple[str, str | None]] = [
     ('{"id":1,"type":"teleoperate","v":true,"w":0}', "v"),
     ('{"id":1,"type":"teleoperate","v":0}', "w"),
     ('{"id":1,"type":"teleoperate","v":99,"w":0}', "v"),
-    ('{"id":1,"type":"drive_request","kind":"goal","x":1e9,"y":0}', "x"),
-    ('{"id":1,"type":"drive_request","kind":"flight"}', "kind"),
+    ('{"id":1,"type":"goal","x":1e9,"y":0}', "x"),
+    ('{"id":1,"type":"drive_request"}', "type"),
     ('{"id":1,"type":"arm","now":true}', "now"),
     ('{"id":1,"type":"ARM"}', "type"),
     ('{"id":1}', "type"),
     ('{"id":1,"type":"delete_segments","numbers":[]}', "numbers"),
     ('{"id":1,"type":"delete_segments","numbers":[1.5]}', "numbers.0"),
-    ('{"id":1,"type":"set","path":"a","value":[1]}', "value"),
+    ('{"id":1,"type":"set_parameter","path":"a","value":[1]}', "value"),
 ]
 
 
@@ -100,7 +100,7 @@ async def test_what_has_no_number_is_answered_without(text: str) -> None:
 async def test_a_parameter_is_changed_for_all_to_see_and_taken_back() -> None:
     async with operated() as case:
         page, other = await case.page(), await case.page()
-        answer = await page.ask(type="set", path=GAIN, value=2)
+        answer = await page.ask(type="set_parameter", path=GAIN, value=2)
         assert answer["data"] == [{"path": GAIN, "value": 2.0}]
         for one in (page, other):
             told = next((m for m in one.heard if m["type"] == "parameters"), None) or await one.next("parameters")
@@ -108,10 +108,10 @@ async def test_a_parameter_is_changed_for_all_to_see_and_taken_back() -> None:
         (settings,) = case.run.asked
         assert isinstance(settings, Settings)
         assert settings.behaviors.avoid_static_obstacle.avoid_obstacle_gain == 2.0
-        answer = await page.ask(type="undo")
+        answer = await page.ask(type="undo_parameter")
         assert answer["data"] == {"path": GAIN, "value": 1.0}
         assert case.run.asked[1] == case.run.settings
-        assert (await page.ask(type="undo"))["error"] == "there is no change to take back"
+        assert (await page.ask(type="undo_parameter"))["error"] == "there is no change to take back"
 
 
 @pytest.mark.parametrize(
@@ -131,7 +131,7 @@ async def test_a_parameter_is_changed_for_all_to_see_and_taken_back() -> None:
 async def test_a_parameter_that_is_refused(path: str, value: Any, error: str) -> None:
     async with operated() as case:
         page = await case.page()
-        answer = await page.ask(type="set", path=path, value=value)
+        answer = await page.ask(type="set_parameter", path=path, value=value)
         assert not answer["ok"]
         assert answer["field"] == path
         assert error in answer["error"] or answer["error"].startswith(error)
@@ -141,8 +141,8 @@ async def test_a_parameter_that_is_refused(path: str, value: Any, error: str) ->
 async def test_a_firing_pattern_by_name_and_what_is_not_given() -> None:
     async with operated("ring.firing={sets=[[0,8],[1,9]]}") as case:
         page = await case.page()
-        assert (await page.ask(type="set", path="ring.firing.preset", value="quadrants"))["ok"]
-        assert (await page.ask(type="set", path="behaviors.move_ahead.distance_m", value=None))["ok"]
+        assert (await page.ask(type="set_parameter", path="ring.firing.preset", value="quadrants"))["ok"]
+        assert (await page.ask(type="set_parameter", path="behaviors.move_ahead.distance_m", value=None))["ok"]
         settings = case.console.tuning.current
         assert (settings.ring.firing.preset, settings.ring.firing.sets) == ("quadrants", None)
         assert settings.behaviors.move_ahead.distance_m is None
@@ -151,7 +151,7 @@ async def test_a_firing_pattern_by_name_and_what_is_not_given() -> None:
 async def test_all_settings_as_a_file_that_gives_them_again(tmp_path: Path) -> None:
     async with operated("link.port=/dev/pts/7") as case:
         page = await case.page()
-        await page.ask(type="set", path=GAIN, value=3.5)
+        await page.ask(type="set_parameter", path=GAIN, value=3.5)
         text = (await page.ask(type="save_toml"))["data"]
     assert f"{GAIN}: 1.0 → 3.5" in text
     assert "/dev/pts/7" not in text, "the emulator's port"
@@ -163,11 +163,11 @@ async def test_all_settings_as_a_file_that_gives_them_again(tmp_path: Path) -> N
 async def test_settings_from_elsewhere_are_shown_and_end_what_can_be_taken_back() -> None:
     async with operated() as case:
         page = await case.page()
-        await page.ask(type="set", path=GAIN, value=3.5)
+        await page.ask(type="set_parameter", path=GAIN, value=3.5)
         case.console.adopt(case.run.settings)
         while (await page.next("parameters"))["parameters"] != page.heard[0]["parameters"]:
             pass
-        assert not (await page.ask(type="undo"))["ok"]
+        assert not (await page.ask(type="undo_parameter"))["ok"]
 
 
 @pytest.mark.parametrize(
@@ -197,16 +197,16 @@ async def test_a_further_model_is_greeted_and_not_taken_back() -> None:
         page, other = await case.page(), await case.page()
         case.cycles()
         await other.next("state")
-        await page.ask(type="set", path=GAIN, value=2.0)
+        await page.ask(type="set_parameter", path=GAIN, value=2.0)
         assert (await page.ask(type="load_model", toml=BOX))["data"] == {"name": "crate"}
         for one in (page, other):
-            hellos = [message for message in one.heard if message["type"] == "hello"]
-            hello = hellos[1] if len(hellos) > 1 else await one.next("hello")
-            assert [model["name"] for model in hello["models"]] == ["semicircle", "crate"]
-            assert hello["role"] == ("control" if one is page else "watch")
-        assert (await page.ask(type="undo"))["data"] == {"path": GAIN, "value": 1.0}
+            sessions = [message for message in one.heard if message["type"] == "session"]
+            session = sessions[1] if len(sessions) > 1 else await one.next("session")
+            assert [model["name"] for model in session["models"]] == ["semicircle", "crate"]
+            assert session["role"] == ("control" if one is page else "watch")
+        assert (await page.ask(type="undo_parameter"))["data"] == {"path": GAIN, "value": 1.0}
         assert [model.name for model in case.console.tuning.current.models] == ["semicircle", "crate"]
-        assert not (await page.ask(type="undo"))["ok"]
+        assert not (await page.ask(type="undo_parameter"))["ok"]
         case.cycles()
         assert (await other.next("state"))["segments"]["whole"], "it was greeted anew"
 

@@ -89,7 +89,7 @@ async def test_by_another_name_of_this_machine() -> None:
     async with operated() as case:
         name = f"localhost:{case.url.port}"
         page = await case.connect(host=name, origin=f"http://{name}")
-        assert (await page.next("hello"))["role"] == "control"
+        assert (await page.next("session"))["role"] == "control"
 
 
 @pytest.mark.parametrize("token", [None, "wrong", "%00", "x" * 5000])
@@ -115,10 +115,10 @@ async def test_a_page_from_elsewhere(origin: str | None) -> None:
 async def test_who_has_no_token_may_be_let_watch_and_nothing_more() -> None:
     async with operated("console.watch_without_token=true") as case:
         page = await case.connect(token=None)
-        hello = await page.next("hello")
-        assert hello["role"] == "watch"
-        assert hello["has_token"] is False
-        for kind in ("halt", "arm", "take_control", "undo", "save_toml", "recordings"):
+        session = await page.next("session")
+        assert session["role"] == "watch"
+        assert session["has_token"] is False
+        for kind in ("halt", "arm", "take_control", "undo_parameter", "save_toml", "list_recordings"):
             answer = await page.ask(type=kind)
             assert not answer["ok"]
             assert "only watches" in answer["error"]
@@ -285,7 +285,7 @@ async def test_requests_in_a_row_on_one_connection_are_answered_once() -> None:
 
 
 async def test_the_end_is_told_and_leaves_nothing() -> None:
-    async with operated(overtime=AsyncCommands()) as case:
+    async with operated(async_commands=AsyncCommands()) as case:
         pages = [await case.page() for _ in range(3)]
         codes = asyncio.gather(*(page.closed() for page in pages))
         await asyncio.sleep(0)

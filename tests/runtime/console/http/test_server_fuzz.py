@@ -17,7 +17,7 @@ import structlog
 
 from behaviors.teleoperation import Teleoperate
 from drivers.driver import RobotDriver
-from runtime.console.commands.messages import BadMessage, read_message
+from runtime.console.commands.messages import MalformedMessage, read_message
 from runtime.console.console import Console
 from runtime.console.http.client_limits import Limits
 from runtime.cycle.modes import Mode, Request
@@ -36,9 +36,9 @@ BOUNDLESS = Limits(messages_per_s=1e9, waiting=10**9, waiting_bytes=10**12)
 
 GOOD: list[dict[str, Any]] = [
     *(row[0] for row in ASKED), *(row[0] for row in EDITS), *(row[0] for row in OF_TIME),
-    {"type": "take_control"}, {"type": "give_control"}, {"type": "grant", "client": 2},
-    {"type": "evidence", "object": 1}, {"type": "load_model", "toml": "name = 1"}, {"type": "undo"},
-    {"type": "set", "path": "behaviors.arbiter.base_velocity_m_s", "value": 0.4}, {"type": "save_toml"},
+    {"type": "take_control"}, {"type": "release_control"}, {"type": "grant_control", "client": 2},
+    {"type": "evidence", "object": 1}, {"type": "load_model", "toml": "name = 1"}, {"type": "undo_parameter"},
+    {"type": "set_parameter", "path": "behaviors.arbiter.base_velocity_m_s", "value": 0.4}, {"type": "save_toml"},
 ]  # fmt: skip
 ODD: list[Any] = [
     None, True, -1, 0, 2**53, 2**70, 1e308, -0.0, "", "x", "\x00", "halt", "arm", "🤖" * 50, [], [[]], {},
@@ -108,7 +108,7 @@ class NoWire:
 def has_form(text: str) -> bool:
     try:
         read_message(text)
-    except BadMessage:
+    except MalformedMessage:
         return False
     return True
 
@@ -125,15 +125,15 @@ async def test_at_the_desk() -> None:
             if k % 5000 == 0:
                 for client in (controller, watcher, stranger):
                     client._waiting.clear()
-            case.console.desk.take(stranger, text)
+            case.console.dispatcher.take(stranger, text)
             assert case.run.asked == []
             if has_form(text):
                 formed += 1
                 if '"take_control"' not in text:
-                    case.console.desk.take(watcher, text)
+                    case.console.dispatcher.take(watcher, text)
                     assert set(case.run.asked) <= {Request.HALT}
             else:
-                case.console.desk.take(controller, text)
+                case.console.dispatcher.take(controller, text)
                 assert case.run.asked == []
                 assert orjson.loads(controller._waiting[-1])["ok"] is False
             case.run.asked.clear()
@@ -199,7 +199,7 @@ def test_a_whole_process_does_not_move(monkeypatch: pytest.MonkeyPatch, *, armed
                     return
                 is_halt = has_form(text) and '"halt"' in text
                 if not is_halt and '"take_control"' not in text:
-                    console.desk.take(watcher if has_form(text) else controller, text)
+                    console.dispatcher.take(watcher if has_form(text) else controller, text)
             for client in (watcher, controller):
                 client._waiting.clear()
 

@@ -14,7 +14,8 @@ import orjson
 import pytest
 
 from runtime.console.clients.client import Frame
-from runtime.console.playback.replay_client import PLAYERS_MAX, PlayedFrame, PlayerError, ReplayClient, report_of
+from runtime.console.frames.frame_encoder import EncodedFrame
+from runtime.console.playback.replay_client import WORKERS_MAX, ReplayClient, ReplayError, report_of
 from runtime.recording.storage import in_folder, listing
 from runtime.support.child_process import COMMAND, NICENESS, end_child, start_child
 from tests.hil.machine import PATIENCE_S
@@ -39,22 +40,22 @@ class Page:
     def __init__(self) -> None:
         self.is_gone = False
         self.live: list[bool] = []
-        self.frames: list[PlayedFrame] = []
+        self.frames: list[EncodedFrame] = []
         self.said: list[dict[str, Any]] = []
 
     def switch(self, *, live: bool) -> None:
         self.live.append(live)
 
-    def show(self, shot: Frame) -> None:
-        assert isinstance(shot, PlayedFrame)
-        self.frames.append(shot)
+    def show(self, frame: Frame) -> None:
+        assert isinstance(frame, EncodedFrame)
+        self.frames.append(frame)
 
     def say(self, message: dict[str, Any]) -> None:
         self.said.append(message)
 
     @property
     def last(self) -> dict[str, Any]:
-        return dict(orjson.loads(self.frames[-1].told(follows=False, dropped=0, controls=True)))
+        return dict(orjson.loads(self.frames[-1].encode(follows=False, dropped=0, controls=True)))
 
 
 async def until(done: Callable[[], bool]) -> None:
@@ -82,7 +83,7 @@ async def test_a_recording_on_the_page(folder: Path) -> None:
         assert page.live == [False]
         await until(lambda: bool(page.frames))
         assert (page.last["cycle"], page.last["segments"]) == (1, {"whole": True})
-        changes = orjson.loads(page.frames[-1].told(follows=True, dropped=3, controls=False))
+        changes = orjson.loads(page.frames[-1].encode(follows=True, dropped=3, controls=False))
         assert (changes["segments"], changes["dropped"], changes["controller"]) == ({"whole": False}, 3, False)
         await made.scrub(page, 3.0)
         await until(lambda: page.last["cycle"] == 61)
@@ -92,7 +93,7 @@ async def test_a_recording_on_the_page(folder: Path) -> None:
         await until(lambda: page.last["cycle"] == 100 and not page.last["playing"])
         await made.live(page)
         assert page.live == [False, True]
-        with pytest.raises(PlayerError, match="no recording is open"):
+        with pytest.raises(ReplayError, match="no recording is open"):
             await made.scrub(page, 1.0)
         count = len(page.frames)
         await asyncio.sleep(0)
@@ -103,26 +104,26 @@ async def test_what_cannot_be_opened(folder: Path) -> None:
     page = Page()
     async with players(folder) as made:
         for name in ("", "none.mcap", "../runs/hall.mcap", str(folder / "hall.mcap"), "hall", "/etc/passwd"):
-            with pytest.raises(PlayerError, match="there is no recording"):
+            with pytest.raises(ReplayError, match="there is no recording"):
                 await made.open(page, name)
-        with pytest.raises(PlayerError, match=r"broken\.mcap: holds no message"):
+        with pytest.raises(ReplayError, match=r"broken\.mcap: holds no message"):
             await made.open(page, "broken.mcap")
         assert page.live == []
-        with pytest.raises(PlayerError, match="finite"):
+        with pytest.raises(ReplayError, match="finite"):
             await made.scrub(page, float("nan"))
         for speed in (1e9, -1.0, float("nan")):
-            with pytest.raises(PlayerError, match="speed"):
+            with pytest.raises(ReplayError, match="speed"):
                 await made.play(page, speed)
 
 
 async def test_only_so_many_at_a_time_and_none_is_left_behind(folder: Path) -> None:
-    pages = [Page() for _ in range(PLAYERS_MAX)]
+    pages = [Page() for _ in range(WORKERS_MAX)]
     async with players(folder) as made:
         await asyncio.gather(*(made.open(page, "hall.mcap") for page in pages))
         processes = [playing._process.pid for playing in made._open.values()]
-        assert len(set(processes)) == PLAYERS_MAX
+        assert len(set(processes)) == WORKERS_MAX
         assert all(os.getpriority(os.PRIO_PROCESS, pid) >= NICENESS for pid in processes)
-        with pytest.raises(PlayerError, match="open already"):
+        with pytest.raises(ReplayError, match="open already"):
             await made.open(Page(), "hall.mcap")
         made.leave(pages[0])
         await until(lambda: not made._ending)
@@ -140,14 +141,14 @@ async def test_a_player_that_dies_is_told(folder: Path) -> None:
         (playing,) = made._open.values()
         playing._process.kill()
         await until(lambda: playing.is_over)
-        with pytest.raises(PlayerError, match="has ended"):
+        with pytest.raises(ReplayError, match="has ended"):
             await made.scrub(page, 1.0)
         await made.open(page, "hall.mcap")
 
 
 async def test_a_program_that_is_none_is_told_in_a_line(folder: Path) -> None:
     made = ReplayClient(folder, "tests.runtime.console.no_such", lambda: None)
-    with pytest.raises(PlayerError, match="no_such"):
+    with pytest.raises(ReplayError, match="no_such"):
         await made.open(Page(), "hall.mcap")
 
 
@@ -179,17 +180,17 @@ async def test_the_page_of_a_run_that_goes_on(folder: Path, tmp_path: Path) -> N
     async with players(folder, str(cut)) as made:
         first = asyncio.create_task(made.report())
         await asyncio.sleep(0)
-        with pytest.raises(PlayerError, match="already"):
+        with pytest.raises(ReplayError, match="already"):
             await made.report()
         page = (await first).decode()
         assert page.startswith("<!doctype html>")
         assert "Pictures" in page
     async with players(folder) as made:
-        with pytest.raises(PlayerError, match="nothing is being recorded"):
+        with pytest.raises(ReplayError, match="nothing is being recorded"):
             await made.report()
-    with pytest.raises(PlayerError, match=r"broken\.mcap: holds no message"):
+    with pytest.raises(ReplayError, match=r"broken\.mcap: holds no message"):
         await report_of(folder / "broken.mcap", "m")
-    with pytest.raises(PlayerError, match="not done within"):
+    with pytest.raises(ReplayError, match="not done within"):
         await report_of(cut, "m", patience_s=0.01)
 
 

@@ -1,0 +1,21 @@
+"""The one exception of a console command: why it was not carried out, worded for the operator."""
+
+from __future__ import annotations
+
+from config.errors import UserError
+
+
+class CommandError(UserError):
+    """A command was not carried out; the client gets the text in its answer, and nothing else ends.
+
+    Parameters
+    ----------
+    text : str
+        For the operator: what is wrong and what to do.
+    field : str, optional
+        The input field of the page next to which the text belongs.
+    """
+
+    def __init__(self, text: str, field: str | None = None) -> None:
+        super().__init__(text)
+        self.field = field
