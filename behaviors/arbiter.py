@@ -1,6 +1,6 @@
 """The arbiter: adds the schemas' vectors and answers with a velocity the base can drive, or with a reason to stop.
 
-Most schemas ask for a direction (`arbitrate`); an operator's hand asks for a velocity (`limit`), which the echoes
+Most schemas ask for a direction (`arbitrate`); an operator's hand asks for a velocity (`limit_velocity`), which the echoes
 only ever take from. A decision that lacks a part is a stop, never a guess: what comes out is either within every
 limit or no velocity.
 """
@@ -93,7 +93,7 @@ def arbitrate(
     return Drive(Twist(v, w))
 
 
-def limit(
+def limit_velocity(
     asked: Twist,
     responses: Sequence[Response],
     percept: Percept,

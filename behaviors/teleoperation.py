@@ -1,7 +1,7 @@
 """Teleoperation as a schema among others (Arkin 1991): the operator's hand on the stick is one more vector.
 
 What the operator asks for is a velocity, and standing still, turning on the spot and backing are part of it, which
-no vector can say; so the velocity goes to `behaviors.arbiter.limit` beside the vector. It holds for a moment only: a
+no vector can say; so the velocity goes to `behaviors.arbiter.limit_velocity` beside the vector. It holds for a moment only: a
 hand that has left the stick, or a page that was closed, must not drive on.
 """
 
@@ -29,7 +29,7 @@ class Teleoperate:
     kind: Literal["teleoperate"] = "teleoperate"
 
 
-HANDS_OFF: Final = Teleoperate(0.0, 0.0)
+TELEOPERATION_ENDED: Final = Teleoperate(0.0, 0.0)
 """Nobody's hand is on the stick: the robot stands."""
 
 
@@ -39,6 +39,6 @@ def teleoperation(percept: Percept, asked: Teleoperate, base_velocity_m_s: float
     return Response(SCHEMA, magnitude * math.cos(percept.pose.theta), magnitude * math.sin(percept.pose.theta))
 
 
-def is_over(asked: Teleoperate, age_s: float, config: TeleoperationConfig) -> bool:
+def is_expired(asked: Teleoperate, age_s: float, config: TeleoperationConfig) -> bool:
     """Say whether a velocity asked for `age_s` ago holds no longer."""
     return not 0.0 <= age_s < min(asked.valid_s, config.message_age_max_s)

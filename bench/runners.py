@@ -15,7 +15,7 @@ from config.load import load_settings
 from config.robot import RingConfig
 from config.settings import Settings
 from drivers.messages import Firing
-from perception.pipeline import Perception, SeenObject
+from perception.pipeline import DetectedObject, Perception
 from runtime.simulation.open_loop import perceive
 
 
@@ -64,7 +64,7 @@ class OurRunner:
     def __init__(self, settings: Settings) -> None:
         self._perception = Perception(settings.ring, settings.models, settings.perception)
         self._names = {model.name for model in settings.models}
-        self._seen: tuple[SeenObject, ...] = ()
+        self._seen: tuple[DetectedObject, ...] = ()
 
     def take(self, firing: Firing) -> Watch:
         """Take in one reading."""

@@ -17,21 +17,21 @@ from config.files import ConfigError, Kind, dotted, list_shipped, one_line, pars
 from config.layers import Layers, Location, PathError, Source
 from config.model import ModelConfig
 from config.overrides import apply_overrides, parse_override
-from config.problems import describe_all, given_type, shown, unknown_key
+from config.problems import describe_errors, given_type, shown, unknown_key
 from config.robot import RobotConfig
 from config.settings import Settings
 from config.world import WorldConfig
 
 __all__ = [
     "ConfigError",
-    "changed_settings",
     "list_shipped",
     "load_any",
     "load_model",
     "load_robot",
     "load_settings",
     "load_world",
-    "model_in",
+    "override_settings",
+    "parse_model",
     "with_value",
 ]
 
@@ -165,7 +165,7 @@ def load_settings(
     return _validated(Settings, settings)
 
 
-def changed_settings(settings: Settings, name: str, overrides: Sequence[str]) -> Settings:
+def override_settings(settings: Settings, name: str, overrides: Sequence[str]) -> Settings:
     """Return settings that are already whole with single ones overridden.
 
     Parameters
@@ -224,7 +224,7 @@ def with_value(settings: Settings, name: str, location: Location, value: object)
     return _validated(Settings, layers)
 
 
-def model_in(text: str, name: str) -> ModelConfig:
+def parse_model(text: str, name: str) -> ModelConfig:
     """Return the object model that a text in TOML describes, named `name` in complaints.
 
     Raises
@@ -249,7 +249,7 @@ def _validated(model: type[M], layers: Layers) -> M:
     try:
         return model.model_validate(layers.tree)
     except ValidationError as error:
-        raise ConfigError(*describe_all(error, layers, model)) from None
+        raise ConfigError(*describe_errors(error, layers, model)) from None
 
 
 def _robot_layer(names: Layers) -> tuple[Layers, list[str]]:

@@ -12,7 +12,7 @@ from typing import Final, TypeAlias
 
 from pydantic import Field, model_validator
 
-from config.strict import Many, Point, Strict
+from config.strict import Point, Strict, TomlList
 
 Side: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
 
@@ -27,7 +27,7 @@ class ModelConfig(Strict):
     """An object model: a chain of vertices, open or closed, perhaps standing for an arc."""
 
     name: str = Field(min_length=1, pattern=r"^[A-Za-z0-9_-]+$")
-    vertices_m: Many[Point] = Field(min_length=2, max_length=64)
+    vertices_m: TomlList[Point] = Field(min_length=2, max_length=64)
     """Corners of the outline in order; the origin is the point whose position is reported."""
     closed: bool
     arc_radius_m: float | None = Field(default=None, gt=0.0, le=100.0)

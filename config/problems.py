@@ -6,7 +6,7 @@ import datetime
 import json
 import re
 import types
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Annotated, Union, get_args, get_origin
 
@@ -52,11 +52,18 @@ BOUNDS = MappingProxyType(
     }
 )
 
+RENAMED_KEYS: Mapping[Location, str] = MappingProxyType({("perception", "full"): "perception.bayes"})
+"""Former names of settings and sections, each with its name now."""
+RENAMED_VALUES: Mapping[tuple[Location, object], str] = MappingProxyType(
+    {(("perception", "method"), "full"): "bayes"}
+)
+"""Former values of a setting, each with its name now."""
+
 PROBLEMS_MAX = 100
 """Problems told at most; more of them means the file is of another kind altogether."""
 
 
-def describe_all(error: ValidationError, layers: Layers, model: type[BaseModel]) -> list[str]:
+def describe_errors(error: ValidationError, layers: Layers, model: type[BaseModel]) -> list[str]:
     """Return one line for each problem in `error`, in the order of the schema.
 
     Parameters
@@ -118,6 +125,8 @@ def _describe(details: ErrorDetails, layers: Layers, model: type[BaseModel]) -> 
     path = dotted(source.local(location))
     if kind == "missing":
         return f"{source.name}: {path}: missing"
+    if kind == "extra_forbidden" and location in RENAMED_KEYS:
+        return f"{source.name}: {path}: was renamed: call it {RENAMED_KEYS[location]}"
     if kind == "extra_forbidden":
         also = ("robot",) if len(location) == 1 and "models" in model.model_fields else ()
         return f"{source.name}: {path}: {unknown_key(location, model, also)}"
@@ -134,6 +143,8 @@ def _complaint(details: ErrorDetails, model: type[BaseModel]) -> str:
         return f"must be {BOUNDS[kind]} {_number(bound)}{_other_bounds(model, location, kind)}"
     if kind == "finite_number":
         return "must be a finite number"
+    if kind == "literal_error" and (renamed := RENAMED_VALUES.get((location, str(value)))) is not None:
+        return f'was renamed: write "{renamed}"'
     if kind == "literal_error":
         names = [str(a) for a in get_args(_unwrapped(_annotation_at(model, location)))]
         return f"must be one of {', '.join(names)}{did_you_mean(value, names) if isinstance(value, str) else ''}"

@@ -18,7 +18,7 @@ from config.layers import Location
 from config.problems import shown
 from config.settings import Settings
 
-LIVE: Final = frozenset(
+LIVE_SETTINGS: Final = frozenset(
     {
         "behaviors",
         "cycle.perception_budget_s",
@@ -69,14 +69,14 @@ class Difference:
         if self.location == MODELS and isinstance(self.before, tuple) and isinstance(self.after, tuple):
             return self.before == self.after[: len(self.before)]
         keys = [str(key) for key in self.location]
-        return any(".".join(keys[:n]) in LIVE for n in range(1, len(keys) + 1))
+        return any(".".join(keys[:n]) in LIVE_SETTINGS for n in range(1, len(keys) + 1))
 
     def __str__(self) -> str:
         return f"{self.path}: {_shown(self.before)} → {_shown(self.after)}"
 
 
 @dataclass(frozen=True, slots=True)
-class Reload:
+class ReloadResult:
     """What became of an attempt."""
 
     settings: Settings
@@ -87,7 +87,7 @@ class Reload:
     """Why nothing was taken over, one line each; empty where it was."""
 
 
-def reload(current: Settings, propose: Callable[[], Settings]) -> Reload:
+def reload(current: Settings, propose: Callable[[], Settings]) -> ReloadResult:
     """Return the settings in force after an attempt to change them.
 
     Parameters
@@ -100,12 +100,12 @@ def reload(current: Settings, propose: Callable[[], Settings]) -> Reload:
     try:
         proposed = propose()
     except ConfigError as error:
-        return Reload(current, problems=error.problems)
+        return ReloadResult(current, problems=error.problems)
     changed = tuple(differences(current, proposed))
     fixed = tuple(f"{d}: needs a restart" for d in changed if not d.live)
     if fixed:
-        return Reload(current, problems=fixed)
-    return Reload(proposed, changed) if changed else Reload(current)
+        return ReloadResult(current, problems=fixed)
+    return ReloadResult(proposed, changed) if changed else ReloadResult(current)
 
 
 def differences(before: object, after: object, at: Location = ()) -> Iterator[Difference]:

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, NamedTuple, TypeAlias
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from config.strict import Many, Strict
+from config.strict import Strict, TomlList
 
 SOUND_SPEED_M_S = 343.0
 """Speed of sound in dry air at 20 °C; what the ring's own electronics assume."""
@@ -18,7 +18,7 @@ SOUND_SPEED_M_S = 343.0
 SENSORS_MAX = 255
 """Sensors in a ring, and sets in a firing pattern; a file that lists a million must not fill the memory."""
 
-SensorSet: TypeAlias = Annotated[Many[Annotated[int, Field(ge=0, lt=SENSORS_MAX)]], Field(max_length=SENSORS_MAX)]
+SensorSet: TypeAlias = Annotated[TomlList[Annotated[int, Field(ge=0, lt=SENSORS_MAX)]], Field(max_length=SENSORS_MAX)]
 """Numbers of sensors that fire together."""
 
 Preset = Literal["single", "opposite_pairs", "thirds", "quadrants", "octets", "alternating"]
@@ -46,7 +46,7 @@ class FiringConfig(Strict):
     preset: Preset | None = None
     """A regular pattern by name: how many sensors, equally spaced, fire at a time; `alternating` fires octets and
     thirds in turn, so that no two sensors fire together in both and crosstalk shows."""
-    sets: Annotated[Many[SensorSet], Field(max_length=SENSORS_MAX)] | None = None
+    sets: Annotated[TomlList[SensorSet], Field(max_length=SENSORS_MAX)] | None = None
     """Sets of sensor numbers, fired in turn; instead of a preset."""
     rotations: int = Field(default=1, ge=1, le=255)
     """Fire `sets` this many times round, one sensor further round the ring each time."""
@@ -76,7 +76,7 @@ class RingConfig(Strict):
 
     count: int | None = Field(default=None, ge=2, le=SENSORS_MAX)
     radius_m: float | None = Field(default=None, ge=0.0, le=10.0)
-    sensors: Annotated[Many[SensorConfig], Field(max_length=SENSORS_MAX)] | None = None
+    sensors: Annotated[TomlList[SensorConfig], Field(max_length=SENSORS_MAX)] | None = None
     beam_half_angle_deg: float = Field(gt=0.0, lt=90.0)
     resolution_m: float = Field(ge=0.0, lt=1.0)
     """Step of the reported range; 0 = not quantised."""

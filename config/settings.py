@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from config.model import ModelConfig
 from config.robot import RobotConfig
-from config.strict import Many, Strict
+from config.strict import Strict, TomlList
 from config.world import WorldConfig
 
 
@@ -113,7 +113,7 @@ class BayesConfig(Strict):
 
 
 class PerceptionConfig(Strict):
-    """Perception: the method and its constants; the sections below `full` are the paper's steps."""
+    """Perception: the method and its constants; the sections below `bayes` are the paper's steps."""
 
     method: Literal["paper", "bayes"] = "bayes"
     """How objects are recognised: as the paper does it, or exactly."""
@@ -263,7 +263,7 @@ class ConsoleConfig(Strict):
 class Settings(RobotConfig):
     """All settings of one run: the robot's sections at the top, then what it recognises and does."""
 
-    models: Many[ModelConfig] = Field(min_length=1)
+    models: TomlList[ModelConfig] = Field(min_length=1)
     world: WorldConfig | None = None
     """What the emulator shows where no port is given."""
     cycle: CycleConfig = CycleConfig()

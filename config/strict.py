@@ -30,11 +30,11 @@ def _list_as_tuple(value: object) -> object:
     return tuple(value) if isinstance(value, list) else value
 
 
-Many: TypeAlias = Annotated[tuple[T, ...], BeforeValidator(_list_as_tuple)]
+TomlList: TypeAlias = Annotated[tuple[T, ...], BeforeValidator(_list_as_tuple)]
 """An immutable sequence written as a TOML list."""
 
-Place: TypeAlias = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
+Coordinate: TypeAlias = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
 """A coordinate, metres; nobody drives ten kilometres by sonar, and the squares of a typo overflow."""
 
-Point: TypeAlias = Annotated[tuple[Place, Place], BeforeValidator(_list_as_tuple)]
+Point: TypeAlias = Annotated[tuple[Coordinate, Coordinate], BeforeValidator(_list_as_tuple)]
 """A pair of coordinates in metres written as a TOML list of two numbers."""

@@ -6,9 +6,9 @@ from typing import Annotated, Final, Literal, TypeAlias
 
 from pydantic import Field
 
-from config.strict import Many, Place, Point, Strict
+from config.strict import Coordinate, Point, Strict, TomlList
 
-THINGS_MAX: Final = 1000
+ITEMS_MAX: Final = 1000
 """Things of a kind in a world, and corners of a thing."""
 
 Turn: TypeAlias = Annotated[float, Field(ge=-360.0, le=360.0)]
@@ -18,25 +18,25 @@ Turn: TypeAlias = Annotated[float, Field(ge=-360.0, le=360.0)]
 class DrumConfig(Strict):
     """A closed cylinder."""
 
-    x_m: Place
-    y_m: Place
+    x_m: Coordinate
+    y_m: Coordinate
     radius_m: float = Field(gt=0.0, le=100.0)
 
 
 class WallConfig(Strict):
     """A straight wall between two points, seen from both sides."""
 
-    x1_m: Place
-    y1_m: Place
-    x2_m: Place
-    y2_m: Place
+    x1_m: Coordinate
+    y1_m: Coordinate
+    x2_m: Coordinate
+    y2_m: Coordinate
 
 
 class BoxConfig(Strict):
     """A rectangle by its centre, its sides, and its rotation."""
 
-    x_m: Place
-    y_m: Place
+    x_m: Coordinate
+    y_m: Coordinate
     width_m: float = Field(gt=0.0, le=100.0)
     depth_m: float = Field(gt=0.0, le=100.0)
     angle_deg: Turn = 0.0
@@ -45,14 +45,14 @@ class BoxConfig(Strict):
 class PolygonConfig(Strict):
     """A closed polygon by its corners, in order."""
 
-    vertices_m: Many[Point] = Field(min_length=3, max_length=THINGS_MAX)
+    vertices_m: TomlList[Point] = Field(min_length=3, max_length=ITEMS_MAX)
 
 
 class StartConfig(Strict):
     """Where the robot stands when the world begins, in world coordinates."""
 
-    x_m: Place = 0.0
-    y_m: Place = 0.0
+    x_m: Coordinate = 0.0
+    y_m: Coordinate = 0.0
     heading_deg: Turn = 0.0
 
 
@@ -89,10 +89,10 @@ class OdometryConfig(Strict):
 class WorldConfig(Strict):
     """A world file."""
 
-    drum: Many[DrumConfig] = Field(default=(), max_length=THINGS_MAX)
-    wall: Many[WallConfig] = Field(default=(), max_length=THINGS_MAX)
-    box: Many[BoxConfig] = Field(default=(), max_length=THINGS_MAX)
-    polygon: Many[PolygonConfig] = Field(default=(), max_length=THINGS_MAX)
+    drum: TomlList[DrumConfig] = Field(default=(), max_length=ITEMS_MAX)
+    wall: TomlList[WallConfig] = Field(default=(), max_length=ITEMS_MAX)
+    box: TomlList[BoxConfig] = Field(default=(), max_length=ITEMS_MAX)
+    polygon: TomlList[PolygonConfig] = Field(default=(), max_length=ITEMS_MAX)
     start: StartConfig = StartConfig()
     acoustics: AcousticsConfig = AcousticsConfig()
     odometry: OdometryConfig = OdometryConfig()

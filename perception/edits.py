@@ -78,7 +78,7 @@ Edit: TypeAlias = DeleteSegments | PinSegments | PlaceModel | MoveObject | Rejec
 
 NUMBER_MAX: Final = 2**53
 """Numbers stay below this: a page keeps them as floats."""
-PLACE_MAX_M: Final = 10_000.0
+COORDINATE_MAX_M: Final = 10_000.0
 """Nothing stands farther off than this along an axis; a number beyond it is a slip."""
 
 
@@ -87,8 +87,8 @@ class Segments(NamedTuple):
 
     numbers: Ints
     """(n,) by which a segment is known as long as it is there; none is used twice."""
-    ends: Floats
-    """(n, 5) ends x, y, x, y (m) and normal (rad)."""
+    geometry: Floats
+    """(n, 5) end points x1, y1, x2, y2 (m) and direction of the normal (rad)."""
     times: Floats
     """(n,) when each was completed, s of the robot's clock; NaN where a recording's beginning does not tell."""
     pinned: Ints
@@ -140,14 +140,14 @@ class Evidence:
     """By how much other explanations of the readings led when they were last asked, nat; negative: were behind."""
 
 
-def out_of_place(x: float, y: float, theta: float) -> str | None:
+def invalid_pose(x: float, y: float, theta: float) -> str | None:
     """Return why a pose given by hand is none, None where it is good."""
-    if abs(x) <= PLACE_MAX_M and abs(y) <= PLACE_MAX_M and abs(theta) <= PLACE_MAX_M:
+    if abs(x) <= COORDINATE_MAX_M and abs(y) <= COORDINATE_MAX_M and abs(theta) <= COORDINATE_MAX_M:
         return None
     return f"({x:g} m, {y:g} m, {theta:g} rad) is no place: give metres and radians in the odometry's frame"
 
 
-def not_a_number(edit: Edit) -> str | None:
+def invalid_number(edit: Edit) -> str | None:
     """Return why the numbers that an edit names are none that anything has, None where they may be."""
     match edit:
         case DeleteSegments(numbers) | PinSegments(numbers):
@@ -160,12 +160,12 @@ def not_a_number(edit: Edit) -> str | None:
     return None if wrong is None else f"nothing has the number {wrong}"
 
 
-def nobody(number: int) -> str:
+def no_such_object(number: int) -> str:
     """Return why an edit of an object fails that is not there."""
     return f"there is no object {number} any more: look at the list again"
 
 
-def not_there(numbers: set[int]) -> str:
+def no_such_segments(numbers: set[int]) -> str:
     """Return why an edit of segments fails of which some are not there."""
     named = ", ".join(map(str, sorted(numbers)[:5]))
     more = f" and {len(numbers) - 5} more" if len(numbers) > 5 else ""

@@ -1,8 +1,7 @@
 """Perception as an anytime stage: the part that always runs, and refinement in quanta of bounded work.
 
 `observe` takes in one firing. `refine` does one quantum; the caller decides how many it can afford, and what is
-unfinished goes on next time from where it stood. How objects are recognised is a method's affair: the paper's, or the
-full one.
+unfinished goes on next time from where it stood. Objects are recognised by a method: the paper's or the Bayesian one.
 """
 
 from __future__ import annotations
@@ -15,34 +14,34 @@ from config.robot import RingConfig
 from config.settings import PerceptionConfig
 from drivers.messages import Firing
 from perception.bayes.bayes_method import BayesPerception
-from perception.edits import Edit, Evidence, MoveObject, PlaceModel, Segments, not_a_number, out_of_place
+from perception.detected_object import DetectedObject, MapCounts
+from perception.edits import Edit, Evidence, MoveObject, PlaceModel, Segments, invalid_number, invalid_pose
 from perception.fresh_echoes import FreshEchoes
 from perception.kernel import Floats
 from perception.paper.paper_method import PaperPerception
-from perception.seen_object import SeenObject, Tally
-from perception.segments import mounts_array
-from perception.sensor_monitor import SensorWatch
+from perception.sensor_monitor import SensorMonitor
+from perception.sensor_mounts import mounts_array
 from perception.sensor_report import SensorReport
 from perception.snapshot import Snapshot, put_back, snapshot_of
 
-__all__ = ["Method", "Perception", "SeenObject", "method_of"]
+__all__ = ["DetectedObject", "Method", "Perception", "make_method"]
 
 
 class Method(Protocol):
     """A way to recognise objects."""
 
     @property
-    def pending(self) -> bool:
-        """Whether refinement has anything left to improve now."""
+    def can_refine(self) -> bool:
+        """Whether `refine` has anything to improve now."""
         ...
 
     @property
-    def waiting(self) -> bool:
-        """Whether anything may wait for refinement, be it for the next firing."""
+    def converged(self) -> bool:
+        """Whether nothing is left to improve, now or with the next firing."""
         ...
 
     @property
-    def tally(self) -> Tally:
+    def counts(self) -> MapCounts:
         """How many segments and hypotheses there are."""
         ...
 
@@ -54,15 +53,15 @@ class Method(Protocol):
         """Do one quantum of refinement and return its iterations, zero where nothing is left to improve."""
         ...
 
-    def objects(self) -> tuple[SeenObject, ...]:
+    def objects(self) -> tuple[DetectedObject, ...]:
         """Return the models recognised now, best first."""
         ...
 
-    def things(self) -> tuple[SeenObject, ...]:
+    def labelled_objects(self) -> tuple[DetectedObject, ...]:
         """Return everything that has a name, models or not."""
         ...
 
-    def segments_now(self) -> Floats:
+    def segment_geometry(self) -> Floats:
         """Return the outline segments in the map: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""
         ...
 
@@ -78,24 +77,24 @@ class Method(Protocol):
         """Return why an object is believed, None where there is none of this number; changes nothing."""
         ...
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Begin anew, as after the odometry did."""
         ...
 
-    def adopt(self, config: PerceptionConfig) -> None:
-        """Go on with other constants, of those that a running process follows (`config.reload.LIVE`)."""
+    def apply_settings(self, config: PerceptionConfig) -> None:
+        """Go on with other constants, of those that a running process follows (`config.reload.LIVE_SETTINGS`)."""
         ...
 
-    def recognise(self, models: Sequence[ModelConfig]) -> None:
+    def set_models(self, models: Sequence[ModelConfig]) -> None:
         """Look for further models as well, which come after those from before."""
         ...
 
-    def restored(self) -> None:
+    def drop_caches(self) -> None:
         """Drop what was worked out before the memory was put back from a snapshot."""
         ...
 
 
-def method_of(ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> Method:
+def make_method(ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> Method:
     """Return the method that the configuration names."""
     if config.method == "paper":
         return PaperPerception(ring, models, config)
@@ -116,26 +115,26 @@ class Perception:
     """
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> None:
-        self.method = method_of(ring, models, config)
-        self.watch = SensorWatch(ring)
+        self.method = make_method(ring, models, config)
+        self.sensor_monitor = SensorMonitor(ring)
         self._echoes = FreshEchoes(mounts_array(ring.mounts))
         self._sensors = len(ring.mounts)
         self._models = tuple(models)
 
     @property
-    def pending(self) -> bool:
-        """Whether refinement has anything left to improve now."""
-        return self.method.pending
+    def can_refine(self) -> bool:
+        """Whether `refine` has anything to improve now."""
+        return self.method.can_refine
 
     @property
-    def waiting(self) -> bool:
-        """Whether anything may wait for refinement, be it for the next firing."""
-        return self.method.waiting
+    def converged(self) -> bool:
+        """Whether nothing is left to improve, now or with the next firing."""
+        return self.method.converged
 
     @property
-    def tally(self) -> Tally:
+    def counts(self) -> MapCounts:
         """How many segments and hypotheses there are."""
-        return self.method.tally
+        return self.method.counts
 
     def observe(self, firing: Firing) -> int:
         """Take in one firing and return how many outline segments it completed.
@@ -147,7 +146,7 @@ class Perception:
         """
         if len(firing.ranges_m) != self._sensors:
             raise ValueError(f"a firing of {len(firing.ranges_m)} ranges came to a ring of {self._sensors} sensors")
-        believed, possible = self.watch.believe(firing)
+        believed, possible = self.sensor_monitor.filter(firing)
         self._echoes.update(possible)
         return self.method.observe(believed)
 
@@ -155,17 +154,17 @@ class Perception:
         """Do one quantum of refinement and return its iterations, zero where nothing is left to improve."""
         return self.method.refine()
 
-    def objects(self) -> tuple[SeenObject, ...]:
+    def objects(self) -> tuple[DetectedObject, ...]:
         """Return the models recognised now, best first."""
         return self.method.objects()
 
-    def things(self) -> tuple[SeenObject, ...]:
+    def labelled_objects(self) -> tuple[DetectedObject, ...]:
         """Return everything that has a name, models or not: also walls, corners, posts and what is unknown."""
-        return self.method.things()
+        return self.method.labelled_objects()
 
-    def segments_now(self) -> Floats:
+    def segment_geometry(self) -> Floats:
         """Return the outline segments in the map: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""
-        return self.method.segments_now()
+        return self.method.segment_geometry()
 
     def segments(self) -> Segments:
         """Return the outline segments in the map with their numbers, times, and which are pinned; copies."""
@@ -176,9 +175,9 @@ class Perception:
 
         What the robot has to keep clear of is none of a person's affair: the fresh echoes stay whatever is edited.
         """
-        refused = not_a_number(edit)
+        refused = invalid_number(edit)
         if refused is None and isinstance(edit, PlaceModel | MoveObject):
-            refused = out_of_place(edit.x, edit.y, edit.theta)
+            refused = invalid_pose(edit.x, edit.y, edit.theta)
         return self.method.edit(edit) if refused is None else refused
 
     def evidence(self, number: int) -> Evidence | None:
@@ -189,29 +188,29 @@ class Perception:
         """Return each sensor's last echo not older than that at the robot's time `t_s`: points of shape (k, 2), m."""
         return self._echoes.points(t_s, age_max_s)
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Begin anew, as after the odometry did."""
-        self.method.forget()
-        self.watch.forget()
+        self.method.reset()
+        self.sensor_monitor.reset()
         self._echoes.clear()
 
-    def adopt(self, config: PerceptionConfig) -> None:
-        """Go on with other constants, of those that a running process follows (`config.reload.LIVE`)."""
-        self.method.adopt(config)
+    def apply_settings(self, config: PerceptionConfig) -> None:
+        """Go on with other constants, of those that a running process follows (`config.reload.LIVE_SETTINGS`)."""
+        self.method.apply_settings(config)
 
-    def recognise(self, models: Sequence[ModelConfig]) -> None:
+    def set_models(self, models: Sequence[ModelConfig]) -> None:
         """Look for these models from now on: those from before, and perhaps further ones after them."""
         if tuple(models) != self._models:
             self._models = tuple(models)
-            self.method.recognise(models)
+            self.method.set_models(models)
 
-    def listen_to(self, ring: RingConfig) -> None:
+    def set_firing_pattern(self, ring: RingConfig) -> None:
         """Expect another firing pattern of the same sensors from now on."""
-        self.watch.listen_to(ring)
+        self.sensor_monitor.set_firing_pattern(ring)
 
-    def sensors(self) -> tuple[SensorReport, ...]:
+    def sensor_reports(self) -> tuple[SensorReport, ...]:
         """Return which sensors are not believed, and why."""
-        return self.watch.reports()
+        return self.sensor_monitor.reports()
 
     def snapshot(self) -> Snapshot:
         """Return copies of everything remembered, from which `restore` goes on to the bit."""
@@ -226,4 +225,4 @@ class Perception:
             The snapshot is of other settings.
         """
         put_back(self, snapshot)
-        self.method.restored()
+        self.method.drop_caches()

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from config.robot import RingConfig
 from drivers.messages import Firing
 from perception.kernel import Floats, Ints
-from perception.segments import mounts_array
+from perception.sensor_mounts import mounts_array
 from perception.sensor_report import SensorReport, report
 from perception.sensor_tests import (
     AT,
@@ -78,7 +78,7 @@ def fires(ring: RingConfig) -> NDArray[np.bool_]:
     return named
 
 
-class SensorWatch:
+class SensorMonitor:
     """Takes in firings and gives them back without what is not to be believed.
 
     Parameters
@@ -114,7 +114,7 @@ class SensorWatch:
         self._believed = np.zeros(count)
         self._possible = np.zeros(count)
 
-    def believe(self, firing: Firing) -> tuple[Firing, Firing]:
+    def filter(self, firing: Firing) -> tuple[Firing, Firing]:
         """Take in a firing; return what is to be believed of it, and that with what is in doubt.
 
         What is in doubt makes no map, and is kept clear of all the same. Ranges that are neither are NaN there, as if
@@ -133,12 +133,12 @@ class SensorWatch:
             _only(firing, possible) if news & LESS_POSSIBLE else firing,
         )
 
-    def listen_to(self, ring: RingConfig) -> None:
+    def set_firing_pattern(self, ring: RingConfig) -> None:
         """Expect another firing pattern of the same sensors from now on."""
         self._expected[:] = fires(ring)
         self._memory[:, MISSED] = 0.0
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Begin anew, as after the odometry did; what is wrong with a sensor stays wrong."""
         self._memory[:, [COUNT, EVER, MISSED]] = 0.0
 

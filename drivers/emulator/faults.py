@@ -18,7 +18,7 @@ from pydantic_core import ErrorDetails
 
 from config.files import SIZE_MAX, ConfigError, dotted, one_line, parse_document
 from config.problems import shown as shown_value
-from config.strict import Many, Strict
+from config.strict import Strict, TomlList
 
 
 class _Timed(Strict):
@@ -111,7 +111,7 @@ Fault: TypeAlias = (
 class FaultScript(Strict):
     """A fault script file."""
 
-    fault: Many[Annotated[Fault, Field(discriminator="kind")]] = ()
+    fault: TomlList[Annotated[Fault, Field(discriminator="kind")]] = ()
 
 
 def load_faults(path: str | Path) -> tuple[Fault, ...]:

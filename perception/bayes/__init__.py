@@ -1,4 +1,4 @@
-"""The `full` method: raw ranges, compared under every explanation one has, as they come.
+"""The `bayes` method: raw ranges, compared under every explanation one has, as they come.
 
 The paper clusters segments and relaxes a model onto them. That finds a pose to a tenth of a foot and cannot say
 whether the thing is a drum at all. Here segments only *propose* a body and relaxation only finds the basin; what is

@@ -34,10 +34,10 @@ from perception.bayes.pinned_segments import Pins
 from perception.bayes.segment_list import drawn, listed
 from perception.bayes.state import KIND, MODEL, PPROB, PROB, PT, SEGMENTS, ST, clear, make_state
 from perception.bayes.state_migration import inherit, number_heirs
+from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import Edit, Evidence, Segments
 from perception.kernel import Floats
-from perception.seen_object import SeenObject, Tally
-from perception.segments import mounts_array
+from perception.sensor_mounts import mounts_array
 
 
 class BayesPerception:
@@ -70,8 +70,8 @@ class BayesPerception:
         self._library(models)
         self._sure = np.zeros(max(config.tracks_max, PT), np.int64)
         self._told = np.full((config.tracks_max, TOLD), np.nan)
-        self._circles: dict[int, SeenObject] = {}
-        self._objects: tuple[SeenObject, ...] | None = None
+        self._circles: dict[int, DetectedObject] = {}
+        self._objects: tuple[DetectedObject, ...] | None = None
         self._left = 0
         self._polygons_left = 0
         self._circles_pending = False
@@ -79,22 +79,22 @@ class BayesPerception:
         self._polygons_turn = False
 
     @property
-    def pending(self) -> bool:
-        """Whether refinement has anything left to improve before the next firing."""
+    def can_refine(self) -> bool:
+        """Whether `refine` has anything to improve before the next firing."""
         return (self._circles_pending and self._left > 0) or (self._polygons_pending and self._polygons_left > 0)
 
     @property
-    def waiting(self) -> bool:
-        """Whether an object may wait, be it for the next firing."""
-        return self._circles_pending or self._polygons_pending
+    def converged(self) -> bool:
+        """Whether nothing is left to improve, now or with the next firing."""
+        return not (self._circles_pending or self._polygons_pending)
 
     @property
-    def tally(self) -> Tally:
+    def counts(self) -> MapCounts:
         """How many segments and tracks there are, the latter established or not."""
         s = self.memory
         living = np.minimum(s.fill, s.store.shape[1]).sum()
         tracks = np.count_nonzero(s.ti[:, ST]) + np.count_nonzero(s.pi[:, ST])
-        return Tally(int(living), int(s.g[SEGMENTS]), int(tracks))
+        return MapCounts(int(living), int(s.g[SEGMENTS]), int(tracks))
 
     def observe(self, firing: Firing) -> int:
         """Take in one firing and return how many outline segments it completed."""
@@ -127,13 +127,13 @@ class BayesPerception:
             return int(self._polygons_pending)
         return 0
 
-    def objects(self) -> tuple[SeenObject, ...]:
+    def objects(self) -> tuple[DetectedObject, ...]:
         """Return the models that are sure, best first; only refinement changes them."""
         if self._objects is None:
             self._objects = self._sure_objects()
         return self._objects
 
-    def _sure_objects(self) -> tuple[SeenObject, ...]:
+    def _sure_objects(self) -> tuple[DetectedObject, ...]:
         s, p = self.memory, self.settings
         least = self._config.report_probability
         n = sure_circles(self._handle, self._told, self._sure)
@@ -147,18 +147,18 @@ class BayesPerception:
             ]
         return tuple(sorted(seen, key=attrgetter("score"), reverse=True))
 
-    def _tell_circle(self, t: int) -> SeenObject:
+    def _tell_circle(self, t: int) -> DetectedObject:
         s = self.memory
         told = circle(s, self.settings, t, self._round[s.ti[t, KIND]], float(s.tf[t, PROB]))
         self._circles[t] = told
         return told
 
-    def things(self) -> tuple[SeenObject, ...]:
+    def labelled_objects(self) -> tuple[DetectedObject, ...]:
         """Return the objects, then everything else that has a name."""
         called = self.objects()
         return (*called, *other_things(self.memory, self.settings, self._config.report_probability, called))
 
-    def segments_now(self) -> Floats:
+    def segment_geometry(self) -> Floats:
         """Return the mapped segments: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""
         return drawn(listed(self.memory)[2])
 
@@ -185,7 +185,7 @@ class BayesPerception:
             name = self._round[s.ti[row, KIND]] if s.ti[row, KIND] < p.models else rival_label(s, row)
         return evidence_of(s, p, row, number, name, rival_labels(p, self._round))
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Begin anew, as after the odometry did."""
         clear(self.memory)
         self._pins.clear()
@@ -194,14 +194,14 @@ class BayesPerception:
         self._polygons_left = 0
         self._circles_pending = self._polygons_pending = self._polygons_turn = False
 
-    def adopt(self, config: PerceptionConfig) -> None:
+    def apply_settings(self, config: PerceptionConfig) -> None:
         """Go on with other constants; the number of tracks stays."""
         self._config = config.bayes
         self.settings = tuned(self.settings, config.bayes)
         self._handle = hold(self.memory, self.settings)
         self._objects = None
 
-    def recognise(self, models: Sequence[ModelConfig]) -> None:
+    def set_models(self, models: Sequence[ModelConfig]) -> None:
         """Look for further models as well, which come after those from before."""
         before, self.settings = self.settings, self.settings._replace(**library(models))
         self.memory = inherit(self.memory, before, self.settings)
@@ -210,7 +210,7 @@ class BayesPerception:
         self._told[:] = np.nan
         self._objects = None
 
-    def restored(self) -> None:
+    def drop_caches(self) -> None:
         """Drop what was worked out before the memory was put back from a snapshot, and make good what it lacks."""
         number_heirs(self.memory)
         self._told[:] = np.nan

@@ -47,8 +47,8 @@ from perception.edits import (
     PinSegments,
     PlaceModel,
     RejectObject,
-    nobody,
-    not_there,
+    no_such_object,
+    no_such_segments,
 )
 
 REJECTED_MAX: Final = 40.0
@@ -79,7 +79,7 @@ def edit_memory(
     match edit:
         case DeleteSegments(numbers):
             missing = delete(s, pins, numbers)
-            return not_there(missing) if missing else None
+            return no_such_segments(missing) if missing else None
         case PinSegments(numbers, pinned):
             return _pin(s, pins, numbers, pinned=pinned)
         case PlaceModel():
@@ -90,7 +90,7 @@ def edit_memory(
             return None
     row = row_of(s, edit.object)
     if row is None:
-        return nobody(edit.object)
+        return no_such_object(edit.object)
     match edit:
         case MoveObject(_, x, y, theta):
             if row < len(s.ti):
@@ -114,11 +114,11 @@ def heard_last(s: State) -> float:
 def _pin(s: State, pins: Pins, numbers: Sequence[int], *, pinned: bool) -> str | None:
     if not pinned:
         missing = pins.remove(numbers)
-        return not_there(missing) if missing else None
+        return no_such_segments(missing) if missing else None
     missing, full = pins.add(s, numbers)
     if full:
         return f"{len(full)} of these segments cannot be pinned: too many are, there or altogether; the others are"
-    return not_there(missing) if missing else None
+    return no_such_segments(missing) if missing else None
 
 
 def _place(

@@ -62,8 +62,8 @@ from perception.bayes.state import (
     State,
 )  # fmt: skip
 from perception.bayes.walls import is_wall
+from perception.detected_object import DetectedObject
 from perception.kernel import Floats, Ints, kernel
-from perception.seen_object import SeenObject
 
 TOLD: Final = 10
 """What makes up a circle as an object, in numbers."""
@@ -222,11 +222,11 @@ def worst_sigma(xx: float, xy: float, yy: float) -> float:
     return math.sqrt(max(0.0, middle + math.hypot(0.5 * (xx - yy), xy)))
 
 
-def circle(s: State, p: Settings, t: int, label: str, probability: float) -> SeenObject:
+def circle(s: State, p: Settings, t: int, label: str, probability: float) -> DetectedObject:
     """Return a circle's track as an object; a circle has no heading."""
     track = s.tf[t].tolist()
     xx, xy, yy = p.inflate * track[C00], p.inflate * track[C01], p.inflate * track[C11]
-    return SeenObject(
+    return DetectedObject(
         label,
         track[TX],
         track[TY],
@@ -254,7 +254,7 @@ def polygon_covariance(track: Floats) -> Floats:
     return covariance + np.tril(covariance, -1).T
 
 
-def polygon(s: State, p: Settings, t: int, label: str, probability: float) -> SeenObject:
+def polygon(s: State, p: Settings, t: int, label: str, probability: float) -> DetectedObject:
     """Return a polygon's track as an object; of the headings at which it looks alike the least one from −π on."""
     track = s.pf[t]
     theta = float(track[PTH])
@@ -262,14 +262,14 @@ def polygon(s: State, p: Settings, t: int, label: str, probability: float) -> Se
     xx, xy, yy = float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1])
     period = 2.0 * math.pi / int(p.sym[s.pi[t, MODEL]])
     is_placed = xx > 0.0  # else only a person's word places it so far
-    return SeenObject(
+    return DetectedObject(
         label, float(track[PX]), float(track[PY]), (theta + 0.5 * period) % period - 0.5 * period,
         worst_sigma(xx, xy, yy) if is_placed else BY_HAND_M, int(track[PHITS]), probability, probability,
         (xx, xy, yy) if is_placed else None, *said(s, s.ti.shape[0] + t),
     )  # fmt: skip
 
 
-def wall(line: Floats) -> SeenObject:
+def wall(line: Floats) -> DetectedObject:
     """Return a line as an object: the middle of what was seen of it, and its direction."""
     nx, ny, middle = float(line[LNX]), float(line[LNY]), 0.5 * float(line[LLO] + line[LHI])
     across, length = float(line[LP11] + line[LP00] * middle**2), float(line[LHI] - line[LLO])
@@ -277,7 +277,7 @@ def wall(line: Floats) -> SeenObject:
     xx, yy = nx * nx * across + ny * ny * along, ny * ny * across + nx * nx * along
     xy = nx * ny * (across - along)
     probability = 1.0 / (1.0 + math.exp(-float(line[LLOG])))
-    return SeenObject(
+    return DetectedObject(
         "wall", float(line[LOX] + line[LC] * nx) - ny * middle, float(line[LOY] + line[LC] * ny) + nx * middle,
         math.atan2(nx, -ny), worst_sigma(xx, xy, yy), int(line[LN]), probability, probability, (xx, xy, yy),
     )  # fmt: skip
@@ -304,7 +304,7 @@ def rival_labels(p: Settings, rounds: Sequence[str]) -> tuple[str, ...]:
     return (*rounds, *others, "wall", "corner")
 
 
-def other_things(s: State, p: Settings, least: float, called: Sequence[SeenObject]) -> list[SeenObject]:
+def other_things(s: State, p: Settings, least: float, called: Sequence[DetectedObject]) -> list[DetectedObject]:
     """Return what has no model's name: walls, corners, edges, posts, barrels, and what is unknown."""
     found = [wall(line) for line in s.lines if is_wall(line)]
     for t in np.flatnonzero(s.ti[:, ST] != FREE):

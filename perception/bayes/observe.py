@@ -44,7 +44,7 @@ from perception.bayes.track_selection import is_waiting
 from perception.bayes.walls import update_lines
 from perception.kernel import Floats, Ints, kernel
 
-PLACE_MAX_M: Final = 0.5 * FAR
+COORDINATE_MAX_M: Final = 0.5 * FAR
 """A place this far from the odometry's origin is none: ranges as long as this mean silence."""
 STILL_M: Final = 0.05 * FOOT_M
 STILL_COS: Final = 0.9998
@@ -73,7 +73,7 @@ def place_readings(
 
     A pose that is no place and a range that is no distance are left out: entered, they would stay in every sum.
     """
-    if not (abs(px) < PLACE_MAX_M and abs(py) < PLACE_MAX_M and math.isfinite(yaw)):
+    if not (abs(px) < COORDINATE_MAX_M and abs(py) < COORDINATE_MAX_M and math.isfinite(yaw)):
         return 0
     c = math.cos(yaw)
     sn = math.sin(yaw)

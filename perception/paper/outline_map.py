@@ -50,7 +50,7 @@ def erase_contradicted(
     start, count : int
         Oldest slot and number of slots in use, circular.
     ranges, mounts, pose_x, pose_y, yaw, half_angle
-        The firing, as in `perception.segments.pair_readings`.
+        The firing, as in `perception.paper.segments.pair_readings`.
     margin : float
         How much farther than the segment the echo must be, m.
 

@@ -16,6 +16,7 @@ from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import PerceptionConfig
 from drivers.messages import Firing
+from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import (
     ClearMap,
     ConfirmObject,
@@ -28,8 +29,8 @@ from perception.edits import (
     PlaceModel,
     RejectObject,
     Segments,
-    nobody,
-    not_there,
+    no_such_object,
+    no_such_segments,
 )
 from perception.kernel import Floats, Ints
 from perception.object_model import ObjectModel
@@ -47,8 +48,8 @@ from perception.paper.manual_placement import (
 )
 from perception.paper.outline_map import OutlineMap
 from perception.paper.recognition import goodness_of_fit
-from perception.seen_object import SeenObject, Tally
-from perception.segments import SegmentExtractor, mounts_array
+from perception.paper.segments import SegmentExtractor
+from perception.sensor_mounts import mounts_array
 
 
 class PaperPerception:
@@ -87,14 +88,14 @@ class PaperPerception:
         self._by_hand = False
 
     @property
-    def pending(self) -> bool:
-        """Whether refinement has anything left to improve."""
+    def can_refine(self) -> bool:
+        """Whether `refine` has anything to improve now."""
         return self.placements.pending or self.candidates.pending
 
     @property
-    def waiting(self) -> bool:
-        """The same: nothing waits for a firing."""
-        return self.pending
+    def converged(self) -> bool:
+        """Whether nothing is left to improve, now or with the next firing."""
+        return not self.can_refine
 
     def observe(self, firing: Firing) -> int:
         """Take in one firing and return how many outline segments it completed."""
@@ -114,19 +115,19 @@ class PaperPerception:
         return self.candidates.refine(self.clusters, self.outline)
 
     @property
-    def tally(self) -> Tally:
+    def counts(self) -> MapCounts:
         """How many segments and clusters there are."""
-        return Tally(self.outline.living, self.outline.total, self.clusters.count)
+        return MapCounts(self.outline.living, self.outline.total, self.clusters.count)
 
-    def segments_now(self) -> Floats:
+    def segment_geometry(self) -> Floats:
         """Return the outline segments in the map: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""
-        return self.outline.listed().ends
+        return self.outline.listed().geometry
 
     def segments(self) -> Segments:
         """Return the outline segments in the map with all that is known of them."""
         return self.outline.listed()
 
-    def objects(self) -> tuple[SeenObject, ...]:
+    def objects(self) -> tuple[DetectedObject, ...]:
         """Return what is recognised now, best first.
 
         Candidates that rest on one another explain one object, and the best of them stays: a cluster that Table 1
@@ -142,24 +143,24 @@ class PaperPerception:
                 seen.append(candidate)
         return tuple(sorted(seen, key=lambda s: s.score, reverse=True))
 
-    def things(self) -> tuple[SeenObject, ...]:
+    def labelled_objects(self) -> tuple[DetectedObject, ...]:
         """Return everything that has a name: here the objects."""
         return self.objects()
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Begin anew, as after the odometry did."""
-        self._extractor.forget()
+        self._extractor.reset()
         self.outline.clear()
         self.clusters.update(self.outline)
         self.candidates.clear()
         self.placements.clear()
         self._rejections.clear()
 
-    def adopt(self, config: PerceptionConfig) -> None:
+    def apply_settings(self, config: PerceptionConfig) -> None:
         """Go on with other constants; what sizes an array stays."""
         relaxation, segments_min = self._config.relaxation, self._config.clusters.segments_min
         self._config = config
-        self._extractor.adopt(config.segments)
+        self._extractor.apply_settings(config.segments)
         self.outline.adopt(config.map)
         others = self.clusters.adopt(config.clusters) or segments_min != config.clusters.segments_min
         self.candidates.adopt(config.relaxation, config.clusters.segments_min, config.clusters.threshold_m)
@@ -169,14 +170,14 @@ class PaperPerception:
         if others:
             self._follow()
 
-    def recognise(self, models: Sequence[ModelConfig]) -> None:
+    def set_models(self, models: Sequence[ModelConfig]) -> None:
         """Look for further models as well, which come after those from before."""
         self._models = tuple(ObjectModel.from_config(m) for m in models)
         self._scratch = np.zeros(max(len(m.sides) for m in self._models), dtype=np.int64)
         self.candidates.extend(self._models, self.clusters, self.outline)
         self.placements.adopt(self._models, self._config.relaxation, self._config.clusters.threshold_m)
 
-    def restored(self) -> None:
+    def drop_caches(self) -> None:
         """Make good what the snapshot of an older program does not hold."""
         self.outline.restored()
         self.candidates.restored()
@@ -203,10 +204,10 @@ class PaperPerception:
             case RejectObject(number):
                 return self._reject(number)
             case ClearMap():
-                self.forget()
+                self.reset()
                 return None
         self._follow()
-        return not_there(missing) if missing else None
+        return no_such_segments(missing) if missing else None
 
     def evidence(self, number: int) -> Evidence | None:
         """Return the segments around an object, and which of them lie on it."""
@@ -253,7 +254,7 @@ class PaperPerception:
             )
         found = self.candidates.find(number)
         if found is None:
-            return nobody(number)
+            return no_such_object(number)
         at = facing_from(self.candidates.poses[found]) if pose is None else pose
         refused = self._put(number, found[1], at, confirmed=bool(confirmed))
         if refused is None:
@@ -270,7 +271,7 @@ class PaperPerception:
             m, (x, y, _) = found[1], facing_from(self.candidates.poses[found])
             self.candidates.rename(*found)
         else:
-            return nobody(number)
+            return no_such_object(number)
         self._rejections.add(x, y, self._config.recognition.separation_m, m, self.outline.total)
         return None
 
@@ -283,7 +284,7 @@ class PaperPerception:
             limits.tolerance_m, math.radians(limits.tolerance_deg), self._scratch,
         )  # fmt: skip
 
-    def _judge(self, cluster: int, m: int) -> SeenObject | None:
+    def _judge(self, cluster: int, m: int) -> DetectedObject | None:
         """Return the candidate as an object if it fits well enough."""
         if not self.candidates.rested[cluster, m]:
             return None
@@ -298,18 +299,18 @@ class PaperPerception:
         share = support / len(slots)
         if share < limits.support_min or coverage < limits.coverage_min:
             return None
-        return SeenObject(
+        return DetectedObject(
             self._models[m].name, x, y, theta, residual / math.sqrt(support), support, share * coverage,
             number=int(self.candidates.numbers[cluster, m]),
         )  # fmt: skip
 
-    def _judge_placement(self, k: int) -> SeenObject:
+    def _judge_placement(self, k: int) -> DetectedObject:
         """Return a placement as an object, however well it fits."""
         row, slots = self.placements.rows[k], self.placements.members(k, self.outline)
         x, y, theta = facing_from(self.placements.poses[k])
         support, residual, coverage = self._fit(int(row[MODEL]), slots, self.placements.poses[k])
         sigma = residual / math.sqrt(support) if support else self._config.clusters.threshold_m
-        return SeenObject(
+        return DetectedObject(
             self._models[row[MODEL]].name, x, y, theta, sigma, support, support / max(1, len(slots)) * coverage,
             number=int(row[NUMBER]), confirmed=bool(row[CONFIRMED]), placed=not row[CONFIRMED],
         )  # fmt: skip

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from config.settings import Settings
 from config.world import WorldConfig
 from drivers.messages import Pose
-from perception.pipeline import SeenObject
+from perception.pipeline import DetectedObject
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import Command, CycleRecord, State, step, take_over
 from runtime.cycle.summary import ObjectRow, object_row
@@ -100,7 +100,7 @@ def _note_stop(story: RunOutcome, record: CycleRecord, at_s: float) -> None:
 
 
 def _sum_up(story: RunOutcome, state: State, world: WorldConfig | None) -> None:
-    seen: tuple[SeenObject, ...] = state.perception.objects()
+    seen: tuple[DetectedObject, ...] = state.perception.objects()
     story.objects = [object_row(one) for one in seen]
     if world is None or not world.drum:
         return

@@ -15,7 +15,7 @@ from config.settings import Settings
 from drivers.messages import Firing, Floats, Odometry, Pose
 from perception.paper.paper_method import PaperPerception
 from perception.pipeline import Perception
-from perception.segments import mounts_array
+from perception.sensor_mounts import mounts_array
 from runtime.analysis.trace import Cluster, MapMoment, Trace
 
 MOMENTS_MAX: Final = 240
@@ -52,7 +52,7 @@ class Timeline:
         self._trace.notes.append(f"the robot restarted after {t_s:.1f} s; what was before is not shown")
         self._rows, self._heard, self._held, self._pose = [], 0, {}, None
         self._trace.moments, self._trace.odometry = [], []
-        self._front.forget()
+        self._front.reset()
 
     def hear(self, t_s: float, firing: Firing) -> None:
         """Take a firing."""
@@ -100,7 +100,7 @@ class Timeline:
             trace.segments = np.array([[first, last, *row] for first, last, row in self._held.values()])
 
     def _note(self, t_s: float, perception: Perception) -> None:
-        rows = perception.segments_now()
+        rows = perception.segment_geometry()
         for key, row in zip((r.tobytes() for r in np.round(rows, DIGITS)), rows, strict=True):
             first = self._held[key][0] if key in self._held else t_s
             self._held[key] = (first, t_s, row)
@@ -112,7 +112,7 @@ class Timeline:
             self._every_s *= 2.0
         moments.append(
             MapMoment(
-                t_s, self._pose, self._yaw, self._heard, front.segments_now()[:, :4], clusters_of(front),
+                t_s, self._pose, self._yaw, self._heard, front.segment_geometry()[:, :4], clusters_of(front),
                 perception.objects(),
             )
         )  # fmt: skip

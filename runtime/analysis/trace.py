@@ -12,7 +12,7 @@ import numpy as np
 from config.settings import Settings
 from config.world import WorldConfig
 from drivers.messages import Floats, LinkCounts, Odometry, Pose
-from perception.seen_object import SeenObject
+from perception.detected_object import DetectedObject
 
 T, SENSOR, X, Y, BEARING, RANGE, ROBOT_T = range(7)
 """Columns of `Trace.echoes`."""
@@ -43,7 +43,7 @@ class MapMoment:
     segments: Floats
     """(n, 4): outline segments of the paper's front end: ends x, y, x, y, m."""
     clusters: tuple[Cluster, ...]
-    objects: tuple[SeenObject, ...]
+    objects: tuple[DetectedObject, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +127,7 @@ class Trace:
         return self.moments[-1] if self.moments else None
 
     @property
-    def objects(self) -> tuple[SeenObject, ...]:
+    def objects(self) -> tuple[DetectedObject, ...]:
         """What was recognised at the end."""
         return self.moments[-1].objects if self.moments else ()
 

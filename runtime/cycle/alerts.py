@@ -17,10 +17,10 @@ class Alerts:
     def news(self, heard: Heard, perception: Perception) -> list[str]:
         """Return a line for each thing that is new: what happened, likely cause, next action."""
         lines = list(heard.notes)
-        if perception.watch.changes == self._changes:
+        if perception.sensor_monitor.changes == self._changes:
             return lines
-        self._changes = perception.watch.changes
-        now = {report.sensor: report for report in perception.sensors()}
+        self._changes = perception.sensor_monitor.changes
+        now = {report.sensor: report for report in perception.sensor_reports()}
         lines += [report.reason for sensor, report in now.items() if self._told.get(sensor) != report]
         lines += [f"sensor {sensor} behaves again and is believed" for sensor in self._told if sensor not in now]
         self._told = now

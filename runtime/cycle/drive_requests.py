@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
-from behaviors.arbiter import Decision, Drive, arbitrate, limit
+from behaviors.arbiter import Decision, Drive, arbitrate, limit_velocity
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import avoid_static_obstacle
 from behaviors.move_ahead import SCHEMA as AHEAD
@@ -19,14 +19,14 @@ from behaviors.move_ahead import Leg, move_ahead
 from behaviors.move_to_goal import SCHEMA as TO_GOAL
 from behaviors.move_to_goal import Goal, move_to_goal
 from behaviors.response import Response
-from behaviors.teleoperation import HANDS_OFF, Teleoperate, is_over, teleoperation
 from behaviors.teleoperation import SCHEMA as BY_HAND
+from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, is_expired, teleoperation
 from config.settings import Settings
 from drivers.messages import Twist
 from perception.percept import Percept
 
 STANDSTILL: Final = Twist(0.0, 0.0)
-PLACE_MAX_M: Final = 10_000.0
+COORDINATE_MAX_M: Final = 10_000.0
 """A goal farther off than this along an axis is a slip of the pen; nobody drives ten kilometres by sonar."""
 SUM: Final = "sum"
 
@@ -59,7 +59,7 @@ def validate(drive_request: DriveRequest) -> str | None:
     """Return why a drive_request is none, None where it is good."""
     match drive_request:
         case Goal(x, y):
-            if not (abs(x) <= PLACE_MAX_M and abs(y) <= PLACE_MAX_M):
+            if not (abs(x) <= COORDINATE_MAX_M and abs(y) <= COORDINATE_MAX_M):
                 return f"the goal ({x:g}, {y:g}) is no place: give metres in the odometry's frame"
         case Teleoperate(v, w, valid_s):
             if not (math.isfinite(v) and math.isfinite(w) and valid_s >= 0.0):
@@ -69,7 +69,7 @@ def validate(drive_request: DriveRequest) -> str | None:
 
 def after_a_stop(drive_request: DriveRequest) -> DriveRequest:
     """Return what is left of a drive_request once the robot has stopped driving: the legs, or nothing."""
-    return drive_request if isinstance(drive_request, Legs) else HANDS_OFF
+    return drive_request if isinstance(drive_request, Legs) else TELEOPERATION_ENDED
 
 
 def drive(
@@ -95,19 +95,23 @@ def drive(
     if isinstance(drive_request, Teleoperate):
         # Of the cycles that are in time the last one is to stop: the next one would be late.
         age_s = now_s - drive_request_s
-        if drive_request != HANDS_OFF and is_over(
+        if drive_request != TELEOPERATION_ENDED and is_expired(
             drive_request, age_s + 1.0 / settings.cycle.rate_hz, behaviors.teleoperation
         ):
-            drive_request = HANDS_OFF
+            drive_request = TELEOPERATION_ENDED
         hand = teleoperation(percept, drive_request, behaviors.arbiter.base_velocity_m_s)
         both = behaviors.teleoperation.avoid
         responses, expected = ((hand, away), (BY_HAND, AVOID)) if both else ((hand,), (BY_HAND,))
-        decision = limit(
+        decision = limit_velocity(
             Twist(drive_request.v, drive_request.w), responses, percept, body, behaviors.arbiter, expected
         )
         nobody = "nobody is at the controls: drive by hand, name a goal, or go on with the legs"
         return DriveResult(
-            decision, shown(responses, decision), drive_request, leg, nobody if drive_request == HANDS_OFF else None
+            decision,
+            shown(responses, decision),
+            drive_request,
+            leg,
+            nobody if drive_request == TELEOPERATION_ENDED else None,
         )
     if isinstance(drive_request, Goal):
         to_goal, drive_request = move_to_goal(percept, drive_request, behaviors.move_to_goal)

@@ -10,7 +10,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING, TypeAlias
 
-from config.reload import Reload, reload
+from config.reload import ReloadResult, reload
 from config.settings import Settings
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ class Reloader:
             try:
                 outcome = await asyncio.to_thread(reload, self.current, self._propose)
                 validate = await self._ready(self.current, outcome.settings)
-                self._conclude(outcome if validate is None else Reload(self.current, problems=(validate,)))
+                self._conclude(outcome if validate is None else ReloadResult(self.current, problems=(validate,)))
             except Exception as error:  # noqa: BLE001 - a reload that fails must not end a run that goes well
                 self._log.error(
                     "the configuration is kept: reading it failed", error=f"{type(error).__name__}: {error}"
@@ -96,7 +96,7 @@ class Reloader:
             if not self._again:
                 return
 
-    def _conclude(self, outcome: Reload) -> None:
+    def _conclude(self, outcome: ReloadResult) -> None:
         if outcome.problems:
             for line in outcome.problems:
                 self._log.warning("the configuration is kept", problem=line)

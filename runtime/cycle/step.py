@@ -164,18 +164,18 @@ def step(
     quanta, iterations, refinement = _refine(state.perception, may_refine)
     mark(Phase.REFINE)
     state.cycle += 1
-    tally = state.perception.tally
+    counts = state.perception.counts
     return CycleRecord(
-        state.cycle, inputs, state.mode, command, new_segments, tally.living, tally.hypotheses, quanta, iterations,
+        state.cycle, inputs, state.mode, command, new_segments, counts.segments, counts.hypotheses, quanta, iterations,
         refinement, refused,
     )  # fmt: skip
 
 
 def take_over(state: State, settings: Settings) -> None:
     """Let perception go on with other settings, of those that a running process follows (`config.reload`)."""
-    state.perception.adopt(settings.perception)
-    state.perception.recognise(settings.models)
-    state.perception.listen_to(settings.ring)
+    state.perception.apply_settings(settings.perception)
+    state.perception.set_models(settings.models)
+    state.perception.set_firing_pattern(settings.ring)
 
 
 def _edit(state: State, inputs: Inputs) -> tuple[Refused, ...]:
@@ -192,7 +192,7 @@ def _edit(state: State, inputs: Inputs) -> tuple[Refused, ...]:
 def _perceive(state: State, inputs: Inputs) -> int:
     """Take in what arrived: the part of perception that always runs."""
     if inputs.heard.rebooted:
-        state.perception.forget()
+        state.perception.reset()
         state.odometry = None
         state.leg = None
         state.drive_request = after_a_stop(state.drive_request)  # a goal is a place in the odometry that was
@@ -273,11 +273,11 @@ def _drive(state: State, inputs: Inputs, settings: Settings) -> Drive | Stop:
 def _refine(perception: Perception, may_refine: Callable[[int], bool]) -> tuple[int, int, StopCause]:
     """Refine quantum by quantum; return quanta, iterations, and why it ended."""
     quanta = iterations = 0
-    while perception.pending:
+    while perception.can_refine:
         if not may_refine(quanta):
             return quanta, iterations, "budget"
         iterations += perception.refine()
         quanta += 1
     if quanta == 0:
         return quanta, iterations, "nothing"
-    return quanta, iterations, "quota" if perception.waiting else "converged"
+    return quanta, iterations, "converged" if perception.converged else "quota"

@@ -12,7 +12,7 @@ import orjson
 from config.errors import FAILED, UserError
 from drivers.driver import RobotDriver
 from drivers.messages import Pose
-from perception.pipeline import SeenObject
+from perception.pipeline import DetectedObject
 from runtime.cycle.step import State
 from runtime.timing.cycle_stats import CycleStats, Quantiles
 from runtime.timing.footprint import FootprintRow
@@ -114,7 +114,7 @@ class ReplaySummary(TypedDict):
     cycle_us: Quantiles
 
 
-def object_row(seen: SeenObject) -> ObjectRow:
+def object_row(seen: DetectedObject) -> ObjectRow:
     """Return an object in its JSON form."""
     row: ObjectRow = {
         "model": seen.model,
@@ -132,7 +132,7 @@ def object_row(seen: SeenObject) -> ObjectRow:
     return row
 
 
-def in_frame(frame: Pose, seen: SeenObject) -> SeenObject:
+def in_frame(frame: Pose, seen: DetectedObject) -> DetectedObject:
     """Return an object of ours in a frame in which our origin is `frame`."""
     if frame == Pose(0.0, 0.0, 0.0):
         return seen
@@ -166,7 +166,9 @@ def run_summary(
         "late": books.late,
         "missed": books.missed,
         "lag_us": books.lag_us(),
-        "sensors": [{"sensor": r.sensor, "fault": r.fault, "reason": r.reason} for r in state.perception.sensors()],
+        "sensors": [
+            {"sensor": r.sensor, "fault": r.fault, "reason": r.reason} for r in state.perception.sensor_reports()
+        ],
         "link": {"frames": counts.frames, "bad": counts.bad, "lost": counts.lost},
         "process": cost,
         "mode": state.mode.mode.value,

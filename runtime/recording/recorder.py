@@ -158,10 +158,12 @@ class Recorder:
             self._gap = self._writer.wants_keyframe = False
             self._last_keyframe_s = now_s
             seen = state.perception
-            whole = MapSnapshot(record.cycle, seen.segments_now(), seen.objects(), left_by(state), seen.snapshot())
+            whole = MapSnapshot(
+                record.cycle, seen.segment_geometry(), seen.objects(), left_by(state), seen.snapshot()
+            )
             self._hand(KEYFRAME, now_s, whole)
         elif record.cycle % self._moment_cycles == 0:
-            self._hand(SEGMENTS, now_s, MapSnapshot(record.cycle, segments=state.perception.segments_now()))
+            self._hand(SEGMENTS, now_s, MapSnapshot(record.cycle, segments=state.perception.segment_geometry()))
         elif record.cycle % self._moment_cycles == self._moment_cycles // 2:
             self._hand(OBJECTS, now_s, MapSnapshot(record.cycle, objects=state.perception.objects()))
 

@@ -33,7 +33,7 @@ def replay(
         began = time.perf_counter()
         perception.observe(firing)
         quanta = 0
-        while perception.pending and enough_quanta(quanta):
+        while perception.can_refine and enough_quanta(quanta):
             perception.refine()
             quanta += 1
         books.enter(time.perf_counter() - began)
@@ -41,8 +41,8 @@ def replay(
             on_firing(firing, perception)
     return {
         "objects": [object_row(seen) for seen in perception.objects()],
-        "segments": perception.tally.total,
-        "clusters": perception.tally.hypotheses,
+        "segments": perception.counts.segments_total,
+        "clusters": perception.counts.hypotheses,
         "cycles": books.cycles,
         "cycle_us": books.cycle_us(),
     }

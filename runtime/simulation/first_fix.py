@@ -13,7 +13,7 @@ from typing import Final, TypedDict
 
 from config.units import FOOT_M
 from config.world import DrumConfig
-from perception.seen_object import SeenObject
+from perception.detected_object import DetectedObject
 
 WITHIN_M: Final = 0.25 * FOOT_M
 ASKED_M: Final = 4.0 * FOOT_M
@@ -45,7 +45,7 @@ class FixWatch:
         self._drums = drums
         self._before: list[float | None] = [None] * len(drums)
 
-    def look(self, x: float, seen: Iterable[SeenObject]) -> None:
+    def look(self, x: float, seen: Iterable[DetectedObject]) -> None:
         """Enter what is reported with the robot at `x` (m) along the hall."""
         places = [(o.x, o.y) for o in seen]
         for i, drum in enumerate(self._drums):

@@ -12,7 +12,7 @@ from config.model import ModelConfig
 from config.settings import Settings
 from config.world import BoxConfig, WorldConfig
 from drivers.messages import Firing
-from perception.pipeline import Perception, SeenObject
+from perception.pipeline import DetectedObject, Perception
 from runtime.analysis.plots.geometry import CHI2_95
 from runtime.simulation.evaluation import DrumRow, Outcome, against_truth, nearest_pairs
 from runtime.simulation.first_fix import FirstFix, FixWatch, summarise_fixes
@@ -63,10 +63,10 @@ class HallOutcome:
     """For each drum of a straight hall, how far before it the robot was at its first sure fix, m."""
 
 
-def perceive(perception: Perception, firing: Firing) -> tuple[SeenObject, ...]:
+def perceive(perception: Perception, firing: Firing) -> tuple[DetectedObject, ...]:
     """Take in one reading, improve until nothing is left to improve, and return what is recognised then."""
     perception.observe(firing)
-    while perception.pending and perception.refine():
+    while perception.can_refine and perception.refine():
         pass
     return perception.objects()
 
@@ -74,7 +74,7 @@ def perceive(perception: Perception, firing: Firing) -> tuple[SeenObject, ...]:
 def run_hall(settings: Settings, hall: Hall, seed: int) -> HallOutcome:
     """Drive through `hall` once and set what was seen against what stands there."""
     perception = Perception(settings.ring, settings.models, settings.perception)
-    seen: tuple[SeenObject, ...] = ()
+    seen: tuple[DetectedObject, ...] = ()
     heard = list(readings(settings.ring, hall, seed))
     books = CycleStats(late_after_s=math.inf)
     watch = FixWatch(() if hall.path else hall.world.drum)
@@ -87,7 +87,7 @@ def run_hall(settings: Settings, hall: Hall, seed: int) -> HallOutcome:
     return HallOutcome(drums, boxes, false, heard[-1].t_s, books, inside_ellipse(drums, seen), watch.fixes())
 
 
-def inside_ellipse(drums: Iterable[DrumRow], seen: Iterable[SeenObject]) -> list[bool]:
+def inside_ellipse(drums: Iterable[DrumRow], seen: Iterable[DetectedObject]) -> list[bool]:
     """Tell for each drum found with a covariance whether it stands in the 95 % ellipse of its estimate."""
     by_place = {(s.x, s.y): s.covariance for s in seen}
     told = []
@@ -102,7 +102,7 @@ def inside_ellipse(drums: Iterable[DrumRow], seen: Iterable[SeenObject]) -> list
 
 
 def judge(
-    world: WorldConfig, seen: Iterable[SeenObject], models: Iterable[ModelConfig]
+    world: WorldConfig, seen: Iterable[DetectedObject], models: Iterable[ModelConfig]
 ) -> tuple[list[DrumRow], list[BoxRow], int]:
     """Set round models against the world's drums and the others against its boxes; count what matches nothing.
 

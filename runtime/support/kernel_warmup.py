@@ -45,9 +45,9 @@ def _drive(settings: Settings, perception: Perception, firings: int = FIRINGS) -
     for k in range(firings):
         ranges = np.full(len(settings.ring.mounts), 2.0)
         perception.observe(Firing(0.1 * k, Pose(0.1 * k, 0.0, 0.0), 0.0, ranges))
-        while firings > 1 and perception.pending:
+        while firings > 1 and perception.can_refine:
             perception.refine()
-    perception.things()
+    perception.labelled_objects()
 
 
 def _square() -> ModelConfig:
@@ -72,7 +72,9 @@ def _edited(settings: Settings, method: str, models: Sequence[ModelConfig]) -> N
 
     perception = _perception(settings, method, models)
     _drive(settings, perception)
-    ClusterView(settings.perception).rows(perception.segments().ends)  # of every method's map the console shows them
+    ClusterView(settings.perception).rows(
+        perception.segments().geometry
+    )  # of every method's map the console shows them
     numbers = tuple(perception.segments().numbers[:2].tolist())
     perception.edit(PinSegments(numbers, pinned=True))
     for model in models:

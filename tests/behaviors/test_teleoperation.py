@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from behaviors.arbiter import Drive, Stop, limit
+from behaviors.arbiter import Drive, Stop, limit_velocity
 from behaviors.response import Response
-from behaviors.teleoperation import HANDS_OFF, Teleoperate, is_over, teleoperation
+from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, is_expired, teleoperation
 from config.robot import BodyConfig
 from config.settings import ArbiterConfig, TeleoperationConfig
 from perception.percept import Percept, Pose, Twist
@@ -32,7 +32,7 @@ def decide(v: float, w: float, percept: Percept, push: tuple[float, float] = (0.
     c, s = math.cos(percept.pose.theta), math.sin(percept.pose.theta)
     hand = teleoperation(percept, Teleoperate(v, w), CONFIG.base_velocity_m_s)
     away = Response("avoid", c * push[0] - s * push[1], s * push[0] + c * push[1])
-    return limit(Twist(v, w), (hand, away), percept, BODY, CONFIG, EXPECTED)
+    return limit_velocity(Twist(v, w), (hand, away), percept, BODY, CONFIG, EXPECTED)
 
 
 def twist(v: float, w: float, percept: Percept, push: tuple[float, float] = (0.0, 0.0)) -> tuple[float, float]:
@@ -108,7 +108,7 @@ def test_pushes_from_the_side_steer_one_that_goes_ahead_by_its_speed(heading: fl
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_velocity_that_is_none_stops(bad: float) -> None:
     for v, w in ((bad, 0.0), (0.0, bad)):
-        decision = limit(Twist(v, w), (Response("hand", 0.0, 0.0),), at(0.0), BODY, CONFIG, ("hand",))
+        decision = limit_velocity(Twist(v, w), (Response("hand", 0.0, 0.0),), at(0.0), BODY, CONFIG, ("hand",))
         assert isinstance(decision, Stop)
         assert decision.reason.startswith("the velocity asked for (")
     assert isinstance(decide(bad, 0.0, at(0.0)), Stop), "its vector is none either"
@@ -116,7 +116,7 @@ def test_a_velocity_that_is_none_stops(bad: float) -> None:
 
 def test_a_schema_that_is_missing_stops() -> None:
     hand = Response("teleoperation", 0.0, 0.0)
-    decision = limit(Twist(0.1, 0.0), (hand,), at(0.0), BODY, CONFIG, EXPECTED)
+    decision = limit_velocity(Twist(0.1, 0.0), (hand,), at(0.0), BODY, CONFIG, EXPECTED)
     assert isinstance(decision, Stop)
     assert "avoid" in decision.reason
 
@@ -135,7 +135,7 @@ def test_no_velocity_and_no_vector_makes_a_bad_command() -> None:
     stops = 0
     for i, (v, w, x1, y1, x2, y2) in enumerate(rows.tolist()):
         percept = Percept(Pose(0.0, 0.0, float(rng.uniform(-4.0, 4.0))), points[i % 64])
-        decision = limit(
+        decision = limit_velocity(
             Twist(v, w), (Response("a", x1, y1), Response("b", x2, y2)), percept, BODY, CONFIG, ("a", "b")
         )
         if isinstance(decision, Stop):
@@ -151,11 +151,11 @@ def test_no_velocity_and_no_vector_makes_a_bad_command() -> None:
 
 def test_how_long_a_word_holds() -> None:
     config = TeleoperationConfig(message_age_max_s=0.25)
-    assert not is_over(Teleoperate(0.1, 0.0), 0.0, config)
-    assert not is_over(Teleoperate(0.1, 0.0), 0.249, config)
-    assert is_over(Teleoperate(0.1, 0.0), 0.25, config)
-    assert is_over(Teleoperate(0.1, 0.0, valid_s=0.1), 0.1, config), "the word itself may say less"
-    assert is_over(Teleoperate(0.1, 0.0, valid_s=9.0), 0.25, config), "and never more than the settings"
-    assert is_over(Teleoperate(0.1, 0.0), -0.001, config), "a clock that went back says nothing"
-    assert is_over(Teleoperate(0.1, 0.0), math.nan, config)
-    assert (HANDS_OFF.v, HANDS_OFF.w) == (0.0, 0.0)
+    assert not is_expired(Teleoperate(0.1, 0.0), 0.0, config)
+    assert not is_expired(Teleoperate(0.1, 0.0), 0.249, config)
+    assert is_expired(Teleoperate(0.1, 0.0), 0.25, config)
+    assert is_expired(Teleoperate(0.1, 0.0, valid_s=0.1), 0.1, config), "the word itself may say less"
+    assert is_expired(Teleoperate(0.1, 0.0, valid_s=9.0), 0.25, config), "and never more than the settings"
+    assert is_expired(Teleoperate(0.1, 0.0), -0.001, config), "a clock that went back says nothing"
+    assert is_expired(Teleoperate(0.1, 0.0), math.nan, config)
+    assert (TELEOPERATION_ENDED.v, TELEOPERATION_ENDED.w) == (0.0, 0.0)

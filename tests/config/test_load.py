@@ -183,3 +183,17 @@ def test_the_kind_of_a_file_is_seen_from_its_keys(tmp_path: Path) -> None:
     assert isinstance(load_any(write(tmp_path / "r.toml", ROBOT)), Settings)
     with pytest.raises(ConfigError, match=r"w\.toml: drum\.0\.x: unknown key"):
         load_any(write(tmp_path / "w.toml", "[[drum]]\nx = 1\nx_m=1\ny_m=2\nradius_m=1"))
+
+
+@pytest.mark.parametrize(
+    ("override", "text"),
+    [
+        ("perception.method=full", '--set: perception.method = "full": was renamed: write "bayes"'),
+        ("perception.full.tracks_max=12", "--set: perception.full: was renamed: call it perception.bayes"),
+    ],
+)
+def test_a_former_name_is_refused_with_the_new_one(override: str, text: str) -> None:
+    """Settings files of older versions say `full` for the Bayesian method."""
+    with pytest.raises(ConfigError) as caught:
+        load_settings("hallway", [override])
+    assert caught.value.problems == (text,)

@@ -12,7 +12,7 @@ import pytest
 from pydantic import BaseModel
 
 from config.load import ConfigError, load_settings
-from config.reload import LIVE, Difference, differences, reload
+from config.reload import LIVE_SETTINGS, Difference, differences, reload
 from config.settings import Settings
 from tests.config.test_every_field import SETTINGS, Setting, holder
 from tests.config.toml_text import MODEL, RUN, document
@@ -34,7 +34,7 @@ def settings_from(folder: Path, table: dict[str, Any]) -> Settings:
 
 
 def test_whatever_is_declared_live_exists() -> None:
-    assert set(every_path(Settings)) >= LIVE
+    assert set(every_path(Settings)) >= LIVE_SETTINGS
 
 
 def test_what_a_process_is_built_from_is_not_live() -> None:

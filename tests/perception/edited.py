@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from config.load import load_settings
 from config.settings import Settings
 from drivers.messages import Firing
-from perception.pipeline import Perception, SeenObject
+from perception.pipeline import DetectedObject, Perception
 from tests.perception.halls import FT
 
 EARLY = 61
@@ -45,23 +45,23 @@ def hear(perception: Perception, firing: Firing) -> None:
 
 
 def settle(perception: Perception) -> None:
-    while perception.pending and perception.refine():
+    while perception.can_refine and perception.refine():
         pass
 
 
-def at(perception: Perception, place: tuple[float, float], within_m: float = 0.15) -> SeenObject | None:
+def at(perception: Perception, place: tuple[float, float], within_m: float = 0.15) -> DetectedObject | None:
     """Return the object at a place, None where there is none."""
     near = [o for o in perception.objects() if math.dist((o.x, o.y), place) < within_m]
     return min(near, key=lambda o: math.dist((o.x, o.y), place)) if near else None
 
 
-def there(perception: Perception, place: tuple[float, float] = DRUM) -> SeenObject:
+def there(perception: Perception, place: tuple[float, float] = DRUM) -> DetectedObject:
     found = at(perception, place)
     assert found is not None, perception.objects()
     return found
 
 
-def number_of(seen: SeenObject) -> int:
+def number_of(seen: DetectedObject) -> int:
     assert seen.number is not None
     return seen.number
 

@@ -21,7 +21,7 @@ from perception.edits import (
     PlaceModel,
     RejectObject,
 )
-from perception.pipeline import Perception, SeenObject
+from perception.pipeline import DetectedObject, Perception
 from tests.perception.edited import (
     EARLY,
     SETTINGS,
@@ -173,7 +173,7 @@ def test_a_snapshot_of_an_older_program_is_made_good(seen: Perception, firings: 
     other.restore(old)
     assert [replace(o, number=None) for o in other.objects()] == [replace(o, number=None) for o in seen.objects()]
     assert None not in {o.number for o in other.objects()}
-    assert len(set(other.segments().numbers.tolist())) == other.tally.living == seen.tally.living
+    assert len(set(other.segments().numbers.tolist())) == other.counts.segments == seen.counts.segments
     for firing in again(firings):
         hear(seen, firing)
         hear(other, firing)
@@ -190,10 +190,10 @@ def test_models_are_added_while_it_perceives(seen: Perception, firings: list[Fir
     crate = load_model("box").model_copy(update={"name": "crate"})
     before = {o.number: o for o in seen.objects()}
     models = (*chosen.models, post, crate)
-    seen.recognise(chosen.models)
+    seen.set_models(chosen.models)
     assert {o.number: o for o in seen.objects()} == before, "nothing new is nothing"
-    seen.recognise(models)
-    after: dict[Any, SeenObject] = {o.number: o for o in seen.objects()}
+    seen.set_models(models)
+    after: dict[Any, DetectedObject] = {o.number: o for o in seen.objects()}
     if is_bayes(seen):
         assert after == before
     settle(seen)
@@ -239,11 +239,11 @@ def test_every_edit_in_turn_on_the_first_things_seen(begun: Perception, firings:
     other = fresh("bayes")
     whole = begun.snapshot()
     other.restore({n: a for n, a in whole.items() if not any(f".{part}" in n for part in OLDER["bayes"])})
-    assert {o.number for o in other.objects()} <= set(range(1, begun.tally.hypotheses + 1))
+    assert {o.number for o in other.objects()} <= set(range(1, begun.counts.hypotheses + 1))
     other.restore(whole)
     assert other.objects() == begun.objects()
     post = load_model("drum").model_copy(update={"name": "bollard", "arc_radius_m": 0.12})
-    begun.recognise((*SETTINGS["bayes"].models, post))
+    begun.set_models((*SETTINGS["bayes"].models, post))
     assert {o.number for o in begun.objects()} >= {by_hand, box}
     assert begun.edit(RejectObject(box)) is None
     assert begun.edit(RejectObject(by_hand)) is None
@@ -256,4 +256,4 @@ def test_every_edit_in_turn_on_the_first_things_seen(begun: Perception, firings:
     refused = begun.edit(PinSegments((*pins, 10**6), pinned=False))
     assert refused is not None
     assert begun.edit(ClearMap()) is None
-    assert begun.things() == ()
+    assert begun.labelled_objects() == ()

@@ -39,8 +39,8 @@ def test_objects_and_segments_keep_their_numbers(seen: Perception, firings: list
     before = {o.number: (o.x, o.y) for o in seen.objects()}
     assert len(before) >= 4
     assert None not in before
-    kept = dict(zip(seen.segments().numbers.tolist(), seen.segments().ends.tolist(), strict=True))
-    assert len(kept) == len(seen.segments().numbers) == seen.tally.living
+    kept = dict(zip(seen.segments().numbers.tolist(), seen.segments().geometry.tolist(), strict=True))
+    assert len(kept) == len(seen.segments().numbers) == seen.counts.segments
     assert all(n > 0 for n in kept)
     for firing in again(firings):
         hear(seen, firing)
@@ -49,7 +49,7 @@ def test_objects_and_segments_keep_their_numbers(seen: Perception, firings: list
             assert math.dist(before[o.number], (o.x, o.y)) < 0.1
     assert len(before.keys() & {o.number for o in seen.objects()}) >= 4
     listed = seen.segments()
-    after = dict(zip(listed.numbers.tolist(), listed.ends.tolist(), strict=True))
+    after = dict(zip(listed.numbers.tolist(), listed.geometry.tolist(), strict=True))
     assert len(after) == len(listed.numbers)
     common = kept.keys() & after.keys()
     assert common
@@ -58,7 +58,7 @@ def test_objects_and_segments_keep_their_numbers(seen: Perception, firings: list
     times = listed.times
     assert np.isfinite(times).all()
     assert (times <= firings[-1].t_s).all()
-    np.testing.assert_array_equal(listed.ends, seen.segments_now())
+    np.testing.assert_array_equal(listed.geometry, seen.segment_geometry())
 
 
 # Segments.
@@ -66,15 +66,15 @@ def test_objects_and_segments_keep_their_numbers(seen: Perception, firings: list
 
 def test_deleted_segments_are_gone_and_the_rest_is_as_it_was(seen: Perception) -> None:
     numbers, ends, times, _ = seen.segments()
-    doomed, total = tuple(numbers[::3].tolist()), seen.tally.total
+    doomed, total = tuple(numbers[::3].tolist()), seen.counts.segments_total
     assert seen.edit(DeleteSegments(doomed)) is None
     left = seen.segments()
     stays = ~np.isin(numbers, doomed)
-    assert seen.tally.living == stays.sum()
-    assert seen.tally.total == total
+    assert seen.counts.segments == stays.sum()
+    assert seen.counts.segments_total == total
     order, was = np.argsort(left.numbers), np.argsort(numbers[stays])
     np.testing.assert_array_equal(left.numbers[order], numbers[stays][was])
-    np.testing.assert_array_equal(left.ends[order], ends[stays][was])
+    np.testing.assert_array_equal(left.geometry[order], ends[stays][was])
     np.testing.assert_array_equal(left.times[order], times[stays][was])
     refused = seen.edit(DeleteSegments((doomed[0], int(numbers[1]))))
     assert refused is not None
@@ -90,12 +90,12 @@ def test_pinned_segments_outlast_whatever_comes(seen: Perception, firings: list[
     pins = tuple(listed.numbers[np.argsort(listed.times)][:: max(1, len(listed.numbers) // 12)].tolist())
     assert seen.edit(PinSegments(pins, pinned=True)) is None
     assert set(seen.segments().numbers[seen.segments().pinned == 1].tolist()) == set(pins)
-    rows = {n: tuple(e) for n, e in zip(listed.numbers.tolist(), listed.ends.tolist(), strict=True) if n in pins}
+    rows = {n: tuple(e) for n, e in zip(listed.numbers.tolist(), listed.geometry.tolist(), strict=True) if n in pins}
     for lap in range(1, 4):
         for firing in passed(firings):
             seen.observe(replace(firing, t_s=firing.t_s + 200.0 * lap))
     after = seen.segments()
-    now = {n: tuple(e) for n, e in zip(after.numbers.tolist(), after.ends.tolist(), strict=True)}
+    now = {n: tuple(e) for n, e in zip(after.numbers.tolist(), after.geometry.tolist(), strict=True)}
     assert {n: now.get(n) for n in pins} == rows
     assert set(after.numbers[after.pinned == 1].tolist()) == set(pins)
     gone = set(listed.numbers.tolist()) - set(pins) - set(after.numbers.tolist())
@@ -233,7 +233,7 @@ def test_a_confirmed_object_is_reported_however_little_speaks_for_it(
 ) -> None:
     """The Bayesian method, early on: something is about to be a drum, and is not sure enough to be called one."""
     seen = begun
-    doubtful = [o for o in seen.things() if o.model == "unknown"]
+    doubtful = [o for o in seen.labelled_objects() if o.model == "unknown"]
     assert doubtful
     number = number_of(doubtful[0])
     assert number not in {o.number for o in seen.objects()}
@@ -281,7 +281,7 @@ def test_after_the_map_is_cleared_all_begins_anew_but_numbers_and_obstacles(
     obstacles = seen.obstacles(firings[-1].t_s, 1e9)
     assert len(obstacles) > 3
     assert seen.edit(ClearMap()) is None
-    assert (seen.objects(), seen.tally.living, seen.tally.hypotheses, seen.pending) == ((), 0, 0, False)
+    assert (seen.objects(), seen.counts.segments, seen.counts.hypotheses, seen.can_refine) == ((), 0, 0, False)
     assert len(seen.segments().numbers) == 0
     np.testing.assert_array_equal(seen.obstacles(firings[-1].t_s, 1e9), obstacles)
     for firing in passed(firings):

@@ -12,8 +12,8 @@ from perception.paper.candidates import follow_clusters
 from perception.paper.clusters import cluster_segments, group_by_cluster
 from perception.paper.outline_map import erase_contradicted
 from perception.paper.recognition import goodness_of_fit
+from perception.paper.segments import pair_readings, tangent
 from perception.relaxation import increment, relax
-from perception.segments import pair_readings, tangent
 from tests import naive
 
 EXACT = 1e-12

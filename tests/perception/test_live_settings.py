@@ -44,16 +44,16 @@ def test_another_gamma_wakes_what_rested_and_it_rests_elsewhere(firings: list[Fi
     assert perception.edit(PlaceModel("semicircle", 0.3, 1.2, 0.0)) is None
     settle(perception)  # type: ignore[arg-type]
     rested, placed = perception.candidates.poses.copy(), perception.placements.poses.copy()
-    perception.adopt(SHIPPED.perception)
-    assert not perception.pending, "the same constants wake nobody"
-    perception.adopt(changed(relaxation={"gamma": 3.0}))
+    perception.apply_settings(SHIPPED.perception)
+    assert not perception.can_refine, "the same constants wake nobody"
+    perception.apply_settings(changed(relaxation={"gamma": 3.0}))
     assert perception.candidates.awake == int((perception.candidates.numbers > 0).sum()) > 0
     assert perception.placements.pending
     settle(perception)  # type: ignore[arg-type]
     many = perception.clusters.count
     assert np.abs(perception.candidates.poses[:many] - rested[:many]).max() > 1e-4
     assert np.abs(perception.placements.poses[0] - placed[0]).max() > 1e-5
-    perception.adopt(SHIPPED.perception)
+    perception.apply_settings(SHIPPED.perception)
     settle(perception)  # type: ignore[arg-type]
     np.testing.assert_allclose(perception.candidates.poses[:many], rested[:many], atol=0.02)
 
@@ -62,7 +62,7 @@ def test_another_threshold_makes_the_clusters_that_it_makes_of_the_same_map(firi
     perception = perceived(firings)
     other = changed(clusters={"threshold_m": 0.25})
     before = perception.clusters.count
-    perception.adopt(other)
+    perception.apply_settings(other)
     fresh = perceived(firings, other)
     np.testing.assert_array_equal(perception.outline.segments, fresh.outline.segments)
     assert perception.clusters.count == fresh.clusters.count != before
@@ -77,7 +77,7 @@ def test_smaller_clusters_get_models_as_soon_as_they_may(firings: list[Firing]) 
     perception = perceived(firings[:70])
     fewer = changed(clusters={"segments_min": 2})
     few = int((perception.candidates.numbers[: perception.clusters.count] > 0).sum())
-    perception.adopt(fewer)
+    perception.apply_settings(fewer)
     sizes = perception.clusters.sizes[: perception.clusters.count]
     numbers = perception.candidates.numbers[: perception.clusters.count, 0]
     assert (numbers > 0).sum() == (sizes >= 2).sum() > few
@@ -85,14 +85,16 @@ def test_smaller_clusters_get_models_as_soon_as_they_may(firings: list[Firing]) 
     for j in small:
         off = perception.candidates.poses[j, 0, :2] - perception.clusters.centres[j]
         assert np.hypot(*off) < 0.5, "it is placed at its cluster"
-    perception.adopt(SHIPPED.perception)
+    perception.apply_settings(SHIPPED.perception)
     assert int((perception.candidates.numbers[: perception.clusters.count] > 0).sum()) == few
 
 
 def test_segments_are_made_by_the_constants_of_their_time(firings: list[Firing]) -> None:
     perception = perceived(firings[:60])
-    perception.adopt(changed(segments={"baseline_min_m": 0.45, "baseline_max_m": 0.5}))
-    total = perception.tally.total
+    perception.apply_settings(changed(segments={"baseline_min_m": 0.45, "baseline_max_m": 0.5}))
+    total = perception.counts.segments_total
     for firing in firings[60:]:
         perception.observe(firing)
-    assert perception.tally.total - total < perceived(firings).tally.total - total, "fewer pairs are that far apart"
+    assert perception.counts.segments_total - total < perceived(firings).counts.segments_total - total, (
+        "fewer pairs are that far apart"
+    )

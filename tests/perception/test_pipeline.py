@@ -14,7 +14,7 @@ from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose
 from perception.paper.paper_method import PaperPerception
-from perception.pipeline import Perception, SeenObject
+from perception.pipeline import DetectedObject, Perception
 from tests.perception.halls import FT, drive, drums, settings
 
 TABLE_2_MEAN_FT = 0.25
@@ -28,12 +28,12 @@ def perceive(chosen: Settings) -> PaperPerception:
 def settle(perception: PaperPerception | Perception) -> int:
     """Refine until nothing is left to improve; return the iterations it took."""
     iterations = 0
-    while perception.pending:
+    while perception.can_refine:
         iterations += perception.refine()
     return iterations
 
 
-def errors_ft(objects: tuple[SeenObject, ...], places_ft: list[tuple[float, float]]) -> list[float]:
+def errors_ft(objects: tuple[DetectedObject, ...], places_ft: list[tuple[float, float]]) -> list[float]:
     return [min((math.dist((o.x / FT, o.y / FT), p) for o in objects), default=math.inf) for p in places_ft]
 
 
@@ -204,9 +204,9 @@ def test_forgetting_begins_anew() -> None:
         perception.observe(firing)
         settle(perception)
     assert perception.objects()
-    perception.forget()
+    perception.reset()
     assert perception.objects() == ()
-    assert not perception.pending
+    assert not perception.can_refine
     assert len(perception.obstacles(1e9, math.inf)) == 0
     for firing in drive(load_world("hallway")):
         perception.observe(firing)

@@ -12,7 +12,7 @@ from config.load import load_settings
 from config.settings import Settings
 from drivers.messages import Firing
 from perception.kernel import Floats
-from perception.segments import SegmentExtractor
+from perception.paper.segments import SegmentExtractor
 from runtime.recording.ring_log import read_ring_log
 from runtime.recording.ring_log_replay import replay
 from tests import recordings

@@ -17,7 +17,7 @@ from drivers.emulator.sonar import Sonar
 from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import Firing, Pose
 from perception.pipeline import Perception
-from perception.sensor_monitor import SensorWatch
+from perception.sensor_monitor import SensorMonitor
 from perception.sensor_report import SensorFault
 from perception.sensor_tests import FAILURES, RETURNS
 from runtime.simulation.random_halls import random_hall
@@ -60,11 +60,11 @@ def firings(
 
 def found(config: RingConfig, heard: Iterable[Firing]) -> Found:
     """Return everything that was ever reported, and after which way, m."""
-    watch, reports, way, last = SensorWatch(config), dict[tuple[int, SensorFault], float](), 0.0, None
+    watch, reports, way, last = SensorMonitor(config), dict[tuple[int, SensorFault], float](), 0.0, None
     for firing in heard:
         way += 0.0 if last is None else math.hypot(firing.pose.x - last.x, firing.pose.y - last.y)
         last = firing.pose
-        watch.believe(firing)
+        watch.filter(firing)
         for report in watch.reports():
             reports.setdefault((report.sensor, report.fault), way)
     return reports
@@ -120,10 +120,10 @@ def test_a_stuck_sensor_is_masked_and_said_to_be(measured: Callable[[str], None]
         got = found(RING, firings(RING, world, path, {sensor: stuck_m}))
         assert set(got) == {(sensor, "stuck")}
         ways += got.values()
-    watch = SensorWatch(RING)
+    watch = SensorMonitor(RING)
     world, path = random_hall(3, NOISY)
     for firing in firings(RING, world, path, {7: 1.2}):
-        believed, possible = watch.believe(firing)
+        believed, possible = watch.filter(firing)
     assert np.isnan(believed.ranges_m[7])
     assert np.isnan(possible.ranges_m[7])
     (report,) = watch.reports()
@@ -142,13 +142,13 @@ def test_a_failing_sensor_is_reported_and_one_that_is_not_to_fire_is_not(measure
         assert set(got) == {(sensor, "failing")}
     sparse = ring(sets=(tuple(range(0, 24, 2)), tuple(range(0, 24, 3))))
     assert found(sparse, firings(sparse, world, path)) == {}
-    watch = SensorWatch(RING)
+    watch = SensorMonitor(RING)
     for firing in firings(sparse, world, path):
-        watch.believe(firing)
+        watch.filter(firing)
     assert {r.sensor for r in watch.reports()} == {1, 5, 7, 11, 13, 17, 19, 23}
-    watch.listen_to(sparse)
+    watch.set_firing_pattern(sparse)
     for firing in firings(RING, world, path[:6]):
-        watch.believe(firing)
+        watch.filter(firing)
     assert watch.reports() == ()
     measured(f"24 sensors that always fail: 24 reported after {FAILURES} firings")
 
@@ -165,16 +165,16 @@ def test_a_sensor_that_never_hears_keeps_its_silence_to_itself_until_it_hears(
         assert set(got) <= {(sensor, "silent")}
         caught += len(got)
     assert caught >= 20
-    watch = SensorWatch(RING)
+    watch = SensorMonitor(RING)
     world, path = random_hall(0, ROUGH)
     drive = list(firings(RING, world, path, {0: math.inf}))
     for firing in drive:
-        believed, _ = watch.believe(firing)
+        believed, _ = watch.filter(firing)
         if watch.reports() and not np.isnan(firing.ranges_m[0]):
             assert np.isnan(believed.ranges_m[0])
             break
     echo = Firing(firing.t_s + 0.15, firing.pose, firing.ring_yaw, np.where(np.isnan(firing.ranges_m), np.nan, 2.0))
-    believed, _ = watch.believe(echo)
+    believed, _ = watch.filter(echo)
     assert believed.ranges_m[0] == 2.0
     assert watch.reports() == ()
     measured(f"24 sensors that never hear: the silence of {caught} not believed")
@@ -182,13 +182,13 @@ def test_a_sensor_that_never_hears_keeps_its_silence_to_itself_until_it_hears(
 
 def test_a_stuck_sensor_comes_back_when_it_behaves() -> None:
     world, path = random_hall(3, NOISY)
-    watch, config = SensorWatch(RING), RING
+    watch, config = SensorMonitor(RING), RING
     for firing in firings(config, world, path, {7: 1.2}):
-        watch.believe(firing)
+        watch.filter(firing)
     assert watch.reports()
     masked = 0
     for firing in firings(config, world, path[-200:]):
-        believed, _ = watch.believe(firing)
+        believed, _ = watch.filter(firing)
         masked += bool(np.isnan(believed.ranges_m[7]) and not np.isnan(firing.ranges_m[7]))
     assert watch.reports() == ()
     assert masked <= 3 * RETURNS
@@ -200,11 +200,11 @@ def crosstalk(config: RingConfig, halls: range) -> tuple[int, int, int, int]:
     for hall in halls:
         world, path = random_hall(hall, MIRRORS)
         loud = world.model_copy(update={"acoustics": MIRRORS.model_copy(update={"crosstalk": 1.0})})
-        watch = SensorWatch(config)
+        watch = SensorMonitor(config)
         for firing, true in zip(firings(config, loud, path), firings(config, world, path), strict=True):
             fired = ~np.isnan(firing.ranges_m)
             ghosts = fired & (firing.ranges_m < np.nan_to_num(true.ranges_m, nan=0.0) - 0.1)
-            doubted = np.isnan(watch.believe(firing)[0].ranges_m)
+            doubted = np.isnan(watch.filter(firing)[0].ranges_m)
             heard += int(ghosts.sum())
             through += int((ghosts & ~doubted).sum())
             honest += int((fired & ~ghosts).sum())
@@ -247,14 +247,14 @@ def test_another_partner_exposes_crosstalk(
 def test_crosstalk_that_stays_is_masked_and_says_who() -> None:
     """Two sensors of one set, one of which reads short in it; in the other set it does not."""
     config = ring(sets=((0, 2), (0, 12)))
-    watch = SensorWatch(config)
+    watch = SensorMonitor(config)
     seen = []
     for k in range(120):
         ranges = np.full(24, np.nan)
         ranges[[0, 2] if k % 2 == 0 else [0, 12]] = 4.0
         if k % 2 == 0:
             ranges[0] = 1.0
-        believed, possible = watch.believe(Firing(PERIOD_S * k, Pose(0.0, 0.0, 0.0), 0.0, ranges))
+        believed, possible = watch.filter(Firing(PERIOD_S * k, Pose(0.0, 0.0, 0.0), 0.0, ranges))
         seen.append((believed.ranges_m[0], possible.ranges_m[0]))
     assert [b for b, _ in seen[1::2]] == [4.0] * 60
     assert np.isnan([b for b, _ in seen[40::2]]).all()
@@ -266,11 +266,11 @@ def test_crosstalk_that_stays_is_masked_and_says_who() -> None:
 
 def test_sets_without_a_pattern_are_not_compared() -> None:
     """A log that names whoever has news, say."""
-    watch, rng = SensorWatch(RING), np.random.default_rng(5)
+    watch, rng = SensorMonitor(RING), np.random.default_rng(5)
     for k in range(400):
         ranges = np.where(rng.random(24) < 0.5, rng.uniform(0.5, 7.0, 24), np.nan)
         firing = Firing(PERIOD_S * k, Pose(0.0, 0.0, 0.0), 0.0, ranges)
-        assert watch.believe(firing) == (firing, firing)
+        assert watch.filter(firing) == (firing, firing)
 
 
 def test_masks_stand_before_map_and_obstacles_and_go_with_the_snapshot() -> None:
@@ -279,7 +279,7 @@ def test_masks_stand_before_map_and_obstacles_and_go_with_the_snapshot() -> None
     drive = list(firings(RING, world, path, {7: 1.2}))
     for firing in drive:
         perception.observe(firing)
-    (report,) = perception.sensors()
+    (report,) = perception.sensor_reports()
     assert report.sensor == 7
     last = drive[-1]
     points = perception.obstacles(last.t_s, 1.0)
@@ -287,6 +287,6 @@ def test_masks_stand_before_map_and_obstacles_and_go_with_the_snapshot() -> None
     assert not np.isclose(away, 1.2 + 0.381, atol=0.001).any()
     other = Perception(RING, SETTINGS.models, SETTINGS.perception)
     other.restore(perception.snapshot())
-    assert other.sensors() == perception.sensors()
-    other.forget()
-    assert other.sensors() == perception.sensors(), "the robot restarted, the sensor is still broken"
+    assert other.sensor_reports() == perception.sensor_reports()
+    other.reset()
+    assert other.sensor_reports() == perception.sensor_reports(), "the robot restarted, the sensor is still broken"

@@ -24,7 +24,7 @@ from perception.bayes.state import (
     State,
     make_state,
 )  # fmt: skip
-from perception.segments import mounts_array
+from perception.sensor_mounts import mounts_array
 from tests import naive_bayes as naive_full
 from tests.naive_tracks import Line
 

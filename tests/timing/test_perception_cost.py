@@ -48,7 +48,7 @@ def cost_ms(perception: Perception, firing: Firing) -> float:
     begin_ns = time.thread_time_ns()
     perception.observe(firing)
     done = 0
-    while perception.pending and enough_quanta(done):
+    while perception.can_refine and enough_quanta(done):
         perception.refine()
         done += 1
     return 1e-6 * (time.thread_time_ns() - begin_ns)

@@ -11,7 +11,7 @@ import numpy as np
 from config.model import ModelConfig
 from config.world import WorldConfig
 from drivers.messages import Floats, Pose
-from perception.seen_object import SeenObject
+from perception.detected_object import DetectedObject
 from runtime.analysis.trace import BEARING, RANGE, Trace, X, Y
 
 CHI2_95: Final = 5.991
@@ -79,12 +79,12 @@ def things(world: WorldConfig) -> tuple[list[Floats], list[Floats]]:
     return closed, [np.array([[w.x1_m, w.y1_m], [w.x2_m, w.y2_m]]) for w in world.wall]
 
 
-def outline(seen: SeenObject, model: ModelConfig | None, *, whole: bool) -> tuple[Floats, bool]:
+def outline(seen: DetectedObject, model: ModelConfig | None, *, whole: bool) -> tuple[Floats, bool]:
     """Return the outline of an object where it was seen, and whether it is closed, m.
 
     Parameters
     ----------
-    seen : SeenObject
+    seen : DetectedObject
         The object.
     model : ModelConfig, optional
         Its model; without one a small circle marks it.
@@ -98,7 +98,7 @@ def outline(seen: SeenObject, model: ModelConfig | None, *, whole: bool) -> tupl
     return rotated(np.array(model.vertices_m), seen.x, seen.y, seen.theta), model.closed
 
 
-def ellipse(seen: SeenObject) -> Floats | None:
+def ellipse(seen: DetectedObject) -> Floats | None:
     """Return the 95 % ellipse of an object's place, m; None where its covariance is not known."""
     if seen.covariance is None:
         return None

@@ -18,7 +18,7 @@ from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 
 from drivers.messages import Floats, Pose
-from perception.seen_object import SeenObject
+from perception.detected_object import DetectedObject
 from runtime.analysis.plots.geometry import Frame, arcs, ellipse, outline, rotated, things
 from runtime.analysis.plots.plot_style import CLUSTER, ECHO, INK, MODEL, MUTED, PAPER, ROBOT, SEGMENT, THING
 from runtime.analysis.text_tables import Units, length
@@ -123,7 +123,7 @@ def draw_clusters(axes: Axes, clusters: Iterable[Cluster], least: int, frame: Fr
 
 
 def draw_objects(
-    axes: Axes, objects: Sequence[SeenObject], trace: Trace, frame: Frame, units: Units, *, told: bool = True
+    axes: Axes, objects: Sequence[DetectedObject], trace: Trace, frame: Frame, units: Units, *, told: bool = True
 ) -> list[Line2D]:
     """Draw the models where they were matched, with the error of each where the truth is known."""
     models = {model.name: model for model in trace.settings.models}
@@ -177,7 +177,7 @@ class Thing(NamedTuple):
     error_m: float
 
 
-def stand_for(objects: Sequence[SeenObject], trace: Trace) -> dict[int, Thing]:
+def stand_for(objects: Sequence[DetectedObject], trace: Trace) -> dict[int, Thing]:
     """Return what each object stands for, where that is something that stood there and the truth is known."""
     if trace.world is None:
         return {}

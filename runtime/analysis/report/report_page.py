@@ -11,7 +11,7 @@ import numpy as np
 
 from config.units import FOOT_M
 from drivers.messages import Pose
-from perception.seen_object import SeenObject
+from perception.detected_object import DetectedObject
 from runtime import VERSION
 from runtime.analysis.plots.figure_files import styled, svg_of
 from runtime.analysis.plots.layers import stand_for
@@ -66,7 +66,7 @@ def _judged(trace: Trace) -> tuple[list[DrumRow], list[BoxRow], int] | None:
         return None
     placed = [trace.start.compose(Pose(o.x, o.y, o.theta)) for o in trace.objects]
     seen = [
-        SeenObject(o.model, p.x, p.y, p.theta, o.sigma, o.support, o.score)
+        DetectedObject(o.model, p.x, p.y, p.theta, o.sigma, o.support, o.score)
         for o, p in zip(trace.objects, placed, strict=True)
     ]
     return judge(trace.world, seen, trace.settings.models)

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
-from config.load import changed_settings, load_settings
+from config.load import load_settings, override_settings
 from runtime.analysis.text_tables import Units, length, objects_table
 from runtime.cycle.summary import ReplaySummary, object_row, write_json
 from runtime.support.kernel_cache import ready_kernels
@@ -90,7 +90,7 @@ def other_settings(
     """Return the settings to replay with: of a run file, or the recorded ones with some overridden."""
     if other is not None or models or robot is not None:
         return load_settings(other, sets, robot=robot, models=models)
-    return changed_settings(recording.settings, str(recording.path), sets)
+    return override_settings(recording.settings, str(recording.path), sets)
 
 
 @contextlib.contextmanager
@@ -153,8 +153,8 @@ def summarise(recording: Recording, verdict: ReplayResult) -> ReplaySummary:
     perception = verdict.state.perception if verdict.state is not None else None
     return {
         "objects": [] if perception is None else [object_row(seen) for seen in perception.objects()],
-        "segments": 0 if perception is None else perception.tally.total,
-        "clusters": 0 if perception is None else perception.tally.hypotheses,
+        "segments": 0 if perception is None else perception.counts.segments_total,
+        "clusters": 0 if perception is None else perception.counts.hypotheses,
         "cycles": verdict.cycles,
         "cycle_us": verdict.books.cycle_us(),
         "verify": {

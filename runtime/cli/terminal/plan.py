@@ -9,7 +9,7 @@ from typing import Final
 from rich.text import Text
 
 from drivers.messages import Floats, Pose
-from perception.pipeline import SeenObject
+from perception.pipeline import DetectedObject
 
 ARROWS: Final = "→↗↑↖←↙↓↘"
 CELL_ASPECT: Final = 2.0
@@ -72,7 +72,7 @@ def draw_plan(
     pose: Pose,
     trail: list[tuple[float, float]],
     segments: Floats,
-    objects: tuple[SeenObject, ...],
+    objects: tuple[DetectedObject, ...],
     size_m: dict[str, float],
     columns: int,
     rows: int,
@@ -87,7 +87,7 @@ def draw_plan(
         Where it was, m.
     segments : (n, 5) float
         Outline segments: ends x, y, x, y (m), normal (rad).
-    objects : tuple of SeenObject
+    objects : tuple of DetectedObject
         What is recognised.
     size_m : dict
         Radius at which to draw each model, m.

@@ -29,7 +29,7 @@ from rich.text import Text
 from config.settings import Settings
 from drivers.driver import RobotDriver
 from drivers.messages import Floats, LinkCounts, Pose
-from perception.pipeline import SeenObject
+from perception.pipeline import DetectedObject
 from runtime.analysis.text_tables import Units, objects_table
 from runtime.cli.terminal.plan import draw_plan
 from runtime.cycle.modes import ModeState, Request
@@ -61,7 +61,7 @@ class Snapshot:
     trail: list[tuple[float, float]]
     segments: Floats
     clusters: int
-    objects: tuple[SeenObject, ...]
+    objects: tuple[DetectedObject, ...]
     ranges: Floats
     counts: LinkCounts
     cycles: int
@@ -120,10 +120,10 @@ class View:
             self._trail.append((pose.x, pose.y))
         mode = record.mode if state.standing is None else replace(record.mode, reason=state.standing)
         self._slot = Snapshot(
-            mode, pose, list(self._trail), state.perception.segments_now(), record.clusters,
-            state.perception.things(), self._ranges.copy(), driver.counts,
+            mode, pose, list(self._trail), state.perception.segment_geometry(), record.clusters,
+            state.perception.labelled_objects(), self._ranges.copy(), driver.counts,
             books.cycles, books.late, books.cycle_us(), books.lag_us(), books.missed, tuple(books.faults.items()),
-            tuple(report.reason for report in state.perception.sensors()),
+            tuple(report.reason for report in state.perception.sensor_reports()),
         )  # fmt: skip
         self._wake.set()
 

@@ -11,7 +11,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from typing import Any, Final, NamedTuple, Protocol
 
 from behaviors.move_to_goal import Goal
-from behaviors.teleoperation import HANDS_OFF, Teleoperate
+from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate
 from config.reload import Difference
 from runtime.console.clients.client import Client
 from runtime.console.clients.client_hub import Hub
@@ -114,7 +114,7 @@ class CommandDispatcher:
         """Let nobody's hand be on the stick any more: whoever had the control has it no longer."""
         if self._is_by_hand:
             self._is_by_hand = False
-            self._robot.drive_request(HANDS_OFF)
+            self._robot.drive_request(TELEOPERATION_ENDED)
 
     def _allow(self, client: Client, message: Message) -> None:
         if not client.has_token:

@@ -13,10 +13,10 @@ import tomli_w
 
 from config.errors import UserError
 from config.layers import Location
-from config.load import MODELS_MAX, ConfigError, model_in, with_value
+from config.load import MODELS_MAX, ConfigError, parse_model, with_value
 from config.model import ModelConfig
 from config.problems import shown
-from config.reload import Difference, Reload, differences, reload
+from config.reload import Difference, ReloadResult, differences, reload
 from config.settings import Settings
 from runtime.cli.commands.firing_check import refuse_impossible_firing
 from runtime.console.commands.command_error import CommandError
@@ -83,7 +83,7 @@ class Tuning:
             Why not.
         """
         try:
-            model = model_in(toml, "model")
+            model = parse_model(toml, "model")
         except ConfigError as error:
             raise CommandError(str(error), "toml") from None
 
@@ -140,7 +140,7 @@ class Tuning:
             self._take_over(outcome.settings)
         return outcome.changed
 
-    def _weighed(self, path: str, propose: Callable[[], Settings], given: str = "") -> Reload:
+    def _weighed(self, path: str, propose: Callable[[], Settings], given: str = "") -> ReloadResult:
         """Return what a change comes to, or refuse it; nothing is taken over."""
 
         def proposed() -> Settings:

@@ -18,8 +18,8 @@ from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import Teleoperate
 from config.settings import Settings
 from drivers.messages import Firing, Floats, LinkCounts
+from perception.detected_object import DetectedObject
 from perception.paper.cluster_view import ClusterView
-from perception.seen_object import SeenObject
 from runtime.console.frames.segment_delta import SegmentTable
 from runtime.cycle.drive_requests import DriveRequest
 from runtime.cycle.step import CycleRecord, State
@@ -137,7 +137,7 @@ class FrameEncoder:
             "ranges": _told(np.where(np.isinf(self._ranges), NOTHING_HEARD, self._ranges), 4),
             "age": _told(t_s - self._heard_s, 3),
             "clusters": self._cluster_rows,
-            "objects": [_object(seen) for seen in state.perception.things()],
+            "objects": [_object(seen) for seen in state.perception.labelled_objects()],
             "vectors": [[r.schema, round(r.x, 4), round(r.y, 4)] for r in state.vectors],
             "drive_request": _drive_request(state.drive_request),
             "phases": {name: round(1e6 * s, 1) for name, s in phases_s.items()},
@@ -148,7 +148,7 @@ class FrameEncoder:
             "quanta": 0 if record is None else record.quanta,
             "refinement": "nothing" if record is None else record.refinement,
             "link": {"frames": link.frames, "bad": link.bad, "lost": link.lost},
-            "sensors": [[r.sensor, r.fault, r.reason] for r in state.perception.sensors()],
+            "sensors": [[r.sensor, r.fault, r.reason] for r in state.perception.sensor_reports()],
             "clients": context.clients,
             "recording": None if context.recording is None else context.recording._asdict(),
             "paused": context.is_paused,
@@ -172,14 +172,13 @@ class FrameEncoder:
 
     def _segments(self, state: State) -> bytes:
         perception = state.perception
-        tally = perception.tally
-        counts = (tally.total, tally.living)
+        counts = (perception.counts.segments_total, perception.counts.segments)
         if counts == self._counts and not self._is_stale:
             return self._table.unchanged()
         self._counts, self._is_stale = counts, False
         now = perception.segments()
-        self._cluster_rows = self._clusters.rows(now.ends)
-        rows = np.column_stack([now.ends, now.times])
+        self._cluster_rows = self._clusters.rows(now.geometry)
+        rows = np.column_stack([now.geometry, now.times])
         return self._table.update(now.numbers, rows, now.numbers[now.pinned == 1])
 
 
@@ -188,7 +187,7 @@ def _told(values: Floats, places: int) -> list[float | None]:
     return [None if math.isnan(value) else value for value in np.round(values, places).tolist()]
 
 
-def _object(seen: SeenObject) -> dict[str, Any]:
+def _object(seen: DetectedObject) -> dict[str, Any]:
     return {
         "number": seen.number,
         "model": seen.model,

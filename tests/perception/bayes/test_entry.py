@@ -14,8 +14,8 @@ from perception.bayes import object_report as report
 from perception.bayes.bayes_method import BayesPerception
 from perception.bayes.object_report import TOLD
 from perception.bayes.state import C00, C11, HITS, KIND, MARK, NTF, NTI, NUMBER, PROB, TX, TY, make_state
+from perception.detected_object import DetectedObject
 from perception.kernel import Floats, kernel
-from perception.seen_object import SeenObject
 from runtime.simulation.scenes import halls, readings
 
 SETTINGS = load_settings("hallway")
@@ -44,7 +44,7 @@ def test_what_goes_in_by_the_handle_comes_to_the_same() -> None:
     assert held.g.any()
 
 
-def afresh(perception: BayesPerception) -> list[SeenObject]:
+def afresh(perception: BayesPerception) -> list[DetectedObject]:
     """Tell every sure circle from its track, as if for the first time."""
     s, p, sure = perception.memory, perception.settings, np.zeros(len(perception.memory.ti), np.int64)
     n = report.sure_circles(s.ti, s.names, sure)
@@ -60,10 +60,10 @@ def test_no_object_is_out_of_date() -> None:
         for firing in readings(SETTINGS.ring, halls("moved")[seed], seed):
             perception.observe(firing)
             assert list(perception.objects()) == afresh(perception)
-            while perception.pending and perception.refine():
+            while perception.can_refine and perception.refine():
                 assert list(perception.objects()) == afresh(perception)
             most = max(most, len(perception.objects()))
-        perception.forget()
+        perception.reset()
         assert perception.objects() == ()
     assert most == 6
 

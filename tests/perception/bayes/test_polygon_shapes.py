@@ -14,8 +14,8 @@ import pytest
 from config.load import load_settings
 from config.model import ModelConfig
 from config.world import AcousticsConfig, PolygonConfig, StartConfig, WallConfig, WorldConfig
+from perception.detected_object import DetectedObject
 from perception.pipeline import Perception
-from perception.seen_object import SeenObject
 from runtime.simulation.open_loop import perceive
 from runtime.simulation.scenes import Hall, readings
 
@@ -62,9 +62,9 @@ def hall(outline: ModelConfig, poses: list[Pose], acoustics: Acoustics) -> Hall:
     return Hall(outline.name, world)
 
 
-def drive(outline: ModelConfig, poses: list[Pose], acoustics: Acoustics) -> tuple[SeenObject, ...]:
+def drive(outline: ModelConfig, poses: list[Pose], acoustics: Acoustics) -> tuple[DetectedObject, ...]:
     perception = Perception(SETTINGS.ring, (outline,), SETTINGS.perception)
-    seen: tuple[SeenObject, ...] = ()
+    seen: tuple[DetectedObject, ...] = ()
     for firing in readings(SETTINGS.ring, hall(outline, poses, acoustics), 0):
         seen = perceive(perception, firing)
     return seen

@@ -237,9 +237,9 @@ def test_garbage_is_survived(tracks: int) -> None:
         s = perception.memory
         for _ in range(60):
             perception.observe(garbage(rng))
-            while perception.pending:
+            while perception.can_refine:
                 perception.refine()
-            for seen in perception.things():
+            for seen in perception.labelled_objects():
                 assert np.isfinite([seen.x, seen.y, seen.theta, seen.sigma, seen.score]).all()
                 assert 0.0 <= (seen.probability or 0.0) <= 1.0
         for name in ("ti", "tf", "comp", "lines", "g", "ddl", "ntot", "nll", "bins", "hist", "pf", "pbins", "store"):

@@ -172,11 +172,11 @@ def test_everything_has_a_name() -> None:
     perception = Perception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
     for firing in readings(SETTINGS.ring, hall, 0):
         perceive(perception, firing)
-    names = [thing.model for thing in perception.things()]
+    names = [thing.model for thing in perception.labelled_objects()]
     assert names.count("semicircle") == 6
     assert names.count("wall") >= 2
     assert set(names) <= {"semicircle", "wall", "inside corner", "edge", "post", "barrel", "unknown"}
-    for thing in perception.things():
+    for thing in perception.labelled_objects():
         assert thing.probability is not None
         assert 0.0 <= thing.probability <= 1.0
         assert thing.covariance is not None
@@ -207,11 +207,11 @@ def test_forgetting_is_beginning_anew_to_the_bit() -> None:
     used, new = (Perception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception) for _ in range(2))
     for firing in readings(SETTINGS.ring, hall, 1):
         perceive(used, firing)
-    known = {seen.number for seen in used.things()} - {None}
+    known = {seen.number for seen in used.labelled_objects()} - {None}
     assert len(known) >= 6
-    used.forget()
-    assert used.objects() == used.things() == ()
-    assert (used.tally.living, used.tally.hypotheses, used.pending) == (0, 0, False)
+    used.reset()
+    assert used.objects() == used.labelled_objects() == ()
+    assert (used.counts.segments, used.counts.hypotheses, used.can_refine) == (0, 0, False)
     for firing in readings(SETTINGS.ring, hall, 2):
         one, other = perceive(used, firing), perceive(new, firing)
         assert [replace(seen, number=None) for seen in one] == [replace(seen, number=None) for seen in other]

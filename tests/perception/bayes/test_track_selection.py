@@ -141,7 +141,7 @@ def test_in_a_hall_with_one_quantum_a_firing_every_track_gets_its_turn() -> None
     for firing in readings(SETTINGS.ring, hall, 3):
         perception.observe(firing)
         perception.refine()
-        cut += perception.pending
+        cut += perception.can_refine
         longest = max(longest, int(perception.memory.ti[:, PASSED].max()), int(perception.memory.pi[:, PASSED].max()))
     assert cut > 100, "one quantum was enough: nothing was put to the test"
     assert 3 < longest <= selection.PATIENCE + SETTINGS.perception.bayes.tracks_max + 1

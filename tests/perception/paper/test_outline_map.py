@@ -40,7 +40,7 @@ def told(outline: OutlineMap) -> list[tuple[int, float, float, int]]:
     listed = outline.listed()
     return sorted(
         (int(n), float(t), float(e[0]), int(p))
-        for n, e, t, p in zip(listed.numbers, listed.ends, listed.times, listed.pinned, strict=True)
+        for n, e, t, p in zip(listed.numbers, listed.geometry, listed.times, listed.pinned, strict=True)
     )
 
 

@@ -180,7 +180,7 @@ class Operated:
             made = sum(state.perception.observe(firing) for firing in heard.firings)
             record = CycleRecord(
                 self.cycle, replace(Inputs(t_s, LineState.READY, None, heard), **inputs), ModeState(Mode.DRIVE),
-                Twist(0.3, 0.0), made, state.perception.tally.living, state.perception.tally.hypotheses, 2, 2,
+                Twist(0.3, 0.0), made, state.perception.counts.segments, state.perception.counts.hypotheses, 2, 2,
                 "quota", refused,
             )  # fmt: skip
             self.console.on_cycle(record, state, self.run.books, Counted())  # type: ignore[arg-type]

@@ -11,7 +11,7 @@ import pytest
 
 from behaviors.move_to_goal import Goal
 from behaviors.response import Response
-from behaviors.teleoperation import HANDS_OFF, Teleoperate
+from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate
 from config.load import load_settings
 from drivers.driver import LineState
 from drivers.messages import Flags, Pose, Twist
@@ -112,7 +112,7 @@ def test_the_hand_drives_while_it_speaks_and_stops_within_a_quarter_second() -> 
     assert 0.19 < script.now_s - last_s < 0.251
     assert record.mode.mode is Mode.DRIVE
     assert "nobody is at the controls" in standing(script)
-    assert script.state.drive_request == HANDS_OFF
+    assert script.state.drive_request == TELEOPERATION_ENDED
     for _ in range(50):
         assert script.tell(None).command == STANDSTILL
     assert script.tell(FORWARD).command != STANDSTILL
@@ -165,7 +165,7 @@ def test_after_a_stop_goal_and_hand_do_not_resume(
     assert script.tell(drive_request).command != STANDSTILL
     script.tell(drive_request if at_once else None, **found)
     assert script.state.mode.mode is not Mode.DRIVE
-    assert script.state.drive_request == HANDS_OFF
+    assert script.state.drive_request == TELEOPERATION_ENDED
     assert arm(script).command == STANDSTILL
     for _ in range(20):
         record = script.tell(None)
@@ -187,7 +187,7 @@ def test_a_stop_that_the_cycle_finds_itself_takes_the_goal_as_well() -> None:
     while script.state.mode.mode is Mode.DRIVE:
         record = script.tell(None, firing=False)
     assert "ring has not reported" in str(record.mode.reason)
-    assert script.state.drive_request == HANDS_OFF
+    assert script.state.drive_request == TELEOPERATION_ENDED
     assert script.state.vectors == ()
 
 

@@ -124,7 +124,7 @@ def test_at_any_phase_it_stands_until_it_is_re_armed(measured: Callable[[str], N
 
         # The map is empty at that moment, and clock and odometry begin again.
         assert not run.state.perception.objects()
-        assert run.state.perception.tally.living == 0
+        assert run.state.perception.counts.segments == 0
         seen_s, before = run.now_s, len(run.firings)
         run.until(lambda: len(run.firings) > before, 1.0)  # noqa: B023 - called within the turn
         worst_echo_s = max(worst_echo_s, run.now_s - seen_s)

@@ -114,7 +114,7 @@ def test_perception_goes_on_with_other_constants(method: str) -> None:
     )
     inner: Any = perception.method
     remembered = inner.memory if method == "bayes" else inner.outline.segments
-    perception.adopt(other)
+    perception.apply_settings(other)
     if method == "bayes":
         assert inner.memory is remembered
         assert inner.settings.attempts == 7

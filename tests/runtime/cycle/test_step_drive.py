@@ -133,9 +133,9 @@ def test_the_command_goes_before_refinement_and_each_quantum_is_asked_for(drive:
         if record.refinement == "budget":
             expected.append(("may?", record.quanta))
             assert record.quanta == quanta
-            assert script.state.perception.pending
+            assert script.state.perception.can_refine
         else:
-            assert not script.state.perception.pending
+            assert not script.state.perception.can_refine
         assert script.log == expected
         assert record.quanta == len(done) <= quanta
         assert record.iterations == sum(entry[1] for entry in done)
@@ -152,7 +152,7 @@ def test_refinement_of_one_cycle_resumes_where_the_last_one_stood(drive: Drive) 
     for quanta in (1, 3, 10_000):
         state, _ = played(echoes, lambda _done: False)
         total, cycles, now_s = 0, 0, echoes[-1].inputs.now_s
-        while state.perception.pending:
+        while state.perception.can_refine:
             now_s += PERIOD_S
             cycles += 1
             inputs = Inputs(now_s, LineState.READY, None, NOTHING)
@@ -170,7 +170,7 @@ def test_refinement_of_one_cycle_resumes_where_the_last_one_stood(drive: Drive) 
 def test_few_quanta_a_cycle_find_what_many_find(drive: Drive) -> None:
     """Echoes keep coming here, so the ways differ; where they lead does not."""
     few, _ = played(drive.records, lambda done: done < 3)
-    while few.perception.pending:
+    while few.perception.can_refine:
         few.perception.refine()
     many = {(round(o.x, 1), round(o.y, 1)): o for o in drive.state.perception.objects()}
     for seen in few.perception.objects():
@@ -227,6 +227,6 @@ def test_without_a_budget_the_record_says_so_exactly_where_something_was_left_to
     for record in drive.records:
         got = step(state, record.inputs, SETTINGS, lambda _c: None, lambda _done: False)
         assert (got.quanta, got.iterations) == (0, 0)
-        assert got.refinement == ("budget" if state.perception.pending else "nothing")
+        assert got.refinement == ("budget" if state.perception.can_refine else "nothing")
         causes.add(got.refinement)
     assert causes == {"budget", "nothing"}

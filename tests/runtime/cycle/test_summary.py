@@ -10,11 +10,11 @@ from typing import get_type_hints
 import pytest
 
 from config.errors import FAILED, UserError
-from perception.pipeline import SeenObject
+from perception.pipeline import DetectedObject
 from runtime.cycle.summary import LinkRow, ObjectRow, ReplaySummary, RunSummary, object_row, write_json
 from runtime.simulation.evaluation import DrumRow, Outcome
 
-SEEN = SeenObject("semicircle", 1.0, -2.0, 0.1 + 0.2, 1e-17, 39, 2.0 / 3.0)
+SEEN = DetectedObject("semicircle", 1.0, -2.0, 0.1 + 0.2, 1e-17, 39, 2.0 / 3.0)
 
 
 def test_the_forms_are_those_of_the_public_surface() -> None:

@@ -71,7 +71,7 @@ def test_segments_go_in_as_changes_and_add_up(run: Path) -> None:
     assert at_keyframes >= 4
     state = verdict_of(run).state
     assert state is not None
-    assert len(held) == pytest.approx(len(state.perception.segments_now()), abs=3)
+    assert len(held) == pytest.approx(len(state.perception.segment_geometry()), abs=3)
     changes = [len(change.added) for change in entries if not change.whole]
     assert statistics.median(changes) < 0.5 * len(held), "only what is new"
 

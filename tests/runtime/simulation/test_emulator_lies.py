@@ -154,7 +154,7 @@ def test_a_robot_with_broken_sensors_drives_on_and_says_which(measured: Callable
     while run.now_s < UNTIL_S:
         record = run.cycle()
         lines += notices.news(record.inputs.heard, run.state.perception)
-    assert {r.sensor: r.fault for r in run.state.perception.sensors()} == {5: "stuck", 7: "failing"}
+    assert {r.sensor: r.fault for r in run.state.perception.sensor_reports()} == {5: "stuck", 7: "failing"}
     assert len(lines) == 2
     assert "sensor 7 never answers when it should fire" in lines[0]
     assert "sensor 5 always answers 1.19 m" in lines[1]

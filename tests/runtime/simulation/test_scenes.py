@@ -13,7 +13,7 @@ import pytest
 from config.load import load_model, load_robot
 from config.world import BoxConfig, WorldConfig
 from drivers.messages import Firing, Floats
-from perception.pipeline import SeenObject
+from perception.pipeline import DetectedObject
 from runtime.cli.app import call
 from runtime.simulation.open_loop import angle_error, judge
 from runtime.simulation.scene_names import SceneName
@@ -153,8 +153,8 @@ def test_walls_answer_from_the_side_and_from_the_end() -> None:
             assert firing.ranges_m[[6, 18]] / FT == pytest.approx([6.75, 6.75], abs=0.05 + 1e-9)
 
 
-def seen(model: str, x_ft: float, y_ft: float, theta: float = 0.0) -> SeenObject:
-    return SeenObject(model, x_ft * FT, y_ft * FT, theta, sigma=0.01, support=9, score=0.9)
+def seen(model: str, x_ft: float, y_ft: float, theta: float = 0.0) -> DetectedObject:
+    return DetectedObject(model, x_ft * FT, y_ft * FT, theta, sigma=0.01, support=9, score=0.9)
 
 
 def test_a_drum_is_no_box_and_a_box_no_drum() -> None:

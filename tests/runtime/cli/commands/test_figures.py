@@ -145,10 +145,10 @@ def test_frames_and_outlines() -> None:
     frame = Frame(Pose(-1.8288, 0.5, math.pi / 2), FOOT_M)
     (point,) = frame.points(np.array([[0.3048, 0.0]]))
     assert point == pytest.approx([-6.0, (0.5 + 0.3048) / 0.3048])
-    from perception.seen_object import SeenObject
+    from perception.detected_object import DetectedObject
 
     model = load_settings("hallway").models[0]
-    seen = SeenObject("semicircle", 2.0, 1.0, math.pi, 0.0, 9, 1.0)
+    seen = DetectedObject("semicircle", 2.0, 1.0, math.pi, 0.0, 9, 1.0)
     chords, closed = outline(seen, model, whole=False)
     assert not closed
     assert np.allclose(np.hypot(*(chords - [2.0, 1.0]).T), 0.3048, atol=1e-5)

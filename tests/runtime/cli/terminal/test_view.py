@@ -22,7 +22,7 @@ from rich.console import Console
 from config.load import load_settings
 from drivers.messages import Floats, LinkCounts, Pose
 from drivers.registry import make_driver
-from perception.pipeline import SeenObject
+from perception.pipeline import DetectedObject
 from runtime.cli.terminal.plan import ARROWS, MARGIN_M, Plan, draw_plan
 from runtime.cli.terminal.view import EVERY_CYCLES, SWITCH_INTERVAL_S, Snapshot, View, keys
 from runtime.cycle.modes import Mode, ModeState, Request
@@ -38,12 +38,12 @@ EMPTY = Snapshot(
 )  # fmt: skip
 
 
-def seen(x: float, y: float, model: str = "semicircle") -> SeenObject:
-    return SeenObject(model, x, y, 0.5, 0.01, 39, 0.9)
+def seen(x: float, y: float, model: str = "semicircle") -> DetectedObject:
+    return DetectedObject(model, x, y, 0.5, 0.01, 39, 0.9)
 
 
 def rows(pose: Pose, *, trail: list[tuple[float, float]] | None = None, segments: Floats = NO_SEGMENTS,
-         objects: tuple[SeenObject, ...] = ()) -> list[str]:  # fmt: skip
+         objects: tuple[DetectedObject, ...] = ()) -> list[str]:  # fmt: skip
     return draw_plan(pose, trail or [], segments, objects, {"semicircle": 0.3048}, 60, 20).plain.split("\n")
 
 

@@ -35,7 +35,7 @@ def agree(segments: Segments, case: Operated) -> None:
     """Assert that the page knows what is in the map."""
     now = case.run.state.perception.segments()
     assert sorted(segments) == sorted(now.numbers.tolist())
-    for number, ends in zip(now.numbers.tolist(), now.ends.tolist(), strict=True):
+    for number, ends in zip(now.numbers.tolist(), now.geometry.tolist(), strict=True):
         assert segments[number][:5] == pytest.approx(ends, abs=1e-4)
 
 

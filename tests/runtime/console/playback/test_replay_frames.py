@@ -59,7 +59,7 @@ def test_the_changes_of_all_frames_come_to_the_map_of_the_last(folder: Path) -> 
     assert (head["cycle"], head["mode"]) == (playback.cycles, "DRIVE")
     assert head["playback"] == {"s": playback.t_s, "is_playing": True, "speed": 2.0}
     assert (head["paused"], head["speed"]) == (False, 1.0), "that is the live run's affair"
-    assert len(head["objects"]) == len(shown.state.perception.things())
+    assert len(head["objects"]) == len(shown.state.perception.labelled_objects())
 
 
 @pytest.mark.realtime

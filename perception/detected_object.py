@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 @dataclass(frozen=True, slots=True)
-class SeenObject:
+class DetectedObject:
     """An object recognised and located, in the odometry's frame."""
 
     model: str
@@ -21,7 +21,7 @@ class SeenObject:
     sigma: float
     """Standard error of the position, m: along its worst axis, or as the paper's method's residuals have it."""
     support: int
-    """How many outline segments (paper) or raw readings (full) lie on it."""
+    """The number of outline segments (paper) or raw readings (bayes) that support it."""
     score: float
     """From 0 to 1: the probability that it is what it is called, or the paper's method's goodness of fit."""
     probability: float | None = None
@@ -36,12 +36,12 @@ class SeenObject:
     """A person put it there, and the readings do not bear that out by themselves yet."""
 
 
-class Tally(NamedTuple):
-    """How much a method holds at the moment, and how much it has made."""
+class MapCounts(NamedTuple):
+    """The numbers of segments and hypotheses that a method holds."""
 
-    living: int
-    """Outline segments in the map."""
-    total: int
-    """Outline segments ever made."""
+    segments: int
+    """Outline segments in the map now."""
+    segments_total: int
+    """Outline segments completed since the start."""
     hypotheses: int
-    """Where something is thought to be: clusters, or tracks, established or not."""
+    """Places where an object may be: clusters (paper), or tracks, tentative ones included (bayes)."""

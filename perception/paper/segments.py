@@ -7,7 +7,6 @@ tangent of both arcs is the best estimate of the surface that answered both.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from config.robot import RingConfig
 from config.settings import SegmentsConfig
 from drivers.messages import Firing
 from perception.kernel import Floats, Ints, kernel
+from perception.sensor_mounts import mounts_array
 
 REMEMBERED = 16
 """Readings kept of each sensor; they lie a fraction of a baseline apart, so this spans several baselines."""
@@ -187,15 +187,10 @@ class SegmentExtractor:
         )  # fmt: skip
         return self._out[:count]
 
-    def adopt(self, config: SegmentsConfig) -> None:
+    def apply_settings(self, config: SegmentsConfig) -> None:
         """Make pairs of other readings from now on."""
         self._config = config
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Forget all readings, as after the odometry began anew."""
         self._filled[:] = 0
-
-
-def mounts_array(mounts: Sequence[tuple[float, float, float]]) -> Floats:
-    """Return sensors' mounts as an array of shape (n, 3): x, y (m), direction (rad)."""
-    return np.array(mounts, dtype=np.float64).reshape(len(mounts), 3)
