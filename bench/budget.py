@@ -106,9 +106,9 @@ def account_for(settings: Settings, cycles: int, budget_s: float) -> Account:
     memory = MemoryPolicy()
     with memory.driving():
         for cycle in range(1, SETTLED_CYCLES + cycles + 1):
-            now_s = cycle / settings.cycle.rate_hz
-            line.exchange(now_s)
-            inputs = gather(driver, now_s, Request.ARM if state.mode.mode is Mode.READY else None)
+            run_s = cycle / settings.cycle.rate_hz
+            line.exchange(run_s)
+            inputs = gather(driver, run_s, Request.ARM if state.mode.mode is Mode.READY else None)
             if cycle == SETTLED_CYCLES + 1:
                 account = perception.account = Account(1e6 * budget_s)
             _one_cycle(state, inputs, settings, driver, account, budget_s)

@@ -65,7 +65,7 @@ class Left:
             self.modes.clear()
         self.modes.add(record.mode.mode)
         if record.cycle > SETTLED_CYCLES and record.cycle % SAMPLE_CYCLES == 0:
-            self.samples.append((record.inputs.now_s, own_mb() or math.nan))
+            self.samples.append((record.inputs.run_s, own_mb() or math.nan))
         if record.cycle == self.last:
             self.after_mb = own_mb() or math.nan
 

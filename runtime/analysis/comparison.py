@@ -75,8 +75,8 @@ def compare_runs(
         if entry.topic != CYCLE:
             continue
         record = decode(Cycle, entry.data).record
-        begun_s = record.inputs.now_s if begun_s is None else begun_s
-        at_s = record.inputs.now_s - begun_s
+        begun_s = record.inputs.run_s if begun_s is None else begun_s
+        at_s = record.inputs.run_s - begun_s
         first = replay_cycle(was, record, mine)
         second = step(would_be, record.inputs, settings, _ignore, enough_quanta)
         told.cycles += 1
@@ -95,7 +95,7 @@ def _ignore(command: Command) -> None:
 
 
 def _note_stop(story: RunOutcome, record: CycleRecord, at_s: float) -> None:
-    if record.mode.mode is Mode.SAFE_STOP and record.mode.since_s == record.inputs.now_s:
+    if record.mode.mode is Mode.SAFE_STOP and record.mode.entered_run_s == record.inputs.run_s:
         story.stops.append((at_s, record.mode.reason or ""))
 
 

@@ -123,13 +123,13 @@ class _Listener:
 
     def on_cycle(self, record: CycleRecord, state: State) -> None:
         """Take a cycle, replayed."""
-        now_s = record.inputs.now_s
+        run_s = record.inputs.run_s
         if self._begun_s is None:
-            self._begun_s = now_s
-            self._trace.begun_ns = self._recording.about.unix_minus_host_ns + round(1e9 * now_s)
+            self._begun_s = run_s
+            self._trace.begun_ns = self._recording.about.unix_minus_host_ns + round(1e9 * run_s)
         else:
-            self._trace.gaps_s.append(now_s - self._before_s)
-        t_s, self._before_s = now_s - self._begun_s, now_s
+            self._trace.gaps_s.append(run_s - self._before_s)
+        t_s, self._before_s = run_s - self._begun_s, run_s
         if record.inputs.heard.rebooted:
             self._gathering.begin_anew(t_s)
         for firing in record.inputs.heard.firings:

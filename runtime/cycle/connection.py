@@ -44,11 +44,11 @@ class Connection(NamedTuple):
         await link.open_once()
         give_up_s = self.clock() + CONNECT_MAX_S
         while driver.state is not LineState.READY and not is_stopping():
-            now_s = self.clock()
-            driver.tick(now_s)
+            run_s = self.clock()
+            driver.tick(run_s)
             self.send()
             lost = None if link.is_open else link.last_error
-            if now_s > give_up_s or lost is not None or driver.state is LineState.DOWN:
+            if run_s > give_up_s or lost is not None or driver.state is LineState.DOWN:
                 await link.stop()
                 port = link.config.port
                 nobody = f"nothing on {port} answers like the robot: check its power and link.baud"

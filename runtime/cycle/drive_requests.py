@@ -73,7 +73,7 @@ def after_a_stop(drive_request: DriveRequest) -> DriveRequest:
 
 
 def drive(
-    drive_request: DriveRequest, drive_request_s: float, now_s: float, leg: Leg, percept: Percept, settings: Settings
+    drive_request: DriveRequest, requested_run_s: float, run_s: float, leg: Leg, percept: Percept, settings: Settings
 ) -> DriveResult:
     """Ask the schemas that the drive_request names, and the arbiter.
 
@@ -81,8 +81,8 @@ def drive(
     ----------
     drive_request : DriveRequest
         What is wanted.
-    drive_request_s, now_s : float
-        When that was said, and now, by the host's clock.
+    requested_run_s, run_s : float
+        When that was said, and now, by the run's clock.
     leg : Leg
         The way under way, for `Legs`.
     percept : Percept
@@ -94,7 +94,7 @@ def drive(
     away = avoid_static_obstacle(percept, body.radius_m, behaviors.avoid_static_obstacle)
     if isinstance(drive_request, Teleoperate):
         # Of the cycles that are in time the last one is to stop: the next one would be late.
-        age_s = now_s - drive_request_s
+        age_s = run_s - requested_run_s
         if drive_request != TELEOPERATION_ENDED and is_expired(
             drive_request, age_s + 1.0 / settings.cycle.rate_hz, behaviors.teleoperation
         ):

@@ -23,7 +23,7 @@ def give(driver: RobotDriver, command: Command) -> None:
 
 def gather(
     driver: RobotDriver,
-    now_s: float,
+    run_s: float,
     request: Request | None,
     *,
     echo_age_s: float | None = None,
@@ -31,13 +31,28 @@ def gather(
     fault: str | None = None,
     edits: tuple[Edit, ...] = (),
     drive_request: DriveRequest | None = None,
+    host_s: float | None = None,
 ) -> Inputs:
-    """Return everything a cycle that begins at `now_s` is told."""
-    driver.tick(now_s)
+    """Return everything that a cycle which begins at `run_s` takes in.
+
+    Parameters
+    ----------
+    driver : RobotDriver
+        Holds what arrived since the cycle before.
+    run_s, host_s : float
+        The cycle's beginning by the run's clock and by the host's; virtual time has only the former.
+    request, drive_request, edits
+        What the operator asks for.
+    echo_age_s : float, optional
+        How long the oldest of the firings has waited.
+    overrun, fault : str, optional
+        Why the robot must not drive.
+    """
+    driver.tick(run_s)
     gap_max_s = gap_max(driver)
     state, trouble, heard = driver.state, driver.trouble, driver.take()
     return Inputs(
-        now_s,
+        run_s,
         state,
         trouble,
         heard,
@@ -48,6 +63,7 @@ def gather(
         fault,
         edits=edits,
         drive_request=drive_request,
+        host_s=host_s,
     )
 
 

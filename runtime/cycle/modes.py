@@ -65,27 +65,27 @@ class Request(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ModeState:
-    """A mode, since when (s), why, and since when it is being armed."""
+    """A mode, when it was entered by the run's clock, why, and since when it is being armed."""
 
     mode: Mode = Mode.CONNECTING
-    since_s: float = 0.0
+    entered_run_s: float = 0.0
     reason: str | None = None
-    arming_s: float | None = None
+    arming_run_s: float | None = None
 
-    def enter(self, mode: Mode, now_s: float, reason: str | None = None) -> ModeState:
+    def enter(self, mode: Mode, run_s: float, reason: str | None = None) -> ModeState:
         """Return the state of having just entered `mode`."""
-        return ModeState(mode, now_s, reason)
+        return ModeState(mode, run_s, reason)
 
     def entered_since(self, before: ModeState) -> bool:
         """Say whether a mode was entered since `before`, be it the same one again."""
-        return (self.mode, self.since_s) != (before.mode, before.since_s)
+        return (self.mode, self.entered_run_s) != (before.mode, before.entered_run_s)
 
 
 @dataclass(frozen=True, slots=True)
 class Situation:
     """What the modes depend on, as one cycle finds it."""
 
-    now_s: float
+    run_s: float
     line: LineState
     trouble: str | None
     flags: Flags
@@ -116,19 +116,19 @@ def advance(state: ModeState, seen: Situation) -> ModeState:
     if state.mode is Mode.DRIVE:
         reason = why_stop(state, seen)
         if reason is not None:
-            return state.enter(Mode.SAFE_STOP, seen.now_s, reason)
-        return state.enter(Mode.READY, seen.now_s, DISARMED) if seen.request is Request.DISARM else state
+            return state.enter(Mode.SAFE_STOP, seen.run_s, reason)
+        return state.enter(Mode.READY, seen.run_s, DISARMED) if seen.request is Request.DISARM else state
     if seen.request is Request.HALT:
-        return state.enter(Mode.SAFE_STOP, seen.now_s, HALTED)
+        return state.enter(Mode.SAFE_STOP, seen.run_s, HALTED)
     if seen.fault is not None:
         known = state.mode is Mode.SAFE_STOP and state.reason == seen.fault and seen.request is None
-        return replace(state, arming_s=None) if known else state.enter(Mode.SAFE_STOP, seen.now_s, seen.fault)
+        return replace(state, arming_run_s=None) if known else state.enter(Mode.SAFE_STOP, seen.run_s, seen.fault)
     if seen.line is not LineState.READY:
         if state.mode is Mode.SAFE_STOP:
-            return replace(state, arming_s=None)
-        return replace(state, mode=Mode.CONNECTING, reason=seen.trouble, arming_s=None)
+            return replace(state, arming_run_s=None)
+        return replace(state, mode=Mode.CONNECTING, reason=seen.trouble, arming_run_s=None)
     if state.mode is Mode.CONNECTING:
-        state = state.enter(Mode.READY, seen.now_s)
+        state = state.enter(Mode.READY, seen.run_s)
     return _arm(state, seen)
 
 
@@ -153,29 +153,29 @@ def why_stop(state: ModeState, seen: Situation) -> str | None:
         return "the base reports a motor fault: check its drives, then re-arm"
     if seen.flags & Flags.LATCHED:
         return "the base latched without being told to from here: check its emergency stop, then re-arm"
-    if seen.flags & Flags.DEADMAN and seen.now_s - state.since_s > DEADMAN_GRACE_S:
+    if seen.flags & Flags.DEADMAN and seen.run_s - state.entered_run_s > DEADMAN_GRACE_S:
         return "the base's deadman tripped: commands came too late; check line and load, then re-arm"
     return None
 
 
 def _arm(state: ModeState, seen: Situation) -> ModeState:
     """Go through the arming of a robot that stands in READY or SAFE_STOP on a line that works."""
-    if seen.request is Request.ARM and state.arming_s is None:
-        return replace(state, arming_s=seen.now_s)
-    if state.arming_s is None:
+    if seen.request is Request.ARM and state.arming_run_s is None:
+        return replace(state, arming_run_s=seen.run_s)
+    if state.arming_run_s is None:
         return state
     if seen.request is Request.DISARM:
         # From SAFE_STOP the latch is open already: it is set again.
-        return state.enter(state.mode, seen.now_s, DISARMED)
+        return state.enter(state.mode, seen.run_s, DISARMED)
     if seen.gap_s > seen.gap_max_s:
-        return state.enter(Mode.SAFE_STOP, seen.now_s, HELD_UP.format(seen.gap_s))
+        return state.enter(Mode.SAFE_STOP, seen.run_s, HELD_UP.format(seen.gap_s))
     if seen.overrun is not None:
-        return state.enter(Mode.SAFE_STOP, seen.now_s, seen.overrun)
-    waited = seen.now_s - state.arming_s
+        return state.enter(Mode.SAFE_STOP, seen.run_s, seen.overrun)
+    waited = seen.run_s - state.arming_run_s
     if waited >= ARMING_MIN_S and not seen.flags & Flags.LATCHED:
-        return state.enter(Mode.DRIVE, seen.now_s)
+        return state.enter(Mode.DRIVE, seen.run_s)
     if waited > ARMING_MAX_S:
         return state.enter(
-            Mode.SAFE_STOP, seen.now_s, "the base's latch does not clear: look for bumper contact or a motor fault"
+            Mode.SAFE_STOP, seen.run_s, "the base's latch does not clear: look for bumper contact or a motor fault"
         )
     return state

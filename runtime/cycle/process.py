@@ -66,7 +66,7 @@ class Observers:
     on_cycle: Callable[[CycleRecord, State, CycleStats, RobotDriver], None] | None = None
     on_firing: Callable[[Firing], None] | None = None
     on_bytes: Callable[[Way, float, bytes], None] | None = None
-    """Gets what goes over the line, either way, and when, by the host's clock."""
+    """Gets the direction, the moment by the host's clock, and the bytes that went over the line."""
     on_settings: Callable[[Settings], None] | None = None
     """Gets settings taken over while the robot runs, before the first cycle under them."""
 
@@ -213,14 +213,14 @@ class RobotProcess:
 
     async def _cycle(self, seconds: float | None) -> None:
         """Run cycles in their rhythm until the run ends."""
-        began_s, rhythm = self._clock(), self._rhythm
-        with rhythm.start(began_s, gap_max(self._driver)):
+        begin_run_s, rhythm = self._clock(), self._rhythm
+        with rhythm.start(begin_run_s, gap_max(self._driver)):
             while not self._stop.is_set():
                 try:
                     now = await rhythm.wait()
                     if now is None:
                         continue
-                    if seconds is not None and now.wall_s - began_s >= seconds:
+                    if seconds is not None and now.run_s - begin_run_s >= seconds:
                         return
                     self._one_cycle(now)
                     left_s = rhythm.end(self._clock())
@@ -248,8 +248,8 @@ class RobotProcess:
         if self._arm_when_ready and self._state.mode.mode is Mode.READY:
             self._arm_when_ready = False
             self.request(Request.ARM)
-        rhythm, start_s, clock = self._rhythm, now.wall_s, self._clock.host
-        spent_s = now.host_s + self._settings.cycle.perception_budget_s
+        rhythm, run_s, clock = self._rhythm, now.run_s, self._clock.host
+        refine_until_host_s = now.host_s + self._settings.cycle.perception_budget_s
         mark = rhythm.keeper.mark
         request, self._request = self._request, None
         drive_request, self._drive_request = self._drive_request, None
@@ -257,8 +257,8 @@ class RobotProcess:
         begun = rhythm.begin(now)
         fault = self.health.fault()
         inputs = gather(
-            self._driver, start_s, request, echo_age_s=begun.echo_age_s, overrun=rhythm.overrun, fault=fault,
-            edits=edits, drive_request=drive_request,
+            self._driver, run_s, request, echo_age_s=begun.echo_age_s, overrun=rhythm.overrun, fault=fault,
+            edits=edits, drive_request=drive_request, host_s=now.host_s,
         )  # fmt: skip
         mark(Phase.GATHER)
         before = self._state.mode
@@ -266,8 +266,8 @@ class RobotProcess:
             self._state,
             inputs,
             self._settings,
-            lambda command: self._carry_out(command, start_s + inputs.gap_max_s),
-            lambda _done: clock() < spent_s,
+            lambda command: self._carry_out(command, run_s + inputs.gap_max_s),
+            lambda _done: clock() < refine_until_host_s,
             mark,
         )
         if self._state.mode.entered_since(before):
@@ -280,7 +280,7 @@ class RobotProcess:
         if self._observers.on_cycle is not None:
             self._observers.on_cycle(record, self._state, rhythm.books, self._driver)
         if fault is None:
-            self._notifier.well(start_s)
+            self._notifier.well(run_s)
         mark(Phase.OBSERVERS)
 
     def _note_mode(self) -> None:
@@ -290,15 +290,15 @@ class RobotProcess:
         self._notifier.status(state.mode.value if state.reason is None else f"{state.mode.value}: {state.reason}")
         self._log.info("mode", mode=state.mode.value, reason=state.reason, cycle=self._state.cycle)
 
-    def _carry_out(self, command: Command, stale_s: float) -> None:
+    def _carry_out(self, command: Command, stale_run_s: float) -> None:
         """Put the command on the line, but no velocity decided too long ago; the next cycle stops for such a gap."""
         if not isinstance(command, Twist):
             give(self._driver, command)
             self._send()
-        elif self._clock() <= stale_s:
+        elif self._clock() <= stale_run_s:
             give(self._driver, command)
             self._send()
-            if self._clock() > stale_s:
+            if self._clock() > stale_run_s:
                 # Held up between the look at the clock and the line: a base that had stopped by itself was set in
                 # motion. The HALT is right behind.
                 self._halt()
@@ -307,7 +307,7 @@ class RobotProcess:
         if self._link.is_open and (data := self._driver.outgoing(writable=self._link.writable)):
             taken = self._link.send(data)
             if taken and self._observers.on_bytes is not None:
-                self._observers.on_bytes("out", self._clock(), data)
+                self._observers.on_bytes("out", self._clock.host(), data)
 
     def _halt(self) -> None:
         """Have the base told now, whatever else is under way; on a line that is gone, as soon as it is back."""
@@ -319,12 +319,12 @@ class RobotProcess:
         self._send()
 
     def _received(self, data: bytes) -> None:
-        now_s, waiting = self._clock(), self._driver.waiting
-        self._driver.receive(data, now_s)
+        (run_s, host_s), waiting = self._clock.both(), self._driver.waiting
+        self._driver.receive(data, run_s)
         if self._driver.waiting > waiting:
-            self._rhythm.hear(now_s)
+            self._rhythm.hear(run_s)
         if self._observers.on_bytes is not None:
-            self._observers.on_bytes("in", now_s, data)
+            self._observers.on_bytes("in", host_s, data)
 
     def _closed(self, reason: str) -> None:
         self._driver.closed()

@@ -55,9 +55,9 @@ StopCause: TypeAlias = Literal["budget", "quota", "converged", "nothing"]
 
 @dataclass(frozen=True, slots=True)
 class Inputs:
-    """Everything a cycle is told. `now_s` is the host's clock."""
+    """Everything a cycle takes in, at `run_s` of the run's clock."""
 
-    now_s: float
+    run_s: float
     line: LineState
     trouble: str | None
     heard: Heard
@@ -74,6 +74,8 @@ class Inputs:
     """What the operator wants driven from now on; None where that is as before."""
     edits: tuple[Edit, ...] = ()
     """What the operator does to what was perceived, in this order."""
+    host_s: float | None = None
+    """The same moment by the host's clock; None in virtual time. For the record only: no decision depends on it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,13 +95,13 @@ class State:
     mode: ModeState = field(default_factory=ModeState)
     leg: Leg | None = None
     odometry: Odometry | None = None
-    last_firing_s: float = 0.0
-    now_s: float | None = None
+    last_firing_robot_s: float = 0.0
+    run_s: float | None = None
     cycle: int = 0
     drive_request: DriveRequest = field(default_factory=Legs)
     """What is driven in DRIVE."""
-    drive_request_s: float = 0.0
-    """When the operator said so, by the host's clock."""
+    requested_run_s: float = 0.0
+    """When the operator said so, by the run's clock."""
     vectors: tuple[Response, ...] = ()
     """What the schemas answered in the last cycle, and their sum; nothing where none was asked."""
     standing: str | None = None
@@ -196,13 +198,13 @@ def _perceive(state: State, inputs: Inputs) -> int:
         state.odometry = None
         state.leg = None
         state.drive_request = after_a_stop(state.drive_request)  # a goal is a place in the odometry that was
-        state.last_firing_s = 0.0
+        state.last_firing_robot_s = 0.0
     if inputs.heard.odometry is not None:
         state.odometry = inputs.heard.odometry
     new_segments = 0
     for firing in inputs.heard.firings:
         new_segments += state.perception.observe(firing)
-        state.last_firing_s = firing.t_s
+        state.last_firing_robot_s = firing.t_s
     return new_segments
 
 
@@ -210,7 +212,7 @@ def _take_wish(state: State, inputs: Inputs) -> None:
     """Take over what the operator wants driven; the legs begin anew where they were done."""
     if inputs.drive_request is None or validate(inputs.drive_request) is not None:
         return
-    state.drive_request, state.drive_request_s = inputs.drive_request, inputs.now_s
+    state.drive_request, state.requested_run_s = inputs.drive_request, inputs.run_s
     if isinstance(inputs.drive_request, Legs) and state.leg is not None and state.leg.done:
         state.leg = None
 
@@ -232,10 +234,10 @@ def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
     """Go through modes and schemas and return what the base is told."""
     flags = Flags.NONE if state.odometry is None else state.odometry.flags
     before = state.mode
-    gap_s = 0.0 if state.now_s is None else inputs.now_s - state.now_s
-    state.now_s = inputs.now_s
+    gap_s = 0.0 if state.run_s is None else inputs.run_s - state.run_s
+    state.run_s = inputs.run_s
     situation = Situation(
-        inputs.now_s, inputs.line, inputs.trouble, flags, inputs.heard.rebooted, inputs.request,
+        inputs.run_s, inputs.line, inputs.trouble, flags, inputs.heard.rebooted, inputs.request,
         gap_s, inputs.gap_max_s, inputs.overrun, inputs.fault,
     )  # fmt: skip
     state.mode = advance(before, situation)
@@ -243,10 +245,10 @@ def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
         decision = _drive(state, inputs, settings)
         if isinstance(decision, Drive):
             return decision.twist
-        state.mode = state.mode.enter(Mode.SAFE_STOP, inputs.now_s, decision.reason)
+        state.mode = state.mode.enter(Mode.SAFE_STOP, inputs.run_s, decision.reason)
     if state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT} and state.mode.entered_since(before):
         return Order.HALT
-    if state.mode.arming_s is not None and before.arming_s is None:
+    if state.mode.arming_run_s is not None and before.arming_run_s is None:
         return Order.RELEASE
     return STANDSTILL if state.mode.mode is Mode.READY else None
 
@@ -256,7 +258,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings) -> Drive | Stop:
     odometry, behaviors = state.odometry, settings.behaviors
     if odometry is None:
         return Stop("no odometry has arrived: check that the base reports it, then re-arm")
-    silence = odometry.t_s - state.last_firing_s
+    silence = odometry.t_s - state.last_firing_robot_s
     patience = behaviors.avoid_static_obstacle.echo_age_max_s
     if silence > patience:
         likely = inputs.trouble or "check the ring's power and cable"
@@ -264,7 +266,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings) -> Drive | Stop:
     if state.leg is None:
         state.leg = Leg.starting_at(odometry.pose)
     percept = Percept(odometry.pose, state.perception.obstacles(odometry.t_s, patience))
-    driven = drive(state.drive_request, state.drive_request_s, inputs.now_s, state.leg, percept, settings)
+    driven = drive(state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings)
     state.drive_request, state.leg = driven.drive_request, driven.leg
     state.vectors, state.standing = driven.vectors, driven.standing
     return driven.decision

@@ -141,7 +141,7 @@ class Recorder:
 
     def on_cycle(self, record: CycleRecord, state: State) -> None:
         """Take a cycle, just over."""
-        now_s = record.inputs.now_s
+        run_s = record.inputs.run_s
         self._cycle = record.cycle
         if not self._on:
             return
@@ -149,23 +149,23 @@ class Recorder:
             # What follows is replayed from the state that this one left.
             self._begins, self._gap = False, True
         else:
-            self._hand(CYCLE, now_s, record)
+            self._hand(CYCLE, run_s, record)
         if self._last_keyframe_s is None:
-            self._last_keyframe_s = now_s
+            self._last_keyframe_s = run_s
         room = len(self._writer.queue) < self._queue_max
-        due = self._gap or self._writer.wants_keyframe or now_s - self._last_keyframe_s >= self._keyframe_s
+        due = self._gap or self._writer.wants_keyframe or run_s - self._last_keyframe_s >= self._keyframe_s
         if due and room:
             self._gap = self._writer.wants_keyframe = False
-            self._last_keyframe_s = now_s
+            self._last_keyframe_s = run_s
             seen = state.perception
             whole = MapSnapshot(
                 record.cycle, seen.segment_geometry(), seen.objects(), left_by(state), seen.snapshot()
             )
-            self._hand(KEYFRAME, now_s, whole)
+            self._hand(KEYFRAME, run_s, whole)
         elif record.cycle % self._moment_cycles == 0:
-            self._hand(SEGMENTS, now_s, MapSnapshot(record.cycle, segments=state.perception.segment_geometry()))
+            self._hand(SEGMENTS, run_s, MapSnapshot(record.cycle, segments=state.perception.segment_geometry()))
         elif record.cycle % self._moment_cycles == self._moment_cycles // 2:
-            self._hand(OBJECTS, now_s, MapSnapshot(record.cycle, objects=state.perception.objects()))
+            self._hand(OBJECTS, run_s, MapSnapshot(record.cycle, objects=state.perception.objects()))
 
     def on_bytes(self, way: str, host_s: float, data: bytes) -> None:
         """Take bytes that came or went over the line."""

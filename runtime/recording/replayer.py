@@ -202,7 +202,7 @@ class Replayer:
         verdict, before = self.verdict, self._last
         if before is not None and record.cycle != before[0] + 1:
             verdict.missing.append((before[0] + 1, record.cycle - 1))
-        self._last = (record.cycle, record.inputs.now_s)
+        self._last = (record.cycle, record.inputs.run_s)
         if self.state is None or record.cycle != self.state.cycle + 1:
             if before is None and self.state is not None:
                 verdict.missing.append((1, record.cycle - 1))
@@ -217,7 +217,7 @@ class Replayer:
         if verdict.first_cycle is None:
             verdict.first_cycle = record.cycle
         if before is not None:
-            verdict.recorded_s += record.inputs.now_s - before[1]
+            verdict.recorded_s += record.inputs.run_s - before[1]
         written = encode(Cycle.model_construct(record=replayed))
         # What an older program did not write yet is what it is where nobody says anything.
         if written != data and written != (recorded := encode(Cycle.model_construct(record=record))):

@@ -76,13 +76,13 @@ class Answers:
     def on_state(self, _record: CycleRecord, state: State, start: Pose) -> None:
         """Look at what is reported."""
         told = state.perception.objects()
-        if told is self._told or state.now_s is None:
+        if told is self._told or state.run_s is None:
             return
         self._told = told
         for place in (start.compose(Pose(seen.x, seen.y, seen.theta)) for seen in told):
             for i, drum in enumerate(self.world.drum):
                 if i not in self.when and math.hypot(place.x - drum.x_m, place.y - drum.y_m) <= GATE_M:
-                    self.when[i] = (state.now_s, self._way_m)
+                    self.when[i] = (state.run_s, self._way_m)
 
 
 def in_long_hall(settings: Settings) -> Settings:

@@ -17,20 +17,16 @@ from runtime.timing.run_clock import run_clock
 class ClockSample(NamedTuple):
     """What the clocks show at one moment."""
 
-    wall_s: float
+    run_s: float
+    """The run's clock."""
+    host_s: float
+    """The host's monotonic clock, by which work is measured: the two part where the run's time is held."""
     thread_s: float
     """CPU time of this thread."""
     process_s: float
     """CPU time of all threads of this process."""
     waits: int
     """How often this thread gave up the processor by itself."""
-    ahead_s: float = 0.0
-    """How far the host's clock is ahead of the run's, which `wall_s` is by: they part where time can be held."""
-
-    @property
-    def host_s(self) -> float:
-        """The moment by the host's clock: what work takes is counted by that one."""
-        return self.wall_s + self.ahead_s
 
 
 class ClockSampler:
@@ -48,6 +44,5 @@ class ClockSampler:
     def read(self) -> ClockSample:
         """Return what the clocks show now; about 5 µs."""
         waits = resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw
-        host_s = self._clock.host()
-        wall_s = self._clock.at(host_s)
-        return ClockSample(wall_s, time.thread_time(), time.process_time(), waits, host_s - wall_s)
+        run_s, host_s = self._clock.both()
+        return ClockSample(run_s, host_s, time.thread_time(), time.process_time(), waits)

@@ -53,15 +53,15 @@ class CycleScheduler:
         self.books = CycleStats(LATE_SHARE * self._period_s, is_touched=True)
         self.keeper = Timekeeper(self.books, self._read, lambda: self._watch.seen, callbacks)
 
-    def start(self, now_s: float, gap_max_s: float) -> AbstractContextManager[None]:
-        """Have the first cycle due at `now_s`, commands being `gap_max_s` apart at most; watch while inside."""
-        self._pacer = Pacer(now_s, self._period_s, self._step_s, PATIENCE_SHARE * gap_max_s)
+    def start(self, run_s: float, gap_max_s: float) -> AbstractContextManager[None]:
+        """Have the first cycle due at `run_s`, commands being `gap_max_s` apart at most; watch while inside."""
+        self._pacer = Pacer(run_s, self._period_s, self._step_s, PATIENCE_SHARE * gap_max_s)
         return self._watch.on_duty()
 
-    def hear(self, now_s: float) -> None:
+    def hear(self, run_s: float) -> None:
         """Take note that an echo has just been read from the line."""
         if self._pacer is not None:
-            self._pacer.hear(now_s, self.keeper.held_since_s)
+            self._pacer.hear(run_s, self.keeper.held_since_s)
             self._waker.wake()
 
     def wake(self) -> None:
@@ -79,15 +79,15 @@ class CycleScheduler:
         pacer = self._started()
         period_s, is_following = pacer.period_s, pacer.is_locked
         self._clock.begun()
-        begun = pacer.begin(now.wall_s)
+        begun = pacer.begin(now.run_s)
         self.keeper.begin(now, begun, period_s, is_following=is_following)
-        self._watch.expect(pacer.due_s + self.books.late_after_s - now.wall_s)
+        self._watch.expect(pacer.due_s + self.books.late_after_s - now.run_s)
         return begun
 
-    def end(self, now_s: float) -> float:
-        """End the cycle at `now_s`; return how long the next one leaves, s."""
+    def end(self, run_s: float) -> float:
+        """End the cycle at `run_s`; return how long the next one leaves, s."""
         self.keeper.end()
-        return self._started().advance(now_s) - now_s
+        return self._started().advance(run_s) - run_s
 
     def close(self) -> None:
         """Give the timer back; there is no further cycle."""

@@ -51,17 +51,17 @@ class Footprint:
         self._start_s = age_s()
         self._signatures = compiled_signatures()
         self._own_mb = own_mb()
-        self._wall_s = time.monotonic()
+        self._begin_host_s = time.monotonic()
         self._cpu_s = time.process_time()
 
     def close(self) -> FootprintRow:
         """Return what the run cost up to now."""
-        wall_s = time.monotonic() - self._wall_s
+        driven_s = time.monotonic() - self._begin_host_s
         cpu_s = time.process_time() - self._cpu_s
         now_mb, before_mb = own_mb(), self._own_mb
         return {
             "start_s": _rounded(self._start_s, 2),
-            "cpu_share": round(cpu_s / wall_s, 4) if wall_s > 0.0 else 0.0,
+            "cpu_share": round(cpu_s / driven_s, 4) if driven_s > 0.0 else 0.0,
             "rss_mb": _rounded(rss_mb(), 1),
             "rss_peak_mb": _rounded(peak_mb(), 1),
             "growth_mb": None if now_mb is None or before_mb is None else round(now_mb - before_mb, 2),

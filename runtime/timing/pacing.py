@@ -94,20 +94,20 @@ class Pacer:
         """True while cycles follow the echoes."""
         return self._is_locked
 
-    def hear(self, now_s: float, held_since_s: float | None = None) -> None:
+    def hear(self, run_s: float, held_since_s: float | None = None) -> None:
         """Take note of an echo: it begins the next cycle at once unless it comes too early for that.
 
         Parameters
         ----------
-        now_s : float
+        run_s : float
             When it was read, s.
         held_since_s : float, optional
             Since when nobody looked, s: it may have been there as long. Then it counts as having come when it was
             expected.
         """
-        arrived_s = now_s
+        arrived_s = run_s
         if held_since_s is not None:
-            arrived_s = min(now_s, max(self._due_s, held_since_s))
+            arrived_s = min(run_s, max(self._due_s, held_since_s))
         if self._begun_s is not None:
             # A deadline behind us means that nobody looked, whatever held the loop.
             arrived_s = min(arrived_s, max(self._deadline_s, self._begun_s))
@@ -116,31 +116,31 @@ class Pacer:
         self._echo_s = arrived_s
         if self._called_s is not None or not self._follows:
             return
-        if self._begun_s is None or now_s >= self._begun_s + self._earliest_s - ROUNDING:
+        if self._begun_s is None or run_s >= self._begun_s + self._earliest_s - ROUNDING:
             self._called_s = arrived_s
-            self._deadline_s = now_s
+            self._deadline_s = run_s
         else:
             self._plan(self._begun_s)
 
-    def begin(self, now_s: float) -> CycleStart:
-        """Begin a cycle at `now_s`, and plan the next one."""
+    def begin(self, run_s: float) -> CycleStart:
+        """Begin a cycle at `run_s`, and plan the next one."""
         due_s = self._deadline_s if self._called_s is None else self._called_s
         # What comes so late that it is too early for the next one to follow takes the next one's place.
-        missed = max(0, math.floor((now_s - self._due_s + EARLY * self._slot_s) / self.period_s + ROUNDING))
-        age_s = None if self._oldest_s is None else now_s - self._oldest_s
+        missed = max(0, math.floor((run_s - self._due_s + EARLY * self._slot_s) / self.period_s + ROUNDING))
+        age_s = None if self._oldest_s is None else run_s - self._oldest_s
         self.missed += missed
-        self._begun_s = now_s
+        self._begun_s = run_s
         self._called_s = self._oldest_s = None
-        self._plan(now_s)
-        return CycleStart(due_s, max(0.0, now_s - due_s), missed, age_s)
+        self._plan(run_s)
+        return CycleStart(due_s, max(0.0, run_s - due_s), missed, age_s)
 
-    def advance(self, now_s: float) -> float:
-        """End a cycle at `now_s`: leave out deadlines that have passed meanwhile, and return the one ahead."""
-        if self._called_s is None and self._deadline_s <= now_s:
-            behind = math.floor((now_s - self._deadline_s) / self.period_s + ROUNDING) + 1
+    def advance(self, run_s: float) -> float:
+        """End a cycle at `run_s`: leave out deadlines that have passed meanwhile, and return the one ahead."""
+        if self._called_s is None and self._deadline_s <= run_s:
+            behind = math.floor((run_s - self._deadline_s) / self.period_s + ROUNDING) + 1
             ahead_s = self._deadline_s + behind * self.period_s
             latest_s = math.inf if self._begun_s is None or not self._is_locked else self._begun_s + self._gap_s
-            self._deadline_s = max(now_s, min(ahead_s, latest_s))
+            self._deadline_s = max(run_s, min(ahead_s, latest_s))
         return self._deadline_s
 
     @property
@@ -169,8 +169,8 @@ class Pacer:
         else:
             self._due_s = self._deadline_s = begun_s + self._locked_s
 
-    def _hears(self, now_s: float) -> bool:
+    def _hears(self, run_s: float) -> bool:
         """Say whether there are echoes to follow."""
         if not self._follows or self._echo_s is None:
             return False
-        return now_s - self._echo_s <= LOST_STEPS * max(self._step_s, self._locked_s) + ROUNDING
+        return run_s - self._echo_s <= LOST_STEPS * max(self._step_s, self._locked_s) + ROUNDING

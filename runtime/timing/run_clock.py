@@ -44,6 +44,11 @@ class RunClock:
         """Return the run's time at a moment of the host's clock that is now."""
         return host_s
 
+    def both(self) -> tuple[float, float]:
+        """Return the present moment by the run's clock and by the host's, s."""
+        host_s = self.host()
+        return self.at(host_s), host_s
+
     def expect(self, due_s: float) -> float:
         """Take note of when the next cycle is due and return how long that is, s; inf where nobody knows.
 
@@ -114,9 +119,9 @@ class PacedClock(RunClock):
             return math.inf
         self._extend(due_s)
         host_s = self.host()
-        now_s = self.at(host_s)
-        if due_s <= now_s:
-            return due_s - now_s
+        run_s = self.at(host_s)
+        if due_s <= run_s:
+            return due_s - run_s
         return math.inf if due_s > self._lived_s else self.pace.host_at(due_s) - host_s
 
     def begun(self) -> None:
@@ -162,19 +167,19 @@ class PacedClock(RunClock):
     def step(self) -> None:
         """Let time go by, from where it is held, until the next cycle is due, and let that one begin."""
         self._turns = 1
-        now_s = self()
-        self._lived_s, self._told_s = now_s, -math.inf
-        self._change(TimeScale(self.host(), now_s, self.factor, max(now_s, self._due_s or now_s)))
+        run_s = self()
+        self._lived_s, self._told_s = run_s, -math.inf
+        self._change(TimeScale(self.host(), run_s, self.factor, max(run_s, self._due_s or run_s)))
 
     def go(self) -> None:
         """Let time go by from where it is held."""
         self._turns = None
         host_s = self.host()
-        now_s = self.at(host_s)
+        run_s = self.at(host_s)
         is_free = self.factor == 1.0
-        until_s = math.inf if is_free else max(now_s, self._due_s or now_s) + LEASE_S
-        self._lived_s = math.inf if is_free else now_s
-        self._change(TimeScale(host_s, now_s, self.factor, until_s))
+        until_s = math.inf if is_free else max(run_s, self._due_s or run_s) + LEASE_S
+        self._lived_s = math.inf if is_free else run_s
+        self._change(TimeScale(host_s, run_s, self.factor, until_s))
 
     def lived(self, run_s: float) -> None:
         """Take the emulator's word for how far its robot has lived, with what it sent by then on the line."""

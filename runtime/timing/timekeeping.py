@@ -40,7 +40,7 @@ class Span(NamedTuple):
     end: ClockSample
 
     @property
-    def wall_s(self) -> float:
+    def took_s(self) -> float:
         """How long it had the loop."""
         return self.end.host_s - self.begin.host_s
 
@@ -48,7 +48,7 @@ class Span(NamedTuple):
         """Return who kept it from working for most of its time, None where it was slow by itself."""
         if self.end.waits == self.begin.waits:
             return _robbed(self.begin, self.end)
-        return _beside(self.begin, self.end, self.wall_s)
+        return _beside(self.begin, self.end, self.took_s)
 
 
 class Latest(NamedTuple):
@@ -185,7 +185,7 @@ class Timekeeper:
 
     def latest(self) -> Latest:
         """Return how the newest cycle went, of whose phases those are known that have ended."""
-        phases_s = {s.name: s.wall_s for s in self._stretches if s.name in _PHASES}
+        phases_s = {s.name: s.took_s for s in self._stretches if s.name in _PHASES}
         return Latest(phases_s, 0.0 if self._begun is None else self._begun.late_s)
 
     def timing(self) -> Timing:
@@ -207,14 +207,14 @@ class Timekeeper:
         """Take note of a beginning: either the loop has been busy ever since the last end, or it paused."""
         last, self._last = self._last, now
         if last is None or now.thread_s - last.thread_s < MOSTLY * (now.host_s - last.host_s):
-            self._held_since_s = now.wall_s
+            self._held_since_s = now.run_s
 
     def _enter(self, stretch: Span) -> None:
         if len(self._stretches) == STRETCHES_MAX:
             del self._stretches[0]
         self._stretches.append(stretch)
         # What it left of the run's time, which does not go on beyond a cycle that takes long where it is held.
-        self._busy_s += stretch.end.wall_s - stretch.begin.wall_s
+        self._busy_s += stretch.end.run_s - stretch.begin.run_s
         self._last = stretch.end
 
     def _judge(self, now: ClockSample, begun: CycleStart) -> str:
@@ -224,10 +224,10 @@ class Timekeeper:
         is_late = begun.late_s > self._books.late_after_s
         untimed_s = begun.late_s if is_late else 0.0
         for stretch in self._stretches:
-            overlap_s = max(0.0, stretch.end.wall_s - max(begun.due_s, stretch.begin.wall_s)) if is_late else 0.0
+            overlap_s = max(0.0, stretch.end.run_s - max(begun.due_s, stretch.begin.run_s)) if is_late else 0.0
             untimed_s -= overlap_s
-            if (overlap_s, stretch.wall_s) > most:
-                blamed, most = stretch, (overlap_s, stretch.wall_s)
+            if (overlap_s, stretch.took_s) > most:
+                blamed, most = stretch, (overlap_s, stretch.took_s)
         sight = self._seen()
         if blamed is not None and most[0] >= untimed_s:
             inside = f" (in {sight.function})" if sight is not None and blamed.name == Phase.OBSERVERS.value else ""
@@ -238,7 +238,7 @@ class Timekeeper:
         if last is None:
             return OUTSIDE
         # The time to account for begins where the cycle was due; before that the loop had a right to sleep.
-        overdue_s = now.wall_s - max(last.wall_s, begun.due_s)
+        overdue_s = now.run_s - max(last.run_s, begun.due_s)
         if now.thread_s - last.thread_s > MOSTLY * overdue_s:
             return UNTIMED
         return _beside(last, now, overdue_s) or OUTSIDE
@@ -246,10 +246,10 @@ class Timekeeper:
 
 def _robbed(begin: ClockSample, end: ClockSample) -> str | None:
     """Return who had the time between two readings, None where the thread had most of it."""
-    wall_s = end.host_s - begin.host_s
-    if end.thread_s - begin.thread_s > MOSTLY * wall_s:
+    took_s = end.host_s - begin.host_s
+    if end.thread_s - begin.thread_s > MOSTLY * took_s:
         return None
-    return _beside(begin, end, wall_s) or OUTSIDE
+    return _beside(begin, end, took_s) or OUTSIDE
 
 
 def _beside(begin: ClockSample, end: ClockSample, span_s: float) -> str | None:

@@ -43,15 +43,15 @@ def decoder(data: bytes) -> None:
 
 def driver(data: bytes) -> None:
     """A robot that says anything at all, in frames with good checksums: the driver believes it or not, and lives."""
-    robot, now_s, rest = make_driver(ROBOT), 0.0, data
-    robot.opened(now_s)
+    robot, run_s, rest = make_driver(ROBOT), 0.0, data
+    robot.opened(run_s)
     while rest:
         length, rest = rest[0] % 48, rest[1:]
         body, rest = rest[:length], rest[length:]
-        now_s += length * 0.01
+        run_s += length * 0.01
         said = encode(Ident(0, 1, 24, 381, 500, 20, length % 3, "denning")) if length % 7 == 0 else framed(body)
-        robot.receive(said, now_s)
-        robot.tick(now_s)
+        robot.receive(said, run_s)
+        robot.tick(run_s)
         robot.drive(Twist(0.1, -0.1))
         if length % 11 == 0:
             robot.halt()

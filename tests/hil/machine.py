@@ -39,11 +39,11 @@ if hasattr(os, "sched_setaffinity"):
 before_s = time.monotonic()
 while True:
     time.sleep(0.02)
-    now_s = time.monotonic()
-    if now_s - before_s - 0.02 > float(sys.argv[2]):
-        sys.stdout.write(f"{now_s - before_s - 0.02:.3f}\\n")
+    host_s = time.monotonic()
+    if host_s - before_s - 0.02 > float(sys.argv[2]):
+        sys.stdout.write(f"{host_s - before_s - 0.02:.3f}\\n")
         sys.stdout.flush()
-    before_s = now_s
+    before_s = host_s
 """
 
 

@@ -84,8 +84,8 @@ class Operator:
         self.loop.call_soon_threadsafe(self.process.request, Request.HALT)
         while not self.halted.is_set() and last_s < asked_s + PATIENCE_S:
             time.sleep(TURN_S)
-            now_s = time.monotonic()
-            worst_s, last_s = max(worst_s, now_s - last_s - TURN_S), now_s
+            host_s = time.monotonic()
+            worst_s, last_s = max(worst_s, host_s - last_s - TURN_S), host_s
         return self.halted_s - asked_s, worst_s
 
 
@@ -109,9 +109,9 @@ async def halts(folder: Path, monkeypatch: pytest.MonkeyPatch, trials: int) -> O
         if mode.mode is Mode.DRIVE:
             if operator.asked_s is None:
                 operator.drives.set()
-            while time.monotonic() < record.inputs.now_s + BUSY_S:
+            while time.monotonic() < record.inputs.run_s + BUSY_S:
                 pass
-        elif mode.arming_s is None and operator.asked_s is None:
+        elif mode.arming_run_s is None and operator.asked_s is None:
             process.request(Request.ARM)
 
     with Recorder(settings, OneFile(folder / "run.mcap")) as recorder:

@@ -38,11 +38,11 @@ from drivers.emulator.pty_transport import PtyPort
 from runtime.cli.app import main
 decoder, write, log = Decoder("robot"), PtyPort.write, open(sys.argv[1], "w", buffering=1)
 def told(port, data):
-    now_s = time.monotonic()
+    host_s = time.monotonic()
     write(port, data)
     for frame in decoder.feed(data):
         if isinstance(frame, Echo):
-            log.write(f"{frame.t_us} {now_s!r}\\n")
+            log.write(f"{frame.t_us} {host_s!r}\\n")
 PtyPort.write = told
 main(["emulate", "--config", "hallway", "--link", sys.argv[2]])
 """
@@ -87,10 +87,10 @@ def news(ages_s: list[float]) -> Iterator[str]:
     pending = bytearray()
 
     def hear() -> None:
-        now_s = time.monotonic()
+        host_s = time.monotonic()
         pending.extend(os.read(master, 4096))
         *words, rest = pending.split(b"\n")
-        ages_s.extend(now_s - float(word) for word in words)
+        ages_s.extend(host_s - float(word) for word in words)
         pending[:] = rest
 
     asyncio.get_running_loop().add_reader(master, hear)
@@ -111,7 +111,7 @@ async def test_an_echo_waits_for_no_timer(tmp_path: Path) -> None:
 
     def note(record: CycleRecord, *_: State | CycleStats | RobotDriver) -> None:
         for firing in record.inputs.heard.firings:
-            began[round(firing.t_s * 1e6)] = record.inputs.now_s
+            began[round(firing.t_s * 1e6)] = record.inputs.run_s
         if record.inputs.echo_age_s is not None:
             waited_s.append(record.inputs.echo_age_s)
         if len(began) >= ECHOES:

@@ -56,10 +56,10 @@ class Drive:
         """Arm until it drives; a busy machine may have stopped it once more by itself."""
         end_s, armed_s = time.monotonic() + PATIENCE_S, 0.0
         while not self.truth.read()[-1].driving:
-            now_s = time.monotonic()
-            assert now_s < end_s, (self.run.modes(), self.run.err)
-            if now_s - armed_s > 2.0 and self.run.modes()[-1:] in (["SAFE_STOP"], ["READY"]):
-                armed_s = now_s
+            host_s = time.monotonic()
+            assert host_s < end_s, (self.run.modes(), self.run.err)
+            if host_s - armed_s > 2.0 and self.run.modes()[-1:] in (["SAFE_STOP"], ["READY"]):
+                armed_s = host_s
                 self.run.signal(signal.SIGUSR1)
             time.sleep(0.01)
 

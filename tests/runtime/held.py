@@ -33,9 +33,9 @@ class HeldLink(MemoryLink):
     is_hung = False
 
     def live(self) -> bytes:
-        now_s = self.governor.now_s(self._loop.time())
-        data = self._robot.advance(now_s - self._begin_s)
-        for line in self.governor.lived(now_s).splitlines():
+        run_s = self.governor.now_s(self._loop.time())
+        data = self._robot.advance(run_s - self._begin_s)
+        for line in self.governor.lived(run_s).splitlines():
             self._loop.call_soon(self.control.heard, line)
         return data
 

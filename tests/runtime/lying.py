@@ -43,21 +43,21 @@ class Run:
         self.state = State(Perception(settings.ring, settings.models, settings.perception))
 
     @property
-    def now_s(self) -> float:
+    def run_s(self) -> float:
         return self.cycles / self.settings.cycle.rate_hz
 
     def cycle(self) -> CycleRecord:
         self.cycles += 1
-        self.line.exchange(self.now_s)
+        self.line.exchange(self.run_s)
         request = Request.ARM if self.arms and self.state.mode.mode is Mode.READY else None
-        inputs = gather(self.driver, self.now_s, request)
+        inputs = gather(self.driver, self.run_s, request)
         record = step(self.state, inputs, self.settings, lambda c: give(self.driver, c), enough_quanta)
         self.firings += inputs.heard.firings
         self.notes += inputs.heard.notes
         return record
 
-    def until(self, now_s: float) -> None:
-        while self.now_s < now_s:
+    def until(self, run_s: float) -> None:
+        while self.run_s < run_s:
             self.cycle()
 
     def objects_ft(self) -> list[tuple[float, float]]:

@@ -45,7 +45,7 @@ class Script:
     settings: Settings = SETTINGS
     quanta: int = 50
     log: list[object] = field(default_factory=list)
-    now_s: float = 100.0
+    run_s: float = 100.0
     robot_s: float = 7.0
     pose: Pose = HERE
     drive_request: DriveRequest | None = None
@@ -71,13 +71,13 @@ class Script:
         rebooted: bool = False,
     ) -> CycleRecord:
         """Run one cycle; 3 m of free space around the robot."""
-        self.now_s += PERIOD_S
+        self.run_s += PERIOD_S
         self.robot_s += PERIOD_S
         sensors = len(self.settings.ring.mounts)
         firings = (Firing(self.robot_s, self.pose, 0.0, np.full(sensors, 3.0)),) if firing else ()
         told = Odometry(self.robot_s, self.pose, 0.0, Twist(0.0, 0.0), flags, 0) if odometry else None
         inputs = Inputs(
-            self.now_s, line, trouble, Heard(firings, told, rebooted), request, drive_request=self.drive_request
+            self.run_s, line, trouble, Heard(firings, told, rebooted), request, drive_request=self.drive_request
         )
         self.log.clear()
         return step(self.state, inputs, self.settings, lambda c: self.log.append(("command", c)), self.may_refine)

@@ -31,13 +31,13 @@ class _Selector(selectors.SelectSelector):
 
     def __init__(self) -> None:
         super().__init__()
-        self.now_s = 100.0
+        self.host_s = 100.0
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         ready = super().select(0.0)
         if not ready:
             assert timeout is not None, "nothing will ever happen again"
-            self.now_s += max(0.0, timeout)
+            self.host_s += max(0.0, timeout)
         return ready
 
 
@@ -51,11 +51,11 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         self._clock_resolution = 1e-7
 
     def time(self) -> float:
-        return self.clock_of.now_s
+        return self.clock_of.host_s
 
     def spend(self, seconds: float) -> None:
         """Let time pass as if something had held the loop."""
-        self.clock_of.now_s += seconds
+        self.clock_of.host_s += seconds
 
 
 class MemoryLink:

@@ -55,12 +55,12 @@ def test_what_is_not_used_is_not_saved_up() -> None:
 
 
 def test_processor_time_begins_anew_each_cycle() -> None:
-    now_s = 0.0
+    spent_s = 0.0
 
     def clock() -> float:
-        nonlocal now_s
-        now_s += 0.001  # a quantum between two looks
-        return now_s
+        nonlocal spent_s
+        spent_s += 0.001  # a quantum between two looks
+        return spent_s
 
     assert asked(ProcessorTime(0.0035, clock), 3) == [3, 3, 3]
     assert asked(ProcessorTime(0.0, clock), 2) == [0, 0]

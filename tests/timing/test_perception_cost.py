@@ -121,7 +121,7 @@ class VirtualClock:
     """A clock that only quanta move."""
 
     def __init__(self, quantum_s: float) -> None:
-        self.now_s, self.quantum_s = 0.0, quantum_s
+        self.spent_s, self.quantum_s = 0.0, quantum_s
 
 
 class Clocked(Perception):
@@ -130,7 +130,7 @@ class Clocked(Perception):
     clock: VirtualClock
 
     def refine(self) -> int:
-        self.clock.now_s += self.clock.quantum_s
+        self.clock.spent_s += self.clock.quantum_s
         return super().refine()
 
 
@@ -140,12 +140,12 @@ def budgeted(records: list[CycleRecord], budget_s: float, quantum_s: float) -> I
     clock = perception.clock = VirtualClock(quantum_s)
     state = State(perception)
     for record in records:
-        begin_s = clock.now_s
+        begin_s = clock.spent_s
 
         def may_refine(_done: int, begin_s: float = begin_s) -> bool:
-            return clock.now_s - begin_s < budget_s
+            return clock.spent_s - begin_s < budget_s
 
-        yield step(state, record.inputs, MANY_QUANTA, lambda _c: None, may_refine), clock.now_s - begin_s
+        yield step(state, record.inputs, MANY_QUANTA, lambda _c: None, may_refine), clock.spent_s - begin_s
 
 
 @pytest.mark.parametrize("budget_s", [0.0001, 0.001, 0.0015, 0.0025])

@@ -91,7 +91,7 @@ def recorded(settings: Settings, seed: int, path: Path) -> SeedOutcome:
     with Recorder(settings, OneFile(path), clock=lambda: now[0], queue_max=QUEUE_MAX, emulated=True) as recorder:
 
         def on_state(record: CycleRecord, state: State, _start: Pose) -> None:
-            now[0] = record.inputs.now_s
+            now[0] = record.inputs.run_s
             recorder.on_cycle(record, state)
 
         if settings.world is None:

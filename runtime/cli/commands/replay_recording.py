@@ -193,13 +193,13 @@ def watching(recording: Recording, span: Span, units: Units) -> Iterator[tuple[O
             driver.take()
 
     def on_cycle(record: CycleRecord, state: State) -> None:
-        recorded_s, now_s = record.inputs.now_s, time.monotonic()
+        recorded_s, host_s = record.inputs.run_s, time.monotonic()
         if not begun:
-            begun.append((recorded_s, now_s))
+            begun.append((recorded_s, host_s))
         due_s = begun[0][1] + (recorded_s - begun[0][0]) / (span.speed or math.inf)
-        if due_s > now_s:
-            time.sleep(due_s - now_s)
-        books.enter(0.0, max(0.0, now_s - due_s))
+        if due_s > host_s:
+            time.sleep(due_s - host_s)
+        books.enter(0.0, max(0.0, host_s - due_s))
         if view is not None:
             view.on_cycle(record, state, books, driver)
 

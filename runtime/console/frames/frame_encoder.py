@@ -128,7 +128,7 @@ class FrameEncoder:
             "mode": state.mode.mode.value,
             "reason": state.mode.reason,
             "hold_reason": state.standing,
-            "arming": state.mode.arming_s is not None,
+            "arming": state.mode.arming_run_s is not None,
             "pose": [0.0, 0.0, 0.0],
             "ring_yaw": 0.0,
             "twist": [0.0, 0.0],

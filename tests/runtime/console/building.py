@@ -24,7 +24,7 @@ def told(shown: Shown) -> dict[str, Any]:
         "cycle": shown.record.cycle,
         "record": hash(encode(Cycle.model_construct(record=shown.record))),
         "memory": hash(b"".join(name.encode() + array.tobytes() for name, array in sorted(memory.items()))),
-        "left": repr((shown.state.mode, shown.state.leg, shown.state.odometry, shown.state.now_s)),
+        "left": repr((shown.state.mode, shown.state.leg, shown.state.odometry, shown.state.run_s)),
     }
 
 

@@ -84,7 +84,7 @@ def test_a_thousand_halts_at_any_moment(monkeypatch: pytest.MonkeyPatch, measure
                 if not asking and rng.random() < 0.5:
                     asking.append(True)
                     soon()
-            elif not pending and mode.arming_s is None:
+            elif not pending and mode.arming_run_s is None:
                 asking.clear()
                 process.request(Request.ARM)
             loop.spend(rng.choice(SOME_BUSY))

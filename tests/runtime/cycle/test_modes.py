@@ -33,7 +33,7 @@ FAULT = ModeState(Mode.FAULT, 50.0, "a fault")
 
 
 def arming(state: ModeState, for_s: float) -> ModeState:
-    return replace(state, arming_s=NOW - for_s)
+    return replace(state, arming_run_s=NOW - for_s)
 
 
 def line(state: LineState, trouble: str | None = None) -> Situation:
@@ -83,7 +83,7 @@ TRANSITIONS = [
     (DRIVE, flags(Flags.LATCHED), Mode.SAFE_STOP, "latched", False),
     (DRIVE, flags(Flags.DEADMAN), Mode.SAFE_STOP, "deadman", False),
     (DRIVE, flags(Flags.BATTERY_LOW), Mode.DRIVE, None, False),
-    (replace(DRIVE, since_s=NOW - 0.5 * DEADMAN_GRACE_S), flags(Flags.DEADMAN), Mode.DRIVE, None, False),
+    (replace(DRIVE, entered_run_s=NOW - 0.5 * DEADMAN_GRACE_S), flags(Flags.DEADMAN), Mode.DRIVE, None, False),
     (DRIVE, replace(QUIET, gap_s=GAP_MAX_S), Mode.DRIVE, None, False),
     (DRIVE, replace(QUIET, gap_s=1.01 * GAP_MAX_S), Mode.SAFE_STOP, "held up for 0.5 s", False),
     (arming(READY, WAITED), replace(QUIET, gap_s=3.0), Mode.SAFE_STOP, "held up for 3.0 s", False),
@@ -122,18 +122,18 @@ def test_transition(before: ModeState, seen: Situation, mode: Mode, reason: str 
     after = advance(before, seen)
     assert after.mode is mode
     assert (after.reason is None) if reason is None else (after.reason is not None and reason in after.reason)
-    assert (after.arming_s is not None) == is_arming
+    assert (after.arming_run_s is not None) == is_arming
     if mode is not before.mode and mode is not Mode.CONNECTING:
-        assert after.since_s == NOW
+        assert after.entered_run_s == NOW
 
 
 def test_a_part_that_has_failed_ends_every_mode_but_a_fault_and_an_arm_changes_nothing() -> None:
     seen = replace(QUIET, fault="the part `link` has ended")
     for before in (CONNECTING, READY, DRIVE, STOPPED, arming(READY, WAITED), arming(STOPPED, WAITED)):
         after = advance(before, seen)
-        assert (after.mode, after.reason, after.since_s) == (Mode.SAFE_STOP, seen.fault, NOW)
-        assert after.arming_s is None
-        later = replace(seen, now_s=NOW + 0.05)
+        assert (after.mode, after.reason, after.entered_run_s) == (Mode.SAFE_STOP, seen.fault, NOW)
+        assert after.arming_run_s is None
+        later = replace(seen, run_s=NOW + 0.05)
         assert advance(after, later) == after, "it is entered once"
         armed = advance(after, replace(later, request=Request.ARM))
         assert armed == ModeState(Mode.SAFE_STOP, NOW + 0.05, seen.fault), "and told again to whoever arms"
@@ -158,7 +158,7 @@ def test_the_table_shows_every_mode_from_every_other_that_leads_there() -> None:
 
 situations = st.builds(
     Situation,
-    now_s=st.sampled_from([0.02, 0.05, 0.3, 1.5]),  # how long after the one before
+    run_s=st.sampled_from([0.02, 0.05, 0.3, 1.5]),  # how long after the one before
     line=st.sampled_from([LineState.READY] * 8 + list(LineState)),
     trouble=st.sampled_from([None, "some trouble"]),
     flags=st.sampled_from([Flags.NONE] * 6 + list(Flags)),
@@ -169,10 +169,10 @@ situations = st.builds(
 
 @given(st.lists(situations, min_size=5, max_size=40), st.sampled_from([CONNECTING, READY, DRIVE, STOPPED, FAULT]))
 def test_motion_never_resumes_by_itself(steps: list[Situation], begin: ModeState) -> None:
-    state, now_s, armed = begin, NOW, False
+    state, run_s, armed = begin, NOW, False
     for step in steps:
-        now_s += step.now_s
-        seen = replace(step, now_s=now_s, gap_s=step.now_s)
+        run_s += step.run_s
+        seen = replace(step, run_s=run_s, gap_s=step.run_s)
         before, state = state, advance(state, seen)
         if begin.mode is Mode.FAULT:
             assert state == begin
@@ -190,7 +190,7 @@ def test_motion_never_resumes_by_itself(steps: list[Situation], begin: ModeState
         taken_back = seen.request in {Request.HALT, Request.DISARM}
         if state.mode is Mode.DRIVE or taken_back or seen.line is not LineState.READY:
             armed = False
-        if before.arming_s is not None and state.mode is Mode.SAFE_STOP and state.since_s == now_s:
+        if before.arming_run_s is not None and state.mode is Mode.SAFE_STOP and state.entered_run_s == run_s:
             armed = False
 
 
@@ -199,7 +199,7 @@ def test_cycles_that_overrun_too_often_stop_a_drive_and_end_an_arming() -> None:
     seen = replace(QUIET, overrun=reason)
     stopped = advance(ModeState(Mode.DRIVE, NOW - 5.0), seen)
     assert (stopped.mode, stopped.reason) == (Mode.SAFE_STOP, reason)
-    arming = advance(ModeState(Mode.READY, NOW - 5.0, arming_s=NOW - 0.2), seen)
+    arming = advance(ModeState(Mode.READY, NOW - 5.0, arming_run_s=NOW - 0.2), seen)
     assert (arming.mode, arming.reason) == (Mode.SAFE_STOP, reason)
     assert advance(ModeState(Mode.READY, NOW - 5.0), seen).mode is Mode.READY
     assert advance(ModeState(Mode.DRIVE, NOW - 5.0), replace(seen, request=Request.HALT)).reason != reason
@@ -208,10 +208,10 @@ def test_cycles_that_overrun_too_often_stop_a_drive_and_end_an_arming() -> None:
 @pytest.mark.parametrize(
     ("before", "seen", "mode"),
     [
-        (replace(READY, arming_s=0.0), replace(QUIET, now_s=ARMING_MIN_S), Mode.DRIVE),
-        (replace(READY, arming_s=0.0), replace(flags(Flags.LATCHED), now_s=ARMING_MAX_S), Mode.READY),
-        (replace(READY, arming_s=0.0), replace(QUIET, now_s=1.0, gap_s=GAP_MAX_S), Mode.DRIVE),
-        (replace(DRIVE, since_s=0.0), replace(flags(Flags.DEADMAN), now_s=DEADMAN_GRACE_S), Mode.DRIVE),
+        (replace(READY, arming_run_s=0.0), replace(QUIET, run_s=ARMING_MIN_S), Mode.DRIVE),
+        (replace(READY, arming_run_s=0.0), replace(flags(Flags.LATCHED), run_s=ARMING_MAX_S), Mode.READY),
+        (replace(READY, arming_run_s=0.0), replace(QUIET, run_s=1.0, gap_s=GAP_MAX_S), Mode.DRIVE),
+        (replace(DRIVE, entered_run_s=0.0), replace(flags(Flags.DEADMAN), run_s=DEADMAN_GRACE_S), Mode.DRIVE),
     ],
     ids=["waited just long enough", "the latch has its whole second", "a gap as long as may be", "grace to its end"],
 )
@@ -230,8 +230,8 @@ def test_modes_and_requests_are_called_what_logs_and_summaries_call_them() -> No
 
 
 def test_a_mode_entered_again_is_entered() -> None:
-    assert (CONNECTING.mode, CONNECTING.since_s) == (Mode.CONNECTING, 0.0)
+    assert (CONNECTING.mode, CONNECTING.entered_run_s) == (Mode.CONNECTING, 0.0)
     assert not DRIVE.entered_since(DRIVE)
-    assert not replace(DRIVE, arming_s=1.0, reason="another").entered_since(DRIVE)
+    assert not replace(DRIVE, arming_run_s=1.0, reason="another").entered_since(DRIVE)
     assert DRIVE.enter(Mode.DRIVE, NOW).entered_since(DRIVE)
     assert STOPPED.entered_since(DRIVE)

@@ -32,24 +32,24 @@ class ModesMachine(RuleBasedStateMachine):
         self.entries: list[Mode] = [Mode.CONNECTING]
 
     def cycle(self, request: Request | None = None, *, gap_s: float = CYCLE_S, rebooted: bool = False) -> None:
-        now_s = self.seen.now_s + gap_s
-        self.seen = replace(self.seen, now_s=now_s, request=request, gap_s=gap_s, rebooted=rebooted)
+        run_s = self.seen.run_s + gap_s
+        self.seen = replace(self.seen, run_s=run_s, request=request, gap_s=gap_s, rebooted=rebooted)
         before, self.state = self.state, advance(self.state, self.seen)
         after = self.state
         if after.mode is not before.mode:
             self.entries.append(after.mode)
         if request is Request.ARM and self.seen.line is LineState.READY and self.armed_s is None:
-            self.armed_s = now_s
+            self.armed_s = run_s
         if after.mode is Mode.DRIVE and before.mode is not Mode.DRIVE:
             assert self.armed_s is not None, "motion resumed by itself"
-            assert ARMING_MIN_S <= now_s - self.armed_s <= ARMING_MAX_S + gap_s
+            assert ARMING_MIN_S <= run_s - self.armed_s <= ARMING_MAX_S + gap_s
             assert before.mode in {Mode.READY, Mode.SAFE_STOP}
         if request is Request.HALT:
             assert after.mode is not Mode.DRIVE, "a HALT is never overruled"
         if before.mode is Mode.DRIVE and after.mode is not Mode.DRIVE:
             assert after.mode is Mode.SAFE_STOP or (after.mode is Mode.READY and request is Request.DISARM)
-            assert after.since_s == now_s
-        given_up = before.arming_s is not None and after.arming_s is None
+            assert after.entered_run_s == run_s
+        given_up = before.arming_run_s is not None and after.arming_run_s is None
         taken_back = request in {Request.HALT, Request.DISARM}
         if after.mode is Mode.DRIVE or taken_back or self.seen.line is not LineState.READY or given_up:
             self.armed_s = None
@@ -88,7 +88,7 @@ class ModesMachine(RuleBasedStateMachine):
     def disarm(self) -> None:
         self.cycle(Request.DISARM)
         assert self.state.mode is not Mode.DRIVE
-        assert self.state.arming_s is None
+        assert self.state.arming_run_s is None
 
     @rule()
     def reboot(self) -> None:
@@ -122,12 +122,12 @@ class ModesMachine(RuleBasedStateMachine):
         if state.mode is Mode.DRIVE:
             assert seen.line is LineState.READY
             assert state.reason is None
-            assert state.arming_s is None
+            assert state.arming_run_s is None
         if state.mode is Mode.SAFE_STOP:
             assert state.reason
             assert "\n" not in state.reason
         assert state.mode is not Mode.FAULT
-        assert state.since_s <= seen.now_s
+        assert state.entered_run_s <= seen.run_s
 
 
 ModesMachine.TestCase.settings = settings(max_examples=150, stateful_step_count=40, deadline=None)

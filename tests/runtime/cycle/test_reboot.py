@@ -42,7 +42,7 @@ class Run:
     down_s: float
     method: Literal["paper", "bayes"] = "paper"
     clock_start_us: int = 0
-    now_s: float = 0.0
+    run_s: float = 0.0
     firings: list[Firing] = field(default_factory=list)
     records: list[CycleRecord] = field(default_factory=list)
     truths: list[GroundTruth] = field(default_factory=list)
@@ -60,9 +60,9 @@ class Run:
         self.state = State(Perception(settings.ring, settings.models, settings.perception))
 
     def cycle(self, request: Request | None = None) -> CycleRecord:
-        self.now_s = (len(self.records) + 1) * PERIOD_S
-        self.line.exchange(self.now_s)
-        inputs = gather(self.driver, self.now_s, request)
+        self.run_s = (len(self.records) + 1) * PERIOD_S
+        self.line.exchange(self.run_s)
+        inputs = gather(self.driver, self.run_s, request)
         record = step(self.state, inputs, self.settings, lambda c: give(self.driver, c), enough_quanta)
         self.firings += inputs.heard.firings
         self.records.append(record)
@@ -70,9 +70,9 @@ class Run:
         return record
 
     def until(self, done: Callable[[], bool], patience_s: float, request: Request | None = None) -> None:
-        give_up_s = self.now_s + patience_s
+        give_up_s = self.run_s + patience_s
         while not done():
-            assert self.now_s < give_up_s, (self.state.mode, self.driver.state, self.driver.trouble)
+            assert self.run_s < give_up_s, (self.state.mode, self.driver.state, self.driver.trouble)
             self.cycle(request)
             request = None
 
@@ -90,9 +90,9 @@ class Run:
     def go_through_the_reboot(self) -> float:
         """Drive up to the reboot and through it, unarmed; return after how long the program stood in SAFE_STOP."""
         self.drive()
-        self.until(lambda: self.now_s >= self.reboot_s, self.reboot_s + 1.0)
+        self.until(lambda: self.run_s >= self.reboot_s, self.reboot_s + 1.0)
         self.until(lambda: self.mode is Mode.SAFE_STOP, 2.0)
-        stopped_s = self.now_s - self.reboot_s
+        stopped_s = self.run_s - self.reboot_s
         if not any(record.inputs.heard.rebooted for record in self.records):
             self.until(self.reboot_seen, self.down_s + 2.0)
         return stopped_s
@@ -125,13 +125,13 @@ def test_at_any_phase_it_stands_until_it_is_re_armed(measured: Callable[[str], N
         # The map is empty at that moment, and clock and odometry begin again.
         assert not run.state.perception.objects()
         assert run.state.perception.counts.segments == 0
-        seen_s, before = run.now_s, len(run.firings)
+        seen_s, before = run.run_s, len(run.firings)
         run.until(lambda: len(run.firings) > before, 1.0)  # noqa: B023 - called within the turn
-        worst_echo_s = max(worst_echo_s, run.now_s - seen_s)
+        worst_echo_s = max(worst_echo_s, run.run_s - seen_s)
         assert run.driver.state is LineState.READY, "the pattern was sent again"
 
         # It stands, however long nobody arms it.
-        run.until(lambda: run.now_s >= run.reboot_s + run.down_s + 3.0, 9.0)  # noqa: B023
+        run.until(lambda: run.run_s >= run.reboot_s + run.down_s + 3.0, 9.0)  # noqa: B023
         assert run.mode is Mode.SAFE_STOP
         late = [t for t in run.truths if t.emulated_s > reboot_s + STANDS_WITHIN_S]
         assert late
@@ -162,8 +162,8 @@ def test_no_jump_in_the_map(method: Literal["paper", "bayes"], measured: Callabl
     assert world is not None
     drums = np.array([in_frame_of(origin, (drum.x_m, drum.y_m)) for drum in world.drum])
     worst_ft, seen = 0.0, 0
-    give_up_s = run.now_s + 14.0
-    while run.now_s < give_up_s:
+    give_up_s = run.run_s + 14.0
+    while run.run_s < give_up_s:
         run.cycle()
         for found in run.state.perception.objects():
             seen += 1
@@ -179,11 +179,11 @@ def test_a_restart_as_the_clock_wraps_is_seen_by_the_silent_ring(measured: Calla
     """The one moment when the clock does not tell: just as it would have begun anew by itself."""
     run = Run(3.0, 0.0, clock_start_us=2**32 - 3_000_000)
     run.drive()
-    run.until(lambda: run.now_s >= 3.0, 4.0)
+    run.until(lambda: run.run_s >= 3.0, 4.0)
     run.until(run.reboot_seen, 1.5)
     assert run.mode is Mode.SAFE_STOP
     assert not run.state.perception.objects()
-    seen_s = run.now_s - run.reboot_s
+    seen_s = run.run_s - run.reboot_s
     before = len(run.firings)
     run.until(lambda: len(run.firings) > before, 1.0)
     measured(f"a restart hidden by the clock's wrap: seen after {seen_s:.2f} s")

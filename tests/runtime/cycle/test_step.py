@@ -71,9 +71,9 @@ def test_deadman_after_its_grace() -> None:
 def test_held_up_for_longer_than_the_deadman_it_does_not_drive_on_what_it_knew() -> None:
     """As after SIGSTOP and SIGCONT: what waits in the buffer first is from before the base stopped by itself."""
     script = Script().driving()
-    script.now_s += 0.3
+    script.run_s += 0.3
     assert isinstance(script.cycle().command, Twist)
-    script.now_s += 0.6
+    script.run_s += 0.6
     record = script.cycle()
     assert (record.mode.mode, record.command) == (Mode.SAFE_STOP, Order.HALT)
     assert "held up for 0.6 s" in str(record.mode.reason) or "held up for 0.7 s" in str(record.mode.reason)

@@ -66,7 +66,7 @@ def left_behind(state: State) -> object:
         perception.outline.segments, perception.outline.times, perception.outline.alive,
         perception.candidates.poses, perception.candidates.rested, perception.clusters.centres,
     ]  # fmt: skip
-    return bits([*arrays, perception.objects(), state.mode, state.leg, state.odometry, state.last_firing_s])
+    return bits([*arrays, perception.objects(), state.mode, state.leg, state.odometry, state.last_firing_robot_s])
 
 
 def fresh() -> State:
@@ -151,11 +151,11 @@ def test_refinement_of_one_cycle_resumes_where_the_last_one_stood(drive: Drive) 
     rested = []
     for quanta in (1, 3, 10_000):
         state, _ = played(echoes, lambda _done: False)
-        total, cycles, now_s = 0, 0, echoes[-1].inputs.now_s
+        total, cycles, run_s = 0, 0, echoes[-1].inputs.run_s
         while state.perception.can_refine:
-            now_s += PERIOD_S
+            run_s += PERIOD_S
             cycles += 1
-            inputs = Inputs(now_s, LineState.READY, None, NOTHING)
+            inputs = Inputs(run_s, LineState.READY, None, NOTHING)
             record = step(state, inputs, SETTINGS, lambda _c: None, partial(operator.gt, quanta))
             assert record.quanta <= quanta
             total += record.iterations
@@ -184,13 +184,13 @@ def test_a_reboot_clears_the_map_and_the_leg(drive: Drive) -> None:
     last = again[-1]
     assert last.segments > 20
     assert state.leg is not None
-    inputs = Inputs(last.inputs.now_s + PERIOD_S, LineState.READY, None, Heard((), None, rebooted=True))
+    inputs = Inputs(last.inputs.run_s + PERIOD_S, LineState.READY, None, Heard((), None, rebooted=True))
     commands: list[Command] = []
     record = step(state, inputs, SETTINGS, commands.append, enough_quanta)
     assert commands == [Order.HALT]
     assert (record.segments, record.clusters, record.refinement) == (0, 0, "nothing")
     assert state.perception.objects() == ()
-    assert bits((state.odometry, state.leg, state.last_firing_s)) == bits((None, None, 0.0))
+    assert bits((state.odometry, state.leg, state.last_firing_robot_s)) == bits((None, None, 0.0))
     assert (state.mode.mode, state.cycle) == (Mode.SAFE_STOP, last.cycle + 1)
     assert "restarted" in str(state.mode.reason)
 

@@ -157,7 +157,7 @@ def test_without_one_edit_the_replay_goes_another_way(edited: Path, tmp_path: Pa
 
 
 NEW = {
-    "inputs": ("drive_request", "edits"), "record": ("refused",), "left": ("drive_request", "drive_request_s", "vectors", "standing"),
+    "inputs": ("drive_request", "edits"), "record": ("refused",), "left": ("drive_request", "requested_run_s", "vectors", "standing"),
 }  # fmt: skip
 ARRAYS = (
     ".memory.names", ".memory.tally", ".memory.stamps", ".memory.barred", "._pins.", ".outline.numbers",

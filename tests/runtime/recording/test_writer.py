@@ -36,7 +36,7 @@ def switched(place: Path, at: dict[int, Callable[[Recorder], None]], seconds: fl
         def on_state(record: CycleRecord, state: State, _start: Pose) -> None:
             recorder.on_cycle(record, state)
             recorder.on_bytes("in", now[0], b"\x00bytes\xff")
-            now[0] = record.inputs.now_s
+            now[0] = record.inputs.run_s
             if record.cycle in at:
                 at[record.cycle](recorder)
 

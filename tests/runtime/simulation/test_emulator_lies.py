@@ -51,12 +51,12 @@ def through(run: Run, over_s: float) -> tuple[float, float]:
     """Return the worst error from the twentieth reading after the lie on, and the worst of all after 10 s, feet."""
     run.until(over_s)
     before, worst, late = len(run.firings), 0.0, 0.0
-    while run.now_s < UNTIL_S:
+    while run.run_s < UNTIL_S:
         run.cycle()
         errors = run.errors_ft()
         if len(run.firings) - before >= READINGS:
             worst = max([worst, *errors])
-        if run.now_s > over_s + FORGOTTEN_S:
+        if run.run_s > over_s + FORGOTTEN_S:
             late = max([late, *errors])
     assert len(run.firings) - before >= READINGS
     return worst, late
@@ -133,7 +133,7 @@ def test_noise_stops_it_only_where_it_lasts_and_is_named(rate: float, measured: 
         reason = str(stopped.reason)
         assert "broken frames came in place of its echoes: noise on the line" in reason
         assert reason.endswith(", then re-arm")
-        assert 0.9 < stopped.since_s - (FROM_S + 0.017 * seed) < 1.2
+        assert 0.9 < stopped.entered_run_s - (FROM_S + 0.017 * seed) < 1.2
         firings = len(run.firings)
         run.until(FROM_S + 3.0)
         assert run.driver.state is LineState.READY
@@ -151,7 +151,7 @@ def test_a_robot_with_broken_sensors_drives_on_and_says_which(measured: Callable
         StuckSensor(kind="stuck_sensor", at_s=2.0, duration_s=1e3, sensor=5, range_m=1.2),
     )
     run, notices, lines = hallway(0, *faults), Alerts(), list[str]()
-    while run.now_s < UNTIL_S:
+    while run.run_s < UNTIL_S:
         record = run.cycle()
         lines += notices.news(record.inputs.heard, run.state.perception)
     assert {r.sensor: r.fault for r in run.state.perception.sensor_reports()} == {5: "stuck", 7: "failing"}

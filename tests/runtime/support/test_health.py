@@ -66,7 +66,7 @@ class Watched:
         """Run for `LAST` cycles and keep what there was."""
         ears = Decoder("host")
 
-        def on_bytes(way: str, _at_s: float, data: bytes) -> None:
+        def on_bytes(way: str, _host_s: float, data: bytes) -> None:
             if way == "out":
                 self.sent += [(len(self.modes), frame) for frame in ears.feed(data)]
 

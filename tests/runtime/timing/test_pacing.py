@@ -19,9 +19,9 @@ TINY = 1e-7
 
 def on_time(pacer: Pacer, took_s: float = 0.001) -> CycleStart:
     """Begin a cycle at its deadline and end it."""
-    now_s = pacer.deadline_s
-    begun = pacer.begin(now_s)
-    pacer.advance(now_s + took_s)
+    run_s = pacer.deadline_s
+    begun = pacer.begin(run_s)
+    pacer.advance(run_s + took_s)
     return begun
 
 
@@ -91,31 +91,31 @@ class Ring:
 
     def __init__(self, pacer: Pacer, echoes_s: list[float]) -> None:
         self.pacer, self.echoes_s = pacer, deque(sorted(echoes_s))
-        self.now_s = BEGIN
+        self.run_s = BEGIN
         self.begun: list[tuple[float, CycleStart]] = []
         self.came_s: list[float] = []
         """When the oldest echo of each cycle came, nan where none did."""
         self.waiting_s: list[float] = []
 
     def _read(self, held_since_s: float | None) -> None:
-        while self.echoes_s and self.echoes_s[0] <= self.now_s:
+        while self.echoes_s and self.echoes_s[0] <= self.run_s:
             self.waiting_s.append(self.echoes_s.popleft())
-            self.pacer.hear(self.now_s, held_since_s)
+            self.pacer.hear(self.run_s, held_since_s)
 
     def cycle(self, took_s: float = 0.001, held_s: float = 0.0) -> CycleStart:
         """Wait for a cycle, run it, and have the loop held for a while after it."""
-        while self.pacer.deadline_s > self.now_s:
+        while self.pacer.deadline_s > self.run_s:
             next_echo_s = self.echoes_s[0] if self.echoes_s else math.inf
-            self.now_s = min(next_echo_s, self.pacer.deadline_s)
+            self.run_s = min(next_echo_s, self.pacer.deadline_s)
             self._read(None)
-        begun = self.pacer.begin(self.now_s)
-        self.begun.append((self.now_s, begun))
+        begun = self.pacer.begin(self.run_s)
+        self.begun.append((self.run_s, begun))
         self.came_s.append(min(self.waiting_s, default=math.nan))
         self.waiting_s.clear()
-        since_s = self.now_s
-        self.now_s += took_s
-        self.pacer.advance(self.now_s)
-        self.now_s += held_s
+        since_s = self.run_s
+        self.run_s += took_s
+        self.pacer.advance(self.run_s)
+        self.run_s += held_s
         self._read(since_s)
         return begun
 
@@ -151,12 +151,12 @@ def test_at_the_rings_own_pace_every_echo_begins_a_cycle_at_once(jitter_s: float
 def test_any_step_is_followed_at_a_rate_near_the_own_one(step_s: float, period_s: float) -> None:
     count = math.ceil(20.0 / step_s)
     ring = Ring(Pacer(BEGIN, period_s, step_s), echoes(count, step_s, 0.02 * step_s))
-    while ring.now_s < BEGIN + 19.0:
+    while ring.run_s < BEGIN + 19.0:
         ring.cycle(took_s=0.0001)
     locked_s = ring.pacer.period_s
     assert ring.pacer.is_locked
     assert 2 / 3 * period_s - TINY <= locked_s <= 1.5 * period_s + TINY
-    rate = len(ring.begun) / (ring.now_s - BEGIN)
+    rate = len(ring.begun) / (ring.run_s - BEGIN)
     assert rate == pytest.approx(1.0 / locked_s, rel=0.05)
     begun = [b for at_s, b in ring.begun if at_s > BEGIN + 2.0]
     slot_s = min(step_s, locked_s)
@@ -173,7 +173,7 @@ def test_echoes_that_stop_and_come_again() -> None:
     """It goes on at its own period within two steps, and an echo is followed again at once."""
     first, pause_s = echoes(100, PERIOD, 0.001), 2.013
     ring = Ring(Pacer(BEGIN, PERIOD, PERIOD), first + [t + 100 * PERIOD + pause_s for t in first])
-    while ring.now_s < first[-1] + 1.9:
+    while ring.run_s < first[-1] + 1.9:
         ring.cycle()
     assert not ring.pacer.is_locked
     silent = [at_s for at_s, _ in ring.begun if at_s > first[-1] + (LOST_STEPS + 1) * PERIOD]
@@ -253,6 +253,6 @@ def test_never_a_burst_and_never_starved_whatever_comes(
         assert (begun.echo_age_s is None) == math.isnan(came_s)
         if came_s > free_s + TINY:
             assert begun.echo_age_s == pytest.approx(at_s - came_s, abs=1e-6), "nothing held the loop"
-        free_s = ring.now_s
+        free_s = ring.run_s
     least_s = min(Pacer(BEGIN, PERIOD, step_s)._locked_s, PERIOD) * 0.5
     assert all(gap_s >= least_s - TINY for gap_s in ring.gaps_s[1:])

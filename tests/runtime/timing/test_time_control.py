@@ -43,8 +43,8 @@ class Watched:
         self.records.append(record)
         self.spend(self.busy_s)
 
-    def on_bytes(self, way: str, at_s: float, _data: bytes) -> None:
-        self.pieces.append((way, at_s))
+    def on_bytes(self, way: str, host_s: float, _data: bytes) -> None:
+        self.pieces.append((way, host_s))
 
     @property
     def modes(self) -> list[Mode]:
@@ -94,10 +94,10 @@ def test_a_pause_of_any_length_is_not_there(monkeypatch: pytest.MonkeyPatch) -> 
                 assert await it.control.pause() is None
                 assert it.control.is_paused
                 cycles, pieces_in, here_s = len(watched.records), len(watched.pieces), it.control.clock()
-                where, at_s = it.robot.truth, lived_s(it.robot)
+                where, robot_s = it.robot.truth, lived_s(it.robot)
                 await asyncio.sleep(pause_s)
                 assert (len(watched.records), it.control.clock()) == (cycles, here_s)
-                assert (it.robot.truth, lived_s(it.robot)) == (where, at_s)
+                assert (it.robot.truth, lived_s(it.robot)) == (where, robot_s)
                 assert len(watched.pieces) <= pieces_in + 2, "what was on its way may come"
                 assert await it.control.resume() is None
                 await until(lambda before=cycles: len(watched.records) >= before + 40)  # type: ignore[misc]
@@ -107,7 +107,7 @@ def test_a_pause_of_any_length_is_not_there(monkeypatch: pytest.MonkeyPatch) -> 
     assert (summary["link"]["bad"], summary["link"]["lost"]) == (0, 0)
     assert watched.modes[-1] is Mode.DRIVE
     assert Mode.SAFE_STOP not in watched.modes
-    times = [record.inputs.now_s for record in watched.records]
+    times = [record.inputs.run_s for record in watched.records]
     gaps = [b - a for a, b in itertools.pairwise(times)]
     assert max(gaps) < 1.8 * CYCLE_S, "the run's time knows of no pause"
     firings = [f.t_s for record in watched.records for f in record.inputs.heard.firings]
@@ -154,7 +154,7 @@ def test_one_step_is_one_cycle_and_its_time(monkeypatch: pytest.MonkeyPatch) -> 
                 await asyncio.sleep(1.0)
                 assert len(watched.records) == cycles + 1
             first, last = watched.records[-60], watched.records[-1]
-            assert last.inputs.now_s - first.inputs.now_s == pytest.approx(59 * CYCLE_S, rel=0.05)
+            assert last.inputs.run_s - first.inputs.run_s == pytest.approx(59 * CYCLE_S, rel=0.05)
             assert sum(len(record.inputs.heard.firings) for record in watched.records[-60:]) >= 58
             assert await it.control.resume() is None
             await until(lambda: len(watched.records) >= 160)
@@ -198,7 +198,7 @@ def test_another_speed_is_another_speed_and_nothing_else(monkeypatch: pytest.Mon
         summary, watched = run(it, act)
     assert (summary["mode"], summary["stop_reasons"]) == ("DRIVE", [])
     assert (summary["link"]["bad"], summary["link"]["lost"]) == (0, 0)
-    gaps = [b.inputs.now_s - a.inputs.now_s for a, b in itertools.pairwise(watched.records)]
+    gaps = [b.inputs.run_s - a.inputs.run_s for a, b in itertools.pairwise(watched.records)]
     assert sum(gaps) / len(gaps) == pytest.approx(CYCLE_S, rel=0.05)
 
 
@@ -216,7 +216,7 @@ def test_fast_motion_waits_for_a_slow_process(monkeypatch: pytest.MonkeyPatch, h
 
         summary, watched = run(it, act)
     assert (summary["mode"], summary["stop_reasons"]) == ("DRIVE", [])
-    gaps = [b.inputs.now_s - a.inputs.now_s for a, b in itertools.pairwise(watched.records)]
+    gaps = [b.inputs.run_s - a.inputs.run_s for a, b in itertools.pairwise(watched.records)]
     assert max(gaps) < 2.5 * CYCLE_S
 
 

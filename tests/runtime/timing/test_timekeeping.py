@@ -35,22 +35,22 @@ class Machine:
     """Clocks that only what happens moves; whole microseconds, so that books can be exact."""
 
     def __init__(self) -> None:
-        self.wall_us, self.thread_us, self.process_us, self.waits = BEGIN_US, 0, 0, 0
+        self.host_us, self.thread_us, self.process_us, self.waits = BEGIN_US, 0, 0, 0
 
     def read(self) -> ClockSample:
-        return ClockSample(self.wall_us * US, self.thread_us * US, self.process_us * US, self.waits)
+        return ClockSample(self.host_us * US, self.host_us * US, self.thread_us * US, self.process_us * US, self.waits)
 
     def work(self, us: int) -> None:
-        self.wall_us, self.thread_us, self.process_us = self.wall_us + us, self.thread_us + us, self.process_us + us
+        self.host_us, self.thread_us, self.process_us = self.host_us + us, self.thread_us + us, self.process_us + us
 
     def be_put_aside(self, us: int) -> None:
-        self.wall_us += us
+        self.host_us += us
 
     def block(self, us: int) -> None:
-        self.wall_us, self.waits = self.wall_us + us, self.waits + 1
+        self.host_us, self.waits = self.host_us + us, self.waits + 1
 
     def wait_for_thread(self, us: int) -> None:
-        self.wall_us, self.process_us, self.waits = self.wall_us + us, self.process_us + us, self.waits + 1
+        self.host_us, self.process_us, self.waits = self.host_us + us, self.process_us + us, self.waits + 1
 
 
 @dataclass(frozen=True)
@@ -107,25 +107,25 @@ class Run:
 
     def slot(self, delay: Delay) -> None:
         """Run a cycle and what comes after it, up to the next one's beginning."""
-        self._delay, machine, began_us = delay, self.machine, self.machine.wall_us
+        self._delay, machine, began_us = delay, self.machine, self.machine.host_us
         for phase in Phase:
             machine.work(PHASE_US)
             self._meet(phase.value)
             self.phase_us[phase.value] += PHASE_US + (delay.us if delay.place == phase.value else 0)
             self.keeper.mark(phase)
         self.keeper.end()
-        ended_us = machine.wall_us
+        ended_us = machine.host_us
         self.pacer.advance(ended_us * US)
         self.receive()
         self._meet("untimed")
-        busy_us = machine.wall_us - began_us - (delay.us if delay.place == "untimed" else 0)
-        machine.block(max(0, round(self.pacer.deadline_s / US) - machine.wall_us))
+        busy_us = machine.host_us - began_us - (delay.us if delay.place == "untimed" else 0)
+        machine.block(max(0, round(self.pacer.deadline_s / US) - machine.host_us))
         self._meet("asleep")
         self._account(ended_us, busy_us)
         self.begin()
 
     def _account(self, ended_us: int, busy_us: int) -> None:
-        now_us = self.machine.wall_us
+        now_us = self.machine.host_us
         while self.deadline_us <= ended_us:
             self.deadline_us += PERIOD_US
         missed = 0
@@ -142,9 +142,9 @@ class Run:
 
     def begin(self) -> CycleStart:
         now, period_s = self.machine.read(), self.pacer.period_s
-        begun = self.pacer.begin(now.wall_s)
+        begun = self.pacer.begin(now.run_s)
         self.keeper.begin(now, begun, period_s, is_following=False)
-        if self.missed or self.machine.wall_us > BEGIN_US:
+        if self.missed or self.machine.host_us > BEGIN_US:
             self.due_us += PERIOD_US
             self.deadline_us = self.due_us
         else:
@@ -260,13 +260,13 @@ def test_the_step_marks_its_phases_and_no_overrun_delays_a_stop(
     state, commands = State(perception), list[tuple[Command, int]]()
 
     def carry_out(command: Command) -> None:
-        commands.append((command, machine.wall_us))
+        commands.append((command, machine.host_us))
         machine.work(command_us)
 
     here = Pose(0.0, 0.0, 0.0)
     for cycle in range(30):
         perception.refine_us = refine_us if cycle > 20 else 0
-        began_us = machine.wall_us
+        began_us = machine.host_us
         t_s = 1.0 + 0.05 * cycle
         heard = Heard(
             (Firing(t_s, here, 0.0, np.full(24, 3.0)),),
@@ -279,7 +279,7 @@ def test_the_step_marks_its_phases_and_no_overrun_delays_a_stop(
         record = step(state, inputs, SETTINGS, carry_out, lambda done: done < 1, keeper.mark)
         keeper.end()
         assert commands[-1][1] - began_us == observe_us, "the command waits for nothing but the part that always runs"
-        took = {stretch.name: round(stretch.wall_s / US) for stretch in keeper._stretches}
+        took = {stretch.name: round(stretch.took_s / US) for stretch in keeper._stretches}
         assert took == {
             "perceive": observe_us, "decide": 0, "command": command_us, "refine": perception.refine_us
         }  # fmt: skip
@@ -298,8 +298,8 @@ def test_the_meter_tells_work_from_sleep() -> None:
     time.sleep(0.02)
     slept = meter.read()
     assert slept.waits > before.waits
-    assert slept.wall_s - before.wall_s >= 0.02
-    assert slept.thread_s - before.thread_s < 0.5 * (slept.wall_s - before.wall_s)
+    assert slept.host_s - before.host_s >= 0.02
+    assert slept.thread_s - before.thread_s < 0.5 * (slept.host_s - before.host_s)
     while meter.read().thread_s - slept.thread_s < 0.02:
         pass
     worked = meter.read()
