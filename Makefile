@@ -1,10 +1,10 @@
-# Two commands matter: `make run` starts the robot in the emulator, `make test` proves that it works.
-# `make bench` measures it against what one would use instead, `make soak` runs the long forms of the tests.
+# `make run` starts the robot with the emulator, `make test` runs all checks and tests.
+# `make bench` measures accuracy and timing, `make soak` runs the long forms of the tests.
 
 PYTHON ?= python3.11
 VENV   := .venv
 BIN    := $(VENV)/bin
-PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+PIP    := $(BIN)/python -m pip install -q --disable-pip-version-check
 
 .PHONY: run test lint tests boundscheck promises mutants soak bench clean
 
@@ -20,8 +20,8 @@ lint: $(VENV)/test.stamp
 	$(BIN)/lint-imports
 	$(BIN)/codespell
 
-# Kernels are tested compiled, and once more as plain Python: only so does coverage see into them. What watches the clock
-# mostly waits: two of a kind, and nothing beside them.
+# Kernels are tested compiled, and again as plain Python, because coverage cannot trace compiled code. Tests that depend
+# on the wall clock run last, two at a time, with no other load.
 tests: $(VENV)/test.stamp
 	$(BIN)/python -m pytest -q -n auto -m "(kernels or compiled) and not realtime and not soak"
 	$(BIN)/python -m pytest -q -n auto -m "not (kernels or compiled) and not realtime and not soak" --cov --cov-report=
@@ -29,29 +29,29 @@ tests: $(VENV)/test.stamp
 		--cov --cov-append --cov-report=term:skip-covered --cov-fail-under=90
 	$(BIN)/python -m pytest -q -n 2 -m "realtime and not soak"
 
-# Compiled code reads beyond an array in silence; this run does not let it.
+# Compiled code does not check array bounds by default; this run does.
 boundscheck: $(VENV)/test.stamp
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(BIN)/python -m pytest -q -n auto -m "not realtime and not compiled and not soak" \
 		tests/perception tests/drivers/emulator/test_acoustics.py tests/drivers/test_emulator*.py
 
-# What is promised, measured again: writes docs/promises.md. (With a blank for the =, pytest takes the page for a test.)
+# Measures every promise and writes docs/promises.md. (The option needs its "=": pytest would take the page for a test.)
 promises: $(VENV)/test.stamp
 	$(BIN)/python -m pytest -q -m "promise and not soak" --promises=docs/promises.md
 
-# The long forms, the fuzzers, and an hour and a half of driving in virtual time: does anything grow, compile late, or
-# collect all garbage? And generated examples that no run had before; `make tests` has the same ones every time.
+# Long forms of tests, fuzzers, new random examples (`make tests` repeats the same ones), and 1.5 h of driving in virtual
+# time that checks memory growth, late compilation and full garbage collections.
 soak: $(VENV)/soak.stamp
 	$(BIN)/python -m pytest -q -m hypothesis --hypothesis-profile=explore
 	$(BIN)/python -m pytest -m soak --promises=docs/promises-soak.md
 	@$(BIN)/python -m bench.growth $(SOAK)
 	@$(BIN)/python -m bench.budget $(SOAK)
 
-# Small lies put into the code, and whether the tests notice: writes docs/mutants.md.
+# Changes the code in one place at a time, checks that the tests detect it, and writes docs/mutants.md.
 mutants: $(VENV)/test.stamp
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m tests.mutation.campaign
 
-# Ours against the libraries one would use instead, and against the clock; BENCH=--quick for a small run of the first,
-# TIMING="--against earlier.json" for a comparison.
+# Compares our methods with libraries, then measures timing. BENCH=--quick shortens the comparison,
+# TIMING="--against earlier.json" adds the figures of an earlier run.
 bench: $(VENV)/bench.stamp
 	@$(BIN)/python -m bench $(BENCH)
 	@$(BIN)/python -m bench timing $(TIMING)
@@ -63,8 +63,8 @@ clean:
 	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .import_linter_cache
 
 $(VENV)/bin/python:
-	@command -v $(PYTHON) >/dev/null || { echo "make: $(PYTHON) is not here; install it, or name another: make PYTHON=python3.12"; exit 1; }
-	@$(PYTHON) -c "import ensurepip" 2>/dev/null || { echo "installing $(PYTHON)-venv, without which Debian's Python makes no environments"; \
+	@command -v $(PYTHON) >/dev/null || { echo "make: $(PYTHON) not found: install it, or choose another: make PYTHON=python3.12"; exit 1; }
+	@$(PYTHON) -c "import ensurepip" 2>/dev/null || { echo "installing $(PYTHON)-venv, which Debian's Python needs for virtual environments"; \
 		$$([ $$(id -u) = 0 ] || echo sudo) sh -c "apt-get -qq update && apt-get -qq install -y $(PYTHON)-venv"; }
 	$(PYTHON) -m venv $(VENV)
 
@@ -72,9 +72,9 @@ $(VENV)/run.stamp: pyproject.toml | $(VENV)/bin/python
 	$(PIP) --editable .
 	@touch $@
 
-# The page of the console is tested in a browser: Debian's.
+# The console's page is tested in Debian's browser.
 $(VENV)/browser.stamp: | $(VENV)/bin/python
-	@command -v chromium >/dev/null || { echo "installing chromium, in which the console's page is tested"; \
+	@command -v chromium >/dev/null || { echo "installing chromium for the tests of the console's page"; \
 		$$([ $$(id -u) = 0 ] || echo sudo) sh -c "apt-get -qq update && apt-get -qq install -y chromium"; }
 	@touch $@
 

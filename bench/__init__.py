@@ -1,1 +1,1 @@
-"""What a user would pick instead, measured on the same readings: `make bench`. No test is collected here."""
+"""Measurements: our methods against libraries on the same readings, and the timing of a run. No tests are here."""

@@ -1,4 +1,4 @@
-"""`make bench`: our methods and the peers on the same readings, accuracy and time in one run."""
+"""Command line of the measurements (`make bench`): comparison, timing, recording, console, wake-ups."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from rich.console import Console
 from bench.console import console_table
 from bench.console import figures as figures_of
 from bench.console import measure as measure_console
-from bench.contestant import Peer
+from bench.estimator import Peer
 from bench.measure import Plan, measure
 from bench.recording import measure_recording
-from bench.runners import Method, contestants
+from bench.runners import Method, candidates
 from bench.table import results_table
 from bench.timing import Timing, TimingPlan, measure_timing
 from bench.timing_table import figures_table, quantiles_table, read_earlier
@@ -29,7 +29,7 @@ OURS: Final = (
     Method("echolocate, bayes", ("perception.method=bayes",)),
     Method("echolocate, paper", ("perception.method=paper",)),
 )
-"""Our own methods, a line each."""
+"""Our own methods: name in the table, and settings."""
 
 FULL: Final = Plan(repetitions=3, halls_max=10, passes=20)
 QUICK: Final = Plan(repetitions=1, halls_max=2, passes=4)
@@ -40,7 +40,7 @@ WAKING_TURNS: Final = 10
 
 Measure: TypeAlias = Callable[[TimingPlan, tuple[str, ...], Callable[[str], None]], Timing]
 
-app = App(help="Measure our methods and the libraries that one would use instead, on the same readings.")
+app = App(help="Measure our methods and the libraries one would use instead, on the same readings.")
 
 
 @app.default
@@ -51,18 +51,18 @@ def bench(
     repetitions: int | None = None,
     only: str = "",
 ) -> int:
-    """Run the comparison, print its table and write it as JSON.
+    """Compare our methods with the libraries; print the table and write it as JSON.
 
     Parameters
     ----------
     json
         File to write.
     quick
-        A small run: few halls, few passes, once.
+        Run once, with few halls and few passes.
     repetitions
-        How often everything is run; medians are reported.
+        Number of repetitions; medians are reported.
     only
-        Take only those whose name contains this.
+        Run only the methods whose name contains this text.
     """
     use_cache()
     from runtime.cycle.summary import write_json
@@ -73,17 +73,17 @@ def bench(
         plan = Plan(max(1, repetitions), plan.halls_max, plan.passes)
     settings = load_settings("hallway")
     ready_kernels(settings, console, PARTS)
-    entered = [c for c in contestants(OURS, load_peers()) if only in c.name]
-    if not entered:
-        console.print(f"bench: no contestant's name contains {only!r}", markup=False)
+    selected = [c for c in candidates(OURS, load_peers()) if only in c.name]
+    if not selected:
+        console.print(f"bench: no method's name contains {only!r}", markup=False)
         return 2
     with console.status("bench") as status:
-        results = measure(entered, settings.ring, plan, status.update)
+        results = measure(selected, settings.ring, plan, status.update)
     try:
         write_json(json, {"repetitions": plan.repetitions, "passes": plan.passes, "results": results})
-    except UserError as complaint:
-        console.print(f"bench: {complaint}", markup=False)
-        return complaint.exit_code
+    except UserError as error:
+        console.print(f"bench: {error}", markup=False)
+        return error.exit_code
     _wide().print(results_table(results, plan))
     return 0
 
@@ -98,7 +98,7 @@ def timing(
     busy: int = TIMING.busy,
     sets: Annotated[tuple[str, ...], Parameter(name="--set", negative="", allow_leading_hyphen=False)] = (),
 ) -> int:
-    """Measure how a run keeps its time over the pty, in turns with bare controls.
+    """Measure the timing of a run over the pty, in turns with minimal control programs.
 
     Parameters
     ----------
@@ -107,13 +107,13 @@ def timing(
     against
         JSON of an earlier run to compare with.
     seconds
-        How long ours and the control run, each round.
+        Duration of our run and of the control in each round, s.
     rounds
-        How often.
+        Number of rounds.
     busy
-        Processes beside that never rest.
+        Number of CPU-bound background processes.
     sets
-        Override one setting, as in cycle.rate_hz=10.
+        Setting to override, as in cycle.rate_hz=10.
     """
     plan = TimingPlan(max(1.0, seconds), max(1, rounds), max(0, busy))
     return _measured(measure_timing, plan, sets, json, against)
@@ -128,7 +128,7 @@ def recording(
     rounds: int = RECORDING.rounds,
     sets: Annotated[tuple[str, ...], Parameter(name="--set", negative="", allow_leading_hyphen=False)] = (),
 ) -> int:
-    """Measure what recording costs a run over the pty: time of its loop, room on the disk.
+    """Measure what recording costs a run over the pty: loop time and disk space.
 
     Parameters
     ----------
@@ -137,27 +137,27 @@ def recording(
     against
         JSON of an earlier run to compare with.
     seconds
-        How long runs with and without a recording last, each round.
+        Duration of the runs with and without a recording in each round, s.
     rounds
-        How often.
+        Number of rounds.
     sets
-        Override one setting, as in recording.keyframe_period_s=10.
+        Setting to override, as in recording.keyframe_period_s=10.
     """
     return _measured(measure_recording, TimingPlan(max(1.0, seconds), max(1, rounds), 0), sets, json, against)
 
 
 @app.command
 def console(*, json: str = "console.json", seconds: float = 30.0, rounds: int = 5) -> int:
-    """Measure what open pages of the operator console cost a run, in turns with none open.
+    """Measure what open pages of the operator console cost a run, in turns with no page open.
 
     Parameters
     ----------
     json
         File to write.
     seconds
-        How long a run lasts, each turn.
+        Duration of each run, s.
     rounds
-        How often.
+        Number of rounds.
     """
     use_cache()
     from runtime.cycle.summary import write_json
@@ -169,44 +169,44 @@ def console(*, json: str = "console.json", seconds: float = 30.0, rounds: int = 
         with out.status("bench") as status:
             rows = figures_of(measure_console(seconds, rounds, status.update))
         write_json(json, {"seconds": seconds, "rounds": rounds, "rows": rows})
-    except UserError as complaint:
-        out.print(f"bench: {complaint}", markup=False)
-        return complaint.exit_code
+    except UserError as error:
+        out.print(f"bench: {error}", markup=False)
+        return error.exit_code
     _wide().print(console_table(rows, seconds, rounds))
     return 0
 
 
 @app.command
 def waking(*, json: str = "waking.json", turns: int = WAKING_TURNS, busy: int = 2) -> int:
-    """Measure ways of sleeping until a deadline: idle, and beside processes that never rest.
+    """Measure methods of sleeping until a deadline, on an idle and on a busy machine.
 
     Parameters
     ----------
     json
         File to write.
     turns
-        How often each way has its turn of two seconds.
+        Number of turns of two seconds for each method.
     busy
-        Processes beside that never rest.
+        Number of CPU-bound background processes in the second half.
     """
     from runtime.cycle.summary import write_json
 
     console = Console(stderr=True)
     with console.status("bench") as status:
         by_load = {
-            f"{beside} busy": figures(measure_waking(max(1, turns), beside, status.update)) for beside in (0, busy)
+            f"{count} busy": figures(measure_waking(max(1, turns), count, status.update)) for count in (0, busy)
         }
     try:
         write_json(json, by_load)
-    except UserError as complaint:
-        console.print(f"bench: {complaint}", markup=False)
-        return complaint.exit_code
+    except UserError as error:
+        console.print(f"bench: {error}", markup=False)
+        return error.exit_code
     _wide().print(waking_table(by_load))
     return 0
 
 
 def _measured(measure: Measure, plan: TimingPlan, sets: tuple[str, ...], json: str, against: str | None) -> int:
-    """Measure, write the figures and print them."""
+    """Run a timing measurement, write its figures as JSON and print its tables; return the exit code."""
     use_cache()
     from runtime.cycle.summary import write_json
 
@@ -217,9 +217,9 @@ def _measured(measure: Measure, plan: TimingPlan, sets: tuple[str, ...], json: s
         with console.status("bench") as status:
             result = measure(plan, sets, status.update)
         write_json(json, result.as_json())
-    except UserError as complaint:
-        console.print(f"bench: {complaint}", markup=False)
-        return complaint.exit_code
+    except UserError as error:
+        console.print(f"bench: {error}", markup=False)
+        return error.exit_code
     wide = _wide()
     wide.print(quantiles_table(result, earlier))
     wide.print(figures_table(result, earlier))
@@ -227,13 +227,13 @@ def _measured(measure: Measure, plan: TimingPlan, sets: tuple[str, ...], json: s
 
 
 def _wide() -> Console:
-    """Return the terminal, or where there is none one wide enough for every table."""
+    """Return a console for tables: the terminal, or 180 columns where output is redirected."""
     out = Console()
     return out if out.is_terminal else Console(width=180)
 
 
 def load_peers() -> tuple[Peer, ...]:
-    """Import the peers; they need the extra `bench`."""
+    """Return the peer of each library; the libraries need the extra `bench`."""
     try:
         from bench.peers import (
             filterpy_ekf,

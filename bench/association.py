@@ -1,9 +1,9 @@
-"""What every peer leaves to its user: association, gating, and the decision "is it a drum at all".
+"""Data association for the peers, which their libraries leave to the user: gating, track management, confirmation.
 
-One is written for all of them, and its time is told apart from theirs. The centres that segments vote for found
-tracks. Each range goes to the track that it fits best, within a gate round what the estimator believes of it; ranges
-that fit nothing wait a while, in case a track is founded that explains them. A track is a drum where enough ranges
-fit, few pulses went through it, and it was seen from enough sides. Tracks that come to lie on one another are one.
+All peers share it, and its time is measured apart from theirs. Centres that segments vote for create tracks. Each
+range goes to the track that it fits best, within a gate around the estimator's estimate. Ranges that fit no track are
+kept for a while, in case a new track explains them. A track is confirmed as a drum when enough ranges fit, few pulses
+passed through it, and it was seen from enough directions. Tracks that converge on one place are merged.
 """
 
 from __future__ import annotations
@@ -22,33 +22,33 @@ from config.robot import RingConfig
 from config.units import FOOT_M
 from drivers.messages import Floats
 
-FOUND_GATE_M: Final = 1.0 * FOOT_M
-"""A vote farther than this from every track founds one; neighbouring drums are three feet apart."""
-RIPE_VOTES: Final = 4
+NEW_TRACK_GATE_M: Final = 1.0 * FOOT_M
+"""A vote farther than this from every track creates one; neighbouring drums are three feet apart."""
+INITIAL_VOTES: Final = 4
 VOTES_AVERAGED: Final = 30
 RANGE_GATE_FIRST_M: Final = 0.35 * FOOT_M
 RANGE_GATE_M: Final = 0.2 * FOOT_M
 SETTLED_HITS: Final = 12
-"""After so many ranges the narrower gate holds."""
+"""Ranges after which the narrower gate applies."""
 BEAM_SLACK: Final = 1.15
-"""A range may come from this many beam half-angles off the axis: the track's place is not exact yet."""
-BEAM_SURE: Final = 0.85
-"""A pulse went through a track only where the track is well inside the beam."""
-WAITING: Final = 240
-"""Ranges that fit nothing yet and are kept."""
-FORGOTTEN_AFTER: Final = 40
-"""Readings after which a track that never ripened is dropped."""
+"""Beam half-angles off the axis within which a range is accepted: the track's place is not exact yet."""
+BEAM_INSIDE: Final = 0.85
+"""Beam half-angles within which a track lies well inside the beam, so that a longer range passed through it."""
+UNASSIGNED_MAX: Final = 240
+"""Ranges without a track that are kept."""
+DROPPED_AFTER: Final = 40
+"""Readings without support after which an uninitialized track is dropped."""
 
 DRUM_HITS: Final = 12
 DRUM_HIT_SHARE: Final = 0.6
 DRUM_SECTOR_RAD: Final = math.radians(5.0)
 DRUM_SECTORS: Final = 12
-"""A drum was seen from so many directions, five degrees wide each; passing by one gives twice as many."""
+"""Directions, five degrees wide each, from which a drum must be seen; passing by one gives twice as many."""
 
 
 @dataclass(frozen=True, slots=True)
 class RangeHit:
-    """A range given to a track: the reading, the ring's place then, the sensor's mount and place, m."""
+    """A range assigned to a track: the reading, the ring's pose (m, rad), the sensor's mount and place, m."""
 
     track: int
     reading: int
@@ -61,19 +61,19 @@ class RangeHit:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What one reading says, associated."""
+    """One reading after association."""
 
-    begun: Mapping[int, Place]
-    """Tracks that ripened with this reading, and a first guess of their centre."""
+    initiated: Mapping[int, Place]
+    """Tracks initialized by this reading, with a first estimate of the centre, m."""
     ranges: tuple[RangeHit, ...]
     segments: tuple[tuple[int, Segment], ...]
     confirmed: tuple[int, ...]
-    """Tracks that are drums, the best supported first."""
+    """Tracks confirmed as drums, the best supported first."""
 
 
 @dataclass(slots=True)
 class Track:
-    """Something that may be a drum."""
+    """Candidate for a drum: its place, m, and the evidence for it."""
 
     x: float
     y: float
@@ -84,109 +84,113 @@ class Track:
     sectors: set[int] = field(default_factory=set)
 
     @property
-    def ripe(self) -> bool:
-        """Whether the first guess is worth giving to an estimator."""
-        return self.votes >= RIPE_VOTES
+    def is_initialized(self) -> bool:
+        """Whether enough segments voted for a first estimate."""
+        return self.votes >= INITIAL_VOTES
 
     @property
     def confirmed(self) -> bool:
-        """Whether it is a drum."""
+        """Whether the evidence suffices for a drum."""
         enough = self.hits >= max(DRUM_HITS, DRUM_HIT_SHARE * (self.hits + self.misses))
-        return self.ripe and enough and len(self.sectors) >= DRUM_SECTORS
+        return self.is_initialized and enough and len(self.sectors) >= DRUM_SECTORS
 
 
 class Association:
-    """Readings in, associated evidence out.
+    """Associates readings with tracks.
 
     Parameters
     ----------
     ring
-        The sensors.
+        Geometry of the sensors.
     """
 
     def __init__(self, ring: RingConfig) -> None:
         self._mounts = [(mount.x_m, mount.y_m) for mount in ring.mounts]
         self._half_angle = math.radians(ring.beam_half_angle_deg)
         self._tracks: dict[int, Track] = {}
-        self._waiting: deque[tuple[Reading, int]] = deque(maxlen=WAITING)
-        self._founded = 0
+        self._unassigned: deque[tuple[Reading, int]] = deque(maxlen=UNASSIGNED_MAX)
+        self._created = 0
 
-    def take(self, reading: Reading, believed: Mapping[int, Place]) -> Evidence:
-        """Associate one reading.
+    def take(self, reading: Reading, estimates: Mapping[int, Place]) -> Evidence:
+        """Return one reading's evidence, associated with tracks.
 
         Parameters
         ----------
         reading
-            The reading.
-        believed
-            Where the estimator has its tracks by now; the mean of the votes serves where it says nothing.
+            Reading of the whole ring.
+        estimates
+            Estimated centre of each track, m; the mean of the votes is used for tracks not in it.
         """
-        self._tidy(reading.number, believed)
-        begun: dict[int, Place] = {}
+        self._prune(reading.number, estimates)
+        initiated: dict[int, Place] = {}
         segments = tuple(
-            (self._vote(segment, reading.number, believed, begun), segment) for segment in reading.segments
+            (self._vote(segment, reading.number, estimates, initiated), segment) for segment in reading.segments
         )
         hits: list[RangeHit] = []
-        for k in begun:
-            hits += self._late(k)
-        hits += self._associate(reading, believed)
+        for k in initiated:
+            hits += self._assign_kept(k)
+        hits += self._associate(reading, estimates)
         drums = sorted(((t.hits, k) for k, t in self._tracks.items() if t.confirmed), reverse=True)
-        return Evidence(begun, tuple(hits), segments, tuple(k for _, k in drums))
+        return Evidence(initiated, tuple(hits), segments, tuple(k for _, k in drums))
 
-    def _where(self, k: int, believed: Mapping[int, Place]) -> Place:
+    def _where(self, k: int, estimates: Mapping[int, Place]) -> Place:
         track = self._tracks[k]
-        return believed.get(k, (track.x, track.y))
+        return estimates.get(k, (track.x, track.y))
 
-    def _vote(self, segment: Segment, now: int, believed: Mapping[int, Place], begun: dict[int, Place]) -> int:
-        """Give a segment to the nearest track, or found one; return which."""
+    def _vote(
+        self, segment: Segment, number: int, estimates: Mapping[int, Place], initiated: dict[int, Place]
+    ) -> int:
+        """Assign a segment to the nearest track, or create one; return its key."""
         x = segment.ends[1][0] + RADIUS_M * math.cos(segment.normal)
         y = segment.ends[1][1] + RADIUS_M * math.sin(segment.normal)
-        nearest, gap = -1, FOUND_GATE_M
+        nearest, gap = -1, NEW_TRACK_GATE_M
         for k in self._tracks:
-            if (distance := math.dist((x, y), self._where(k, believed))) < gap:
+            if (distance := math.dist((x, y), self._where(k, estimates))) < gap:
                 nearest, gap = k, distance
         if nearest < 0:
-            self._founded += 1
-            self._tracks[self._founded] = Track(x, y, now)
-            return self._founded
+            self._created += 1
+            self._tracks[self._created] = Track(x, y, number)
+            return self._created
         track = self._tracks[nearest]
         track.votes += 1
-        track.last = now
+        track.last = number
         if track.votes <= VOTES_AVERAGED:
             track.x += (x - track.x) / track.votes
             track.y += (y - track.y) / track.votes
-        if track.votes == RIPE_VOTES:
-            begun[nearest] = (track.x, track.y)
+        if track.votes == INITIAL_VOTES:
+            initiated[nearest] = (track.x, track.y)
         return nearest
 
-    def _late(self, k: int) -> list[RangeHit]:
-        """Give waiting ranges to a track that has just ripened."""
-        if not self._waiting:
+    def _assign_kept(self, k: int) -> list[RangeHit]:
+        """Return the kept ranges that fit a track which has just been initialized."""
+        if not self._unassigned:
             return []
         track = self._tracks[k]
-        sensors = np.array([reading.sensors[i] for reading, i in self._waiting])
-        ranges = np.array([reading.ranges[i] for reading, i in self._waiting])
+        sensors = np.array([reading.sensors[i] for reading, i in self._unassigned])
+        ranges = np.array([reading.ranges[i] for reading, i in self._unassigned])
         longer, off, bearing = self._compare(sensors, ranges, np.array([[track.x, track.y]]))
         fits = (off[:, 0] <= BEAM_SLACK * self._half_angle) & (np.abs(longer[:, 0]) <= RANGE_GATE_FIRST_M)
         hits = []
         left: list[tuple[Reading, int]] = []
-        for taken, (reading, i), direction in zip(fits.tolist(), self._waiting, bearing[:, 0].tolist(), strict=True):
+        for taken, (reading, i), direction in zip(
+            fits.tolist(), self._unassigned, bearing[:, 0].tolist(), strict=True
+        ):
             if taken:
                 hits.append(self._hit(k, reading, i, direction))
             else:
                 left.append((reading, i))
-        self._waiting = deque(left, maxlen=WAITING)
+        self._unassigned = deque(left, maxlen=UNASSIGNED_MAX)
         return hits
 
-    def _associate(self, reading: Reading, believed: Mapping[int, Place]) -> list[RangeHit]:
-        """Give each range to the track it fits best, and count what went through a track."""
-        heard = np.isfinite(reading.ranges)
-        ids = [k for k, track in self._tracks.items() if track.ripe]
+    def _associate(self, reading: Reading, estimates: Mapping[int, Place]) -> list[RangeHit]:
+        """Return each range with the track it fits best, and count the pulses that passed through a track."""
+        has_echo = np.isfinite(reading.ranges)
+        ids = [k for k, track in self._tracks.items() if track.is_initialized]
         if not ids:
-            self._waiting.extend((reading, i) for i in np.flatnonzero(heard).tolist())
+            self._unassigned.extend((reading, i) for i in np.flatnonzero(has_echo).tolist())
             return []
         tracks = [self._tracks[k] for k in ids]
-        places = np.array([self._where(k, believed) for k in ids])
+        places = np.array([self._where(k, estimates) for k in ids])
         gates = np.array([RANGE_GATE_M if t.hits >= SETTLED_HITS else RANGE_GATE_FIRST_M for t in tracks])
         longer, off, bearing = self._compare(reading.sensors, reading.ranges, places)
         fits = (off <= BEAM_SLACK * self._half_angle) & (np.abs(longer) <= gates)
@@ -196,8 +200,8 @@ class Association:
             self._hit(ids[j], reading, i, float(bearing[i, j]))
             for i, j in zip(np.flatnonzero(taken).tolist(), best[taken].tolist(), strict=True)
         ]
-        self._waiting.extend((reading, i) for i in np.flatnonzero(heard & ~taken).tolist())
-        through = (off <= BEAM_SURE * self._half_angle) & (longer > gates)
+        self._unassigned.extend((reading, i) for i in np.flatnonzero(has_echo & ~taken).tolist())
+        through = (off <= BEAM_INSIDE * self._half_angle) & (longer > gates)
         for track, passed in zip(tracks, through.sum(axis=0).tolist(), strict=True):
             track.misses += passed
         return hits
@@ -219,15 +223,17 @@ class Association:
         x, y = float(reading.sensors[i, 0]), float(reading.sensors[i, 1])
         return RangeHit(k, reading.number, reading.ring, self._mounts[i], x, y, float(reading.ranges[i]))
 
-    def _tidy(self, now: int, believed: Mapping[int, Place]) -> None:
-        """Drop tracks that never ripened, and of two that lie on one another the one with less support."""
-        stale = [k for k, t in self._tracks.items() if not t.ripe and now - t.last > FORGOTTEN_AFTER]
+    def _prune(self, number: int, estimates: Mapping[int, Place]) -> None:
+        """Drop stale uninitialized tracks, and of two tracks in one place the one with less support."""
+        stale = [k for k, t in self._tracks.items() if not t.is_initialized and number - t.last > DROPPED_AFTER]
         for k in stale:
             del self._tracks[k]
         kept: list[Place] = []
         for k in sorted(self._tracks, key=lambda k: self._tracks[k].hits, reverse=True):
-            here = self._where(k, believed)
-            if self._tracks[k].ripe and any(math.dist(here, there) < 0.5 * FOUND_GATE_M for there in kept):
+            here = self._where(k, estimates)
+            if self._tracks[k].is_initialized and any(
+                math.dist(here, there) < 0.5 * NEW_TRACK_GATE_M for there in kept
+            ):
                 del self._tracks[k]
             else:
                 kept.append(here)

@@ -1,10 +1,10 @@
-"""What a cycle's refinement costs against its budget, in thread CPU time; `make soak` drives 100,000 cycles.
+"""Cost of a cycle's refinement against its budget, in thread CPU time; `make soak` drives 100,000 cycles.
 
-A program of its own, as the growth of a long drive is. Perception's time is that of its base part and of its quanta:
-in no cycle may that be more than the budget and one quantum, for which there is half a millisecond.
+It runs as its own process. Perception's time is that of its base part and of its quanta: in no cycle may it exceed
+the budget and one quantum of half a millisecond.
 
-A virtual machine whose host takes its processor away books that time to whoever was running. The drive is the same to
-the bit every time, so it is driven twice: what a cycle takes in both drives is its own, the rest is the machine's.
+A virtual machine charges time that its host took away to the running thread. The drive is bit-identical every time,
+so it is repeated: the smaller time of each cycle is its own, and the rest is the machine's.
 """
 
 from __future__ import annotations
@@ -36,32 +36,34 @@ from runtime.timing.phases import Phase
 from runtime.timing.refinement_budget import ProcessorTime
 
 QUANTUM_MAX_US: Final = 500.0
-"""Of a quantum's CPU time, at p99.9."""
+"""Limit of a quantum's CPU time at p99.9."""
 DRIVES: Final = 2
 SETTLED_CYCLES: Final = 200
-"""Until then the robot is being armed, and what is made at first need is made."""
+"""Cycles before the measurement: the robot is armed, and buffers are allocated on first use."""
 
-app = App(help="Drive for many cycles in virtual time and set perception's time against its budget.")
+app = App(help="Drive for many cycles in virtual time and compare perception's time with its budget.")
 
 
 @dataclass
-class Account:
+class DriveCosts:
     """CPU times of one drive, µs."""
 
     budget_us: float
     base_us: list[float] = field(default_factory=list)
-    """Of the part of perception that always runs, a cycle."""
+    """Of the part of perception that always runs, per cycle."""
     spent_us: list[float] = field(default_factory=list)
-    """Of that and the quanta, a cycle."""
+    """Of that part and the quanta, per cycle."""
     quanta_us: list[float] = field(default_factory=list)
+    """Of each quantum."""
     causes: dict[str, int] = field(default_factory=dict)
+    """Number of cycles by the reason why refinement stopped."""
 
     def beyond_us(self) -> Floats:
-        """Return by how much each cycle took longer than its budget."""
+        """Return by how much each cycle exceeded its budget, µs, shape (cycles,)."""
         return np.array(self.spent_us) - self.budget_us
 
     def figures(self) -> dict[str, Any]:
-        """Return what there is to say of this drive alone."""
+        """Return the figures of this drive."""
         return {
             "budget_us": self.budget_us,
             "cycles": len(self.spent_us),
@@ -80,28 +82,38 @@ def _quantiles(taken_us: list[float]) -> dict[str, float]:
     return {name: round(value, 1) for name, value in zip(("p50", "p99", "p99.9", "max"), values, strict=True)}
 
 
-class Timed(Perception):
-    """Perception whose quanta are timed."""
+class TimedPerception(Perception):
+    """Perception that measures the CPU time of its quanta."""
 
-    account: Account
+    costs: DriveCosts
 
     def refine(self) -> int:
-        """Do one quantum and book it."""
+        """Run one quantum and record its CPU time; return what the quantum returns."""
         begin_ns = time.thread_time_ns()
         done = super().refine()
         took_us = 1e-3 * (time.thread_time_ns() - begin_ns)
-        self.account.quanta_us.append(took_us)
+        self.costs.quanta_us.append(took_us)
         return done
 
 
-def account_for(settings: Settings, cycles: int, budget_s: float) -> Account:
-    """Drive to and fro for so many cycles under a budget of thread CPU time, as the robot's own process does."""
+def costs_of_drive(settings: Settings, cycles: int, budget_s: float) -> DriveCosts:
+    """Return the costs of driving up and down the hall under a budget of thread CPU time.
+
+    Parameters
+    ----------
+    settings
+        Settings of the run.
+    cycles
+        Number of cycles to measure.
+    budget_s
+        Refinement budget of a cycle, s of CPU time.
+    """
     assert settings.world is not None
     robot = make_device(settings, settings.world, 0)
     driver = make_driver(settings)
     line = MemoryLine(driver, robot)
-    perception = Timed(settings.ring, settings.models, settings.perception)
-    account = perception.account = Account(1e6 * budget_s)
+    perception = TimedPerception(settings.ring, settings.models, settings.perception)
+    costs = perception.costs = DriveCosts(1e6 * budget_s)
     state = State(perception)
     memory = MemoryPolicy()
     with memory.driving():
@@ -110,28 +122,28 @@ def account_for(settings: Settings, cycles: int, budget_s: float) -> Account:
             line.exchange(run_s)
             inputs = gather(driver, run_s, Request.ARM if state.mode.mode is Mode.READY else None)
             if cycle == SETTLED_CYCLES + 1:
-                account = perception.account = Account(1e6 * budget_s)
-            _one_cycle(state, inputs, settings, driver, account, budget_s)
+                costs = perception.costs = DriveCosts(1e6 * budget_s)
+            _one_cycle(state, inputs, settings, driver, costs, budget_s)
             memory.cycle_done(1.0)
-    return account
+    return costs
 
 
 def _one_cycle(
-    state: State, inputs: Inputs, settings: Settings, driver: RobotDriver, account: Account, budget_s: float
+    state: State, inputs: Inputs, settings: Settings, driver: RobotDriver, costs: DriveCosts, budget_s: float
 ) -> None:
-    """Run one cycle under the budget and book it."""
+    """Run one cycle under the budget and record its costs."""
     marks: dict[Phase, float] = {}
-    allowance = ProcessorTime(budget_s)
+    budget = ProcessorTime(budget_s)
     begin_s = time.thread_time()
-    allowance.begin()
+    budget.begin()
     record = step(
-        state, inputs, settings, lambda command: give(driver, command), allowance,
+        state, inputs, settings, lambda command: give(driver, command), budget,
         lambda phase: marks.__setitem__(phase, time.thread_time()),
     )  # fmt: skip
     base_us = 1e6 * (marks[Phase.PERCEIVE] - begin_s)
-    account.base_us.append(base_us)
-    account.spent_us.append(base_us + 1e6 * (marks[Phase.REFINE] - marks[Phase.COMMAND]))
-    account.causes[record.refinement] = account.causes.get(record.refinement, 0) + 1
+    costs.base_us.append(base_us)
+    costs.spent_us.append(base_us + 1e6 * (marks[Phase.REFINE] - marks[Phase.COMMAND]))
+    costs.causes[record.refinement] = costs.causes.get(record.refinement, 0) + 1
 
 
 @app.default
@@ -141,12 +153,12 @@ def main(
     *,
     budget_ms: Annotated[tuple[float, ...], Parameter(negative="", consume_multiple=True)] = (5.0, 0.1),
 ) -> int:
-    """Print the figures of each budget as JSON; fail where a cycle took more than its budget and a quantum."""
+    """Print the figures of each budget as JSON; exit with 1 if a cycle exceeded its budget and one quantum."""
     settings = load_settings("hallway", ["behaviors.move_ahead.at_end=turn_back"])
     ready_kernels(settings, Console(stderr=True))
-    kept = True
+    within_limits = True
     for budget in budget_ms:
-        drives = [account_for(settings, cycles, 1e-3 * budget) for _ in range(DRIVES)]
+        drives = [costs_of_drive(settings, cycles, 1e-3 * budget) for _ in range(DRIVES)]
         beyond_us = np.min([drive.beyond_us() for drive in drives], axis=0)
         both = {
             "beyond_budget_us_max": round(float(beyond_us.max()), 1),
@@ -154,9 +166,9 @@ def main(
         }
         figures = {"in_every_drive": both, "drives": [drive.figures() for drive in drives]}
         sys.stdout.write(orjson.dumps(figures).decode() + "\n")
-        kept &= both["cycles_beyond_a_quantum"] == 0
-        kept &= all(drive.figures()["quantum_us"]["p99.9"] <= QUANTUM_MAX_US for drive in drives)
-    return DONE if kept else FAILED
+        within_limits &= both["cycles_beyond_a_quantum"] == 0
+        within_limits &= all(drive.figures()["quantum_us"]["p99.9"] <= QUANTUM_MAX_US for drive in drives)
+    return DONE if within_limits else FAILED
 
 
 if __name__ == "__main__":

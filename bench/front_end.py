@@ -1,7 +1,7 @@
-"""The common front end: outline segments, which every peer begins with, as one who uses numpy would write it.
+"""Front end common to all peers: outline segments (McKerrow), in plain numpy.
 
-Two ranges of one sensor from two places have a common tangent, the outline segment. Behind it, along its normal and
-one radius deep, a drum's centre would be.
+Two ranges of one sensor from two places have a common tangent, the outline segment. A drum's centre would lie behind
+it, one radius along the normal.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from drivers.messages import Firing, Floats
 from runtime.simulation.scenes import DRUM_RADIUS_FT
 
 RADIUS_M: Final = DRUM_RADIUS_FT * FOOT_M
-"""Of the drums; every peer is told."""
+"""Radius of the drums; every peer knows it."""
 
 BASELINE_MIN_M: Final = 0.7 * FOOT_M
 BASELINE_MAX_M: Final = 1.1 * FOOT_M
-REMEMBERED: Final = 4
-"""Readings to pair with: at a quarter of a foot each, up to a foot back."""
+KEPT_READINGS: Final = 4
+"""Earlier readings to pair with: a quarter of a foot apart, so up to a foot back."""
 
 Place = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """An outline segment: its ends, m, and the direction of its normal, away from the sensor, rad."""
+    """Outline segment: its ends, m, and the direction of its normal away from the sensor, rad."""
 
     ends: tuple[Place, Place]
     normal: float
@@ -39,7 +39,7 @@ class Segment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reading:
-    """A reading of the whole ring, and the segments that it completes.
+    """Reading of the whole ring, with the segments that it completes.
 
     `sensors` has shape (n, 3): x, y (m) and direction (rad) in the world. `ranges` has shape (n,), m.
     """
@@ -52,22 +52,22 @@ class Reading:
 
 
 class FrontEnd:
-    """Firings in, readings with segments out.
+    """Turns firings into readings with segments.
 
     Parameters
     ----------
     ring
-        The sensors.
+        Geometry of the sensors.
     """
 
     def __init__(self, ring: RingConfig) -> None:
         self._mounts = np.array(ring.mounts, dtype=np.float64).reshape(-1, 3)
         self._half_angle = math.radians(ring.beam_half_angle_deg)
-        self._kept: deque[tuple[Floats, Floats]] = deque(maxlen=REMEMBERED)
+        self._kept: deque[tuple[Floats, Floats]] = deque(maxlen=KEPT_READINGS)
         self._count = 0
 
     def take(self, firing: Firing) -> Reading:
-        """Take in one firing of the whole ring."""
+        """Return the reading of one firing of the whole ring."""
         c, s = math.cos(firing.ring_yaw), math.sin(firing.ring_yaw)
         x, y, angle = self._mounts.T
         ring = (firing.pose.x, firing.pose.y, firing.ring_yaw)
@@ -79,17 +79,17 @@ class FrontEnd:
         return Reading(self._count, ring, sensors, ranges, segments)
 
     def _segments(self, sensors: Floats, ranges: Floats) -> tuple[Segment, ...]:
-        """Return the tangents of this reading and the last one far enough back, sensor by sensor."""
+        """Return the tangents of this reading and the latest one far enough back, sensor by sensor."""
         far_enough = (
-            (before, heard, baseline)
-            for before, heard in self._kept
+            (before, old_ranges, baseline)
+            for before, old_ranges in self._kept
             if BASELINE_MIN_M <= (baseline := math.hypot(*(sensors[0, :2] - before[0, :2]))) <= BASELINE_MAX_M
         )
         if (last := next(far_enough, None)) is None:
             return ()
-        before, heard, baseline = last
+        before, old_ranges, baseline = last
         with np.errstate(invalid="ignore"):
-            shorter = heard - ranges
+            shorter = old_ranges - ranges
             usable = np.isfinite(shorter) & (np.abs(shorter) <= baseline)
         i = np.flatnonzero(usable)
         along = np.arctan2(sensors[i, 1] - before[i, 1], sensors[i, 0] - before[i, 0])
@@ -101,7 +101,7 @@ class FrontEnd:
         inside = off[rows, side] <= self._half_angle
         i, normal = i[inside], normals[rows, side][inside]
         n = np.column_stack([np.cos(normal), np.sin(normal)])
-        old = (before[i, :2] + heard[i, None] * n).tolist()
+        old = (before[i, :2] + old_ranges[i, None] * n).tolist()
         new = (sensors[i, :2] + ranges[i, None] * n).tolist()
         found = zip(old, new, normal.tolist(), strict=True)
         return tuple(Segment(((a[0], a[1]), (b[0], b[1])), direction) for a, b, direction in found)

@@ -1,7 +1,7 @@
-"""What a long drive leaves behind: memory, late compilations, full collections. `make soak` drives for a day.
+"""Growth during a long drive: memory, late compilations, full garbage collections. `make soak` drives for hours.
 
-A program of its own, so that nothing but the drive is in the figures. Virtual time, the emulated robot in the same
-process: whatever that one leaves behind counts as well.
+It runs as its own process, so that the figures hold nothing but the drive, in virtual time. The emulated robot runs
+in the same process and counts as well.
 """
 
 from __future__ import annotations
@@ -27,28 +27,28 @@ from runtime.timing.footprint import own_mb
 from runtime.timing.memory_policy import MemoryPolicy
 
 SETTLED_CYCLES: Final = 1000
-"""A minute: once down the hall, by when everything that is allocated at first need has been."""
+"""A minute: one pass down the hall, after which everything allocated on first use is there."""
 GROWTH_MAX_MB: Final = 1.0
-"""In an hour, and in whatever is shorter."""
+"""Limit for an hour, and for any shorter drive."""
 SAMPLE_CYCLES: Final = 1000
 SETTLED_SHARE: Final = 0.2
-"""Of a drive: tables that are filled as the map fills come to their size in it."""
-LINE_MIN: Final = 10
-"""Samples through which a line is laid, at least."""
+"""Share of a drive in which tables that fill with the map reach their size."""
+FIT_SAMPLES_MIN: Final = 10
+"""Fewest samples through which a line is fitted."""
 WRAP_US: Final = 2**32
 SLACK_S: Final = 0.04
-"""What is left of a cycle's period; virtual time has no slack of its own."""
+"""Idle time after each cycle, as given to the memory policy; virtual time has none."""
 
-app = App(help="Drive for many cycles in virtual time and say what is left behind.")
+app = App(help="Drive for many cycles in virtual time and report what has grown.")
 
 
 @dataclass
-class Left:
-    """Looks on from the moment when everything is settled."""
+class GrowthMonitor:
+    """Samples memory and modes once the drive is settled."""
 
     memory: MemoryPolicy
     last: int
-    """The cycle after which the account is drawn up, while everything is still there."""
+    """Last cycle, after which memory is measured while everything is still allocated."""
     before_mb: float = math.nan
     after_mb: float = math.nan
     signatures: int = 0
@@ -57,7 +57,7 @@ class Left:
     """Virtual time, s, and memory, MB."""
 
     def on_cycle(self, record: CycleRecord, _truth: GroundTruth) -> None:
-        """Keep the memory policy as a run on a line does."""
+        """Apply the memory policy as a real run does, and take the samples of this cycle."""
         self.memory.cycle_done(SLACK_S)
         if record.cycle == SETTLED_CYCLES:
             self.before_mb = own_mb() or math.nan
@@ -71,9 +71,9 @@ class Left:
 
     @property
     def slope_mb_h(self) -> float:
-        """How fast memory grows once the drive is settled, MB/h; zero for a drive too short to tell."""
+        """Growth of memory once the drive is settled, MB/h; zero if the drive is too short for a fit."""
         settled = self.samples[round(SETTLED_SHARE * len(self.samples)) :]
-        if len(settled) < LINE_MIN:
+        if len(settled) < FIT_SAMPLES_MIN:
             return 0.0
         at_s, mb = np.array(settled).T
         return float(3600.0 * np.polyfit(at_s - at_s[0], mb, 1)[0])
@@ -84,42 +84,42 @@ def grow(
     cycles: Annotated[int, Parameter(help="Cycles after the first thousand.")] = 100_000,
     /,
     *,
-    wrap_s: Annotated[float, Parameter(help="The robot's clock wraps after so many seconds.")] = math.inf,
+    wrap_s: Annotated[float, Parameter(help="The robot's clock wraps after this time, s.")] = math.inf,
 ) -> int:
-    """Print the figures as JSON; fail where the drive left more behind than it may."""
+    """Print the figures as JSON; exit with 1 if the drive grew beyond a limit."""
     settings = load_settings("hallway", ["behaviors.move_ahead.at_end=turn_back"])
     ready_kernels(settings, Console(stderr=True))
     if settings.world is None:
         return FAILED
     memory = MemoryPolicy()
     last = SETTLED_CYCLES + cycles
-    left = Left(memory, last)
+    monitor = GrowthMonitor(memory, last)
     with memory.driving():
         clock_us = 0 if math.isinf(wrap_s) else WRAP_US - round(1e6 * wrap_s)
         simulate(
-            settings, settings.world, 0, last / settings.cycle.rate_hz, left.on_cycle, clock_start_us=clock_us
+            settings, settings.world, 0, last / settings.cycle.rate_hz, monitor.on_cycle, clock_start_us=clock_us
         )  # fmt: skip
     signatures = compiled_signatures()
-    growth_mb, compilations = round(left.after_mb - left.before_mb, 3), signatures - left.signatures
+    growth_mb, compilations = round(monitor.after_mb - monitor.before_mb, 3), signatures - monitor.signatures
     figures: dict[str, Any] = {
         "cycles": cycles,
         "growth_mb": growth_mb,
-        "slope_mb_h": round(left.slope_mb_h, 3),
+        "slope_mb_h": round(monitor.slope_mb_h, 3),
         "wraps": math.floor((1e6 * last / settings.cycle.rate_hz + clock_us) / WRAP_US),
         "compilations": compilations,
         "signatures": signatures,
         "collections": memory.collections,
-        "modes": sorted(mode.value for mode in left.modes),
+        "modes": sorted(mode.value for mode in monitor.modes),
     }
     sys.stdout.write(orjson.dumps(figures).decode() + "\n")
     hours = max(1.0, cycles / settings.cycle.rate_hz / 3600.0)
-    kept = (
+    within_limits = (
         growth_mb < hours * GROWTH_MAX_MB
-        and left.slope_mb_h < GROWTH_MAX_MB
+        and monitor.slope_mb_h < GROWTH_MAX_MB
         and not compilations
         and not memory.collections[-1]
     )
-    return DONE if kept and left.modes == {Mode.DRIVE} else FAILED
+    return DONE if within_limits and monitor.modes == {Mode.DRIVE} else FAILED
 
 
 if __name__ == "__main__":

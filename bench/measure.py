@@ -1,6 +1,6 @@
-"""The run itself: every contestant through every hall in turn, and what came of it.
+"""The comparison: drives every candidate through every hall and scores it.
 
-Contestants take turns hall by hall, so that whatever else the machine does falls on all alike.
+Candidates take turns hall by hall, so that other load on the machine affects all of them alike.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from statistics import median
 from typing import Final, TypedDict
 
 from bench.front_end import Place
-from bench.runners import Contestant, Watch
+from bench.runners import Candidate, ReadingTimes
 from config.robot import RingConfig
 from config.units import FOOT_M
 from drivers.messages import Firing
@@ -28,17 +28,17 @@ SCENES: Final[tuple[SceneName, ...]] = (
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """How much is run."""
+    """Extent of the comparison."""
 
     repetitions: int
     halls_max: int
-    """Halls of a scene that are driven through."""
+    """Halls of a scene to drive through, at most."""
     passes: int
-    """Of the long drive, whose last pass is compared with its first."""
+    """Passes of the long drive, whose last pass is compared with its first."""
 
 
 class SceneScore(TypedDict):
-    """One contestant in one scene and one repetition: counts over all its halls, errors in feet."""
+    """Score of one candidate in one scene and repetition: counts over all halls, errors in feet."""
 
     found: int
     of: int
@@ -48,19 +48,19 @@ class SceneScore(TypedDict):
 
 
 class Times(TypedDict):
-    """Medians per ring reading, ms."""
+    """Median times per ring reading, ms."""
 
     front_end: float
-    """Outline segments, common to all peers; none for ours, whose own time holds everything."""
+    """Outline segments, common to all peers; zero for our methods, whose `own` includes everything."""
     association: float
-    """What a peer leaves to its user, common to all peers."""
+    """Data association, common to all peers."""
     own: float
-    """The library itself, and for ours everything."""
+    """The library itself; for our methods everything."""
     total: float
 
 
 class Result(TypedDict):
-    """One contestant's whole run: medians over the repetitions, and each repetition."""
+    """Result of one candidate: medians over the repetitions, and each repetition."""
 
     name: str
     version: str
@@ -73,46 +73,46 @@ class Result(TypedDict):
 
 @dataclass(slots=True)
 class _Tally:
-    """What a contestant has gathered so far."""
+    """Scores and times of a candidate so far."""
 
     scores: dict[SceneName, list[SceneScore]]
-    clean: list[Watch]
-    first: list[Watch]
-    last: list[Watch]
+    clean: list[ReadingTimes]
+    first: list[ReadingTimes]
+    last: list[ReadingTimes]
 
 
 def measure(
-    contestants: Sequence[Contestant], ring: RingConfig, plan: Plan, say: Callable[[str], None]
+    candidates: Sequence[Candidate], ring: RingConfig, plan: Plan, report: Callable[[str], None]
 ) -> list[Result]:
-    """Run all contestants and return their results in the same order.
+    """Run all candidates and return their results in the same order.
 
     Parameters
     ----------
-    contestants
-        Who takes part.
+    candidates
+        Candidates to compare.
     ring
-        What they hear through.
+        Geometry of the sensors.
     plan
-        How much is run.
-    say
-        Told what is being run now.
+        Extent of the comparison.
+    report
+        Called with a line on what is running.
     """
-    tallies = [_Tally({name: [] for name in SCENES}, [], [], []) for _ in contestants]
+    tallies = [_Tally({name: [] for name in SCENES}, [], [], []) for _ in candidates]
     warm = list(readings(ring, halls("clean")[0], seed=0))
-    for contestant in contestants:  # compiles, imports lazily, fills caches
-        drive(contestant, warm)
+    for candidate in candidates:  # compiles, imports lazily, fills caches
+        drive(candidate, warm)
     for repetition in range(plan.repetitions):
         for scene in SCENES:
-            say(f"repetition {repetition + 1} of {plan.repetitions}: {scene}")
-            _run_scene(scene, contestants, tallies, ring, plan, repetition)
-        say(f"repetition {repetition + 1} of {plan.repetitions}: {plan.passes} passes of clean")
-        _run_long(contestants, tallies, ring, plan, repetition)
-    return [_result(c, t) for c, t in zip(contestants, tallies, strict=True)]
+            report(f"repetition {repetition + 1} of {plan.repetitions}: {scene}")
+            _run_scene(scene, candidates, tallies, ring, plan, repetition)
+        report(f"repetition {repetition + 1} of {plan.repetitions}: {plan.passes} passes of clean")
+        _run_long(candidates, tallies, ring, plan, repetition)
+    return [_result(c, t) for c, t in zip(candidates, tallies, strict=True)]
 
 
-def drive(contestant: Contestant, firings: Sequence[Firing]) -> tuple[list[Watch], list[Place]]:
-    """Take one contestant through one drive; return each reading's two times, s, and the drums at its end, m."""
-    runner = contestant.begin()
+def drive(candidate: Candidate, firings: Sequence[Firing]) -> tuple[list[ReadingTimes], list[Place]]:
+    """Drive one candidate through one drive; return each reading's times, s, and the drums at the end, m."""
+    runner = candidate.create()
     gc.collect()
     gc.disable()
     try:
@@ -124,17 +124,17 @@ def drive(contestant: Contestant, firings: Sequence[Firing]) -> tuple[list[Watch
 
 def _run_scene(
     scene: SceneName,
-    contestants: Sequence[Contestant],
+    candidates: Sequence[Candidate],
     tallies: Sequence[_Tally],
     ring: RingConfig,
     plan: Plan,
     repetition: int,
 ) -> None:
-    rows: list[list[tuple[Hall, list[tuple[float, float]]]]] = [[] for _ in contestants]
+    rows: list[list[tuple[Hall, list[tuple[float, float]]]]] = [[] for _ in candidates]
     for i, hall in enumerate(halls(scene)[: plan.halls_max]):
         firings = list(readings(ring, hall, seed=1000 * repetition + i))
-        for contestant, tally, row in zip(contestants, tallies, rows, strict=True):
-            times, drums = drive(contestant, firings)
+        for candidate, tally, row in zip(candidates, tallies, rows, strict=True):
+            times, drums = drive(candidate, firings)
             row.append((hall, drums))
             if scene == "clean":
                 tally.clean += times
@@ -143,21 +143,21 @@ def _run_scene(
 
 
 def _run_long(
-    contestants: Sequence[Contestant], tallies: Sequence[_Tally], ring: RingConfig, plan: Plan, repetition: int
+    candidates: Sequence[Candidate], tallies: Sequence[_Tally], ring: RingConfig, plan: Plan, repetition: int
 ) -> None:
     firings = list(readings(ring, halls("clean")[0], seed=repetition, passes=plan.passes))
-    for contestant, tally in zip(contestants, tallies, strict=True):
-        if not contestant.slow:
-            times, _ = drive(contestant, firings)
+    for candidate, tally in zip(candidates, tallies, strict=True):
+        if not candidate.slow:
+            times, _ = drive(candidate, firings)
             tally.first += times[:READINGS]
             tally.last += times[-READINGS:]
 
 
-def score(seen: Sequence[tuple[Hall, list[tuple[float, float]]]]) -> SceneScore:
-    """Set the drums seen in each hall against those that stand there."""
+def score(found: Sequence[tuple[Hall, list[tuple[float, float]]]]) -> SceneScore:
+    """Return the score of the drums found (m) in each hall against the true ones."""
     errors: list[float] = []
     of = false = 0
-    for hall, drums in seen:
+    for hall, drums in found:
         truth = [(drum.x_m, drum.y_m) for drum in hall.world.drum]
         match = nearest_pairs(truth, drums)
         errors += [math.dist(truth[i], drums[j]) / FOOT_M for i, j in match.items()]
@@ -167,11 +167,11 @@ def score(seen: Sequence[tuple[Hall, list[tuple[float, float]]]]) -> SceneScore:
     return {"found": len(errors), "of": of, "false": false, "mean_ft": mean, "max_ft": worst}
 
 
-def _result(contestant: Contestant, tally: _Tally) -> Result:
+def _result(candidate: Candidate, tally: _Tally) -> Result:
     return {
-        "name": contestant.name,
-        "version": contestant.version,
-        "scenes": {scene: _middle(scores) for scene, scores in tally.scores.items()},
+        "name": candidate.name,
+        "version": candidate.version,
+        "scenes": {scene: _median_score(scores) for scene, scores in tally.scores.items()},
         "repetitions": dict(tally.scores.items()),
         "ms": _times(tally.clean),
         "ms_first_pass": _times(tally.first) if tally.first else None,
@@ -179,7 +179,7 @@ def _result(contestant: Contestant, tally: _Tally) -> Result:
     }
 
 
-def _middle(scores: Sequence[SceneScore]) -> SceneScore:
+def _median_score(scores: Sequence[SceneScore]) -> SceneScore:
     means = [s["mean_ft"] for s in scores if s["mean_ft"] is not None]
     worst = [s["max_ft"] for s in scores if s["max_ft"] is not None]
     return {
@@ -191,8 +191,8 @@ def _middle(scores: Sequence[SceneScore]) -> SceneScore:
     }
 
 
-def _times(watches: Sequence[Watch]) -> Times:
-    columns = zip(*watches, strict=True)
+def _times(samples: Sequence[ReadingTimes]) -> Times:
+    columns = zip(*samples, strict=True)
     front_end, association, own = (1e3 * median(column) for column in columns)
-    total = 1e3 * median(sum(watch) for watch in watches)
+    total = 1e3 * median(sum(sample) for sample in samples)
     return {"front_end": front_end, "association": association, "own": own, "total": total}

@@ -1,4 +1,4 @@
-"""What the peers are told of the readings' noise: one figure for all scenes, as a user of one robot would have."""
+"""Noise model given to the peers: one figure for all scenes, as the user of one robot would have."""
 
 from __future__ import annotations
 
@@ -8,6 +8,6 @@ from typing import Final
 from config.units import FOOT_M
 
 RANGE_SIGMA_M: Final = math.hypot(0.1 / math.sqrt(12.0), 0.03) * FOOT_M
-"""Rounding to a tenth of a foot, and some."""
-GUESS_SIGMA_M: Final = 0.5 * FOOT_M
-"""Of the first guess of a drum's centre."""
+"""Standard deviation of a range: rounding to 0.1 ft, and 0.03 ft of noise."""
+INITIAL_SIGMA_M: Final = 0.5 * FOOT_M
+"""Standard deviation of the first estimate of a drum's centre."""

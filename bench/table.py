@@ -1,4 +1,4 @@
-"""The result as a person reads it: one row a contestant, lengths in feet, times in milliseconds."""
+"""Table of the comparison: one row per candidate, lengths in feet, times in milliseconds."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from bench.measure import Plan, Result, SceneScore, Times
 
 
 def results_table(results: Sequence[Result], plan: Plan) -> Table:
-    """Return the table of the whole run."""
+    """Return the table of all results."""
     table = Table(
-        title="Lengths in feet; f/f: found/false; ms: median per ring reading, the peers' own after segments and "
-        "association,\nwhich are common to them and told apart; ours holds everything",
+        title="Lengths in feet; f/f: found/false; ms: median per ring reading, for peers without segments and "
+        "association,\nwhich they share and which have their own columns; for our methods everything",
         title_justify="left",
     )
-    table.add_column("contestant")
+    table.add_column("method")
     headings = (
         "clean\nmean/max", "moved\nf/f mean/max", "noisy\nf/f (mean)", "walls\nf/f (mean)", "jit10\nf/f (mean)",
         "boxes false\nfacing, 45°", "ms", "ms of\nassociation", "ms of\nsegments",
@@ -32,9 +32,9 @@ def results_table(results: Sequence[Result], plan: Plan) -> Table:
             ("" if scenes["clean"]["found"] == scenes["clean"]["of"] else _counts(scenes["clean"]) + " ")
             + _mean_max(scenes["clean"]),
             f"{_counts(moved)} {_mean_max(moved)}",
-            _counted(scenes["noisy"]),
-            _counted(scenes["walls"]),
-            _counted(scenes["jit10"]),
+            _counts_and_mean(scenes["noisy"]),
+            _counts_and_mean(scenes["walls"]),
+            _counts_and_mean(scenes["jit10"]),
             f"{scenes['boxes_facing']['false']}, {scenes['boxes_45']['false']}",
             f"{result['ms']['own']:.3f}",
             _part(result["ms"]["association"]),
@@ -53,7 +53,7 @@ def _mean_max(score: SceneScore) -> str:
     return f"{_length(score['mean_ft'])}/{_length(score['max_ft'])}"
 
 
-def _counted(score: SceneScore) -> str:
+def _counts_and_mean(score: SceneScore) -> str:
     return f"{_counts(score)} ({_length(score['mean_ft'])})"
 
 

@@ -1,4 +1,4 @@
-"""The timing table, and the comparison with an earlier run."""
+"""Tables of a timing measurement, with its limits and the comparison with an earlier run."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from config.errors import WRONG_CALL, UserError
 
 COLUMNS: Final = ("p50", "p99", "p99.9", "max")
 ANSWER_MAX_US: Final = 3000.0
-"""From an echo to the command, beyond what the bare control takes, at p99."""
+"""Limit of the time from an echo to the command beyond the control's, at p99."""
 LATE_MAX_US: Final = 1000.0
-"""After its time that a cycle begins, beyond what a bare loop's does, at p99.9."""
+"""Limit of how late a cycle starts beyond the control's wake-up, at p99.9."""
 LIMITS: Final = {
     "start_s": 2.5, "rss_mb": 250.0, "rss_peak_mb": 250.0, "cpu_share": 0.06,
     "compilations": 0.0, "full collections": 0.0, "link lost": 0.0, "stops": 0.0, WINDOW_USED: 0.03,
     VIRTUAL: 10.0, LOOP_P99: 300.0, HOUR_MB: 30.0, DROPPED: 0.0,
 }  # fmt: skip
-"""What each figure may be at most."""
+"""Limit of each figure."""
 
 Earlier = Mapping[str, Any]
 
 
 def read_earlier(path: str) -> Earlier:
-    """Return the JSON of an earlier run.
+    """Return the quantiles and figures of an earlier run.
 
     Raises
     ------
     UserError
-        There is none at `path`, or it is something else.
+        The file cannot be read, or was not written by `bench timing`.
     """
     try:
         earlier: Earlier = orjson.loads(Path(path).read_bytes())
@@ -42,28 +42,28 @@ def read_earlier(path: str) -> Earlier:
     except OSError as error:
         raise UserError(f"--against {path}: cannot be read: {error.strerror}", WRONG_CALL) from error
     except (orjson.JSONDecodeError, KeyError, TypeError, ValueError) as error:
-        raise UserError(f"--against {path}: is not what `bench timing --json` writes", WRONG_CALL) from error
+        raise UserError(f"--against {path}: was not written by `bench timing --json`", WRONG_CALL) from error
 
 
-def verdicts(timing: Timing) -> list[tuple[str, float, float]]:
-    """Return what was asked: a name, the figure, and the most it may be."""
+def checks(timing: Timing) -> list[tuple[str, float, float]]:
+    """Return the checks: name, figure and limit."""
     rows = timing.quantiles_us
-    asked = [(name, timing.figures[name], limit) for name, limit in LIMITS.items() if name in timing.figures]
+    checked = [(name, timing.figures[name], limit) for name, limit in LIMITS.items() if name in timing.figures]
     if ECHO_TO_DRIVE in rows and ECHO_TO_DRIVE + CONTROL in rows:
         limit = ANSWER_MAX_US + rows[ECHO_TO_DRIVE + CONTROL]["p99"]
-        asked.append((f"{ECHO_TO_DRIVE}, p99 µs", rows[ECHO_TO_DRIVE]["p99"], limit))
+        checked.append((f"{ECHO_TO_DRIVE}, p99 µs", rows[ECHO_TO_DRIVE]["p99"], limit))
     if LATE in rows and WAKING + CONTROL in rows:
         limit = LATE_MAX_US + rows[WAKING + CONTROL]["p99.9"]
-        asked.append(("a cycle begins after its time, p99.9 µs", rows[LATE]["p99.9"], limit))
-    return asked
+        checked.append(("a cycle starts late, p99.9 µs", rows[LATE]["p99.9"], limit))
+    return checked
 
 
 def quantiles_table(timing: Timing, earlier: Earlier | None) -> Table:
-    """Return the quantiles, µs; beside each its earlier self where there is one."""
+    """Return the table of quantiles, µs, with those of an earlier run if given."""
     plan = timing.plan
-    title = f"timing, µs: {plan.rounds} × {plan.seconds:g} s over the pty, {plan.busy} busy processes beside"
+    title = f"timing, µs: {plan.rounds} × {plan.seconds:g} s over the pty, {plan.busy} busy processes"
     table = Table(title=title, title_justify="left")
-    table.add_column("what")
+    table.add_column("row")
     for column in COLUMNS:
         table.add_column(column, justify="right")
         if earlier is not None:
@@ -79,11 +79,11 @@ def quantiles_table(timing: Timing, earlier: Earlier | None) -> Table:
 
 
 def figures_table(timing: Timing, earlier: Earlier | None) -> Table:
-    """Return start-up, memory, processor time and counts, with what they may be at most."""
-    limits = {name: limit for name, _, limit in verdicts(timing)}
-    found = timing.figures | {name: figure for name, figure, _ in verdicts(timing)}
-    table = Table(title="the process, the worst of all rounds", title_justify="left")
-    table.add_column("what")
+    """Return the table of start-up time, memory, processor time and counts, with their limits."""
+    limits = {name: limit for name, _, limit in checks(timing)}
+    found = timing.figures | {name: figure for name, figure, _ in checks(timing)}
+    table = Table(title="process: the worst of all rounds", title_justify="left")
+    table.add_column("row")
     for column in ("figure", "at most", ""):
         table.add_column(column, justify="right")
     if earlier is not None:

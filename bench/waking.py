@@ -1,7 +1,7 @@
-"""Which way of sleeping wakes a loop on time: the table behind `runtime/timing/wake.py`, as `make bench` measures it.
+"""Wake-up latency of methods of sleeping until a deadline: the reason for the choice in `runtime/timing/wake.py`.
 
-Every contestant sleeps to the same grid of deadlines, a few seconds at a time, in turns with the others, so that
-whatever else the machine does meets all of them alike. The control is a thread that sleeps without any loop.
+Every method sleeps to the same grid of deadlines, two seconds at a time, in turns with the others, so that other load
+on the machine affects all of them alike. The control sleeps without an event loop.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from runtime.timing.realtime import ask_slice
 from runtime.timing.wake import Waker
 
 PERIOD_S: Final = 0.05
-"""The cycle's own."""
+"""Period of the cycle."""
 WAKES_A_TURN: Final = 40
 SPIN_S: Final = 0.001
 SLICE_S: Final = 0.0001
-"""As realtime.slice_s."""
-CONTROL: Final = "time.sleep, no loop"
+"""As the setting realtime.slice_s."""
+CONTROL: Final = "time.sleep, no event loop"
 
 Sleep: TypeAlias = Callable[[float], Awaitable[object]]
 NewLoop: TypeAlias = Callable[[], asyncio.AbstractEventLoop]
 
 
 @dataclass
-class Way:
-    """A way of sleeping, and what came of it."""
+class SleepMethod:
+    """Method of sleeping, and its measured lateness and CPU time."""
 
     name: str
     sleep: Callable[[], contextlib.AbstractContextManager[Sleep]]
@@ -47,8 +47,8 @@ class Way:
 
 
 @contextlib.contextmanager
-def bare() -> Iterator[Sleep]:
-    """Sleep without any loop."""
+def by_time_sleep() -> Iterator[Sleep]:
+    """Sleep without an event loop."""
 
     async def until(deadline_s: float) -> None:
         time.sleep(max(0.0, deadline_s - time.monotonic()))
@@ -58,7 +58,7 @@ def bare() -> Iterator[Sleep]:
 
 @contextlib.contextmanager
 def by_asyncio() -> Iterator[Sleep]:
-    """Sleep as everyone does."""
+    """Sleep by asyncio.sleep."""
 
     async def until(deadline_s: float) -> None:
         await asyncio.sleep(max(0.0, deadline_s - time.monotonic()))
@@ -77,8 +77,8 @@ def by_waker() -> Iterator[Sleep]:
 
 
 @contextlib.contextmanager
-def by_waker_in_short_turns() -> Iterator[Sleep]:
-    """Sleep as the cycle does, asking the system for short turns, as a run does."""
+def by_waker_with_slice() -> Iterator[Sleep]:
+    """Sleep as the cycle does, with a short scheduler time slice requested, as a run does."""
     ask_slice(SLICE_S)
     try:
         with by_waker() as sleep:
@@ -90,10 +90,10 @@ def by_waker_in_short_turns() -> Iterator[Sleep]:
 def spinning(
     sleep: Callable[[], contextlib.AbstractContextManager[Sleep]], spin_s: float
 ) -> Callable[[], contextlib.AbstractContextManager[Sleep]]:
-    """Return a way that sleeps until shortly before the deadline and looks at the clock without rest from then on."""
+    """Return a method that sleeps until `spin_s` before the deadline and then polls the clock."""
 
     @contextlib.contextmanager
-    def way() -> Iterator[Sleep]:
+    def method() -> Iterator[Sleep]:
         with sleep() as sleeps:
 
             async def until(deadline_s: float) -> None:
@@ -103,81 +103,91 @@ def spinning(
 
             yield until
 
-    return way
+    return method
 
 
 def select_loop() -> asyncio.AbstractEventLoop:
-    """Return a loop on select(), whose timeouts have microseconds."""
+    """Return an event loop on select(), whose timeouts have microsecond resolution."""
     return asyncio.SelectorEventLoop(selectors.SelectSelector())
 
 
-def ways() -> list[Way]:
-    """Return all contestants; uvloop only where it is installed."""
-    entered = [
-        Way(CONTROL, bare),
-        Way("asyncio.sleep", by_asyncio),
-        Way("asyncio.sleep + 1 ms spin", spinning(by_asyncio, SPIN_S)),
-        Way("asyncio.sleep on select()", by_asyncio, select_loop),
-        Way("timerfd (runtime/timing/wake.py)", by_waker),
-        Way("timerfd, realtime.slice_s = 0.0001", by_waker_in_short_turns),
-        Way("timerfd + 0.2 ms spin", spinning(by_waker, 0.0002)),
+def sleep_methods() -> list[SleepMethod]:
+    """Return all methods; uvloop only if it is installed."""
+    methods = [
+        SleepMethod(CONTROL, by_time_sleep),
+        SleepMethod("asyncio.sleep", by_asyncio),
+        SleepMethod("asyncio.sleep + 1 ms spin", spinning(by_asyncio, SPIN_S)),
+        SleepMethod("asyncio.sleep on select()", by_asyncio, select_loop),
+        SleepMethod("timerfd (runtime/timing/wake.py)", by_waker),
+        SleepMethod("timerfd, realtime.slice_s = 0.0001", by_waker_with_slice),
+        SleepMethod("timerfd + 0.2 ms spin", spinning(by_waker, 0.0002)),
     ]
     with contextlib.suppress(ImportError):
         uvloop = importlib.import_module("uvloop")
-        entered.insert(2, Way(f"uvloop {uvloop.__version__}", by_asyncio, uvloop.new_event_loop))
-    return entered
+        methods.insert(2, SleepMethod(f"uvloop {uvloop.__version__}", by_asyncio, uvloop.new_event_loop))
+    return methods
 
 
 @contextlib.contextmanager
-def hogs(count: int) -> Iterator[None]:
-    """Run `count` processes beside this one that never rest."""
+def busy_processes(count: int) -> Iterator[None]:
+    """Run `count` CPU-bound processes in the background."""
     started = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
     try:
         yield
     finally:
-        for hog in started:
-            hog.kill()
-            hog.wait()
+        for process in started:
+            process.kill()
+            process.wait()
 
 
-async def _turn(way: Way, wakes: int) -> None:
-    with way.sleep() as sleep:
+async def _turn(method: SleepMethod, wakes: int) -> None:
+    with method.sleep() as sleep:
         begin_s, begin_cpu_s = time.monotonic(), time.process_time()
         for k in range(1, wakes + 1):
             deadline_s = begin_s + k * PERIOD_S
             await sleep(deadline_s)
-            way.late_us.append(1e6 * (time.monotonic() - deadline_s))
-        way.cpu_us.append(1e6 * (time.process_time() - begin_cpu_s) / wakes)
+            method.late_us.append(1e6 * (time.monotonic() - deadline_s))
+        method.cpu_us.append(1e6 * (time.process_time() - begin_cpu_s) / wakes)
 
 
-def measure(turns: int, beside: int, told: Callable[[str], None]) -> list[Way]:
-    """Measure every way in turns, beside so many processes that never rest."""
-    entered = ways()
-    with hogs(beside):
+def measure(turns: int, busy: int, report: Callable[[str], None]) -> list[SleepMethod]:
+    """Return every method with its measured lateness and CPU time.
+
+    Parameters
+    ----------
+    turns
+        Number of turns for each method.
+    busy
+        Number of CPU-bound background processes.
+    report
+        Called with a line on what is running.
+    """
+    methods = sleep_methods()
+    with busy_processes(busy):
         for turn in range(turns):
-            for way in entered:
-                told(f"waking: {way.name}, turn {turn + 1} of {turns}, {beside} busy processes beside it")
-                with asyncio.Runner(loop_factory=way.new_loop) as runner:
-                    runner.run(_turn(way, WAKES_A_TURN))
-    return entered
+            for method in methods:
+                report(f"waking: {method.name}, turn {turn + 1} of {turns}, {busy} busy processes")
+                with asyncio.Runner(loop_factory=method.new_loop) as runner:
+                    runner.run(_turn(method, WAKES_A_TURN))
+    return methods
 
 
-def figures(measured: list[Way]) -> dict[str, dict[str, float]]:
-    """Return lateness and CPU time of each way, µs a wake."""
+def figures(measured: list[SleepMethod]) -> dict[str, dict[str, float]]:
+    """Return lateness and CPU time of each method, µs per wake-up."""
     rows = {}
-    for way in measured:
-        p50, p99, p999 = np.quantile(way.late_us, [0.5, 0.99, 0.999])
-        rows[way.name] = {
+    for method in measured:
+        p50, p99, p999 = np.quantile(method.late_us, [0.5, 0.99, 0.999])
+        rows[method.name] = {
             "p50": round(float(p50), 1), "p99": round(float(p99), 1), "p99.9": round(float(p999), 1),
-            "max": round(max(way.late_us), 1), "cpu": round(float(np.mean(way.cpu_us)), 1),
+            "max": round(max(method.late_us), 1), "cpu": round(float(np.mean(method.cpu_us)), 1),
         }  # fmt: skip
     return rows
 
 
 def waking_table(by_load: dict[str, dict[str, dict[str, float]]]) -> Table:
-    """Return the table: a row a way, lateness and CPU time, idle and beside busy processes."""
-    table = Table(title="waking: µs after the deadline, at 20 Hz", title_justify="left")
-    table.add_column("way")
+    """Return the table: one row per method, lateness and CPU time by the number of busy processes."""
+    table = Table(title="wake-ups: µs after the deadline, at 20 Hz", title_justify="left")
+    table.add_column("method")
     columns = ("p50", "p99", "p99.9", "max", "cpu")
     for load in by_load:
         for column in columns:

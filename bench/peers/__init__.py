@@ -1,1 +1,1 @@
-"""One file for each library, used as its own users would; each needs only that library, from the extra `bench`."""
+"""One module for each library, used as its documentation recommends; each needs only that library (extra `bench`)."""

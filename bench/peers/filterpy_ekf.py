@@ -1,4 +1,4 @@
-"""filterpy's extended Kalman filter: one of two states, the centre's x and y, for each track; ranges one by one."""
+"""filterpy's extended Kalman filter: one filter per track, its state the centre's x and y, updated range by range."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
 from bench.association import Evidence
-from bench.contestant import Peer, Tracks
+from bench.estimator import Peer, Tracks
 from bench.front_end import RADIUS_M
-from bench.noise import GUESS_SIGMA_M, RANGE_SIGMA_M
+from bench.noise import INITIAL_SIGMA_M, RANGE_SIGMA_M
 from drivers.messages import Floats
 
 INNOVATION_SIGMAS: Final = 3.5
@@ -31,7 +31,7 @@ def jacobian(state: Floats, x: float, y: float) -> Floats:
 
 
 class Filters(Tracks):
-    """A filter for each track."""
+    """One extended Kalman filter per track."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -39,10 +39,10 @@ class Filters(Tracks):
 
     def update(self, evidence: Evidence) -> None:
         """Update the filters with their ranges."""
-        for track, place in evidence.begun.items():
+        for track, place in evidence.initiated.items():
             ekf = ExtendedKalmanFilter(dim_x=2, dim_z=1)
             ekf.x = np.array(place)
-            ekf.P = np.eye(2) * GUESS_SIGMA_M**2
+            ekf.P = np.eye(2) * INITIAL_SIGMA_M**2
             ekf.R = np.array([[RANGE_SIGMA_M**2]])
             self._filters[track] = ekf
             self.places[track] = place

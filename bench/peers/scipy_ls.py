@@ -1,4 +1,4 @@
-"""scipy's least_squares on all ranges of a track so far, begun from where the last solution lay."""
+"""scipy's least_squares on all ranges of a track so far, started from the last solution."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from bench.association import Evidence
-from bench.contestant import Peer, Tracks
+from bench.estimator import Peer, Tracks
 from bench.front_end import RADIUS_M
 from bench.noise import RANGE_SIGMA_M
 from drivers.messages import Floats
@@ -17,7 +17,7 @@ RANGES_MIN: Final = 4
 
 
 def residuals(centre: Floats, rows: Floats) -> Floats:
-    """Return expected less measured range for rows of sensor x, y and range."""
+    """Return expected less measured range, m, shape (n,), for rows (n, 3) of sensor x, y and range, m."""
     off: Floats = np.hypot(centre[0] - rows[:, 0], centre[1] - rows[:, 1]) - RADIUS_M - rows[:, 2]
     return off
 
@@ -30,15 +30,15 @@ def jacobian(centre: Floats, rows: Floats) -> Floats:
 
 
 class LeastSquares(Tracks):
-    """All ranges kept, solved anew for each track that got one."""
+    """Keeps all ranges; solves again for each track that got one."""
 
     def __init__(self) -> None:
         super().__init__()
         self._rows: dict[int, list[tuple[float, float, float]]] = {}
 
     def update(self, evidence: Evidence) -> None:
-        """Solve for the tracks that were ranged."""
-        for track, place in evidence.begun.items():
+        """Solve for the tracks that got ranges."""
+        for track, place in evidence.initiated.items():
             self.places[track] = place
             self._rows[track] = []
         for hit in evidence.ranges:

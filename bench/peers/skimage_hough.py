@@ -1,6 +1,6 @@
 """scikit-image's circular Hough transform of known radius, on an image of all segments so far.
 
-It finds and decides by itself: what has enough of a circle's pixels is a drum.
+It needs no association: a circle with enough of its pixels set is a drum.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from skimage.draw import line
 from skimage.transform import hough_circle, hough_circle_peaks
 
 from bench.association import Evidence
-from bench.contestant import Peer
+from bench.estimator import Peer
 from bench.front_end import RADIUS_M, Place
 from config.units import FOOT_M
 from runtime.simulation.scenes import FROM_FT, TO_FT
@@ -23,13 +23,13 @@ PIXEL_M: Final = 0.05 * FOOT_M
 LEFT_M: Final = (FROM_FT - 2.0) * FOOT_M - 0.37 * PIXEL_M
 RIGHT_M: Final = (TO_FT + 4.0) * FOOT_M
 SIDE_M: Final = 9.0 * FOOT_M + 0.41 * PIXEL_M
-"""The fractions keep the scenes' round numbers off the grid, on which they would come out exact by luck."""
+"""The fractions of a pixel keep the scenes' round coordinates off the grid, where they would be exact by luck."""
 SHARE_MIN: Final = 0.25
 """Share of a circle's pixels that must be set; a drum shows about half of itself to the hall."""
 
 
 class Hough:
-    """One image of the hall, transformed anew with each reading that adds to it."""
+    """Keeps one image of the hall; transforms it after each reading that adds to it."""
 
     def __init__(self) -> None:
         self._image = np.zeros((math.ceil(2.0 * SIDE_M / PIXEL_M), math.ceil((RIGHT_M - LEFT_M) / PIXEL_M)), np.bool_)
@@ -56,8 +56,8 @@ class Hough:
     def _pixel(x: float, y: float) -> tuple[int, int]:
         return round((y + SIDE_M) / PIXEL_M), round((x - LEFT_M) / PIXEL_M)
 
-    def believed(self) -> Mapping[int, Place]:
-        """Return nothing: the transform knows no tracks."""
+    def estimates(self) -> Mapping[int, Place]:
+        """Return no estimates: the transform has no tracks."""
         return {}
 
     def drums(self) -> list[Place]:

@@ -1,4 +1,4 @@
-"""scikit-image's ransac with CircleModel, on the segments' ends of each track; its radius must come out right."""
+"""scikit-image's ransac with CircleModel on the segment ends of each track; fits with a wrong radius are rejected."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from skimage.measure import CircleModel, ransac
 
 from bench.association import Evidence
-from bench.contestant import Peer, Tracks
+from bench.estimator import Peer, Tracks
 from bench.front_end import RADIUS_M, Place
 from config.units import FOOT_M
 from drivers.messages import Floats
@@ -22,7 +22,7 @@ TRIALS: Final = 50
 
 
 class Ransac(Tracks):
-    """All points kept, a circle drawn anew through those of each track that got some."""
+    """Keeps all points; fits a circle again for each track that got some."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -31,7 +31,7 @@ class Ransac(Tracks):
 
     def update(self, evidence: Evidence) -> None:
         """Fit the tracks that got segments."""
-        self.places.update(evidence.begun)
+        self.places.update(evidence.initiated)
         for track, segment in evidence.segments:
             self._points.setdefault(track, []).extend(segment.ends)
         for track in {track for track, _ in evidence.segments} & self.places.keys():
@@ -39,8 +39,8 @@ class Ransac(Tracks):
             if len(points) >= POINTS_MIN and (centre := self._fit(points)) is not None:
                 self.places[track] = centre
 
-    def believed(self) -> Mapping[int, Place]:
-        """Return nothing: a circle drawn through few points may lie anywhere, and would mislead the association."""
+    def estimates(self) -> Mapping[int, Place]:
+        """Return no estimates: a circle through few points may lie anywhere and would mislead the association."""
         return {}
 
     def _fit(self, points: Floats) -> Place | None:
@@ -48,7 +48,7 @@ class Ransac(Tracks):
             return bool(model) and abs(float(model.radius) - RADIUS_M) <= RADIUS_TOLERANCE_M
 
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that three points in line make no circle, and the like
+            warnings.simplefilter("ignore")  # on collinear points, for example
             model, _ = ransac(
                 points, CircleModel, min_samples=3, residual_threshold=INLIER_M, is_model_valid=has_the_radius,
                 max_trials=TRIALS, rng=self._rng,

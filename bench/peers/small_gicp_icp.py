@@ -1,4 +1,4 @@
-"""small_gicp's point-to-point ICP: the segments' ends of a track onto points on a drum's outline, begun warm."""
+"""small_gicp's point-to-point ICP: aligns the segment ends of a track with a drum's outline, warm-started."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import numpy as np
 import small_gicp
 
 from bench.association import Evidence
-from bench.contestant import Peer, Tracks
+from bench.estimator import Peer, Tracks
 from bench.front_end import RADIUS_M
 
 OUTLINE_POINTS: Final = 720
 CORRESPONDENCE_MAX_M: Final = 0.3
 POINTS_MIN: Final = 12
-"""Below, the library itself warns."""
+"""The library warns below this."""
 
 
 class Icp(Tracks):
-    """All points kept, aligned anew for each track that got some."""
+    """Keeps all points; aligns them again for each track that got some."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -30,7 +30,7 @@ class Icp(Tracks):
 
     def update(self, evidence: Evidence) -> None:
         """Align the tracks that got segments."""
-        self.places.update(evidence.begun)
+        self.places.update(evidence.initiated)
         for track, segment in evidence.segments:
             self._points.setdefault(track, []).extend((x, y, 0.0) for x, y in segment.ends)
         for track in {track for track, _ in evidence.segments} & self.places.keys():

@@ -1,4 +1,4 @@
-"""What the timing bench makes of a trace and of summaries: the right pairs, the worst figures, nothing invented."""
+"""Tests of bench.timing and bench.timing_table: echo-command pairs, worst figures, limits, earlier runs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from bench.timing import (
     worst_figures,
     worst_rows,
 )
-from bench.timing_table import figures_table, quantiles_table, read_earlier, verdicts
+from bench.timing_table import checks, figures_table, quantiles_table, read_earlier
 from config.errors import UserError
 
 PLAN = TimingPlan(1.0, 1, 0)
@@ -35,17 +35,17 @@ def trace(folder: Path, *rows: str) -> Path:
     return path
 
 
-def test_an_echo_is_answered_by_the_first_command_after_it(tmp_path: Path) -> None:
+def test_echo_is_paired_with_the_next_command(tmp_path: Path) -> None:
     path = trace(
         tmp_path, "0.5,echo", "0.9,drive", "1.0,echo", "1.002,drive", "1.04,drive", "2.0,echo", "3.0,echo",
         "3.001,drive", "4.0,echo",
     )  # fmt: skip
     taken_us, unanswered = answers_us(path)
     assert taken_us == pytest.approx([2000.0, 1000.0], abs=0.1)
-    assert unanswered == 1, "the second; the one before the first command and the last one do not count"
+    assert unanswered == 1, "the second echo; those before the first command and after the last do not count"
 
 
-def test_a_conversation_without_commands_has_no_answers(tmp_path: Path) -> None:
+def test_trace_without_commands_has_no_pairs(tmp_path: Path) -> None:
     assert answers_us(trace(tmp_path, "1.0,echo", "2.0,echo")) == ([], 0)
 
 
@@ -72,7 +72,7 @@ def test_figures_are_the_worst_of_all_runs() -> None:
     figures = worst_figures([summary(), summary(start_s=2.0, collections=[0, 0, 1])])
     assert figures == {
         "start_s": 2.0, "full collections": 1.0, "link lost": 0.0, "late": 0.0, "missed": 2.0,
-        "stops": 0.0, "gave up driving": 0.0,
+        "stops": 0.0, "ended outside DRIVE": 0.0,
     }  # fmt: skip
 
 
@@ -81,44 +81,44 @@ def timed(p99: float, control: float) -> Timing:
     return Timing(PLAN, rows, {"start_s": 2.0, "cpu_share": 0.07})
 
 
-def test_limits_are_three_milliseconds_beyond_the_control() -> None:
-    asked = {name: (figure, limit) for name, figure, limit in verdicts(timed(3400.0, 500.0))}
-    assert asked[f"{ECHO_TO_DRIVE}, p99 µs"] == pytest.approx((3400.0, 3500.0))
-    assert asked["start_s"] == (2.0, 2.5)
-    assert asked["cpu_share"] == (0.07, 0.06)
+def test_echo_to_drive_limit_is_three_milliseconds_beyond_the_control() -> None:
+    limits = {name: (figure, limit) for name, figure, limit in checks(timed(3400.0, 500.0))}
+    assert limits[f"{ECHO_TO_DRIVE}, p99 µs"] == pytest.approx((3400.0, 3500.0))
+    assert limits["start_s"] == (2.0, 2.5)
+    assert limits["cpu_share"] == (0.07, 0.06)
 
 
-def test_cycles_may_begin_a_millisecond_later_than_a_bare_loop_wakes() -> None:
+def test_cycle_start_limit_is_one_millisecond_beyond_the_control() -> None:
     rows = {LATE: quantiles_of([1900.0]), WAKING + CONTROL: quantiles_of([1000.0])}
-    assert verdicts(Timing(PLAN, rows, {WINDOW_USED: 0.02})) == [
+    assert checks(Timing(PLAN, rows, {WINDOW_USED: 0.02})) == [
         (WINDOW_USED, 0.02, 0.03),
-        ("a cycle begins after its time, p99.9 µs", 1900.0, 2000.0),
+        ("a cycle starts late, p99.9 µs", 1900.0, 2000.0),
     ]
 
 
-def test_the_window_is_the_way_to_the_farthest_echo_and_back() -> None:
+def test_window_is_the_flight_time_of_the_farthest_echo() -> None:
     assert window_s([]) == pytest.approx(0.0453, abs=1e-4)
 
 
-def test_an_earlier_run_stands_beside_this_one(tmp_path: Path) -> None:
+def test_earlier_run_is_compared(tmp_path: Path) -> None:
     path = tmp_path / "earlier.json"
     path.write_bytes(orjson.dumps(timed(3000.0, 400.0).as_json()))
     earlier = read_earlier(str(path))
-    now = timed(3400.0, 500.0)
-    assert quantiles_table(now, earlier).row_count == 2
-    assert [list(column.cells) for column in figures_table(now, earlier).columns][3][:2] == [
+    current = timed(3400.0, 500.0)
+    assert quantiles_table(current, earlier).row_count == 2
+    assert [list(column.cells) for column in figures_table(current, earlier).columns][3][:2] == [
         "kept",
         "[bold red]missed[/]",
     ]
-    before = [list(column.cells) for column in quantiles_table(now, earlier).columns][2]
+    before = [list(column.cells) for column in quantiles_table(current, earlier).columns][2]
     assert before == ["3000", "400"]
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[1]", '{"quantiles_us": 3, "figures": 4}'])
-def test_something_else_is_no_earlier_run(text: str, tmp_path: Path) -> None:
+def test_other_file_is_refused_as_earlier_run(text: str, tmp_path: Path) -> None:
     path = tmp_path / "earlier.json"
     path.write_text(text)
-    with pytest.raises(UserError, match="is not what"):
+    with pytest.raises(UserError, match="was not written by"):
         read_earlier(str(path))
     with pytest.raises(UserError, match="cannot be read"):
         read_earlier(str(tmp_path / "none.json"))

@@ -1,4 +1,4 @@
-"""Who takes part, and what each must answer: a list of drums after every reading."""
+"""Interface of a peer in the comparison: associated evidence in, a list of drums out after every reading."""
 
 from __future__ import annotations
 
@@ -12,52 +12,52 @@ from bench.front_end import Place
 
 
 class Estimator(Protocol):
-    """A peer: associated evidence in, drums out."""
+    """Estimates drums from associated evidence."""
 
     def take(self, evidence: Evidence) -> None:
-        """Take in one reading."""
+        """Process one reading."""
         ...
 
-    def believed(self) -> Mapping[int, Place]:
-        """Return where each track is thought to be, m; association gates round it."""
+    def estimates(self) -> Mapping[int, Place]:
+        """Return the estimated centre of each track, m; association gates around it."""
         ...
 
     def drums(self) -> list[Place]:
-        """Return the drums seen so far, m."""
+        """Return the centres of the drums seen so far, m."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Peer:
-    """A peer as the table names it: its library, that library's package, and how one begins anew."""
+    """A library in the comparison: its name in the table, its package, and a factory of its estimator."""
 
     name: str
     package: str
-    begin: Callable[[], Estimator]
+    create: Callable[[], Estimator]
     slow: bool = False
-    """Whether twenty passes would take it longer than anyone waits."""
+    """Whether the drive of twenty passes is left out because it would take too long."""
 
 
 class Tracks(ABC):
-    """What estimators that follow tracks one by one have in common."""
+    """Base of estimators that keep one state per track."""
 
     def __init__(self) -> None:
         self.places: dict[int, Place] = {}
         self._confirmed: tuple[int, ...] = ()
 
     def take(self, evidence: Evidence) -> None:
-        """Take in one reading."""
+        """Process one reading."""
         self.update(evidence)
         self._confirmed = evidence.confirmed
 
     @abstractmethod
     def update(self, evidence: Evidence) -> None:
-        """Bring `places` up to date with `evidence`."""
+        """Update `places` from `evidence`."""
 
-    def believed(self) -> Mapping[int, Place]:
-        """Return where each track is thought to be."""
+    def estimates(self) -> Mapping[int, Place]:
+        """Return the estimated centre of each track, m."""
         return self.places
 
     def drums(self) -> list[Place]:
-        """Return the places of those tracks that association calls drums."""
+        """Return the centres of the confirmed tracks, m."""
         return [self.places[k] for k in self._confirmed if k in self.places]

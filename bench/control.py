@@ -1,7 +1,7 @@
-"""The paired controls: the least a process can do where ours does everything, as programs of their own.
+"""Paired controls of the timing measurements: programs that do the least a process can do.
 
-``wake`` sleeps to a grid of deadlines without a loop; ``answer`` sends a DRIVE for each ECHO, from a blocking read to
-a blocking write. What they take is what the machine takes, just then, with everything else that runs on it.
+``wake`` sleeps to a grid of deadlines without an event loop; ``answer`` sends a DRIVE for each ECHO, from a blocking
+read to a blocking write. Their times are those of the machine under its present load.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from drivers.denning.frames import Drive, Echo, Hello, Pattern
 from drivers.denning.wire_units import wire_pattern
 
 READ_MAX: Final = 4096
-app = App(help="The least a process can do in place of ours.")
+app = App(help="Minimal programs as controls of the timing measurements.")
 
 
 @app.command
 def wake(period_s: float, seconds: float, out: Path, /) -> None:
-    """Write how late each wake-up was, µs, a line each."""
+    """Sleep to deadlines `period_s` apart for `seconds`; write how late each wake-up was, µs, one per line."""
     late_us = []
     begin_s = time.monotonic()
     for k in range(1, int(seconds / period_s) + 1):
@@ -38,7 +38,7 @@ def wake(period_s: float, seconds: float, out: Path, /) -> None:
 
 @app.command
 def answer(port: str, seconds: float, /, *, sets: Annotated[tuple[str, ...], Parameter(name="--set")] = ()) -> None:
-    """Answer every ECHO on `port` with a DRIVE that stands still."""
+    """Answer every ECHO on `port` with a DRIVE of zero velocity for `seconds`."""
     pattern = wire_pattern(load_settings("hallway", sets).ring)
     line = os.open(port, os.O_RDWR | os.O_NOCTTY)
     tty.setraw(line)
@@ -46,7 +46,7 @@ def answer(port: str, seconds: float, /, *, sets: Annotated[tuple[str, ...], Par
     seq = 2
     os.write(line, b"\0" + encode(Hello(0)) + encode(Pattern(1, *pattern)))
     end_s = time.monotonic() + seconds
-    while time.monotonic() < end_s:  # odometry ends every read
+    while time.monotonic() < end_s:  # odometry keeps arriving, so that no read blocks for long
         for frame in decoder.feed(os.read(line, READ_MAX)):
             if isinstance(frame, Echo):
                 os.write(line, encode(Drive(seq % 256, 0, 0)))
