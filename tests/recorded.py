@@ -13,14 +13,14 @@ from mcap.writer import CompressionType, Writer
 from config.load import load_settings
 from config.settings import Settings
 from runtime.cycle.step import State
-from runtime.recording.channels import CHANNELS, CYCLE, Entry, schema_of
+from runtime.recording.channels import CHANNELS, CYCLE, RawMessage, schema_of
 from runtime.recording.mcap_file import CHUNK_BYTES, INDEX, PROFILE
 from runtime.recording.reader import open_recording
 from runtime.recording.recorder import Recorder
-from runtime.recording.replayer import ReplayResult, replay
-from runtime.recording.storage import OneFile, Place
+from runtime.recording.replayer import ReplayResult, verify_recording
+from runtime.recording.storage import RecordingTarget, SingleFile
 from runtime.recording.writer import RecorderStatus
-from runtime.simulation.closed_loop import Said, simulate
+from runtime.simulation.closed_loop import OperatorInput, simulate
 
 WAIT_S = 30.0
 SECONDS = 12.0
@@ -56,20 +56,20 @@ class FiveInSix:
 
 def record(
     settings: Settings,
-    path: Path | Place,
+    path: Path | RecordingTarget,
     seconds: float,
     seed: int = 0,
     queue_max: int = 8192,
     reloads: Mapping[int, Settings] = MappingProxyType({}),
-    operator: Callable[[int, State], Said] | None = None,
+    operator: Callable[[int, State], OperatorInput] | None = None,
 ) -> RecorderStatus:
     """Record a run in virtual time in which every sixth quantum of refinement is refused for want of time."""
     world = settings.world
     assert world is not None
     now = [0.0]
-    place = OneFile(path) if isinstance(path, Path) else path
+    place = SingleFile(path) if isinstance(path, Path) else path
     with Recorder(settings, place, clock=lambda: now[0], queue_max=queue_max, emulated=True) as recorder:
-        until(lambda: recorder.standing.file is not None or recorder.standing.trouble is not None, "a file")
+        until(lambda: recorder.status.file is not None or recorder.status.last_error is not None, "a file")
 
         def on_state(record: object, state: object, _start: object) -> None:
             recorder.on_cycle(record, state)  # type: ignore[arg-type]
@@ -85,20 +85,20 @@ def record(
             return reloads.get(cycle)
 
         simulate(
-            settings, world, seed, seconds, on_state=on_state, allowance=FiveInSix(seed), reload=reload,
+            settings, world, seed, seconds, on_state=on_state, refinement_budget=FiveInSix(seed), reload=reload,
             operator=operator,
         )  # fmt: skip
         recorder.on_summary({"mode": "DRIVE", "cycles": 20 * seconds})
-    return recorder.standing
+    return recorder.status
 
 
-def entries_of(path: Path) -> list[Entry]:
+def entries_of(path: Path) -> list[RawMessage]:
     """Return every message of a recording."""
     with open_recording(path) as recording:
-        return list(recording.entries())
+        return list(recording.messages())
 
 
-def rewrite(entries: Iterator[Entry] | list[Entry], path: Path, profile: str = f"{PROFILE}/1") -> None:
+def rewrite(entries: Iterator[RawMessage] | list[RawMessage], path: Path, profile: str = f"{PROFILE}/1") -> None:
     """Write messages as a recording, a chunk every ten cycles."""
     with path.open("wb") as file:
         writer = Writer(file, CHUNK_BYTES, CompressionType.ZSTD, INDEX, enable_data_crcs=True)
@@ -116,9 +116,9 @@ def rewrite(entries: Iterator[Entry] | list[Entry], path: Path, profile: str = f
         writer.finish()
 
 
-def verdict_of(path: Path, **span: float) -> ReplayResult:
+def verify_file(path: Path, **span: float) -> ReplayResult:
     """Replay a recording that is whole, or a span of it."""
     with open_recording(path) as recording:
-        verdict = replay(recording, **span)  # type: ignore[arg-type]
+        result = verify_recording(recording, **span)  # type: ignore[arg-type]
         assert recording.damage == []
-    return verdict
+    return result

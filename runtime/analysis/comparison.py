@@ -17,11 +17,11 @@ from perception.pipeline import DetectedObject
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import Command, CycleRecord, State, step, take_over
 from runtime.cycle.summary import ObjectRow, object_row
-from runtime.recording.channels import CYCLE, SETTINGS, Entry, decode
-from runtime.recording.reader import Recording, RecordingError, settings_in
+from runtime.recording.channels import CYCLE, SETTINGS, RawMessage, decode
+from runtime.recording.reader import Recording, RecordingError, parse_settings
 from runtime.recording.replayer import fresh_state, replay_cycle
 from runtime.recording.schema import Cycle, SettingsChange
-from runtime.simulation.evaluation import against_truth
+from runtime.simulation.evaluation import match_drums
 from runtime.timing.refinement_budget import enough_quanta
 
 
@@ -49,7 +49,7 @@ class Comparison:
 
 
 def compare_runs(
-    recording: Recording, settings: Settings, on_entry: Callable[[Entry], None] | None = None
+    recording: Recording, settings: Settings, on_message: Callable[[RawMessage], None] | None = None
 ) -> Comparison:
     """Run the step over a recording with its own settings and with others, side by side.
 
@@ -66,11 +66,11 @@ def compare_runs(
         )
     told, was, would_be = Comparison(), fresh_state(mine), fresh_state(settings)
     begun_s = None
-    for entry in recording.entries():
-        if on_entry is not None:
-            on_entry(entry)
+    for entry in recording.messages():
+        if on_message is not None:
+            on_message(entry)
         if entry.topic == SETTINGS:
-            mine = settings_in(decode(SettingsChange, entry.data).settings)
+            mine = parse_settings(decode(SettingsChange, entry.data).settings)
             take_over(was, mine)
         if entry.topic != CYCLE:
             continue
@@ -106,5 +106,5 @@ def _sum_up(story: RunOutcome, state: State, world: WorldConfig | None) -> None:
         return
     start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
     places = [start.compose(Pose(one.x, one.y, one.theta)) for one in seen]
-    rows, story.false = against_truth(world, [(p.x, p.y) for p in places])
+    rows, story.false = match_drums(world, [(p.x, p.y) for p in places])
     story.errors_m = [row["error"] for row in rows]

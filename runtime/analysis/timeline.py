@@ -1,136 +1,136 @@
-"""A run collected as it goes by: echoes, the way, and at even distances what was known.
-
-The paper's figures show outline segments and clusters whatever method named the objects, so the paper's front end
-listens here to the same firings. What is kept is bounded: of a long run moments lie farther apart.
-"""
+"""What is known of a run that is over, whether a recording told it or a ring log."""
 
 from __future__ import annotations
 
 import math
-from typing import Final
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from config.settings import Settings
-from drivers.messages import Firing, Floats, Odometry, Pose
-from perception.paper.paper_method import PaperPerception
-from perception.pipeline import Perception
-from perception.sensor_mounts import mounts_array
-from runtime.analysis.trace import Cluster, MapMoment, Trace
+from config.world import WorldConfig
+from drivers.messages import Floats, LinkCounts, Odometry, Pose
+from perception.detected_object import DetectedObject
 
-MOMENTS_MAX: Final = 240
-"""Kept at most; then every second one goes and they come half as often."""
-FIRST_EVERY_S: Final = 0.25
-ODOMETRY_EVERY_S: Final = 0.1
-DIGITS: Final = 4
-"""Of a coordinate by which a segment is known again, m."""
+T, SENSOR, X, Y, BEARING, RANGE, ROBOT_T = range(7)
+"""Columns of `Timeline.echoes`."""
 
 
+@dataclass(frozen=True, slots=True)
+class Cluster:
+    """A cluster of outline segments: its centre and the rectangle around it, m."""
+
+    x: float
+    y: float
+    left: float
+    bottom: float
+    right: float
+    top: float
+    segments: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunSnapshot:
+    """What was known at one time."""
+
+    t_s: float
+    pose: Pose
+    ring_yaw: float
+    echoes: int
+    """Rows of `Timeline.echoes` that had come by then."""
+    segments: Floats
+    """(n, 4): outline segments of the paper's front end: ends x, y, x, y, m."""
+    clusters: tuple[Cluster, ...]
+    objects: tuple[DetectedObject, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ModeEntry:
+    """A mode that was entered, and why."""
+
+    t_s: float
+    mode: str
+    reason: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class LogEntry:
+    """A line of the log."""
+
+    t_s: float
+    level: str
+    text: str
+
+
+def _no_rows() -> Floats:
+    return np.zeros((0, 7))
+
+
+@dataclass(frozen=True, slots=True)
+class BookmarkEntry:
+    """A bookmark: when, what it says, and where the robot was."""
+
+    t_s: float
+    text: str
+    pose: Pose | None
+
+
+@dataclass(slots=True, eq=False)
 class Timeline:
-    """Collects a run into a trace.
+    """A run, in the odometry's frame; times are seconds after its first cycle or firing."""
 
-    Parameters
-    ----------
-    trace : Trace
-        Filled.
-    """
-
-    def __init__(self, trace: Trace) -> None:
-        self._trace = trace
-        self._mounts = mounts_array(trace.settings.ring.mounts)
-        self._every_s = FIRST_EVERY_S
-        self._next_s = 0.0
-        self._rows: list[Floats] = []
-        self._heard = 0
-        self._held: dict[bytes, tuple[float, float, Floats]] = {}
-        self._pose: Pose | None = None
-        self._yaw = 0.0
-        self._front = front_end(trace.settings)
-
-    def begin_anew(self, t_s: float) -> None:
-        """Drop what was, as the program does where the robot restarted and its odometry began again."""
-        self._trace.notes.append(f"the robot restarted after {t_s:.1f} s; what was before is not shown")
-        self._rows, self._heard, self._held, self._pose = [], 0, {}, None
-        self._trace.moments, self._trace.odometry = [], []
-        self._front.reset()
-
-    def hear(self, t_s: float, firing: Firing) -> None:
-        """Take a firing."""
-        c, s = math.cos(firing.ring_yaw), math.sin(firing.ring_yaw)
-        fired = np.flatnonzero(~np.isnan(firing.ranges_m))
-        mounts = self._mounts[fired]
-        rows = np.empty((len(fired), 7))
-        rows[:, 0], rows[:, 1] = t_s, fired
-        rows[:, 2] = firing.pose.x + c * mounts[:, 0] - s * mounts[:, 1]
-        rows[:, 3] = firing.pose.y + s * mounts[:, 0] + c * mounts[:, 1]
-        rows[:, 4] = firing.ring_yaw + mounts[:, 2]
-        rows[:, 5], rows[:, 6] = firing.ranges_m[fired], firing.t_s
-        self._rows.append(rows)
-        self._heard += len(rows)
-        self._front.observe(firing)
-        self._pose, self._yaw = firing.pose, firing.ring_yaw
-
-    def move(self, t_s: float, odometry: Odometry) -> None:
-        """Take where the base believes it is."""
-        self._pose, self._yaw = odometry.pose, odometry.ring_yaw
-        way = self._trace.odometry
-        if not way or t_s - way[-1][0] >= ODOMETRY_EVERY_S:
-            way.append((t_s, odometry))
+    path: Path
+    settings: Settings
+    world: WorldConfig | None
+    """What stood there, where that is known."""
+    start_unix_ns: int = 0
+    """Unix time of its first cycle; 0 where nobody knows."""
+    seconds: float = 0.0
+    cycles: int = 0
+    echoes: Floats = field(default_factory=_no_rows)
+    """(n, 7): t (s), sensor, where the sensor was x, y (m), where it looked (rad), range (m, inf heard nothing), and
+    the firing's own time by the robot's clock (s)."""
+    odometry: list[tuple[float, Odometry]] = field(default_factory=list)
+    """Thinned to ten a second."""
+    snapshots: list[RunSnapshot] = field(default_factory=list)
+    """Evenly over the run; the last is its end."""
+    segments: Floats = field(default_factory=_no_rows)
+    """(n, 7): the run's own map: first and last seen (s), ends x, y, x, y (m), normal (rad)."""
+    modes: list[ModeEntry] = field(default_factory=list)
+    log: list[LogEntry] = field(default_factory=list)
+    bookmarks: list[BookmarkEntry] = field(default_factory=list)
+    gaps_s: list[float] = field(default_factory=list)
+    """From cycle to cycle."""
+    stops: dict[str, int] = field(default_factory=dict)
+    """How often refinement ended for which cause."""
+    counts: LinkCounts | None = None
+    summary: dict[str, Any] | None = None
+    """What the run said of itself at its end; none where it was cut off."""
+    versions: dict[str, str] = field(default_factory=dict)
+    started: str | None = None
+    notes: list[str] = field(default_factory=list)
+    """What is missing or damaged, a line each."""
 
     @property
-    def pose(self) -> Pose | None:
-        """Where the robot is, as far as it was heard."""
-        return self._pose
+    def start(self) -> Pose:
+        """Where the odometry began: in the world's coordinates where the world is known, else in its own."""
+        if self.world is None:
+            return Pose(0.0, 0.0, 0.0)
+        start = self.world.start
+        return Pose(start.x_m, start.y_m, math.radians(start.heading_deg))
 
-    def pass_by(self, t_s: float, perception: Perception) -> None:
-        """Note a moment where one is due."""
-        self._trace.seconds = t_s
-        if t_s >= self._next_s:
-            self._next_s = t_s + self._every_s
-            self._note(t_s, perception)
+    @property
+    def last(self) -> RunSnapshot | None:
+        """The end of the run."""
+        return self.snapshots[-1] if self.snapshots else None
 
-    def end(self, perception: Perception | None) -> None:
-        """Close the trace with the moment of its end."""
-        trace = self._trace
-        if perception is not None and (not trace.moments or trace.moments[-1].t_s < trace.seconds):
-            self._note(trace.seconds, perception)
-        if self._rows:
-            trace.echoes = np.concatenate(self._rows)
-        if self._held:
-            trace.segments = np.array([[first, last, *row] for first, last, row in self._held.values()])
+    @property
+    def objects(self) -> tuple[DetectedObject, ...]:
+        """What was recognised at the end."""
+        return self.snapshots[-1].objects if self.snapshots else ()
 
-    def _note(self, t_s: float, perception: Perception) -> None:
-        rows = perception.segment_geometry()
-        for key, row in zip((r.tobytes() for r in np.round(rows, DIGITS)), rows, strict=True):
-            first = self._held[key][0] if key in self._held else t_s
-            self._held[key] = (first, t_s, row)
-        if self._pose is None:
-            return
-        moments, front = self._trace.moments, self._front
-        if len(moments) >= MOMENTS_MAX:
-            del moments[1::2]
-            self._every_s *= 2.0
-        moments.append(
-            MapMoment(
-                t_s, self._pose, self._yaw, self._heard, front.segment_geometry()[:, :4], clusters_of(front),
-                perception.objects(),
-            )
-        )  # fmt: skip
-
-
-def front_end(settings: Settings) -> PaperPerception:
-    """Return the paper's method with the constants of a run, whatever method the run had."""
-    return PaperPerception(settings.ring, settings.models, settings.perception)
-
-
-def clusters_of(front: PaperPerception) -> tuple[Cluster, ...]:
-    """Return the clusters there are now, each with the rectangle around its segments."""
-    told = []
-    for j in range(front.clusters.count):
-        rows = front.outline.segments[front.clusters.members(j)]
-        xs, ys = rows[:, (0, 2)], rows[:, (1, 3)]
-        x, y = front.clusters.centres[j].tolist()
-        told.append(
-            Cluster(x, y, float(xs.min()), float(ys.min()), float(xs.max()), float(ys.max()), len(rows))
-        )  # fmt: skip
-    return tuple(told)
+    def unix_ns(self, t_s: float) -> int:
+        """Return a time of the run as Unix time, from 0 on where that is not known."""
+        return self.start_unix_ns + round(1e9 * t_s)

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from runtime.cli.options import Flag, Sets, UnitsOption
 
 if TYPE_CHECKING:
-    from runtime.analysis.trace_sources import Asked
+    from runtime.analysis.timeline_sources import TimelineSource
 
 File = Annotated[str, Parameter(help="A recording (MCAP) or a ring log (CSV).")]
 
@@ -29,11 +29,11 @@ class Besides:
         Parameter(name="--model", negative="", help="Ring logs: object model, a file or a name; may be repeated."),
     ] = ()
 
-    def asked(self, file: str, sets: tuple[str, ...]) -> Asked:
+    def asked(self, file: str, sets: tuple[str, ...]) -> TimelineSource:
         """Return what is asked for, in the words of those who read it."""
-        from runtime.analysis.trace_sources import Asked
+        from runtime.analysis.timeline_sources import TimelineSource
 
-        return Asked(file, sets, self.robot, self.models, self.world)
+        return TimelineSource(file, sets, self.robot, self.models, self.world)
 
 
 NOTHING: Final = Besides()

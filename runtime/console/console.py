@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, Final
 from config.reload import differences
 from config.settings import Settings
 from drivers.driver import RobotDriver
-from runtime.analysis.text_tables import Units
 from runtime.console.clients.client import Client
 from runtime.console.clients.client_hub import Hub
 from runtime.console.commands.async_commands import AsyncCommands
@@ -37,6 +36,7 @@ from runtime.cycle.process import CONSOLE_FRAME, CONSOLE_RECEIVE
 from runtime.cycle.reloader import Ready
 from runtime.cycle.step import CycleRecord, State
 from runtime.support.health import describe_exception
+from runtime.support.length_format import Units
 from runtime.timing.cycle_stats import CycleStats
 
 if TYPE_CHECKING:

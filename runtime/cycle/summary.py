@@ -89,7 +89,7 @@ class RunSummary(TypedDict):
 
 
 class VerifyRow(TypedDict):
-    """What the replay of a recording found: see `runtime.recording.replayer.Verdict`."""
+    """What the replay of a recording found: see `runtime.recording.replayer.ReplayResult`."""
 
     differences: int
     first: str | None

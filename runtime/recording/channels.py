@@ -9,22 +9,22 @@ from typing import Final, NamedTuple, TypeVar
 import orjson
 
 from runtime.recording.schema import (
-    About,
     Bookmark,
     Cycle,
-    Form,
-    FormSchema,
     Keyframe,
     LogLine,
     MapChange,
     ModeChange,
     ObjectsSeen,
+    Payload,
+    PayloadSchema,
     RunEnd,
+    RunInfo,
     SerialBytes,
     SettingsChange,
 )
 
-ABOUT: Final = "/about"
+RUN_INFO: Final = "/run_info"
 CYCLE: Final = "/cycle"
 MODE: Final = "/mode"
 SEGMENTS: Final = "/segments"
@@ -36,9 +36,9 @@ SETTINGS: Final = "/settings"
 SUMMARY: Final = "/summary"
 BOOKMARK: Final = "/bookmark"
 
-CHANNELS: Final[Mapping[str, type[Form]]] = MappingProxyType(
+CHANNELS: Final[Mapping[str, type[Payload]]] = MappingProxyType(
     {
-        ABOUT: About,
+        RUN_INFO: RunInfo,
         CYCLE: Cycle,
         MODE: ModeChange,
         SEGMENTS: MapChange,
@@ -54,10 +54,10 @@ CHANNELS: Final[Mapping[str, type[Form]]] = MappingProxyType(
 )
 """In the order in which they are numbered in a file, from 1; new ones go to the end."""
 
-F = TypeVar("F", bound=Form)
+F = TypeVar("F", bound=Payload)
 
 
-class Entry(NamedTuple):
+class RawMessage(NamedTuple):
     """A message as it lies in a recording."""
 
     topic: str
@@ -66,7 +66,7 @@ class Entry(NamedTuple):
     data: bytes
 
 
-def encode(form: Form) -> bytes:
+def encode(form: Payload) -> bytes:
     """Return a message's JSON; its values are trusted, for they come from the program itself."""
     return form.__pydantic_serializer__.to_json(form)
 
@@ -82,6 +82,6 @@ def decode(kind: type[F], data: bytes) -> F:
     return kind.model_validate_json(data)
 
 
-def schema_of(form: type[Form]) -> bytes:
+def schema_of(form: type[Payload]) -> bytes:
     """Return the JSON schema of what `encode` writes."""
-    return orjson.dumps(form.model_json_schema(mode="serialization", schema_generator=FormSchema))
+    return orjson.dumps(form.model_json_schema(mode="serialization", schema_generator=PayloadSchema))

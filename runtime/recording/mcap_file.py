@@ -10,7 +10,7 @@ from typing import Final
 from mcap.writer import CompressionType, IndexType, Writer
 
 from runtime import VERSION
-from runtime.recording.channels import ABOUT, CHANNELS, schema_of
+from runtime.recording.channels import CHANNELS, RUN_INFO, schema_of
 from runtime.recording.schema import FORMAT
 
 PROFILE: Final = "echolocate"
@@ -28,7 +28,7 @@ class McapFile:
     ----------
     path : Path
         Replaced if it exists.
-    about : bytes
+    info : bytes
         The first message, in a chunk of its own with schemas and channels.
     log_ns : int
         Its log time.
@@ -39,7 +39,7 @@ class McapFile:
         As every method does, where the disk will not have it.
     """
 
-    def __init__(self, path: Path, about: bytes, log_ns: int) -> None:
+    def __init__(self, path: Path, info: bytes, log_ns: int) -> None:
         self.path = path
         self._file = path.open("wb")
         self._writer = Writer(
@@ -49,16 +49,16 @@ class McapFile:
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         try:
-            self._begin(about, log_ns)
+            self._begin(info, log_ns)
         except OSError:
             self.abandon()
             raise
 
-    def _begin(self, about: bytes, log_ns: int) -> None:
+    def _begin(self, info: bytes, log_ns: int) -> None:
         self._writer.start(profile=f"{PROFILE}/{FORMAT}", library=f"echolocate {VERSION}")
         for topic, form in CHANNELS.items():
             self.channel(topic, form.__name__, schema_of(form))
-        self.add(ABOUT, about, log_ns)
+        self.add(RUN_INFO, info, log_ns)
         self.flush()
 
     def channel(self, topic: str, name: str, schema: bytes) -> None:

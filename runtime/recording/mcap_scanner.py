@@ -21,7 +21,7 @@ from mcap.records import Channel, Chunk, DataEnd, Footer, Header, Message, Schem
 from mcap.stream_reader import breakup_chunk
 from mcap.writer import MCAP0_MAGIC
 
-from runtime.recording.channels import CHANNELS, Entry
+from runtime.recording.channels import CHANNELS, RawMessage
 
 BEGIN: Final = 8
 """The first byte after the magic ones."""
@@ -84,7 +84,7 @@ class McapScanner:
         except UNREADABLE:
             self.profile = ""
 
-    def chunks(self, since: int = BEGIN) -> Iterator[list[Entry]]:
+    def chunks(self, since: int = BEGIN) -> Iterator[list[RawMessage]]:
         """Yield the messages of every chunk that is whole, in the order of the file.
 
         Parameters
@@ -125,7 +125,7 @@ class McapScanner:
             return None
         return code, length
 
-    def _find(self, at: int) -> tuple[list[Entry] | None, int]:
+    def _find(self, at: int) -> tuple[list[RawMessage] | None, int]:
         """Return the next whole chunk from `at` on, and where to go on after it: the end where there is none."""
         data, look = bytes(self._data[at:]), 0
         while (found := data.find(ZSTD, look)) >= 0:
@@ -151,7 +151,7 @@ class McapScanner:
         longest = {Opcode.CHUNK: CONTENT_MAX, Opcode.HEADER: HEADER_MAX, Opcode.DATA_END: 4}.get(code, 0)
         return bool(length <= longest) and at + HEAD + length > len(self._data)
 
-    def _chunk(self, at: int, length: int) -> list[Entry] | None:
+    def _chunk(self, at: int, length: int) -> list[RawMessage] | None:
         """Return the messages of the chunk at a byte, None where it is damaged."""
         try:
             chunk = Chunk.read(_stream(self._data[at + HEAD : at + HEAD + length]))
@@ -175,7 +175,7 @@ class McapScanner:
                 if record.schema_id in self._schemas:
                     self.schemas[record.topic] = self._schemas[record.schema_id]
             elif isinstance(record, Message) and record.channel_id in self._topics:
-                entries.append(Entry(self._topics[record.channel_id], record.log_time, record.data))
+                entries.append(RawMessage(self._topics[record.channel_id], record.log_time, record.data))
         times = [entry.log_ns for entry in entries]
         if times and (min(times), max(times)) != (chunk.message_start_time, chunk.message_end_time):
             self.damage.append(CorruptRegion(at, "a chunk's own times are wrong; its messages are whole"))

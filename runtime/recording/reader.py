@@ -16,13 +16,13 @@ from pydantic import ValidationError
 from config.errors import WRONG_CALL, UserError
 from config.settings import Settings
 from config.world import WorldConfig
-from runtime.recording.channels import ABOUT, Entry, decode
+from runtime.recording.channels import RUN_INFO, RawMessage, decode
 from runtime.recording.mcap_file import PROFILE
 from runtime.recording.mcap_scanner import CorruptRegion, McapScanner
-from runtime.recording.schema import FORMAT, About
+from runtime.recording.schema import FORMAT, RunInfo
 
 MAGIC: Final = b"\x89MCAP"
-SECOND_NS: Final = 1_000_000_000
+NS_PER_S: Final = 1_000_000_000
 
 
 class RecordingError(UserError):
@@ -39,14 +39,14 @@ class Recording:
     ----------
     path : Path
         The file.
-    about : About
+    info : RunInfo
         What the run was.
     settings : Settings
         Its settings.
     """
 
     path: Path
-    about: About
+    info: RunInfo
     settings: Settings
     _data: memoryview
     _salvage: McapScanner = field(init=False)
@@ -54,13 +54,13 @@ class Recording:
     def __post_init__(self) -> None:
         self._salvage = McapScanner(self._data)
 
-    def entries(self) -> Iterator[Entry]:
+    def messages(self) -> Iterator[RawMessage]:
         """Yield every message that can be read, in the order of the file; may be called again."""
         self._salvage = McapScanner(self._data)
         for chunk in self._salvage.chunks():
             yield from chunk
 
-    def chunks(self, since: int | None = None) -> Iterator[tuple[int, list[Entry]]]:
+    def chunks(self, since: int | None = None) -> Iterator[tuple[int, list[RawMessage]]]:
         """Yield the messages chunk by chunk, each with the byte at which to begin to read it again.
 
         Parameters
@@ -93,11 +93,11 @@ class Recording:
     @property
     def world(self) -> WorldConfig | None:
         """What stood there, where that is known: a real robot's settings may name a world, but it is not in it."""
-        return self.settings.world if self.about.emulated else None
+        return self.settings.world if self.info.emulated else None
 
     def host_s(self, log_ns: int) -> float:
         """Return a log time by the host's clock of the run."""
-        return 1e-9 * (log_ns - self.about.unix_minus_host_ns)
+        return 1e-9 * (log_ns - self.info.unix_minus_host_ns)
 
 
 def is_recording(path: Path) -> bool:
@@ -109,7 +109,7 @@ def is_recording(path: Path) -> bool:
         return path.suffix == ".mcap"
 
 
-def settings_in(told: dict[str, Any]) -> Settings:
+def parse_settings(told: dict[str, Any]) -> Settings:
     """Return settings from the form in which a recording holds them.
 
     Raises
@@ -159,7 +159,7 @@ def refuse_strangers(path: Path, salvage: McapScanner) -> None:
         raise RecordingError(f"{path}: is an MCAP file of another program ({named!r}), not a recording of a run")
 
 
-def refuse_newer(path: Path, salvage: McapScanner, told: About | None = None) -> None:
+def refuse_newer(path: Path, salvage: McapScanner, told: RunInfo | None = None) -> None:
     """Refuse what this program is too old for; what stands under a checksum goes before what does not.
 
     Raises
@@ -190,14 +190,14 @@ def open_recording(path: Path) -> Iterator[Recording]:
     with mapped(path) as data:
         salvage = McapScanner(data)
         refuse_strangers(path, salvage)
-        about = next((e for chunk in salvage.chunks() for e in chunk if e.topic == ABOUT), None)
-        if about is None:
+        info = next((e for chunk in salvage.chunks() for e in chunk if e.topic == RUN_INFO), None)
+        if info is None:
             refuse_newer(path, salvage)
             raise RecordingError(f"{path}: {_why_nothing(salvage)}")
         try:
-            told = decode(About, about.data)
+            told = decode(RunInfo, info.data)
             refuse_newer(path, salvage, told)
-            settings = settings_in(told.settings)
+            settings = parse_settings(told.settings)
         except ValidationError as error:
             raise RecordingError(
                 f"{path}: its settings are not those of this version ({_first_of(error)}); replay it with the "

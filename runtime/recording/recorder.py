@@ -22,8 +22,8 @@ from config.settings import Settings
 from runtime import VERSION
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, LOG, OBJECTS, SEGMENTS, SERIAL, SETTINGS, SUMMARY
-from runtime.recording.schema import FORMAT, About, Bookmark, LogLine, RunEnd, left_by
-from runtime.recording.storage import Place
+from runtime.recording.schema import FORMAT, Bookmark, LogLine, RunEnd, RunInfo, carried_state
+from runtime.recording.storage import RecordingTarget
 from runtime.recording.writer import QUEUE_MAX, Item, MapSnapshot, RecorderStatus, RecordingWriter, Reloaded, Switch
 from runtime.support.kernel_cache import kernels_key
 
@@ -33,7 +33,7 @@ BOOKMARK_MAX: Final = 500
 """Characters."""
 
 
-def made_by() -> dict[str, str]:
+def software_versions() -> dict[str, str]:
     """Return what the last bit of a result may depend on besides its inputs."""
     return {
         "echolocate": VERSION,
@@ -46,12 +46,12 @@ def made_by() -> dict[str, str]:
     }
 
 
-def about(settings: Settings, clock: Callable[[], float], *, emulated: bool) -> About:
+def run_info(settings: Settings, clock: Callable[[], float], *, emulated: bool) -> RunInfo:
     """Return what stands at the beginning of a recording that begins now."""
-    return About(
+    return RunInfo(
         format=FORMAT,
         settings=settings.model_dump(mode="json"),
-        made_by=made_by(),
+        versions=software_versions(),
         started=datetime.now(UTC).isoformat(timespec="seconds"),
         unix_minus_host_ns=time.time_ns() - round(1e9 * clock()),
         part=1,
@@ -66,7 +66,7 @@ class Recorder:
     ----------
     settings : Settings
         Of the run.
-    place : Place
+    place : RecordingTarget
         Where the recording goes.
     clock : callable
         The host's clock of the run: monotonic, s.
@@ -75,13 +75,13 @@ class Recorder:
     emulated : bool
         Whether the settings' world is what the robot meets.
     on : bool
-        Whether to record from the beginning; `switch` may do so later.
+        Whether to record from the beginning; `set_enabled` may do so later.
     """
 
     def __init__(
         self,
         settings: Settings,
-        place: Place,
+        place: RecordingTarget,
         clock: Callable[[], float] = time.monotonic,
         queue_max: int = QUEUE_MAX,
         *,
@@ -92,7 +92,7 @@ class Recorder:
         self._queue_max = queue_max
         self._moment_cycles = max(1, round(MOMENT_S * settings.cycle.rate_hz))
         self._keyframe_s = settings.recording.keyframe_period_s
-        self._writer = RecordingWriter(place, about(settings, clock, emulated=emulated), on=on)
+        self._writer = RecordingWriter(place, run_info(settings, clock, emulated=emulated), on=on)
         self._on = on
         self._begins = False
         self._last_keyframe_s: float | None = None
@@ -109,20 +109,20 @@ class Recorder:
         self._writer.stop()
 
     @property
-    def standing(self) -> RecorderStatus:
+    def status(self) -> RecorderStatus:
         """How the recording stands."""
-        return self._writer.standing
+        return self._writer.status
 
     def probe(self) -> str | None:
         """Say how its thread ended; None while it runs. See `runtime.support.health`."""
         return self._writer.probe()
 
     @property
-    def is_on(self) -> bool:
+    def is_enabled(self) -> bool:
         """Whether a recording is wanted."""
         return self._on
 
-    def switch(self, *, on: bool) -> None:
+    def set_enabled(self, *, on: bool) -> None:
         """Begin another file with the next cycle, or end the one under way; nothing where it is so already."""
         if on == self._on:
             return
@@ -131,7 +131,7 @@ class Recorder:
 
     def bookmark(self, text: str) -> str | None:
         """Put a mark into the recording; returns why not."""
-        if not self._writer.standing.under_way or not self._on:
+        if not self._writer.status.is_writing or not self._on:
             return "nothing is being recorded: switch the recording on first"
         words = " ".join(text.split())
         if not words or len(words) > BOOKMARK_MAX:
@@ -159,7 +159,7 @@ class Recorder:
             self._last_keyframe_s = run_s
             seen = state.perception
             whole = MapSnapshot(
-                record.cycle, seen.segment_geometry(), seen.objects(), left_by(state), seen.snapshot()
+                record.cycle, seen.segment_geometry(), seen.objects(), carried_state(state), seen.snapshot()
             )
             self._hand(KEYFRAME, run_s, whole)
         elif record.cycle % self._moment_cycles == 0:

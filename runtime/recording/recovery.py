@@ -9,7 +9,7 @@ from typing import Final
 
 from mcap.writer import CompressionType, Writer
 
-from runtime.recording.channels import CHANNELS, CYCLE, Entry, schema_of
+from runtime.recording.channels import CHANNELS, CYCLE, RawMessage, schema_of
 from runtime.recording.mcap_file import CHUNK_BYTES, INDEX, PROFILE
 from runtime.recording.mcap_scanner import CorruptRegion, McapScanner
 from runtime.recording.reader import RecordingError, mapped, refuse_newer, refuse_strangers
@@ -84,7 +84,7 @@ def _copy(salvage: McapScanner, source: Path, beside: Path, target: Path) -> Rec
     return Recovered(target, chunks, messages, cycles, first_ns, last_ns, tuple(salvage.damage), salvage.finished)
 
 
-def _channel(writer: Writer, salvage: McapScanner, entry: Entry) -> int:
+def _channel(writer: Writer, salvage: McapScanner, entry: RawMessage) -> int:
     """Register a channel with the schema that the file has for it, or else this program's."""
     schema = salvage.schemas.get(entry.topic)
     if schema is not None:

@@ -19,18 +19,18 @@ from config.settings import Settings
 from perception.pipeline import Perception
 from perception.snapshot import Snapshot
 from runtime.cycle.step import CycleRecord, State, step, take_over
-from runtime.recording.channels import ABOUT, CYCLE, KEYFRAME, SETTINGS, Entry, decode, encode
-from runtime.recording.reader import SECOND_NS, Recording, settings_in
+from runtime.recording.channels import CYCLE, KEYFRAME, RUN_INFO, SETTINGS, RawMessage, decode, encode
+from runtime.recording.reader import NS_PER_S, Recording, parse_settings
 from runtime.recording.schema import (
-    About,
+    CarriedState,
     Cycle,
     Keyframe,
-    Left,
+    RunInfo,
     SettingsChange,
-    StateLeft,
-    left_by,
-    put_back,
-    snapshot_in,
+    StateFields,
+    carried_state,
+    perception_snapshot,
+    restore_state,
 )
 from runtime.timing.cycle_stats import CycleStats
 
@@ -57,8 +57,8 @@ class ReplayResult:
 
     cycles: int = 0
     """Replayed and compared."""
-    different: int = 0
-    first: Difference | None = None
+    differences: int = 0
+    first_difference: Difference | None = None
     first_cycle: int | None = None
     """Where the replay began."""
     keyframes: int = 0
@@ -67,19 +67,19 @@ class ReplayResult:
     """Cycles that could not be replayed: what went before is missing, and no keyframe had followed yet."""
     missing: list[tuple[int, int]] = field(default_factory=list)
     """First and last cycle of each stretch that is not in the recording."""
-    refinement: Counter[str] = field(default_factory=Counter)
+    refinement_stops: Counter[str] = field(default_factory=Counter)
     """How often refinement ended for which cause."""
     recorded_s: float = 0.0
-    wall_s: float = 0.0
+    elapsed_s: float = 0.0
     state: State | None = None
     """As it was left."""
-    books: CycleStats = field(default_factory=lambda: CycleStats(late_after_s=float("inf")))
+    cycle_stats: CycleStats = field(default_factory=lambda: CycleStats(late_after_s=float("inf")))
     """What the steps took."""
 
     @property
     def times_real_time(self) -> float:
         """How much faster the replay was than the run."""
-        return self.recorded_s / self.wall_s if self.wall_s else 0.0
+        return self.recorded_s / self.elapsed_s if self.elapsed_s else 0.0
 
 
 def fresh_state(settings: Settings) -> State:
@@ -95,23 +95,23 @@ def replay_cycle(state: State, record: CycleRecord, settings: Settings) -> Cycle
 def keyframe_before(recording: Recording, since_s: float) -> int | None:
     """Return the log time of the last keyframe not later than `since_s` after the first cycle, None without one."""
     first_ns, found = None, None
-    for entry in recording.entries():
+    for entry in recording.messages():
         if entry.topic == CYCLE and first_ns is None:
             first_ns = entry.log_ns
         elif entry.topic == KEYFRAME and first_ns is not None:
-            if entry.log_ns - first_ns > since_s * SECOND_NS:
+            if entry.log_ns - first_ns > since_s * NS_PER_S:
                 break
             found = entry.log_ns
     return found
 
 
-def replay(
+def verify_recording(
     recording: Recording,
     *,
     since_s: float = 0.0,
     until_s: float = float("inf"),
     on_cycle: OnCycle | None = None,
-    on_entry: Callable[[Entry], None] | None = None,
+    on_message: Callable[[RawMessage], None] | None = None,
 ) -> ReplayResult:
     """Run the step over a recording and compare every record with the one in it.
 
@@ -123,26 +123,26 @@ def replay(
         The part of it, in seconds after its first cycle; begun at the last keyframe before.
     on_cycle : callable, optional
         Gets each replayed record and the state it left.
-    on_entry : callable, optional
+    on_message : callable, optional
         Gets every message on the way.
     """
     begin_ns = keyframe_before(recording, since_s) if since_s > 0.0 else None
     run = Replayer(recording, on_cycle, begun=begin_ns is None)
     first_ns = None
     began_s = time.perf_counter()
-    for entry in recording.entries():
+    for entry in recording.messages():
         if entry.topic == CYCLE:
             first_ns = entry.log_ns if first_ns is None else first_ns
-            if entry.log_ns - first_ns > until_s * SECOND_NS:
+            if entry.log_ns - first_ns > until_s * NS_PER_S:
                 break
         if begin_ns is not None and entry.log_ns < begin_ns:
             continue
-        if on_entry is not None:
-            on_entry(entry)
+        if on_message is not None:
+            on_message(entry)
         run.take(entry)
-    run.verdict.wall_s = time.perf_counter() - began_s
-    run.verdict.state = run.state
-    return run.verdict
+    run.result.elapsed_s = time.perf_counter() - began_s
+    run.result.state = run.state
+    return run.result
 
 
 class Replayer:
@@ -159,14 +159,14 @@ class Replayer:
     """
 
     def __init__(self, recording: Recording, on_cycle: OnCycle | None, *, begun: bool) -> None:
-        self.verdict = ReplayResult()
+        self.result = ReplayResult()
         self._settings = recording.settings
-        self._told = recording.about.settings
+        self._told = recording.info.settings
         self.state: State | None = fresh_state(self._settings) if begun else None
         self._on_cycle = on_cycle
         self._last: tuple[int, float] | None = None
 
-    def take(self, entry: Entry) -> None:
+    def take(self, entry: RawMessage) -> None:
         """Take the next message."""
         if entry.topic == CYCLE:
             self._cycle(decode(Cycle, entry.data).record, entry.data)
@@ -174,15 +174,15 @@ class Replayer:
             self._keyframe(decode(Keyframe, entry.data))
         elif entry.topic == SETTINGS:
             self._adopt(decode(SettingsChange, entry.data).settings)
-        elif entry.topic == ABOUT:  # stands before every keyframe, with what is in force there
-            self._adopt(decode(About, entry.data).settings)
+        elif entry.topic == RUN_INFO:  # stands before every keyframe, with what is in force there
+            self._adopt(decode(RunInfo, entry.data).settings)
 
     @property
     def told(self) -> dict[str, Any]:
         """The settings in force, as the recording tells them."""
         return self._told
 
-    def go_on(self, told: dict[str, Any], left: Left, memory: Snapshot) -> None:
+    def go_on(self, told: dict[str, Any], left: StateFields, memory: Snapshot) -> None:
         """Go on from what a cycle left under these settings: the next message is the one after that cycle's."""
         self._adopt(told)
         self.state = fresh_state(self._settings)
@@ -194,35 +194,35 @@ class Replayer:
         """Go on with other settings, as the process did at this place."""
         if told == self._told:
             return
-        self._told, self._settings = told, settings_in(told)
+        self._told, self._settings = told, parse_settings(told)
         if self.state is not None:
             take_over(self.state, self._settings)
 
     def _cycle(self, record: CycleRecord, data: bytes) -> None:
-        verdict, before = self.verdict, self._last
+        result, before = self.result, self._last
         if before is not None and record.cycle != before[0] + 1:
-            verdict.missing.append((before[0] + 1, record.cycle - 1))
+            result.missing.append((before[0] + 1, record.cycle - 1))
         self._last = (record.cycle, record.inputs.run_s)
         if self.state is None or record.cycle != self.state.cycle + 1:
             if before is None and self.state is not None:
-                verdict.missing.append((1, record.cycle - 1))
+                result.missing.append((1, record.cycle - 1))
             self.state = None
-            verdict.skipped += 1
+            result.skipped += 1
             return
         began_s = time.perf_counter()
         replayed = replay_cycle(self.state, record, self._settings)
-        verdict.books.enter(time.perf_counter() - began_s)
-        verdict.cycles += 1
-        verdict.refinement[record.refinement] += 1
-        if verdict.first_cycle is None:
-            verdict.first_cycle = record.cycle
+        result.cycle_stats.enter(time.perf_counter() - began_s)
+        result.cycles += 1
+        result.refinement_stops[record.refinement] += 1
+        if result.first_cycle is None:
+            result.first_cycle = record.cycle
         if before is not None:
-            verdict.recorded_s += record.inputs.run_s - before[1]
+            result.recorded_s += record.inputs.run_s - before[1]
         written = encode(Cycle.model_construct(record=replayed))
         # What an older program did not write yet is what it is where nobody says anything.
         if written != data and written != (recorded := encode(Cycle.model_construct(record=record))):
             self._note(
-                record.cycle, first_difference(orjson.loads(recorded)["record"], orjson.loads(written)["record"])
+                record.cycle, find_difference(orjson.loads(recorded)["record"], orjson.loads(written)["record"])
             )
         if self._on_cycle is not None:
             self._on_cycle(replayed, self.state)
@@ -230,29 +230,31 @@ class Replayer:
     def _keyframe(self, frame: Keyframe) -> None:
         if self.state is None or self.state.cycle != frame.cycle:
             self.state = fresh_state(self._settings)
-            put_back(self.state, frame)
+            restore_state(self.state, frame)
             return
-        self.verdict.keyframes += 1
+        self.result.keyframes += 1
         mine = self.state.perception.snapshot()
-        for name, array in snapshot_in(frame).items():
+        for name, array in perception_snapshot(frame).items():
             if name not in mine or array.tobytes() != mine[name].tobytes():
                 now = mine.get(name)
                 where = "" if now is None else str(np.argwhere(np.atleast_1d(now != array)).tolist()[:1])
                 self._note(frame.cycle, (f"memory {name}{where}", "one", "another"))
                 return
         told = frame.left.model_fields_set
-        left = encode(StateLeft.model_construct(**{k: v for k, v in left_by(self.state).items() if k in told}))
-        self._note(frame.cycle, first_difference(orjson.loads(encode(frame.left)), orjson.loads(left), "state."))
+        left = encode(
+            CarriedState.model_construct(**{k: v for k, v in carried_state(self.state).items() if k in told})
+        )
+        self._note(frame.cycle, find_difference(orjson.loads(encode(frame.left)), orjson.loads(left), "state."))
 
     def _note(self, cycle: int, found: tuple[str, object, object] | None) -> None:
         if found is None:
             return
-        self.verdict.different += 1
-        if self.verdict.first is None:
-            self.verdict.first = Difference(cycle, *found)
+        self.result.differences += 1
+        if self.result.first_difference is None:
+            self.result.first_difference = Difference(cycle, *found)
 
 
-def first_difference(recorded: Any, replayed: Any, path: str = "") -> tuple[str, object, object] | None:  # noqa: ANN401
+def find_difference(recorded: Any, replayed: Any, path: str = "") -> tuple[str, object, object] | None:  # noqa: ANN401
     """Return path and values of the first place where two JSON trees differ, to the bit; None where none does."""
     if isinstance(recorded, dict) and isinstance(replayed, dict):
         names = [*recorded, *(name for name in replayed if name not in recorded)]
@@ -262,4 +264,4 @@ def first_difference(recorded: Any, replayed: Any, path: str = "") -> tuple[str,
     else:
         same = type(recorded) is type(replayed) and repr(recorded) == repr(replayed)
         return None if same else (path.rstrip("."), recorded, replayed)
-    return next((found for name, a, b in pairs if (found := first_difference(a, b, f"{path}{name}."))), None)
+    return next((found for name, a, b in pairs if (found := find_difference(a, b, f"{path}{name}."))), None)

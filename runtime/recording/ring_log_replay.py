@@ -13,7 +13,7 @@ from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.refinement_budget import enough_quanta
 
 
-def replay(
+def replay_firings(
     settings: Settings, firings: Iterable[Firing], on_firing: Callable[[Firing, Perception], None] | None = None
 ) -> ReplaySummary:
     """Run perception over `firings` and return what it saw.
@@ -28,7 +28,7 @@ def replay(
         Called after each.
     """
     perception = Perception(settings.ring, settings.models, settings.perception)
-    books = CycleStats(late_after_s=float("inf"))
+    cycle_stats = CycleStats(late_after_s=float("inf"))
     for firing in firings:
         began = time.perf_counter()
         perception.observe(firing)
@@ -36,13 +36,13 @@ def replay(
         while perception.can_refine and enough_quanta(quanta):
             perception.refine()
             quanta += 1
-        books.enter(time.perf_counter() - began)
+        cycle_stats.enter(time.perf_counter() - began)
         if on_firing is not None:
             on_firing(firing, perception)
     return {
         "objects": [object_row(seen) for seen in perception.objects()],
         "segments": perception.counts.segments_total,
         "clusters": perception.counts.hypotheses,
-        "cycles": books.cycles,
-        "cycle_us": books.cycle_us(),
+        "cycles": cycle_stats.cycles,
+        "cycle_us": cycle_stats.cycle_us(),
     }

@@ -54,7 +54,7 @@ class RingLogWriter:
             self._bytes = self._path.stat().st_size
 
     @property
-    def standing(self) -> RecorderStatus:
+    def status(self) -> RecorderStatus:
         """How the ring log stands; its messages are firings, its size is told at the end."""
         dropped = self._refused + self._unwritten
         return RecorderStatus(str(self._path), 1, self._bytes, self._taken, dropped, self._trouble)

@@ -24,20 +24,20 @@ FORMAT: Final = 1
 """Counted up when older programs can no longer read what is written."""
 
 
-class Form(BaseModel):
+class Payload(BaseModel):
     """A message of a recording; what a newer program has added to one is not read."""
 
     model_config = ConfigDict(frozen=True, ser_json_inf_nan="strings", ser_json_bytes="base64",
                               val_json_bytes="base64", use_attribute_docstrings=True)  # fmt: skip
 
 
-class About(Form):
+class RunInfo(Payload):
     """What a run was: everything that a replay needs besides the messages."""
 
     format: int
     settings: dict[str, Any]
     """The run's settings, object models among them, as `Settings` dumps them."""
-    made_by: dict[str, str]
+    versions: dict[str, str]
     """Versions of program and libraries, the kernels' key, the processor: what the last bits may depend on."""
     started: str
     """Date and time, UTC."""
@@ -49,34 +49,34 @@ class About(Form):
     """The settings' world is what stood there; a real robot knows of none."""
 
 
-class SettingsChange(Form):
+class SettingsChange(Payload):
     """Other settings, in force from a cycle on: an input of it as much as an echo is."""
 
     cycle: int
     settings: dict[str, Any]
-    """Whole, as in `About`, which repeats them from then on."""
+    """Whole, as in `RunInfo`, which repeats them from then on."""
 
 
-class RunEnd(Form):
+class RunEnd(Payload):
     """What a run that came to its own end says of itself: its books, line counts and stop reasons."""
 
     summary: dict[str, Any]
 
 
-class Cycle(Form):
+class Cycle(Payload):
     """One cycle of the step."""
 
     record: CycleRecord
 
 
-class ModeChange(Form):
+class ModeChange(Payload):
     """A mode that was entered, or a reason that changed."""
 
     cycle: int
     mode: ModeState
 
 
-class SerialBytes(Form):
+class SerialBytes(Payload):
     """Bytes of the line as they came or went for a while, in whatever pieces."""
 
     host_s: float
@@ -97,7 +97,7 @@ class SerialBytes(Form):
         ]
 
 
-class LogLine(Form):
+class LogLine(Payload):
     """A line of the log."""
 
     level: str
@@ -105,7 +105,7 @@ class LogLine(Form):
     fields: dict[str, Any]
 
 
-class Bookmark(Form):
+class Bookmark(Payload):
     """A mark that an operator put here, to be found again; nothing in the run hangs on it."""
 
     cycle: int
@@ -113,7 +113,7 @@ class Bookmark(Form):
     text: str
 
 
-class MapChange(Form):
+class MapChange(Payload):
     """What has happened to the outline map since the message before."""
 
     cycle: int
@@ -127,7 +127,7 @@ class MapChange(Form):
     """Numbers."""
 
 
-class ObjectsSeen(Form):
+class ObjectsSeen(Payload):
     """What is recognised now, as in the run's summary."""
 
     cycle: int
@@ -142,15 +142,15 @@ def _default(of: Field[Any]) -> Any:  # noqa: ANN401 - a field's default is what
 
 
 _HINTS: Final = get_type_hints(State)
-StateLeft: Any = create_model(  # type: ignore[call-overload]  # mypy sees no field definitions here
-    "StateLeft",
-    __base__=Form,
+CarriedState: Any = create_model(  # type: ignore[call-overload]  # mypy sees no field definitions here
+    "CarriedState",
+    __base__=Payload,
     __doc__="What a cycle leaves to the next one besides perception's memory.",
     **{f.name: (_HINTS[f.name], _default(f)) for f in fields(State) if f.name != "perception"},
 )
 
 
-class ArrayForm(Form):
+class ArrayInfo(Payload):
     """Where an array of the memory is: the arrays lie one after the other."""
 
     name: str
@@ -158,37 +158,37 @@ class ArrayForm(Form):
     shape: list[int]
 
 
-class Keyframe(Form):
+class Keyframe(Payload):
     """The whole state after a cycle: a replay can begin here."""
 
     cycle: int
-    left: StateLeft  # of the fields of `State`
-    arrays: list[ArrayForm]
+    left: CarriedState  # of the fields of `State`
+    arrays: list[ArrayInfo]
     memory: bytes
     """The arrays' bytes, little-endian, compressed by zstd."""
 
 
-Left: TypeAlias = dict[str, Any]
+StateFields: TypeAlias = dict[str, Any]
 
 
-def left_by(state: State) -> Left:
+def carried_state(state: State) -> StateFields:
     """Return the state's fields but for perception; all are immutable."""
     return {f.name: getattr(state, f.name) for f in fields(State) if f.name != "perception"}
 
 
-def keyframe(cycle: int, left: Left, snapshot: Snapshot) -> Keyframe:
+def keyframe(cycle: int, left: StateFields, snapshot: Snapshot) -> Keyframe:
     """Return the message that holds a state."""
-    arrays = [ArrayForm(name=name, dtype=a.dtype.str, shape=list(a.shape)) for name, a in snapshot.items()]
+    arrays = [ArrayInfo(name=name, dtype=a.dtype.str, shape=list(a.shape)) for name, a in snapshot.items()]
     memory = zstandard.compress(b"".join(a.tobytes() for a in snapshot.values()))
     return Keyframe.model_construct(
         cycle=cycle,
-        left=StateLeft.model_construct(**left),  # type: ignore[arg-type]
+        left=CarriedState.model_construct(**left),  # type: ignore[arg-type]
         arrays=arrays,
         memory=memory,
     )
 
 
-def snapshot_in(frame: Keyframe) -> Snapshot:
+def perception_snapshot(frame: Keyframe) -> Snapshot:
     """Return the memory that a keyframe holds."""
     raw, taken, at = zstandard.decompress(frame.memory), {}, 0
     for array in frame.arrays:
@@ -199,7 +199,7 @@ def snapshot_in(frame: Keyframe) -> Snapshot:
     return taken
 
 
-def put_back(state: State, frame: Keyframe) -> None:
+def restore_state(state: State, frame: Keyframe) -> None:
     """Make `state` what it was when the keyframe was taken.
 
     Raises
@@ -207,13 +207,13 @@ def put_back(state: State, frame: Keyframe) -> None:
     ValueError
         The keyframe was taken with other settings.
     """
-    state.perception.restore(snapshot_in(frame))
+    state.perception.restore(perception_snapshot(frame))
     for f in fields(State):
         if f.name != "perception":
             setattr(state, f.name, getattr(frame.left, f.name))
 
 
-class FormSchema(GenerateJsonSchema):
+class PayloadSchema(GenerateJsonSchema):
     """JSON schemas of what is really written: numbers JSON cannot name go as strings, flags as their sum."""
 
     def float_schema(self, schema: core_schema.FloatSchema) -> JsonSchemaValue:

@@ -15,24 +15,24 @@ SUFFIX: Final = ".mcap"
 MEGABYTE: Final = 1_000_000
 
 
-class Place(Protocol):
+class RecordingTarget(Protocol):
     """Where the parts of one recording go."""
 
     def path(self, part: int) -> Path:
         """Return where a part goes, numbered from 1, and make it possible that it goes there."""
         ...
 
-    def tidy(self, current: Path) -> None:
+    def enforce_limits(self, current: Path) -> None:
         """Keep what lies there within its bounds; called now and then while `current` grows."""
         ...
 
-    def is_bayes(self, part_bytes: int) -> bool:
+    def is_part_full(self, part_bytes: int) -> bool:
         """Say whether a part of that size should be followed by the next one."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
-class OneFile:
+class SingleFile:
     """A file by name, and beside it the next ones after trouble with the disk: `hall-2.mcap` and so on."""
 
     first: Path
@@ -41,16 +41,16 @@ class OneFile:
         """Return the part's file."""
         return self.first if part == 1 else self.first.with_stem(f"{self.first.stem}-{part}")
 
-    def tidy(self, current: Path) -> None:
+    def enforce_limits(self, current: Path) -> None:
         """Leave everything: a file that was asked for is not for us to delete."""
 
-    def is_bayes(self, part_bytes: int) -> bool:  # noqa: ARG002 - what is asked for by name stays one file
+    def is_part_full(self, part_bytes: int) -> bool:  # noqa: ARG002 - what is asked for by name stays one file
         """Say no."""
         return False
 
 
 @dataclass(frozen=True, slots=True)
-class Rotating:
+class RotatingFolder:
     """A folder of recordings with a cap on their number and on their size together.
 
     Parameters
@@ -74,11 +74,11 @@ class Rotating:
         self._keep(self.config.keep - 1, path)
         return path
 
-    def tidy(self, current: Path) -> None:
+    def enforce_limits(self, current: Path) -> None:
         """Delete the oldest recordings until the rest is within bounds; never the one under way."""
         self._keep(self.config.keep, current)
 
-    def is_bayes(self, part_bytes: int) -> bool:
+    def is_part_full(self, part_bytes: int) -> bool:
         """Say whether the part has its share of the cap: a quarter, so that the cap can be kept to."""
         return part_bytes > 0.25 * self.config.cap_mb * MEGABYTE
 
@@ -100,7 +100,7 @@ class Rotating:
                 total -= size
 
 
-class Listed(NamedTuple):
+class RecordingFile(NamedTuple):
     """A recording in the folder."""
 
     file: str
@@ -110,7 +110,7 @@ class Listed(NamedTuple):
     """Unix time."""
 
 
-def listing(folder: Path) -> list[Listed]:
+def list_recordings(folder: Path) -> list[RecordingFile]:
     """Return the recordings in a folder, newest first; none where there is no such folder. Waits for the disk."""
     found = []
     with contextlib.suppress(OSError):
@@ -118,13 +118,13 @@ def listing(folder: Path) -> list[Listed]:
             with contextlib.suppress(OSError):  # it made room for another just now
                 known = path.stat()
                 if stat.S_ISREG(known.st_mode):
-                    found.append(Listed(path.name, known.st_size, known.st_mtime))
+                    found.append(RecordingFile(path.name, known.st_size, known.st_mtime))
     return sorted(found, key=lambda one: (-one.modified_s, one.file))
 
 
-def in_folder(folder: Path, name: str) -> Path | None:
-    """Return the recording of that name in a folder; None where `listing` has none, wherever else the name leads."""
-    return next((folder / one.file for one in listing(folder) if one.file == name), None)
+def find_recording(folder: Path, name: str) -> Path | None:
+    """Return the recording of that name in a folder; None where `list_recordings` has none, wherever else the name leads."""
+    return next((folder / one.file for one in list_recordings(folder) if one.file == name), None)
 
 
 def recordings_folder(config: RecordingConfig) -> Path:

@@ -22,21 +22,21 @@ from drivers.messages import Floats
 from runtime.cycle.modes import ModeState
 from runtime.cycle.step import CycleRecord
 from runtime.cycle.summary import object_row
-from runtime.recording.channels import ABOUT, CYCLE, KEYFRAME, MODE, OBJECTS, SEGMENTS, SETTINGS, encode
+from runtime.recording.channels import CYCLE, KEYFRAME, MODE, OBJECTS, RUN_INFO, SEGMENTS, SETTINGS, encode
 from runtime.recording.mcap_file import McapFile
 from runtime.recording.schema import (
-    About,
     Cycle,
-    Form,
-    Left,
     MapChange,
     ModeChange,
     ObjectsSeen,
+    Payload,
+    RunInfo,
     SerialBytes,
     SettingsChange,
+    StateFields,
     keyframe,
 )
-from runtime.recording.storage import Place
+from runtime.recording.storage import RecordingTarget
 from runtime.support.health import Worker
 
 QUEUE_MAX: Final = 8192
@@ -86,7 +86,7 @@ class MapSnapshot(NamedTuple):
     cycle: int
     segments: Floats | None = None
     objects: tuple[Any, ...] | None = None
-    left: Left | None = None
+    left: StateFields | None = None
     memory: dict[str, Any] | None = None
 
 
@@ -101,11 +101,11 @@ class RecorderStatus:
     messages: int = 0
     dropped: int = 0
     """Handed over while the queue was full or no file could be written, or not yet in a file when it failed."""
-    trouble: str | None = None
+    last_error: str | None = None
     """The last one with the disk."""
     sync_max_s: float = 0.0
     """The longest that the disk took to confirm."""
-    under_way: bool = False
+    is_writing: bool = False
     """Whether the file is being written."""
 
 
@@ -114,9 +114,9 @@ class RecordingWriter:
 
     Parameters
     ----------
-    place : Place
+    place : RecordingTarget
         Where its files go.
-    about : About
+    info : RunInfo
         What stands at the beginning of each.
     clock : callable
         Monotonic, s: the thread's own pace.
@@ -125,14 +125,14 @@ class RecordingWriter:
     """
 
     def __init__(
-        self, place: Place, about: About, clock: Callable[[], float] = time.monotonic, *, on: bool = True
+        self, place: RecordingTarget, info: RunInfo, clock: Callable[[], float] = time.monotonic, *, on: bool = True
     ) -> None:
         self.queue: deque[Item] = deque()
         self.wants_keyframe = False
         """A file has begun, or something is missing: without a keyframe no replay could go on."""
-        self.standing = RecorderStatus()
+        self.status = RecorderStatus()
         self._place = place
-        self._about = about
+        self._info = info
         self._clock = clock
         self._part: McapFile | None = None
         self._parts = 0
@@ -159,10 +159,10 @@ class RecordingWriter:
         self._thread.join(CLOSE_MAX_S)
         sys.setswitchinterval(self._interval_s)
         if self._thread.is_alive():
-            why = f"the disk did not take the end of {self.standing.file} within {CLOSE_MAX_S:.0f} s"
-            self.standing = replace(self.standing, trouble=why)
+            why = f"the disk did not take the end of {self.status.file} within {CLOSE_MAX_S:.0f} s"
+            self.status = replace(self.status, last_error=why)
         elif self._part is not None:
-            self._leave(f"{self.standing.file}: its writer failed: {self._thread.failure}")
+            self._leave(f"{self.status.file}: its writer failed: {self._thread.failure}")
 
     def probe(self) -> str | None:
         """Say how the thread ended; None while it runs. See `runtime.support.health`."""
@@ -170,7 +170,7 @@ class RecordingWriter:
 
     def drop(self, count: int = 1) -> None:
         """Count what is not written."""
-        self.standing = replace(self.standing, dropped=self.standing.dropped + count)
+        self.status = replace(self.status, dropped=self.status.dropped + count)
 
     def _work(self) -> None:
         flushed_s = synced_s = tidied_s = self._clock()
@@ -190,7 +190,7 @@ class RecordingWriter:
                 self._guarded(self._sync)
                 synced_s = self._clock()
             if now_s - tidied_s >= RETRY_S and self._part is not None:
-                self._guarded(lambda: self._place.tidy(self._current()))
+                self._guarded(lambda: self._place.enforce_limits(self._current()))
                 tidied_s = now_s
         self._guarded(self._finish)
 
@@ -199,7 +199,7 @@ class RecordingWriter:
         try:
             work()
         except OSError as error:
-            where = self.standing.file if self._part is not None else str(error.filename)
+            where = self.status.file if self._part is not None else str(error.filename)
             self._leave(f"{where}: {error.strerror or error}")
 
     def _leave(self, why: str) -> None:
@@ -209,21 +209,21 @@ class RecordingWriter:
         self.drop(self._unflushed)
         self._unflushed = 0
         self._retry_s = self._clock() + RETRY_S
-        self.standing = replace(self.standing, trouble=why, under_way=False)
+        self.status = replace(self.status, last_error=why, is_writing=False)
 
     def _current(self) -> Path:
         return Path() if self._part is None else self._part.path
 
     def _open(self) -> None:
         self._parts += 1
-        about = self._about.model_copy(update={"part": self._parts})
-        self._about = about
+        info = self._info.model_copy(update={"part": self._parts})
+        self._info = info
         host_ns = time.time_ns()
-        self._part = McapFile(self._place.path(self._parts), encode(about), host_ns)
-        self._before = self.standing.bytes
+        self._part = McapFile(self._place.path(self._parts), encode(info), host_ns)
+        self._before = self.status.bytes
         self._mode = None
-        path, files = str(self._part.path), self.standing.files + 1
-        self.standing = replace(self.standing, file=path, files=files, under_way=True)
+        path, files = str(self._part.path), self.status.files + 1
+        self.status = replace(self.status, file=path, files=files, is_writing=True)
 
     def _finish(self) -> None:
         if self._part is not None:
@@ -232,7 +232,7 @@ class RecordingWriter:
             try:
                 part.finish()
                 size = self._before + part.path.stat().st_size
-                self.standing = replace(self.standing, bytes=size, under_way=False)
+                self.status = replace(self.status, bytes=size, is_writing=False)
                 self._unflushed = 0
             except OSError as error:
                 self._leave(f"{part.path}: {error.strerror or error}")
@@ -242,8 +242,8 @@ class RecordingWriter:
             self._enter_pieces()
             self._part.flush()
             self._unflushed = 0
-            self.standing = replace(self.standing, bytes=self._before + self._part.bytes)
-            if self._place.is_bayes(self._part.bytes):
+            self.status = replace(self.status, bytes=self._before + self._part.bytes)
+            if self._place.is_part_full(self._part.bytes):
                 self.wants_keyframe = True
         elif self._on and self._clock() >= self._retry_s:
             self.wants_keyframe = True
@@ -253,8 +253,8 @@ class RecordingWriter:
             began_s = self._clock()
             self._part.sync()
             took_s = self._clock() - began_s
-            if took_s > self.standing.sync_max_s:
-                self.standing = replace(self.standing, sync_max_s=took_s)
+            if took_s > self.status.sync_max_s:
+                self.status = replace(self.status, sync_max_s=took_s)
 
     def _enter(self, item: Item) -> None:
         """Write one item; with a keyframe the next file can begin."""
@@ -264,13 +264,13 @@ class RecordingWriter:
                 self._finish()
             return
         if item.topic == KEYFRAME:
-            if self._part is not None and self._place.is_bayes(self._part.bytes):
+            if self._part is not None and self._place.is_part_full(self._part.bytes):
                 self._finish()
             if self._part is None and self._clock() >= self._retry_s:
                 self._open()
         if item.topic == SETTINGS:
             settings = item.what.settings.model_dump(mode="json")
-            self._about = self._about.model_copy(update={"settings": settings})
+            self._info = self._info.model_copy(update={"settings": settings})
         if self._part is None:
             self.drop(int(self._on))
             return
@@ -281,7 +281,7 @@ class RecordingWriter:
             case MapSnapshot():
                 self._enter_moment(item.what, log_ns)
             case Reloaded(cycle, _):
-                change = SettingsChange.model_construct(cycle=cycle, settings=self._about.settings)
+                change = SettingsChange.model_construct(cycle=cycle, settings=self._info.settings)
                 self._add(SETTINGS, change, log_ns)
             case bytes():
                 self._pieces.setdefault(item.topic, []).append((item.host_s, item.what))
@@ -300,7 +300,7 @@ class RecordingWriter:
         self._pieces.clear()
 
     def _log_ns(self, host_s: float) -> int:
-        return self._about.unix_minus_host_ns + round(1e9 * host_s)
+        return self._info.unix_minus_host_ns + round(1e9 * host_s)
 
     def _enter_cycle(self, record: CycleRecord, log_ns: int) -> None:
         self._add(CYCLE, Cycle.model_construct(record=record), log_ns, record.cycle)
@@ -310,7 +310,7 @@ class RecordingWriter:
 
     def _enter_moment(self, moment: MapSnapshot, log_ns: int) -> None:
         if moment.left is not None and moment.memory is not None:
-            self._add(ABOUT, self._about, log_ns)
+            self._add(RUN_INFO, self._info, log_ns)
             self._add(KEYFRAME, keyframe(moment.cycle, moment.left, moment.memory), log_ns, moment.cycle)
         if moment.segments is not None:
             self._add(SEGMENTS, self._map_change(moment, moment.segments), log_ns)
@@ -334,11 +334,11 @@ class RecordingWriter:
             removed=removed,
         )  # fmt: skip
 
-    def _add(self, topic: str, form: Form, log_ns: int, sequence: int = 0) -> None:
+    def _add(self, topic: str, form: Payload, log_ns: int, sequence: int = 0) -> None:
         if self._part is not None:
             self._unflushed += 1
             self._part.add(topic, encode(form), log_ns, sequence)
-            self.standing = replace(self.standing, messages=self.standing.messages + 1)
+            self.status = replace(self.status, messages=self.status.messages + 1)
 
 
 def _rounded(row: dict[str, Any]) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from drivers.emulator.robot_device import GroundTruth
 from drivers.messages import Pose
 from runtime.cycle.step import CycleRecord, State
 from runtime.simulation.closed_loop import simulate
-from runtime.simulation.evaluation import GATE_M, SECONDS_MAX, against_truth, estimates, refuse_unfinished
+from runtime.simulation.evaluation import GATE_M, SECONDS_MAX, estimates, match_drums, require_finished
 from runtime.simulation.long_hall import WAY_M, long_hall
 from runtime.timing.refinement_budget import RefinementBudget
 
@@ -51,7 +51,7 @@ class BudgetRow(TypedDict):
 
 
 @dataclass
-class Answers:
+class DetectionLog:
     """Looks on at one drive and notes when each drum is reported for the first time."""
 
     world: WorldConfig
@@ -85,7 +85,7 @@ class Answers:
                     self.when[i] = (state.run_s, self._way_m)
 
 
-def in_long_hall(settings: Settings) -> Settings:
+def long_hall_settings(settings: Settings) -> Settings:
     """Return the settings for a drive down the hall once, with no limit on refinement but the budget."""
     ahead = settings.behaviors.move_ahead.model_copy(update={"distance_m": WAY_M, "at_end": "stop"})
     bayes = settings.perception.bayes.model_copy(update={"quanta_per_firing": QUANTA_PER_FIRING})
@@ -98,17 +98,17 @@ def in_long_hall(settings: Settings) -> Settings:
 
 
 def drive(
-    settings: Settings, budget: float, allowance: Callable[[], RefinementBudget], seeds: Sequence[int]
+    settings: Settings, budget: float, refinement_budget: Callable[[], RefinementBudget], seeds: Sequence[int]
 ) -> BudgetRow:
     """Drive down a hall for each seed under one budget.
 
     Parameters
     ----------
     settings : Settings
-        From `in_long_hall`.
+        From `long_hall_settings`.
     budget : float
         What the row is called.
-    allowance : callable
+    refinement_budget : callable
         Makes what carries the budget out.
     seeds : sequence of int
         Of the halls and of everything random in them.
@@ -121,12 +121,18 @@ def drive(
     looks, errors, found, false = [], [], 0, 0
     for seed in seeds:
         world = long_hall(seed)
-        looking = Answers(world)
+        looking = DetectionLog(world)
         run = simulate(
-            settings, world, seed, SECONDS_MAX, looking.on_cycle, allowance=allowance(), on_state=looking.on_state
+            settings,
+            world,
+            seed,
+            SECONDS_MAX,
+            looking.on_cycle,
+            refinement_budget=refinement_budget(),
+            on_state=looking.on_state,
         )
-        refuse_unfinished(run, seed, SECONDS_MAX)
-        rows, wrong = against_truth(world, estimates(run))
+        require_finished(run, seed, SECONDS_MAX)
+        rows, wrong = match_drums(world, estimates(run))
         errors += [row["error"] for row in rows if row["error"] is not None]
         found += sum(row["estimate"] is not None for row in rows)
         false += wrong

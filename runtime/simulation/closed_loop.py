@@ -30,7 +30,7 @@ SETTLING_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class OperatorInput:
     """What an operator says in a cycle."""
 
     request: Request | None = None
@@ -39,7 +39,7 @@ class Said:
 
 
 @dataclass(frozen=True, slots=True)
-class Simulated:
+class SimulationResult:
     """What a run in virtual time left behind."""
 
     state: State
@@ -47,8 +47,8 @@ class Simulated:
     """Where the odometry began, in world coordinates."""
     truth: GroundTruth
     virtual_s: float
-    wall_s: float
-    books: CycleStats
+    elapsed_s: float
+    cycle_stats: CycleStats
     """What the cycles took."""
     counts: LinkCounts
 
@@ -60,13 +60,13 @@ def simulate(
     seconds_max: float,
     on_cycle: Callable[[CycleRecord, GroundTruth], None] | None = None,
     *,
-    allowance: RefinementBudget | None = None,
+    refinement_budget: RefinementBudget | None = None,
     on_state: Callable[[CycleRecord, State, Pose], None] | None = None,
     clock_start_us: int = 0,
     reload: Callable[[int], Settings | None] | None = None,
     on_bytes: OnBytes | None = None,
-    operator: Callable[[int, State], Said] | None = None,
-) -> Simulated:
+    operator: Callable[[int, State], OperatorInput] | None = None,
+) -> SimulationResult:
     """Drive through `world` until the leg is done, the robot stops for a reason, or the time is up.
 
     Parameters
@@ -81,7 +81,7 @@ def simulate(
         Virtual time after which the run ends.
     on_cycle : callable, optional
         Gets every record, and the truth of that moment.
-    allowance : RefinementBudget, optional
+    refinement_budget : RefinementBudget, optional
         How much refinement a cycle may do; `QUANTA_PER_CYCLE` where not given.
     on_state : callable, optional
         Gets every record, the state it left, and where the odometry began.
@@ -95,33 +95,33 @@ def simulate(
         Asked with the number of each cycle, and the state before it, for what an operator says in it. It arms only
         where it says so, and a drive does not end by itself.
     """
-    allowance = Quanta(QUANTA_PER_CYCLE) if allowance is None else allowance
+    refinement_budget = Quanta(QUANTA_PER_CYCLE) if refinement_budget is None else refinement_budget
     robot = make_device(settings, world, seed, clock_start_us=clock_start_us)
     driver = make_driver(settings)
     line = MemoryLine(driver, robot, on_bytes=on_bytes)
     state = State(Perception(settings.ring, settings.models, settings.perception))
     start = robot.truth.pose
     began = time.perf_counter()
-    books = CycleStats(late_after_s=math.inf, is_touched=True)
+    cycle_stats = CycleStats(late_after_s=math.inf, is_touched=True)
     until, now = seconds_max, 0.0
     while now < until:
-        now = (books.cycles + 1) / settings.cycle.rate_hz
-        if reload is not None and (other := reload(books.cycles + 1)) is not None:
+        now = (cycle_stats.cycles + 1) / settings.cycle.rate_hz
+        if reload is not None and (other := reload(cycle_stats.cycles + 1)) is not None:
             settings = other
             driver.set_firing(settings.ring)
             take_over(state, settings)
         line.exchange(now)
         request = Request.ARM if state.mode.mode is Mode.READY else None
-        said = Said(request) if operator is None else operator(books.cycles + 1, state)
+        said = OperatorInput(request) if operator is None else operator(cycle_stats.cycles + 1, state)
         inputs = replace(gather(driver, now, said.request), drive_request=said.drive_request, edits=said.edits)
         step_s = time.perf_counter()
-        allowance.begin()
-        record = step(state, inputs, settings, lambda c: give(driver, c), allowance)
-        books.enter(time.perf_counter() - step_s)
+        refinement_budget.begin()
+        record = step(state, inputs, settings, lambda c: give(driver, c), refinement_budget)
+        cycle_stats.enter(time.perf_counter() - step_s)
         if on_cycle is not None:
             on_cycle(record, robot.truth)
         if on_state is not None:
             on_state(record, state, start)
         if operator is None and (state.mode.mode is Mode.SAFE_STOP or (state.leg is not None and state.leg.done)):
             until = min(until, now + SETTLING_S)
-    return Simulated(state, start, robot.truth, now, time.perf_counter() - began, books, driver.counts)
+    return SimulationResult(state, start, robot.truth, now, time.perf_counter() - began, cycle_stats, driver.counts)

@@ -25,7 +25,7 @@ START_MAX_S: Final = 60.0
 END_MAX_S: Final = 2.0
 
 
-class OwnEmulator(NamedTuple):
+class EmulatorHandle(NamedTuple):
     """An emulator of this process's own."""
 
     port: str
@@ -35,7 +35,7 @@ class OwnEmulator(NamedTuple):
 
 
 @contextlib.asynccontextmanager
-async def emulator(arguments: Sequence[str], clock: PacedClock | None = None) -> AsyncIterator[OwnEmulator]:
+async def start_emulator(arguments: Sequence[str], clock: PacedClock | None = None) -> AsyncIterator[EmulatorHandle]:
     """Run ``echolocate emulate`` beside this process.
 
     It gets a session of its own, so that Ctrl-C on the terminal reaches this process only, which then halts the
@@ -62,7 +62,7 @@ async def emulator(arguments: Sequence[str], clock: PacedClock | None = None) ->
             await _wait_until_ready(process)
             control = EmulatorControl(lambda line: _write(process, line), PacedClock() if clock is None else clock)
             listener = asyncio.create_task(_listen(process, control), name="emulator's time")
-            yield OwnEmulator(str(port), control)
+            yield EmulatorHandle(str(port), control)
         finally:
             if listener is not None:
                 listener.cancel()

@@ -17,7 +17,7 @@ from drivers.messages import Pose
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord, State
 from runtime.cycle.summary import object_row
-from runtime.simulation.closed_loop import Simulated, simulate
+from runtime.simulation.closed_loop import SimulationResult, simulate
 from runtime.timing.cycle_stats import Quantiles, worst_of
 
 GATE_M: Final = FOOT_M
@@ -72,7 +72,7 @@ class SeedOutcome:
     rows: list[DrumRow]
     false: int
     virtual_s: float
-    wall_s: float
+    elapsed_s: float
     cycle_us: Quantiles
     end: dict[str, Any] = field(default_factory=dict)
     """What a recording of it says at its end, as a run's summary does."""
@@ -100,12 +100,14 @@ def run_seed(
         The robot stopped for a reason, touched something, or did not get through in `SECONDS_MAX`.
     """
     run = simulate(settings, world, seed, SECONDS_MAX, on_state=on_state, on_bytes=on_bytes)
-    refuse_unfinished(run, seed, SECONDS_MAX)
-    rows, false = against_truth(world, estimates(run))
-    return SeedOutcome(seed, rows, false, run.virtual_s, run.wall_s, run.books.cycle_us(), end_of(run))
+    require_finished(run, seed, SECONDS_MAX)
+    rows, false = match_drums(world, estimates(run))
+    return SeedOutcome(
+        seed, rows, false, run.virtual_s, run.elapsed_s, run.cycle_stats.cycle_us(), simulation_summary(run)
+    )
 
 
-def refuse_unfinished(run: Simulated, seed: int, seconds_max: float) -> None:
+def require_finished(run: SimulationResult, seed: int, seconds_max: float) -> None:
     """Refuse a drive that did not come through.
 
     Raises
@@ -127,26 +129,26 @@ def refuse_unfinished(run: Simulated, seed: int, seconds_max: float) -> None:
         )
 
 
-def end_of(run: Simulated) -> dict[str, Any]:
+def simulation_summary(run: SimulationResult) -> dict[str, Any]:
     """Return the summary of a run in virtual time: what there is of ``echolocate run``'s without a clock."""
     counts = run.counts
     return {
         "objects": [object_row(seen) for seen in run.state.perception.objects()],
-        "cycles": run.books.cycles,
-        "cycle_us": run.books.cycle_us(),
+        "cycles": run.cycle_stats.cycles,
+        "cycle_us": run.cycle_stats.cycle_us(),
         "link": {"frames": counts.frames, "bad": counts.bad, "lost": counts.lost},
         "mode": run.state.mode.mode.value,
         "stop_reasons": [],
     }
 
 
-def estimates(run: Simulated) -> list[tuple[float, float]]:
+def estimates(run: SimulationResult) -> list[tuple[float, float]]:
     """Return where objects were seen, in world coordinates, m."""
     places = [run.start.compose(Pose(o.x, o.y, o.theta)) for o in run.state.perception.objects()]
     return [(p.x, p.y) for p in places]
 
 
-def against_truth(world: WorldConfig, seen: list[tuple[float, float]]) -> tuple[list[DrumRow], int]:
+def match_drums(world: WorldConfig, seen: list[tuple[float, float]]) -> tuple[list[DrumRow], int]:
     """Pair drums with estimates, nearest pairs first and each at most once; return the rows and the false ones."""
     drums = [(d.x_m, d.y_m) for d in world.drum]
     match = nearest_pairs(drums, seen)
@@ -195,13 +197,13 @@ def summarise(outcomes: list[SeedOutcome]) -> Outcome:
     """Return the summary over all runs: their rows one after another."""
     rows = [row for outcome in outcomes for row in outcome.rows]
     errors = [row["error"] for row in rows if row["error"] is not None]
-    wall_s = sum(outcome.wall_s for outcome in outcomes)
+    elapsed_s = sum(outcome.elapsed_s for outcome in outcomes)
     outcome: Outcome = {
         "drums": rows,
         "false": sum(outcome.false for outcome in outcomes),
         "mean_error": sum(errors) / len(errors) if errors else None,
         "max_error": max(errors, default=None),
-        "times_real_time": sum(outcome.virtual_s for outcome in outcomes) / wall_s if wall_s else 0.0,
+        "times_real_time": sum(outcome.virtual_s for outcome in outcomes) / elapsed_s if elapsed_s else 0.0,
         "cycle_us": worst_of([outcome.cycle_us for outcome in outcomes]),
     }
     if len(outcomes) > 1 and (over := spread(outcomes)) is not None:

@@ -16,7 +16,7 @@ from config.world import DrumConfig
 from perception.detected_object import DetectedObject
 
 WITHIN_M: Final = 0.25 * FOOT_M
-ASKED_M: Final = 4.0 * FOOT_M
+EARLY_FIX_M: Final = 4.0 * FOOT_M
 """How long before is asked for."""
 ROUNDING_M: Final = 1e-9
 
@@ -29,10 +29,10 @@ class FirstFix(TypedDict):
     median: float
     """Of the drums that were."""
     share: float
-    """Of all drums, how many were fixed `ASKED_M` before."""
+    """Of all drums, how many were fixed `EARLY_FIX_M` before."""
 
 
-class FixWatch:
+class FirstFixTracker:
     """Watches the drums of one straight drive.
 
     Parameters
@@ -67,5 +67,5 @@ def summarise_fixes(fixes: Sequence[float | None]) -> FirstFix | None:
     return {
         "least": min(had) if len(had) == len(fixes) else None,
         "median": median(had),
-        "share": sum(fix >= ASKED_M - ROUNDING_M for fix in had) / len(fixes),
+        "share": sum(fix >= EARLY_FIX_M - ROUNDING_M for fix in had) / len(fixes),
     }

@@ -14,8 +14,8 @@ from config.world import BoxConfig, WorldConfig
 from drivers.messages import Firing
 from perception.pipeline import DetectedObject, Perception
 from runtime.analysis.plots.geometry import CHI2_95
-from runtime.simulation.evaluation import DrumRow, Outcome, against_truth, nearest_pairs
-from runtime.simulation.first_fix import FirstFix, FixWatch, summarise_fixes
+from runtime.simulation.evaluation import DrumRow, Outcome, match_drums, nearest_pairs
+from runtime.simulation.first_fix import FirstFix, FirstFixTracker, summarise_fixes
 from runtime.simulation.scene_names import SceneName
 from runtime.simulation.scenes import Hall, halls, readings
 from runtime.timing.cycle_stats import CycleStats, worst_of
@@ -55,7 +55,7 @@ class HallOutcome:
     boxes: list[BoxRow]
     false: int
     virtual_s: float
-    books: CycleStats
+    cycle_stats: CycleStats
     """What the readings took."""
     inside: list[bool]
     """For each drum found with a covariance, whether it stands in the 95 % ellipse."""
@@ -76,15 +76,15 @@ def run_hall(settings: Settings, hall: Hall, seed: int) -> HallOutcome:
     perception = Perception(settings.ring, settings.models, settings.perception)
     seen: tuple[DetectedObject, ...] = ()
     heard = list(readings(settings.ring, hall, seed))
-    books = CycleStats(late_after_s=math.inf)
-    watch = FixWatch(() if hall.path else hall.world.drum)
+    cycle_stats = CycleStats(late_after_s=math.inf)
+    watch = FirstFixTracker(() if hall.path else hall.world.drum)
     for firing in heard:
         begin = time.perf_counter()
         seen = perceive(perception, firing)
-        books.enter(time.perf_counter() - begin)
+        cycle_stats.enter(time.perf_counter() - begin)
         watch.look(float(firing.pose.x), seen)
-    drums, boxes, false = judge(hall.world, seen, settings.models)
-    return HallOutcome(drums, boxes, false, heard[-1].t_s, books, inside_ellipse(drums, seen), watch.fixes())
+    drums, boxes, false = match_objects(hall.world, seen, settings.models)
+    return HallOutcome(drums, boxes, false, heard[-1].t_s, cycle_stats, inside_ellipse(drums, seen), watch.fixes())
 
 
 def inside_ellipse(drums: Iterable[DrumRow], seen: Iterable[DetectedObject]) -> list[bool]:
@@ -101,7 +101,7 @@ def inside_ellipse(drums: Iterable[DrumRow], seen: Iterable[DetectedObject]) -> 
     return told
 
 
-def judge(
+def match_objects(
     world: WorldConfig, seen: Iterable[DetectedObject], models: Iterable[ModelConfig]
 ) -> tuple[list[DrumRow], list[BoxRow], int]:
     """Set round models against the world's drums and the others against its boxes; count what matches nothing.
@@ -114,7 +114,7 @@ def judge(
     radii = [model.arc_radius_m for model in models if model.arc_radius_m is not None]
     wanted = [d for d in world.drum if not radii or any(abs(d.radius_m - r) < RADIUS_TOLERANCE_M for r in radii)]
     world = world.model_copy(update={"drum": tuple(wanted)})
-    drums, false_drums = against_truth(world, [(s.x, s.y) for s in known if is_round[s.model]])
+    drums, false_drums = match_drums(world, [(s.x, s.y) for s in known if is_round[s.model]])
     angular = [s for s in known if not is_round[s.model]]
     places = [(box.x_m, box.y_m) for box in world.box]
     match = nearest_pairs(places, [(s.x, s.y) for s in angular])
@@ -152,7 +152,7 @@ def summarise_scene(name: SceneName, outcomes: list[HallOutcome], models: Iterab
     drums = [row for outcome in outcomes for row in outcome.drums]
     boxes = [row for outcome in outcomes for row in outcome.boxes] if with_boxes else []
     errors = [e for rows in (drums, boxes) for row in rows if (e := row["error"]) is not None]
-    wall_s = sum(outcome.books.total_s for outcome in outcomes)
+    elapsed_s = sum(outcome.cycle_stats.total_s for outcome in outcomes)
     inside = [told for outcome in outcomes for told in outcome.inside]
     return {
         "scene": name,
@@ -164,6 +164,6 @@ def summarise_scene(name: SceneName, outcomes: list[HallOutcome], models: Iterab
         "false": sum(outcome.false for outcome in outcomes),
         "mean_error": sum(errors) / len(errors) if errors else None,
         "max_error": max(errors, default=None),
-        "times_real_time": sum(outcome.virtual_s for outcome in outcomes) / wall_s if wall_s else 0.0,
-        "cycle_us": worst_of([outcome.books.cycle_us() for outcome in outcomes]),
+        "times_real_time": sum(outcome.virtual_s for outcome in outcomes) / elapsed_s if elapsed_s else 0.0,
+        "cycle_us": worst_of([outcome.cycle_stats.cycle_us() for outcome in outcomes]),
     }

@@ -17,7 +17,7 @@ import pytest
 from config.load import ConfigError, load_settings, load_world
 from drivers.registry import make_device
 from runtime.recording.ring_log import RingLogError, read_ring_log
-from runtime.recording.ring_log_replay import replay
+from runtime.recording.ring_log_replay import replay_firings
 from tests.fuzz.campaign import KINDS, shipped
 from tests.fuzz.hazards import HAZARDS
 from tests.fuzz.mutators import mutated
@@ -115,7 +115,7 @@ def test_logs_beyond_all_sense_are_replayed(method: str, tmp_path: Path) -> None
         path = tmp_path / "log.csv"
         path.write_text(wild_log(rng, len(settings.ring.mounts)))
         try:
-            summary = replay(settings, read_ring_log(path))
+            summary = replay_firings(settings, read_ring_log(path))
         except RingLogError as error:
             raise AssertionError(path.read_text()) from error
         for seen in summary["objects"]:

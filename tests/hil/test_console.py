@@ -26,7 +26,7 @@ from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import LOG
 from runtime.recording.reader import open_recording
-from runtime.simulation.emulator_process import emulator
+from runtime.simulation.emulator_process import start_emulator
 from runtime.support.kernel_loader import KernelLoader
 from runtime.support.logs import open_log
 from runtime.timing.cycle_stats import CycleStats
@@ -83,7 +83,7 @@ def test_from_the_start_url_to_the_end_of_the_run(tmp_path: Path) -> None:
         assert token in log
         assert '"event":"a part' not in log
         with open_recording(recording) as told:
-            lines = [bytes(entry.data).decode() for entry in told.entries() if entry.topic == LOG]
+            lines = [bytes(entry.data).decode() for entry in told.messages() if entry.topic == LOG]
         assert [line for line in lines if '"console"' in line]
         assert not [line for line in lines if token in line]
 
@@ -239,7 +239,7 @@ async def test_halt_from_a_page_in_time(tmp_path: Path, measured: Callable[[str]
         elif mode.arming_run_s is None and operator.asked_s is None:
             process.request(Request.ARM)
 
-    async with emulator([]) as (port, _control):
+    async with start_emulator([]) as (port, _control):
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
             process = operator.process = RobotProcess(
                 on_port(settings, port), log, Observers(on_cycle, on_bytes=on_bytes)

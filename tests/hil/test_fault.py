@@ -12,7 +12,7 @@ from drivers.driver import RobotDriver
 from runtime.cli.commands.run import on_port
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
-from runtime.simulation.emulator_process import emulator
+from runtime.simulation.emulator_process import start_emulator
 from runtime.support.logs import open_log
 from runtime.timing.cycle_stats import CycleStats
 from tests.hil.machine import PATIENCE_S, stalls_excused
@@ -28,7 +28,7 @@ async def test_a_cycle_that_fails_halts_the_base_and_ends_in_fault(tmp_path: Pat
             raise ZeroDivisionError("planted")
 
     trace = tmp_path / "trace.csv"
-    async with emulator(["--trace", str(trace)]) as (port, _):
+    async with start_emulator(["--trace", str(trace)]) as (port, _):
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
             process = RobotProcess(on_port(load_settings("hallway"), port), log, Observers(on_cycle=fail))
             summary = await process.run(arm=True, seconds=PATIENCE_S)

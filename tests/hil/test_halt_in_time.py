@@ -24,8 +24,8 @@ from runtime.cycle.modes import Mode, Request
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.recorder import Recorder
-from runtime.recording.storage import OneFile
-from runtime.simulation.emulator_process import emulator
+from runtime.recording.storage import SingleFile
+from runtime.simulation.emulator_process import start_emulator
 from runtime.support.logs import open_log
 from runtime.timing.cycle_stats import CycleStats
 from tests.hil.machine import PATIENCE_S
@@ -114,8 +114,8 @@ async def halts(folder: Path, monkeypatch: pytest.MonkeyPatch, trials: int) -> O
         elif mode.arming_run_s is None and operator.asked_s is None:
             process.request(Request.ARM)
 
-    with Recorder(settings, OneFile(folder / "run.mcap")) as recorder:
-        async with emulator(["--trace", str(trace)]) as (port, _):
+    with Recorder(settings, SingleFile(folder / "run.mcap")) as recorder:
+        async with start_emulator(["--trace", str(trace)]) as (port, _):
             with open_log(LogConfig(file=str(folder / "log.jsonl")), terminal=False) as log:
                 process = operator.process = RobotProcess(
                     on_port(settings, port), log, Observers(on_cycle, on_bytes=on_bytes)
@@ -128,7 +128,7 @@ async def halts(folder: Path, monkeypatch: pytest.MonkeyPatch, trials: int) -> O
     last = Truth(trace).read()[-1]
     assert last.still
     assert last.flags & Flags.LATCHED
-    assert recorder.standing.sync_max_s == 0.0 or recorder.standing.sync_max_s >= 5.0
+    assert recorder.status.sync_max_s == 0.0 or recorder.status.sync_max_s >= 5.0
     return operator
 
 

@@ -24,9 +24,9 @@ from runtime.cycle.step import CycleRecord, State
 from runtime.cycle.summary import RunSummary
 from runtime.recording.reader import open_recording
 from runtime.recording.recorder import Recorder
-from runtime.recording.replayer import replay
-from runtime.recording.storage import OneFile
-from runtime.simulation.emulator_process import emulator
+from runtime.recording.replayer import verify_recording
+from runtime.recording.storage import SingleFile
+from runtime.simulation.emulator_process import start_emulator
 from runtime.support.logs import open_log
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.run_clock import PacedClock
@@ -54,10 +54,10 @@ async def run(folder: Path, act: Act) -> tuple[RunSummary, list[CycleRecord], Pa
     """Drive on an emulator of our own, do something to its time, and end; returns truth and recording as well."""
     trace, recorded, records = folder / "trace.csv", folder / "run.mcap", list[CycleRecord]()
     clock = PacedClock()
-    async with emulator(["--trace", str(trace)], clock) as (port, control):
+    async with start_emulator(["--trace", str(trace)], clock) as (port, control):
         with (
             open_log(LogConfig(file=str(folder / "log.jsonl")), terminal=False) as log,
-            Recorder(SETTINGS, OneFile(recorded), clock, emulated=True) as recorder,
+            Recorder(SETTINGS, SingleFile(recorded), clock, emulated=True) as recorder,
         ):
 
             def on_cycle(record: CycleRecord, state: State, _books: CycleStats, _driver: RobotDriver) -> None:
@@ -77,8 +77,8 @@ async def run(folder: Path, act: Act) -> tuple[RunSummary, list[CycleRecord], Pa
 
 def replays_to_the_bit(recorded: Path) -> bool:
     with open_recording(recorded) as recording:
-        verdict = replay(recording)
-    return verdict.cycles > 20 and verdict.first is None and not verdict.missing
+        result = verify_recording(recording)
+    return result.cycles > 20 and result.first_difference is None and not result.missing
 
 
 @stalls_excused

@@ -22,7 +22,7 @@ from runtime.cli.commands.run import on_port
 from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
-from runtime.simulation.emulator_process import emulator
+from runtime.simulation.emulator_process import start_emulator
 from runtime.support.logs import open_log
 from runtime.timing.cycle_stats import CycleStats
 from tests.hil.machine import PATIENCE_S, stalls_excused
@@ -156,7 +156,7 @@ async def test_overruns_in_a_row_end_in_a_safe_stop_that_names_the_callback(tmp_
             process.stop()
 
     settings = load_settings("hallway", ["cycle.overruns_max=5"])
-    async with emulator([]) as (port, _):
+    async with start_emulator([]) as (port, _):
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
             process = RobotProcess(on_port(settings, port), log, Observers(on_cycle=plant))
             summary = await process.run(arm=True, seconds=PATIENCE_S)

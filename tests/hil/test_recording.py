@@ -17,7 +17,7 @@ from config.errors import DONE, FAILED
 from runtime.cli.app import call
 from runtime.recording.channels import CYCLE, KEYFRAME, LOG, SERIAL, decode
 from runtime.recording.reader import open_recording
-from runtime.recording.schema import About, Cycle, LogLine, SerialBytes
+from runtime.recording.schema import Cycle, LogLine, RunInfo, SerialBytes
 from tests.hil.machine import stalls_excused
 from tests.hil.running import running
 from tests.recorded import entries_of
@@ -165,8 +165,8 @@ def test_every_run_leaves_a_recording_unless_told_otherwise(tmp_path: Path) -> N
     assert len(files) == 2
     for path in files:
         with open_recording(path) as recording:
-            assert isinstance(recording.about, About)
-            cycles = [decode(Cycle, e.data).record.cycle for e in recording.entries() if e.topic == CYCLE]
+            assert isinstance(recording.info, RunInfo)
+            cycles = [decode(Cycle, e.data).record.cycle for e in recording.messages() if e.topic == CYCLE]
         assert cycles == list(range(1, len(cycles) + 1))
         assert len(cycles) >= 5  # of 20: how many depends on what else the machine does
 

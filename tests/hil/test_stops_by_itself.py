@@ -63,7 +63,7 @@ class Drive:
                 self.run.signal(signal.SIGUSR1)
             time.sleep(0.01)
 
-    def judge(self, since_t_s: float) -> None:
+    def match_objects(self, since_t_s: float) -> None:
         """Assert that the wheels have stood still from the bound on, up to now."""
         self.truth.wait(lambda row: row.t_s > since_t_s + STOPPED_WITHIN_S + 0.1, "the robot's time")
         seen = self.truth.since(since_t_s)
@@ -79,13 +79,13 @@ class Drive:
             time.sleep(rng.uniform(0.0, PHASE_S))
             fault()
             at = self.truth.at(time.monotonic())
-            self.judge(at.t_s)
+            self.match_objects(at.t_s)
             over()
             wait_for(lambda: self.stops() > before, f"a SAFE_STOP after {self.run.modes()}")  # noqa: B023
             # As long again (what is called here is called within the turn): nobody has armed it.
             until_s = self.truth.read()[-1].t_s + STOPPED_WITHIN_S / 2.0
             self.truth.wait(lambda row: row.t_s > until_s, "a while in SAFE_STOP")  # noqa: B023
-            self.judge(at.t_s)
+            self.match_objects(at.t_s)
             if at.driving:
                 return
 
@@ -140,9 +140,9 @@ def unplugged(folder: Path, count: int) -> float:
             drive.truth.wait(lambda row, at_s=at_s: row.t_s > at_s, "the moment of the fault")  # type: ignore[misc]
             if not drive.truth.at_robot(at_s).driving:
                 continue
-            drive.judge(at_s)
+            drive.match_objects(at_s)
             wait_for(lambda: drive.stops() > before, "a SAFE_STOP")  # noqa: B023
-            drive.judge(at_s)
+            drive.match_objects(at_s)
             hits += 1
             if hits == count:
                 return end(drive)
@@ -174,13 +174,13 @@ def killed(folder: Path, count: int) -> float:
                 up_t_s = truth.read()[-1].t_s
                 truth.wait(lambda row, t_s=up_t_s: row.t_s > t_s + 0.5, "a while in READY")  # type: ignore[misc]
                 if k:
-                    drive.judge(since_t_s)
+                    drive.match_objects(since_t_s)
                 drive.get_under_way()
                 time.sleep(rng.uniform(0.0, PHASE_S))
                 run.signal(signal.SIGKILL)
                 run.process.wait()
                 since_t_s = truth.at(time.monotonic()).t_s
-                drive.judge(since_t_s)
+                drive.match_objects(since_t_s)
                 worst_s = max(worst_s, drive.worst_s)
     return worst_s
 

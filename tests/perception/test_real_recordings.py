@@ -14,7 +14,7 @@ from drivers.messages import Firing
 from perception.kernel import Floats
 from perception.paper.segments import SegmentExtractor
 from runtime.recording.ring_log import read_ring_log
-from runtime.recording.ring_log_replay import replay
+from runtime.recording.ring_log_replay import replay_firings
 from tests import recordings
 
 SIDES = (0, 7)
@@ -28,7 +28,7 @@ def corridor(tmp_path: Path) -> tuple[Settings, list[Firing]]:
 
 def test_the_corridor_gives_at_least_300_outline_segments(tmp_path: Path) -> None:
     chosen, firings = corridor(tmp_path)
-    assert replay(chosen, firings)["segments"] >= 300
+    assert replay_firings(chosen, firings)["segments"] >= 300
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -69,4 +69,4 @@ def test_the_ring_of_24_runs_through_at_its_full_length(tmp_path: Path) -> None:
     recordings.scitos_ring_log(tmp_path / "ring.csv")
     (tmp_path / "robot.toml").write_text(recordings.scitos_robot())
     chosen = load_settings(robot=str(tmp_path / "robot.toml"))
-    assert replay(chosen, read_ring_log(tmp_path / "ring.csv", 24))["cycles"] == 5456
+    assert replay_firings(chosen, read_ring_log(tmp_path / "ring.csv", 24))["cycles"] == 5456

@@ -14,9 +14,9 @@ from tests.recorded import SECONDS, hall, record
 @pytest.fixture(scope="session")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("recorded") / "hall.mcap"
-    standing = record(hall(), path, SECONDS)
-    assert (standing.dropped, standing.trouble, standing.files) == (0, None, 1)
-    assert standing.bytes == path.stat().st_size
+    status = record(hall(), path, SECONDS)
+    assert (status.dropped, status.last_error, status.files) == (0, None, 1)
+    assert status.bytes == path.stat().st_size
     return path
 
 

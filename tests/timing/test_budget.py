@@ -19,23 +19,23 @@ from config.errors import DONE, WRONG_CALL
 from config.load import load_settings
 from runtime.cli.app import call
 from runtime.cycle.step import CycleRecord
-from runtime.simulation.budget_sweep import BudgetRow, drive, in_long_hall
+from runtime.simulation.budget_sweep import BudgetRow, drive, long_hall_settings
 from runtime.simulation.closed_loop import simulate
 from runtime.simulation.long_hall import A_SIDE, long_hall
 from runtime.timing.refinement_budget import ProcessorTime, Quanta, RefinementBudget
 
 ROOT = Path(__file__).parents[2]
 CYCLES = 3000
-SETTINGS = in_long_hall(load_settings("irregular"))
+SETTINGS = long_hall_settings(load_settings("irregular"))
 
 
-def asked(allowance: RefinementBudget, cycles: int) -> list[int]:
+def asked(refinement_budget: RefinementBudget, cycles: int) -> list[int]:
     """Return how many quanta each cycle gets where there is no end of work."""
     counts = []
     for _ in range(cycles):
-        allowance.begin()
+        refinement_budget.begin()
         done = 0
-        while allowance(done):
+        while refinement_budget(done):
             done += 1
         counts.append(done)
     return counts
@@ -48,10 +48,10 @@ def test_quanta_are_counted_by_the_cycle() -> None:
 
 
 def test_what_is_not_used_is_not_saved_up() -> None:
-    allowance = Quanta(2)
+    refinement_budget = Quanta(2)
     for _ in range(5):
-        allowance.begin()
-    assert asked(allowance, 1) == [2]
+        refinement_budget.begin()
+    assert asked(refinement_budget, 1) == [2]
 
 
 def test_processor_time_begins_anew_each_cycle() -> None:
@@ -94,9 +94,14 @@ def test_the_record_says_how_many_quanta_ran_and_why_no_more() -> None:
     settings = load_settings("hallway")
     assert settings.world is not None
     records: list[CycleRecord] = []
-    for allowance in (Quanta(50), Quanta(0.5)):
+    for refinement_budget in (Quanta(50), Quanta(0.5)):
         simulate(
-            settings, settings.world, 0, 15.0, lambda record, _truth: records.append(record), allowance=allowance
+            settings,
+            settings.world,
+            0,
+            15.0,
+            lambda record, _truth: records.append(record),
+            refinement_budget=refinement_budget,
         )
     quanta: dict[str, set[int]] = {}
     for record in records:

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from runtime.analysis.trace import BEARING, RANGE, ROBOT_T, SENSOR, T, Trace, X, Y
+from runtime.analysis.timeline import BEARING, RANGE, ROBOT_T, SENSOR, T, Timeline, X, Y
 
 Table: TypeAlias = Mapping[str, Sequence[Any]]
 """Columns by name, all of one length; None stands for what is not known."""
@@ -18,19 +18,19 @@ Table: TypeAlias = Mapping[str, Sequence[Any]]
 FRAME_NOTE = "metres, radians, seconds after the first cycle; coordinates in the frame of the odometry"
 
 
-def tables(trace: Trace) -> dict[str, Table]:
+def tables(timeline: Timeline) -> dict[str, Table]:
     """Return the tables of a run by name."""
     return {
-        "echoes": _echoes(trace),
-        "segments": _segments(trace),
-        "objects": _objects(trace),
-        "odometry": _odometry(trace),
+        "echoes": _echoes(timeline),
+        "segments": _segments(timeline),
+        "objects": _objects(timeline),
+        "odometry": _odometry(timeline),
     }
 
 
-def _echoes(trace: Trace) -> Table:
+def _echoes(timeline: Timeline) -> Table:
     """Return one row for each sensor that fired; `heard` says whether anything came back."""
-    rows = trace.echoes
+    rows = timeline.echoes
     heard = np.isfinite(rows[:, RANGE])
     reach = np.where(heard, rows[:, RANGE], np.nan)
     return {
@@ -47,15 +47,15 @@ def _echoes(trace: Trace) -> Table:
     }
 
 
-def _segments(trace: Trace) -> Table:
+def _segments(timeline: Timeline) -> Table:
     """Return one row for each outline segment that was in the run's own map when anybody looked."""
     names = ("first_seen_s", "last_seen_s", "x1_m", "y1_m", "x2_m", "y2_m", "normal_rad")
-    return {name: trace.segments[:, i].tolist() for i, name in enumerate(names)}
+    return {name: timeline.segments[:, i].tolist() for i, name in enumerate(names)}
 
 
-def _objects(trace: Trace) -> Table:
-    """Return one row for each object at each moment."""
-    seen = [(m.t_s, o) for m in trace.moments for o in m.objects]
+def _objects(timeline: Timeline) -> Table:
+    """Return one row for each object at each snapshot."""
+    seen = [(m.t_s, o) for m in timeline.snapshots for o in m.objects]
     return {
         "t_s": [t for t, _ in seen],
         "model": [o.model for _, o in seen],
@@ -72,8 +72,8 @@ def _objects(trace: Trace) -> Table:
     }
 
 
-def _odometry(trace: Trace) -> Table:
-    way = trace.odometry
+def _odometry(timeline: Timeline) -> Table:
+    way = timeline.odometry
     return {
         "t_s": [t for t, _ in way],
         "robot_t_s": [o.t_s for _, o in way],
@@ -91,7 +91,7 @@ def _known(values: list[float]) -> list[float | None]:
     return [None if math.isnan(value) else value for value in values]
 
 
-def write_csv(trace: Trace, folder: Path) -> list[Path]:
+def write_csv(timeline: Timeline, folder: Path) -> list[Path]:
     """Write a CSV file for each table; what is not known is an empty cell.
 
     Raises
@@ -100,7 +100,7 @@ def write_csv(trace: Trace, folder: Path) -> list[Path]:
         A file cannot be written.
     """
     paths = []
-    for name, table in tables(trace).items():
+    for name, table in tables(timeline).items():
         path = folder / f"{name}.csv"
         with path.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
@@ -110,7 +110,7 @@ def write_csv(trace: Trace, folder: Path) -> list[Path]:
     return paths
 
 
-def write_parquet(trace: Trace, folder: Path) -> list[Path]:
+def write_parquet(timeline: Timeline, folder: Path) -> list[Path]:
     """Write a Parquet file for each table; its metadata says units and frame.
 
     Raises
@@ -124,10 +124,10 @@ def write_parquet(trace: Trace, folder: Path) -> list[Path]:
     whole = pa.int64()
     kinds = {"model": pa.string(), "heard": pa.bool_(), "sensor": whole, "support": whole, "flags": whole}
     paths = []
-    for name, table in tables(trace).items():
+    for name, table in tables(timeline).items():
         schema = pa.schema(
             [(column, kinds.get(column, pa.float64())) for column in table],
-            metadata={"echolocate": FRAME_NOTE, "begun_unix_ns": str(trace.begun_ns)},
+            metadata={"echolocate": FRAME_NOTE, "begun_unix_ns": str(timeline.start_unix_ns)},
         )
         path = folder / f"{name}.parquet"
         pq.write_table(pa.table(dict(table), schema=schema), path, compression="zstd")

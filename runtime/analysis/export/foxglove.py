@@ -31,7 +31,7 @@ from runtime.analysis.export.shapes import (
     whole_ring,
 )
 from runtime.analysis.plots.geometry import outline, things
-from runtime.analysis.trace import BEARING, RANGE, MapMoment, Said, Trace, X, Y
+from runtime.analysis.timeline import BEARING, RANGE, LogEntry, RunSnapshot, Timeline, X, Y
 
 ARC_POINTS: Final = 9
 LINE_PX: Final = 2.0
@@ -41,7 +41,7 @@ T = TypeVar("T")
 Places = Iterable[Iterable[float]]
 
 
-def write_foxglove(trace: Trace, path: Path) -> list[Path]:
+def write_foxglove(timeline: Timeline, path: Path) -> list[Path]:
     """Write a run as an MCAP for Foxglove.
 
     Raises
@@ -54,7 +54,7 @@ def write_foxglove(trace: Trace, path: Path) -> list[Path]:
         disk = _Disk(file)
         try:
             with foxglove.open_mcap(disk, context=context):
-                _Teller(trace, context).tell()
+                _Teller(timeline, context).tell()
         except RuntimeError:
             if disk.refusal is None:
                 raise
@@ -92,10 +92,10 @@ class _Disk:
 class _Teller:
     """Writes a run into channels."""
 
-    def __init__(self, trace: Trace, context: foxglove.Context) -> None:
-        self._trace = trace
-        self._models = {model.name: model for model in trace.settings.models}
-        self._whole = trace.settings.perception.method == "bayes"
+    def __init__(self, timeline: Timeline, context: foxglove.Context) -> None:
+        self._timeline = timeline
+        self._models = {model.name: model for model in timeline.settings.models}
+        self._whole = timeline.settings.perception.method == "bayes"
         self._frames = ch.FrameTransformsChannel("/tf", context=context)
         self._pose = ch.PoseInFrameChannel("/pose", context=context)
         self._ring = ch.LaserScanChannel("/ring", context=context)
@@ -107,21 +107,21 @@ class _Teller:
 
     def tell(self) -> None:
         """Write everything, in order of time."""
-        trace = self._trace
-        poses = [(t, o.pose) for t, o in trace.odometry] or [(m.t_s, m.pose) for m in trace.moments]
+        timeline = self._timeline
+        poses = [(t, o.pose) for t, o in timeline.odometry] or [(m.t_s, m.pose) for m in timeline.snapshots]
         items: list[tuple[float, Callable[[int], None]]] = [(0.0, self._tell_truth)]
         items += [(t, partial(self._tell_pose, pose)) for t, pose in poses]
-        items += [(part.t_s, partial(self._tell_round, part)) for part in rounds(trace)]
-        items += [(moment.t_s, partial(self._tell_moment, moment)) for moment in trace.moments]
-        items += [(max(0.0, said.t_s), partial(self._tell_line, said)) for said in trace.log]
+        items += [(part.t_s, partial(self._tell_round, part)) for part in rounds(timeline)]
+        items += [(snapshot.t_s, partial(self._write_snapshot, snapshot)) for snapshot in timeline.snapshots]
+        items += [(max(0.0, said.t_s), partial(self._tell_line, said)) for said in timeline.log]
         for t_s, tell in sorted(items, key=lambda item: item[0]):
-            tell(trace.unix_ns(t_s))
+            tell(timeline.unix_ns(t_s))
 
     def _tell_truth(self, at: int) -> None:
-        self._frame("world", "odom", self._trace.start, at)
-        if self._trace.world is None:
+        self._frame("world", "odom", self._timeline.start, at)
+        if self._timeline.world is None:
             return
-        closed, lines = things(self._trace.world)
+        closed, lines = things(self._timeline.world)
         loops = [_line(points.tolist(), TRUTH, closed=True) for points in closed]
         walls = [_line(points.tolist(), TRUTH, closed=False) for points in lines]
         entity = fx.SceneEntity(timestamp=_stamp(at), frame_id="world", id="truth", lines=[*loops, *walls])
@@ -141,7 +141,7 @@ class _Teller:
 
     def _tell_round(self, part: Round, at: int) -> None:
         """Write a firing: one scan of an even ring, or of any other an arc for each sensor."""
-        ring = self._trace.settings.ring
+        ring = self._timeline.settings.ring
         radius, sensors = even_radius(ring), len(ring.mounts)
         if radius is not None:
             scan = fx.LaserScan(
@@ -158,15 +158,15 @@ class _Teller:
             )  # fmt: skip
             self._ring.log(scan, log_time=at)
 
-    def _tell_moment(self, moment: MapMoment, at: int) -> None:
-        ends = moment.segments.reshape(-1, 2).tolist()
+    def _write_snapshot(self, snapshot: RunSnapshot, at: int) -> None:
+        ends = snapshot.segments.reshape(-1, 2).tolist()
         many = fx.LinePrimitive(
             type=fx.LinePrimitiveLineType.LineList, thickness=LINE_PX, scale_invariant=True,
             points=[fx.Point3(x=x, y=y) for x, y in ends], color=_colour(SEGMENT),
         )  # fmt: skip
         _scene(self._segments, "segments", [many] if ends else [], [], at)
         boxes = []
-        for c in moment.clusters:
+        for c in snapshot.clusters:
             corners = [(c.left, c.bottom), (c.right, c.bottom), (c.right, c.top), (c.left, c.top)]
             boxes.append(_line(corners, CLUSTER, closed=True))
             for up in (CROSS_M, -CROSS_M):
@@ -174,7 +174,7 @@ class _Teller:
                 boxes.append(_line(stroke, CLUSTER, closed=False))
         _scene(self._clusters, "clusters", boxes, [], at)
         shapes, texts = [], []
-        for number, seen in enumerate(moment.objects, 1):
+        for number, seen in enumerate(snapshot.objects, 1):
             points, closed = outline(seen, self._models.get(seen.model), whole=self._whole)
             shapes.append(_line(points.tolist(), MODEL, closed=closed))
             text = fx.TextPrimitive(
@@ -184,7 +184,7 @@ class _Teller:
             texts.append(text)
         _scene(self._objects, "models", shapes, texts, at)
 
-    def _tell_line(self, said: Said, at: int) -> None:
+    def _tell_line(self, said: LogEntry, at: int) -> None:
         levels = {"debug": fx.LogLevel.Debug, "warning": fx.LogLevel.Warning, "error": fx.LogLevel.Error}
         level = levels.get(said.level, fx.LogLevel.Info)
         self._log.log(fx.Log(timestamp=_stamp(at), level=level, message=said.text, name="echolocate"), log_time=at)

@@ -35,7 +35,7 @@ def write_log(recording: Recording, path: Path) -> int:
 
 def _heard(recording: Recording) -> Iterator[tuple[tuple[Firing, ...], bool]]:
     """Yield the firings of each cycle, and whether the robot had restarted before them."""
-    for entry in recording.entries():
+    for entry in recording.messages():
         if entry.topic == CYCLE:
             heard = decode(Cycle, entry.data).record.inputs.heard
             yield heard.firings, heard.rebooted

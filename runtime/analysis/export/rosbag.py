@@ -19,7 +19,7 @@ from rosbags.typesys import Stores, get_typestore
 from drivers.messages import Odometry, Pose
 from runtime.analysis.export.shapes import CLUSTER, MODEL, SEGMENT, TRUTH, Colour, Round, rounds, turned
 from runtime.analysis.plots.geometry import outline, things
-from runtime.analysis.trace import RANGE, SENSOR, MapMoment, Trace
+from runtime.analysis.timeline import RANGE, SENSOR, RunSnapshot, Timeline
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Msg, Msgarg
@@ -33,7 +33,7 @@ DELETE_ALL: Final = 3
 Points = list[tuple[float, float]]
 
 
-def write_bag(trace: Trace, folder: Path) -> list[Path]:
+def write_bag(timeline: Timeline, folder: Path) -> list[Path]:
     """Write a run as a ROS 2 bag, a folder that must not exist yet; its storage is MCAP.
 
     Raises
@@ -42,32 +42,32 @@ def write_bag(trace: Trace, folder: Path) -> list[Path]:
         It cannot be written.
     """
     with Writer(folder, version=VERSION, storage_plugin=StoragePlugin.MCAP) as writer:
-        _Teller(trace, writer).tell()
+        _Teller(timeline, writer).tell()
     return [folder]
 
 
 class _Teller:
     """Writes a run into a bag."""
 
-    def __init__(self, trace: Trace, writer: Writer) -> None:
-        self._trace = trace
+    def __init__(self, timeline: Timeline, writer: Writer) -> None:
+        self._timeline = timeline
         self._writer = writer
         self._store = get_typestore(Stores.ROS2_JAZZY)
         self._connections: dict[str, Any] = {}
-        self._models = {model.name: model for model in trace.settings.models}
-        self._whole = trace.settings.perception.method == "bayes"
+        self._models = {model.name: model for model in timeline.settings.models}
+        self._whole = timeline.settings.perception.method == "bayes"
 
     def tell(self) -> None:
         """Write everything, in order of time."""
-        trace = self._trace
+        timeline = self._timeline
         items: list[tuple[float, Callable[[int], None]]] = [(0.0, self._tell_still)]
-        items += [(t, partial(self._tell_odometry, odometry)) for t, odometry in trace.odometry]
-        items += [(part.t_s, partial(self._tell_round, part)) for part in rounds(trace)]
-        items += [(moment.t_s, partial(self._tell_moment, moment)) for moment in trace.moments]
-        if not trace.odometry:
-            items += [(m.t_s, partial(self._tell_base, m.pose)) for m in trace.moments]
+        items += [(t, partial(self._tell_odometry, odometry)) for t, odometry in timeline.odometry]
+        items += [(part.t_s, partial(self._tell_round, part)) for part in rounds(timeline)]
+        items += [(snapshot.t_s, partial(self._write_snapshot, snapshot)) for snapshot in timeline.snapshots]
+        if not timeline.odometry:
+            items += [(m.t_s, partial(self._tell_base, m.pose)) for m in timeline.snapshots]
         for t_s, tell in sorted(items, key=lambda item: item[0]):
-            tell(trace.unix_ns(t_s))
+            tell(timeline.unix_ns(t_s))
 
     def _make(self, kind: str, **values: Msgarg) -> Msg:
         return self._store.types[kind](**values)
@@ -111,11 +111,11 @@ class _Teller:
 
     def _tell_still(self, at: int) -> None:
         """Write what never moves: the sensors on the ring, where the odometry began, what stood there."""
-        mounts = enumerate(self._trace.settings.ring.mounts)
+        mounts = enumerate(self._timeline.settings.ring.mounts)
         sensors = [("ring", f"sonar_{i:02d}", Pose(x, y, angle)) for i, (x, y, angle) in mounts]
-        self._frames("/tf_static", [("world", "odom", self._trace.start), *sensors], at)
-        if self._trace.world is not None:
-            closed, lines = things(self._trace.world)
+        self._frames("/tf_static", [("world", "odom", self._timeline.start), *sensors], at)
+        if self._timeline.world is not None:
+            closed, lines = things(self._timeline.world)
             rows = [*((_looped(points.tolist())) for points in closed), *(points.tolist() for points in lines)]
             markers = [self._marker("truth", i, STRIP, row, TRUTH, at, "world") for i, row in enumerate(rows)]
             self._markers("/truth", markers, at)
@@ -140,7 +140,7 @@ class _Teller:
         self._write("/odom", "nav_msgs/msg/Odometry", message, at)
 
     def _tell_round(self, part: Round, at: int) -> None:
-        ring = self._trace.settings.ring
+        ring = self._timeline.settings.ring
         self._frames("/tf", [("odom", "ring", Pose(part.x, part.y, part.yaw))], at)
         for row in part.rows:
             name = f"s{int(row[SENSOR]):02d}"
@@ -152,15 +152,15 @@ class _Teller:
             )  # fmt: skip
             self._write(f"/sonar/{name}", "sensor_msgs/msg/Range", message, at)
 
-    def _tell_moment(self, moment: MapMoment, at: int) -> None:
-        segments: Points = [(x, y) for x, y in moment.segments.reshape(-1, 2).tolist()]
+    def _write_snapshot(self, snapshot: RunSnapshot, at: int) -> None:
+        segments: Points = [(x, y) for x, y in snapshot.segments.reshape(-1, 2).tolist()]
         markers = [self._marker("all", 0, STRIP, [], TRUTH, at, action=DELETE_ALL)]
         if segments:
             markers.append(self._marker("segments", 0, LINES, segments, SEGMENT, at))
-        for number, c in enumerate(moment.clusters):
+        for number, c in enumerate(snapshot.clusters):
             corners = [(c.left, c.bottom), (c.right, c.bottom), (c.right, c.top), (c.left, c.top)]
             markers.append(self._marker("clusters", number, STRIP, _looped(corners), CLUSTER, at))
-        for number, seen in enumerate(moment.objects):
+        for number, seen in enumerate(snapshot.objects):
             points, closed = outline(seen, self._models.get(seen.model), whole=self._whole)
             row = _looped(points.tolist()) if closed else points.tolist()
             markers.append(self._marker(f"models/{seen.model}", number, STRIP, row, MODEL, at))

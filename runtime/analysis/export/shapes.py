@@ -11,7 +11,7 @@ import numpy as np
 
 from config.robot import RingConfig
 from drivers.messages import Floats
-from runtime.analysis.trace import BEARING, RANGE, ROBOT_T, SENSOR, T, Trace, X, Y
+from runtime.analysis.timeline import BEARING, RANGE, ROBOT_T, SENSOR, T, Timeline, X, Y
 
 HEIGHT_M = 0.9
 """Of what is drawn upright: a drum's."""
@@ -42,12 +42,12 @@ class Round:
     yaw: float
     """Where the ring was, and its direction."""
     rows: Floats
-    """Of `Trace.echoes`."""
+    """Of `Timeline.echoes`."""
 
 
-def rounds(trace: Trace) -> Iterator[Round]:
+def rounds(timeline: Timeline) -> Iterator[Round]:
     """Yield the firings of a run, each with where the ring was, worked out from its sensors' places."""
-    rows, mounts = trace.echoes, trace.settings.ring.mounts
+    rows, mounts = timeline.echoes, timeline.settings.ring.mounts
     if not len(rows):
         return
     cuts = np.flatnonzero((np.diff(rows[:, ROBOT_T]) != 0.0) | (np.diff(rows[:, T]) != 0.0)) + 1

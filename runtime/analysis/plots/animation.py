@@ -23,8 +23,8 @@ from PIL import Image
 from runtime.analysis.plots.layers import draw_arcs, draw_clusters, draw_objects, draw_segments, draw_things, draw_way
 from runtime.analysis.plots.paper_figures import Canvas, legend
 from runtime.analysis.plots.plot_style import MUTED
-from runtime.analysis.text_tables import Units
-from runtime.analysis.trace import RANGE, MapMoment, Trace
+from runtime.analysis.timeline import RANGE, RunSnapshot, Timeline
+from runtime.support.length_format import Units
 
 FRAMES_MAX: Final = 72
 SECONDS: Final = 8.0
@@ -41,28 +41,28 @@ ECHOES_SHOWN: Final = 48
 Pixels = NDArray[np.uint8]
 
 
-def frames(trace: Trace, units: Units) -> Iterator[Pixels]:
+def frames(timeline: Timeline, units: Units) -> Iterator[Pixels]:
     """Yield the frames, RGB of shape (height, width, 3), all of one size."""
-    moments = trace.moments[:: max(1, math.ceil(len(trace.moments) / FRAMES_MAX))]
-    if trace.last is not None and moments[-1] is not trace.last:
-        moments.append(trace.last)
-    canvas = Canvas(trace, units)
+    snapshots = timeline.snapshots[:: max(1, math.ceil(len(timeline.snapshots) / FRAMES_MAX))]
+    if timeline.last is not None and snapshots[-1] is not timeline.last:
+        snapshots.append(timeline.last)
+    canvas = Canvas(timeline, units)
     figure, axes = canvas.figure(ROOM_IN)
     painter: Any = FigureCanvasAgg(figure)  # whose methods have no types
     figure.set_dpi(DPI)
-    handles = draw_things(axes, trace, canvas.frame)
-    _title(axes, trace.last, trace)
+    handles = draw_things(axes, timeline, canvas.frame)
+    _title(axes, timeline.last, timeline)
     still = set(_drawn(axes))
-    if trace.last is not None:  # laid out for everything that will ever be in it
-        legend(figure, [*handles, *_draw(axes, trace, trace.last, canvas)])
+    if timeline.last is not None:  # laid out for everything that will ever be in it
+        legend(figure, [*handles, *_draw(axes, timeline, timeline.last, canvas)])
     painter.draw()
     figure.set_layout_engine("none")
-    for moment in moments:
+    for snapshot in snapshots:
         for artist in _drawn(axes):
             if artist not in still:
                 artist.remove()
-        _draw(axes, trace, moment, canvas)
-        _title(axes, moment, trace)
+        _draw(axes, timeline, snapshot, canvas)
+        _title(axes, snapshot, timeline)
         painter.draw()
         shown: Pixels = np.asarray(painter.buffer_rgba())[: -1 if figure.bbox.height % 2 else None, :, :3].copy()
         yield shown
@@ -72,31 +72,29 @@ def _drawn(axes: Axes) -> list[Artist]:
     return [*axes.lines, *axes.patches, *axes.collections, *axes.texts]
 
 
-def _title(axes: Axes, moment: MapMoment | None, trace: Trace) -> None:
-    if moment is not None:
-        axes.set_title(f"{moment.t_s:5.1f} s of {trace.seconds:.1f} s")
-        words = (
-            f"{len(moment.segments)} segments, {len(moment.clusters)} clusters, {len(moment.objects)} objects known"
-        )
+def _title(axes: Axes, snapshot: RunSnapshot | None, timeline: Timeline) -> None:
+    if snapshot is not None:
+        axes.set_title(f"{snapshot.t_s:5.1f} s of {timeline.seconds:.1f} s")
+        words = f"{len(snapshot.segments)} segments, {len(snapshot.clusters)} clusters, {len(snapshot.objects)} objects known"
         axes.set_title(words, loc="right", fontsize=8.5, fontweight="normal", color=MUTED)
 
 
-def _draw(axes: Axes, trace: Trace, moment: MapMoment, canvas: Canvas) -> list[Line2D]:
-    settings, frame = trace.settings, canvas.frame
-    newest = trace.echoes[max(0, moment.echoes - ECHOES_SHOWN) : moment.echoes]
+def _draw(axes: Axes, timeline: Timeline, snapshot: RunSnapshot, canvas: Canvas) -> list[Line2D]:
+    settings, frame = timeline.settings, canvas.frame
+    newest = timeline.echoes[max(0, snapshot.echoes - ECHOES_SHOWN) : snapshot.echoes]
     newest = newest[np.isfinite(newest[:, RANGE])]
-    poses = [m.pose for m in trace.moments if m.t_s <= moment.t_s]
+    poses = [m.pose for m in timeline.snapshots if m.t_s <= snapshot.t_s]
     return [
         *draw_arcs(axes, newest, math.radians(settings.ring.beam_half_angle_deg), frame),
-        *draw_segments(axes, moment.segments, frame, faint=True),
-        *draw_clusters(axes, moment.clusters, settings.perception.clusters.segments_min, frame),
-        *draw_objects(axes, moment.objects, trace, frame, "m", told=False),
+        *draw_segments(axes, snapshot.segments, frame, faint=True),
+        *draw_clusters(axes, snapshot.clusters, settings.perception.clusters.segments_min, frame),
+        *draw_objects(axes, snapshot.objects, timeline, frame, "m", told=False),
         *draw_way(axes, poses, frame, settings.body.radius_m),
     ]
 
 
 def save_moving(
-    trace: Trace, units: Units, folder: Path, name: str, on_frame: Callable[[], None] = lambda: None
+    timeline: Timeline, units: Units, folder: Path, name: str, on_frame: Callable[[], None] = lambda: None
 ) -> list[Path]:
     """Write the moving picture as a GIF, and as an MP4 where ffmpeg is there; return the files.
 
@@ -106,7 +104,7 @@ def save_moving(
         A file cannot be written.
     """
     shown = []
-    for frame in frames(trace, units):
+    for frame in frames(timeline, units):
         shown.append(frame)
         on_frame()
     if not shown:

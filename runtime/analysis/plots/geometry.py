@@ -12,7 +12,7 @@ from config.model import ModelConfig
 from config.world import WorldConfig
 from drivers.messages import Floats, Pose
 from perception.detected_object import DetectedObject
-from runtime.analysis.trace import BEARING, RANGE, Trace, X, Y
+from runtime.analysis.timeline import BEARING, RANGE, Timeline, X, Y
 
 CHI2_95: Final = 5.991
 """The 95 % quantile of χ² of two degrees of freedom."""
@@ -109,18 +109,18 @@ def ellipse(seen: DetectedObject) -> Floats | None:
     return around
 
 
-def window(trace: Trace, frame: Frame) -> tuple[float, float, float, float]:
+def window(timeline: Timeline, frame: Frame) -> tuple[float, float, float, float]:
     """Return left, right, bottom, top of what must be seen, in the picture's unit."""
     margin = MARGIN_M / frame.unit_m
-    reach = trace.settings.body.radius_m / frame.unit_m + 0.3 * margin
-    way = np.array([(m.pose.x, m.pose.y) for m in trace.moments] or [(0.0, 0.0)])
+    reach = timeline.settings.body.radius_m / frame.unit_m + 0.3 * margin
+    way = np.array([(m.pose.x, m.pose.y) for m in timeline.snapshots] or [(0.0, 0.0)])
     placed = frame.points(way)
     corners = [placed.min(axis=0) - reach, placed.max(axis=0) + reach]
-    if trace.world is not None:
-        closed, lines = things(trace.world)
+    if timeline.world is not None:
+        closed, lines = things(timeline.world)
         places = [frame.world(points) for points in (*closed, *lines)]
     else:
-        rows = np.empty((0, 4)) if trace.last is None else trace.last.segments
+        rows = np.empty((0, 4)) if timeline.last is None else timeline.last.segments
         places = [frame.points(rows.reshape(-1, 2))] if len(rows) else []
     for points in places:
         corners += [points.min(axis=0) - margin, points.max(axis=0) + margin]

@@ -21,19 +21,19 @@ from drivers.messages import Floats, Pose
 from perception.detected_object import DetectedObject
 from runtime.analysis.plots.geometry import Frame, arcs, ellipse, outline, rotated, things
 from runtime.analysis.plots.plot_style import CLUSTER, ECHO, INK, MODEL, MUTED, PAPER, ROBOT, SEGMENT, THING
-from runtime.analysis.text_tables import Units, length
-from runtime.analysis.trace import RANGE, Cluster, Marked, Trace
+from runtime.analysis.timeline import RANGE, BookmarkEntry, Cluster, Timeline
 from runtime.simulation.evaluation import nearest_pairs
+from runtime.support.length_format import Units, format_length
 
 ARCS_MAX: Final = 4000
 """Drawn in a picture; more are a grey mass, and megabytes."""
 
 
-def draw_things(axes: Axes, trace: Trace, frame: Frame) -> list[Line2D]:
+def draw_things(axes: Axes, timeline: Timeline, frame: Frame) -> list[Line2D]:
     """Draw what stood there, where it is known."""
-    if trace.world is None:
+    if timeline.world is None:
         return []
-    closed, lines = things(trace.world)
+    closed, lines = things(timeline.world)
     outlines = [frame.world(points) for points in closed]
     polygons = PolyCollection(outlines, facecolor=THING, edgecolor=MUTED, linewidth=1.0, alpha=0.55, zorder=1)
     polygons.set_gid("truth")
@@ -63,7 +63,7 @@ def draw_way(axes: Axes, poses: Sequence[Pose], frame: Frame, radius_m: float) -
     return [line]
 
 
-def draw_bookmarks(axes: Axes, bookmarks: Sequence[Marked], frame: Frame) -> list[Line2D]:
+def draw_bookmarks(axes: Axes, bookmarks: Sequence[BookmarkEntry], frame: Frame) -> list[Line2D]:
     """Draw where the robot was when each bookmark was put, under the bookmark's number."""
     style: Any = {"marker": "D", "markersize": 5, "linestyle": "", "color": PAPER, "markeredgecolor": INK}
     placed = [(number, mark.pose) for number, mark in enumerate(bookmarks, 1) if mark.pose is not None]
@@ -123,12 +123,18 @@ def draw_clusters(axes: Axes, clusters: Iterable[Cluster], least: int, frame: Fr
 
 
 def draw_objects(
-    axes: Axes, objects: Sequence[DetectedObject], trace: Trace, frame: Frame, units: Units, *, told: bool = True
+    axes: Axes,
+    objects: Sequence[DetectedObject],
+    timeline: Timeline,
+    frame: Frame,
+    units: Units,
+    *,
+    told: bool = True,
 ) -> list[Line2D]:
     """Draw the models where they were matched, with the error of each where the truth is known."""
-    models = {model.name: model for model in trace.settings.models}
-    whole = trace.settings.perception.method == "bayes"
-    known = stand_for(objects, trace) if told else {}
+    models = {model.name: model for model in timeline.settings.models}
+    whole = timeline.settings.perception.method == "bayes"
+    known = match_to_truth(objects, timeline) if told else {}
     for number, seen in enumerate(objects, 1):
         points, closed = outline(seen, models.get(seen.model), whole=whole)
         shape = Polygon(frame.points(points), closed=closed, facecolor="none", edgecolor=MODEL, linewidth=2.2,
@@ -147,7 +153,7 @@ def draw_objects(
             model = models.get(seen.model)
             reach = 0.1 if model is None else model.arc_radius_m or max(math.hypot(*v) for v in model.vertices_m)
             one = known.get(number - 1)
-            error = "" if one is None else f"\n{length(one.error_m, units, 3)} {units}"
+            error = "" if one is None else f"\n{format_length(one.error_m, units, 3)} {units}"
             _label(
                 axes,
                 f"{number if one is None else one.name}{error}",
@@ -177,12 +183,12 @@ class Thing(NamedTuple):
     error_m: float
 
 
-def stand_for(objects: Sequence[DetectedObject], trace: Trace) -> dict[int, Thing]:
+def match_to_truth(objects: Sequence[DetectedObject], timeline: Timeline) -> dict[int, Thing]:
     """Return what each object stands for, where that is something that stood there and the truth is known."""
-    if trace.world is None:
+    if timeline.world is None:
         return {}
-    placed = [trace.start.compose(Pose(o.x, o.y, o.theta)) for o in objects]
-    drums, boxes = trace.world.drum, trace.world.box
+    placed = [timeline.start.compose(Pose(o.x, o.y, o.theta)) for o in objects]
+    drums, boxes = timeline.world.drum, timeline.world.box
     truth = [(d.x_m, d.y_m) for d in drums] + [(b.x_m, b.y_m) for b in boxes]
     names = [f"drum {i}" for i in range(1, len(drums) + 1)] + [f"box {i}" for i in range(1, len(boxes) + 1)]
     pairs = nearest_pairs(truth, [(p.x, p.y) for p in placed])

@@ -25,8 +25,8 @@ from runtime.analysis.plots.layers import (
     heard,
 )
 from runtime.analysis.plots.plot_style import MUTED, WIDTH_IN
-from runtime.analysis.text_tables import Units
-from runtime.analysis.trace import RANGE, Trace
+from runtime.analysis.timeline import RANGE, Timeline
+from runtime.support.length_format import Units
 
 HEIGHT_MIN_IN, HEIGHT_MAX_IN = 3.0, 8.5
 ROOM_IN: Final = 1.2
@@ -37,17 +37,17 @@ ROOM_IN: Final = 1.2
 class Canvas:
     """Where a picture of a run goes: its plane and its unit."""
 
-    trace: Trace
+    timeline: Timeline
     units: Units
 
     @property
     def frame(self) -> Frame:
         """The plane."""
-        return Frame(self.trace.start, FOOT_M if self.units == "ft" else 1.0)
+        return Frame(self.timeline.start, FOOT_M if self.units == "ft" else 1.0)
 
     def figure(self, room_in: float = ROOM_IN) -> tuple[Figure, Axes]:
         """Return an empty picture, as high as the run's shape asks for, with some room around the plane."""
-        left, right, bottom, top = window(self.trace, self.frame)
+        left, right, bottom, top = window(self.timeline, self.frame)
         height = (WIDTH_IN - 0.7) * (top - bottom) / (right - left) + room_in
         figure = Figure(figsize=(WIDTH_IN, min(max(height, HEIGHT_MIN_IN), HEIGHT_MAX_IN)), layout="constrained")
         axes = figure.add_subplot()
@@ -56,31 +56,31 @@ class Canvas:
 
     def prepare(self, axes: Axes) -> None:
         """Give axes the run's window, equal scales, and labels."""
-        left, right, bottom, top = window(self.trace, self.frame)
+        left, right, bottom, top = window(self.timeline, self.frame)
         axes.set(xlim=(left, right), ylim=(bottom, top), xlabel=f"x ({self.units})", ylabel=f"y ({self.units})")
         axes.set_aspect("equal", adjustable="box")
 
 
-def paper_figures(trace: Trace) -> tuple[int, int, int, int] | None:
+def paper_figures(timeline: Timeline) -> tuple[int, int, int, int] | None:
     """Return the numbers of the paper's figures of the same run, None where it has none."""
     for name, first in (("hallway", 6), ("irregular", 10)):
-        if trace.world is not None and trace.world == load_world(name):
+        if timeline.world is not None and timeline.world == load_world(name):
             return (first, first + 1, first + 2, first + 3)
     return None
 
 
-def pictures(trace: Trace, units: Units) -> dict[str, Figure]:
+def pictures(timeline: Timeline, units: Units) -> dict[str, Figure]:
     """Return the four pictures of a run's end by name, in the paper's order."""
-    canvas, last = Canvas(trace, units), trace.last
+    canvas, last = Canvas(timeline, units), timeline.last
     if last is None:
         return {}
-    numbers = paper_figures(trace)
-    half = math.radians(trace.settings.ring.beam_half_angle_deg)
-    least = trace.settings.perception.clusters.segments_min
-    arcs_shown = heard(trace.echoes)
-    count, shown = int((trace.echoes[:, RANGE] < math.inf).sum()), len(arcs_shown)
+    numbers = paper_figures(timeline)
+    half = math.radians(timeline.settings.ring.beam_half_angle_deg)
+    least = timeline.settings.perception.clusters.segments_min
+    arcs_shown = heard(timeline.echoes)
+    count, shown = int((timeline.echoes[:, RANGE] < math.inf).sum()), len(arcs_shown)
     few = f", {shown:,} of them drawn" if shown < count else ""
-    method = "the Bayesian method" if trace.settings.perception.method == "bayes" else "relaxation"
+    method = "the Bayesian method" if timeline.settings.perception.method == "bayes" else "relaxation"
     frame = canvas.frame
 
     def raw(axes: Axes) -> list[Line2D]:
@@ -96,11 +96,11 @@ def pictures(trace: Trace, units: Units) -> dict[str, Figure]:
 
     def models(axes: Axes) -> list[Line2D]:
         return draw_segments(axes, last.segments, frame, faint=True) + draw_objects(
-            axes, last.objects, trace, frame, units
+            axes, last.objects, timeline, frame, units
         )
 
     told = {
-        "raw": ("Raw data", f"{count:,} echoes in {trace.seconds:.0f} s{few}", raw),
+        "raw": ("Raw data", f"{count:,} echoes in {timeline.seconds:.0f} s{few}", raw),
         "segments": ("Segments", f"{len(last.segments):,} outline segments in the map", segments),
         "clusters": ("Clusters", f"{len(last.clusters)} clusters of outline segments", clusters),
         "models": ("Matched models", f"{len(last.objects)} recognised, by {method}", models),
@@ -114,12 +114,12 @@ def pictures(trace: Trace, units: Units) -> dict[str, Figure]:
 
 def _picture(canvas: Canvas, title: str, line: str, draw: Callable[[Axes], list[Line2D]]) -> Figure:
     figure, axes = canvas.figure()
-    trace, frame = canvas.trace, canvas.frame
+    timeline, frame = canvas.timeline, canvas.frame
     handles = draw(axes)
-    handles += draw_things(axes, trace, frame)
-    poses = [m.pose for m in trace.moments]
-    handles += draw_way(axes, poses, frame, trace.settings.body.radius_m)
-    handles += draw_bookmarks(axes, trace.bookmarks, frame)
+    handles += draw_things(axes, timeline, frame)
+    poses = [m.pose for m in timeline.snapshots]
+    handles += draw_way(axes, poses, frame, timeline.settings.body.radius_m)
+    handles += draw_bookmarks(axes, timeline.bookmarks, frame)
     axes.set_title(title)
     axes.set_title(line, loc="right", fontsize=8.5, fontweight="normal", color=MUTED)
     legend(figure, handles)

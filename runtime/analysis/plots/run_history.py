@@ -7,27 +7,31 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from config.units import FOOT_M
-from runtime.analysis.plots.layers import stand_for
+from runtime.analysis.plots.layers import match_to_truth
 from runtime.analysis.plots.plot_style import ECHO, MODEL, MUTED, SEGMENT, WIDTH_IN
-from runtime.analysis.text_tables import Units
-from runtime.analysis.trace import Trace
+from runtime.analysis.timeline import Timeline
+from runtime.support.length_format import Units
 
 
-def course(trace: Trace, units: Units) -> Figure:
+def course(timeline: Timeline, units: Units) -> Figure:
     """Return the picture: objects known, their errors where the truth is known, and the time from cycle to cycle."""
-    with_errors = trace.world is not None
+    with_errors = timeline.world is not None
     figure = Figure(figsize=(WIDTH_IN, 4.6 if with_errors else 3.2), layout="constrained")
     panels = figure.subplots(3 if with_errors else 2, 1, sharex=True)
-    times = [m.t_s for m in trace.moments]
+    times = [m.t_s for m in timeline.snapshots]
     known = panels[0]
-    known.step(times, [len(m.objects) for m in trace.moments], where="post", color=MODEL, linewidth=1.8, gid="known")
+    known.step(
+        times, [len(m.objects) for m in timeline.snapshots], where="post", color=MODEL, linewidth=1.8, gid="known"
+    )
     known.set_ylabel("objects known")
     known.set_ylim(bottom=0.0)
     known.yaxis.set_major_locator(MaxNLocator(integer=True))
     known.set_title("Course of the run")
     if with_errors:
         unit = FOOT_M if units == "ft" else 1.0
-        errors = [[one.error_m / unit for one in stand_for(m.objects, trace).values()] for m in trace.moments]
+        errors = [
+            [one.error_m / unit for one in match_to_truth(m.objects, timeline).values()] for m in timeline.snapshots
+        ]
         at = [t for t, found in zip(times, errors, strict=True) if found]
         panels[1].plot(at, [max(found) for found in errors if found], color=SEGMENT, linewidth=1.5,
                        linestyle=(0, (3, 1.5)), label="worst", gid="worst")  # fmt: skip
@@ -38,12 +42,12 @@ def course(trace: Trace, units: Units) -> Figure:
         if at:
             panels[1].legend(loc="upper right", ncols=2)
     rhythm = panels[-1]
-    gaps = 1e3 * np.array(trace.gaps_s)
-    rhythm.plot(np.cumsum(trace.gaps_s), gaps, marker=".", markersize=3, linestyle="", color=ECHO, alpha=0.6,
+    gaps = 1e3 * np.array(timeline.gaps_s)
+    rhythm.plot(np.cumsum(timeline.gaps_s), gaps, marker=".", markersize=3, linestyle="", color=ECHO, alpha=0.6,
                 gid="gaps", rasterized=len(gaps) > 2000)  # fmt: skip
     rhythm.set(xlabel="t (s)", ylabel="between cycles (ms)")
     rhythm.set_ylim(bottom=0.0)
-    for number, mark in enumerate(trace.bookmarks, 1):
+    for number, mark in enumerate(timeline.bookmarks, 1):
         for panel in panels:
             panel.axvline(mark.t_s, color=MUTED, linewidth=0.9, linestyle=(0, (1, 1.5)), gid=f"bookmark-{number}")
         known.annotate(str(number), (mark.t_s, 1.0), xycoords=("data", "axes fraction"), xytext=(2.0, -9.0),

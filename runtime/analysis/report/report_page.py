@@ -14,16 +14,16 @@ from drivers.messages import Pose
 from perception.detected_object import DetectedObject
 from runtime import VERSION
 from runtime.analysis.plots.figure_files import styled, svg_of
-from runtime.analysis.plots.layers import stand_for
+from runtime.analysis.plots.layers import match_to_truth
 from runtime.analysis.plots.paper_figures import paper_figures, pictures
 from runtime.analysis.plots.run_history import course
 from runtime.analysis.report.html_parts import note, section, settings_list, table, tile
 from runtime.analysis.report.inline_svg import inlined
 from runtime.analysis.report.stylesheet import CSS
-from runtime.analysis.text_tables import Units, length, place
-from runtime.analysis.trace import RANGE, Trace
+from runtime.analysis.timeline import RANGE, Timeline
 from runtime.simulation.evaluation import DrumRow
-from runtime.simulation.open_loop import BoxRow, judge
+from runtime.simulation.open_loop import BoxRow, match_objects
+from runtime.support.length_format import Units, format_length, format_point
 
 LOG_SHOWN: Final = 40
 CAPTIONS: Final = MappingProxyType(
@@ -36,21 +36,21 @@ CAPTIONS: Final = MappingProxyType(
 )
 
 
-def page(trace: Trace, units: Units) -> str:
+def page(timeline: Timeline, units: Units) -> str:
     """Return the page as one text of HTML that refers to nothing outside itself."""
-    name = escape(trace.path.name)
+    name = escape(timeline.path.name)
     body = "".join(
         (
-            _head(trace, units),
-            section("Objects", _table_2(trace, units), _others(trace, units)),
-            section("Pictures", _pictures(trace, units)),
-            section("Bookmarks", *_bookmarks(trace, units)),
-            section("Timing", *_timing(trace)),
-            section("Line", *_line(trace)),
-            section("Modes and stop reasons", *_modes(trace)),
-            section("Log: warnings and errors", _log(trace)),
-            section("Made by", _made_by(trace)),
-            section("Settings", settings_list(trace.settings)),
+            _head(timeline, units),
+            section("Objects", _table_2(timeline, units), _others(timeline, units)),
+            section("Pictures", _pictures(timeline, units)),
+            section("Bookmarks", *_bookmarks(timeline, units)),
+            section("Timing", *_timing(timeline)),
+            section("Line", *_line(timeline)),
+            section("Modes and stop reasons", *_modes(timeline)),
+            section("Log: warnings and errors", _log(timeline)),
+            section("Made by", _made_by(timeline)),
+            section("Settings", settings_list(timeline.settings)),
         )
     )
     return (
@@ -61,44 +61,44 @@ def page(trace: Trace, units: Units) -> str:
     )
 
 
-def _judged(trace: Trace) -> tuple[list[DrumRow], list[BoxRow], int] | None:
-    if trace.world is None:
+def _judged(timeline: Timeline) -> tuple[list[DrumRow], list[BoxRow], int] | None:
+    if timeline.world is None:
         return None
-    placed = [trace.start.compose(Pose(o.x, o.y, o.theta)) for o in trace.objects]
+    placed = [timeline.start.compose(Pose(o.x, o.y, o.theta)) for o in timeline.objects]
     seen = [
         DetectedObject(o.model, p.x, p.y, p.theta, o.sigma, o.support, o.score)
-        for o, p in zip(trace.objects, placed, strict=True)
+        for o, p in zip(timeline.objects, placed, strict=True)
     ]
-    return judge(trace.world, seen, trace.settings.models)
+    return match_objects(timeline.world, seen, timeline.settings.models)
 
 
-def _head(trace: Trace, units: Units) -> str:
-    method = {"bayes": "Bayesian method", "paper": "paper's method"}[trace.settings.perception.method]
-    when = "" if trace.started is None else f"{trace.started}, "
+def _head(timeline: Timeline, units: Units) -> str:
+    method = {"bayes": "Bayesian method", "paper": "paper's method"}[timeline.settings.perception.method]
+    when = "" if timeline.started is None else f"{timeline.started}, "
     tiles = []
-    if (judged := _judged(trace)) is not None:
+    if (judged := _judged(timeline)) is not None:
         drums, boxes, false = judged
         rows = [*drums, *boxes]
         errors = [row["error"] for row in rows if row["error"] is not None]
         tiles.append(tile(f"{len(errors)} of {len(rows)}", f"things found, {false} false"))
         if errors:
-            tiles.append(tile(f"{length(sum(errors) / len(errors), units, 3)} {units}", "mean error"))
-            tiles.append(tile(f"{length(max(errors), units, 3)} {units}", "worst error"))
+            tiles.append(tile(f"{format_length(sum(errors) / len(errors), units, 3)} {units}", "mean error"))
+            tiles.append(tile(f"{format_length(max(errors), units, 3)} {units}", "worst error"))
     else:
-        tiles.append(tile(str(len(trace.objects)), "objects recognised"))
-    back = int(np.isfinite(trace.echoes[:, RANGE]).sum())
-    tiles.append(tile(f"{back:,}", f"echoes of {len(trace.echoes):,} readings"))
-    tiles.append(tile(f"{trace.cycles:,}", "cycles" if trace.modes else "firings"))
-    tiles.append(tile(f"{trace.seconds:.1f} s", "long"))
-    about = escape(f"{when}{method}, version {trace.made_by.get('echolocate', VERSION)}")
-    notes = "".join(note(text, bad=True) for text in trace.notes)
-    title = escape(trace.path.stem)
+        tiles.append(tile(str(len(timeline.objects)), "objects recognised"))
+    back = int(np.isfinite(timeline.echoes[:, RANGE]).sum())
+    tiles.append(tile(f"{back:,}", f"echoes of {len(timeline.echoes):,} readings"))
+    tiles.append(tile(f"{timeline.cycles:,}", "cycles" if timeline.modes else "firings"))
+    tiles.append(tile(f"{timeline.seconds:.1f} s", "long"))
+    about = escape(f"{when}{method}, version {timeline.versions.get('echolocate', VERSION)}")
+    notes = "".join(note(text, bad=True) for text in timeline.notes)
+    title = escape(timeline.path.stem)
     return f'<h1>{title}</h1><p class="sub">{about}</p><div class="tiles">{"".join(tiles)}</div>{notes}'
 
 
-def _table_2(trace: Trace, units: Units) -> str:
+def _table_2(timeline: Timeline, units: Units) -> str:
     """Return the paper's Table 2 of this run, with errors."""
-    if (judged := _judged(trace)) is None:
+    if (judged := _judged(timeline)) is None:
         return note("What stood there is not known, so no error is told.")
     drums, boxes, false = judged
     heads = ["", f"truth ({units})", f"estimate ({units})", f"error ({units})"]
@@ -111,46 +111,46 @@ def _table_2(trace: Trace, units: Units) -> str:
         rows.append(
             [
                 f"{what} {number}",
-                place(*row["truth"], units),
-                "not found" if estimate is None else place(*estimate, units),
-                "" if error is None else length(error, units, 3),
+                format_point(*row["truth"], units),
+                "not found" if estimate is None else format_point(*estimate, units),
+                "" if error is None else format_length(error, units, 3),
             ]
         )
     told = note(f"As the paper's Table 2, in world coordinates. {false} recognised where nothing of the kind stands.")
-    numbers = paper_figures(trace)
+    numbers = paper_figures(timeline)
     if numbers is not None and numbers[0] == 6:
-        mean, worst = (length(FOOT_M * feet, units, 3) for feet in (0.249, 0.349))
+        mean, worst = (format_length(FOOT_M * feet, units, 3) for feet in (0.249, 0.349))
         told += note(f"The paper's own Table 2 has a mean error of {mean} {units} and a worst of {worst} {units}.")
     return table(heads, rows) + told
 
 
-def _others(trace: Trace, units: Units) -> str:
-    if not trace.objects:
+def _others(timeline: Timeline, units: Units) -> str:
+    if not timeline.objects:
         return note("Nothing was recognised.")
     heads = ["", f"x ({units})", f"y ({units})", "heading (°)", f"σ ({units})", "support", "score"]
-    known = stand_for(trace.objects, trace)
-    names = [known[j].name if j in known else str(j + 1) for j in range(len(trace.objects))]
+    known = match_to_truth(timeline.objects, timeline)
+    names = [known[j].name if j in known else str(j + 1) for j in range(len(timeline.objects))]
     rows = [
         [
             f"{name}, {o.model}",
-            length(o.x, units, 3),
-            length(o.y, units, 3),
+            format_length(o.x, units, 3),
+            format_length(o.y, units, 3),
             f"{math.degrees(o.theta):.0f}",
-            length(o.sigma, units, 4),
+            format_length(o.sigma, units, 4),
             str(o.support),
             f"{o.score:.3f}",
         ]
-        for name, o in zip(names, trace.objects, strict=True)
+        for name, o in zip(names, timeline.objects, strict=True)
     ]
     return note("What the run itself reports, in the odometry's frame, named as in the picture:") + table(heads, rows)
 
 
-def _pictures(trace: Trace, units: Units) -> str:
+def _pictures(timeline: Timeline, units: Units) -> str:
     with styled(text_as_text=True):
         drawn = {
-            **{name: (svg_of(figure), CAPTIONS[name]) for name, figure in pictures(trace, units).items()},
+            **{name: (svg_of(figure), CAPTIONS[name]) for name, figure in pictures(timeline, units).items()},
             "course": (
-                svg_of(course(trace, units)),
+                svg_of(course(timeline, units)),
                 "Objects known, their errors, and the cycles' rhythm.",
             ),
         }
@@ -161,18 +161,23 @@ def _pictures(trace: Trace, units: Units) -> str:
     return f'<div class="figures">{figures}</div>'
 
 
-def _bookmarks(trace: Trace, units: Units) -> list[str]:
+def _bookmarks(timeline: Timeline, units: Units) -> list[str]:
     rows = []
-    for number, mark in enumerate(trace.bookmarks, 1):
-        there = None if mark.pose is None else trace.start.compose(mark.pose)
+    for number, mark in enumerate(timeline.bookmarks, 1):
+        there = None if mark.pose is None else timeline.start.compose(mark.pose)
         rows.append(
-            [str(number), f"{mark.t_s:.2f} s", "" if there is None else place(there.x, there.y, units), mark.text]
+            [
+                str(number),
+                f"{mark.t_s:.2f} s",
+                "" if there is None else format_point(there.x, there.y, units),
+                mark.text,
+            ]
         )
     return [table(["", "after", f"robot at ({units})", "what"], rows, text=True)] if rows else []
 
 
-def _timing(trace: Trace) -> list[str]:
-    summary = trace.summary or {}
+def _timing(timeline: Timeline) -> list[str]:
+    summary = timeline.summary or {}
     rows: list[tuple[str, list[float]]] = []
     parts = []
     timing: dict[str, Any] = summary.get("timing", {})
@@ -190,16 +195,16 @@ def _timing(trace: Trace) -> list[str]:
         parts.append(table(heads, [[name, *("" if math.isnan(v) else f"{v:.2f}" for v in vs)] for name, vs in rows]))
     else:
         parts.append(note("The run's own books are not in the file: it was cut off, or this is a ring log."))
-    if trace.gaps_s:
-        q = 1e3 * np.quantile(trace.gaps_s, [0.0, 0.5, 0.99, 1.0])
-        what = "cycle to cycle" if trace.modes else "firing to firing"
+    if timeline.gaps_s:
+        q = 1e3 * np.quantile(timeline.gaps_s, [0.0, 0.5, 0.99, 1.0])
+        what = "cycle to cycle" if timeline.modes else "firing to firing"
         parts.append(note(f"From {what}, ms: least {q[0]:.1f}, median {q[1]:.1f}, p99 {q[2]:.1f}, most {q[3]:.1f}."))
     if "late" in summary:
         by = ", ".join(f"{culprit} ({count})" for culprit, count in timing.get("faults", {}).items())
         whose = f"; by fault of {by}" if by else ""
         parts.append(note(f"{summary['late']} cycles late, {summary.get('missed', 0)} missed{whose}."))
-    if trace.stops:
-        causes = ", ".join(f"{cause} {count}" for cause, count in sorted(trace.stops.items()))
+    if timeline.stops:
+        causes = ", ".join(f"{cause} {count}" for cause, count in sorted(timeline.stops.items()))
         parts.append(note(f"Refinement ended by: {causes}."))
     return parts
 
@@ -208,9 +213,9 @@ def _spread(spread: dict[str, float]) -> list[float]:
     return [1e-3 * spread.get(key, math.nan) for key in ("p50", "p99", "p999", "max")]
 
 
-def _line(trace: Trace) -> list[str]:
-    link = (trace.summary or {}).get("link")
-    counts = trace.counts
+def _line(timeline: Timeline) -> list[str]:
+    link = (timeline.summary or {}).get("link")
+    counts = timeline.counts
     rows = []
     if link is not None:
         rows.append(["as the run counted", *(f"{link[key]:,}" for key in ("frames", "bad", "lost"))])
@@ -219,23 +224,23 @@ def _line(trace: Trace) -> list[str]:
     return [table(["", "frames", "bad", "lost"], rows)] if rows else []
 
 
-def _modes(trace: Trace) -> list[str]:
-    reasons = [str(reason) for reason in (trace.summary or {}).get("stop_reasons", [])]
+def _modes(timeline: Timeline) -> list[str]:
+    reasons = [str(reason) for reason in (timeline.summary or {}).get("stop_reasons", [])]
     if not reasons:
-        reasons = [m.reason for m in trace.modes if m.mode in {"SAFE_STOP", "FAULT"} and m.reason]
-    if not trace.modes:
+        reasons = [m.reason for m in timeline.modes if m.mode in {"SAFE_STOP", "FAULT"} and m.reason]
+    if not timeline.modes:
         return []
-    rows = [[f"{m.t_s:.2f} s", m.mode, m.reason or ""] for m in trace.modes]
+    rows = [[f"{m.t_s:.2f} s", m.mode, m.reason or ""] for m in timeline.modes]
     told = note("Never stopped for a reason.") if not reasons else "".join(note(r, bad=True) for r in reasons)
     return [told, table(["after", "mode", "why"], rows, text=True)]
 
 
-def _log(trace: Trace) -> str:
-    said = [line for line in trace.log if line.level not in {"info", "debug"}]
+def _log(timeline: Timeline) -> str:
+    said = [line for line in timeline.log if line.level not in {"info", "debug"}]
     rows = [[f"{line.t_s:.2f} s", line.level, line.text] for line in said[:LOG_SHOWN]]
     more = note(f"and {len(said) - LOG_SHOWN} more") if len(said) > LOG_SHOWN else ""
     return table(["after", "level", "what"], rows, text=True) + more if rows else ""
 
 
-def _made_by(trace: Trace) -> str:
-    return table(["", ""], [[k, v] for k, v in trace.made_by.items()], text=True) if trace.made_by else ""
+def _made_by(timeline: Timeline) -> str:
+    return table(["", ""], [[k, v] for k, v in timeline.versions.items()], text=True) if timeline.versions else ""

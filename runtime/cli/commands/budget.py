@@ -15,7 +15,7 @@ from config.load import load_settings
 from runtime.support.kernel_cache import ready_kernels
 
 if TYPE_CHECKING:
-    from runtime.analysis.text_tables import Units
+    from runtime.support.length_format import Units
     from runtime.timing.refinement_budget import RefinementBudget
 
 
@@ -37,12 +37,12 @@ def run_budgets(
     settings = load_settings("irregular", sets, models=models)
     console = Console(stderr=True)
     ready_kernels(settings, console)
-    from runtime.analysis.text_tables import budget_table
+    from runtime.cli.tables import budget_table
     from runtime.cycle.summary import write_json
-    from runtime.simulation.budget_sweep import drive, in_long_hall
+    from runtime.simulation.budget_sweep import drive, long_hall_settings
     from runtime.timing.refinement_budget import ProcessorTime, Quanta
 
-    settings = in_long_hall(settings)
+    settings = long_hall_settings(settings)
     makers: list[tuple[float, Callable[[], RefinementBudget]]] = (
         [(most, partial(Quanta, most)) for most in quanta]
         or [(most, partial(ProcessorTime, 1e-3 * most)) for most in budgets_ms]

@@ -12,11 +12,12 @@ from rich.progress import track
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings
 from config.settings import Settings
-from runtime.analysis.text_tables import Units, boxes_table, scene_verdict, spread_verdict, table_2, verdict
 from runtime.cli.commands.firing_check import refuse_impossible_firing
 from runtime.cli.commands.offline_io import folder, read
+from runtime.cli.tables import boxes_table, outcome_line, scene_line, spread_line, table_2
 from runtime.simulation.scene_names import SceneName
 from runtime.support.kernel_cache import ready_kernels
+from runtime.support.length_format import Units
 
 if TYPE_CHECKING:
     from runtime.simulation.evaluation import SeedOutcome
@@ -64,9 +65,9 @@ def run_experiment(
         write_json(json_file, outcome)
     if seeds <= SEEDS_SHOWN:
         told.print(table_2(outcome, units))
-    told.print(verdict(outcome, units))
+    told.print(outcome_line(outcome, units))
     if "spread" in outcome:
-        told.print(spread_verdict(outcome["spread"], units))
+        told.print(spread_line(outcome["spread"], units))
     if place is not None:
         for path in shown(place, name, console, units):
             told.print(str(path))
@@ -84,11 +85,11 @@ def recorded(settings: Settings, seed: int, path: Path) -> SeedOutcome:
     from drivers.messages import Pose
     from runtime.cycle.step import CycleRecord, State
     from runtime.recording.recorder import Recorder
-    from runtime.recording.storage import OneFile
+    from runtime.recording.storage import SingleFile
     from runtime.simulation.evaluation import run_seed
 
     now = [0.0]
-    with Recorder(settings, OneFile(path), clock=lambda: now[0], queue_max=QUEUE_MAX, emulated=True) as recorder:
+    with Recorder(settings, SingleFile(path), clock=lambda: now[0], queue_max=QUEUE_MAX, emulated=True) as recorder:
 
         def on_state(record: CycleRecord, state: State, _start: Pose) -> None:
             now[0] = record.inputs.run_s
@@ -98,22 +99,22 @@ def recorded(settings: Settings, seed: int, path: Path) -> SeedOutcome:
             raise UserError("there is no world to drive through", WRONG_CALL)
         outcome = run_seed(settings, settings.world, seed, on_state, recorder.on_bytes)
         recorder.on_summary(outcome.end)
-    if recorder.standing.trouble is not None or recorder.standing.dropped:
-        why = recorder.standing.trouble or "the disk was too slow"
+    if recorder.status.last_error is not None or recorder.status.dropped:
+        why = recorder.status.last_error or "the disk was too slow"
         raise UserError(f"--out: the recording is not whole: {why}; make room or choose another place", FAILED)
     return outcome
 
 
 def shown(place: Path, name: str, console: Console, units: Units) -> list[Path]:
     """Draw the recorded run and write its page; return all files."""
-    from runtime.analysis.trace_sources import Asked
+    from runtime.analysis.timeline_sources import TimelineSource
     from runtime.cli.commands.figures import draw_all
     from runtime.cli.commands.report import report
 
-    trace = read(Asked(str(place / f"{name}.mcap")), console)
+    timeline = read(TimelineSource(str(place / f"{name}.mcap")), console)
     page = place / f"{name}.html"
-    report(trace, page, console, units=units)
-    return [trace.path, page, *draw_all(trace, place, console, moving=True, units=units)]
+    report(timeline, page, console, units=units)
+    return [timeline.path, page, *draw_all(timeline, place, console, moving=True, units=units)]
 
 
 def run_scenes(
@@ -145,7 +146,7 @@ def run_scenes(
             out.print(table_2(outcome, units))
         if outcome["boxes"]:
             out.print(boxes_table(outcome, units))
-    out.print(scene_verdict(outcome, units), soft_wrap=True)
+    out.print(scene_line(outcome, units), soft_wrap=True)
     return DONE
 
 

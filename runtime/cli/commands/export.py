@@ -12,8 +12,8 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from runtime.cli.commands.offline_io import folder, need, progress, read, writing
 
 if TYPE_CHECKING:
-    from runtime.analysis.trace import Trace
-    from runtime.analysis.trace_sources import Asked
+    from runtime.analysis.timeline import Timeline
+    from runtime.analysis.timeline_sources import TimelineSource
 
 Form: TypeAlias = Literal["csv", "parquet", "foxglove", "rosbag2", "ringlog"]
 
@@ -24,50 +24,50 @@ NEEDED: Final = MappingProxyType(
 EXTRA: Final = "export"
 
 
-def export_run(asked: Asked, form: Form, out: str) -> int:
+def export_run(source: TimelineSource, form: Form, out: str) -> int:
     """Carry out the command; see `runtime.cli.app.export`."""
     if form in NEEDED:
         need(*NEEDED[form], EXTRA)
     target = Path(out)
-    if target.absolute() == Path(asked.file).absolute():
+    if target.absolute() == Path(source.file).absolute():
         raise UserError(f"--out {out}: is the file itself; choose another name", WRONG_CALL)
     console, told = Console(stderr=True, soft_wrap=True, highlight=False), Console(soft_wrap=True, highlight=False)
     if form == "ringlog":
-        told.print(f"{target}: {ring_log(asked, target)} firings")
+        told.print(f"{target}: {ring_log(source, target)} firings")
         return DONE
     if form in {"csv", "parquet"}:
         target = folder(out)
     elif form == "rosbag2" and target.exists():
         raise UserError(f"--out {out}: is there already; a bag is a new folder", FAILED)
-    trace = read(asked, console)
+    timeline = read(source, console)
     with progress(console, "writing"), writing("--out", target):
-        for path in write(trace, form, target):
+        for path in write(timeline, form, target):
             told.print(str(path))
-    for note in trace.notes:
+    for note in timeline.notes:
         console.print(note)
     return DONE
 
 
-def write(trace: Trace, form: Form, target: Path) -> list[Path]:
-    """Write a run in the form asked for; each form's package is imported only here."""
+def write(timeline: Timeline, form: Form, target: Path) -> list[Path]:
+    """Write a run in the form source for; each form's package is imported only here."""
     if form == "csv":
         from runtime.analysis.export.csv_tables import write_csv
 
-        return write_csv(trace, target)
+        return write_csv(timeline, target)
     if form == "parquet":
         from runtime.analysis.export.csv_tables import write_parquet
 
-        return write_parquet(trace, target)
+        return write_parquet(timeline, target)
     if form == "foxglove":
         from runtime.analysis.export.foxglove import write_foxglove
 
-        return write_foxglove(trace, target)
+        return write_foxglove(timeline, target)
     from runtime.analysis.export.rosbag import write_bag
 
-    return write_bag(trace, target)
+    return write_bag(timeline, target)
 
 
-def ring_log(asked: Asked, target: Path) -> int:
+def ring_log(source: TimelineSource, target: Path) -> int:
     """Write the firings of a recording as a ring log and return how many.
 
     Raises
@@ -79,7 +79,7 @@ def ring_log(asked: Asked, target: Path) -> int:
     from runtime.recording.reader import RecordingError, is_recording, open_recording
     from runtime.recording.ring_log import RingLogError
 
-    path = Path(asked.file)
+    path = Path(source.file)
     try:
         with open_recording(path) as recording:
             return write_log(recording, target)

@@ -8,28 +8,28 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from config.errors import DONE
-from runtime.analysis.text_tables import Units
 from runtime.cli.commands.offline_io import folder, progress, read, writing
+from runtime.support.length_format import Units
 
 if TYPE_CHECKING:
-    from runtime.analysis.trace import Trace
-    from runtime.analysis.trace_sources import Asked
+    from runtime.analysis.timeline import Timeline
+    from runtime.analysis.timeline_sources import TimelineSource
 
 
-def draw_figures(asked: Asked, out: str, *, moving: bool, units: Units) -> int:
+def draw_figures(source: TimelineSource, out: str, *, moving: bool, units: Units) -> int:
     """Carry out the command; see `runtime.cli.app.figures`."""
     console = Console(stderr=True, soft_wrap=True, highlight=False)
     place = folder(out)
-    trace = read(asked, console)
+    timeline = read(source, console)
     told = Console(soft_wrap=True, highlight=False)
-    for path in draw_all(trace, place, console, moving=moving, units=units):
+    for path in draw_all(timeline, place, console, moving=moving, units=units):
         told.print(str(path))
-    for note in trace.notes:
+    for note in timeline.notes:
         console.print(note)
     return DONE
 
 
-def draw_all(trace: Trace, place: Path, console: Console, *, moving: bool, units: Units) -> list[Path]:
+def draw_all(timeline: Timeline, place: Path, console: Console, *, moving: bool, units: Units) -> list[Path]:
     """Write every picture of a run into a folder and return the files.
 
     Raises
@@ -43,9 +43,9 @@ def draw_all(trace: Trace, place: Path, console: Console, *, moving: bool, units
 
     with progress(console, "drawing") as step, writing("--out", place), styled():
         paths = []
-        for name, figure in pictures(trace, units).items():
+        for name, figure in pictures(timeline, units).items():
             paths += save(figure, place, name)
             step()
         if moving:
-            paths += save_moving(trace, units, place, "overview", step)
+            paths += save_moving(timeline, units, place, "overview", step)
     return paths

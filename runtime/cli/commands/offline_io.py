@@ -14,8 +14,8 @@ from config.errors import FAILED, WRONG_CALL, UserError
 from runtime.support.kernel_cache import ready_kernels
 
 if TYPE_CHECKING:
-    from runtime.analysis.trace import Trace
-    from runtime.analysis.trace_sources import Asked
+    from runtime.analysis.timeline import Timeline
+    from runtime.analysis.timeline_sources import TimelineSource
 
 
 @contextlib.contextmanager
@@ -26,21 +26,21 @@ def progress(console: Console, what: str) -> Iterator[Callable[[], None]]:
         yield lambda: bar.update(task, advance=1)
 
 
-def read(asked: Asked, console: Console) -> Trace:
-    """Return the trace of a file.
+def read(source: TimelineSource, console: Console) -> Timeline:
+    """Return the timeline of a file.
 
     Raises
     ------
     UserError
         It cannot be read, or holds nothing to show.
     """
-    from runtime.analysis.trace_sources import trace_of
+    from runtime.analysis.timeline_sources import load_timeline
 
     with progress(console, "reading") as step:
-        trace = trace_of(asked, lambda settings: ready_kernels(settings, console), step)
-    if trace.last is None:
-        raise UserError(f"{asked.file}: holds no echo and no odometry: nothing to show", FAILED)
-    return trace
+        timeline = load_timeline(source, lambda settings: ready_kernels(settings, console), step)
+    if timeline.last is None:
+        raise UserError(f"{source.file}: holds no echo and no odometry: nothing to show", FAILED)
+    return timeline
 
 
 @contextlib.contextmanager

@@ -15,19 +15,20 @@ from rich.progress import Progress
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings, override_settings
-from runtime.analysis.text_tables import Units, length, objects_table
+from runtime.cli.tables import objects_table
 from runtime.cycle.summary import ReplaySummary, object_row, write_json
 from runtime.support.kernel_cache import ready_kernels
+from runtime.support.length_format import Units, format_length
 
 if TYPE_CHECKING:
     from config.settings import Settings
     from runtime.analysis.comparison import RunOutcome
     from runtime.cycle.step import CycleRecord, State
-    from runtime.recording.channels import Entry
+    from runtime.recording.channels import RawMessage
     from runtime.recording.reader import Recording
     from runtime.recording.replayer import ReplayResult
 
-    OnEntry = Callable[[Entry], None]
+    OnEntry = Callable[[RawMessage], None]
     OnCycle = Callable[[CycleRecord, State], None]
 
 
@@ -105,67 +106,69 @@ def rerun(
     recording: Recording, console: Console, *, span: Span, verify: bool, json_file: str | None, units: Units
 ) -> int:
     """Replay and tell what came out."""
-    from runtime.recording.recorder import made_by
-    from runtime.recording.replayer import replay
+    from runtime.recording.recorder import software_versions
+    from runtime.recording.replayer import verify_recording
 
     ready_kernels(recording.settings, console)
-    now, then = made_by(), recording.about.made_by
+    now, then = software_versions(), recording.info.versions
     others = [f"{name} {then.get(name)} → {now[name]}" for name in now if then.get(name) != now[name]]
     if others:
         console.print(f"made by another program or machine: {', '.join(others)}; results may differ from there on")
     until_s = math.inf if span.until_s is None else span.until_s
     with contextlib.ExitStack() as stack:
-        on_cycle, on_entry = None, stack.enter_context(progress(console, shown=span.speed is None))
+        on_cycle, on_message = None, stack.enter_context(progress(console, shown=span.speed is None))
         if span.speed is not None:
-            on_cycle, on_entry = stack.enter_context(watching(recording, span, units))
-        verdict = replay(recording, since_s=span.since_s, until_s=until_s, on_cycle=on_cycle, on_entry=on_entry)
-    if verdict.cycles == 0:
-        if verdict.skipped or span != Span(0.0, None, span.speed):
+            on_cycle, on_message = stack.enter_context(watching(recording, span, units))
+        result = verify_recording(
+            recording, since_s=span.since_s, until_s=until_s, on_cycle=on_cycle, on_message=on_message
+        )
+    if result.cycles == 0:
+        if result.skipped or span != Span(0.0, None, span.speed):
             raise UserError(f"{recording.path}: holds no cycle that can be replayed in this part of it", FAILED)
         console.print(f"{recording.path}: holds no cycle yet: the run ended before its first one; nothing differs")
         if json_file is not None:
-            write_json(json_file, summarise(recording, verdict))
+            write_json(json_file, summarise(recording, result))
         return DONE
-    summary = summarise(recording, verdict)
+    summary = summarise(recording, result)
     if json_file is not None:
         write_json(json_file, summary)
     out = Console(soft_wrap=True, highlight=False)
     out.print(objects_table(summary["objects"], units))
     for damage in recording.damage:
         console.print(f"at byte {damage.at}: {damage.what}")
-    for first, last in verdict.missing:
+    for first, last in result.missing:
         console.print(f"cycles {first} to {last} are not in the recording; taken up again at the next keyframe")
-    causes = ", ".join(f"{cause} {count}" for cause, count in sorted(verdict.refinement.items()))
+    causes = ", ".join(f"{cause} {count}" for cause, count in sorted(result.refinement_stops.items()))
     out.print(
-        f"{verdict.cycles} cycles from cycle {verdict.first_cycle} on, {verdict.different} differences, "
-        f"{verdict.keyframes} keyframes compared; refinement ended by: {causes}; "
-        f"{verdict.times_real_time:.0f} times real time"
+        f"{result.cycles} cycles from cycle {result.first_cycle} on, {result.differences} differences, "
+        f"{result.keyframes} keyframes compared; refinement ended by: {causes}; "
+        f"{result.times_real_time:.0f} times real time"
     )
-    if verdict.first is not None:
+    if result.first_difference is not None:
         if verify:
-            raise UserError(f"{recording.path}: the replay differs, first in {verdict.first}", FAILED)
-        console.print(f"the replay differs, first in {verdict.first}")
+            raise UserError(f"{recording.path}: the replay differs, first in {result.first_difference}", FAILED)
+        console.print(f"the replay differs, first in {result.first_difference}")
     return DONE
 
 
-def summarise(recording: Recording, verdict: ReplayResult) -> ReplaySummary:
+def summarise(recording: Recording, result: ReplayResult) -> ReplaySummary:
     """Return the summary of a replay."""
-    perception = verdict.state.perception if verdict.state is not None else None
+    perception = result.state.perception if result.state is not None else None
     return {
         "objects": [] if perception is None else [object_row(seen) for seen in perception.objects()],
         "segments": 0 if perception is None else perception.counts.segments_total,
         "clusters": 0 if perception is None else perception.counts.hypotheses,
-        "cycles": verdict.cycles,
-        "cycle_us": verdict.books.cycle_us(),
+        "cycles": result.cycles,
+        "cycle_us": result.cycle_stats.cycle_us(),
         "verify": {
-            "differences": verdict.different,
-            "first": None if verdict.first is None else str(verdict.first),
-            "first_cycle": verdict.first_cycle,
-            "keyframes": verdict.keyframes,
-            "skipped": verdict.skipped,
-            "missing": verdict.missing,
-            "refinement": dict(verdict.refinement),
-            "times_real_time": round(verdict.times_real_time, 1),
+            "differences": result.differences,
+            "first": None if result.first_difference is None else str(result.first_difference),
+            "first_cycle": result.first_cycle,
+            "keyframes": result.keyframes,
+            "skipped": result.skipped,
+            "missing": result.missing,
+            "refinement": dict(result.refinement_stops),
+            "times_real_time": round(result.times_real_time, 1),
             "damage": [f"at byte {damage.at}: {damage.what}" for damage in recording.damage],
         },
     }
@@ -186,7 +189,7 @@ def watching(recording: Recording, span: Span, units: Units) -> Iterator[tuple[O
     driver.opened(0.0)
     begun: list[tuple[float, float]] = []
 
-    def on_entry(entry: Entry) -> None:
+    def on_message(entry: RawMessage) -> None:
         if entry.topic == SERIAL["in"]:
             for t_s, data in decode(SerialBytes, entry.data).pieces():
                 driver.receive(data, t_s)
@@ -206,7 +209,7 @@ def watching(recording: Recording, span: Span, units: Units) -> Iterator[tuple[O
     with contextlib.ExitStack() as stack:
         if view is not None:
             stack.enter_context(view.shown())
-        yield on_cycle, on_entry
+        yield on_cycle, on_message
 
 
 def tell_other(recording: Recording, settings: Settings, console: Console, units: Units) -> int:
@@ -214,8 +217,8 @@ def tell_other(recording: Recording, settings: Settings, console: Console, units
     from runtime.analysis.comparison import compare_runs
 
     ready_kernels(settings, console)
-    with progress(console) as on_entry:
-        told = compare_runs(recording, settings, on_entry)
+    with progress(console) as on_message:
+        told = compare_runs(recording, settings, on_message)
     out = Console(soft_wrap=True, highlight=False)
     for title, story in (("as it was", told.was), ("with the other settings", told.would_be)):
         out.print(title)
@@ -233,8 +236,8 @@ def errors_line(story: RunOutcome, units: Units) -> str:
     if story.errors_m is None:
         return f"{len(story.objects)} objects"
     found = [error for error in story.errors_m if error is not None]
-    mean = length(sum(found) / len(found), units, 4) if found else "none"
-    worst = length(max(found), units, 4) if found else "none"
+    mean = format_length(sum(found) / len(found), units, 4) if found else "none"
+    worst = format_length(max(found), units, 4) if found else "none"
     return (
         f"{len(found)} of {len(story.errors_m)} drums, {story.false} false; "
         f"mean error {mean} {units}, worst {worst} {units}"

@@ -11,9 +11,10 @@ from rich.progress import Progress
 
 from config.errors import DONE
 from config.load import load_settings
-from runtime.analysis.text_tables import Units, objects_table
+from runtime.cli.tables import objects_table
 from runtime.cycle.summary import write_json
 from runtime.support.kernel_cache import ready_kernels
+from runtime.support.length_format import Units
 
 if TYPE_CHECKING:
     from drivers.messages import Firing
@@ -33,11 +34,11 @@ def replay_log(
     console = Console(stderr=True)
     ready_kernels(settings, console)
     from runtime.recording.ring_log import read_ring_log
-    from runtime.recording.ring_log_replay import replay
+    from runtime.recording.ring_log_replay import replay_firings
 
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         firings = read_ring_log(Path(log), sensors=len(settings.ring.mounts))
-        summary = replay(settings, watched(firings, progress))
+        summary = replay_firings(settings, watched(firings, progress))
     if json_file is not None:
         write_json(json_file, summary)
     out = Console()

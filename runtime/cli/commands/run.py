@@ -16,12 +16,13 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import ConfigError, load_settings
 from config.settings import Settings
 from runtime import VERSION
-from runtime.analysis.text_tables import Units, objects_table, timing_table, timing_verdict
 from runtime.cli.commands.firing_check import refuse_impossible_firing
 from runtime.cli.commands.run_recording import RunRecording, kept
+from runtime.cli.tables import objects_table, timing_line, timing_table
 from runtime.support.config_lint import lint
 from runtime.support.file_lock import file_lock
 from runtime.support.kernel_cache import ready_kernels
+from runtime.support.length_format import Units
 from runtime.support.logs import LogStatus, open_log
 from runtime.support.sd_notify import SdNotifier
 from runtime.timing.run_clock import PacedClock, RunClock
@@ -102,7 +103,7 @@ def run_robot(
             log.warning(text)
 
         async def whole() -> RunSummary:
-            from runtime.simulation.emulator_process import emulator
+            from runtime.simulation.emulator_process import start_emulator
             from runtime.timing.time_control import NoTimeControl
 
             async with contextlib.AsyncExitStack() as running:
@@ -110,7 +111,7 @@ def run_robot(
                 control: TimeControl = NoTimeControl()
                 if isinstance(clock, PacedClock):
                     words = emulation.arguments(config, sets)
-                    emulated, control = await running.enter_async_context(emulator(words, clock))
+                    emulated, control = await running.enter_async_context(start_emulator(words, clock))
                     chosen = on_port(settings, emulated)
                 return await watch(
                     chosen, log, console, clock=clock, control=control, live=live, units=units, keeping=keeping,
@@ -133,7 +134,7 @@ def run_robot(
     out = Console()
     out.print(objects_table(summary["objects"], units))
     out.print(timing_table(summary))
-    out.print(timing_verdict(summary))
+    out.print(timing_line(summary))
     if lines.lost:
         out.print(f"{lines.lost} lines of the log are missing: {lines.trouble}; make room or choose another log.file")
     if summary["mode"] == "FAULT":

@@ -68,10 +68,10 @@ class RunRecording:
         def on_cycle(record: CycleRecord, state: State, books: CycleStats, driver: RobotDriver) -> None:
             recorder.on_cycle(record, state)
             for part in parts:
-                standing = part.standing
-                if standing.trouble != self._told.get(part):
-                    self._told[part] = standing.trouble
-                    log.warning("the recording has trouble", reason=standing.trouble, dropped=standing.dropped)
+                standing = part.status
+                if standing.last_error != self._told.get(part):
+                    self._told[part] = standing.last_error
+                    log.warning("the recording has trouble", reason=standing.last_error, dropped=standing.dropped)
             if view is not None:
                 view(record, state, books, driver)
 
@@ -85,12 +85,12 @@ class RunRecording:
     @property
     def now(self) -> RecorderStatus | None:
         """The recording under way; None where there is none."""
-        standing = self._recorder.standing
-        return standing if standing.under_way and self._recorder.is_on else None
+        standing = self._recorder.status
+        return standing if standing.is_writing and self._recorder.is_enabled else None
 
     async def record(self, *, on: bool) -> str | None:
         """Begin another recording with the next cycle, or end the one under way; returns why not."""
-        self._recorder.switch(on=on)
+        self._recorder.set_enabled(on=on)
         return None
 
     async def bookmark(self, text: str) -> str | None:
@@ -109,15 +109,15 @@ class RunRecording:
     @property
     def standing(self) -> RecordingRow | None:
         """How ring log or recording stands, for the summary; None where there was none."""
-        standing = asdict(self._asked.standing)
-        if not standing["files"] and standing["trouble"] is None:
+        standing = asdict(self._asked.status)
+        if not standing["files"] and standing["last_error"] is None:
             return None
         return {
             "file": standing["file"],
             "files": standing["files"],
             "bytes": standing["bytes"],
             "dropped": standing["dropped"],
-            "trouble": standing["trouble"],
+            "trouble": standing["last_error"],
             "sync_max_s": round(standing["sync_max_s"], 4),
         }
 
@@ -129,13 +129,13 @@ class RunRecording:
         UserError
             The disk refused, or something was dropped.
         """
-        now = self._asked.standing
-        if self._asked_for and (now.trouble is not None or now.dropped):
+        now = self._asked.status
+        if self._asked_for and (now.last_error is not None or now.dropped):
             what, salvage = "recording", " (`echolocate recover` reads what is there)"
             if self._ring_log is not None:
                 what, salvage = "ring log", ""
             raise UserError(
-                f"--record: the {what} is not whole: {now.trouble or 'the disk was too slow'}; {now.dropped} "
+                f"--record: the {what} is not whole: {now.last_error or 'the disk was too slow'}; {now.dropped} "
                 f"messages are missing; make room or choose another disk{salvage}",
                 FAILED,
             )
@@ -167,16 +167,16 @@ def kept(
     """
     from runtime.recording.recorder import Recorder
     from runtime.recording.ring_log_writer import RingLogWriter
-    from runtime.recording.storage import OneFile, Place, Rotating, recordings_folder
+    from runtime.recording.storage import RecordingTarget, RotatingFolder, SingleFile, recordings_folder
 
     run = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{os.getpid()}"
-    place: Place = Rotating(recordings_folder(settings.recording), run, settings.recording)
+    place: RecordingTarget = RotatingFolder(recordings_folder(settings.recording), run, settings.recording)
     with contextlib.ExitStack() as stack:
         ring_log: RingLogWriter | None = None
         if record is not None and Path(record).suffix.lower() == RING_LOG:
             on, ring_log = False, stack.enter_context(RingLogWriter(Path(record)))
         elif record is not None:
-            on, place = True, OneFile(Path(record))
+            on, place = True, SingleFile(Path(record))
         else:
             on = settings.recording.enabled and not no_record
         recorder = stack.enter_context(Recorder(settings, place, clock, emulated=emulated, on=on))

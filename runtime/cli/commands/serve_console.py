@@ -7,13 +7,13 @@ from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Final
 
 from config.settings import Settings
-from runtime.analysis.text_tables import Units
 from runtime.console.commands.async_commands import AsyncCommands
 from runtime.console.console import Console
 from runtime.console.frames.frame_encoder import RecordingStatus
 from runtime.console.playback.replay_client import ReplayClient
 from runtime.cycle.reloader import Ready
 from runtime.recording.storage import recordings_folder
+from runtime.support.length_format import Units
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger

@@ -30,12 +30,13 @@ from config.settings import Settings
 from drivers.driver import RobotDriver
 from drivers.messages import Floats, LinkCounts, Pose
 from perception.pipeline import DetectedObject
-from runtime.analysis.text_tables import Units, objects_table
+from runtime.cli.tables import objects_table
 from runtime.cli.terminal.plan import draw_plan
 from runtime.cycle.modes import ModeState, Request
 from runtime.cycle.step import CycleRecord, State
 from runtime.cycle.summary import object_row
 from runtime.support.health import Worker
+from runtime.support.length_format import Units
 from runtime.timing.cycle_stats import CycleStats, Quantiles
 
 EVERY_CYCLES: Final = 5

@@ -9,8 +9,8 @@ from config.settings import Settings
 from config.world import StartConfig, WorldConfig
 from drivers.messages import Pose
 from runtime import VERSION
-from runtime.analysis.text_tables import Units
 from runtime.console.commands.parameters import parameters
+from runtime.support.length_format import Units
 
 
 def session_info(settings: Settings, *, name: str | None, emulated: bool, units: Units) -> dict[str, Any]:

@@ -17,13 +17,13 @@ from typing import Any, Final
 
 import orjson
 
-from runtime.analysis.text_tables import Units
 from runtime.console.commands.command_error import CommandError
 from runtime.console.frames.frame_encoder import EncodedFrame
 from runtime.console.playback.replay_worker import ANSWER, HEADER, SPEED_MAX, SPEED_MIN
 from runtime.console.protocols import Viewer
-from runtime.recording.storage import in_folder, listing
+from runtime.recording.storage import find_recording, list_recordings
 from runtime.support.child_process import COMMAND, end_child, start_child
+from runtime.support.length_format import Units
 
 WORKERS_MAX: Final = 3
 """Recordings open at a time: each is a process with the whole of perception in its memory."""
@@ -156,7 +156,7 @@ class ReplayClient:
 
     async def recordings(self) -> list[dict[str, Any]]:
         """Return which recordings there are, newest first; `live` is the one under way."""
-        found = await asyncio.to_thread(listing, self._folder)
+        found = await asyncio.to_thread(list_recordings, self._folder)
         current = self._current()
         here = [{**one._asdict(), "live": str(self._folder / one.file) == current} for one in found]
         if current is not None and not any(one["live"] for one in here):
@@ -172,7 +172,7 @@ class ReplayClient:
             There is none of that name, it cannot be played, or too many are open.
         """
         current = self._current()
-        path = Path(file) if file == current else await asyncio.to_thread(in_folder, self._folder, file)
+        path = Path(file) if file == current else await asyncio.to_thread(find_recording, self._folder, file)
         if path is None:
             raise ReplayError(f"there is no recording {file!r} in {self._folder}: ask for the list again")
         await self._close(viewer)

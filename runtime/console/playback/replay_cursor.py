@@ -17,12 +17,21 @@ from typing import Any, Final, NamedTuple
 from perception.snapshot import Snapshot
 from runtime.cycle.modes import ModeState
 from runtime.cycle.step import CycleRecord, State
-from runtime.recording.channels import ABOUT, BOOKMARK, CYCLE, KEYFRAME, MODE, SETTINGS, Entry, decode
+from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, MODE, RUN_INFO, SETTINGS, RawMessage, decode
 from runtime.recording.mcap_scanner import BEGIN
-from runtime.recording.reader import SECOND_NS, Recording, RecordingError
+from runtime.recording.reader import NS_PER_S, Recording, RecordingError
 from runtime.recording.replayer import Replayer
-from runtime.recording.schema import About, Bookmark, Cycle, Keyframe, Left, ModeChange, SettingsChange, left_by
-from runtime.recording.schema import snapshot_in as memory_in
+from runtime.recording.schema import (
+    Bookmark,
+    Cycle,
+    Keyframe,
+    ModeChange,
+    RunInfo,
+    SettingsChange,
+    StateFields,
+    carried_state,
+)
+from runtime.recording.schema import perception_snapshot as memory_in
 
 NUMBER: Final = re.compile(rb'\{"record":\{"cycle":(\d{1,15}),')
 LOOK_BACK: Final = 20
@@ -46,7 +55,7 @@ class _Place:
 
     chunk_at: int
     told: dict[str, Any]
-    left: Left
+    left: StateFields
     memory: Snapshot
 
 
@@ -105,7 +114,7 @@ class ReplayCursor:
         self._kept_bytes = 0
         self._replayed: list[Shown] = []
         self._rerun = Replayer(recording, self._take, begun=True)
-        self._entries: Iterator[tuple[int, Entry]] = iter(())
+        self._entries: Iterator[tuple[int, RawMessage]] = iter(())
         self._next = self.jumps = 0
         self._begin_at(0)
 
@@ -156,27 +165,27 @@ class ReplayCursor:
     def _survey(self) -> None:
         """Note what is where."""
         index, recording = self._index, self._recording
-        told, raw = recording.about.settings, b""
+        told, raw = recording.info.settings, b""
         first_ns: int | None = None
         for chunk_at, entries in recording.chunks():
             for entry in entries:
                 if entry.topic == CYCLE:
                     first_ns = entry.log_ns if first_ns is None else first_ns
                     index.numbers.append(_number(entry))
-                    index.times_s.append((entry.log_ns - first_ns) / SECOND_NS)
+                    index.times_s.append((entry.log_ns - first_ns) / NS_PER_S)
                     index.chunks_at.append(chunk_at)
                 elif entry.topic == KEYFRAME:
                     index.keyframes.append((len(index.numbers), chunk_at, told))
                 elif entry.topic == SETTINGS:
                     told = decode(SettingsChange, entry.data).settings
-                elif entry.topic == ABOUT and entry.data != raw:
+                elif entry.topic == RUN_INFO and entry.data != raw:
                     raw = entry.data
-                    told = decode(About, raw).settings
+                    told = decode(RunInfo, raw).settings
                 elif entry.topic == BOOKMARK:
-                    s = 0.0 if first_ns is None else max(0.0, (entry.log_ns - first_ns) / SECOND_NS)
+                    s = 0.0 if first_ns is None else max(0.0, (entry.log_ns - first_ns) / NS_PER_S)
                     self.bookmarks.append((s, decode(Bookmark, entry.data).text))
                 elif entry.topic == MODE and first_ns is not None:
-                    at_s = (entry.log_ns - first_ns) / SECOND_NS
+                    at_s = (entry.log_ns - first_ns) / NS_PER_S
                     self.modes.append((at_s, decode(ModeChange, entry.data).mode))
 
     def _nearest(self, position: int) -> int:
@@ -204,12 +213,12 @@ class ReplayCursor:
             self._rerun = Replayer(self._recording, self._take, begun=True)
             self._entries = self._since(BEGIN)
 
-    def _since(self, begin_at: int) -> Iterator[tuple[int, Entry]]:
+    def _since(self, begin_at: int) -> Iterator[tuple[int, RawMessage]]:
         for chunk_at, entries in self._recording.chunks(begin_at):
             for entry in entries:
                 yield chunk_at, entry
 
-    def _after(self, chunk_at: int, number: int) -> Iterator[tuple[int, Entry]]:
+    def _after(self, chunk_at: int, number: int) -> Iterator[tuple[int, RawMessage]]:
         """Yield what comes after a cycle."""
         rest = self._since(chunk_at)
         for _, entry in rest:
@@ -217,7 +226,7 @@ class ReplayCursor:
                 break
         yield from rest
 
-    def _from_keyframe(self, begin_at: int, told: dict[str, Any]) -> Iterator[tuple[int, Entry]]:
+    def _from_keyframe(self, begin_at: int, told: dict[str, Any]) -> Iterator[tuple[int, RawMessage]]:
         """Put the keyframe's state in force and yield what comes after it."""
         rest = self._since(begin_at)
         skipped = self._next - bisect_left(self._index.chunks_at, begin_at)
@@ -238,7 +247,7 @@ class ReplayCursor:
         if self._next % KEPT_EVERY or self._next in self._kept or self._rerun.state is None:
             return
         state = self._rerun.state
-        place = _Place(chunk_at, self._rerun.told, left_by(state), state.perception.snapshot())
+        place = _Place(chunk_at, self._rerun.told, carried_state(state), state.perception.snapshot())
         self._kept[self._next] = place
         self._kept_bytes += _size(place)
         while self._kept_bytes > KEPT_BYTES and len(self._kept) > 1:
@@ -249,7 +258,7 @@ def _size(place: _Place) -> int:
     return sum(array.nbytes for array in place.memory.values())
 
 
-def _number(entry: Entry) -> int:
+def _number(entry: RawMessage) -> int:
     """Return a cycle's number, which its record begins with: to read all of it takes long."""
     found = NUMBER.match(entry.data)
     return decode(Cycle, entry.data).record.cycle if found is None else int(found[1])

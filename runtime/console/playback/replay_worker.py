@@ -21,7 +21,7 @@ import orjson
 from config.settings import Settings
 from runtime.console.playback.replay_cursor import ReplayCursor, Shown
 from runtime.cycle.step import CycleRecord
-from runtime.recording.reader import RecordingError, open_recording, settings_in
+from runtime.recording.reader import RecordingError, open_recording, parse_settings
 from runtime.support.child_process import lower_priority
 
 FRAME_S: Final = 0.05
@@ -226,13 +226,13 @@ def play(file: str, make: Make) -> int:
     try:
         with open_recording(Path(file)) as recording:
             playback = ReplayCursor(recording)
-            emulated = recording.about.emulated
+            emulated = recording.info.emulated
 
             def build(told: dict[str, Any]) -> Builder:
-                return make(settings_in(told), emulated=emulated)
+                return make(parse_settings(told), emulated=emulated)
 
-            about = build(recording.about.settings).about()
-            _answer(about_recording(playback, {"about": about, "started": recording.about.started}))
+            about = build(recording.info.settings).about()
+            _answer(about_recording(playback, {"about": about, "started": recording.info.started}))
             player = ReplayWorker(playback, build, _show, time.monotonic)
             player.do({"do": "scrub", "s": 0.0})
             _serve(player)

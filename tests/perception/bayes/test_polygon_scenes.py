@@ -15,7 +15,7 @@ from perception.bayes.object_report import polygon_covariance
 from perception.bayes.state import PX, PY
 from perception.kernel import Floats
 from perception.pipeline import Perception
-from runtime.simulation.open_loop import HallOutcome, angle_error, judge, perceive, run_scene
+from runtime.simulation.open_loop import HallOutcome, angle_error, match_objects, perceive, run_scene
 from runtime.simulation.scenes import PLACES_FT, Hall, readings
 
 pytestmark = pytest.mark.compiled
@@ -42,7 +42,7 @@ def squares(perception: Perception, world: WorldConfig) -> Iterator[tuple[float,
     """Squared errors of the boxes found, in units of the covariance: of the place, and of the whole pose."""
     assert isinstance(perception.method, BayesPerception)
     tracks = perception.method.memory.pf
-    rows = judge(world, perception.objects(), SETTINGS.models)[1]
+    rows = match_objects(world, perception.objects(), SETTINGS.models)[1]
     for box, row in zip(world.box, rows, strict=True):
         estimate = row["estimate"]
         if estimate is None:
@@ -75,7 +75,7 @@ def test_boxes_that_stand_anyhow_are_found_and_the_covariance_is_honest() -> Non
                 perceive(perception, firing)
             told += list(squares(perception, hall.world))
             wanted += len(hall.world.box)
-            false += judge(hall.world, perception.objects(), SETTINGS.models)[2]
+            false += match_objects(hall.world, perception.objects(), SETTINGS.models)[2]
     assert len(told) >= 0.93 * wanted
     assert false <= 2
     slack = 3.0 * math.sqrt(0.95 * 0.05 / len(told))

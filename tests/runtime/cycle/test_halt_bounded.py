@@ -63,7 +63,7 @@ def test_a_thousand_halts_at_any_moment(monkeypatch: pytest.MonkeyPatch, measure
             asked_s = loop.time() + after_s
             loop.call_later(after_s, lambda: ask(asked_s, unplug=unplug))
 
-        def judge() -> None:
+        def match_objects() -> None:
             asked_s, unplugged = pending[0]
             halted_s = sent.first(Halt, asked_s)
             if halted_s is not None:
@@ -77,7 +77,7 @@ def test_a_thousand_halts_at_any_moment(monkeypatch: pytest.MonkeyPatch, measure
         def on_cycle(record: CycleRecord, _state: State, _books: CycleStats, _driver: RobotDriver) -> None:
             mode = record.mode
             if pending and mode.mode is Mode.SAFE_STOP and links[0].is_open:
-                judge()
+                match_objects()
             if len(waits_s) == TRIALS:
                 process.stop()
             elif not pending and mode.mode is Mode.DRIVE:

@@ -15,11 +15,11 @@ from mcap.stream_reader import StreamReader
 
 from config.errors import DONE
 from runtime.cli.app import call
-from runtime.recording.channels import CYCLE, Entry, decode
+from runtime.recording.channels import CYCLE, RawMessage, decode
 from runtime.recording.mcap_scanner import McapScanner
 from runtime.recording.reader import open_recording
 from runtime.recording.recovery import recover
-from runtime.recording.replayer import replay
+from runtime.recording.replayer import verify_recording
 from runtime.recording.schema import Cycle
 from tests.recorded import entries_of, hall, record, rewrite
 
@@ -47,7 +47,7 @@ def small(small_file: Path) -> bytes:
     return small_file.read_bytes()
 
 
-def salvaged(data: bytes) -> tuple[list[list[Entry]], McapScanner]:
+def salvaged(data: bytes) -> tuple[list[list[RawMessage]], McapScanner]:
     salvage = McapScanner(memoryview(data))
     return list(salvage.chunks()), salvage
 
@@ -125,12 +125,12 @@ def test_a_lost_chunk_is_got_over_at_the_next_keyframe(run: Path, tmp_path: Path
     path = tmp_path / "x.mcap"
     path.write_bytes(data)
     with open_recording(path) as recording:
-        verdict = replay(recording)
+        result = verify_recording(recording)
         assert [damage.at for damage in recording.damage] == [begin]
-    assert verdict.first is None, str(verdict.first)
-    assert verdict.missing == [(61, 70)]
-    assert 10 <= verdict.skipped <= 20
-    assert verdict.cycles + verdict.skipped == 190
+    assert result.first_difference is None, str(result.first_difference)
+    assert result.missing == [(61, 70)]
+    assert 10 <= result.skipped <= 20
+    assert result.cycles + result.skipped == 190
 
 
 def test_recovered_it_is_whole_again(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -168,7 +168,7 @@ def test_without_its_first_chunk_a_recording_is_still_known(run: Path, tmp_path:
     cycles = [decode(Cycle, e.data).record.cycle for e in entries_of(tmp_path / "y.mcap") if e.topic == CYCLE]
     assert cycles == list(range(11, 201))
     with open_recording(tmp_path / "y.mcap") as recording:
-        verdict = replay(recording)
-    assert verdict.first is None
-    assert verdict.missing == [(1, 10)]
-    assert verdict.cycles >= 150
+        result = verify_recording(recording)
+    assert result.first_difference is None
+    assert result.missing == [(1, 10)]
+    assert result.cycles >= 150

@@ -12,8 +12,8 @@ from mcap.writer import Writer
 
 from config.errors import DONE, FAILED, WRONG_CALL
 from runtime.cli.app import call
-from runtime.recording.channels import ABOUT, CYCLE, Entry, decode, encode
-from runtime.recording.schema import FORMAT, About
+from runtime.recording.channels import CYCLE, RUN_INFO, RawMessage, decode, encode
+from runtime.recording.schema import FORMAT, RunInfo
 from tests.recorded import entries_of, rewrite
 
 FORMS = ("csv", "parquet", "foxglove", "rosbag2", "ringlog")
@@ -42,8 +42,8 @@ def newer(hall_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recording as a later version of this program would write it, with a topic that this one does not know."""
     path = tmp_path_factory.mktemp("newer") / "newer.mcap"
     first, *rest = entries_of(hall_run)
-    about = decode(About, first.data).model_copy(update={"format": FORMAT + 1})
-    rewrite([Entry(ABOUT, first.log_ns, encode(about)), *rest], path, f"echolocate/{FORMAT + 1}")
+    about = decode(RunInfo, first.data).model_copy(update={"format": FORMAT + 1})
+    rewrite([RawMessage(RUN_INFO, first.log_ns, encode(about)), *rest], path, f"echolocate/{FORMAT + 1}")
     return path
 
 
@@ -110,7 +110,7 @@ def test_a_newer_file_is_restored_as_it_is_or_refused_as_newer(
     assert (code, "newer program" in line) == (WRONG_CALL, True)
 
 
-def entries_of_any(path: Path) -> list[Entry]:
+def entries_of_any(path: Path) -> list[RawMessage]:
     from runtime.recording.mcap_scanner import McapScanner
 
     return [entry for chunk in McapScanner(memoryview(path.read_bytes())).chunks() for entry in chunk]

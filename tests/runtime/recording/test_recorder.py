@@ -14,13 +14,13 @@ import pytest
 from mcap.reader import NonSeekingReader, make_reader
 
 from runtime.recording.channels import (
-    ABOUT,
     BOOKMARK,
     CHANNELS,
     CYCLE,
     KEYFRAME,
     LOG,
     MODE,
+    RUN_INFO,
     SEGMENTS,
     SERIAL,
     SETTINGS,
@@ -31,9 +31,9 @@ from runtime.recording.channels import (
 from runtime.recording.reader import open_recording
 from runtime.recording.recorder import Recorder
 from runtime.recording.schema import Cycle, LogLine, MapChange, SerialBytes
-from runtime.recording.storage import OneFile, Rotating
+from runtime.recording.storage import RotatingFolder, SingleFile
 from runtime.simulation.closed_loop import simulate
-from tests.recorded import SECONDS, entries_of, hall, record, verdict_of
+from tests.recorded import SECONDS, entries_of, hall, record, verify_file
 
 
 def test_everything_that_happened_is_in_it(run: Path) -> None:
@@ -53,7 +53,7 @@ def test_everything_that_happened_is_in_it(run: Path) -> None:
     assert (line.level, line.event, line.fields) == ("info", "start", {"why": "None"})
     with open_recording(run) as recording:
         assert recording.settings == hall()
-        assert len(list(recording.entries())) == len(entries)
+        assert len(list(recording.messages())) == len(entries)
         assert recording.finished
 
 
@@ -69,7 +69,7 @@ def test_segments_go_in_as_changes_and_add_up(run: Path) -> None:
         held |= {change.first + i: row for i, row in enumerate(change.added)}
         at_keyframes += change.whole and len(before) > 0
     assert at_keyframes >= 4
-    state = verdict_of(run).state
+    state = verify_file(run).state
     assert state is not None
     assert len(held) == pytest.approx(len(state.perception.segment_geometry()), abs=3)
     changes = [len(change.added) for change in entries if not change.whole]
@@ -102,7 +102,7 @@ def test_the_stock_reader_reads_it_and_its_own_schemas_hold(run: Path) -> None:
 def test_what_does_not_fit_is_dropped_counted_and_got_over(tmp_path: Path) -> None:
     path = tmp_path / "x.mcap"
     settings = hall()
-    recorder = Recorder(settings, OneFile(path), clock=lambda: 0.0, queue_max=40)
+    recorder = Recorder(settings, SingleFile(path), clock=lambda: 0.0, queue_max=40)
     assert settings.world is not None
     # Nothing takes from the queue until half of the run is over: then a thread does, and the rest gets through.
     count = 0
@@ -118,14 +118,14 @@ def test_what_does_not_fit_is_dropped_counted_and_got_over(tmp_path: Path) -> No
 
     simulate(settings, settings.world, 0, 10.0, on_state=on_state)
     recorder.__exit__(None, None, None)
-    assert recorder.standing.dropped >= 50
-    verdict = verdict_of(path)
-    assert verdict.first is None, str(verdict.first)
-    ((first, last),) = verdict.missing
+    assert recorder.status.dropped >= 50
+    result = verify_file(path)
+    assert result.first_difference is None, str(result.first_difference)
+    ((first, last),) = result.missing
     assert first <= 41
     assert 95 <= last <= 125
-    assert verdict.cycles + verdict.skipped + (last - first + 1) == 200
-    assert verdict.skipped <= 2, "a keyframe follows at once"
+    assert result.cycles + result.skipped + (last - first + 1) == 200
+    assert result.skipped <= 2, "a keyframe follows at once"
 
 
 @pytest.mark.compiled
@@ -134,7 +134,7 @@ def test_the_loop_only_hands_over() -> None:
     settings = hall("recording.keyframe_period_s=3600.0")
     assert settings.world is not None
     handed, encoded = [], []
-    recorder = Recorder(settings, OneFile(Path("/nowhere/at/all")), clock=lambda: 0.0)
+    recorder = Recorder(settings, SingleFile(Path("/nowhere/at/all")), clock=lambda: 0.0)
 
     def on_state(cycle: Any, state: Any, _start: Any) -> None:
         began = time.perf_counter()
@@ -148,7 +148,7 @@ def test_the_loop_only_hands_over() -> None:
     assert statistics.median(handed) < statistics.median(encoded), (handed, encoded)
 
 
-class Full(OneFile):
+class Full(SingleFile):
     """A disk that is full, and stays so."""
 
     def path(self, part: int) -> Path:  # noqa: ARG002 - always this one
@@ -156,19 +156,19 @@ class Full(OneFile):
 
 
 def test_a_full_disk_is_told_and_nothing_waits_for_it() -> None:
-    standing = record(hall(), Full(Path()), 3.0)
-    assert standing.trouble is not None
-    assert "No space left" in standing.trouble
-    assert standing.dropped > 20
+    status = record(hall(), Full(Path()), 3.0)
+    assert status.last_error is not None
+    assert "No space left" in status.last_error
+    assert status.dropped > 20
 
 
 def test_a_folder_that_is_none_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     settings = hall()
-    standing = record(settings, Rotating(tmp_path / "file", "run", settings.recording), 1.0)
-    assert standing.trouble is not None
-    assert str(tmp_path / "file") in standing.trouble
-    assert standing.file is None
+    status = record(settings, RotatingFolder(tmp_path / "file", "run", settings.recording), 1.0)
+    assert status.last_error is not None
+    assert str(tmp_path / "file") in status.last_error
+    assert status.file is None
 
 
 def test_the_folder_keeps_its_cap_and_every_part_replays(tmp_path: Path) -> None:
@@ -178,41 +178,41 @@ def test_the_folder_keeps_its_cap_and_every_part_replays(tmp_path: Path) -> None
         path.write_bytes(b"x" * 1000)
         os.utime(path, (k, k))
     (tmp_path / "notes.txt").write_text("not a recording")
-    place = Rotating(tmp_path, "run", settings.recording)
+    place = RotatingFolder(tmp_path, "run", settings.recording)
 
-    class Unhurried(Rotating):
+    class Unhurried(RotatingFolder):
         """A run in virtual time is over before a part is full: end one after each twentieth of the cap."""
 
-        def is_bayes(self, part_bytes: int) -> bool:
+        def is_part_full(self, part_bytes: int) -> bool:
             return part_bytes > 50_000
 
-    standing = record(settings, Unhurried(place.folder, place.run, place.config), SECONDS)
-    assert standing.trouble is None
+    status = record(settings, Unhurried(place.folder, place.run, place.config), SECONDS)
+    assert status.last_error is None
     parts = sorted(tmp_path.glob("*.mcap"))
-    assert standing.files >= 3
+    assert status.files >= 3
     assert len(parts) <= 3
     assert not any(path.exists() for path in old)
     assert (tmp_path / "notes.txt").exists()
-    verdicts = [verdict_of(part) for part in parts]
-    for verdict in verdicts:
-        assert verdict.first is None, str(verdict.first)
-        assert verdict.skipped == 0
+    results = [verify_file(part) for part in parts]
+    for result in results:
+        assert result.first_difference is None, str(result.first_difference)
+        assert result.skipped == 0
     # How many cycles fit into a part depends on when the writer's clock ends a chunk; the last may be left with none.
-    assert sum(verdict.cycles > 0 for verdict in verdicts) >= len(verdicts) - 1
-    assert place.is_bayes(250_001)
-    assert not place.is_bayes(249_999)
+    assert sum(result.cycles > 0 for result in results) >= len(results) - 1
+    assert place.is_part_full(250_001)
+    assert not place.is_part_full(249_999)
 
 
 def test_a_recording_under_way_is_not_deleted(tmp_path: Path) -> None:
     settings = hall("recording.cap_mb=1.0")
     current = tmp_path / "run-001.mcap"
     current.write_bytes(b"x" * 2_000_000)
-    Rotating(tmp_path, "run", settings.recording).tidy(current)
+    RotatingFolder(tmp_path, "run", settings.recording).enforce_limits(current)
     assert current.exists()
 
 
 def test_about_comes_first_and_with_every_keyframe(run: Path) -> None:
     entries = entries_of(run)
-    assert entries[0].topic == ABOUT
+    assert entries[0].topic == RUN_INFO
     frames = [i for i, entry in enumerate(entries) if entry.topic == KEYFRAME]
-    assert all(entries[i - 1].topic == ABOUT for i in frames)
+    assert all(entries[i - 1].topic == RUN_INFO for i in frames)

@@ -28,11 +28,11 @@ from runtime.cli.app import call
 from runtime.cycle.drive_requests import Legs
 from runtime.cycle.modes import Mode, Request
 from runtime.cycle.step import CycleRecord, Edit, State
-from runtime.recording.channels import CYCLE, KEYFRAME, Entry, decode
+from runtime.recording.channels import CYCLE, KEYFRAME, RawMessage, decode
 from runtime.recording.reader import open_recording
-from runtime.recording.replayer import replay
+from runtime.recording.replayer import verify_recording
 from runtime.recording.schema import Cycle, Keyframe
-from runtime.simulation.closed_loop import Said
+from runtime.simulation.closed_loop import OperatorInput
 from tests.recorded import entries_of, hall, record, rewrite
 
 SECONDS = 26.0
@@ -45,14 +45,14 @@ class Hands:
     def __init__(self) -> None:
         self.done: list[str] = []
 
-    def __call__(self, cycle: int, state: State) -> Said:
+    def __call__(self, cycle: int, state: State) -> OperatorInput:
         request = Request.ARM if cycle in {5, 400} else {370: Request.DISARM, 450: Request.HALT}.get(cycle)
         drive_request: Any = {200: Goal(0.9, 0.2), 300: Legs(), 460: Goal(float("nan"), 0.0)}.get(cycle)
         if 250 <= cycle < 280 and cycle % 2 == 0:
             drive_request = Teleoperate(0.25, 0.1)
         edits = tuple(self.edits(cycle, state))
         self.done += [edit.kind for edit in edits]
-        return Said(request, drive_request, edits)
+        return OperatorInput(request, drive_request, edits)
 
     def edits(self, cycle: int, state: State) -> Iterator[Edit]:
         seen = state.perception
@@ -85,14 +85,14 @@ def edited(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     # From cycle 350 on it knows one thing more.
     more = before.model_copy(update={"models": (*before.models, box.model_copy(update={"name": "crate"}))})
     hands = Hands()
-    standing = record(before, path, SECONDS, operator=hands, reloads={350: more})
-    assert standing.dropped == 0
+    status = record(before, path, SECONDS, operator=hands, reloads={350: more})
+    assert status.dropped == 0
     kinds = "delete_segments pin_segments place_model move_object reject_object confirm_object clear_map"
     assert set(hands.done) == set(kinds.split()), "every kind of edit was tried"
     return path
 
 
-def records_of(entries: list[Entry]) -> list[CycleRecord]:
+def records_of(entries: list[RawMessage]) -> list[CycleRecord]:
     return [decode(Cycle, entry.data).record for entry in entries if entry.topic == CYCLE]
 
 
@@ -100,12 +100,12 @@ def records_of(entries: list[Entry]) -> list[CycleRecord]:
 @pytest.mark.parametrize("since_s", [0.0, 7.0, 9.0, 13.0, 17.0, 25.0])
 def test_replayed_to_the_bit_with_edits_and_wishes(edited: Path, since_s: float) -> None:
     with open_recording(edited) as recording:
-        verdict = replay(recording, since_s=since_s)
-    assert verdict.first is None, str(verdict.first)
-    assert verdict.different == 0
-    assert verdict.cycles >= 20 * (SECONDS - since_s)
-    assert verdict.keyframes >= (SECONDS - since_s) / 2.0 - 2
-    assert verdict.missing == []
+        result = verify_recording(recording, since_s=since_s)
+    assert result.first_difference is None, str(result.first_difference)
+    assert result.differences == 0
+    assert result.cycles >= 20 * (SECONDS - since_s)
+    assert result.keyframes >= (SECONDS - since_s) / 2.0 - 2
+    assert result.missing == []
 
 
 @pytest.mark.compiled
@@ -151,13 +151,13 @@ def test_without_one_edit_the_replay_goes_another_way(edited: Path, tmp_path: Pa
             entries[i] = entry._replace(data=orjson.dumps(told))
     rewrite(entries, tmp_path / "x.mcap")
     with open_recording(tmp_path / "x.mcap") as recording:
-        verdict = replay(recording)
-    assert verdict.first is not None
-    assert verdict.first.cycle >= 150
+        result = verify_recording(recording)
+    assert result.first_difference is not None
+    assert result.first_difference.cycle >= 150
 
 
 NEW = {
-    "inputs": ("drive_request", "edits"), "record": ("refused",), "left": ("drive_request", "requested_run_s", "vectors", "standing"),
+    "inputs": ("drive_request", "edits"), "record": ("refused",), "left": ("drive_request", "requested_run_s", "vectors", "status"),
 }  # fmt: skip
 ARRAYS = (
     ".memory.names", ".memory.tally", ".memory.stamps", ".memory.barred", "._pins.", ".outline.numbers",
@@ -166,7 +166,7 @@ ARRAYS = (
 )  # fmt: skip
 
 
-def of_an_older_program(entry: Entry) -> Entry:
+def of_an_older_program(entry: RawMessage) -> RawMessage:
     """Return a message without what this program has added to it."""
     told = orjson.loads(entry.data)
     if entry.topic == CYCLE:
@@ -175,10 +175,10 @@ def of_an_older_program(entry: Entry) -> Entry:
         for name in NEW["record"]:
             del told["record"][name]
     elif entry.topic == KEYFRAME:
-        from runtime.recording.schema import keyframe, snapshot_in
+        from runtime.recording.schema import keyframe, perception_snapshot
 
         frame = decode(Keyframe, entry.data)
-        memory = snapshot_in(frame)
+        memory = perception_snapshot(frame)
         older = {name: a for name, a in memory.items() if not any(part in f".{name}" for part in ARRAYS)}
         assert len(older) < len(memory)
         left = {name: getattr(frame.left, name) for name in type(frame.left).model_fields}
@@ -195,9 +195,9 @@ def test_recordings_of_older_programs_are_read(method: str, tmp_path: Path) -> N
     rewrite([of_an_older_program(entry) for entry in entries_of(tmp_path / "new.mcap")], tmp_path / "old.mcap")
     for since_s in (0.0, 7.0):
         with open_recording(tmp_path / "old.mcap") as recording:
-            verdict = replay(recording, since_s=since_s)
-        assert verdict.first is None, str(verdict.first)
-        assert verdict.keyframes >= 1
-        assert verdict.state is not None
-        assert verdict.state.perception.objects()
-        assert verdict.state.drive_request == Legs()
+            result = verify_recording(recording, since_s=since_s)
+        assert result.first_difference is None, str(result.first_difference)
+        assert result.keyframes >= 1
+        assert result.state is not None
+        assert result.state.perception.objects()
+        assert result.state.drive_request == Legs()

@@ -9,10 +9,10 @@ import pytest
 from config.errors import DONE, FAILED
 from runtime.analysis.comparison import compare_runs
 from runtime.cli.app import call
-from runtime.recording.channels import ABOUT, CYCLE, KEYFRAME, SETTINGS, decode
-from runtime.recording.reader import open_recording, settings_in
-from runtime.recording.replayer import replay
-from runtime.recording.schema import About, SettingsChange
+from runtime.recording.channels import CYCLE, KEYFRAME, RUN_INFO, SETTINGS, decode
+from runtime.recording.reader import open_recording, parse_settings
+from runtime.recording.replayer import verify_recording
+from runtime.recording.schema import RunInfo, SettingsChange
 from tests.recorded import entries_of, hall, record, rewrite
 
 AT = 150
@@ -32,8 +32,8 @@ def reloaded(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     path = tmp_path_factory.mktemp("reloaded") / "hall.mcap"
     before = hall(f"perception.method={request.param}")
     after = hall(f"perception.method={request.param}", *OTHERS[request.param], FASTER)
-    standing = record(before, path, 12.0, reloads={AT: after})
-    assert standing.dropped == 0
+    status = record(before, path, 12.0, reloads={AT: after})
+    assert status.dropped == 0
     return path
 
 
@@ -41,10 +41,10 @@ def reloaded(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
 @pytest.mark.parametrize("since_s", [0.0, 5.0, 7.0, 9.0])
 def test_replayed_to_the_bit_across_it(reloaded: Path, since_s: float) -> None:
     with open_recording(reloaded) as recording:
-        verdict = replay(recording, since_s=since_s)
-    assert verdict.first is None, str(verdict.first)
-    assert verdict.cycles >= 20 * (12.0 - since_s)
-    assert verdict.missing == []
+        result = verify_recording(recording, since_s=since_s)
+    assert result.first_difference is None, str(result.first_difference)
+    assert result.cycles >= 20 * (12.0 - since_s)
+    assert result.missing == []
 
 
 @pytest.mark.compiled
@@ -54,17 +54,17 @@ def test_it_is_in_the_record_and_in_force_from_its_cycle_on(reloaded: Path, tmp_
     assert change.cycle == AT
     where = [e.topic for e in entries].index(SETTINGS)
     assert sum(e.topic == CYCLE for e in entries[:where]) == AT - 1
-    told = [settings_in(decode(About, e.data).settings) for e in entries[where:] if e.topic == ABOUT]
+    told = [parse_settings(decode(RunInfo, e.data).settings) for e in entries[where:] if e.topic == RUN_INFO]
     assert told
-    assert all(t == settings_in(change.settings) for t in told), "a replay may begin at any keyframe"
+    assert all(t == parse_settings(change.settings) for t in told), "a replay may begin at any keyframe"
     # Without it the replay goes another way.
     first = entries[0]
-    deaf = [e._replace(data=first.data) if e.topic == ABOUT else e for e in entries if e.topic != SETTINGS]
+    deaf = [e._replace(data=first.data) if e.topic == RUN_INFO else e for e in entries if e.topic != SETTINGS]
     rewrite(deaf, tmp_path / "deaf.mcap")
     with open_recording(tmp_path / "deaf.mcap") as recording:
-        verdict = replay(recording)
-    assert verdict.first is not None
-    assert verdict.first.cycle >= AT
+        result = verify_recording(recording)
+    assert result.first_difference is not None
+    assert result.first_difference.cycle >= AT
 
 
 @pytest.mark.compiled

@@ -22,29 +22,29 @@ from runtime.recording.channels import (
 )
 from runtime.recording.reader import RecordingError, open_recording
 from runtime.recording.replayer import fresh_state
-from runtime.recording.schema import FORMAT, About, Cycle, Keyframe, snapshot_in
-from tests.recorded import SECONDS, entries_of, hall, record, rewrite, verdict_of
+from runtime.recording.schema import FORMAT, Cycle, Keyframe, RunInfo, perception_snapshot
+from tests.recorded import SECONDS, entries_of, hall, record, rewrite, verify_file
 
 ROOT = Path(__file__).parents[3]
 
 
 @pytest.mark.compiled
 def test_a_replay_is_the_run_to_the_bit(run: Path) -> None:
-    verdict = verdict_of(run)
-    assert verdict.first is None, str(verdict.first)
-    assert (verdict.cycles, verdict.different, verdict.first_cycle) == (20 * SECONDS, 0, 1)
-    assert set(verdict.refinement) >= {"budget", "converged", "nothing"}
-    assert verdict.keyframes >= SECONDS / 2.0 - 2
-    assert verdict.missing == []
-    assert verdict.state is not None
-    assert len(verdict.state.perception.objects()) >= 3
+    result = verify_file(run)
+    assert result.first_difference is None, str(result.first_difference)
+    assert (result.cycles, result.differences, result.first_cycle) == (20 * SECONDS, 0, 1)
+    assert set(result.refinement_stops) >= {"budget", "converged", "nothing"}
+    assert result.keyframes >= SECONDS / 2.0 - 2
+    assert result.missing == []
+    assert result.state is not None
+    assert len(result.state.perception.objects()) >= 3
 
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("since_s", [2.0, 4.5, 7.9, 11.0])
 def test_so_is_one_from_a_keyframe(run: Path, since_s: float) -> None:
-    whole, part = verdict_of(run), verdict_of(run, since_s=since_s)
-    assert part.first is None, str(part.first)
+    whole, part = verify_file(run), verify_file(run, since_s=since_s)
+    assert part.first_difference is None, str(part.first_difference)
     assert part.first_cycle is not None
     assert 20 * (since_s - 2.1) <= part.first_cycle <= 20 * since_s + 2
     assert part.cycles == 20 * SECONDS - part.first_cycle + 1
@@ -75,10 +75,10 @@ def test_the_papers_method_too(tmp_path: Path) -> None:
     path = tmp_path / "paper.mcap"
     record(hall("perception.method=paper"), path, 10.0)
     for since_s in (0.0, 5.0):
-        verdict = verdict_of(path, since_s=since_s)
-        assert verdict.first is None, str(verdict.first)
-        assert verdict.cycles >= 20 * (10.0 - since_s)
-        assert set(verdict.refinement) >= {"budget", "converged", "nothing"}
+        result = verify_file(path, since_s=since_s)
+        assert result.first_difference is None, str(result.first_difference)
+        assert result.cycles >= 20 * (10.0 - since_s)
+        assert set(result.refinement_stops) >= {"budget", "converged", "nothing"}
 
 
 @pytest.mark.compiled
@@ -89,11 +89,11 @@ def test_the_first_difference_is_named(run: Path, tmp_path: Path) -> None:
             other = Cycle(record=replace(cycle, segments=cycle.segments + 1))
             entries[i] = entry._replace(data=encode(other))
     rewrite(entries, tmp_path / "x.mcap")
-    verdict = verdict_of(tmp_path / "x.mcap")
-    assert verdict.different == 2
-    assert verdict.first is not None
-    assert (verdict.first.cycle, verdict.first.field) == (77, "segments")
-    assert verdict.first.recorded == int(str(verdict.first.replayed)) + 1
+    result = verify_file(tmp_path / "x.mcap")
+    assert result.differences == 2
+    assert result.first_difference is not None
+    assert (result.first_difference.cycle, result.first_difference.field) == (77, "segments")
+    assert result.first_difference.recorded == int(str(result.first_difference.replayed)) + 1
 
 
 @pytest.mark.compiled
@@ -102,19 +102,22 @@ def test_a_memory_that_differs_is_named(run: Path, tmp_path: Path) -> None:
     entries = entries_of(run)
     where = [i for i, entry in enumerate(entries) if entry.topic == KEYFRAME][2]
     frame = decode(Keyframe, entries[where].data)
-    memory = snapshot_in(frame)
+    memory = perception_snapshot(frame)
     name = next(name for name in memory if name.endswith("hist"))
-    from runtime.recording.schema import StateLeft, keyframe
+    from runtime.recording.schema import CarriedState, keyframe
 
     changed = memory[name].copy()
     changed.flat[0] = changed.flat[0] + 1e-9
-    left = {f: getattr(frame.left, f) for f in StateLeft.model_fields}
+    left = {f: getattr(frame.left, f) for f in CarriedState.model_fields}
     entries[where] = entries[where]._replace(data=encode(keyframe(frame.cycle, left, {**memory, name: changed})))
     rewrite(entries, tmp_path / "x.mcap")
-    verdict = verdict_of(tmp_path / "x.mcap")
-    assert verdict.different == 1
-    assert verdict.first is not None
-    assert (verdict.first.cycle, verdict.first.field.split("[")[0]) == (frame.cycle, f"memory {name}")
+    result = verify_file(tmp_path / "x.mcap")
+    assert result.differences == 1
+    assert result.first_difference is not None
+    assert (result.first_difference.cycle, result.first_difference.field.split("[")[0]) == (
+        frame.cycle,
+        f"memory {name}",
+    )
 
 
 def test_other_settings_tell_what_would_have_been(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -138,13 +141,13 @@ def test_a_state_that_is_put_back_is_whole(run: Path) -> None:
     with open_recording(run) as recording:
         state = fresh_state(recording.settings)
         assert state.perception.objects() == ()
-        state.perception.restore(snapshot_in(frames[-1]))
+        state.perception.restore(perception_snapshot(frames[-1]))
         assert len(state.perception.objects()) >= 3
         other = fresh_state(hall("perception.bayes.tracks_max=7"))
         with pytest.raises(ValueError, match="of other settings"):
-            other.perception.restore(snapshot_in(frames[-1]))
+            other.perception.restore(perception_snapshot(frames[-1]))
         with pytest.raises(ValueError, match="another method"):
-            fresh_state(hall("perception.method=paper")).perception.restore(snapshot_in(frames[-1]))
+            fresh_state(hall("perception.method=paper")).perception.restore(perception_snapshot(frames[-1]))
 
 
 def complaint(arguments: list[str], capsys: pytest.CaptureFixture[str], code: int) -> str:
@@ -169,7 +172,7 @@ def test_files_that_are_no_recordings(command: str, tmp_path: Path, capsys: pyte
 def test_a_newer_file_and_a_strange_one(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = str(tmp_path / "x.mcap")
     entries = entries_of(run)
-    about = decode(About, entries[0].data)
+    about = decode(RunInfo, entries[0].data)
     newer = [entries[0]._replace(data=encode(about.model_copy(update={"format": FORMAT + 1}))), *entries[1:]]
     rewrite(newer, Path(path), f"echolocate/{FORMAT + 1}")
     assert "newer program" in complaint(["replay", path], capsys, WRONG_CALL)

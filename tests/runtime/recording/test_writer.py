@@ -17,12 +17,12 @@ from drivers.messages import Pose
 from runtime.cli.app import call
 from runtime.cli.commands.run_recording import RunRecording, kept
 from runtime.cycle.step import CycleRecord, State
-from runtime.recording.channels import ABOUT, BOOKMARK, CYCLE, KEYFRAME, decode
+from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, RUN_INFO, decode
 from runtime.recording.reader import open_recording
 from runtime.recording.recorder import BOOKMARK_MAX, Recorder
-from runtime.recording.replayer import ReplayResult, replay
+from runtime.recording.replayer import ReplayResult, verify_recording
 from runtime.recording.schema import Bookmark
-from runtime.recording.storage import OneFile
+from runtime.recording.storage import SingleFile
 from runtime.simulation.closed_loop import simulate
 from tests.recorded import FiveInSix, entries_of, hall, record, until
 
@@ -31,7 +31,7 @@ def switched(place: Path, at: dict[int, Callable[[Recorder], None]], seconds: fl
     """Record a run in virtual time; `at` says what is done after which cycle."""
     settings, now = hall("perception.method=paper"), [0.0]
     assert settings.world is not None
-    with Recorder(settings, OneFile(place), clock=lambda: now[0], emulated=True, on=on) as recorder:
+    with Recorder(settings, SingleFile(place), clock=lambda: now[0], emulated=True, on=on) as recorder:
 
         def on_state(record: CycleRecord, state: State, _start: Pose) -> None:
             recorder.on_cycle(record, state)
@@ -40,14 +40,14 @@ def switched(place: Path, at: dict[int, Callable[[Recorder], None]], seconds: fl
             if record.cycle in at:
                 at[record.cycle](recorder)
 
-        simulate(settings, settings.world, 0, seconds, on_state=on_state, allowance=FiveInSix(0))
+        simulate(settings, settings.world, 0, seconds, on_state=on_state, refinement_budget=FiveInSix(0))
         recorder.on_summary({"mode": "DRIVE"})
     return recorder
 
 
-def verdict_of(path: Path) -> ReplayResult:
+def verify_file(path: Path) -> ReplayResult:
     with open_recording(path) as recording:
-        return replay(recording)
+        return verify_recording(recording)
 
 
 def cycles_of(path: Path) -> list[int]:
@@ -61,51 +61,51 @@ def cycles_of(path: Path) -> list[int]:
 
 
 def opened(recorder: Recorder) -> None:
-    until(lambda: recorder.standing.under_way, "a file")
+    until(lambda: recorder.status.is_writing, "a file")
 
 
 def closed(recorder: Recorder) -> None:
-    until(lambda: not recorder.standing.under_way, "the end of the file")
+    until(lambda: not recorder.status.is_writing, "the end of the file")
 
 
 def test_off_and_on_again(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
 
     def off(recorder: Recorder) -> None:
-        recorder.switch(on=False)
-        assert not recorder.is_on
+        recorder.set_enabled(on=False)
+        assert not recorder.is_enabled
         closed(recorder)
 
     recorder = switched(
         path,
-        {1: opened, 60: off, 100: lambda r: r.switch(on=True), 101: opened, 102: lambda r: r.switch(on=True)},
+        {1: opened, 60: off, 100: lambda r: r.set_enabled(on=True), 101: opened, 102: lambda r: r.set_enabled(on=True)},
         8.0, on=True,
     )  # fmt: skip
-    assert (recorder.standing.files, recorder.standing.dropped, recorder.standing.trouble) == (2, 0, None)
+    assert (recorder.status.files, recorder.status.dropped, recorder.status.last_error) == (2, 0, None)
     assert cycles_of(path) == list(range(1, 61))
     second = tmp_path / "run-2.mcap"
     assert cycles_of(second) == list(range(102, 161))
-    assert next(e.topic for e in entries_of(second) if e.topic != ABOUT) == KEYFRAME, "with it the file begins"
+    assert next(e.topic for e in entries_of(second) if e.topic != RUN_INFO) == KEYFRAME, "with it the file begins"
     for file, count, first in ((path, 60, 1), (second, 59, 102)):
-        verdict = verdict_of(file)
-        assert (verdict.cycles, verdict.first_cycle, verdict.different) == (count, first, 0)
-        assert (verdict.missing, verdict.skipped) == ([], 0)
+        result = verify_file(file)
+        assert (result.cycles, result.first_cycle, result.differences) == (count, first, 0)
+        assert (result.missing, result.skipped) == ([], 0)
         with open_recording(file) as recording:
-            list(recording.entries())
+            list(recording.messages())
             assert recording.finished
 
 
 def test_off_from_the_beginning_leaves_nothing(tmp_path: Path) -> None:
     recorder = switched(tmp_path / "run.mcap", {}, 2.0, on=False)
-    assert (recorder.standing.files, recorder.standing.dropped, recorder.standing.trouble) == (0, 0, None)
+    assert (recorder.status.files, recorder.status.dropped, recorder.status.last_error) == (0, 0, None)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_on_in_mid_run(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    switched(path, {30: lambda r: r.switch(on=True), 31: opened}, 4.0, on=False)
+    switched(path, {30: lambda r: r.set_enabled(on=True), 31: opened}, 4.0, on=False)
     assert cycles_of(path) == list(range(32, 81))
-    assert verdict_of(path).different == 0
+    assert verify_file(path).differences == 0
 
 
 def test_bookmarks_are_in_it_and_in_nobody_s_way(tmp_path: Path) -> None:
@@ -116,7 +116,7 @@ def test_bookmarks_are_in_it_and_in_nobody_s_way(tmp_path: Path) -> None:
         refused.extend(recorder.bookmark(text) for text in ("", " \n ", "x" * (BOOKMARK_MAX + 1)))
 
     def too_late(recorder: Recorder) -> None:
-        recorder.switch(on=False)
+        recorder.set_enabled(on=False)
         refused.append(recorder.bookmark("too late"))
 
     switched(path, {1: opened, 40: mark, 70: too_late}, 4.0, on=True)
@@ -124,7 +124,7 @@ def test_bookmarks_are_in_it_and_in_nobody_s_way(tmp_path: Path) -> None:
     assert "nothing is being recorded" in str(refused[-1])
     marks = [decode(Bookmark, entry.data) for entry in entries_of(path) if entry.topic == BOOKMARK]
     assert marks == [Bookmark(cycle=40, text="here it <b>was</b>")]
-    assert verdict_of(path).different == 0
+    assert verify_file(path).differences == 0
     recovered = tmp_path / "recovered.mcap"
     assert call(["recover", str(path), "--out", str(recovered)]) == DONE
     assert [entry.data for entry in entries_of(recovered) if entry.topic == BOOKMARK] == [
@@ -136,7 +136,7 @@ def test_a_recording_of_before_there_were_bookmarks_is_read(tmp_path: Path) -> N
     path = tmp_path / "run.mcap"
     record(hall("perception.method=paper"), path, 2.0)
     assert all(entry.topic != BOOKMARK for entry in entries_of(path))
-    assert verdict_of(path).different == 0
+    assert verify_file(path).differences == 0
 
 
 @pytest.mark.compiled
@@ -195,7 +195,7 @@ async def test_a_run_that_records_nothing_may_be_told_to(tmp_path: Path, record:
     def on(keeping: RunRecording) -> None:
         assert keeping.now is None
         assert (keeping.standing is None) == (log is None), "a ring log is there from the first"
-        keeping._recorder.switch(on=True)
+        keeping._recorder.set_enabled(on=True)
 
     keeping = await in_folder_of(folder, on, no_record=True, record=log)
     assert keeping.standing is not None
@@ -210,7 +210,7 @@ async def test_the_console_s_words() -> None:
         def __init__(self) -> None:
             self.asked: list[object] = []
 
-        def switch(self, *, on: bool) -> None:
+        def set_enabled(self, *, on: bool) -> None:
             self.asked.append(on)
 
         def bookmark(self, text: str) -> str | None:

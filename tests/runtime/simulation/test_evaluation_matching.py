@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from config.world import DrumConfig, WorldConfig
-from runtime.simulation.evaluation import GATE_M, SeedOutcome, against_truth, summarise
+from runtime.simulation.evaluation import GATE_M, SeedOutcome, match_drums, summarise
 from runtime.timing.cycle_stats import Quantiles
 
 QUICK: Quantiles = {"p50": 1.0, "p99": 2.0, "max": 9.0}
@@ -21,7 +21,7 @@ def world(*places: tuple[float, float]) -> WorldConfig:
 
 
 def test_rows_are_in_the_order_of_the_drums() -> None:
-    rows, false = against_truth(world((0.0, 0.0), (2.0, 0.0)), [(2.1, 0.0), (0.0, 0.2)])
+    rows, false = match_drums(world((0.0, 0.0), (2.0, 0.0)), [(2.1, 0.0), (0.0, 0.2)])
     assert [row["estimate"] for row in rows] == [(0.0, 0.2), (2.1, 0.0)]
     assert [row["error"] for row in rows] == pytest.approx([0.2, 0.1])
     assert false == 0
@@ -29,14 +29,14 @@ def test_rows_are_in_the_order_of_the_drums() -> None:
 
 def test_the_nearest_pair_goes_first() -> None:
     """The first drum would like the estimate too, but the second is nearer to it."""
-    rows, false = against_truth(world((0.0, 0.0), (0.4, 0.0)), [(0.25, 0.0)])
+    rows, false = match_drums(world((0.0, 0.0), (0.4, 0.0)), [(0.25, 0.0)])
     assert [row["estimate"] for row in rows] == [None, (0.25, 0.0)]
     assert [row["error"] for row in rows] == [None, pytest.approx(0.15)]
     assert false == 0
 
 
 def test_a_second_estimate_of_one_drum_is_false() -> None:
-    rows, false = against_truth(world((0.0, 0.0)), [(0.1, 0.0), (0.05, 0.0)])
+    rows, false = match_drums(world((0.0, 0.0)), [(0.1, 0.0), (0.05, 0.0)])
     assert rows[0]["estimate"] == (0.05, 0.0)
     assert false == 1
 
@@ -44,17 +44,17 @@ def test_a_second_estimate_of_one_drum_is_false() -> None:
 def test_the_gate_is_a_foot() -> None:
     assert pytest.approx(0.3048) == GATE_M
     inside, outside = 0.999 * GATE_M, 1.001 * GATE_M
-    rows, false = against_truth(world((0.0, 0.0)), [(0.0, inside)])
+    rows, false = match_drums(world((0.0, 0.0)), [(0.0, inside)])
     assert rows[0]["error"] == pytest.approx(inside)
     assert false == 0
-    rows, false = against_truth(world((0.0, 0.0)), [(0.0, outside)])
+    rows, false = match_drums(world((0.0, 0.0)), [(0.0, outside)])
     assert (rows[0], false) == ({"truth": (0.0, 0.0), "estimate": None, "error": None}, 1)
 
 
 def test_nothing_seen_and_nothing_there() -> None:
-    rows, false = against_truth(world((1.0, 2.0)), [])
+    rows, false = match_drums(world((1.0, 2.0)), [])
     assert (rows, false) == ([{"truth": (1.0, 2.0), "estimate": None, "error": None}], 0)
-    assert against_truth(world(), [(0.0, 0.0)]) == ([], 1)
+    assert match_drums(world(), [(0.0, 0.0)]) == ([], 1)
 
 
 places = st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), max_size=6)
@@ -62,7 +62,7 @@ places = st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), max_siz
 
 @given(places, places)
 def test_one_to_one_whatever_there_is(drums: list[tuple[float, float]], seen: list[tuple[float, float]]) -> None:
-    rows, false = against_truth(world(*drums), seen)
+    rows, false = match_drums(world(*drums), seen)
     used = [row["estimate"] for row in rows if row["estimate"] is not None]
     assert len(rows) == len(drums)
     assert len(used) + false == len(seen)
@@ -77,8 +77,8 @@ def test_one_to_one_whatever_there_is(drums: list[tuple[float, float]], seen: li
 
 
 def test_summary_over_several_runs() -> None:
-    rows, _ = against_truth(world((0.0, 0.0), (9.0, 9.0)), [(0.0, 0.1)])
-    more, _ = against_truth(world((0.0, 0.0)), [(0.2, 0.0)])
+    rows, _ = match_drums(world((0.0, 0.0), (9.0, 9.0)), [(0.0, 0.1)])
+    more, _ = match_drums(world((0.0, 0.0)), [(0.2, 0.0)])
     got = summarise([SeedOutcome(0, rows, 1, 20.0, 0.5, QUICK), SeedOutcome(1, more, 2, 40.0, 0.5, SLOW)])
     assert got["drums"] == rows + more
     assert got["false"] == 3
@@ -89,6 +89,6 @@ def test_summary_over_several_runs() -> None:
 
 
 def test_summary_of_nothing_found() -> None:
-    rows, _ = against_truth(world((0.0, 0.0)), [])
+    rows, _ = match_drums(world((0.0, 0.0)), [])
     got = summarise([SeedOutcome(0, rows, 0, 20.0, 0.0, QUICK)])
     assert (got["mean_error"], got["max_error"], got["times_real_time"]) == (None, None, 0.0)

@@ -15,7 +15,7 @@ from config.world import BoxConfig, WorldConfig
 from drivers.messages import Firing, Floats
 from perception.pipeline import DetectedObject
 from runtime.cli.app import call
-from runtime.simulation.open_loop import angle_error, judge
+from runtime.simulation.open_loop import angle_error, match_objects
 from runtime.simulation.scene_names import SceneName
 from runtime.simulation.scenes import Hall, halls, readings
 
@@ -161,14 +161,14 @@ def test_a_drum_is_no_box_and_a_box_no_drum() -> None:
     models = [load_model(name) for name in ("semicircle", "box")]
     world = halls("boxes_45")[0].world
     there = [seen("box", 1.1, 4.0, math.radians(139.0)), seen("semicircle", 4.0, 4.0), seen("wall", 0.0, 0.0)]
-    drums, boxes, false = judge(world, there, models)
+    drums, boxes, false = match_objects(world, there, models)
     assert drums == []
     assert false == 1
     assert [row["estimate"] is None for row in boxes] == [False] + [True] * 5
     assert boxes[0]["error"] == pytest.approx(0.1 * FT)
     assert boxes[0]["angle_error"] == pytest.approx(math.radians(4.0))
 
-    drums, boxes, false = judge(halls("clean")[0].world, there, models)
+    drums, boxes, false = match_objects(halls("clean")[0].world, there, models)
     assert boxes == []
     assert false == 1
     assert sum(row["estimate"] is not None for row in drums) == 1
@@ -176,7 +176,7 @@ def test_a_drum_is_no_box_and_a_box_no_drum() -> None:
 
 def test_two_on_one_drum_are_one_and_a_false_one() -> None:
     twice = [seen("semicircle", 1.2, 4.0), seen("semicircle", 1.0, 4.1), seen("semicircle", 1.0, 5.2)]
-    drums, _, false = judge(halls("clean")[0].world, twice, [load_model("semicircle")])
+    drums, _, false = match_objects(halls("clean")[0].world, twice, [load_model("semicircle")])
     assert drums[0]["error"] == pytest.approx(0.1 * FT)
     assert false == 2
 

@@ -27,7 +27,7 @@ from runtime.cycle.reloader import Reloader
 from runtime.cycle.step import CycleRecord, State
 from runtime.cycle.summary import RunSummary
 from runtime.recording.recorder import Recorder
-from runtime.recording.storage import OneFile
+from runtime.recording.storage import SingleFile
 from runtime.recording.writer import RecordingWriter
 from runtime.support.background_writer import BackgroundWriter
 from runtime.support.health import Worker
@@ -245,7 +245,7 @@ def test_the_recorders_thread(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
     monkeypatch.setattr(RecordingWriter, "_enter", fail)
     from tests.recorded import hall
 
-    with Recorder(hall(), OneFile(tmp_path / "run.mcap")) as recorder:
+    with Recorder(hall(), SingleFile(tmp_path / "run.mcap")) as recorder:
 
         def plant(_process: RobotProcess, _loop: VirtualLoop) -> None:
             broken.set()

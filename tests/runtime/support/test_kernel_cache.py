@@ -234,7 +234,7 @@ from perception.edits import (
 )
 from runtime.console.frames.frame_encoder import FrameContext, FrameEncoder
 from runtime.cycle.modes import Mode, Request
-from runtime.simulation.closed_loop import Said, simulate
+from runtime.simulation.closed_loop import OperatorInput, simulate
 
 further = settings.model_copy(update={"models": (*settings.models, load_model(sys.argv[3]))})
 assert set(needed(further)) <= set(needed(settings))
@@ -245,7 +245,7 @@ def by_hand(cycle, state):
     # every half second one thing after the other, also with a model that came late
     perception, arm = state.perception, Request.ARM if state.mode.mode is Mode.READY else None
     if cycle % 10 or state.odometry is None:
-        return Said(arm)
+        return OperatorInput(arm)
     encoder.frame(state, None, FrameContext(host_s=0.0))
     seen = [o for o in perception.objects() if o.number is not None]
     for known in seen:
@@ -259,7 +259,7 @@ def by_hand(cycle, state):
         [MoveObject(o.number, o.x + 0.2, o.y, 0.1) for o in seen], [ConfirmObject(o.number) for o in seen],
         [RejectObject(o.number) for o in seen], [ClearMap()] if cycle > 200 else [],
     )
-    return Said(arm, edits=tuple(edits[cycle // 10 % len(edits)]))
+    return OperatorInput(arm, edits=tuple(edits[cycle // 10 % len(edits)]))
 
 with event.install_listener("numba:compile", Listener()):
     run = simulate(

@@ -14,8 +14,8 @@ import pytest
 
 from config.errors import DONE, FAILED, WRONG_CALL
 from drivers.messages import Firing
-from runtime.analysis.trace import Trace
-from runtime.analysis.trace_sources import Asked, trace_of
+from runtime.analysis.timeline import Timeline
+from runtime.analysis.timeline_sources import TimelineSource, load_timeline
 from runtime.cli.app import call
 from runtime.cli.commands import export
 from runtime.recording.channels import CYCLE, decode
@@ -27,8 +27,8 @@ TABLES = {"echoes", "segments", "objects", "odometry"}
 
 
 @pytest.fixture(scope="module")
-def trace(hall_run: Path) -> Trace:
-    return trace_of(Asked(str(hall_run)), lambda _settings: None)
+def timeline(hall_run: Path) -> Timeline:
+    return load_timeline(TimelineSource(str(hall_run)), lambda _settings: None)
 
 
 def exported(run: Path, form: str, out: Path, *more: str) -> Path:
@@ -36,27 +36,27 @@ def exported(run: Path, form: str, out: Path, *more: str) -> Path:
     return out
 
 
-def test_csv(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
+def test_csv(hall_run: Path, timeline: Timeline, tmp_path: Path) -> None:
     folder = exported(hall_run, "csv", tmp_path / "new")
     read = {}
     for path in folder.iterdir():
         with path.open(encoding="utf-8", newline="") as file:
             read[path.stem] = list(csv.DictReader(file))
     assert set(read) == TABLES
-    assert len(read["echoes"]) == len(trace.echoes)
-    for row, kept in zip(read["echoes"], trace.echoes.tolist(), strict=True):
+    assert len(read["echoes"]) == len(timeline.echoes)
+    for row, kept in zip(read["echoes"], timeline.echoes.tolist(), strict=True):
         assert float(row["bearing_rad"]) == kept[4], "every digit"
         assert row["heard"] == str(math.isfinite(kept[5]))
         assert row["range_m"] == (str(kept[5]) if math.isfinite(kept[5]) else "")
-    last = [row for row in read["objects"] if float(row["t_s"]) == trace.seconds]
+    last = [row for row in read["objects"] if float(row["t_s"]) == timeline.seconds]
     assert [(r["model"], float(r["x_m"]), float(r["y_m"])) for r in last] == [
-        (o.model, o.x, o.y) for o in trace.objects
+        (o.model, o.x, o.y) for o in timeline.objects
     ]
     assert all(float(r["first_seen_s"]) <= float(r["last_seen_s"]) for r in read["segments"])
     assert len(read["odometry"]) > 100
 
 
-def test_parquet(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
+def test_parquet(hall_run: Path, timeline: Timeline, tmp_path: Path) -> None:
     import pyarrow.parquet as pq
 
     folder = exported(hall_run, "parquet", tmp_path / "new")
@@ -64,13 +64,13 @@ def test_parquet(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
     assert set(read) == TABLES
     echoes = read["echoes"]
     assert b"metres" in echoes.schema.metadata[b"echolocate"]
-    assert echoes["sensor"].to_pylist() == trace.echoes[:, 1].astype(int).tolist()
-    assert echoes["range_m"].null_count == int(np.isinf(trace.echoes[:, 5]).sum())
-    assert read["objects"]["x_m"].to_pylist()[-1] == trace.objects[-1].x
-    assert read["segments"].num_rows == len(trace.segments) > 50
+    assert echoes["sensor"].to_pylist() == timeline.echoes[:, 1].astype(int).tolist()
+    assert echoes["range_m"].null_count == int(np.isinf(timeline.echoes[:, 5]).sum())
+    assert read["objects"]["x_m"].to_pylist()[-1] == timeline.objects[-1].x
+    assert read["segments"].num_rows == len(timeline.segments) > 50
 
 
-def test_foxglove(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
+def test_foxglove(hall_run: Path, timeline: Timeline, tmp_path: Path) -> None:
     from mcap.reader import make_reader
     from mcap_protobuf.decoder import DecoderFactory
 
@@ -97,30 +97,30 @@ def test_foxglove(hall_run: Path, trace: Trace, tmp_path: Path) -> None:
         ("/truth", "foxglove.SceneUpdate"),
         ("/log", "foxglove.Log"),
     }
-    assert times[0] == trace.begun_ns
-    assert times[-1] <= trace.unix_ns(trace.seconds)
+    assert times[0] == timeline.start_unix_ns
+    assert times[-1] <= timeline.unix_ns(timeline.seconds)
     assert len(newest["/truth"].entities[0].lines) == 6
-    assert len(newest["/models"].entities[0].lines) == len(trace.objects)
-    assert trace.last is not None
-    assert len(newest["/segments"].entities[0].lines[0].points) == 2 * len(trace.last.segments)
-    assert len(newest["/clusters"].entities[0].lines) == 3 * len(trace.last.clusters)
+    assert len(newest["/models"].entities[0].lines) == len(timeline.objects)
+    assert timeline.last is not None
+    assert len(newest["/segments"].entities[0].lines[0].points) == 2 * len(timeline.last.segments)
+    assert len(newest["/clusters"].entities[0].lines) == 3 * len(timeline.last.clusters)
     start = first["/tf"].transforms[0]
     assert (start.parent_frame_id, start.child_frame_id) == ("world", "odom")
     assert start.translation.x == pytest.approx(-1.8288)
     scan = newest["/ring"]
     assert len(scan.ranges) == 24
     fired = [i for i, r in enumerate(scan.ranges) if not math.isnan(r)]
-    assert fired == sorted(int(row[1]) for row in trace.echoes if row[6] == trace.echoes[-1, 6])
+    assert fired == sorted(int(row[1]) for row in timeline.echoes if row[6] == timeline.echoes[-1, 6])
 
 
-def test_a_scan_puts_echoes_where_they_were(trace: Trace) -> None:
+def test_a_scan_puts_echoes_where_they_were(timeline: Timeline) -> None:
     from runtime.analysis.export.shapes import even_radius, rounds, whole_ring
 
-    radius = even_radius(trace.settings.ring)
+    radius = even_radius(timeline.settings.ring)
     assert radius is not None
     assert radius == pytest.approx(0.381)
     count = 0
-    for part in rounds(trace):
+    for part in rounds(timeline):
         ranges = whole_ring(24, radius, part)
         for row in part.rows:
             reach = ranges[int(row[1])]
@@ -134,7 +134,7 @@ def test_a_scan_puts_echoes_where_they_were(trace: Trace) -> None:
     assert count > 300
 
 
-def test_rosbag2(hall_run: Path, trace: Trace, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_rosbag2(hall_run: Path, timeline: Timeline, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
@@ -147,32 +147,32 @@ def test_rosbag2(hall_run: Path, trace: Trace, tmp_path: Path, capsys: pytest.Ca
             kinds[connection.topic] = connection.msgtype
             counts[connection.topic] += 1
             newest[connection.topic] = reader.deserialize(data, connection.msgtype)
-            assert trace.begun_ns <= at <= trace.unix_ns(trace.seconds)
+            assert timeline.start_unix_ns <= at <= timeline.unix_ns(timeline.seconds)
     sonars = {topic for topic in kinds if topic.startswith("/sonar/")}
     assert len(sonars) == 24
     assert {kinds[topic] for topic in sonars} == {"sensor_msgs/msg/Range"}
-    assert sum(counts[topic] for topic in sonars) == len(trace.echoes)
+    assert sum(counts[topic] for topic in sonars) == len(timeline.echoes)
     assert kinds["/odom"] == "nav_msgs/msg/Odometry"
     assert kinds["/markers"] == "visualization_msgs/msg/MarkerArray"
-    sensor = int(trace.echoes[-1, 1])
+    sensor = int(timeline.echoes[-1, 1])
     told = newest[f"/sonar/s{sensor:02d}"]
-    assert told.range == pytest.approx(trace.echoes[-1, 5])
+    assert told.range == pytest.approx(timeline.echoes[-1, 5])
     assert told.header.frame_id == f"sonar_{sensor:02d}"
     assert told.field_of_view == pytest.approx(math.radians(24.0))
-    odometry = trace.odometry[-1][1]
+    odometry = timeline.odometry[-1][1]
     assert newest["/odom"].pose.pose.position.x == odometry.pose.x
     assert newest["/odom"].twist.twist.linear.x == odometry.twist.v
     models = [m for m in newest["/markers"].markers if m.ns.startswith("models/")]
-    assert len(models) == len(trace.objects)
+    assert len(models) == len(timeline.objects)
     places = np.array([[(p.x, p.y) for p in m.points[:-1]] for m in models]).mean(axis=1)
-    assert np.allclose(places, [(o.x, o.y) for o in trace.objects])
+    assert np.allclose(places, [(o.x, o.y) for o in timeline.objects])
     assert len(newest["/tf_static"].transforms) == 25
     capsys.readouterr()
     assert call(["export", str(hall_run), "--to", "rosbag2", "--out", str(bag)]) == FAILED
     assert "is there already" in capsys.readouterr().err
 
 
-def test_a_ring_log_out_and_in(hall_run: Path, hall_log: Path, trace: Trace, tmp_path: Path) -> None:
+def test_a_ring_log_out_and_in(hall_run: Path, hall_log: Path, timeline: Timeline, tmp_path: Path) -> None:
     heard: list[Firing] = []
     for entry in entries_of(hall_run):
         if entry.topic == CYCLE:
@@ -187,7 +187,7 @@ def test_a_ring_log_out_and_in(hall_run: Path, hall_log: Path, trace: Trace, tmp
     seen = json.loads(summary.read_bytes())["objects"]
     assert len(seen) >= 3
     for one in seen:
-        assert min(math.hypot(one["x"] - o.x, one["y"] - o.y) for o in trace.objects) < 0.02
+        assert min(math.hypot(one["x"] - o.x, one["y"] - o.y) for o in timeline.objects) < 0.02
 
 
 @pytest.mark.compiled

@@ -18,8 +18,8 @@ from config.load import load_settings, load_world
 from config.units import FOOT_M
 from drivers.messages import Floats, Pose
 from runtime.analysis.plots.geometry import Frame, arcs, outline
-from runtime.analysis.trace import Trace
-from runtime.analysis.trace_sources import Asked, trace_of
+from runtime.analysis.timeline import Timeline
+from runtime.analysis.timeline_sources import TimelineSource, load_timeline
 from runtime.cli.app import call
 from tests.architecture import ROOMS
 
@@ -32,8 +32,8 @@ def ids(path: Path) -> set[str]:
     return {element.attrib["id"] for element in ElementTree.parse(path).iter() if "id" in element.attrib}
 
 
-def traced(path: Path, **asked: str) -> Trace:
-    return trace_of(Asked(str(path), **asked), lambda _settings: None)
+def traced(path: Path, **asked: str) -> Timeline:
+    return load_timeline(TimelineSource(str(path), **asked), lambda _settings: None)
 
 
 @pytest.fixture(scope="module")
@@ -98,28 +98,28 @@ def test_the_overview_moves(drawn: Path) -> None:
 
 
 def test_a_trace_holds_the_run(hall_run: Path) -> None:
-    trace = traced(hall_run)
-    assert trace.world == HALLWAY
-    assert trace.cycles == 280
-    assert trace.notes == []
-    assert trace.seconds == pytest.approx(13.95, abs=0.06)
-    assert [entered.mode for entered in trace.modes][-1] == "DRIVE"
-    assert trace.summary is not None
-    times = [moment.t_s for moment in trace.moments]
+    timeline = traced(hall_run)
+    assert timeline.world == HALLWAY
+    assert timeline.cycles == 280
+    assert timeline.notes == []
+    assert timeline.seconds == pytest.approx(13.95, abs=0.06)
+    assert [entered.mode for entered in timeline.modes][-1] == "DRIVE"
+    assert timeline.summary is not None
+    times = [snapshot.t_s for snapshot in timeline.snapshots]
     assert times == sorted(times)
-    assert times[-1] == trace.seconds
-    assert len(trace.objects) >= 3
-    heard = trace.echoes[np.isfinite(trace.echoes[:, 5])]
-    half = math.radians(trace.settings.ring.beam_half_angle_deg)
+    assert times[-1] == timeline.seconds
+    assert len(timeline.objects) >= 3
+    heard = timeline.echoes[np.isfinite(timeline.echoes[:, 5])]
+    half = math.radians(timeline.settings.ring.beam_half_angle_deg)
     # Without noise every arc touches a drum: its distance to the nearest rim is within the rounding of a range.
-    points = trace_frame(trace).points(curve_points(arcs(heard, half)))
+    points = trace_frame(timeline).points(curve_points(arcs(heard, half)))
     drums = np.array([(d.x_m, d.y_m) for d in HALLWAY.drum])
     rims = np.abs(np.linalg.norm(points[:, :, None] - drums, axis=-1) - 0.3048).min(axis=(1, 2))
     assert np.quantile(rims, 0.95) < 0.05
 
 
-def trace_frame(trace: Trace) -> Frame:
-    return Frame(trace.start, 1.0)
+def trace_frame(timeline: Timeline) -> Frame:
+    return Frame(timeline.start, 1.0)
 
 
 def curve_points(curves: Floats) -> Floats:

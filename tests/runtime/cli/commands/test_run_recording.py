@@ -42,8 +42,8 @@ def test_a_ring_log_on_a_disk_that_stands_still_fills_no_memory(
         for number in range(count):
             writer.put(firing(number))
         assert writer._waiting.qsize() <= 64
-        assert writer.standing.dropped > 0
-        assert "more slowly than they come" in str(writer.standing.trouble)
+        assert writer.status.dropped > 0
+        assert "more slowly than they come" in str(writer.status.last_error)
         assert writer.probe() is None, "a slow disk is no part's end"
         os.set_blocking(out, True)
         reader = threading.Thread(target=lambda: read.extend(b"".join(iter(lambda: os.read(out, 65536), b""))))
@@ -51,7 +51,7 @@ def test_a_ring_log_on_a_disk_that_stands_still_fills_no_memory(
     reader.join()
     os.close(out)
     written = read.count(b"\n") - 1
-    assert (written, written + writer.standing.dropped) == (writer.standing.messages, count)
+    assert (written, written + writer.status.dropped) == (writer.status.messages, count)
 
 
 def test_a_full_disk_under_a_ring_log_is_told_and_counted(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from runtime.console.playback.replay_client import ReplayClient
 from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
-from runtime.simulation.emulator_process import emulator
+from runtime.simulation.emulator_process import start_emulator
 from runtime.support.logs import open_log
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.run_clock import PacedClock
@@ -49,7 +49,7 @@ async def test_a_player_and_a_report_beside_a_robot_that_drives(tmp_path: Path) 
 
     clock = PacedClock()
     players = ReplayClient(tmp_path, PROGRAM, lambda: str(recorded))
-    async with emulator([], clock) as (port, _):
+    async with start_emulator([], clock) as (port, _):
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
             process = RobotProcess(on_port(settings, port), log, Observers(on_cycle), clock)
             running = asyncio.create_task(process.run(arm=True, seconds=None))

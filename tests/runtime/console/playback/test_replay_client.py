@@ -16,7 +16,7 @@ import pytest
 from runtime.console.clients.client import Frame
 from runtime.console.frames.frame_encoder import EncodedFrame
 from runtime.console.playback.replay_client import WORKERS_MAX, ReplayClient, ReplayError, report_of
-from runtime.recording.storage import in_folder, listing
+from runtime.recording.storage import find_recording, list_recordings
 from runtime.support.child_process import COMMAND, NICENESS, end_child, start_child
 from tests.hil.machine import PATIENCE_S
 from tests.recorded import hall, record
@@ -165,12 +165,12 @@ async def test_the_list_and_the_one_under_way(folder: Path, tmp_path: Path) -> N
 
 
 def test_a_listing(folder: Path, tmp_path: Path) -> None:
-    assert listing(tmp_path / "none") == []
+    assert list_recordings(tmp_path / "none") == []
     (tmp_path / "folder.mcap").mkdir()
-    assert listing(tmp_path) == []
-    assert [one.file for one in listing(folder)] == ["broken.mcap", "hall.mcap"]
-    assert in_folder(folder, "hall.mcap") == folder / "hall.mcap"
-    assert in_folder(folder, "../hall.mcap") is None
+    assert list_recordings(tmp_path) == []
+    assert [one.file for one in list_recordings(folder)] == ["broken.mcap", "hall.mcap"]
+    assert find_recording(folder, "hall.mcap") == folder / "hall.mcap"
+    assert find_recording(folder, "../hall.mcap") is None
 
 
 async def test_the_page_of_a_run_that_goes_on(folder: Path, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from runtime.console.playback.replay_cursor import KEPT_BYTES, LOOK_BACK, ReplayCursor
-from runtime.recording.channels import ABOUT, BOOKMARK, CYCLE, KEYFRAME, Entry, encode
+from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, RUN_INFO, RawMessage, encode
 from runtime.recording.reader import RecordingError, open_recording
 from runtime.recording.schema import Bookmark
 from tests.recorded import entries_of, hall, record, rewrite
@@ -130,7 +130,7 @@ def test_a_recording_that_begins_in_the_middle(run: Path, tmp_path: Path, truth:
 
 def test_over_a_gap(run: Path, tmp_path: Path, truth: list[dict[str, Any]]) -> None:
     entries, numbers = entries_of(run), iter(range(1, CYCLES + 1))
-    kept: list[Entry] = []
+    kept: list[RawMessage] = []
     for entry in entries:
         number = next(numbers) if entry.topic == CYCLE else 0
         if not 50 < number <= 60:
@@ -149,7 +149,7 @@ def test_bookmarks(run: Path, tmp_path: Path) -> None:
     entries, path = entries_of(run), tmp_path / "marked.mcap"
     cycles = [at for at, entry in enumerate(entries) if entry.topic == CYCLE]
     at = cycles[40]
-    mark = Entry(BOOKMARK, entries[at].log_ns, encode(Bookmark(cycle=41, text="here <it> was")))
+    mark = RawMessage(BOOKMARK, entries[at].log_ns, encode(Bookmark(cycle=41, text="here <it> was")))
     rewrite([*entries[: at + 1], mark, *entries[at + 1 :]], path)
     with open_recording(path) as recording:
         playback = ReplayCursor(recording)
@@ -158,6 +158,6 @@ def test_bookmarks(run: Path, tmp_path: Path) -> None:
 
 def test_what_holds_no_cycle(run: Path, tmp_path: Path) -> None:
     path = tmp_path / "none.mcap"
-    rewrite([entry for entry in entries_of(run) if entry.topic == ABOUT][:1], path)
+    rewrite([entry for entry in entries_of(run) if entry.topic == RUN_INFO][:1], path)
     with open_recording(path) as recording, pytest.raises(RecordingError, match="holds no cycle"):
         ReplayCursor(recording)

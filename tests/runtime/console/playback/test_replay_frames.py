@@ -16,19 +16,19 @@ from runtime.console.playback.replay_frames import make
 from runtime.console.playback.replay_worker import At
 from runtime.cycle.modes import Mode, Request
 from runtime.cycle.step import State
-from runtime.recording.reader import open_recording, settings_in
-from runtime.simulation.closed_loop import Said
+from runtime.recording.reader import open_recording, parse_settings
+from runtime.simulation.closed_loop import OperatorInput
 from tests.recorded import hall, record
 from tests.runtime.console.playback.test_replay_client import Page, until
 
 SECONDS = 5.0
 
 
-def operator(_cycle: int, state: State) -> Said:
+def operator(_cycle: int, state: State) -> OperatorInput:
     """Arm, and take a segment out of the map now and then."""
     numbers = state.perception.segments().numbers.tolist()
     edits = (DeleteSegments((numbers[0],)),) if state.cycle % 15 == 0 and numbers else ()
-    return Said(Request.ARM if state.mode.mode is Mode.READY else None, edits=edits)
+    return OperatorInput(Request.ARM if state.mode.mode is Mode.READY else None, edits=edits)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def test_the_changes_of_all_frames_come_to_the_map_of_the_last(folder: Path) -> 
     seen: dict[int, Any] = {}
     with open_recording(folder / "hall.mcap") as recording:
         playback = ReplayCursor(recording)
-        played = make(settings_in(recording.about.settings), emulated=recording.about.emulated)
+        played = make(parse_settings(recording.info.settings), emulated=recording.info.emulated)
         for shown in playback.to(playback.cycles):
             played.take(shown.record)
             picture = played.frame(shown, At(playback.t_s, is_playing=True, speed=2.0))

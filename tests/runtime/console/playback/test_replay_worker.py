@@ -13,7 +13,7 @@ import pytest
 
 from runtime.console.playback.replay_cursor import ReplayCursor
 from runtime.console.playback.replay_worker import FRAME_S, Picture, ReplayWorker
-from runtime.recording.reader import open_recording, settings_in
+from runtime.recording.reader import open_recording, parse_settings
 from tests.recorded import hall, record
 from tests.runtime.console.building import make
 
@@ -37,7 +37,7 @@ class Watching:
         self.frames: list[tuple[float, int, int, dict[str, Any]]] = []
         self.worked = 0
         self.player = ReplayWorker(
-            playback, lambda told: make(settings_in(told), emulated=True), self._show, lambda: self.now_s
+            playback, lambda told: make(parse_settings(told), emulated=True), self._show, lambda: self.now_s
         )
 
     def _show(self, source: int, number: int, picture: Picture) -> None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING
 
 from rich.table import Table
 
-from config.units import FOOT_M
-from runtime.simulation.first_fix import ASKED_M
+from runtime.simulation.first_fix import EARLY_FIX_M
+from runtime.support.length_format import Units, format_length, format_point
 
 if TYPE_CHECKING:
     # The robot's own process has tables too, and shall not load the emulator for them.
@@ -17,18 +17,6 @@ if TYPE_CHECKING:
     from runtime.simulation.budget_sweep import BudgetRow
     from runtime.simulation.evaluation import DrumRow, Outcome, Spread
     from runtime.simulation.open_loop import BoxRow, SceneOutcome
-
-Units: TypeAlias = Literal["m", "ft"]
-
-
-def length(metres: float, units: Units, digits: int = 2) -> str:
-    """Return a length as text in the units asked for."""
-    return f"{metres if units == 'm' else metres / FOOT_M:.{digits}f}"
-
-
-def place(x: float, y: float, units: Units) -> str:
-    """Return a place as the paper writes it."""
-    return f"({length(x, units)}, {length(y, units)})"
 
 
 def table_2(outcome: Outcome, units: Units) -> Table:
@@ -40,9 +28,9 @@ def table_2(outcome: Outcome, units: Units) -> Table:
         estimate, error = row["estimate"], row["error"]
         table.add_row(
             str(number),
-            place(*row["truth"], units),
-            "not found" if estimate is None else place(*estimate, units),
-            "" if error is None else length(error, units, 3),
+            format_point(*row["truth"], units),
+            "not found" if estimate is None else format_point(*estimate, units),
+            "" if error is None else format_length(error, units, 3),
         )
     return table
 
@@ -56,41 +44,41 @@ def boxes_table(outcome: SceneOutcome, units: Units) -> Table:
         estimate, error, angle = row["estimate"], row["error"], row["angle_error"]
         table.add_row(
             str(number),
-            place(*row["truth"], units),
-            "not found" if estimate is None else place(*estimate, units),
-            "" if error is None else length(error, units, 3),
+            format_point(*row["truth"], units),
+            "not found" if estimate is None else format_point(*estimate, units),
+            "" if error is None else format_length(error, units, 3),
             "" if angle is None else f"{math.degrees(angle):.1f}",
         )
     return table
 
 
-def verdict(outcome: Outcome, units: Units) -> str:
+def outcome_line(outcome: Outcome, units: Units) -> str:
     """Return the experiment in one line."""
-    return _verdict(_found("drums", outcome["drums"]), outcome, units)
+    return _summary_line(_found("drums", outcome["drums"]), outcome, units)
 
 
-def spread_verdict(spread: Spread, units: Units) -> str:
+def spread_line(spread: Spread, units: Units) -> str:
     """Return how much the seeds differ, in one line."""
     return (
-        f"{spread['seeds']} seeds: mean error {length(spread['mean'], units, 4)} ± "
-        f"{length(spread['deviation'], units, 4)} {units} from seed to seed; worst single error "
-        f"{length(spread['worst'], units, 4)} {units} (seed {spread['worst_seed']}); {spread['missed']} drums not "
+        f"{spread['seeds']} seeds: mean error {format_length(spread['mean'], units, 4)} ± "
+        f"{format_length(spread['deviation'], units, 4)} {units} from seed to seed; worst single error "
+        f"{format_length(spread['worst'], units, 4)} {units} (seed {spread['worst_seed']}); {spread['missed']} drums not "
         f"found, at most {spread['missed_most']} by one seed; {spread['false']} false"
     )
 
 
-def scene_verdict(outcome: SceneOutcome, units: Units) -> str:
+def scene_line(outcome: SceneOutcome, units: Units) -> str:
     """Return a scene's outcome in one line."""
     drums, boxes = outcome["drums"], outcome["boxes"]
     parts = [_found(what, rows) for what, rows in (("drums", drums), ("boxes", boxes)) if rows]
-    line = f"{outcome['scene']}: {_verdict(', '.join(parts) or 'nothing to be found', outcome, units)}"
+    line = f"{outcome['scene']}: {_summary_line(', '.join(parts) or 'nothing to be found', outcome, units)}"
     if outcome["inside_95"] is not None:
         line += f"; {outcome['inside_95']:.1%} of the drums found stand in their 95 % ellipse"
     if (fix := outcome["first_fix"]) is not None:
-        least = "a drum never" if fix["least"] is None else f"{length(fix['least'], units)} {units}"
+        least = "a drum never" if fix["least"] is None else f"{format_length(fix['least'], units)} {units}"
         line += (
-            f"; first sure fix before passing: least {least}, median {length(fix['median'], units)} {units}, "
-            f"{fix['share']:.0%} by {length(ASKED_M, units)} {units}"
+            f"; first sure fix before passing: least {least}, median {format_length(fix['median'], units)} {units}, "
+            f"{fix['share']:.0%} by {format_length(EARLY_FIX_M, units)} {units}"
         )
     if outcome["scene"] == "halls" and drums:
         recall = sum(row["estimate"] is not None for row in drums) / len(drums)
@@ -102,10 +90,10 @@ def _found(what: str, rows: Sequence[DrumRow | BoxRow]) -> str:
     return f"{sum(row['estimate'] is not None for row in rows)} of {len(rows)} {what} found"
 
 
-def _verdict(found: str, outcome: Outcome, units: Units) -> str:
+def _summary_line(found: str, outcome: Outcome, units: Units) -> str:
     mean, worst = outcome["mean_error"], outcome["max_error"]
     errors = "" if mean is None or worst is None else (
-        f", mean error {length(mean, units, 3)} {units}, max {length(worst, units, 3)} {units}"
+        f", mean error {format_length(mean, units, 3)} {units}, max {format_length(worst, units, 3)} {units}"
     )  # fmt: skip
     return (
         f"{found}, {outcome['false']} false{errors}; {outcome['times_real_time']:.0f} times real time; "
@@ -121,8 +109,8 @@ def objects_table(objects: list[ObjectRow], units: Units) -> Table:
     for seen in objects:
         table.add_row(
             seen["model"],
-            length(seen["x"], units),
-            length(seen["y"], units),
+            format_length(seen["x"], units),
+            format_length(seen["y"], units),
             f"{seen['theta'] * 57.29578:.0f}",
             str(seen["support"]),
             f"{seen['score']:.2f}",
@@ -142,7 +130,7 @@ def budget_table(rows: Sequence[BudgetRow], unit: str, units: Units) -> Table:
         table.add_column(f"{heading}\n{of}", justify="right", no_wrap=True)
     for row in rows:
         first_s, lengths = row["first_s"], ((row["way_m"], 2), (row["mean_error"], 4), (row["max_error"], 4))
-        way, mean, worst = ("" if v is None else length(v, units, digits) for v, digits in lengths)
+        way, mean, worst = ("" if v is None else format_length(v, units, digits) for v, digits in lengths)
         first = "" if first_s is None else f"{first_s:.2f}"
         found = f"{row['found']}/{row['drums']}"
         cut = f"{row['cut_short']:.1%}"
@@ -170,7 +158,7 @@ def timing_table(summary: RunSummary) -> Table:
     return table
 
 
-def timing_verdict(summary: RunSummary) -> str:
+def timing_line(summary: RunSummary) -> str:
     """Return how well a run kept its time, and by whose fault it did not, in one line."""
     timing = summary["timing"]
     line = (

@@ -8,18 +8,10 @@ import pytest
 from rich.console import Console
 from rich.table import Table
 
-from runtime.analysis.text_tables import (
-    Units,
-    length,
-    objects_table,
-    place,
-    table_2,
-    timing_table,
-    timing_verdict,
-    verdict,
-)
+from runtime.cli.tables import objects_table, outcome_line, table_2, timing_line, timing_table
 from runtime.cycle.summary import ObjectRow, RunSummary
 from runtime.simulation.evaluation import Outcome
+from runtime.support.length_format import Units, format_length, format_point
 from runtime.timing.cycle_stats import Spread
 from runtime.timing.footprint import FootprintRow
 from runtime.timing.timekeeping import Timing
@@ -44,8 +36,12 @@ def shown(table: Table) -> list[str]:
 
 
 def test_lengths_in_both_units() -> None:
-    assert (length(0.3048, "ft"), length(0.3048, "m"), length(-1.0, "m", 3)) == ("1.00", "0.30", "-1.000")
-    assert place(0.3048, -1.2192, "ft") == "(1.00, -4.00)"
+    assert (format_length(0.3048, "ft"), format_length(0.3048, "m"), format_length(-1.0, "m", 3)) == (
+        "1.00",
+        "0.30",
+        "-1.000",
+    )
+    assert format_point(0.3048, -1.2192, "ft") == "(1.00, -4.00)"
 
 
 @pytest.mark.parametrize(
@@ -63,12 +59,12 @@ def test_table_2(units: Units, truth: str, estimate: str, error: str) -> None:
 
 
 def test_verdict() -> None:
-    assert verdict(OUTCOME, "ft") == (
+    assert outcome_line(OUTCOME, "ft") == (
         "1 of 2 drums found, 1 false, mean error 0.200 ft, max 0.200 ft; 79 times real time; "
         "a cycle takes 0.10 ms, p99 0.31 ms"
     )
     nothing: Outcome = {**OUTCOME, "drums": OUTCOME["drums"][1:], "mean_error": None, "max_error": None}
-    assert verdict(nothing, "m").startswith("0 of 1 drums found, 1 false; 79 times real time; ")
+    assert outcome_line(nothing, "m").startswith("0 of 1 drums found, 1 false; 79 times real time; ")
 
 
 def test_objects() -> None:
@@ -103,9 +99,9 @@ def test_where_the_time_went_and_by_whose_fault() -> None:
     for piece in ("refine", "between cycles: link receive", "an echo waits for its cycle", "p99.9"):
         assert piece in text, piece
     assert text.count("0.17") == text.count("1.25") == text.count("8.00") == text.count("49.65") == 4
-    assert timing_verdict(summary) == (
+    assert timing_line(summary) == (
         "240 cycles, 100% of them with the ring; 7 late, 1 missed, 2 overruns; "
         "by fault of: outside the process (6), callback Recorder.flush (1)"
     )
     timing["faults"] = {}
-    assert timing_verdict(summary).endswith("2 overruns")
+    assert timing_line(summary).endswith("2 overruns")

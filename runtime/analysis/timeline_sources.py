@@ -15,14 +15,14 @@ from config.settings import Settings
 from drivers.messages import Firing
 from drivers.registry import make_driver
 from perception.pipeline import Perception
-from runtime.analysis.timeline import Timeline
-from runtime.analysis.trace import Entered, Marked, Said, Trace
+from runtime.analysis.timeline import BookmarkEntry, LogEntry, ModeEntry, Timeline
+from runtime.analysis.timeline_builder import TimelineBuilder
 from runtime.cycle.step import CycleRecord, State
-from runtime.recording.channels import BOOKMARK, LOG, SERIAL, SUMMARY, Entry, decode
+from runtime.recording.channels import BOOKMARK, LOG, SERIAL, SUMMARY, RawMessage, decode
 from runtime.recording.reader import Recording, RecordingError, is_recording, open_recording
-from runtime.recording.replayer import replay
+from runtime.recording.replayer import verify_recording
 from runtime.recording.ring_log import read_ring_log
-from runtime.recording.ring_log_replay import replay as replay_firings
+from runtime.recording.ring_log_replay import replay_firings
 from runtime.recording.schema import Bookmark, LogLine, RunEnd, SerialBytes
 
 Told = Callable[[], None]
@@ -30,7 +30,7 @@ SAID_MAX: Final = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class TimelineSource:
     """Which file, and what a ring log does not say of itself."""
 
     file: str
@@ -41,12 +41,14 @@ class Asked:
     """What stood there, instead of what a recording knows; coordinates as if the log began at the world's start."""
 
 
-def trace_of(asked: Asked, ready: Callable[[Settings], None], on_step: Told = lambda: None) -> Trace:
-    """Return the trace of a recording or a ring log.
+def load_timeline(
+    source: TimelineSource, ready: Callable[[Settings], None], on_step: Told = lambda: None
+) -> Timeline:
+    """Return the timeline of a recording or a ring log.
 
     Parameters
     ----------
-    asked : Asked
+    source : TimelineSource
         The file, and what goes with it.
     ready : callable
         Gets the settings before perception begins: compiles kernels.
@@ -58,44 +60,44 @@ def trace_of(asked: Asked, ready: Callable[[Settings], None], on_step: Told = la
     UserError
         The file is none that can be read, or holds nothing to show.
     """
-    path = Path(asked.file)
+    path = Path(source.file)
     if not is_recording(path):
-        return _of_ring_log(path, asked, ready, on_step)
-    if asked.sets or asked.robot is not None or asked.models:
+        return _of_ring_log(path, source, ready, on_step)
+    if source.sets or source.robot is not None or source.models:
         raise UserError(
             f"{path}: is a recording and knows its settings; --set, --robot and --model are for ring logs",
             WRONG_CALL,
         )
     with open_recording(path) as recording:
         ready(recording.settings)
-        return _of_recording(recording, asked, on_step)
+        return _of_recording(recording, source, on_step)
 
 
-def _of_recording(recording: Recording, asked: Asked, on_step: Told) -> Trace:
-    world = recording.world if asked.world is None else load_world(asked.world)
-    about = recording.about
-    trace = Trace(recording.path, recording.settings, world, made_by=about.made_by, started=about.started)
-    listener = _Listener(recording, trace, on_step)
-    verdict = replay(recording, on_cycle=listener.on_cycle, on_entry=listener.on_entry)
-    if verdict.cycles == 0:
+def _of_recording(recording: Recording, source: TimelineSource, on_step: Told) -> Timeline:
+    world = recording.world if source.world is None else load_world(source.world)
+    about = recording.info
+    timeline = Timeline(recording.path, recording.settings, world, versions=about.versions, started=about.started)
+    listener = _Listener(recording, timeline, on_step)
+    result = verify_recording(recording, on_cycle=listener.on_cycle, on_message=listener.on_message)
+    if result.cycles == 0:
         raise RecordingError(f"{recording.path}: holds no cycle, or none that can be replayed: nothing to show")
     listener.finish()
-    trace.cycles, trace.stops = verdict.cycles, dict(verdict.refinement)
-    trace.notes += [f"cycles {first} to {last} are missing" for first, last in verdict.missing]
-    trace.notes += [f"at byte {damage.at}: {damage.what}" for damage in recording.damage]
-    if verdict.first is not None:
-        trace.notes.append(f"the replay differs from the run, first in {verdict.first}")
-    return trace
+    timeline.cycles, timeline.stops = result.cycles, dict(result.refinement_stops)
+    timeline.notes += [f"cycles {first} to {last} are missing" for first, last in result.missing]
+    timeline.notes += [f"at byte {damage.at}: {damage.what}" for damage in recording.damage]
+    if result.first_difference is not None:
+        timeline.notes.append(f"the replay differs from the run, first in {result.first_difference}")
+    return timeline
 
 
 class _Listener:
     """Sits in on the replay of a recording."""
 
-    def __init__(self, recording: Recording, trace: Trace, on_step: Told) -> None:
+    def __init__(self, recording: Recording, timeline: Timeline, on_step: Told) -> None:
         self._recording = recording
-        self._trace = trace
+        self._timeline = timeline
         self._on_step = on_step
-        self._gathering = Timeline(trace)
+        self._gathering = TimelineBuilder(timeline)
         self._driver = make_driver(recording.settings)
         self._driver.opened(0.0)
         self._has_bytes = False
@@ -104,7 +106,7 @@ class _Listener:
         self._perception: Perception | None = None
         self._said: list[tuple[float, LogLine]] = []
 
-    def on_entry(self, entry: Entry) -> None:
+    def on_message(self, entry: RawMessage) -> None:
         """Take a message."""
         self._on_step()
         if entry.topic == SERIAL["in"]:
@@ -117,18 +119,20 @@ class _Listener:
         elif entry.topic == BOOKMARK:
             host_s = self._recording.host_s(entry.log_ns)
             t_s = 0.0 if self._begun_s is None else max(0.0, host_s - self._begun_s)
-            self._trace.bookmarks.append(Marked(t_s, decode(Bookmark, entry.data).text, self._gathering.pose))
+            self._timeline.bookmarks.append(
+                BookmarkEntry(t_s, decode(Bookmark, entry.data).text, self._gathering.pose)
+            )
         elif entry.topic == SUMMARY:
-            self._trace.summary = decode(RunEnd, entry.data).summary
+            self._timeline.summary = decode(RunEnd, entry.data).summary
 
     def on_cycle(self, record: CycleRecord, state: State) -> None:
         """Take a cycle, replayed."""
         run_s = record.inputs.run_s
         if self._begun_s is None:
             self._begun_s = run_s
-            self._trace.begun_ns = self._recording.about.unix_minus_host_ns + round(1e9 * run_s)
+            self._timeline.start_unix_ns = self._recording.info.unix_minus_host_ns + round(1e9 * run_s)
         else:
-            self._trace.gaps_s.append(run_s - self._before_s)
+            self._timeline.gaps_s.append(run_s - self._before_s)
         t_s, self._before_s = run_s - self._begun_s, run_s
         if record.inputs.heard.rebooted:
             self._gathering.begin_anew(t_s)
@@ -136,32 +140,32 @@ class _Listener:
             self._gathering.hear(t_s, firing)
         if state.odometry is not None:
             self._gathering.move(t_s, state.odometry)
-        modes, mode = self._trace.modes, record.mode
+        modes, mode = self._timeline.modes, record.mode
         if not modes or (modes[-1].mode, modes[-1].reason) != (mode.mode.value, mode.reason):
-            modes.append(Entered(t_s, mode.mode.value, mode.reason))
+            modes.append(ModeEntry(t_s, mode.mode.value, mode.reason))
         self._perception = state.perception
         self._gathering.pass_by(t_s, state.perception)
 
     def finish(self) -> None:
-        """Close the trace."""
+        """Close the timeline."""
         self._gathering.end(self._perception)
         begun_s = self._begun_s or 0.0
         for host_s, line in self._said:
             more = ", ".join(f"{name} {value}" for name, value in line.fields.items() if name != "settings")
-            self._trace.log.append(
-                Said(host_s - begun_s, line.level, f"{line.event}: {more}" if more else line.event)
+            self._timeline.log.append(
+                LogEntry(host_s - begun_s, line.level, f"{line.event}: {more}" if more else line.event)
             )
         if self._has_bytes:
-            self._trace.counts = self._driver.counts
+            self._timeline.counts = self._driver.counts
 
 
-def _of_ring_log(path: Path, asked: Asked, ready: Callable[[Settings], None], on_step: Told) -> Trace:
-    settings = load_settings(None, asked.sets, robot=asked.robot, models=asked.models)
+def _of_ring_log(path: Path, source: TimelineSource, ready: Callable[[Settings], None], on_step: Told) -> Timeline:
+    settings = load_settings(None, source.sets, robot=source.robot, models=source.models)
     firings = read_ring_log(path, sensors=len(settings.ring.mounts))
     first = next(firings)  # complains about a wrong file before anybody waits for kernels
     ready(settings)
-    trace = Trace(path, settings, None if asked.world is None else load_world(asked.world))
-    gathering = Timeline(trace)
+    timeline = Timeline(path, settings, None if source.world is None else load_world(source.world))
+    gathering = TimelineBuilder(timeline)
     begun_s: list[float] = []
     kept: list[Perception] = []
 
@@ -170,13 +174,13 @@ def _of_ring_log(path: Path, asked: Asked, ready: Callable[[Settings], None], on
         if not begun_s:
             begun_s.append(firing.t_s)
             kept.append(perception)
-        elif trace.cycles:
-            trace.gaps_s.append(firing.t_s - begun_s[0] - trace.seconds)
+        elif timeline.cycles:
+            timeline.gaps_s.append(firing.t_s - begun_s[0] - timeline.seconds)
         t_s = firing.t_s - begun_s[0]
         gathering.hear(t_s, firing)
         gathering.pass_by(t_s, perception)
-        trace.cycles += 1
+        timeline.cycles += 1
 
     replay_firings(settings, itertools.chain((first,), firings), on_firing)
     gathering.end(kept[0] if kept else None)
-    return trace
+    return timeline
