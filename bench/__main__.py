@@ -23,7 +23,7 @@ from bench.waking import figures, waking_table
 from bench.waking import measure as measure_waking
 from config.errors import UserError
 from config.load import load_settings
-from runtime.support.kernel_cache import PARTS, ready_kernels, use_cache
+from runtime.support.kernel_cache import PARTS, prepare_kernels, use_kernel_cache
 
 OURS: Final = (
     Method("echolocate, bayes", ("perception.method=bayes",)),
@@ -64,7 +64,7 @@ def bench(
     only
         Run only the methods whose name contains this text.
     """
-    use_cache()
+    use_kernel_cache()
     from runtime.cycle.summary import write_json
 
     console = Console(stderr=True)
@@ -72,7 +72,7 @@ def bench(
     if repetitions is not None:
         plan = Plan(max(1, repetitions), plan.halls_max, plan.passes)
     settings = load_settings("hallway")
-    ready_kernels(settings, console, PARTS)
+    prepare_kernels(settings, console, PARTS)
     selected = [c for c in candidates(OURS, load_peers()) if only in c.name]
     if not selected:
         console.print(f"bench: no method's name contains {only!r}", markup=False)
@@ -159,13 +159,13 @@ def console(*, json: str = "console.json", seconds: float = 30.0, rounds: int = 
     rounds
         Number of rounds.
     """
-    use_cache()
+    use_kernel_cache()
     from runtime.cycle.summary import write_json
 
     out = Console(stderr=True)
     seconds, rounds = max(5.0, seconds), max(1, rounds)
     try:
-        ready_kernels(load_settings("hallway"), out)
+        prepare_kernels(load_settings("hallway"), out)
         with out.status("bench") as status:
             rows = figures_of(measure_console(seconds, rounds, status.update))
         write_json(json, {"seconds": seconds, "rounds": rounds, "rows": rows})
@@ -207,13 +207,13 @@ def waking(*, json: str = "waking.json", turns: int = WAKING_TURNS, busy: int = 
 
 def _measured(measure: Measure, plan: TimingPlan, sets: tuple[str, ...], json: str, against: str | None) -> int:
     """Run a timing measurement, write its figures as JSON and print its tables; return the exit code."""
-    use_cache()
+    use_kernel_cache()
     from runtime.cycle.summary import write_json
 
     console = Console(stderr=True)
     try:
         earlier = None if against is None else read_earlier(against)
-        ready_kernels(load_settings("hallway"), console)
+        prepare_kernels(load_settings("hallway"), console)
         with console.status("bench") as status:
             result = measure(plan, sets, status.update)
         write_json(json, result.as_json())

@@ -30,7 +30,7 @@ from perception.pipeline import Perception
 from runtime.cycle.driver_io import gather, give
 from runtime.cycle.modes import Mode, Request
 from runtime.cycle.step import Inputs, State, step
-from runtime.support.kernel_cache import ready_kernels
+from runtime.support.kernel_cache import prepare_kernels
 from runtime.timing.memory_policy import MemoryPolicy
 from runtime.timing.phases import Phase
 from runtime.timing.refinement_budget import ProcessorTime
@@ -155,7 +155,7 @@ def main(
 ) -> int:
     """Print the figures of each budget as JSON; exit with 1 if a cycle exceeded its budget and one quantum."""
     settings = load_settings("hallway", ["behaviors.move_ahead.at_end=turn_back"])
-    ready_kernels(settings, Console(stderr=True))
+    prepare_kernels(settings, Console(stderr=True))
     within_limits = True
     for budget in budget_ms:
         drives = [costs_of_drive(settings, cycles, 1e-3 * budget) for _ in range(DRIVES)]

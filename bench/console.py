@@ -110,7 +110,7 @@ def one_turn(folder: Path, seconds: float, count: int) -> Turn:
     summary, frames = folder / "run.json", folder / "frames.json"
     with emulating(folder, ()) as port:
         run = start(
-            folder, "run", "runtime.cli.app", "run", "--headless", "--port", port, "--arm", "--seconds", f"{seconds}",
+            folder, "run", "runtime.cli", "run", "--headless", "--port", port, "--arm", "--seconds", f"{seconds}",
             "--json", str(summary), "--no-record", *DRIVE_ON, "--set", "console.port=0",
         )  # fmt: skip
         page_process: subprocess.Popen[bytes] | None = None

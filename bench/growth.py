@@ -22,7 +22,7 @@ from drivers.emulator.robot_device import GroundTruth
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord
 from runtime.simulation.closed_loop import simulate
-from runtime.support.kernel_cache import compiled_signatures, ready_kernels
+from runtime.support.kernel_cache import compiled_signatures, prepare_kernels
 from runtime.timing.footprint import own_mb
 from runtime.timing.memory_policy import MemoryPolicy
 
@@ -88,7 +88,7 @@ def grow(
 ) -> int:
     """Print the figures as JSON; exit with 1 if the drive grew beyond a limit."""
     settings = load_settings("hallway", ["behaviors.move_ahead.at_end=turn_back"])
-    ready_kernels(settings, Console(stderr=True))
+    prepare_kernels(settings, Console(stderr=True))
     if settings.world is None:
         return FAILED
     memory = MemoryPolicy()

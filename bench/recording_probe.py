@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from runtime.cli.app import main
-from runtime.support.kernel_cache import use_cache
+from runtime.support.kernel_cache import use_kernel_cache
 
 
 class Stopwatch:
@@ -40,7 +40,7 @@ class Stopwatch:
 
 def run(out: Path) -> None:
     """Run the command with the arguments of this process, and write the samples to `out`, one per line."""
-    use_cache()  # before the recorder imports numba
+    use_kernel_cache()  # before the recorder imports numba
     from runtime.recording.recorder import Recorder
 
     stopwatch = Stopwatch()

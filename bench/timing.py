@@ -198,7 +198,7 @@ def _ours(folder: Path, seconds: float, sets: Sequence[str]) -> tuple[dict[str, 
     options = [option for text in sets for option in ("--set", text)]
     with emulating(folder, options) as port:
         run = start(
-            folder, "run", "runtime.cli.app", "run", "--headless", "--port", port, "--arm", "--seconds", f"{seconds}",
+            folder, "run", "runtime.cli", "run", "--headless", "--port", port, "--arm", "--seconds", f"{seconds}",
             "--json", str(summary), *DRIVE_ON, *options,
         )  # fmt: skip
         control = start(folder, "wake", "bench.control", "wake", f"{PERIOD_S}", f"{seconds}", str(late))
@@ -240,7 +240,7 @@ def emulating(folder: Path, options: Sequence[str]) -> Iterator[str]:
     """Run the emulator and yield its port; its latency trace is complete afterwards."""
     port, trace = folder / "robot", folder / "latency.csv"
     process = start(
-        folder, "emulate", "runtime.cli.app", "emulate", "--link", str(port), "--latency", str(trace), *options,
+        folder, "emulate", "runtime.cli", "emulate", "--link", str(port), "--latency", str(trace), *options,
     )  # fmt: skip
     try:
         end_s = time.monotonic() + TIMEOUT_S

@@ -20,10 +20,10 @@ from hypothesis import HealthCheck, settings
 from rich.console import Console
 
 from config.load import load_settings
-from runtime.support.kernel_cache import PARTS, ready_kernels, use_cache
+from runtime.support.kernel_cache import PARTS, prepare_kernels, use_kernel_cache
 from tests import promises
 
-use_cache()
+use_kernel_cache()
 
 TERMINAL = ("COLUMNS", "LINES", "FORCE_COLOR", "NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE", "TTY_COMPATIBLE",
             "TTY_INTERACTIVE", "PY_COLORS", "JUPYTER_COLUMNS", "JUPYTER_LINES")  # fmt: skip
@@ -112,7 +112,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def _compile_all() -> None:
-    ready_kernels(load_settings("hallway"), Console(stderr=True), PARTS)
+    prepare_kernels(load_settings("hallway"), Console(stderr=True), PARTS)
 
 
 @pytest.fixture

@@ -305,7 +305,7 @@ def complain(text: str) -> None:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with 0 done, 1 the work failed, 2 the call or configuration was wrong."""
     try:
-        code = call(sys.argv[1:] if arguments is None else arguments)
+        code = run_command(sys.argv[1:] if arguments is None else arguments)
         sys.stdout.flush()
     except BrokenPipeError:
         # Whoever read has left, as `head` does. Python flushes once more at the end, so that must lead somewhere.
@@ -314,11 +314,11 @@ def main(arguments: list[str] | None = None) -> None:
     sys.exit(code)
 
 
-def call(arguments: list[str]) -> int:
+def run_command(arguments: list[str]) -> int:
     """Run one command and return its exit code; what a user can cause becomes a line on stderr."""
-    from runtime.support.kernel_cache import use_cache
+    from runtime.support.kernel_cache import use_kernel_cache
 
-    use_cache()
+    use_kernel_cache()
     try:
         result = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:

@@ -280,7 +280,7 @@ class RobotProcess:
         if self._observers.on_cycle is not None:
             self._observers.on_cycle(record, self._state, rhythm.books, self._driver)
         if fault is None:
-            self._notifier.well(run_s)
+            self._notifier.alive(run_s)
         mark(Phase.OBSERVERS)
 
     def _note_mode(self) -> None:

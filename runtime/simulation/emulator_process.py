@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from config.errors import FAILED, WRONG_CALL, UserError
-from runtime.support.child_process import start_child
-from runtime.support.temp_folder import run_folder
+from runtime.support.child_process import ECHOLOCATE, start_child
+from runtime.support.temp_folder import temp_folder
 from runtime.timing.run_clock import PacedClock
 from runtime.timing.time_control import EmulatorControl
 
@@ -56,7 +56,7 @@ async def start_emulator(arguments: Sequence[str], clock: PacedClock | None = No
     with contextlib.ExitStack() as stack:
         port = _folder(stack) / "robot"
         words = ["emulate", "--link", str(port), "--end-with-parent", "--control", *arguments]
-        process = await start_child("runtime.cli.app", words, talks=True)
+        process = await start_child(ECHOLOCATE, words, pipes=True)
         listener: asyncio.Task[None] | None = None
         try:
             await _wait_until_ready(process)
@@ -72,7 +72,7 @@ async def start_emulator(arguments: Sequence[str], clock: PacedClock | None = No
 
 def _folder(stack: contextlib.ExitStack) -> Path:
     try:
-        return stack.enter_context(run_folder())
+        return stack.enter_context(temp_folder())
     except OSError as error:
         raise UserError(
             f"no temporary folder can be made for the emulator: {error.strerror or error}; make room, or name "

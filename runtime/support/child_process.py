@@ -1,8 +1,7 @@
-"""Programs of ours beside the robot's process, for work that must never cost a cycle.
+"""Start Python modules in processes of their own, for work that must not cost the control loop any time.
 
-A thread would share the interpreter with the cycle. A process does not; and with a lower precedence it gets what the
-robot's process and its emulator leave. What those were granted (a core of their own, real-time priority) is not
-theirs to inherit.
+A thread would share the interpreter with the loop; a process does not. At low priority it gets only the processor
+time that the robot's process and its emulator leave.
 """
 
 from __future__ import annotations
@@ -10,43 +9,52 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import runpy
 import signal
 import sys
 from collections.abc import Sequence
 from typing import Final
 
-COMMAND: Final = "runtime.support.child_process"
+ECHOLOCATE: Final = "runtime.cli"
+"""The module that is the command `echolocate`."""
+LOW_PRIORITY: Final = "runtime.support.child_process"
+"""This module, run as a program: runs the module named by its first argument at low priority."""
 NICENESS: Final = 10
-"""A tenth of the usual share where there is too little for all."""
+"""About a tenth of the usual share of a busy processor."""
 
 
 def child_environment() -> dict[str, str]:
-    """Return the environment in which another interpreter finds the same modules as this one."""
+    """Return an environment in which another interpreter finds the same modules as this one."""
     return {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
 
 
-async def start_child(program: str, words: Sequence[str], *, talks: bool) -> asyncio.subprocess.Process:
-    """Start a program of ours; whether it steps back is its own affair.
+async def start_child(
+    module: str, arguments: Sequence[str], *, pipes: bool, low_priority: bool = False
+) -> asyncio.subprocess.Process:
+    """Start a module as a program, in a session of its own, and return its process.
 
     Parameters
     ----------
-    program : str
-        Its module; this one is any call of ``echolocate``, stepping back.
-    words : sequence of str
+    module : str
+        The module, as after ``python -m``.
+    arguments : sequence of str
         Its arguments.
-    talks : bool
-        Whether there are pipes to talk through; else there is one for what it complains of.
+    pipes : bool
+        Whether standard input and output are pipes to this process; standard error always is one.
+    low_priority : bool
+        Whether it runs at low priority; see `lower_priority`.
     """
     pipe, nothing = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
+    program = [LOW_PRIORITY, module] if low_priority else [module]
     return await asyncio.create_subprocess_exec(
-        sys.executable, "-m", program, *words,
-        stdin=pipe if talks else nothing, stdout=pipe if talks else nothing, stderr=pipe, start_new_session=True,
+        sys.executable, "-m", *program, *arguments,
+        stdin=pipe if pipes else nothing, stdout=pipe if pipes else nothing, stderr=pipe, start_new_session=True,
         env=child_environment(),
     )  # fmt: skip
 
 
-async def end_child(process: asyncio.subprocess.Process) -> None:
-    """End it now: it holds nothing that could be lost."""
+async def kill_child(process: asyncio.subprocess.Process) -> None:
+    """Kill a process that holds nothing that could be lost, and wait for its end."""
     if process.returncode is None:
         with contextlib.suppress(ProcessLookupError):
             os.kill(process.pid, signal.SIGKILL)
@@ -54,7 +62,10 @@ async def end_child(process: asyncio.subprocess.Process) -> None:
 
 
 def lower_priority() -> None:
-    """Take a place behind everything else on this machine, and off a core that is another's own."""
+    """Lower the priority of this process, and leave a processor that its parent has to itself.
+
+    A process inherits the processor that was reserved for its parent; at low priority it must not use it.
+    """
     with contextlib.suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
     pinned = os.sched_getaffinity(0)
@@ -64,13 +75,12 @@ def lower_priority() -> None:
             os.sched_setaffinity(0, others)
 
 
-def main(words: Sequence[str]) -> int:
-    """Carry out a call of the command, behind everything else."""
-    from runtime.cli.app import call
-
+def main() -> None:
+    """Run the module named by the first argument at low priority, with the arguments after it."""
     lower_priority()
-    return call(list(words))
+    del sys.argv[0]
+    runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    main()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from config.settings import Settings
 
 
-def lint(settings: Settings) -> list[str]:
+def lint_settings(settings: Settings) -> list[str]:
     """Return what an experienced operator would say about these settings, a sentence each."""
     said = []
     blind_m = settings.ring.range_min_m

@@ -114,7 +114,7 @@ class Health:
         """Take note of what callbacks of the loop raise, and of exceptions that nobody waited for."""
         loop = asyncio.get_running_loop()
         before = loop.get_exception_handler()
-        loop.set_exception_handler(self._take_accident)
+        loop.set_exception_handler(self._on_unhandled_error)
         try:
             yield
         finally:
@@ -126,7 +126,7 @@ class Health:
         self._ended[name] = ENDED.format(name, how)
         self._log.error("a part has ended", part=name, how=how, exc_info=error)
 
-    def _take_accident(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    def _on_unhandled_error(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         error, task = context.get("exception"), context.get("future") or context.get("task")
         if isinstance(error, BaseException):
             who = f"task `{task.get_name()}`" if isinstance(task, asyncio.Task) else f"callback `{_culprit(error)}`"

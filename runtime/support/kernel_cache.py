@@ -1,8 +1,8 @@
-"""Where compiled kernels are kept, and compiling them before the robot needs them.
+"""The cache of compiled kernels, and compiling them before the robot needs them.
 
-Numba's own cache sits beside the sources, does not notice a change in another file, and fails where it cannot
-write. So each version of the sources gets a folder of its own, named by their content, in the user's cache; and one
-process compiles everything before a second one starts.
+Numba's own cache lies beside the sources, does not notice a change in another file, and fails where it cannot write.
+So each version of the sources gets a folder of its own in the user's cache, named by a digest of their content, and
+one process compiles everything before the next starts.
 """
 
 from __future__ import annotations
@@ -17,25 +17,28 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from platformdirs import user_cache_path
+
 if TYPE_CHECKING:
     from rich.console import Console
 
     from config.settings import Settings
 
 PACKAGES: Final = ("perception", "perception.paper", "perception.bayes", "drivers.emulator")
-"""Where kernels live."""
+"""Packages that hold kernels."""
 
 PAPER: Final = "paper"
-CIRCLES: Final = "bayes"
+BAYES: Final = "bayes"
 POLYGONS: Final = "polygons"
 EMULATOR: Final = "emulator"
-PARTS: Final = (EMULATOR, CIRCLES, POLYGONS, PAPER)
-"""What is compiled for itself; a file of this name in the cache says that it was done. Methods lend their names."""
+PARTS: Final = (EMULATOR, BAYES, POLYGONS, PAPER)
+"""What is compiled separately: a method by its name, what the Bayesian method needs beyond it for polygons, and the
+emulator. A file with the name of a part in the cache folder says that it is compiled."""
 
 
 def kernels_key() -> str:
-    """Return a digest of everything that compiled kernels depend on: these very sources, Python and numba."""
-    checked = os.environ.get("NUMBA_BOUNDSCHECK", "")  # numba's own key does not hold it
+    """Return a digest of everything that compiled kernels depend on: the sources, Python, numba and numpy."""
+    checked = os.environ.get("NUMBA_BOUNDSCHECK", "")  # not part of numba's own key
     digest = hashlib.sha256(f"{sys.version}{version('numba')}{version('numpy')}{checked}".encode())
     for package in PACKAGES:
         spec = find_spec(package)
@@ -46,12 +49,13 @@ def kernels_key() -> str:
 
 
 def cache_folder() -> Path:
-    """Return the folder for the kernels of these very sources, Python and numba; made if it can be."""
+    """Return a writable folder for the kernels of these sources, created if needed.
+
+    It is in the user's cache; where that cannot be written, in the folder for temporary files.
+    """
     key = kernels_key()
-    mine = f"echolocate-{os.getuid()}"
-    homes = [Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"), Path(tempfile.gettempdir()) / mine]
-    for home in homes:
-        folder = home / "echolocate" / "kernels" / key
+    for base in (user_cache_path("echolocate"), Path(tempfile.gettempdir(), f"echolocate-{os.getuid()}")):
+        folder = base / "kernels" / key
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=folder):
@@ -61,32 +65,30 @@ def cache_folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="echolocate-"))
 
 
-def use_cache() -> Path:
-    """Tell numba where to keep kernels; call it before numba is imported. An existing setting is respected."""
+def use_kernel_cache() -> Path:
+    """Set numba's cache folder, unless the environment names one, and return it; call this before importing numba."""
     return Path(os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder())))
 
 
 def is_interpreted() -> bool:
-    """Tell whether nothing is compiled at all."""
+    """Return whether numba's compiler is switched off."""
     return os.environ.get("NUMBA_DISABLE_JIT", "0") not in {"", "0"}
 
 
-def needed(settings: Settings) -> tuple[str, ...]:
-    """Return the parts that a run with these settings needs: polygons are half the work, and many runs have none."""
-    outlines = any(model.arc_radius_m is None for model in settings.models)
-    polygons = (POLYGONS,) if outlines and settings.perception.method == CIRCLES else ()
+def needed_parts(settings: Settings) -> tuple[str, ...]:
+    """Return the parts that a run needs. Polygons take half of the time to compile, and many runs have none."""
+    has_polygons = any(model.arc_radius_m is None for model in settings.models)
+    polygons = (POLYGONS,) if has_polygons and settings.perception.method == BAYES else ()
     return (EMULATOR, settings.perception.method, *polygons)
 
 
-def missing(folder: Path, parts: Iterable[str]) -> list[str]:
-    """Return those of the parts that were never compiled into `folder`."""
+def uncompiled_parts(folder: Path, parts: Iterable[str]) -> list[str]:
+    """Return those parts that are not yet compiled in the cache folder."""
     return [part for part in parts if not (folder / part).exists()]
 
 
 def warm_up(settings: Settings, parts: Iterable[str]) -> None:
-    """Run every kernel of these parts once, so that none is compiled later.
-
-    What a person does by hand is done as well: a first edit must not hold up a cycle.
+    """Run every kernel of these parts once, the operator's edits included, so that no cycle compiles or loads one.
 
     Parameters
     ----------
@@ -95,18 +97,18 @@ def warm_up(settings: Settings, parts: Iterable[str]) -> None:
     parts : iterable of str
         Of `PARTS`.
     """
-    from runtime.support import kernel_warmup as warming
+    from runtime.support import kernel_warmup
 
     for part in parts:
-        warming.RUN_ONCE[part](settings)
+        kernel_warmup.RUN_ONCE[part](settings)
 
 
 def compiled_signatures() -> int:
-    """Return how many signatures of our kernels are compiled or loaded by now: a drive must not add to them."""
+    """Return how many kernel signatures this process has compiled or loaded; a drive must not add to them."""
     dispatchers = sys.modules.get("numba.core.dispatcher")
     if dispatchers is None:
         return 0
-    # One kernel imported by several modules is the same object in all of them.
+    # A kernel imported by several modules is one object.
     kernels = {
         id(value): value
         for name, module in list(sys.modules.items())
@@ -117,41 +119,51 @@ def compiled_signatures() -> int:
     return sum(len(kernel.overloads) for kernel in kernels.values())
 
 
-def ready_kernels(settings: Settings, console: Console, parts: Iterable[str] | None = None) -> None:
-    """Have every kernel compiled, or say that it takes a while and compile it.
+def prepare_kernels(settings: Settings, console: Console, parts: Iterable[str] | None = None) -> None:
+    """Load every kernel, and first compile those that never were, with a notice that this takes a while.
 
     Parameters
     ----------
     settings : Settings
         Ring, models and constants of the run.
     console : Console
-        Where to say so.
+        Where the notice is shown.
     parts : iterable of str, optional
-        Of `PARTS`; what a run with these settings needs where not given.
+        Of `PARTS`; by default those that a run with these settings needs.
     """
-    folder = use_cache()
+    folder = use_kernel_cache()
     if is_interpreted():
         return
-    parts = needed(settings) if parts is None else tuple(parts)
-    absent = missing(folder, parts)
-    if not absent:
+    parts = needed_parts(settings) if parts is None else tuple(parts)
+    uncompiled = uncompiled_parts(folder, parts)
+    if not uncompiled:
         warm_up(settings, (part for part in parts if part != EMULATOR))
         return
     with console.status("compiling kernels; this happens once"):
-        compile_parts(settings, folder, absent)
-        warm_up(settings, (part for part in parts if part not in {*absent, EMULATOR}))
+        compile_parts(settings, folder, uncompiled)
+        warm_up(settings, (part for part in parts if part not in {*uncompiled, EMULATOR}))
 
 
 def compile_parts(settings: Settings, folder: Path, parts: Sequence[str]) -> None:
-    """Compile these parts into `folder`, two at a time where there are two processors, and note that it was done."""
-    from runtime.support import kernel_warmup as warming
+    """Compile these parts and mark them as compiled, in two processes where there are two processors.
 
-    if CIRCLES in parts and (os.cpu_count() or 1) > 1:
-        # What another process compiled meanwhile is found in the cache; what begins first depends on nothing of it.
-        with warming.helper(POLYGONS if POLYGONS in parts else CIRCLES):
-            warming.hear(settings)
+    Parameters
+    ----------
+    settings : Settings
+        Ring, models and constants of the run.
+    folder : Path
+        The cache folder.
+    parts : sequence of str
+        Of `PARTS`.
+    """
+    from runtime.support import kernel_warmup
+
+    if BAYES in parts and (os.cpu_count() or 1) > 1:
+        # What the other process compiles is in the cache afterwards; this one starts with what shares none of it.
+        with kernel_warmup.compile_in_parallel(POLYGONS if POLYGONS in parts else BAYES):
+            kernel_warmup.observe_once(settings)
             if POLYGONS in parts:
-                warming.RUN_ONCE[CIRCLES](settings)
+                kernel_warmup.RUN_ONCE[BAYES](settings)
     warm_up(settings, parts)
     for part in parts:
         (folder / part).touch()

@@ -1,8 +1,8 @@
-"""Running every kernel once, part by part: what was never compiled is compiled then, what was is loaded.
+"""Run every kernel once, part by part: this compiles a kernel that was never compiled, and loads one that was.
 
-Two processes that compile the same kernel do the same work twice, so a helper takes a part that the first process
-comes to last: `python -m runtime.support.kernel_warmup bayes` compiles the refinement of circles, `… polygons` that of polygons,
-`… polygons whole` all that belongs to polygons, for a robot that drives meanwhile.
+Two processes that compile the same kernel do the same work twice. So the second process takes what the first one
+comes to last: `python -m runtime.support.kernel_warmup bayes` compiles the refinement of circles, `… polygons` that
+of polygons, and `… polygons whole` everything that polygons need, for a robot that is driving.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
-from runtime.support.child_process import child_environment, lower_priority
-from runtime.support.kernel_cache import CIRCLES, EMULATOR, PAPER, POLYGONS, compile_parts, use_cache
+from runtime.support.child_process import child_environment
+from runtime.support.kernel_cache import BAYES, EMULATOR, PAPER, POLYGONS, compile_parts, use_kernel_cache
 
 if TYPE_CHECKING:
     from config.model import ModelConfig
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from perception.pipeline import Perception
 
 FIRINGS: Final = 24
-"""So many, past a wall, leave nothing out."""
-HELP_MAX_S: Final = 300.0
-"""A helper slower than this is no help."""
+"""Firings past a wall that between them run every kernel."""
+PARALLEL_MAX_S: Final = 300.0
+"""Time limit for the second process."""
 
 
 def _perception(settings: Settings, method: str, models: Sequence[ModelConfig]) -> Perception:
@@ -57,8 +57,8 @@ def _square() -> ModelConfig:
     return ModelConfig(name="warm-up", closed=True, vertices_m=corners)
 
 
-def _edited(settings: Settings, method: str, models: Sequence[ModelConfig]) -> None:
-    """Drive past a wall, then do every kind of edit with each model: a person's first must not hold up a cycle."""
+def _drive_and_edit(settings: Settings, method: str, models: Sequence[ModelConfig]) -> None:
+    """Drive past a wall, then do every kind of edit with each model: the operator's first must not delay a cycle."""
     from perception.edits import (
         ClearMap,
         ConfirmObject,
@@ -72,9 +72,7 @@ def _edited(settings: Settings, method: str, models: Sequence[ModelConfig]) -> N
 
     perception = _perception(settings, method, models)
     _drive(settings, perception)
-    ClusterView(settings.perception).rows(
-        perception.segments().geometry
-    )  # of every method's map the console shows them
+    ClusterView(settings.perception).rows(perception.segments().geometry)  # the console shows them for either method
     numbers = tuple(perception.segments().numbers[:2].tolist())
     perception.edit(PinSegments(numbers, pinned=True))
     for model in models:
@@ -90,21 +88,21 @@ def _edited(settings: Settings, method: str, models: Sequence[ModelConfig]) -> N
     perception.edit(ClearMap())
 
 
-def hear(settings: Settings) -> None:
-    """Take in one firing and refine nothing."""
-    _drive(settings, _perception(settings, CIRCLES, settings.models), 1)
+def observe_once(settings: Settings) -> None:
+    """Observe one firing without refinement."""
+    _drive(settings, _perception(settings, BAYES, settings.models), 1)
 
 
 def _circles(settings: Settings) -> None:
-    _edited(settings, CIRCLES, settings.models)
+    _drive_and_edit(settings, BAYES, settings.models)
 
 
 def _polygons(settings: Settings) -> None:
-    _edited(settings, CIRCLES, (*settings.models, _square()))
+    _drive_and_edit(settings, BAYES, (*settings.models, _square()))
 
 
 def _paper(settings: Settings) -> None:
-    _edited(settings, PAPER, (*settings.models, _square()))
+    _drive_and_edit(settings, PAPER, (*settings.models, _square()))
 
 
 def _emulator(settings: Settings) -> None:
@@ -122,31 +120,31 @@ def _emulator(settings: Settings) -> None:
 
 
 RUN_ONCE: Final[Mapping[str, Callable[[Settings], None]]] = MappingProxyType(
-    {EMULATOR: _emulator, CIRCLES: _circles, POLYGONS: _polygons, PAPER: _paper}
+    {EMULATOR: _emulator, BAYES: _circles, POLYGONS: _polygons, PAPER: _paper}
 )
-"""How each part is run once."""
+"""Runs each part once."""
 
 
 @contextlib.contextmanager
-def helper(part: str) -> Iterator[None]:
-    """Have another process compile the refinement of `part` meanwhile; wait for it at the end."""
-    quiet = subprocess.DEVNULL
+def compile_in_parallel(part: str) -> Iterator[None]:
+    """Compile the refinement of `part` in another process meanwhile, and wait for it at the end."""
+    null = subprocess.DEVNULL
     process = subprocess.Popen(  # noqa: S603 - this very program
-        [sys.executable, "-m", "runtime.support.kernel_warmup", part], stdin=quiet, stdout=quiet, stderr=quiet,
+        [sys.executable, "-m", "runtime.support.kernel_warmup", part], stdin=null, stdout=null, stderr=null,
         env=child_environment(),
     )  # fmt: skip
     try:
         yield
-        # Whatever became of it, what is missing is compiled by whoever needs it.
+        # If it failed, this process compiles what is missing.
         with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(HELP_MAX_S)
+            process.wait(PARALLEL_MAX_S)
     finally:
         process.kill()
         process.wait()
 
 
-def help_with(part: str) -> None:
-    """Compile a part's refinement, on a memory in which nothing waits for it."""
+def compile_refinement(part: str) -> None:
+    """Compile the refinement of a part by a call on an empty state, which does nothing."""
     from config.load import load_settings
     from perception.bayes.entry import hold, pquantum, quantum
     from perception.bayes.kernel_settings import make_settings
@@ -156,18 +154,17 @@ def help_with(part: str) -> None:
     bayes = settings.perception.bayes
     told = make_settings(settings.ring, settings.models, bayes)
     handle = hold(make_state(len(settings.ring.mounts), told, bayes.tracks_max), told)
-    refine = {CIRCLES: quantum, POLYGONS: pquantum}[part]
+    refine = {BAYES: quantum, POLYGONS: pquantum}[part]
     refine(handle, bayes.fresh_share)
 
 
-def compile_whole(part: str) -> None:
-    """Compile a part for others, in whose way this process is not to be."""
+def compile_part(part: str) -> None:
+    """Compile all kernels of a part."""
     from config.load import load_settings
 
-    lower_priority()
-    compile_parts(load_settings(None), use_cache(), [part])
+    compile_parts(load_settings(None), use_kernel_cache(), [part])
 
 
 if __name__ == "__main__":
-    use_cache()
-    (compile_whole if sys.argv[2:] == ["whole"] else help_with)(sys.argv[1])
+    use_kernel_cache()
+    (compile_part if sys.argv[2:] == ["whole"] else compile_refinement)(sys.argv[1])

@@ -58,13 +58,13 @@ class SdNotifier:
         address = environment.get("NOTIFY_SOCKET")
         return cls(address if address and address[0] in "/@" else None, watchdog_s or None)
 
-    def well(self, now_s: float) -> None:
-        """Tell that all is well at `now_s`: at first that the service is ready, from then on to the watchdog."""
+    def alive(self, host_s: float) -> None:
+        """Tell that all is well at `host_s`: at first that the service is ready, from then on to the watchdog."""
         if not self._is_ready:
             self._is_ready = True
             self._tell("READY=1")
-        if self._every_s is not None and now_s - self._fed_s >= self._every_s:
-            self._fed_s = now_s
+        if self._every_s is not None and host_s - self._fed_s >= self._every_s:
+            self._fed_s = host_s
             self._tell("WATCHDOG=1")
 
     def status(self, text: str) -> None:

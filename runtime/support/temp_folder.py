@@ -24,7 +24,7 @@ YOUNG_S: Final = 60.0
 
 
 @contextlib.contextmanager
-def run_folder() -> Iterator[Path]:
+def temp_folder() -> Iterator[Path]:
     """Give a fresh folder in the system's temporary place that only this user can enter.
 
     Raises

@@ -84,7 +84,7 @@ class Running:
 @contextlib.contextmanager
 def running(folder: Path, name: str, *arguments: str) -> Iterator[Running]:
     """Run `echolocate` with `arguments`; whatever is left of it at the end is killed."""
-    command = [sys.executable, "-m", "runtime.cli.app", *arguments]
+    command = [sys.executable, "-m", "runtime.cli", *arguments]
     if arguments[0] == "run":
         command += ["--headless", "--set", f"log.file={json.dumps(str(folder / f'{name}.jsonl'))}"]
     with (folder / f"{name}.out").open("wb") as out, (folder / f"{name}.err").open("wb") as err:

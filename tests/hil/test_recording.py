@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from config.errors import DONE, FAILED
-from runtime.cli.app import call
+from runtime.cli.app import run_command
 from runtime.recording.channels import CYCLE, KEYFRAME, LOG, SERIAL, decode
 from runtime.recording.reader import open_recording
 from runtime.recording.schema import Cycle, LogLine, RunInfo, SerialBytes
@@ -43,7 +43,7 @@ def record(folder: Path, seconds: float, *more: str) -> dict[str, Any]:
 def verify(path: Path, *more: str) -> dict[str, Any]:
     """Replay a recording, fail where anything differs, and return the summary."""
     summary = path.with_suffix(".json")
-    assert call(["replay", str(path), "--verify", "--json", str(summary), *more]) == DONE
+    assert run_command(["replay", str(path), "--verify", "--json", str(summary), *more]) == DONE
     got: dict[str, Any] = json.loads(summary.read_bytes())
     assert got["verify"]["differences"] == 0
     return got
@@ -118,7 +118,7 @@ def check_killed(folder: Path, name: str, after_s: float) -> float:
     """Kill a run, restore its recording, replay it; return how much was lost, s."""
     path, killed_s = killed(folder, name, after_s)
     restored = path.with_name(f"{path.stem}-recovered.mcap")
-    assert call(["recover", str(path)]) == DONE
+    assert run_command(["recover", str(path)]) == DONE
     got = verify(restored)
     cycles = [entry for entry in entries_of(restored) if entry.topic == CYCLE]
     assert got["cycles"] == len(cycles)

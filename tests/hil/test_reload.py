@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from config.errors import DONE
-from runtime.cli.app import call
+from runtime.cli.app import run_command
 from runtime.recording.channels import SETTINGS
 from runtime.recording.reader import open_recording
 from tests.hil.machine import stalls_excused
@@ -60,6 +60,6 @@ def test_a_configuration_reloaded_while_driving(tmp_path: Path) -> None:
         run.signal(signal.SIGTERM)
         assert run.end() == 0
     assert sum(entry.topic == SETTINGS for entry in entries_of(recorded)) == 1
-    assert call(["replay", str(recorded), "--verify"]) == DONE
+    assert run_command(["replay", str(recorded), "--verify"]) == DONE
     with open_recording(recorded) as recording:
         assert recording.world is None, "on a port that was given nobody knows what stands there"

@@ -109,7 +109,7 @@ def test_nobody_to_tell() -> None:
         SdNotifier.from_environment({"NOTIFY_SOCKET": "host:9"}),
     ):
         with notifier:
-            notifier.well(1.0)
+            notifier.alive(1.0)
             notifier.status("DRIVE")
             notifier.stopping()
         assert notifier.lost == 0
@@ -119,18 +119,18 @@ def test_a_manager_that_is_gone_or_full_holds_up_nobody(tmp_path: Path) -> None:
     path = str(tmp_path / "notify")
     environment = {"NOTIFY_SOCKET": path, "WATCHDOG_USEC": "400000", "WATCHDOG_PID": str(os.getpid())}
     with SdNotifier.from_environment(environment) as notifier:
-        notifier.well(0.0)
+        notifier.alive(0.0)
         assert notifier.lost == 2, "READY and WATCHDOG"
         assert notifier.trouble is not None
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as ears:
             ears.bind(path)
             for k in range(10_000):
-                notifier.well(1.0 + k)
+                notifier.alive(1.0 + k)
                 if notifier.lost > 2:
                     break
             assert notifier.lost == 3, "full, and nobody waited"
             assert ears.recv(100) == b"WATCHDOG=1"
-            notifier.well(1e6)
+            notifier.alive(1e6)
             assert notifier.lost == 3, "and there is room again"
 
 
@@ -148,7 +148,7 @@ def test_the_watchdog_is_fed_in_time_and_no_more(tmp_path: Path) -> None:
 
         with SdNotifier(path, 2.0) as notifier:
             for cycle in range(200):
-                notifier.well(0.05 * cycle)
+                notifier.alive(0.05 * cycle)
                 hear()
             for _ in range(2):
                 notifier.status("SAFE_STOP: " + "x\ny " * STATUS_MAX)
@@ -163,12 +163,12 @@ def test_the_watchdog_is_fed_in_time_and_no_more(tmp_path: Path) -> None:
 def test_another_processs_watchdog_is_not_ours() -> None:
     other = {"NOTIFY_SOCKET": "@nobody", "WATCHDOG_USEC": "1000000", "WATCHDOG_PID": str(os.getpid() + 1)}
     with SdNotifier.from_environment(other) as notifier:
-        notifier.well(0.0)
+        notifier.alive(0.0)
         assert notifier.lost == 1, "READY alone"
 
 
 def service(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "runtime.cli.app", "service", *arguments]
+    command = [sys.executable, "-m", "runtime.cli", "service", *arguments]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)
 
 

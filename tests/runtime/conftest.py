@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from config.errors import DONE
-from runtime.cli.app import call
+from runtime.cli.app import run_command
 from tests.recorded import SECONDS, hall, record
 
 
@@ -30,5 +30,5 @@ def hall_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def hall_log(hall_run: Path) -> Path:
     path = hall_run.with_suffix(".csv")
-    assert call(["export", str(hall_run), "--to", "ringlog", "--out", str(path)]) == DONE
+    assert run_command(["export", str(hall_run), "--to", "ringlog", "--out", str(path)]) == DONE
     return path

@@ -17,7 +17,7 @@ import pytest
 
 from config.errors import DONE, WRONG_CALL
 from config.load import load_settings
-from runtime.cli.app import call
+from runtime.cli.app import run_command
 from runtime.cycle.step import CycleRecord
 from runtime.simulation.budget_sweep import BudgetRow, drive, long_hall_settings
 from runtime.simulation.closed_loop import simulate
@@ -140,7 +140,7 @@ def test_and_they_are_never_worse_in_the_end(sweep: dict[float, BudgetRow]) -> N
 @pytest.mark.compiled
 def test_one_command_prints_the_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "budgets.json"
-    assert call(["experiment", "budget", "--budget-ms", "0.3", "5", "--json", str(path)]) == DONE
+    assert run_command(["experiment", "budget", "--budget-ms", "0.3", "5", "--json", str(path)]) == DONE
     got: dict[str, Any] = json.loads(path.read_bytes())
     assert [row["budget"] for row in got["budgets"]] == [0.3, 5.0]
     assert got["unit"] == "ms"
@@ -152,7 +152,7 @@ def test_one_command_prints_the_table(tmp_path: Path, capsys: pytest.CaptureFixt
     "words", [["--budget-ms", "-1"], ["--seeds", "0"], ["--scene", "clean"], ["--world", "hallway"]]
 )
 def test_a_sweep_that_makes_no_sense_is_refused(words: list[str]) -> None:
-    assert call(["experiment", "budget", *words]) == WRONG_CALL
+    assert run_command(["experiment", "budget", *words]) == WRONG_CALL
 
 
 @pytest.mark.realtime

@@ -12,7 +12,7 @@ from rich.progress import track
 
 from config.errors import DONE, WRONG_CALL, UserError
 from config.load import load_settings
-from runtime.support.kernel_cache import ready_kernels
+from runtime.support.kernel_cache import prepare_kernels
 
 if TYPE_CHECKING:
     from runtime.support.length_format import Units
@@ -36,7 +36,7 @@ def run_budgets(
         raise UserError("--budget-ms, --quanta: must be 0 or above", WRONG_CALL)
     settings = load_settings("irregular", sets, models=models)
     console = Console(stderr=True)
-    ready_kernels(settings, console)
+    prepare_kernels(settings, console)
     from runtime.cli.tables import budget_table
     from runtime.cycle.summary import write_json
     from runtime.simulation.budget_sweep import drive, long_hall_settings

@@ -9,7 +9,7 @@ from config.errors import DONE
 from config.load import load_any
 from config.settings import Settings
 from runtime.cli.commands.firing_check import refuse_impossible_firing
-from runtime.support.config_lint import lint
+from runtime.support.config_lint import lint_settings
 
 
 def check_config(config: str, sets: Sequence[str]) -> int:
@@ -25,7 +25,7 @@ def check_config(config: str, sets: Sequence[str]) -> int:
     settings = load_any(config, sets)
     if isinstance(settings, Settings):
         refuse_impossible_firing(settings)
-        for text in lint(settings):
+        for text in lint_settings(settings):
             sys.stdout.write(f"{config}: {text}\n")
     sys.stdout.write(f"{config}: good\n")
     return DONE

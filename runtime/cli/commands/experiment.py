@@ -16,7 +16,7 @@ from runtime.cli.commands.firing_check import refuse_impossible_firing
 from runtime.cli.commands.offline_io import folder, read
 from runtime.cli.tables import boxes_table, outcome_line, scene_line, spread_line, table_2
 from runtime.simulation.scene_names import SceneName
-from runtime.support.kernel_cache import ready_kernels
+from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.length_format import Units
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def run_experiment(
         raise UserError("the world holds no drum: the experiment sets drums seen against drums there", WRONG_CALL)
     refuse_impossible_firing(settings)
     console = Console(stderr=True)
-    ready_kernels(settings, console)
+    prepare_kernels(settings, console)
     from runtime.cycle.summary import write_json
     from runtime.simulation.evaluation import run_seed, summarise
 
@@ -130,7 +130,7 @@ def run_scenes(
     _refuse_no_seeds(seeds)
     settings = load_settings("hallway", sets, models=models)
     console = Console(stderr=True)
-    ready_kernels(settings, console)
+    prepare_kernels(settings, console)
     from runtime.cycle.summary import write_json
     from runtime.simulation.open_loop import run_scene, summarise_scene
 

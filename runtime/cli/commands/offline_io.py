@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from config.errors import FAILED, WRONG_CALL, UserError
-from runtime.support.kernel_cache import ready_kernels
+from runtime.support.kernel_cache import prepare_kernels
 
 if TYPE_CHECKING:
     from runtime.analysis.timeline import Timeline
@@ -37,7 +37,7 @@ def read(source: TimelineSource, console: Console) -> Timeline:
     from runtime.analysis.timeline_sources import load_timeline
 
     with progress(console, "reading") as step:
-        timeline = load_timeline(source, lambda settings: ready_kernels(settings, console), step)
+        timeline = load_timeline(source, lambda settings: prepare_kernels(settings, console), step)
     if timeline.last is None:
         raise UserError(f"{source.file}: holds no echo and no odometry: nothing to show", FAILED)
     return timeline

@@ -17,7 +17,7 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings, override_settings
 from runtime.cli.tables import objects_table
 from runtime.cycle.summary import ReplaySummary, object_row, write_json
-from runtime.support.kernel_cache import ready_kernels
+from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.length_format import Units, format_length
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def rerun(
     from runtime.recording.recorder import software_versions
     from runtime.recording.replayer import verify_recording
 
-    ready_kernels(recording.settings, console)
+    prepare_kernels(recording.settings, console)
     now, then = software_versions(), recording.info.versions
     others = [f"{name} {then.get(name)} → {now[name]}" for name in now if then.get(name) != now[name]]
     if others:
@@ -216,7 +216,7 @@ def tell_other(recording: Recording, settings: Settings, console: Console, units
     """Replay with the recorded settings and with others, and say what is different."""
     from runtime.analysis.comparison import compare_runs
 
-    ready_kernels(settings, console)
+    prepare_kernels(settings, console)
     with progress(console) as on_message:
         told = compare_runs(recording, settings, on_message)
     out = Console(soft_wrap=True, highlight=False)

@@ -13,7 +13,7 @@ from config.errors import DONE
 from config.load import load_settings
 from runtime.cli.tables import objects_table
 from runtime.cycle.summary import write_json
-from runtime.support.kernel_cache import ready_kernels
+from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.length_format import Units
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def replay_log(
     """Carry out the command; see `runtime.cli.app.replay`."""
     settings = load_settings(None, sets, robot=robot, models=models)
     console = Console(stderr=True)
-    ready_kernels(settings, console)
+    prepare_kernels(settings, console)
     from runtime.recording.ring_log import read_ring_log
     from runtime.recording.ring_log_replay import replay_firings
 

@@ -19,9 +19,9 @@ from runtime import VERSION
 from runtime.cli.commands.firing_check import refuse_impossible_firing
 from runtime.cli.commands.run_recording import RunRecording, kept
 from runtime.cli.tables import objects_table, timing_line, timing_table
-from runtime.support.config_lint import lint
+from runtime.support.config_lint import lint_settings
 from runtime.support.file_lock import file_lock
-from runtime.support.kernel_cache import ready_kernels
+from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.length_format import Units
 from runtime.support.logs import LogStatus, open_log
 from runtime.support.sd_notify import SdNotifier
@@ -89,7 +89,7 @@ def run_robot(
         settings = on_port(settings, port)
     refuse_unwritable({"--record": record, "--json": json_file})
     console = Console(stderr=True)
-    ready_kernels(settings, console)
+    prepare_kernels(settings, console)
     live = not headless and console.is_terminal and not console.is_dumb_terminal
     lines = LogStatus()
     with contextlib.ExitStack() as stack:
@@ -99,7 +99,7 @@ def run_robot(
         keeping = stack.enter_context(kept(settings, record, no_record=no_record, emulated=port is None, clock=clock))
         log = stack.enter_context(open_log(settings.log, terminal=not live, listener=keeping.on_log, status=lines))
         log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
-        for text in lint(settings):
+        for text in lint_settings(settings):
             log.warning(text)
 
         async def whole() -> RunSummary:

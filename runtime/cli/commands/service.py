@@ -86,7 +86,7 @@ def unit(words: Sequence[str], port: str, user: str | None) -> str:
 def command(config: str | None, sets: Sequence[str], port: str) -> list[str]:
     """Return the command that the service runs: never with --arm."""
     installed = Path(sys.executable).with_name("echolocate")
-    program = [str(installed)] if installed.exists() else [sys.executable, "-m", "runtime.cli.app"]
+    program = [str(installed)] if installed.exists() else [sys.executable, "-m", "runtime.cli"]
     # A shipped run is a name; a file must be found from any folder.
     named = [] if config is None else [str(Path(config).resolve()) if Path(config).exists() else config]
     overrides = [word for text in sets for word in ("--set", text)]

@@ -22,7 +22,7 @@ from runtime.console.frames.frame_encoder import EncodedFrame
 from runtime.console.playback.replay_worker import ANSWER, HEADER, SPEED_MAX, SPEED_MIN
 from runtime.console.protocols import Viewer
 from runtime.recording.storage import find_recording, list_recordings
-from runtime.support.child_process import COMMAND, end_child, start_child
+from runtime.support.child_process import ECHOLOCATE, kill_child, start_child
 from runtime.support.length_format import Units
 
 WORKERS_MAX: Final = 3
@@ -108,7 +108,7 @@ class ReplayProcess:
         if self._listener is not None:
             self._listener.cancel()
             await asyncio.gather(self._listener, return_exceptions=True)
-        await end_child(self._process)
+        await kill_child(self._process)
 
     async def _listen(self) -> None:
         with contextlib.suppress(asyncio.IncompleteReadError, OSError):
@@ -180,7 +180,7 @@ class ReplayClient:
             raise ReplayError(f"{WORKERS_MAX} recordings are open already, by other pages: have one closed first")
         self._opening += 1
         try:
-            process = await start_child(self._program, [str(path)], talks=True)
+            process = await start_child(self._program, [str(path)], pipes=True, low_priority=True)
             playing = ReplayProcess(process, lambda frame: self._pass_on(viewer, frame), viewer.say)
             about = await playing.begin()
         finally:
@@ -269,7 +269,7 @@ async def report_of(file: Path, units: Units, patience_s: float = REPORT_MAX_S) 
     with tempfile.TemporaryDirectory(prefix="echolocate-") as folder:
         target = Path(folder) / f"{file.stem}.html"
         process = await start_child(
-            COMMAND, ["report", str(file), "--out", str(target), "--units", units], talks=False
+            ECHOLOCATE, ["report", str(file), "--out", str(target), "--units", units], pipes=False, low_priority=True
         )
         try:
             async with asyncio.timeout(patience_s):
@@ -279,7 +279,7 @@ async def report_of(file: Path, units: Units, patience_s: float = REPORT_MAX_S) 
                 f"the report was not done within {patience_s:.0f} s: make it later, by `echolocate report {file}`"
             ) from None
         finally:
-            await end_child(process)
+            await kill_child(process)
         if process.returncode:
             last = words.decode(errors="replace").strip().rpartition("\n")[2]
             raise ReplayError(f"no report: {last.removeprefix('echolocate: ') or 'its process has ended'}")

@@ -22,7 +22,6 @@ from config.settings import Settings
 from runtime.console.playback.replay_cursor import ReplayCursor, Shown
 from runtime.cycle.step import CycleRecord
 from runtime.recording.reader import RecordingError, open_recording, parse_settings
-from runtime.support.child_process import lower_priority
 
 FRAME_S: Final = 0.05
 """Frames are no closer than this, however fast it goes."""
@@ -222,7 +221,6 @@ def play(file: str, make: Make) -> int:
     make : Make
         Makes builders.
     """
-    lower_priority()
     try:
         with open_recording(Path(file)) as recording:
             playback = ReplayCursor(recording)

@@ -12,7 +12,7 @@ import pytest
 
 from config.errors import DONE, FAILED, WRONG_CALL
 from config.load import list_shipped
-from runtime.cli.app import call, main
+from runtime.cli.app import main, run_command
 
 ROOT = Path(__file__).parents[3]
 HEADER = "t,x,y,theta," + ",".join(f"r{i:02d}" for i in range(24))
@@ -123,7 +123,7 @@ WRONG: list[tuple[list[str], str]] = [
 
 @pytest.mark.parametrize(("arguments", "culprit"), WRONG, ids=[" ".join(row[0]) for row in WRONG])
 def test_a_wrong_call(arguments: list[str], culprit: str, capfd: pytest.CaptureFixture[str]) -> None:
-    assert call(arguments) == WRONG_CALL
+    assert run_command(arguments) == WRONG_CALL
     captured = capfd.readouterr()
     assert captured.out == ""
     (line,) = complaints(captured.err)
@@ -132,7 +132,7 @@ def test_a_wrong_call(arguments: list[str], culprit: str, capfd: pytest.CaptureF
 
 def test_each_problem_has_a_line_of_its_own(capfd: pytest.CaptureFixture[str]) -> None:
     sets = ["--set", "cycle.rate_hz=0", "--set", "ring.beam_half_angle_deg=wide", "--set", "nowhere.x=1"]
-    assert call(["check", "hallway", *sets]) == WRONG_CALL
+    assert run_command(["check", "hallway", *sets]) == WRONG_CALL
     lines = complaints(capfd.readouterr().err)
     assert len(lines) == len({*lines}) >= 2
     assert not [line for line in lines if sum(word in line for word in ("rate_hz", "half_angle", "nowhere")) != 1]
@@ -155,7 +155,7 @@ FAILING: list[tuple[list[str], str]] = [
 
 @pytest.mark.parametrize(("arguments", "culprit"), FAILING, ids=[" ".join(row[0]) for row in FAILING])
 def test_work_that_failed(arguments: list[str], culprit: str, capfd: pytest.CaptureFixture[str]) -> None:
-    assert call(arguments) == FAILED
+    assert run_command(arguments) == FAILED
     (line,) = complaints(capfd.readouterr().err)
     assert culprit in line
     assert Path("regular").read_bytes() == b""
@@ -163,7 +163,7 @@ def test_work_that_failed(arguments: list[str], culprit: str, capfd: pytest.Capt
 
 @pytest.mark.parametrize("arguments", [["--help"], ["-h"], [], ["run", "--help"], ["experiment", "--help"]])
 def test_help(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert call(arguments) == DONE
+    assert run_command(arguments) == DONE
     captured = capsys.readouterr()
     assert "Usage: echolocate" in captured.out
     assert captured.err == ""
@@ -178,14 +178,14 @@ def test_help_tells_every_option_of_the_public_surface(capsys: pytest.CaptureFix
         "check": ["CONFIG"],
     }
     for command, words in surface.items():
-        assert call([command, "--help"]) == DONE
+        assert run_command([command, "--help"]) == DONE
         text = capsys.readouterr().out
         for word in words:
             assert word in text, (command, word)
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
-    assert call(["--version"]) == DONE
+    assert run_command(["--version"]) == DONE
     assert re.fullmatch(r"\d+\.\d+\.\d+\n", capsys.readouterr().out)
 
 
@@ -194,18 +194,18 @@ SHIPPED = sorted(path for path in (ROOT / "config").rglob("*.toml"))
 
 @pytest.mark.parametrize("path", SHIPPED, ids=[f"{path.parent.name}/{path.name}" for path in SHIPPED])
 def test_every_shipped_file_is_good(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert call(["check", str(path)]) == DONE
+    assert run_command(["check", str(path)]) == DONE
     assert capsys.readouterr() == (f"{path}: good\n", "")
 
 
 def test_every_shipped_run_is_good_by_name(capsys: pytest.CaptureFixture[str]) -> None:
     for name in list_shipped("runs"):
-        assert call(["check", name]) == DONE
+        assert run_command(["check", name]) == DONE
         assert capsys.readouterr().out == f"{name}: good\n"
 
 
 def test_a_replay_of_one_firing(capsys: pytest.CaptureFixture[str]) -> None:
-    assert call(["replay", "good.csv", "--model", "drum", "--model", "box", "--json", "x.json"]) == DONE
+    assert run_command(["replay", "good.csv", "--model", "drum", "--model", "box", "--json", "x.json"]) == DONE
     captured = capsys.readouterr()
     assert captured.err == ""
     assert "1 firings, 0 outline segments, 0 clusters" in captured.out
@@ -221,7 +221,7 @@ def test_main_exits_with_the_code(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_as_a_program_too() -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "runtime.cli.app", "check", "halway"],
+        [sys.executable, "-m", "runtime.cli", "check", "halway"],
         env={**os.environ, "PYTHONPATH": str(ROOT)}, text=True, capture_output=True, timeout=60, check=False,
     )  # fmt: skip
     assert done.returncode == WRONG_CALL
@@ -235,7 +235,7 @@ def test_a_reader_that_leaves_is_no_traceback() -> None:
     os.close(read)
     with os.fdopen(write, "w") as out:
         done = subprocess.run(
-            [sys.executable, "-m", "runtime.cli.app", "check", "hallway"],
+            [sys.executable, "-m", "runtime.cli", "check", "hallway"],
             env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=out, stderr=subprocess.PIPE, text=True, timeout=60,
             check=False,
         )  # fmt: skip

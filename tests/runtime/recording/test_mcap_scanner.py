@@ -14,7 +14,7 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 
 from config.errors import DONE
-from runtime.cli.app import call
+from runtime.cli.app import run_command
 from runtime.recording.channels import CYCLE, RawMessage, decode
 from runtime.recording.mcap_scanner import McapScanner
 from runtime.recording.reader import open_recording
@@ -137,13 +137,13 @@ def test_recovered_it_is_whole_again(run: Path, tmp_path: Path, capsys: pytest.C
     data = run.read_bytes()
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(data[: int(0.7 * len(data))])
-    assert call(["recover", str(cut)]) == DONE
+    assert run_command(["recover", str(cut)]) == DONE
     assert "had not been closed" in capsys.readouterr().out
     restored = tmp_path / "cut-recovered.mcap"
     before, after = entries_of(cut), entries_of(restored)
     assert before == after
     assert salvaged(restored.read_bytes())[1].finished
-    assert call(["replay", str(restored), "--verify"]) == DONE
+    assert run_command(["replay", str(restored), "--verify"]) == DONE
     assert sorted(path.name for path in tmp_path.iterdir()) == ["cut-recovered.mcap", "cut.mcap"]
     with restored.open("rb") as file:
         assert sum(1 for _ in StreamReader(file, validate_crcs=True, emit_chunks=True).records) > 10

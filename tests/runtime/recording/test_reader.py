@@ -11,7 +11,7 @@ import pytest
 from mcap.writer import Writer
 
 from config.errors import DONE, FAILED, WRONG_CALL
-from runtime.cli.app import call
+from runtime.cli.app import run_command
 from runtime.recording.channels import CYCLE, RUN_INFO, RawMessage, decode, encode
 from runtime.recording.schema import FORMAT, RunInfo
 from tests.recorded import entries_of, rewrite
@@ -30,7 +30,7 @@ COMMANDS = {**READING, "recover": ("recover", "{file}", "--out", "{out}")}
 
 def told(command: tuple[str, ...], file: Path, out: Path, capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
     """Run a command on a file; return its exit code and the one line that it says."""
-    code = call([word.format(file=file, out=out) for word in command])
+    code = run_command([word.format(file=file, out=out) for word in command])
     err = capsys.readouterr().err
     assert err.startswith("echolocate: "), err
     assert err.count("\n") == 1, err
@@ -100,7 +100,7 @@ def test_a_newer_file_is_restored_as_it_is_or_refused_as_newer(
     """Its messages need not be understood to be copied; of what nobody here can read it is said why."""
     cut, restored = tmp_path / "cut.mcap", tmp_path / "restored.mcap"
     cut.write_bytes(newer.read_bytes()[:-500])
-    assert call(["recover", str(cut), "--out", str(restored)]) == DONE
+    assert run_command(["recover", str(cut), "--out", str(restored)]) == DONE
     capsys.readouterr()
     assert entries_of_any(restored) == entries_of_any(newer)
     code, line = told(READING["replay"], restored, tmp_path / "out", capsys)

@@ -24,7 +24,7 @@ from perception.edits import (
     PlaceModel,
     RejectObject,
 )
-from runtime.cli.app import call
+from runtime.cli.app import run_command
 from runtime.cycle.drive_requests import Legs
 from runtime.cycle.modes import Mode, Request
 from runtime.cycle.step import CycleRecord, Edit, State
@@ -136,7 +136,7 @@ def test_the_record_tells_what_was_done_and_what_was_refused(edited: Path) -> No
 @pytest.mark.compiled
 def test_verify_says_so(edited: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     summary = tmp_path / "s.json"
-    assert call(["replay", str(edited), "--verify", "--json", str(summary)]) == DONE
+    assert run_command(["replay", str(edited), "--verify", "--json", str(summary)]) == DONE
     assert f"{CYCLES} cycles from cycle 1 on, 0 differences" in capsys.readouterr().out
     assert json.loads(summary.read_text())["verify"]["differences"] == 0
 

@@ -8,7 +8,7 @@ import pytest
 
 from config.errors import DONE, FAILED
 from runtime.analysis.comparison import compare_runs
-from runtime.cli.app import call
+from runtime.cli.app import run_command
 from runtime.recording.channels import CYCLE, KEYFRAME, RUN_INFO, SETTINGS, decode
 from runtime.recording.reader import open_recording, parse_settings
 from runtime.recording.replayer import verify_recording
@@ -81,11 +81,11 @@ def test_a_run_without_a_cycle_is_told_plainly(
     path, summary = tmp_path / "none.mcap", tmp_path / "none.json"
     entries = entries_of(reloaded)
     rewrite(entries[:1], path)
-    assert call(["replay", str(path), "--verify", "--json", str(summary)]) == DONE
+    assert run_command(["replay", str(path), "--verify", "--json", str(summary)]) == DONE
     assert "holds no cycle yet" in capsys.readouterr().err
     assert '"cycles": 0' in summary.read_text()
-    assert call(["replay", str(path), "--from", "3"]) == FAILED
+    assert run_command(["replay", str(path), "--from", "3"]) == FAILED
     assert "no cycle that can be replayed" in capsys.readouterr().err
     last = max(i for i, e in enumerate(entries) if e.topic == KEYFRAME)
     rewrite([entries[0], *entries[last + 3 :]], path)
-    assert call(["replay", str(path), "--verify"]) == FAILED, "there are cycles, and none can be compared"
+    assert run_command(["replay", str(path), "--verify"]) == FAILED, "there are cycles, and none can be compared"

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from config.errors import DONE, FAILED, WRONG_CALL
-from runtime.cli.app import call
+from runtime.cli.app import run_command
 from runtime.recording.channels import (
     CYCLE,
     KEYFRAME,
@@ -59,7 +59,7 @@ def test_so_is_one_from_a_keyframe(run: Path, since_s: float) -> None:
 @pytest.mark.parametrize("since", ["0", "9"])
 def test_so_is_one_in_a_process_of_its_own(run: Path, since: str, tmp_path: Path) -> None:
     summary = tmp_path / "summary.json"
-    command = [sys.executable, "-m", "runtime.cli.app", "replay", str(run), "--verify", "--from", since]
+    command = [sys.executable, "-m", "runtime.cli", "replay", str(run), "--verify", "--from", since]
     done = subprocess.run(
         [*command, "--json", str(summary)], env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True,
         text=True, timeout=120, check=False,
@@ -121,7 +121,7 @@ def test_a_memory_that_differs_is_named(run: Path, tmp_path: Path) -> None:
 
 
 def test_other_settings_tell_what_would_have_been(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert call(["replay", str(run), "--set", "perception.method=paper", "--set", "cycle.rate_hz=20"]) == DONE
+    assert run_command(["replay", str(run), "--set", "perception.method=paper", "--set", "cycle.rate_hz=20"]) == DONE
     out = capsys.readouterr().out
     assert out.index("as it was") < out.index("with the other settings")
     assert out.count("of 6 drums") == 2
@@ -131,7 +131,7 @@ def test_other_settings_tell_what_would_have_been(run: Path, capsys: pytest.Capt
 @pytest.mark.compiled
 def test_other_settings_may_drive_otherwise(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     avoid = "behaviors.avoid_static_obstacle.avoid_obstacle_sphere_m=2.0"
-    assert call(["replay", str(run), "--set", avoid]) == DONE
+    assert run_command(["replay", str(run), "--set", avoid]) == DONE
     assert " 0 with another command" not in capsys.readouterr().out
 
 
@@ -151,7 +151,7 @@ def test_a_state_that_is_put_back_is_whole(run: Path) -> None:
 
 
 def complaint(arguments: list[str], capsys: pytest.CaptureFixture[str], code: int) -> str:
-    assert call(arguments) == code
+    assert run_command(arguments) == code
     err = capsys.readouterr().err
     assert err.startswith("echolocate: ")
     assert err.count("\n") == 1, err
@@ -204,5 +204,5 @@ def test_calls_that_make_no_sense(run: Path, tmp_path: Path, capsys: pytest.Capt
 @pytest.mark.compiled
 def test_a_replay_to_watch_keeps_its_pace(run: Path) -> None:
     began_s = time.monotonic()
-    assert call(["replay", str(run), "--verify", "--speed", "5", "--from", "8", "--to", "11"]) == DONE
+    assert run_command(["replay", str(run), "--verify", "--speed", "5", "--from", "8", "--to", "11"]) == DONE
     assert time.monotonic() - began_s > 0.5

@@ -14,7 +14,7 @@ from config.errors import DONE
 from config.load import load_settings
 from drivers.emulator.robot_device import GroundTruth
 from drivers.messages import Pose
-from runtime.cli.app import call
+from runtime.cli.app import run_command
 from runtime.cli.commands.run_recording import RunRecording, kept
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, RUN_INFO, decode
@@ -126,7 +126,7 @@ def test_bookmarks_are_in_it_and_in_nobody_s_way(tmp_path: Path) -> None:
     assert marks == [Bookmark(cycle=40, text="here it <b>was</b>")]
     assert verify_file(path).differences == 0
     recovered = tmp_path / "recovered.mcap"
-    assert call(["recover", str(path), "--out", str(recovered)]) == DONE
+    assert run_command(["recover", str(path), "--out", str(recovered)]) == DONE
     assert [entry.data for entry in entries_of(recovered) if entry.topic == BOOKMARK] == [
         entry.data for entry in entries_of(path) if entry.topic == BOOKMARK
     ]
@@ -148,7 +148,7 @@ def test_report_and_figures_show_them(tmp_path: Path) -> None:
 
     switched(path, {1: opened, 41: mark("a <drum> & more"), 61: mark("second")}, 5.0, on=True)
     page = tmp_path / "run.html"
-    assert call(["report", str(path), "--out", str(page)]) == DONE
+    assert run_command(["report", str(path), "--out", str(page)]) == DONE
     text = page.read_text("utf-8")
     assert "<h2>Bookmarks</h2>" in text
     assert "a &lt;drum&gt; &amp; more" in text
@@ -156,7 +156,7 @@ def test_report_and_figures_show_them(tmp_path: Path) -> None:
     assert re.findall(r"<td>(\d\.\d\d) s</td>", section[: section.index("</section>")]) == ["2.00", "3.00"]
     assert {f"models-bookmark-{n}" for n in (1, 2)} <= set(re.findall(r'id="([^"]*)"', text))
     assert {f"course-bookmark-{n}" for n in (1, 2)} <= set(re.findall(r'id="([^"]*)"', text))
-    assert call(["figures", str(path), "--out", str(tmp_path / "drawn")]) == DONE
+    assert run_command(["figures", str(path), "--out", str(tmp_path / "drawn")]) == DONE
     assert 'id="bookmark-2"' in (tmp_path / "drawn" / "raw.svg").read_text("utf-8")
 
 

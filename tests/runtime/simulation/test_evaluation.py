@@ -17,7 +17,7 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings
 from config.settings import Settings
 from config.world import WorldConfig
-from runtime.cli.app import call
+from runtime.cli.app import run_command
 from runtime.cli.commands.experiment import one_way
 from runtime.recording.reader import open_recording
 from runtime.simulation.evaluation import run_seed, summarise
@@ -30,7 +30,7 @@ TABLE_2 = [(1.0, 4.0), (4.0, 4.0), (7.0, 4.0), (1.0, -4.0), (4.0, -4.0), (7.0, -
 
 def experiment(tmp_path: Path, *arguments: str) -> dict[str, Any]:
     path = tmp_path / "outcome.json"
-    assert call(["experiment", *arguments, "--json", str(path)]) == DONE
+    assert run_command(["experiment", *arguments, "--json", str(path)]) == DONE
     got = json.loads(path.read_bytes())
     assert isinstance(got, dict)
     return got
@@ -91,7 +91,7 @@ def test_an_experiment_leaves_recording_pictures_and_page(tmp_path: Path, capsys
     assert files >= {"irregular.mcap", "irregular.html", "overview.gif", *pictures}
     assert all(str(out / name) in told for name in files)
     recorded = out / "irregular.mcap"
-    assert call(["replay", str(recorded), "--verify"]) == DONE
+    assert run_command(["replay", str(recorded), "--verify"]) == DONE
     with open_recording(recorded) as recording:
         assert recording.world == load_settings("irregular").world
     # The recording is the run of seed 0, and the page tells its errors.
@@ -102,7 +102,7 @@ def test_an_experiment_leaves_recording_pictures_and_page(tmp_path: Path, capsys
 
 
 def test_scenes_record_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert call(["experiment", "hallway", "--scene", "clean", "--out", str(tmp_path)]) == WRONG_CALL
+    assert run_command(["experiment", "hallway", "--scene", "clean", "--out", str(tmp_path)]) == WRONG_CALL
     assert "nothing to record" in capsys.readouterr().err
 
 

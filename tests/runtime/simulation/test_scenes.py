@@ -14,7 +14,7 @@ from config.load import load_model, load_robot
 from config.world import BoxConfig, WorldConfig
 from drivers.messages import Firing, Floats
 from perception.pipeline import DetectedObject
-from runtime.cli.app import call
+from runtime.cli.app import run_command
 from runtime.simulation.open_loop import angle_error, match_objects
 from runtime.simulation.scene_names import SceneName
 from runtime.simulation.scenes import Hall, halls, readings
@@ -190,7 +190,7 @@ def test_a_square_looks_alike_after_a_quarter_turn_and_an_oblong_after_half(dept
 
 def test_the_command_writes_the_contracts_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "clean.json"
-    assert call(["experiment", "hallway", "--scene", "clean", "--method", "paper", "--json", str(path)]) == 0
+    assert run_command(["experiment", "hallway", "--scene", "clean", "--method", "paper", "--json", str(path)]) == 0
     outcome = orjson.loads(path.read_bytes())
     assert {"drums", "false", "mean_error", "max_error", "times_real_time"} <= outcome.keys()
     assert [row["truth"] for row in outcome["drums"]] == [[d.x_m, d.y_m] for d in halls("clean")[0].world.drum]
@@ -204,7 +204,7 @@ def test_the_command_writes_the_contracts_form(tmp_path: Path, capsys: pytest.Ca
     "wrong", [["irregular", "--scene", "clean"], ["hallway", "--scene", "clean", "--world", "hallway"]], ids=" ".join
 )
 def test_a_scene_in_another_hall_is_refused(wrong: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert call(["experiment", *wrong]) == 2
+    assert run_command(["experiment", *wrong]) == 2
     assert "--scene" in capsys.readouterr().err
 
 

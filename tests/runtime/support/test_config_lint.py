@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from config.load import load_settings
-from runtime.support.config_lint import lint
+from runtime.support.config_lint import lint_settings
 
 
 def test_the_shipped_runs_need_no_advice() -> None:
     for name in ("hallway", "irregular"):
-        assert lint(load_settings(name)) == []
+        assert lint_settings(load_settings(name)) == []
 
 
 def test_a_margin_that_the_ring_cannot_hear_is_named() -> None:
-    said = lint(load_settings("hallway", ["ring.range_min_m=0.18"]))
+    said = lint_settings(load_settings("hallway", ["ring.range_min_m=0.18"]))
     assert len(said) == 1
     assert "behaviors.arbiter.clearance_m = 0.16" in said[0]
     assert "ring.range_min_m = 0.18" in said[0]
 
 
 def test_a_cycle_much_slower_than_the_ring_is_named() -> None:
-    said = lint(load_settings("hallway", ["cycle.rate_hz=5"]))
+    said = lint_settings(load_settings("hallway", ["cycle.rate_hz=5"]))
     assert len(said) == 1
     assert "cycle.rate_hz = 5" in said[0]
     assert "20 firings a second" in said[0]

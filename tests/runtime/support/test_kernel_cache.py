@@ -112,20 +112,20 @@ def test_a_home_without_xdg_is_dot_cache(home: Path, monkeypatch: pytest.MonkeyP
 
 def test_an_existing_setting_is_respected(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", "/somewhere/else")
-    assert kernels.use_cache() == Path("/somewhere/else")
+    assert kernels.use_kernel_cache() == Path("/somewhere/else")
     monkeypatch.delenv("NUMBA_CACHE_DIR")
-    assert kernels.use_cache() == kernels.cache_folder()
+    assert kernels.use_kernel_cache() == kernels.cache_folder()
     assert os.environ["NUMBA_CACHE_DIR"] == str(kernels.cache_folder())
     assert home.exists()
 
 
 def test_only_what_a_run_needs_is_compiled() -> None:
     hallway = load_settings("hallway")
-    assert kernels.needed(hallway) == (kernels.EMULATOR, kernels.CIRCLES)
+    assert kernels.needed_parts(hallway) == (kernels.EMULATOR, kernels.BAYES)
     boxes = load_settings("hallway", models=["semicircle", "box"])
-    assert kernels.needed(boxes) == (kernels.EMULATOR, kernels.CIRCLES, kernels.POLYGONS)
+    assert kernels.needed_parts(boxes) == (kernels.EMULATOR, kernels.BAYES, kernels.POLYGONS)
     paper = load_settings("hallway", ["perception.method=paper"], models=["box"])
-    assert kernels.needed(paper) == (kernels.EMULATOR, kernels.PAPER)
+    assert kernels.needed_parts(paper) == (kernels.EMULATOR, kernels.PAPER)
     assert set(warming.RUN_ONCE) == set(kernels.PARTS)
 
 
@@ -143,29 +143,29 @@ def test_each_part_is_compiled_once_and_warmed_up_ever_after(home: Path, monkeyp
     monkeypatch.setattr(kernels, "compile_parts", compile_parts)
     monkeypatch.setattr(kernels, "warm_up", lambda _settings, parts: happened.extend(parts))
     settings, console = load_settings("hallway"), Console(quiet=True)
-    kernels.ready_kernels(settings, console)
+    kernels.prepare_kernels(settings, console)
     assert happened == ["compile emulator", "compile bayes"]
     happened.clear()
-    kernels.ready_kernels(settings, console)
+    kernels.prepare_kernels(settings, console)
     assert happened == ["bayes"], "the emulator is another process"
     happened.clear()
-    kernels.ready_kernels(load_settings("hallway", models=["box"]), console)
+    kernels.prepare_kernels(load_settings("hallway", models=["box"]), console)
     assert happened == ["compile polygons", "bayes"]
-    (home / kernels.CIRCLES).unlink()
-    assert kernels.missing(home, kernels.PARTS) == [kernels.CIRCLES, kernels.PAPER]
+    (home / kernels.BAYES).unlink()
+    assert kernels.uncompiled_parts(home, kernels.PARTS) == [kernels.BAYES, kernels.PAPER]
     happened.clear()
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
-    kernels.ready_kernels(settings, console)
+    kernels.prepare_kernels(settings, console)
     assert happened == [], "there is nothing to compile"
 
 
 @pytest.mark.parametrize(
     ("parts", "processors", "helped"),
     [
-        ((kernels.EMULATOR, kernels.CIRCLES), 2, ["helper bayes", "hear"]),
-        ((kernels.CIRCLES, kernels.POLYGONS), 2, ["helper polygons", "hear", "bayes"]),
+        ((kernels.EMULATOR, kernels.BAYES), 2, ["helper bayes", "observe_once"]),
+        ((kernels.BAYES, kernels.POLYGONS), 2, ["helper polygons", "observe_once", "bayes"]),
         ((kernels.POLYGONS,), 2, []),
-        ((kernels.EMULATOR, kernels.CIRCLES), 1, []),
+        ((kernels.EMULATOR, kernels.BAYES), 1, []),
     ],
 )
 def test_a_helper_takes_what_comes_last(
@@ -174,7 +174,7 @@ def test_a_helper_takes_what_comes_last(
     happened: list[str] = []
 
     @contextlib.contextmanager
-    def helper(part: str) -> Iterator[None]:
+    def compile_in_parallel(part: str) -> Iterator[None]:
         happened.append(f"helper {part}")
         yield
         happened.append("waited")
@@ -182,8 +182,8 @@ def test_a_helper_takes_what_comes_last(
     def noted(name: str) -> Callable[[Settings], None]:
         return lambda _settings: happened.append(name)
 
-    monkeypatch.setattr(warming, "helper", helper)
-    monkeypatch.setattr(warming, "hear", noted("hear"))
+    monkeypatch.setattr(warming, "compile_in_parallel", compile_in_parallel)
+    monkeypatch.setattr(warming, "observe_once", noted("observe_once"))
     monkeypatch.setattr(warming, "RUN_ONCE", {part: noted(part) for part in kernels.PARTS})
     monkeypatch.setattr(os, "cpu_count", lambda: processors)
     kernels.compile_parts(load_settings("hallway"), tmp_path, parts)
@@ -196,8 +196,8 @@ def test_a_helper_compiles_the_refinement_of_either_kind(monkeypatch: pytest.Mon
     asked = []
     for name in ("quantum", "pquantum"):
         monkeypatch.setattr(entry, name, lambda _handle, _share, name=name: asked.append(name))
-    warming.help_with(kernels.CIRCLES)
-    warming.help_with(kernels.POLYGONS)
+    warming.compile_refinement(kernels.BAYES)
+    warming.compile_refinement(kernels.POLYGONS)
     assert asked == ["quantum", "pquantum"]
 
 
@@ -209,20 +209,20 @@ def test_a_helper_that_hangs_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
         return started[-1]
 
     monkeypatch.setattr(subprocess, "Popen", hanging)
-    monkeypatch.setattr(warming, "HELP_MAX_S", 0.01)
-    with warming.helper(kernels.CIRCLES):
+    monkeypatch.setattr(warming, "PARALLEL_MAX_S", 0.01)
+    with warming.compile_in_parallel(kernels.BAYES):
         assert started[0].poll() is None
     assert started[0].returncode is not None
 
 
 COMPILED_LATER = """
 import sys
-from runtime.support.kernel_cache import needed, ready_kernels, use_cache
-use_cache()
+from runtime.support.kernel_cache import needed_parts, prepare_kernels, use_kernel_cache
+use_kernel_cache()
 from config.load import load_settings
 from rich.console import Console
 settings = load_settings("hallway", sys.argv[1].split(), models=sys.argv[2].split())
-ready_kernels(settings, Console(quiet=True))
+prepare_kernels(settings, Console(quiet=True))
 from numba.core import event
 late = []
 class Listener(event.Listener):
@@ -237,7 +237,7 @@ from runtime.cycle.modes import Mode, Request
 from runtime.simulation.closed_loop import OperatorInput, simulate
 
 further = settings.model_copy(update={"models": (*settings.models, load_model(sys.argv[3]))})
-assert set(needed(further)) <= set(needed(settings))
+assert set(needed_parts(further)) <= set(needed_parts(settings))
 
 encoder = FrameEncoder(settings)
 

@@ -67,7 +67,7 @@ async def test_what_was_never_compiled_is_compiled_once_and_loaded_by_a_thread(a
     assert threading.get_ident() not in aside.threads
     assert aside.ready.loaded == 14
     assert [entry["event"] for entry in aside.log.entries] == [
-        "kernels for polygons are being compiled, once; the change is taken over then"
+        "compiling the kernels for polygons, once; the change takes effect afterwards"
     ]
 
 
@@ -128,7 +128,7 @@ def test_another_process_compiles_all_that_belongs_to_polygons(tmp_path: Path) -
         return done.stdout
 
     run("-m", "runtime.support.kernel_warmup", POLYGONS, "whole")
-    assert kernels.missing(tmp_path, [POLYGONS]) == []
+    assert kernels.uncompiled_parts(tmp_path, [POLYGONS]) == []
     assert run("-c", LOADS) == "[]\n"
 
 
@@ -139,9 +139,9 @@ class Listener(event.Listener):
     def on_start(self, e): compiled.append(str(e.data["dispatcher"].py_func.__name__))
     def on_end(self, e): pass
 from config.load import load_settings
-from runtime.support.kernel_cache import CIRCLES, POLYGONS, use_cache, warm_up
-use_cache()
-warm_up(load_settings("hallway"), [CIRCLES])
+from runtime.support.kernel_cache import BAYES, POLYGONS, use_kernel_cache, warm_up
+use_kernel_cache()
+warm_up(load_settings("hallway"), [BAYES])
 with event.install_listener("numba:compile", Listener()):
     warm_up(load_settings("hallway", models=["semicircle", "box"]), [POLYGONS])
 print(compiled)

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from runtime.support.temp_folder import PREFIX, YOUNG_S, run_folder, sweep
+from runtime.support.temp_folder import PREFIX, YOUNG_S, sweep, temp_folder
 
 ROOT = Path(__file__).parents[3]
 OWNER = """
 import sys, time
-from runtime.support.temp_folder import run_folder
-with run_folder() as folder:
+from runtime.support.temp_folder import temp_folder
+with temp_folder() as folder:
     (folder / "robot").symlink_to("/dev/null")
     sys.stdout.write(f"{folder}\\n")
     sys.stdout.flush()
@@ -45,7 +45,7 @@ def owner() -> tuple[subprocess.Popen[str], Path]:
 
 
 def test_it_is_the_user_s_own_and_gone_at_the_end(tmp_path: Path) -> None:
-    with run_folder() as folder:
+    with temp_folder() as folder:
         assert folder.parent == tmp_path
         assert folder.stat().st_mode & 0o777 == 0o700
         (folder / "robot").symlink_to("/dev/null")
@@ -61,7 +61,7 @@ def test_what_a_killed_run_has_left_goes_with_the_next_start(tmp_path: Path) -> 
         assert (folder / "robot").is_symlink(), "its owner lives"
         process.kill()
     assert folder.exists()
-    with run_folder() as own:
+    with temp_folder() as own:
         assert list(tmp_path.iterdir()) == [own]
 
 

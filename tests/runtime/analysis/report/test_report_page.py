@@ -13,7 +13,7 @@ from config.errors import DONE
 from runtime.analysis.report.html_parts import note, table
 from runtime.analysis.report.inline_svg import VARIABLES, inlined
 from runtime.analysis.report.stylesheet import CSS
-from runtime.cli.app import call
+from runtime.cli.app import run_command
 
 VOID = {"meta", "link", "br", "img", "hr", "input", "use", "path"}
 SIZE_MAX = 3_000_000
@@ -57,7 +57,7 @@ class Reader(HTMLParser):
 @pytest.fixture(scope="module")
 def page(hall_run: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
     path = tmp_path_factory.mktemp("page") / "hall.html"
-    assert call(["report", str(hall_run), "--out", str(path), "--units", "ft"]) == DONE
+    assert run_command(["report", str(hall_run), "--out", str(path), "--units", "ft"]) == DONE
     return path.read_text("utf-8")
 
 
@@ -95,7 +95,7 @@ def test_it_tells_the_run(page: str) -> None:
 def test_a_page_beside_a_ring_log(hall_log: Path, tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     log.write_bytes(hall_log.read_bytes())
-    assert call(["report", str(log)]) == DONE
+    assert run_command(["report", str(log)]) == DONE
     page = (tmp_path / "log.html").read_text("utf-8")
     assert "What stood there is not known" in page
     assert Reader(page).open == []

@@ -16,7 +16,7 @@ from config.errors import DONE, FAILED, WRONG_CALL
 from drivers.messages import Firing
 from runtime.analysis.timeline import Timeline
 from runtime.analysis.timeline_sources import TimelineSource, load_timeline
-from runtime.cli.app import call
+from runtime.cli.app import run_command
 from runtime.cli.commands import export
 from runtime.recording.channels import CYCLE, decode
 from runtime.recording.ring_log import read_ring_log
@@ -32,7 +32,7 @@ def timeline(hall_run: Path) -> Timeline:
 
 
 def exported(run: Path, form: str, out: Path, *more: str) -> Path:
-    assert call(["export", str(run), "--to", form, "--out", str(out), *more]) == DONE
+    assert run_command(["export", str(run), "--to", form, "--out", str(out), *more]) == DONE
     return out
 
 
@@ -168,7 +168,7 @@ def test_rosbag2(hall_run: Path, timeline: Timeline, tmp_path: Path, capsys: pyt
     assert np.allclose(places, [(o.x, o.y) for o in timeline.objects])
     assert len(newest["/tf_static"].transforms) == 25
     capsys.readouterr()
-    assert call(["export", str(hall_run), "--to", "rosbag2", "--out", str(bag)]) == FAILED
+    assert run_command(["export", str(hall_run), "--to", "rosbag2", "--out", str(bag)]) == FAILED
     assert "is there already" in capsys.readouterr().err
 
 
@@ -183,7 +183,7 @@ def test_a_ring_log_out_and_in(hall_run: Path, hall_log: Path, timeline: Timelin
         assert (one.t_s, one.pose, one.ring_yaw) == (other.t_s, other.pose, other.ring_yaw)
         assert one.ranges_m.tobytes() == other.ranges_m.tobytes()
     summary = tmp_path / "summary.json"
-    assert call(["replay", str(hall_log), "--json", str(summary)]) == DONE
+    assert run_command(["replay", str(hall_log), "--json", str(summary)]) == DONE
     seen = json.loads(summary.read_bytes())["objects"]
     assert len(seen) >= 3
     for one in seen:
@@ -229,7 +229,7 @@ def test_a_missing_extra_is_one_line(
     module, package = export.NEEDED[form]
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name, *a: None if name == module else find(name, *a))
-    assert call(["export", str(tmp_path / "any.mcap"), "--to", form, "--out", str(tmp_path / "out")]) == FAILED
+    assert run_command(["export", str(tmp_path / "any.mcap"), "--to", form, "--out", str(tmp_path / "out")]) == FAILED
     err = capsys.readouterr().err
     assert err.count("\n") == 1
     assert "pip install 'echolocate[export]'" in err
@@ -239,6 +239,6 @@ def test_a_missing_extra_is_one_line(
 def test_a_ring_log_is_one_already(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = tmp_path / "log.csv"
     log.write_text("t,x,y,theta,r00\n0,0,0,0,1\n", encoding="utf-8")
-    assert call(["export", str(log), "--to", "ringlog", "--out", str(tmp_path / "x.csv")]) == WRONG_CALL
+    assert run_command(["export", str(log), "--to", "ringlog", "--out", str(tmp_path / "x.csv")]) == WRONG_CALL
     assert "one already" in capsys.readouterr().err
-    assert call(["export", str(log), "--to", "csv", "--out", str(log)]) == WRONG_CALL
+    assert run_command(["export", str(log), "--to", "csv", "--out", str(log)]) == WRONG_CALL

@@ -19,7 +19,7 @@ from drivers.messages import Floats, Pose
 from runtime.analysis.plots.geometry import Frame, arcs, outline
 from runtime.analysis.timeline import Timeline
 from runtime.analysis.timeline_sources import TimelineSource, load_timeline
-from runtime.cli.app import call
+from runtime.cli.app import run_command
 
 PICTURES = ("raw", "segments", "clusters", "models")
 HALLWAY = load_world("hallway")
@@ -37,7 +37,7 @@ def traced(path: Path, **asked: str) -> Timeline:
 @pytest.fixture(scope="module")
 def drawn(hall_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("drawn") / "new" / "folder"
-    assert call(["figures", str(hall_run), "--out", str(folder), "--units", "ft"]) == DONE
+    assert run_command(["figures", str(hall_run), "--out", str(folder), "--units", "ft"]) == DONE
     return folder
 
 
@@ -71,7 +71,7 @@ def test_each_shows_its_own(drawn: Path) -> None:
 
 @pytest.mark.compiled
 def test_the_same_run_is_the_same_file(hall_run: Path, drawn: Path, tmp_path: Path) -> None:
-    assert call(["figures", str(hall_run), "--out", str(tmp_path), "--units", "ft", "--still"]) == DONE
+    assert run_command(["figures", str(hall_run), "--out", str(tmp_path), "--units", "ft", "--still"]) == DONE
     assert not (tmp_path / "overview.gif").exists()
     for name in PICTURES:
         for kind in ("svg", "pdf"):
@@ -159,9 +159,9 @@ def test_frames_and_outlines() -> None:
 @pytest.mark.compiled
 def test_a_ring_log_is_drawn_too(hall_log: Path, tmp_path: Path) -> None:
     arguments = ["figures", str(hall_log), "--out", str(tmp_path), "--still"]
-    assert call([*arguments, "--world", "hallway", "--set", "perception.method=paper"]) == DONE
+    assert run_command([*arguments, "--world", "hallway", "--set", "perception.method=paper"]) == DONE
     assert {"truth", "model-1", "centre-1"} <= ids(tmp_path / "models.svg")
-    assert call(arguments) == DONE
+    assert run_command(arguments) == DONE
     assert "truth" not in ids(tmp_path / "raw.svg")
 
 
@@ -189,22 +189,22 @@ def test_files_that_cannot_be_shown(
     for name, data in files.items():
         (tmp_path / name).write_bytes(data)
     for name in (*files, "nowhere.mcap", "nowhere.csv"):
-        assert call([command, str(tmp_path / name), *more, str(tmp_path / "out")]) == WRONG_CALL
+        assert run_command([command, str(tmp_path / name), *more, str(tmp_path / "out")]) == WRONG_CALL
         assert name in next(lines(capsys))
 
 
 def test_places_that_cannot_be_written(hall_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").touch()
     for command, more in (("figures", ()), ("export", ("--to", "csv"))):
-        assert call([command, str(hall_run), *more, "--out", str(tmp_path / "file")]) == WRONG_CALL
+        assert run_command([command, str(hall_run), *more, "--out", str(tmp_path / "file")]) == WRONG_CALL
         assert "is a file" in next(lines(capsys))
-        assert call([command, str(hall_run), *more, "--out", str(tmp_path / "file" / "deeper")]) == FAILED
+        assert run_command([command, str(hall_run), *more, "--out", str(tmp_path / "file" / "deeper")]) == FAILED
         assert "cannot be written" in next(lines(capsys))
-    assert call(["report", str(hall_run), "--out", str(tmp_path / "nowhere" / "x.html")]) == FAILED
+    assert run_command(["report", str(hall_run), "--out", str(tmp_path / "nowhere" / "x.html")]) == FAILED
     assert "cannot be written" in next(lines(capsys))
-    assert call(["report", str(hall_run), "--out", str(hall_run)]) == WRONG_CALL
+    assert run_command(["report", str(hall_run), "--out", str(hall_run)]) == WRONG_CALL
     assert "itself" in next(lines(capsys))
-    assert call(["report", str(hall_run), "--model", "box"]) == WRONG_CALL
+    assert run_command(["report", str(hall_run), "--model", "box"]) == WRONG_CALL
     assert "--model" in next(lines(capsys))
 
 

@@ -17,7 +17,7 @@ from runtime.console.clients.client import Frame
 from runtime.console.frames.frame_encoder import EncodedFrame
 from runtime.console.playback.replay_client import WORKERS_MAX, ReplayClient, ReplayError, report_of
 from runtime.recording.storage import find_recording, list_recordings
-from runtime.support.child_process import COMMAND, NICENESS, end_child, start_child
+from runtime.support.child_process import ECHOLOCATE, NICENESS, kill_child, start_child
 from tests.hil.machine import PATIENCE_S
 from tests.recorded import hall, record
 
@@ -195,6 +195,6 @@ async def test_the_page_of_a_run_that_goes_on(folder: Path, tmp_path: Path) -> N
 
 
 async def test_a_process_beside_is_ended_whatever_it_does() -> None:
-    process = await start_child(COMMAND, ["report", "--help"], talks=False)
-    await end_child(process)
+    process = await start_child(ECHOLOCATE, ["report", "--help"], pipes=False, low_priority=True)
+    await kill_child(process)
     assert process.returncode is not None
