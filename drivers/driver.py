@@ -26,16 +26,16 @@ class LineState(Enum):
 
     CLOSED = "closed"
     """No line is open."""
-    GREETING = "greeting"
+    HANDSHAKE = "handshake"
     """The line is open; the robot has not yet identified itself and taken the firing pattern."""
     READY = "ready"
     """The robot answers, fires, and takes commands."""
     DOWN = "down"
-    """The line is open and the robot does not answer; `RobotDriver.trouble` says more."""
+    """The line is open and the robot does not answer; `RobotDriver.problem` says more."""
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class Received:
     """Everything that arrived since it was last taken, in order."""
 
     firings: tuple[Firing, ...]
@@ -55,7 +55,7 @@ class RobotDriver(Protocol):
         """How far the conversation has come."""
 
     @property
-    def trouble(self) -> str | None:
+    def problem(self) -> str | None:
         """Why the state is DOWN or GREETING longer than it should be: what happened, likely cause, next action."""
 
     @property
@@ -67,23 +67,23 @@ class RobotDriver(Protocol):
         """Frames over the line so far."""
 
     @property
-    def frame(self) -> Pose:
+    def odometry_origin(self) -> Pose:
         """The origin of the poses handed up, in the robot's own odometry: another one since that has leapt."""
 
     @property
-    def waiting(self) -> int:
+    def firings_waiting(self) -> int:
         """Firings that `take` has ready."""
 
-    def opened(self, now_s: float) -> None:
+    def line_opened(self, run_s: float) -> None:
         """Begin (again) on a line just opened: greet the robot and set its firing pattern."""
 
-    def closed(self) -> None:
+    def line_closed(self) -> None:
         """Forget what was under way: the line is gone."""
 
-    def receive(self, data: bytes, now_s: float) -> None:
+    def receive(self, data: bytes, run_s: float) -> None:
         """Take bytes from the line, any chunking."""
 
-    def tick(self, now_s: float) -> None:
+    def tick(self, run_s: float) -> None:
         """Let time pass: commands unanswered are sent again, silence becomes DOWN."""
 
     def drive(self, twist: Twist) -> None:
@@ -101,5 +101,5 @@ class RobotDriver(Protocol):
     def outgoing(self, *, writable: bool) -> bytes:
         """Return what should go on the line now; only HALT while the line is not `writable`."""
 
-    def take(self) -> Heard:
+    def take_received(self) -> Received:
         """Return and forget what arrived since the last call."""

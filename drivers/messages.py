@@ -76,13 +76,13 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class Odometry:
-    """Where the base believes it is, at its own time `t_s` (seconds since boot, unwrapped).
+    """Where the base believes it is, at its own time `robot_s` (seconds since boot, unwrapped).
 
     `pose.theta` is the direction in which the wheels drive; `ring_yaw` the direction of the ring's sensor 0. They
     are one angle on a base whose body turns with its wheels and two on a synchro drive. Both are unwrapped.
     """
 
-    t_s: float
+    robot_s: float
     pose: Pose
     ring_yaw: float
     twist: Twist
@@ -95,10 +95,10 @@ class Firing:
     """One firing of a set of sensors, stamped with the pose at that moment.
 
     `ranges_m` has shape (sensors,), one entry for each sensor of the ring, fired or not: NaN did not fire (or
-    reported a fault), +inf fired and heard nothing inside the window, else metres. `t_s` is the robot's own time.
+    reported a fault), +inf fired and heard nothing inside the window, else metres. `robot_s` is the robot's own time.
     """
 
-    t_s: float
+    robot_s: float
     pose: Pose
     ring_yaw: float
     ranges_m: Floats

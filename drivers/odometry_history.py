@@ -25,7 +25,7 @@ class OdometryHistory:
 
     def add(self, sample: Odometry) -> None:
         """Take the next sample; one that is not later than the newest is ignored."""
-        if not self._samples or sample.t_s > self._samples[-1].t_s:
+        if not self._samples or sample.robot_s > self._samples[-1].robot_s:
             self._samples.append(sample)
 
     def clear(self) -> None:
@@ -38,17 +38,17 @@ class OdometryHistory:
         Returns None where no sample is as old or as new, or the two around it are more than `gap_max_s` apart.
         """
         newest = self.newest
-        if newest is None or t_s > newest.t_s:
+        if newest is None or t_s > newest.robot_s:
             return None
-        if t_s == newest.t_s:
+        if t_s == newest.robot_s:
             return newest.pose, newest.ring_yaw
         # A firing is a few samples old, so the search from the newest back is short.
         for after, before in pairwise(reversed(self._samples)):
-            if before.t_s <= t_s:
-                gap_s = after.t_s - before.t_s
-                if gap_s > gap_max_s and t_s != before.t_s:
+            if before.robot_s <= t_s:
+                gap_s = after.robot_s - before.robot_s
+                if gap_s > gap_max_s and t_s != before.robot_s:
                     return None
-                share = (t_s - before.t_s) / gap_s
+                share = (t_s - before.robot_s) / gap_s
                 yaw = before.ring_yaw + share * (after.ring_yaw - before.ring_yaw)
                 return interpolate(before.pose, after.pose, share), yaw
         return None

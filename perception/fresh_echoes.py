@@ -53,7 +53,7 @@ class FreshEchoes:
         """Take in one firing."""
         pose = firing.pose
         take_in(
-            firing.ranges_m, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), float(firing.t_s),
+            firing.ranges_m, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), float(firing.robot_s),
             self._points, self._times, self._heard,
         )  # fmt: skip
 

@@ -157,4 +157,4 @@ class SensorMonitor:
 
 
 def _only(firing: Firing, ranges: Floats) -> Firing:
-    return Firing(firing.t_s, firing.pose, firing.ring_yaw, ranges.copy())
+    return Firing(firing.robot_s, firing.pose, firing.ring_yaw, ranges.copy())

@@ -42,8 +42,8 @@ def test_udacity_corridor(tmp_path: Path) -> None:
     assert np.allclose(heard * 100.0, np.round(heard * 100.0))
     assert np.isinf(ranges).sum() > 50
 
-    assert firings[0].t_s == 0.0
-    assert firings[-1].t_s == pytest.approx(92.837)
+    assert firings[0].robot_s == 0.0
+    assert firings[-1].robot_s == pytest.approx(92.837)
     places = np.array([(f.pose.x, f.pose.y) for f in firings])
     assert np.hypot(*np.diff(places, axis=0).T).sum() == pytest.approx(25.0, abs=1.0)
     turns = np.abs(np.diff([f.pose.theta for f in firings]))
@@ -68,7 +68,7 @@ def test_scitos_ring(tmp_path: Path) -> None:
     assert np.isinf(ranges).mean() == pytest.approx(0.138, abs=0.001)
     heard = ranges[np.isfinite(ranges)]
     assert (heard.min(), heard.max()) == (0.34, 5.087)
-    assert firings[9].t_s == pytest.approx(1.0)
+    assert firings[9].robot_s == pytest.approx(1.0)
     assert {(f.pose.x, f.pose.y, f.pose.theta) for f in firings} == {(0.0, 0.0, 0.0)}
 
 

@@ -1,7 +1,7 @@
 """The conversation with a robot that speaks the ring-and-base protocol: greet, set the pattern, drive, and notice.
 
 No line, no clock: bytes and times come in, bytes and messages go out. What a command waits for is in `commands`,
-where a firing took place in `stamping`, what trouble is called in `troubles`.
+where a firing took place in `stamping`, what problem is called in `diagnostics`.
 """
 
 from __future__ import annotations
@@ -10,15 +10,15 @@ import math
 from collections import deque
 
 from config.robot import RingConfig, RobotConfig
-from drivers.denning import diagnostics as troubles
+from drivers.denning import diagnostics
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Ack, Drive, Echo, Frame, Halt, Hello, Ident, Nak, NakCode, Odom, Pattern, Release
 from drivers.denning.pending_command import Command
-from drivers.denning.pose_stamping import Stamper
+from drivers.denning.pose_stamping import PoseStamper
 from drivers.denning.robot_clock import Jump
 from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout
 from drivers.denning.wire_units import identity_of, to_wire, wire_pattern
-from drivers.driver import Heard, LineState
+from drivers.driver import LineState, Received
 from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
 
 _GREET_AGAIN_S = 0.5
@@ -52,15 +52,15 @@ class DenningDriver:
     def __init__(self, config: RobotConfig) -> None:
         self._config = config
         self._pattern = wire_pattern(config.ring)
-        self._stamper = Stamper(len(config.ring.mounts), config.body)
+        self._stamper = PoseStamper(len(config.ring.mounts), config.body)
         self._stamper.set_window(self._pattern.window)
         self._state = LineState.CLOSED
-        self._trouble: str | None = None
+        self._problem: str | None = None
         self._identity: Identity | None = None
         self._jump: Jump | None = None
         self._decoder = Decoder("robot", midway=True)
         self._earlier = LinkCounts()
-        self._now_s = 0.0
+        self._run_s = 0.0
         self._odometry_s = 0.0
         self._frame_s = 0.0
         self._bad_then = 0
@@ -83,11 +83,11 @@ class DenningDriver:
         return self._state
 
     @property
-    def trouble(self) -> str | None:
+    def problem(self) -> str | None:
         """What is wrong, in one line; None where nothing is."""
-        if self._trouble is None and self._state is LineState.READY:
-            return troubles.noise(self._ring.drowned(self._now_s, self._decoder.bad), "its echoes")
-        return self._trouble
+        if self._problem is None and self._state is LineState.READY:
+            return diagnostics.noise(self._ring.drowned(self._run_s, self._decoder.bad), "its echoes")
+        return self._problem
 
     @property
     def identity(self) -> Identity | None:
@@ -101,8 +101,8 @@ class DenningDriver:
         return LinkCounts(before.frames + now.frames, before.bad + now.bad, before.lost + now.lost)
 
     @property
-    def waiting(self) -> int:
-        """Firings that `take` has ready."""
+    def firings_waiting(self) -> int:
+        """Firings that `take_received` has ready."""
         return len(self._firings)
 
     @property
@@ -116,19 +116,19 @@ class DenningDriver:
         return self._stamper.out_of_window
 
     @property
-    def frame(self) -> Pose:
+    def odometry_origin(self) -> Pose:
         """The origin of the poses handed up, in the robot's own odometry: another one since that has leapt."""
-        return self._stamper.frame
+        return self._stamper.origin
 
-    def opened(self, now_s: float) -> None:
+    def line_opened(self, run_s: float) -> None:
         """Begin (again) on a line just opened: greet the robot and set its firing pattern."""
-        self.closed()
-        self._now_s = self._frame_s = now_s
+        self.line_closed()
+        self._run_s = self._frame_s = run_s
         self._flush_first = True
         self._watch = CommandAckMonitor()
         self._greet()
 
-    def closed(self) -> None:
+    def line_closed(self) -> None:
         """Forget what was under way; only a HALT not yet answered is kept for the next line."""
         self._earlier = self.counts
         self._decoder = Decoder("robot", midway=True)
@@ -136,31 +136,33 @@ class DenningDriver:
         self._state = LineState.CLOSED
         self._abandon()
 
-    def receive(self, data: bytes, now_s: float) -> None:
+    def receive(self, data: bytes, run_s: float) -> None:
         """Take bytes from the line, any chunking."""
-        self._now_s = now_s
+        self._run_s = run_s
         if self._state is LineState.CLOSED:
             return
         for frame in self._decoder.feed(data):
-            self._frame_s = now_s
+            self._frame_s = run_s
             self._take_frame(frame)
         self._firings.extend(self._stamper.firings())
 
-    def tick(self, now_s: float) -> None:
+    def tick(self, run_s: float) -> None:
         """Let time pass: commands unanswered are sent again, silence becomes DOWN."""
-        self._now_s = now_s
+        self._run_s = run_s
         if self._state is LineState.CLOSED:
             return
         commands = self._commands
-        given_up = [name for name in _ORDER if name in commands and commands[name].tick(now_s)] if commands else ()
+        given_up = [name for name in _ORDER if name in commands and commands[name].tick(run_s)] if commands else ()
         if given_up:
             name = given_up[0]
             heard, tries = self._decoder, self._commands[name].tries
-            trouble = troubles.no_answer(name, tries, frames=heard.frames, bad=heard.bad, baud=self._config.link.baud)
-            self._go_down(trouble)
+            problem = diagnostics.no_answer(
+                name, tries, frames=heard.frames, bad=heard.bad, baud=self._config.link.baud
+            )
+            self._go_down(problem)
         if self._state is LineState.READY:
             self._listen()
-            if "PATTERN" not in self._commands and now_s - self._pattern_s > self._settling_s:
+            if "PATTERN" not in self._commands and run_s - self._pattern_s > self._settling_s:
                 self._stamper.set_window(self._pattern.window)
 
     def drive(self, twist: Twist) -> None:
@@ -221,12 +223,12 @@ class DenningDriver:
         for name in _ORDER if writable else _ORDER[:1]:
             command = self._commands.get(name)
             if command is not None and command.due:
-                out += encode(command.frame(self._next_seq(), self._now_s))
+                out += encode(command.frame(self._next_seq(), self._run_s))
         if self._state is not LineState.READY or "HALT" in self._commands:
             self._drive = None
         if writable and self._drive is not None:
             seq, body = self._next_seq(), self._config.body
-            self._watch.sent(seq, self._now_s)
+            self._watch.sent(seq, self._run_s)
             v, w = to_wire(self._drive.v, body.speed_max_m_s), to_wire(self._drive.w, body.turn_max_rad_s)
             out += encode(Drive(seq, v, w))
             self._drive = None
@@ -240,9 +242,9 @@ class DenningDriver:
             return b"\0" + bytes(out)
         return bytes(out)
 
-    def take(self) -> Heard:
+    def take_received(self) -> Received:
         """Return and forget what arrived since the last call."""
-        heard = Heard(tuple(self._firings), self._odometry, self._rebooted, self._stamper.notes())
+        heard = Received(tuple(self._firings), self._odometry, self._rebooted, self._stamper.notes())
         self._firings.clear()
         self._odometry = None
         self._rebooted = False
@@ -251,16 +253,16 @@ class DenningDriver:
     def _listen(self) -> None:
         """Notice a robot that has fallen silent, one that no longer hears, and a ring that does not fire."""
         silence_max_s = self._config.link.silence_max_s
-        silent_s = self._now_s - self._odometry_s
+        silent_s = self._run_s - self._odometry_s
         untaken_s = self._watch.untaken_s(self._odometry_s)  # what came after it, it cannot tell of
         if silent_s > silence_max_s:
             # An echo may well come right after the last odometry of all.
             others = self._frame_s - self._odometry_s > 0.5 * silence_max_s
             bad = self._decoder.bad - self._bad_then
-            self._go_down(troubles.silence(silent_s, others=others, bad=bad))
+            self._go_down(diagnostics.silence(silent_s, others=others, bad=bad))
         elif untaken_s > _UNTAKEN_SHARE * silence_max_s:
-            self._go_down(troubles.deafness(untaken_s))
-        elif self._ring.should_ask(self._now_s):
+            self._go_down(diagnostics.deafness(untaken_s))
+        elif self._ring.should_ask(self._run_s):
             self._ask_who = True
 
     def _next_seq(self) -> int:
@@ -285,7 +287,7 @@ class DenningDriver:
         self._commands[name] = command
 
     def _greet(self) -> None:
-        self._state = LineState.GREETING
+        self._state = LineState.HANDSHAKE
         self._ask("HELLO")
 
     def _abandon(self) -> None:
@@ -299,13 +301,13 @@ class DenningDriver:
         if halt is not None:
             self._ask("HALT")
 
-    def _go_down(self, trouble: str) -> None:
+    def _go_down(self, problem: str) -> None:
         self._state = LineState.DOWN
-        self._trouble = trouble
+        self._problem = problem
         self._abandon()
         self._ask("HELLO")
         hello = self._commands["HELLO"]
-        hello.due, hello.sent_s = False, self._now_s
+        hello.due, hello.sent_s = False, self._run_s
 
     def _take_frame(self, frame: Frame) -> None:
         match frame:
@@ -318,13 +320,13 @@ class DenningDriver:
             case Odom():
                 self._take_odometry(frame)
             case Echo() if self._state is LineState.READY:
-                self._ring.heard(self._now_s, self._decoder.bad)
+                self._ring.heard(self._run_s, self._decoder.bad)
                 self._stamper.echo(frame)
             case _:
                 pass  # an echo of a pattern that is not ours yet
 
     def _take_ident(self, ident: Ident) -> None:
-        wrong = troubles.wrong_robot(ident, self._config)
+        wrong = diagnostics.wrong_robot(ident, self._config)
         if wrong is not None:
             self._go_down(wrong)
             return
@@ -344,7 +346,7 @@ class DenningDriver:
             self._stamper.break_off()
         self._jump = None
         if greeted or restarted:
-            self._state = LineState.GREETING
+            self._state = LineState.HANDSHAKE
             self._ask("PATTERN")
 
     def _take_ack(self, ack: Ack) -> None:
@@ -354,27 +356,27 @@ class DenningDriver:
         del self._commands[name]
         if name == "PATTERN":
             self._state = LineState.READY
-            self._odometry_s, self._bad_then = self._now_s, self._decoder.bad
-            self._ring.heard(self._now_s, self._decoder.bad)
-            self._pattern_s = self._now_s
+            self._odometry_s, self._bad_then = self._run_s, self._decoder.bad
+            self._ring.heard(self._run_s, self._decoder.bad)
+            self._pattern_s = self._run_s
             if "HALT" in self._commands:
                 self._ask("HALT")  # a robot that answers all else must answer this, within the usual patience
         if self._state is LineState.READY:
-            self._trouble = None
+            self._problem = None
 
     def _take_nak(self, nak: Nak) -> None:
         name = self._answered(nak.of)
         if name is not None:
-            trouble = troubles.refusal(name, nak.code)
+            problem = diagnostics.refusal(name, nak.code)
             if name == "RELEASE":
                 del self._commands[name]
-                self._trouble = trouble
+                self._problem = problem
             else:
-                self._go_down(trouble)
+                self._go_down(problem)
         elif nak.of in self._watch:
             self._watch.settle()
             if nak.code != NakCode.LATCHED:
-                self._trouble = troubles.refusal("DRIVE", nak.code)
+                self._problem = diagnostics.refusal("DRIVE", nak.code)
 
     def _answered(self, seq: int) -> str | None:
         """Return the name of the command under way one of whose tries was `seq`."""
@@ -383,14 +385,14 @@ class DenningDriver:
     def _take_odometry(self, odom: Odom) -> None:
         if "HELLO" in self._commands:
             return  # until it has said who it is, its clock and its odometry may be another life's
-        sample = self._stamper.odometry(odom, self._now_s)
+        sample = self._stamper.odometry(odom, self._run_s)
         if isinstance(sample, Jump):
             # Perhaps it restarted, and its clock, its odometry and its pattern are gone: ask who is there.
             self._jump = sample
             self._abandon()
             self._greet()
             return
-        self._odometry_s, self._bad_then = self._now_s, self._decoder.bad
+        self._odometry_s, self._bad_then = self._run_s, self._decoder.bad
         self._odometry = sample
         self._watch.named(odom.last_drive_seq)
         if sample.flags & Flags.LATCHED:

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from config.robot import BodyConfig
 from drivers import se2
-from drivers.denning import diagnostics as troubles
+from drivers.denning import diagnostics
 from drivers.denning.frames import FAULT, NO_ECHO, WINDOW_MAX, Echo, Odom
 from drivers.denning.robot_clock import Jump, RobotClock
 from drivers.denning.wire_units import odometry_of, ranges_of
@@ -41,7 +41,7 @@ _HERE = Pose(0.0, 0.0, 0.0)
 _NOTES_MAX = 16
 
 
-class Stamper:
+class PoseStamper:
     """The odometry's history and the echoes that wait for it.
 
     Parameters
@@ -67,7 +67,7 @@ class Stamper:
         self.late_echoes = 0
         self.out_of_window = 0
         self.jumps = 0
-        self.frame = _HERE
+        self.origin = _HERE
         self._sensors = sensors
         self._body = body
         self._clock = RobotClock()
@@ -102,7 +102,7 @@ class Stamper:
         self._clock.restart()
         self._last_firing_us = None
         self._last, self._steady = None, 0
-        self.frame, self._ring_offset = _HERE, 0.0
+        self.origin, self._ring_offset = _HERE, 0.0
         self.break_off()
 
     def break_off(self) -> None:
@@ -116,9 +116,9 @@ class Stamper:
         self.late_echoes += len(self._held)
         self._held.clear()
 
-    def odometry(self, odom: Odom, now_s: float) -> Odometry | Jump:
+    def odometry(self, odom: Odom, run_s: float) -> Odometry | Jump:
         """Take an odometry frame; a jump is reported, and the frame not used."""
-        t_us = self._clock.read(odom.t_us, now_s)
+        t_us = self._clock.read(odom.t_us, run_s)
         if isinstance(t_us, Jump):
             return t_us
         told = odometry_of(odom, t_us)
@@ -126,7 +126,7 @@ class Stamper:
         newest = self._history.newest
         if newest is not None:
             moved_m = math.hypot(sample.pose.x - newest.pose.x, sample.pose.y - newest.pose.y)
-            if moved_m > _POSE_JUMP_M + _POSE_JUMP_M_S * (sample.t_s - newest.t_s):
+            if moved_m > _POSE_JUMP_M + _POSE_JUMP_M_S * (sample.robot_s - newest.robot_s):
                 return Jump.AHEAD
         sample = self._without_leap(told, sample)
         self._history.add(sample)
@@ -134,9 +134,9 @@ class Stamper:
         return sample
 
     def _in_our_frame(self, told: Odometry) -> Odometry:
-        if self.frame == _HERE and self._ring_offset == 0.0:
+        if self.origin == _HERE and self._ring_offset == 0.0:
             return told
-        pose = self.frame.inverse().compose(told.pose)
+        pose = self.origin.inverse().compose(told.pose)
         return replace(told, pose=pose, ring_yaw=told.ring_yaw + self._ring_offset)
 
     def _without_leap(self, told: Odometry, sample: Odometry) -> Odometry:
@@ -144,7 +144,7 @@ class Stamper:
         last = self._last
         if last is None:
             return sample
-        dt_s = sample.t_s - last.t_s
+        dt_s = sample.robot_s - last.robot_s
         v, w = 0.5 * (last.twist.v + sample.twist.v), 0.5 * (last.twist.w + sample.twist.w)
         expected = last.pose.compose(se2.exp(v * dt_s, 0.0, w * dt_s))
         ring_yaw = last.ring_yaw if self._body.synchro else last.ring_yaw + w * dt_s
@@ -159,8 +159,10 @@ class Stamper:
         if steady < _STEADY:
             return sample
         self.jumps += 1
-        self._notes.append(troubles.odometry_jump(off_m, wrap_angle(turned), wrap_angle(sample.ring_yaw - ring_yaw)))
-        self.frame = told.pose.compose(expected.inverse())
+        self._notes.append(
+            diagnostics.odometry_jump(off_m, wrap_angle(turned), wrap_angle(sample.ring_yaw - ring_yaw))
+        )
+        self.origin = told.pose.compose(expected.inverse())
         self._ring_offset = ring_yaw - told.ring_yaw
         return replace(told, pose=expected, ring_yaw=ring_yaw)
 
@@ -187,7 +189,7 @@ class Stamper:
             t_us = self._clock.past(self._held[0].t_us)
             if t_us is None:
                 break
-            ahead_us = t_us - round(newest.t_s * 1e6)
+            ahead_us = t_us - round(newest.robot_s * 1e6)
             if 0 < ahead_us <= _FUTURE_MAX_US:
                 break
             echo = self._held.popleft()

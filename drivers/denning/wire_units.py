@@ -93,7 +93,7 @@ def identity_of(ident: Ident) -> Identity:
 def odometry_of(odom: Odom, t_us: int) -> Odometry:
     """Return an odometry sample in SI; `t_us` is its unwrapped time."""
     return Odometry(
-        t_s=t_us * 1e-6,
+        robot_s=t_us * 1e-6,
         pose=Pose(odom.x_0p1mm * 1e-4, odom.y_0p1mm * 1e-4, odom.heading_1em4rad * 1e-4),
         ring_yaw=odom.ring_yaw_1em4rad * 1e-4,
         twist=Twist(odom.v_mm_s * 1e-3, odom.w_mrad_s * 1e-3),

@@ -55,9 +55,9 @@ class MemoryLine:
         data = self._robot.advance(t_s)
         plugged = self._robot.plugged
         if plugged and not self._open:
-            self._driver.opened(now_s)
+            self._driver.line_opened(now_s)
         elif self._open and not plugged:
-            self._driver.closed()
+            self._driver.line_closed()
         self._open = plugged
         if not plugged:
             return

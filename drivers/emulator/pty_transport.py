@@ -24,7 +24,7 @@ from config.world import WorldConfig
 from drivers.emulator.faults import Fault
 from drivers.emulator.latency_trace import LatencyTrace
 from drivers.emulator.robot_device import RobotDevice
-from drivers.emulator.time_channel import ControlChannel
+from drivers.emulator.time_channel import TimeChannel
 from drivers.emulator.truth_trace import TruthTrace
 from drivers.registry import make_device
 
@@ -34,7 +34,7 @@ LAG_MAX_S = 0.1
 """A process held up for longer than this stood still: its robot does not live through the rest in a burst."""
 LINGER_S = 4.0
 """How long the robot outlives its parent: long enough to be seen stopping by itself."""
-_STRIDE_S = 0.01
+_STEP_S = 0.01
 _READ_MAX = 4096
 _NO_HOST = frozenset({errno.EIO, errno.ENXIO})
 
@@ -183,7 +183,7 @@ class PtyPort:
             raise EmulatorError(f"cannot make the link {link}: {reason}; choose another path") from error
 
 
-class RealTime:
+class SlippingClock:
     """The robot's time, tied to the host's clock; slips rather than bursts when the process was held up.
 
     Attributes
@@ -202,7 +202,7 @@ class RealTime:
         """How far the robot has come."""
         return self._robot_s
 
-    def strides(self, now_s: float, *, may_slip: bool = True) -> Iterator[float]:
+    def steps(self, now_s: float, *, may_slip: bool = True) -> Iterator[float]:
         """Yield the robot's times to advance to, one after another, up to the host's time `now_s`."""
         lag_s = now_s - self._start_s - self._robot_s
         if may_slip and lag_s > LAG_MAX_S:
@@ -210,7 +210,7 @@ class RealTime:
             self.slipped_s += lag_s - LAG_MAX_S
         until_s = now_s - self._start_s
         while self._robot_s < until_s:
-            self._robot_s = min(until_s, self._robot_s + _STRIDE_S)
+            self._robot_s = min(until_s, self._robot_s + _STEP_S)
             yield self._robot_s
 
     def host_s(self, robot_s: float) -> float:
@@ -253,7 +253,7 @@ async def serve(
         As for `drivers.registry.make_device`.
     control
         Two file descriptors: laws of time are read from the one, and how far the robot has lived is written to the
-        other, see `ControlChannel`. The truth is then written by the run's clock, which is the host's until it is
+        other, see `TimeChannel`. The truth is then written by the run's clock, which is the host's until it is
         held for the first time.
     clock
         The host's monotonic clock, seconds.
@@ -282,18 +282,18 @@ async def serve(
         stack.callback(port.close)
         channel = None if control is None else _open_channel(control, stack)
         ready(port.path)
-        timeline = RealTime(clock())
+        timeline = SlippingClock(clock())
         orphaned_s: float | None = None
         while not stop.is_set():
             host_s = now_s = clock()
             pause_s, may_slip = PERIOD_S, True
             if channel is not None:
-                channel.listen(host_s)
-                pace = channel.governor.pace
-                now_s = channel.governor.now_s(host_s)
-                pause_s, may_slip = PERIOD_S / max(1.0, pace.factor), pace.is_free
+                channel.receive(host_s)
+                scale = channel.follower.scale
+                now_s = channel.follower.run_at(host_s)
+                pause_s, may_slip = PERIOD_S / max(1.0, scale.factor), scale.is_real_time
             stood_s = timeline.robot_s
-            for robot_s in timeline.strides(now_s, may_slip=may_slip):
+            for robot_s in timeline.steps(now_s, may_slip=may_slip):
                 _exchange(device, port, robot_s, latency, clock)
                 if trace is not None:
                     truth = device.truth
@@ -302,7 +302,7 @@ async def serve(
                 if timeline.robot_s == stood_s:
                     # Time stands still, and a HALT is heard nevertheless.
                     _exchange(device, port, stood_s, latency, clock)
-                channel.lived(now_s)
+                channel.acknowledge(now_s)
             if exit_with_parent and orphaned_s is None and os.getppid() != parent:
                 orphaned_s = host_s
             if orphaned_s is not None and host_s - orphaned_s > LINGER_S:
@@ -336,9 +336,9 @@ def _exchange(
         device.receive(heard)
 
 
-def _open_channel(control: tuple[int, int], stack: contextlib.ExitStack) -> ControlChannel:
+def _open_channel(control: tuple[int, int], stack: contextlib.ExitStack) -> TimeChannel:
     try:
-        channel = ControlChannel(*control)
+        channel = TimeChannel(*control)
     except OSError as error:
         raise EmulatorError(f"cannot be controlled: {os.strerror(error.errno or 0)}; give it two pipes") from error
     stack.callback(channel.close)

@@ -1,8 +1,9 @@
-"""The emulator's side of having its time held: laws come in as lines, and out goes how far the robot has lived.
+"""The emulator's end of the channel that controls its time: time scales come in, acknowledgements go out.
 
-While time is free nothing is said. Under any other law the robot tells after each stretch of its life up to when it
-has lived, with its bytes already on the line; the program that drives it never lets its own clock go beyond that. And
-the robot never lives beyond the law's end. So neither gets ahead of the other, however busy the machine is.
+In real time the emulator sends nothing. Under any other time scale it acknowledges, after each step and once the
+step's bytes are on the line, up to which time it has simulated. The controlling program never lets its own clock pass
+the acknowledged time, and the emulator never passes the end of the time scale. So neither runs ahead of the other,
+however busy the machine is.
 """
 
 from __future__ import annotations
@@ -12,91 +13,99 @@ import math
 import os
 from typing import Final
 
-from drivers.emulator.time_scale import LINE_MAX, REAL, TimeScale, pace_in
+from drivers.emulator.time_scale import MESSAGE_MAX, REAL_TIME, TimeScale, parse_time_scale
 
-LIVED: Final = "at"
+ACKNOWLEDGED: Final = "acknowledged"
+"""First word of a message ``acknowledged NUMBER RUN_S``: simulated up to RUN_S under time scale NUMBER."""
 REFUSED: Final = "refused"
+"""First word of a message ``refused WHY``: what came was not a time scale."""
 _READ_MAX: Final = 4096
 
 
-class Governor:
-    """Obeys laws of time; no I/O.
+class TimeScaleFollower:
+    """Follows the time scales it receives, and acknowledges; without I/O.
 
     Attributes
     ----------
-    pace
-        The law in force.
+    scale
+        The time scale in force.
     """
 
     def __init__(self) -> None:
-        self.pace: TimeScale = REAL
+        self.scale: TimeScale = REAL_TIME
         self._number = 0
-        self._lived_s = -math.inf
-        self._told_s = -math.inf
-        self._owes = False
+        self._simulated_s = -math.inf
+        self._acknowledged_s = -math.inf
+        self._must_acknowledge = False
         self._rest = b""
         self._out = bytearray()
 
-    def now_s(self, host_s: float) -> float:
-        """Return the run's time at a moment of the host's clock; what has been lived is not unlived."""
-        return max(self._lived_s, self.pace.at(host_s))
+    def run_at(self, host_s: float) -> float:
+        """Return the run's time at a reading of the host's clock, s; never less than what has been simulated."""
+        return max(self._simulated_s, self.scale.run_at(host_s))
 
-    def take(self, data: bytes) -> None:
-        """Take what came, any chunking; a line that is no law is refused and changes nothing."""
+    def receive(self, data: bytes) -> None:
+        """Take bytes in any chunking; a line that is not a time scale is refused and changes nothing."""
         *lines, self._rest = (self._rest + data).split(b"\n")
         for line in lines:
             if not line.strip():
                 continue
             try:
-                self._number, self.pace = pace_in(line)
-                self._owes = True
+                self._number, self.scale = parse_time_scale(line)
+                self._must_acknowledge = True
             except ValueError as error:
                 self._out += f"{REFUSED} {error}\n".encode()
-        if len(self._rest) > LINE_MAX:
-            # It is refused when it ends, if it ever does; until then it need not be kept.
-            self._rest = self._rest[: LINE_MAX + 1]
+        if len(self._rest) > MESSAGE_MAX:
+            # It will be refused at its end, if that ever comes; until then its length is all that matters.
+            self._rest = self._rest[: MESSAGE_MAX + 1]
 
-    def lived(self, run_s: float) -> bytes:
-        """Take note that the robot has lived up to `run_s`, and return what is to be said."""
-        self._lived_s = max(self._lived_s, run_s)
-        news = not self.pace.is_free and self._lived_s > self._told_s
-        if self._owes or news:
-            self._out += f"{LIVED} {self._number} {self._lived_s!r}\n".encode()
-            self._owes, self._told_s = False, self._lived_s
+    def acknowledge(self, run_s: float) -> bytes:
+        """Note that the robot has been simulated up to `run_s`, and return the messages to send."""
+        self._simulated_s = max(self._simulated_s, run_s)
+        has_advanced = not self.scale.is_real_time and self._simulated_s > self._acknowledged_s
+        if self._must_acknowledge or has_advanced:
+            self._out += f"{ACKNOWLEDGED} {self._number} {self._simulated_s!r}\n".encode()
+            self._must_acknowledge, self._acknowledged_s = False, self._simulated_s
         out = bytes(self._out)
         self._out.clear()
         return out
 
     def release(self, host_s: float) -> None:
-        """Let time go by freely from here: nobody is there any more to hold it."""
-        if not self.pace.is_free:
-            self.pace = TimeScale(host_s, self.now_s(host_s), 1.0, math.inf)
+        """Return to real time from here on: the controlling program is gone."""
+        if not self.scale.is_real_time:
+            self.scale = TimeScale(host_s, self.run_at(host_s), 1.0, math.inf)
 
 
-class ControlChannel:
-    """A governor at the ends of two pipes.
+class TimeChannel:
+    """A follower of time scales that come and are acknowledged over two pipes.
 
     Parameters
     ----------
     read_fd, write_fd
-        Made non-blocking while the channel is open: what nobody reads in time is lost, and the robot does not wait.
+        File descriptors. They are non-blocking while the channel is open: an acknowledgement that does not fit into
+        the pipe is lost, and the emulator does not wait.
+
+    Attributes
+    ----------
+    follower
+        Has the time scale in force.
 
     Raises
     ------
     OSError
-        They are no files that can be used so.
+        The file descriptors cannot be used so.
     """
 
     def __init__(self, read_fd: int, write_fd: int) -> None:
-        self.governor = Governor()
+        self.follower = TimeScaleFollower()
         self._read_fd, self._write_fd = read_fd, write_fd
-        self._before = {fd: os.get_blocking(fd) for fd in (read_fd, write_fd)}
-        for fd in self._before:
+        self._was_blocking = {fd: os.get_blocking(fd) for fd in (read_fd, write_fd)}
+        for fd in self._was_blocking:
             os.set_blocking(fd, False)
         self._is_open = True
 
-    def listen(self, host_s: float) -> None:
-        """Take what has come; where whoever held the time is gone, time goes by freely from `host_s` on."""
+    def receive(self, host_s: float) -> None:
+        """Take what has come; if the controlling program is gone, return to real time from `host_s` on."""
         if not self._is_open:
             return
         try:
@@ -106,20 +115,20 @@ class ControlChannel:
         except OSError:
             data = b""
         if data:
-            self.governor.take(data)
+            self.follower.receive(data)
         else:
             self._is_open = False
-            self.governor.release(host_s)
+            self.follower.release(host_s)
 
-    def lived(self, run_s: float) -> None:
-        """Tell how far the robot has lived, where that is to be told."""
-        out = self.governor.lived(run_s)
+    def acknowledge(self, run_s: float) -> None:
+        """Send up to which time the robot has been simulated, if the time scale in force asks for it."""
+        out = self.follower.acknowledge(run_s)
         if out and self._is_open:
             with contextlib.suppress(OSError):
                 os.write(self._write_fd, out)
 
     def close(self) -> None:
-        """Leave the pipes as they were."""
-        for fd, was in self._before.items():
+        """Restore the pipes' blocking mode."""
+        for fd, was_blocking in self._was_blocking.items():
             with contextlib.suppress(OSError):
-                os.set_blocking(fd, was)
+                os.set_blocking(fd, was_blocking)

@@ -1,9 +1,9 @@
-"""The pace of a run's time, as a law that two processes read alike.
+"""How fast the run's time passes, in a form that two processes evaluate alike.
 
-An emulator that is paused, stepped or sped up is of use only if the program that drives it lives in the same time:
-else its silence is an alarm, and its robot goes on where it was not to move. Both processes see the host's monotonic
-clock, so what they must agree on is only how the run's time follows from that. The law is four numbers; whoever
-holds them knows the run's time at any moment without asking the other.
+The emulator and the program that drives it must pause, step and speed up together: otherwise the emulator's silence
+raises an alarm, or its robot moves on while the run is paused. Both processes read the host's monotonic clock, so it
+is enough that they agree on how the run's time follows from it. A `TimeScale` says that in four numbers; a process
+that has them knows the run's time without asking the other.
 """
 
 from __future__ import annotations
@@ -11,64 +11,66 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-WORD: Final = "pace"
+KEYWORD: Final = "time_scale"
+"""First word of a message."""
 FACTOR_MIN, FACTOR_MAX = 0.1, 10.0
-LINE_MAX: Final = 200
-"""Bytes of a line, at most."""
+"""Slowest and fastest time, seconds of the run per second of the host."""
+MESSAGE_MAX: Final = 200
+"""Longest message, bytes."""
 
 
 class TimeScale(NamedTuple):
     """How the run's time follows from the host's."""
 
     host_s: float
-    """At this moment of the host's clock, s …"""
+    """A reading of the host's monotonic clock, s."""
     run_s: float
-    """… the run's clock showed this, s."""
+    """The run's time at that reading, s."""
     factor: float
-    """So many seconds of the run go by in one of the host."""
+    """Seconds of the run per second of the host."""
     until_s: float
-    """The run's time stands still once it is so late, s."""
+    """The run's time stops when it gets here, s; inf = never."""
 
-    def at(self, host_s: float) -> float:
-        """Return the run's time at a moment of the host's clock."""
+    def run_at(self, host_s: float) -> float:
+        """Return the run's time at a reading of the host's clock, s."""
         return min(self.until_s, self.run_s + self.factor * max(0.0, host_s - self.host_s))
 
     def host_at(self, run_s: float) -> float:
-        """Return when the run's clock comes to a time; inf where it stands still before."""
+        """Return the host's time at which the run's time gets to `run_s`, s; inf if it stops before."""
         return math.inf if run_s > self.until_s else self.host_s + (run_s - self.run_s) / self.factor
 
     @property
-    def is_free(self) -> bool:
-        """Whether time goes by as it does for everybody: then no side waits for the other."""
+    def is_real_time(self) -> bool:
+        """True if time passes at its natural speed without end: then neither process waits for the other."""
         return self.factor == 1.0 and self.until_s == math.inf
 
-    def line(self, number: int) -> bytes:
-        """Return the law as a line of text, exact to the bit."""
-        return f"{WORD} {number} {self.host_s!r} {self.run_s!r} {self.factor!r} {self.until_s!r}\n".encode()
+    def encode(self, number: int) -> bytes:
+        """Return the time scale as a numbered message, a line of text that is exact to the bit."""
+        return f"{KEYWORD} {number} {self.host_s!r} {self.run_s!r} {self.factor!r} {self.until_s!r}\n".encode()
 
 
-REAL: Final = TimeScale(0.0, 0.0, 1.0, math.inf)
+REAL_TIME: Final = TimeScale(0.0, 0.0, 1.0, math.inf)
 """The run's time is the host's."""
 
 
-def pace_in(line: bytes) -> tuple[int, TimeScale]:
-    """Return the number and the law in a line.
+def parse_time_scale(line: bytes) -> tuple[int, TimeScale]:
+    """Return the message's number and its time scale.
 
     Raises
     ------
     ValueError
-        It is no such line; the text says why.
+        The line is not such a message; the text says why.
     """
-    if len(line) > LINE_MAX:
-        raise ValueError(f"a line has {LINE_MAX} bytes at most")
+    if len(line) > MESSAGE_MAX:
+        raise ValueError(f"a message has at most {MESSAGE_MAX} bytes")
     words = line.decode("ascii", errors="replace").split()
-    if len(words) != 6 or words[0] != WORD:
-        raise ValueError(f"a line is: {WORD} NUMBER HOST_S RUN_S FACTOR UNTIL_S")
+    if len(words) != 6 or words[0] != KEYWORD:
+        raise ValueError(f"expected: {KEYWORD} NUMBER HOST_S RUN_S FACTOR UNTIL_S")
     try:
         number = int(words[1])
         host_s, run_s, factor, until_s = map(float, words[2:])
     except ValueError as error:
-        raise ValueError("NUMBER must be a whole number and the others numbers") from error
+        raise ValueError("NUMBER must be an integer and the others numbers") from error
     if not (math.isfinite(host_s) and math.isfinite(run_s)):
         raise ValueError("HOST_S and RUN_S must be finite")
     if not FACTOR_MIN <= factor <= FACTOR_MAX:

@@ -100,7 +100,7 @@ class BayesPerception:
         """Take in one firing and return how many outline segments it completed."""
         pose = firing.pose
         made, self._circles_pending = observe(
-            self._handle, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), float(firing.t_s),
+            self._handle, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), float(firing.robot_s),
             firing.ranges_m, self._config.fresh_share,
         )  # fmt: skip
         # Polygons come after the circles, but not where the time was up before it was their turn.

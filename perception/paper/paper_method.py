@@ -101,8 +101,8 @@ class PaperPerception:
         """Take in one firing and return how many outline segments it completed."""
         segments = self._extractor.extract(firing)
         erased = self.outline.contradict(firing)
-        aged = self.outline.age(firing.t_s)
-        self.outline.add(segments, firing.t_s)
+        aged = self.outline.age(firing.robot_s)
+        self.outline.add(segments, firing.robot_s)
         if erased > 0 or len(segments) > 0 or aged:
             self._follow()
         return len(segments)

@@ -180,7 +180,7 @@ class SegmentExtractor:
         """
         config = self._config
         count = pair_readings(
-            firing.ranges_m, self._mounts, firing.pose.x, firing.pose.y, firing.ring_yaw, firing.t_s,
+            firing.ranges_m, self._mounts, firing.pose.x, firing.pose.y, firing.ring_yaw, firing.robot_s,
             self._kept, self._newest, self._filled, self._half_angle,
             config.baseline_min_m, config.baseline_max_m, config.gap_max_s, SPACING * config.baseline_min_m,
             self._out,

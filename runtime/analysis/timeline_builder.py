@@ -64,7 +64,7 @@ class TimelineBuilder:
         rows[:, 2] = firing.pose.x + c * mounts[:, 0] - s * mounts[:, 1]
         rows[:, 3] = firing.pose.y + s * mounts[:, 0] + c * mounts[:, 1]
         rows[:, 4] = firing.ring_yaw + mounts[:, 2]
-        rows[:, 5], rows[:, 6] = firing.ranges_m[fired], firing.t_s
+        rows[:, 5], rows[:, 6] = firing.ranges_m[fired], firing.robot_s
         self._rows.append(rows)
         self._heard += len(rows)
         self._front.observe(firing)

@@ -99,7 +99,7 @@ class _Listener:
         self._on_step = on_step
         self._gathering = TimelineBuilder(timeline)
         self._driver = make_driver(recording.settings)
-        self._driver.opened(0.0)
+        self._driver.line_opened(0.0)
         self._has_bytes = False
         self._begun_s: float | None = None
         self._before_s = math.nan
@@ -113,7 +113,7 @@ class _Listener:
             self._has_bytes = True
             for t_s, data in decode(SerialBytes, entry.data).pieces():
                 self._driver.receive(data, t_s)
-            self._driver.take()
+            self._driver.take_received()
         elif entry.topic == LOG and len(self._said) < SAID_MAX:
             self._said.append((self._recording.host_s(entry.log_ns), decode(LogLine, entry.data)))
         elif entry.topic == BOOKMARK:
@@ -172,11 +172,11 @@ def _of_ring_log(path: Path, source: TimelineSource, ready: Callable[[Settings],
     def on_firing(firing: Firing, perception: Perception) -> None:
         on_step()
         if not begun_s:
-            begun_s.append(firing.t_s)
+            begun_s.append(firing.robot_s)
             kept.append(perception)
         elif timeline.cycles:
-            timeline.gaps_s.append(firing.t_s - begun_s[0] - timeline.seconds)
-        t_s = firing.t_s - begun_s[0]
+            timeline.gaps_s.append(firing.robot_s - begun_s[0] - timeline.seconds)
+        t_s = firing.robot_s - begun_s[0]
         gathering.hear(t_s, firing)
         gathering.pass_by(t_s, perception)
         timeline.cycles += 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drivers.driver import Heard
+from drivers.driver import Received
 from perception.pipeline import Perception
 from perception.sensor_report import SensorReport
 
@@ -14,7 +14,7 @@ class Alerts:
         self._changes = 0
         self._told: dict[int, SensorReport] = {}
 
-    def news(self, heard: Heard, perception: Perception) -> list[str]:
+    def news(self, heard: Received, perception: Perception) -> list[str]:
         """Return a line for each thing that is new: what happened, likely cause, next action."""
         lines = list(heard.notes)
         if perception.sensor_monitor.changes == self._changes:

@@ -52,7 +52,7 @@ class Connection(NamedTuple):
                 await link.stop()
                 port = link.config.port
                 nobody = f"nothing on {port} answers like the robot: check its power and link.baud"
-                raise UserError(lost or driver.trouble or nobody, FAILED)
+                raise UserError(lost or driver.problem or nobody, FAILED)
             await asyncio.sleep(TURN_S)
 
     async def halt(self) -> bool:
@@ -63,7 +63,7 @@ class Connection(NamedTuple):
             self.driver.tick(self.clock())
             self.send()
             await asyncio.sleep(TURN_S)
-            odometry = self.driver.take().odometry
+            odometry = self.driver.take_received().odometry
             if odometry is not None and Flags.LATCHED in odometry.flags and odometry.twist == STANDSTILL:
                 return True
         return False

@@ -50,7 +50,7 @@ def gather(
     """
     driver.tick(run_s)
     gap_max_s = gap_max(driver)
-    state, trouble, heard = driver.state, driver.trouble, driver.take()
+    state, trouble, heard = driver.state, driver.problem, driver.take_received()
     return Inputs(
         run_s,
         state,

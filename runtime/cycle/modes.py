@@ -28,7 +28,7 @@ DEADMAN_GRACE_S: Final = 0.5
 LINE_REASONS: Final = MappingProxyType(
     {
         LineState.CLOSED: "the line to the robot is gone: check cable and power, then re-arm",
-        LineState.GREETING: "the robot's clock or odometry jumped, as after a restart: check the robot, then re-arm",
+        LineState.HANDSHAKE: "the robot's clock or odometry jumped, as after a restart: check the robot, then re-arm",
         LineState.DOWN: "the robot does not answer: check its power and cable, then re-arm",
     }
 )

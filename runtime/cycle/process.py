@@ -315,19 +315,19 @@ class RobotProcess:
         self._send()
 
     def _opened(self) -> None:
-        self._driver.opened(self._clock())
+        self._driver.line_opened(self._clock())
         self._send()
 
     def _received(self, data: bytes) -> None:
-        (run_s, host_s), waiting = self._clock.both(), self._driver.waiting
+        (run_s, host_s), waiting = self._clock.both(), self._driver.firings_waiting
         self._driver.receive(data, run_s)
-        if self._driver.waiting > waiting:
+        if self._driver.firings_waiting > waiting:
             self._rhythm.hear(run_s)
         if self._observers.on_bytes is not None:
             self._observers.on_bytes("in", host_s, data)
 
     def _closed(self, reason: str) -> None:
-        self._driver.closed()
+        self._driver.line_closed()
         if not self._stop.is_set():
             self._log.warning("line lost", reason=reason)
 

@@ -16,7 +16,7 @@ from behaviors.arbiter import Drive, Stop
 from behaviors.move_ahead import Leg
 from behaviors.response import Response
 from config.settings import Settings
-from drivers.driver import Heard, LineState
+from drivers.driver import LineState, Received
 from drivers.messages import Flags, Odometry, Twist
 from perception.edits import Edit
 from perception.percept import Percept
@@ -60,7 +60,7 @@ class Inputs:
     run_s: float
     line: LineState
     trouble: str | None
-    heard: Heard
+    heard: Received
     request: Request | None = None
     gap_max_s: float = GAP_MAX_S
     """Cycles farther apart than this come too late for the base's deadman."""
@@ -204,7 +204,7 @@ def _perceive(state: State, inputs: Inputs) -> int:
     new_segments = 0
     for firing in inputs.heard.firings:
         new_segments += state.perception.observe(firing)
-        state.last_firing_robot_s = firing.t_s
+        state.last_firing_robot_s = firing.robot_s
     return new_segments
 
 
@@ -258,14 +258,14 @@ def _drive(state: State, inputs: Inputs, settings: Settings) -> Drive | Stop:
     odometry, behaviors = state.odometry, settings.behaviors
     if odometry is None:
         return Stop("no odometry has arrived: check that the base reports it, then re-arm")
-    silence = odometry.t_s - state.last_firing_robot_s
+    silence = odometry.robot_s - state.last_firing_robot_s
     patience = behaviors.avoid_static_obstacle.echo_age_max_s
     if silence > patience:
         likely = inputs.trouble or "check the ring's power and cable"
         return Stop(f"the ring has not reported for {silence:.1f} s: {likely}, then re-arm")
     if state.leg is None:
         state.leg = Leg.starting_at(odometry.pose)
-    percept = Percept(odometry.pose, state.perception.obstacles(odometry.t_s, patience))
+    percept = Percept(odometry.pose, state.perception.obstacles(odometry.robot_s, patience))
     driven = drive(state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings)
     state.drive_request, state.leg = driven.drive_request, driven.leg
     state.vectors, state.standing = driven.vectors, driven.standing

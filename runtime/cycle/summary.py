@@ -160,7 +160,7 @@ def run_summary(
     """Return the summary of a run that ends in `state`; objects are in the robot's own odometry, leaps and all."""
     counts = driver.counts
     return {
-        "objects": [object_row(in_frame(driver.frame, seen)) for seen in state.perception.objects()],
+        "objects": [object_row(in_frame(driver.odometry_origin, seen)) for seen in state.perception.objects()],
         "cycles": books.cycles,
         "cycle_us": books.cycle_us(),
         "late": books.late,

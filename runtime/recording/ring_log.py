@@ -225,15 +225,15 @@ def _write_rows(file: TextIO, path: Path, firings: Iterable[Firing]) -> None:
         if row == 2:
             count = len(ranges)
             file.write(",".join([*REQUIRED, RING_YAW, *(f"r{i:02d}" for i in range(count))]) + "\n")
-        stamp = [firing.t_s, firing.pose.x, firing.pose.y, firing.pose.theta, firing.ring_yaw]
+        stamp = [firing.robot_s, firing.pose.x, firing.pose.y, firing.pose.theta, firing.ring_yaw]
         if len(ranges) != count or count == 0:
             raise _fault(path, row, f"would have {len(ranges)} sensors", f"the first firing has {count}, at least 1")
-        if not all(map(math.isfinite, stamp)) or firing.t_s < last_t:
+        if not all(map(math.isfinite, stamp)) or firing.robot_s < last_t:
             raise _fault(path, row, f"would have t, pose and ring yaw {stamp}", f"all are finite and t ≥ {last_t}")
         if any(r < 0.0 for r in ranges):
             raise _fault(path, row, f"would have the range {min(ranges)}", f"allowed is {_RANGE}")
         cells = [repr(float(value)) for value in stamp] + ["" if math.isnan(r) else repr(r) for r in ranges]
         file.write(",".join(cells) + "\n")
-        last_t = firing.t_s
+        last_t = firing.robot_s
     if count == 0:
         raise RingLogError(f"{path}: there is no firing to write; a ring log holds at least one")

@@ -84,7 +84,7 @@ def run_hall(settings: Settings, hall: Hall, seed: int) -> HallOutcome:
         cycle_stats.enter(time.perf_counter() - begin)
         watch.look(float(firing.pose.x), seen)
     drums, boxes, false = match_objects(hall.world, seen, settings.models)
-    return HallOutcome(drums, boxes, false, heard[-1].t_s, cycle_stats, inside_ellipse(drums, seen), watch.fixes())
+    return HallOutcome(drums, boxes, false, heard[-1].robot_s, cycle_stats, inside_ellipse(drums, seen), watch.fixes())
 
 
 def inside_ellipse(drums: Iterable[DrumRow], seen: Iterable[DetectedObject]) -> list[bool]:

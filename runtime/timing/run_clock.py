@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from drivers.emulator.time_scale import REAL, TimeScale
+from drivers.emulator.time_scale import REAL_TIME, TimeScale
 
 LEASE_S: Final = 0.002
 """Where time is not free it goes on so far beyond the next cycle's deadline, and no farther until that is over.
@@ -94,7 +94,7 @@ class PacedClock(RunClock):
     ) -> None:
         super().__init__(host)
         self.tell = tell
-        self.pace: TimeScale = REAL
+        self.pace: TimeScale = REAL_TIME
         self.factor = 1.0
         self._lived_s = math.inf
         self._told_s = -math.inf
@@ -109,7 +109,7 @@ class PacedClock(RunClock):
 
     def at(self, host_s: float) -> float:
         """Return the run's time at a moment of the host's clock that is now; it never goes back."""
-        self._shown_s = max(self._shown_s, min(self.pace.at(host_s), self._lived_s))
+        self._shown_s = max(self._shown_s, min(self.pace.run_at(host_s), self._lived_s))
         return self._shown_s
 
     def expect(self, due_s: float) -> float:
@@ -133,7 +133,7 @@ class PacedClock(RunClock):
     def release(self) -> None:
         """Let time go by freely from here on, whether the emulator follows or not."""
         self.factor = 1.0
-        if self._turns is not None or not self.pace.is_free:
+        if self._turns is not None or not self.pace.is_real_time:
             self.go()
 
     def listen(self, call: Callable[[], None]) -> None:
@@ -159,7 +159,7 @@ class PacedClock(RunClock):
         """Begin no further cycle, and let time stand still `lead_s` of the host's from now, on both sides."""
         self._turns = 0
         host_s = self.host()
-        here = self.at(host_s), self.pace.at(host_s)
+        here = self.at(host_s), self.pace.run_at(host_s)
         until_s = min(self.pace.until_s, max(here) + lead_s * self.pace.factor)
         self._told_s = -math.inf
         self._change(self.pace._replace(until_s=until_s))
@@ -183,7 +183,7 @@ class PacedClock(RunClock):
 
     def lived(self, run_s: float) -> None:
         """Take the emulator's word for how far its robot has lived, with what it sent by then on the line."""
-        if self.pace.is_free:
+        if self.pace.is_real_time:
             return
         self._lived_s = self._told_s = run_s
         if run_s > self.pace.until_s:
@@ -195,7 +195,7 @@ class PacedClock(RunClock):
         """Let time that is not free go on to the next cycle, and where it had to wait, at the same pace from here."""
         pace = self.pace
         beyond_s, least_s = (LEASE_S, LEASE_LEAST_S) if self._turns is None else (0.0, 0.0)
-        if pace.is_free or due_s + beyond_s <= pace.until_s + least_s:
+        if pace.is_real_time or due_s + beyond_s <= pace.until_s + least_s:
             return
         host_s = self.host()
         if pace.host_at(pace.until_s) < host_s:

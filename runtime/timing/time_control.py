@@ -12,7 +12,7 @@ import contextlib
 from collections.abc import Callable
 from typing import Final, Protocol
 
-from drivers.emulator.time_channel import LIVED, REFUSED
+from drivers.emulator.time_channel import ACKNOWLEDGED, REFUSED
 from drivers.emulator.time_scale import FACTOR_MAX, FACTOR_MIN, TimeScale
 from runtime.timing.run_clock import PacedClock
 
@@ -148,7 +148,7 @@ class EmulatorControl:
     def heard(self, line: bytes) -> None:
         """Take a line from the emulator."""
         match line.decode(errors="replace").split():
-            case [word, number, run_s] if word == LIVED and number.isdecimal():
+            case [word, number, run_s] if word == ACKNOWLEDGED and number.isdecimal():
                 with contextlib.suppress(ValueError):
                     self.clock.lived(float(run_s))
                     self._answered = int(number)
@@ -191,4 +191,4 @@ class EmulatorControl:
     def _tell(self, pace: TimeScale) -> None:
         self._number += 1
         if self._trouble is None:
-            self._send(pace.line(self._number))
+            self._send(pace.encode(self._number))

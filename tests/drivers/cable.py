@@ -56,11 +56,11 @@ class Cable:
     def plug(self) -> None:
         self.plugged = True
         self.passed = {"to the robot": 0, "to the host": 0}
-        self.driver.opened(self.now_s)
+        self.driver.line_opened(self.now_s)
 
     def unplug(self) -> None:
         self.plugged = False
-        self.driver.closed()
+        self.driver.line_closed()
 
     def step(self) -> None:
         """Let a step's time pass, and a host drive on; ends with the line cut where that byte is reached."""
@@ -73,7 +73,7 @@ class Cable:
             self.driver.drive(Twist(0.1, 0.05))
         if self.plugged:
             self.robot.receive(self._pass("to the robot", self.driver.outgoing(writable=True)))
-        self.firings += self.driver.take().firings
+        self.firings += self.driver.take_received().firings
         if self.plugged and self.cut_after is not None and self.passed[self.cut_after[0]] == self.cut_after[1]:
             self.unplug()
 
@@ -92,6 +92,6 @@ class Cable:
         """Run until a firing arrives, for `patience_s` at most; return how long that took."""
         begun, before = self.now_s, len(self.firings)
         while len(self.firings) == before:
-            assert self.now_s - begun <= patience_s, f"no echo within {patience_s} s: {self.driver.trouble}"
+            assert self.now_s - begun <= patience_s, f"no echo within {patience_s} s: {self.driver.problem}"
             self.step()
         return self.now_s - begun

@@ -47,7 +47,7 @@ class Bench:
 
     def open(self) -> None:
         self._ears = Decoder("host")
-        self.robot.opened(self.now)
+        self.robot.line_opened(self.now)
 
     def state(self) -> LineState:
         return self.robot.state

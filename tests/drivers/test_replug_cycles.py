@@ -97,17 +97,17 @@ async def hosted(config: LinkConfig) -> AsyncIterator[tuple[DenningDriver, async
             link.send(data)
 
     def opened() -> None:
-        driver.opened(loop.time())
+        driver.line_opened(loop.time())
         send()
 
     def received(data: bytes) -> None:
         driver.receive(data, loop.time())
         send()
-        for _ in driver.take().firings:
+        for _ in driver.take_received().firings:
             firings.put_nowait(None)
 
     def closed(reason: str) -> None:
-        driver.closed()
+        driver.line_closed()
         lost.put_nowait(reason)
 
     link = Link(config, opened, received, closed)

@@ -134,9 +134,9 @@ class Host:
         now = time.monotonic
         self.link = Link(
             LinkConfig(port=str(self.path)),
-            lambda: self.driver.opened(now()),
+            lambda: self.driver.line_opened(now()),
             lambda data: self.driver.receive(data, now()),
-            lambda _: self.driver.closed(),
+            lambda _: self.driver.line_closed(),
         )
 
     def cycle(self) -> None:
@@ -147,7 +147,7 @@ class Host:
         if self.down_s is None:
             self.asked += 1
             self.driver.drive(Twist(1e-3 * (self.asked % 500), 0.0))
-        self.driver.take()
+        self.driver.take_received()
         self.send()
 
     def send(self) -> None:
@@ -297,6 +297,6 @@ def test_the_link_is_called_dead_within_half_a_second(kind: str, measured: Calla
         cycle_s = CYCLE_STEPS * STEP_S
         noticed_s = -(-cable.now_s // cycle_s) * cycle_s
         worst_s = max(worst_s, noticed_s - at_s)
-        assert cable.driver.trouble
+        assert cable.driver.problem
     assert worst_s <= DEAD_WITHIN_S + 1e-9
     measured(f"{kind}, at 25 phases: called dead after ≤ {worst_s:.3f} s")

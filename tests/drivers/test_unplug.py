@@ -43,9 +43,9 @@ def cut_before_every_byte(way: Way, outages_s: Sequence[float]) -> str:
         cable.plug()
         worst = max(worst, cable.until_echo(ECHO_WITHIN_S))
         assert cable.driver.state is LineState.READY
-        assert cable.driver.trouble is None
+        assert cable.driver.problem is None
         cable.run(0.1)
-        times = [firing.t_s for firing in cable.firings]
+        times = [firing.robot_s for firing in cable.firings]
         assert all(b - a >= 0.0499 for a, b in itertools.pairwise(times)), "none twice, none too soon"
     shown = ", ".join(f"{outage_s:g}" for outage_s in outages_s)
     return f"cut before each of {total} bytes {way}, for {shown} s: echoes ≤ {worst:.3f} s after it is open again"

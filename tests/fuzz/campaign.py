@@ -44,11 +44,11 @@ def shipped(kind: Any) -> list[bytes]:
 def take_ring_log(path: Path) -> None:
     last = -math.inf
     for firing in read_ring_log(path):
-        assert firing.t_s >= last
+        assert firing.robot_s >= last
         pose = firing.pose
-        assert all(map(math.isfinite, (firing.t_s, pose.x, pose.y, pose.theta, firing.ring_yaw)))
+        assert all(map(math.isfinite, (firing.robot_s, pose.x, pose.y, pose.theta, firing.ring_yaw)))
         assert not (firing.ranges_m < 0.0).any()
-        last = firing.t_s
+        last = firing.robot_s
 
 
 def take_robot(path: Path) -> None:

@@ -44,7 +44,7 @@ def decoder(data: bytes) -> None:
 def driver(data: bytes) -> None:
     """A robot that says anything at all, in frames with good checksums: the driver believes it or not, and lives."""
     robot, run_s, rest = make_driver(ROBOT), 0.0, data
-    robot.opened(run_s)
+    robot.line_opened(run_s)
     while rest:
         length, rest = rest[0] % 48, rest[1:]
         body, rest = rest[:length], rest[length:]
@@ -60,8 +60,8 @@ def driver(data: bytes) -> None:
         heard = Decoder("host")
         heard.feed(robot.outgoing(writable=length % 5 != 0).lstrip(b"\0"))
         assert heard.bad == 0
-        for firing in robot.take().firings:
-            assert all(map(math.isfinite, (firing.t_s, firing.pose.x, firing.pose.y, firing.pose.theta)))
+        for firing in robot.take_received().firings:
+            assert all(map(math.isfinite, (firing.robot_s, firing.pose.x, firing.pose.y, firing.pose.theta)))
             assert firing.ranges_m.shape == (24,)
 
 
@@ -73,9 +73,9 @@ def ring_log(data: bytes) -> None:
         path, last_s = Path(file.name), -math.inf
         try:
             for firing in read_ring_log(path):
-                assert last_s <= firing.t_s < math.inf
+                assert last_s <= firing.robot_s < math.inf
                 assert all(r >= 0.0 or math.isnan(r) for r in firing.ranges_m.tolist())
-                last_s = firing.t_s
+                last_s = firing.robot_s
         except RingLogError as error:
             said = str(error)
         else:

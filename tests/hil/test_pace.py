@@ -111,7 +111,7 @@ async def test_an_echo_waits_for_no_timer(tmp_path: Path) -> None:
 
     def note(record: CycleRecord, *_: State | CycleStats | RobotDriver) -> None:
         for firing in record.inputs.heard.firings:
-            began[round(firing.t_s * 1e6)] = record.inputs.run_s
+            began[round(firing.robot_s * 1e6)] = record.inputs.run_s
         if record.inputs.echo_age_s is not None:
             waited_s.append(record.inputs.echo_age_s)
         if len(began) >= ECHOES:

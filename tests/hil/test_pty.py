@@ -20,7 +20,7 @@ import pytest
 
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Ack, Drive, Echo, Frame, Hello, Ident, Odom, Pattern
-from drivers.emulator.pty_transport import LAG_MAX_S, LINGER_S, EmulatorError, PtyPort, RealTime
+from drivers.emulator.pty_transport import LAG_MAX_S, LINGER_S, EmulatorError, PtyPort, SlippingClock
 from drivers.emulator.truth_trace import HEADER
 from tests.hil.machine import PATIENCE_S, AnyTest, stalls_excused
 
@@ -374,12 +374,12 @@ def test_frozen_emulator_goes_on_without_a_burst(link: Path) -> None:
         assert host.decoder.bad == 0
 
 
-def test_real_time_slips_rather_than_bursts() -> None:
-    timeline = RealTime(100.0)
-    strides = list(timeline.strides(100.035))
+def test_the_emulators_clock_slips_rather_than_bursts() -> None:
+    timeline = SlippingClock(100.0)
+    strides = list(timeline.steps(100.035))
     assert strides == pytest.approx([0.01, 0.02, 0.03, 0.035])
     assert timeline.host_s(0.035) == pytest.approx(100.035)
-    assert list(timeline.strides(100.035)) == []
-    assert list(timeline.strides(105.0))[-1] == pytest.approx(0.035 + LAG_MAX_S)
+    assert list(timeline.steps(100.035)) == []
+    assert list(timeline.steps(105.0))[-1] == pytest.approx(0.035 + LAG_MAX_S)
     assert timeline.slipped_s == pytest.approx(105.0 - 100.035 - LAG_MAX_S)
     assert timeline.host_s(0.035 + LAG_MAX_S) == pytest.approx(105.0)

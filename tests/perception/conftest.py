@@ -16,7 +16,7 @@ from tests.perception.halls import drive
 def firings() -> list[Firing]:
     """A way past the first four drums, and 3 ft of it once more."""
     once = list(drive(load_world("hallway"), (-4.0, SEEN_TO_FT)))
-    return [*once, *drive(load_world("hallway"), (-1.0, 3.0), begin_s=once[-1].t_s + 1.0, y_ft=0.5)]
+    return [*once, *drive(load_world("hallway"), (-1.0, 3.0), begin_s=once[-1].robot_s + 1.0, y_ft=0.5)]
 
 
 @pytest.fixture(scope="module", params=["paper", pytest.param("bayes", marks=pytest.mark.compiled)])

@@ -57,7 +57,7 @@ def test_objects_and_segments_keep_their_numbers(seen: Perception, firings: list
     assert max(after) > max(kept), "new ones have new numbers"
     times = listed.times
     assert np.isfinite(times).all()
-    assert (times <= firings[-1].t_s).all()
+    assert (times <= firings[-1].robot_s).all()
     np.testing.assert_array_equal(listed.geometry, seen.segment_geometry())
 
 
@@ -93,7 +93,7 @@ def test_pinned_segments_outlast_whatever_comes(seen: Perception, firings: list[
     rows = {n: tuple(e) for n, e in zip(listed.numbers.tolist(), listed.geometry.tolist(), strict=True) if n in pins}
     for lap in range(1, 4):
         for firing in passed(firings):
-            seen.observe(replace(firing, t_s=firing.t_s + 200.0 * lap))
+            seen.observe(replace(firing, robot_s=firing.robot_s + 200.0 * lap))
     after = seen.segments()
     now = {n: tuple(e) for n, e in zip(after.numbers.tolist(), after.geometry.tolist(), strict=True)}
     assert {n: now.get(n) for n in pins} == rows
@@ -104,7 +104,7 @@ def test_pinned_segments_outlast_whatever_comes(seen: Perception, firings: list[
     assert not seen.segments().pinned.any()
     for lap in range(4, 8):
         for firing in passed(firings):
-            seen.observe(replace(firing, t_s=firing.t_s + 200.0 * lap))
+            seen.observe(replace(firing, robot_s=firing.robot_s + 200.0 * lap))
     assert not set(pins) <= set(seen.segments().numbers.tolist()), "let go, they leave as any other"
 
 
@@ -216,7 +216,7 @@ def test_a_rejected_object_is_gone_and_only_new_readings_bring_it_back(
     assert at(seen, DRUM, 0.3) is None
     last = list(passed(firings))[-1]
     for k in range(20):
-        hear(seen, replace(last, t_s=last.t_s + 0.05 * k))
+        hear(seen, replace(last, robot_s=last.robot_s + 0.05 * k))
     assert at(seen, DRUM, 0.3) is None, "standing where it stood the robot hears nothing new"
     back = None
     for firing in again(firings):
@@ -278,14 +278,14 @@ def test_after_the_map_is_cleared_all_begins_anew_but_numbers_and_obstacles(
 ) -> None:
     numbers, listed = {o.number for o in seen.objects()}, set(seen.segments().numbers.tolist())
     assert seen.edit(PinSegments(tuple(listed)[:2], pinned=True)) is None
-    obstacles = seen.obstacles(firings[-1].t_s, 1e9)
+    obstacles = seen.obstacles(firings[-1].robot_s, 1e9)
     assert len(obstacles) > 3
     assert seen.edit(ClearMap()) is None
     assert (seen.objects(), seen.counts.segments, seen.counts.hypotheses, seen.can_refine) == ((), 0, 0, False)
     assert len(seen.segments().numbers) == 0
-    np.testing.assert_array_equal(seen.obstacles(firings[-1].t_s, 1e9), obstacles)
+    np.testing.assert_array_equal(seen.obstacles(firings[-1].robot_s, 1e9), obstacles)
     for firing in passed(firings):
-        hear(seen, replace(firing, t_s=firing.t_s + 100.0))
+        hear(seen, replace(firing, robot_s=firing.robot_s + 100.0))
     assert len(seen.objects()) >= 4
     assert numbers.isdisjoint({o.number for o in seen.objects()})
     assert listed.isdisjoint(seen.segments().numbers.tolist())

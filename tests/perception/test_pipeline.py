@@ -121,10 +121,10 @@ def test_old_segments_leave_and_their_objects_with_them() -> None:
     assert last is not None
     assert perception.objects()
     silent = np.full(24, np.nan)
-    perception.observe(Firing(last.t_s + 29.0, last.pose, 0.0, silent))
+    perception.observe(Firing(last.robot_s + 29.0, last.pose, 0.0, silent))
     left = perception.outline.living
     assert 0 < left < perception.outline.total
-    perception.observe(Firing(last.t_s + 31.0, last.pose, 0.0, silent))
+    perception.observe(Firing(last.robot_s + 31.0, last.pose, 0.0, silent))
     assert perception.outline.living == 0
     assert perception.objects() == ()
 
@@ -188,10 +188,10 @@ def test_a_turning_body_sees_the_same() -> None:
     for firing in drive(world):
         straight.observe(firing)
         settle(straight)
-        yaw = 0.4 * math.sin(firing.t_s)
+        yaw = 0.4 * math.sin(firing.robot_s)
         pose = Pose(firing.pose.x, firing.pose.y, yaw)
         fired = np.flatnonzero(~np.isnan(firing.ranges_m))
-        turning.observe(Firing(firing.t_s, pose, yaw, sonar.fire(pose, yaw, [int(i) for i in fired])))
+        turning.observe(Firing(firing.robot_s, pose, yaw, sonar.fire(pose, yaw, [int(i) for i in fired])))
         settle(turning)
     for perception in (straight, turning):
         assert max(errors_ft(perception.objects(), [(4.0, 4.0), (4.0, -4.0)])) <= TABLE_2_MAX_FT

@@ -44,7 +44,7 @@ def test_the_corridors_walls_are_straight_lines(tmp_path: Path, side: int) -> No
             break
         alone = np.full(8, np.nan)
         alone[side] = firing.ranges_m[side]
-        rows += [row.copy() for row in extractor.extract(Firing(firing.t_s, firing.pose, firing.ring_yaw, alone))]
+        rows += [row.copy() for row in extractor.extract(Firing(firing.robot_s, firing.pose, firing.ring_yaw, alone))]
     assert len(rows) >= 20
     assert best_line_share(np.array(rows)) >= 0.8
 

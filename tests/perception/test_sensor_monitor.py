@@ -105,7 +105,7 @@ def test_equal_readings_are_honest_where_nothing_should_change_them(
         assert found(config, firings(config, world, still)) == {}
         assert found(config, firings(config, world, along)) == {}
         slipping = (
-            Firing(f.t_s, Pose(x, y, 0.0), 0.0, f.ranges_m)
+            Firing(f.robot_s, Pose(x, y, 0.0), 0.0, f.ranges_m)
             for f, (x, y, _) in zip(firings(config, world, still), along, strict=False)
         )
         assert found(config, slipping) == {}, "the base slips, and no sensor is to blame"
@@ -173,7 +173,7 @@ def test_a_sensor_that_never_hears_keeps_its_silence_to_itself_until_it_hears(
         if watch.reports() and not np.isnan(firing.ranges_m[0]):
             assert np.isnan(believed.ranges_m[0])
             break
-    echo = Firing(firing.t_s + 0.15, firing.pose, firing.ring_yaw, np.where(np.isnan(firing.ranges_m), np.nan, 2.0))
+    echo = Firing(firing.robot_s + 0.15, firing.pose, firing.ring_yaw, np.where(np.isnan(firing.ranges_m), np.nan, 2.0))
     believed, _ = watch.filter(echo)
     assert believed.ranges_m[0] == 2.0
     assert watch.reports() == ()
@@ -282,7 +282,7 @@ def test_masks_stand_before_map_and_obstacles_and_go_with_the_snapshot() -> None
     (report,) = perception.sensor_reports()
     assert report.sensor == 7
     last = drive[-1]
-    points = perception.obstacles(last.t_s, 1.0)
+    points = perception.obstacles(last.robot_s, 1.0)
     away = np.hypot(points[:, 0] - last.pose.x, points[:, 1] - last.pose.y)
     assert not np.isclose(away, 1.2 + 0.381, atol=0.001).any()
     other = Perception(RING, SETTINGS.models, SETTINGS.perception)

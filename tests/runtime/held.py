@@ -14,7 +14,7 @@ from config.load import load_settings
 from config.settings import Settings
 from drivers.emulator.faults import Fault
 from drivers.emulator.robot_device import RobotDevice
-from drivers.emulator.time_channel import Governor
+from drivers.emulator.time_channel import TimeScaleFollower
 from drivers.registry import make_device
 from runtime.timing.run_clock import PacedClock
 from runtime.timing.time_control import EmulatorControl
@@ -26,16 +26,16 @@ DEAF_S = 0.001
 
 
 class HeldLink(MemoryLink):
-    """A line to a robot that lives by its governor's time; exchanges go on where that stands still."""
+    """A line to a robot that lives by its follower's time; exchanges go on where that stands still."""
 
-    governor: Governor
+    follower: TimeScaleFollower
     control: EmulatorControl
     is_hung = False
 
     def live(self) -> bytes:
-        run_s = self.governor.now_s(self._loop.time())
+        run_s = self.follower.run_at(self._loop.time())
         data = self._robot.advance(run_s - self._begin_s)
-        for line in self.governor.lived(run_s).splitlines():
+        for line in self.follower.acknowledge(run_s).splitlines():
             self._loop.call_soon(self.control.heard, line)
         return data
 
@@ -46,7 +46,7 @@ class HeldLink(MemoryLink):
             super()._exchange()
             if self._turn is not None and self.is_open:
                 self._turn.cancel()
-                pause_s = STEP_S / max(1.0, self.governor.pace.factor)
+                pause_s = STEP_S / max(1.0, self.follower.scale.factor)
                 self._turn = self._loop.call_later(pause_s, self._exchange)
 
 
@@ -58,7 +58,7 @@ class Held(NamedTuple):
     robot: RobotDevice
     links: list[HeldLink]
     control: EmulatorControl
-    governor: Governor
+    follower: TimeScaleFollower
 
 
 @contextlib.contextmanager
@@ -66,7 +66,7 @@ def held(monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] 
     """Give a loop in which `RobotProcess` runs by `control.clock`."""
     settings = load_settings("hallway", ["link.port=memory", *sets])
     assert settings.world is not None
-    loop, links, governor = VirtualLoop(), list[HeldLink](), Governor()
+    loop, links, follower = VirtualLoop(), list[HeldLink](), TimeScaleFollower()
     robot = make_device(settings, settings.world, 3, faults=faults)
 
     on_the_way: deque[bytes] = deque()
@@ -74,13 +74,13 @@ def held(monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] 
     def send(line: bytes) -> None:
         if not links or not links[0].is_hung:
             on_the_way.append(line)
-            loop.call_later(DEAF_S, lambda: governor.take(on_the_way.popleft()))
+            loop.call_later(DEAF_S, lambda: follower.receive(on_the_way.popleft()))
 
     control = EmulatorControl(send, PacedClock(loop.time))
 
     def link(*args: object) -> HeldLink:
         made = HeldLink(robot, loop, *args)  # type: ignore[arg-type]
-        made.governor, made.control = governor, control
+        made.follower, made.control = follower, control
         links.append(made)
         return made
 
@@ -89,6 +89,6 @@ def held(monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] 
     monkeypatch.setattr("runtime.cycle.process.ask", lambda _realtime: ())
     asyncio.set_event_loop(None)
     try:
-        yield Held(loop, settings, robot, links, control, governor)
+        yield Held(loop, settings, robot, links, control, follower)
     finally:
         loop.close()

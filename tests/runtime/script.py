@@ -8,7 +8,7 @@ import numpy as np
 
 from config.load import load_settings
 from config.settings import Settings
-from drivers.driver import Heard, LineState
+from drivers.driver import LineState, Received
 from drivers.messages import Firing, Flags, Odometry, Pose, Twist
 from perception.pipeline import Perception
 from runtime.cycle.modes import Mode, Request
@@ -20,7 +20,7 @@ SETTINGS = load_settings("hallway", ["perception.method=paper"])
 
 PERIOD_S = 1.0 / SETTINGS.cycle.rate_hz
 
-NOTHING = Heard((), None, rebooted=False)
+NOTHING = Received((), None, rebooted=False)
 
 HERE = Pose(0.0, 0.0, 0.0)
 
@@ -77,7 +77,7 @@ class Script:
         firings = (Firing(self.robot_s, self.pose, 0.0, np.full(sensors, 3.0)),) if firing else ()
         told = Odometry(self.robot_s, self.pose, 0.0, Twist(0.0, 0.0), flags, 0) if odometry else None
         inputs = Inputs(
-            self.run_s, line, trouble, Heard(firings, told, rebooted), request, drive_request=self.drive_request
+            self.run_s, line, trouble, Received(firings, told, rebooted), request, drive_request=self.drive_request
         )
         self.log.clear()
         return step(self.state, inputs, self.settings, lambda c: self.log.append(("command", c)), self.may_refine)

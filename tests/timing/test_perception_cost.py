@@ -86,11 +86,11 @@ def test_cost_of_a_ring_reading(records: list[CycleRecord]) -> None:
 def test_the_cost_does_not_grow_with_the_way(records: list[CycleRecord]) -> None:
     """Old segments leave, so that the third lap past the same drums costs what the first did."""
     firings = [firing for record in records for firing in record.inputs.heard.firings]
-    lap_s = firings[-1].t_s - firings[0].t_s + 1.0
+    lap_s = firings[-1].robot_s - firings[0].robot_s + 1.0
     perception, medians = fresh(), []
     for lap in range(4):
         costs = [
-            cost_ms(perception, Firing(f.t_s + lap * 10.0 * lap_s, f.pose, f.ring_yaw, f.ranges_m)) for f in firings
+            cost_ms(perception, Firing(f.robot_s + lap * 10.0 * lap_s, f.pose, f.ring_yaw, f.ranges_m)) for f in firings
         ]
         medians.append(float(np.median(costs)))
     assert max(medians) <= MEDIAN_MS, medians

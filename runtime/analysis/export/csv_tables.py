@@ -76,7 +76,7 @@ def _odometry(timeline: Timeline) -> Table:
     way = timeline.odometry
     return {
         "t_s": [t for t, _ in way],
-        "robot_t_s": [o.t_s for _, o in way],
+        "robot_t_s": [o.robot_s for _, o in way],
         "x_m": [o.pose.x for _, o in way],
         "y_m": [o.pose.y for _, o in way],
         "heading_rad": [o.pose.theta for _, o in way],

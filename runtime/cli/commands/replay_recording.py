@@ -186,14 +186,14 @@ def watching(recording: Recording, span: Span, units: Units) -> Iterator[tuple[O
     settings, console = recording.settings, Console(stderr=True)
     view = View(settings, console, units) if console.is_terminal and not console.is_dumb_terminal else None
     driver, books = make_driver(settings), CycleStats(late_after_s=math.inf)
-    driver.opened(0.0)
+    driver.line_opened(0.0)
     begun: list[tuple[float, float]] = []
 
     def on_message(entry: RawMessage) -> None:
         if entry.topic == SERIAL["in"]:
             for t_s, data in decode(SerialBytes, entry.data).pieces():
                 driver.receive(data, t_s)
-            driver.take()
+            driver.take_received()
 
     def on_cycle(record: CycleRecord, state: State) -> None:
         recorded_s, host_s = record.inputs.run_s, time.monotonic()

@@ -118,7 +118,7 @@ class FrameEncoder:
         self._number += 1
         segments = self._segments(state)
         odometry = state.odometry
-        t_s = 0.0 if odometry is None else odometry.t_s
+        t_s = 0.0 if odometry is None else odometry.robot_s
         link, phases_s = context.link, context.phases_s or {}
         head: dict[str, Any] = {
             "type": "state",
@@ -167,7 +167,7 @@ class FrameEncoder:
     def _hear(self, firing: Firing) -> None:
         fired = np.flatnonzero(~np.isnan(firing.ranges_m))
         self._ranges[fired] = firing.ranges_m[fired]
-        self._heard_s[fired] = firing.t_s
+        self._heard_s[fired] = firing.robot_s
         self._fired.update(fired.tolist())
 
     def _segments(self, state: State) -> bytes:

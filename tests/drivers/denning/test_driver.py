@@ -34,17 +34,17 @@ def test_it_is_a_robot_driver() -> None:
 def test_greeting_then_pattern_then_ready() -> None:
     bench = Bench()
     bench.open()
-    assert bench.state() is LineState.GREETING
+    assert bench.state() is LineState.HANDSHAKE
     first = bench.robot.outgoing(writable=True)
     assert first[0] == 0, "a zero ends what an earlier user left half said"
     assert Decoder("host").feed(first) == [Hello(0, 1)]
     assert bench.heard() == []
     bench.say(IDENT)
-    assert bench.state() is LineState.GREETING
+    assert bench.state() is LineState.HANDSHAKE
     assert bench.heard() == [Pattern(1, 50, 255, OCTETS)]
     bench.say(Ack(0, 1))
     assert bench.state() is LineState.READY
-    assert bench.robot.trouble is None
+    assert bench.robot.problem is None
     identity = bench.robot.identity
     assert identity is not None
     assert (identity.name, identity.sensors, identity.boot_id) == ("denning", 24, 0xB001)
@@ -52,21 +52,21 @@ def test_greeting_then_pattern_then_ready() -> None:
         (0.381, 0.5, 0.02)
     )
     assert bench.robot.counts == LinkCounts(frames=2)
-    assert not bench.robot.take().rebooted
+    assert not bench.robot.take_received().rebooted
 
 
 def test_what_comes_before_the_greeting_is_done_is_not_used() -> None:
     bench = Bench()
     bench.open()
     bench.odom(1_000_000)
-    assert bench.robot.take().odometry is None, "whose odometry?"
+    assert bench.robot.take_received().odometry is None, "whose odometry?"
     bench.heard()
     bench.say(IDENT)
     bench.odom(1_020_000)
     bench.say(Echo(0, 1_020_000, 0, 1, (10,)))
     bench.greet()
     bench.odom(1_040_000)
-    heard = bench.robot.take()
+    heard = bench.robot.take_received()
     assert heard.odometry is not None
     assert heard.firings == (), "a firing of an earlier pattern"
 
@@ -81,7 +81,7 @@ def test_an_unanswered_command_is_sent_three_times_with_numbers_of_their_own() -
     assert sent == [Hello(0), Hello(1), Hello(2)]
     assert bench.device_lost == 0
     assert bench.state() is LineState.DOWN
-    assert "left 3 HELLO unanswered and nothing comes from it" in (bench.robot.trouble or "")
+    assert "left 3 HELLO unanswered and nothing comes from it" in (bench.robot.problem or "")
 
 
 def test_a_lost_ack_is_made_good_by_the_next_and_a_late_one_counts() -> None:
@@ -98,7 +98,7 @@ def test_a_lost_ack_is_made_good_by_the_next_and_a_late_one_counts() -> None:
     assert bench.state() is LineState.READY
     bench.say(Ack(0, again.seq))
     assert bench.state() is LineState.READY
-    assert bench.robot.trouble is None
+    assert bench.robot.problem is None
 
 
 def test_a_robot_that_comes_back_is_taken_up_at_a_modest_pace() -> None:
@@ -114,11 +114,11 @@ def test_a_robot_that_comes_back_is_taken_up_at_a_modest_pace() -> None:
         bench.pass_time(0.01)
     assert len(heard) == 1
     bench.say(IDENT)
-    assert bench.state() is LineState.GREETING
-    assert bench.robot.trouble is not None, "still says why it took so long"
+    assert bench.state() is LineState.HANDSHAKE
+    assert bench.robot.problem is not None, "still says why it took so long"
     bench.answer()
     assert bench.state() is LineState.READY
-    assert bench.robot.trouble is None
+    assert bench.robot.problem is None
 
 
 @pytest.mark.parametrize(
@@ -136,7 +136,7 @@ def test_another_robot_than_expected_is_not_driven(ident: Ident, text: str) -> N
     bench.answer()
     assert bench.state() is LineState.DOWN
     with pytest.raises(AssertionError, match=text):
-        raise AssertionError(bench.robot.trouble)
+        raise AssertionError(bench.robot.problem)
     bench.robot.drive(Twist(0.1, 0.0))
     assert bench.heard() == []
     bench.ident = replace(IDENT, ring_radius_mm=382)
@@ -160,7 +160,7 @@ def test_a_refused_pattern_is_trouble(code: int, text: str) -> None:
     bench.say(Nak(0, pattern.seq, code))
     assert bench.state() is LineState.DOWN
     with pytest.raises(AssertionError, match=text):
-        raise AssertionError(bench.robot.trouble)
+        raise AssertionError(bench.robot.problem)
 
 
 def test_counts_go_on_over_lines(bench: Bench) -> None:
@@ -168,7 +168,7 @@ def test_counts_go_on_over_lines(bench: Bench) -> None:
     bench.robot.receive(b"\x01\x02\x03\0", bench.now)
     bench.robot.receive(encode(replace(ODOM, seq=6)), bench.now)
     assert bench.robot.counts == LinkCounts(frames=4, bad=1, lost=3)
-    bench.robot.closed()
+    bench.robot.line_closed()
     bench.robot.receive(encode(ODOM), bench.now)
     bench.open()
     bench.greet()
@@ -182,7 +182,7 @@ def test_noise_instead_of_an_answer_points_at_the_baud_rate() -> None:
         bench.heard()
         bench.robot.receive(b"\x9f\x33\0", bench.now)
         bench.pass_time(0.01)
-    assert "likely the baud rate" in (bench.robot.trouble or "")
+    assert "likely the baud rate" in (bench.robot.problem or "")
 
 
 @pytest.mark.parametrize(
@@ -194,7 +194,7 @@ def test_noise_in_place_of_odometry_is_named_and_one_broken_frame_is_not(
     bench.robot.receive(b"\x9f\x33\0" * broken, bench.now)
     bench.pass_time(0.41)
     assert bench.state() is LineState.DOWN
-    assert told in (bench.robot.trouble or "")
+    assert told in (bench.robot.problem or "")
 
 
 def test_noise_in_place_of_echoes_is_named_once_they_are_overdue(bench: Bench) -> None:
@@ -202,10 +202,10 @@ def test_noise_in_place_of_echoes_is_named_once_they_are_overdue(bench: Bench) -
         bench.odom(k * PERIOD_US)
         bench.robot.receive(b"\x9f\x33\0" * (k % 2), bench.now)
         bench.pass_time(0.02)
-        assert bench.robot.trouble is None or k > 20
-    assert "broken frames came in place of its echoes: noise" in (bench.robot.trouble or "")
+        assert bench.robot.problem is None or k > 20
+    assert "broken frames came in place of its echoes: noise" in (bench.robot.problem or "")
     bench.say(Echo(0, 29 * PERIOD_US, 0, 1, (10,)))
-    assert bench.robot.trouble is None
+    assert bench.robot.problem is None
 
 
 def test_another_firing_pattern_while_it_drives(bench: Bench) -> None:
@@ -217,7 +217,7 @@ def test_another_firing_pattern_while_it_drives(bench: Bench) -> None:
     assert isinstance(pattern, Pattern)
     assert (len(pattern.masks), pattern.step_period_ms) == (6, 60)
     assert bench.state() is LineState.READY
-    bench.robot.closed()
+    bench.robot.line_closed()
     bench.open()
     (again,) = only([*bench.answer(), *bench.answer()], Pattern)
     assert replace(again, seq=pattern.seq) == pattern, "kept for the next line"
@@ -232,7 +232,7 @@ def test_another_firing_pattern_before_the_first_is_taken() -> None:
     ring = CONFIG.ring.model_copy(update={"firing": FiringConfig(preset="quadrants", step_period_s=0.06)})
     bench.robot.set_firing(ring)
     bench.say(Ack(0, first.seq))
-    assert bench.state() is LineState.GREETING
+    assert bench.state() is LineState.HANDSHAKE
     assert len(only(bench.answer(), Pattern)) == 1
     assert bench.state() is LineState.READY
 

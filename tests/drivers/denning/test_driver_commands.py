@@ -99,7 +99,7 @@ def test_halt_is_repeated_until_answered_whatever_happens(bench: Bench) -> None:
         bench.pass_time(0.02)
     assert bench.state() is LineState.DOWN
     assert 15 <= halts <= 25, "and not once a cycle"
-    bench.robot.closed()
+    bench.robot.line_closed()
     bench.open()
     heard = bench.answer()
     assert [type(frame) for frame in heard] == [Halt, Hello]
@@ -122,7 +122,7 @@ def test_a_robot_that_answers_all_but_halt_is_down() -> None:
         bench.heard()
         bench.pass_time(0.02)
     assert bench.state() is LineState.DOWN
-    assert "left 3 HALT unanswered although it can be heard" in (bench.robot.trouble or "")
+    assert "left 3 HALT unanswered although it can be heard" in (bench.robot.problem or "")
 
 
 def test_release_clears_a_pending_halt_and_waits_for_nobody(bench: Bench) -> None:
@@ -133,7 +133,7 @@ def test_release_clears_a_pending_halt_and_waits_for_nobody(bench: Bench) -> Non
     assert [type(frame) for frame in heard] == [Release]
     bench.pass_time(0.2)
     assert bench.heard() == []
-    bench.robot.closed()
+    bench.robot.line_closed()
     bench.robot.release()
     bench.open()
     assert [type(frame) for frame in bench.answer()] == [Hello], "a release is not kept for later"
@@ -143,16 +143,16 @@ def test_while_latched_a_refused_drive_is_no_trouble(bench: Bench) -> None:
     bench.robot.drive(Twist(0.1, 0.0))
     (drive,) = bench.heard()
     bench.say(Nak(0, drive.seq, NakCode.LATCHED))
-    assert (bench.state(), bench.robot.trouble) == (LineState.READY, None)
+    assert (bench.state(), bench.robot.problem) == (LineState.READY, None)
     bench.robot.drive(Twist(0.1, 0.0))
     (drive,) = bench.heard()
     bench.say(Nak(0, drive.seq, NakCode.VALUE_OUT_OF_RANGE))
     assert bench.state() is LineState.READY
-    assert "refuses DRIVE (NAK 3)" in (bench.robot.trouble or "")
-    assert "body.speed_max_m_s" in (bench.robot.trouble or "")
+    assert "refuses DRIVE (NAK 3)" in (bench.robot.problem or "")
+    assert "body.speed_max_m_s" in (bench.robot.problem or "")
     bench.robot.release()
     bench.answer()
-    assert bench.robot.trouble is None
+    assert bench.robot.problem is None
 
 
 def test_a_refused_release_is_told_and_not_repeated(bench: Bench) -> None:
@@ -160,6 +160,6 @@ def test_a_refused_release_is_told_and_not_repeated(bench: Bench) -> None:
     (release,) = bench.heard()
     bench.say(Nak(0, release.seq, NakCode.LATCHED))
     assert bench.state() is LineState.READY
-    assert "refuses RELEASE (NAK 4): it is latched; remove what holds it" in (bench.robot.trouble or "")
+    assert "refuses RELEASE (NAK 4): it is latched; remove what holds it" in (bench.robot.problem or "")
     bench.pass_time(0.2)
     assert bench.heard() == []

@@ -32,14 +32,14 @@ def test_odometry_in_si(bench: Bench) -> None:
         flags=0b11001,
         last_drive_seq=9,
     )
-    odometry = bench.robot.take().odometry
+    odometry = bench.robot.take_received().odometry
     assert odometry is not None
-    assert odometry.t_s == pytest.approx(1.0)
+    assert odometry.robot_s == pytest.approx(1.0)
     assert (odometry.pose.x, odometry.pose.y, odometry.pose.theta) == pytest.approx((1.2345, -0.6789, 7.0))
     assert (odometry.ring_yaw, odometry.twist.v, odometry.twist.w) == pytest.approx((-0.01, 0.305, -0.25))
     assert odometry.flags == Flags.LATCHED | Flags.DEADMAN | Flags.BATTERY_LOW
     assert odometry.last_drive_seq == 9
-    assert bench.robot.take().odometry is None
+    assert bench.robot.take_received().odometry is None
 
 
 def test_a_firing_has_the_pose_of_its_own_moment(bench: Bench) -> None:
@@ -47,8 +47,8 @@ def test_a_firing_has_the_pose_of_its_own_moment(bench: Bench) -> None:
     for t_us, x, y, heading in ((0, 0, 0, 0), (PERIOD_US, 1000, 1000, 15708)):
         bench.odom(t_us, x_0p1mm=x, y_0p1mm=y, heading_1em4rad=heading, ring_yaw_1em4rad=2000 + t_us // 100)
     bench.say(Echo(0, PERIOD_US // 2, 0, 0x800021, (30, 255, 0)))
-    (firing,) = bench.robot.take().firings
-    assert firing.t_s == pytest.approx(0.01)
+    (firing,) = bench.robot.take_received().firings
+    assert firing.robot_s == pytest.approx(0.01)
     assert (firing.pose.x, firing.pose.y, firing.pose.theta) == pytest.approx(
         (0.1 * math.sqrt(0.5), 0.1 - 0.1 * math.sqrt(0.5), math.pi / 4), abs=1e-4
     )
@@ -62,12 +62,12 @@ def test_a_firing_has_the_pose_of_its_own_moment(bench: Bench) -> None:
 def test_an_echo_before_its_odometry_is_held_and_keeps_its_turn(bench: Bench) -> None:
     bench.odom(0)
     bench.say(Echo(0, 10_000, 0, 1, (10,)), Echo(0, 30_000, 1, 1, (20,)))
-    assert bench.robot.take().firings == ()
+    assert bench.robot.take_received().firings == ()
     bench.odom(PERIOD_US, x_0p1mm=100)
-    (first,) = bench.robot.take().firings
+    (first,) = bench.robot.take_received().firings
     assert first.pose.x == pytest.approx(0.005)
     bench.odom(2 * PERIOD_US, x_0p1mm=300)
-    (second,) = bench.robot.take().firings
+    (second,) = bench.robot.take_received().firings
     assert second.pose.x == pytest.approx(0.02)
     assert bench.robot.late_echoes == 0
 
@@ -86,9 +86,9 @@ def test_one_chunk_or_byte_by_byte_is_the_same(bench: Bench) -> None:
     bench.robot.receive(data, bench.now)
     for i in range(len(data)):
         other.robot.receive(data[i : i + 1], other.now)
-    whole, single = bench.robot.take(), other.robot.take()
-    assert [(f.t_s, f.pose, f.ring_yaw) for f in whole.firings] == [
-        (f.t_s, f.pose, f.ring_yaw) for f in single.firings
+    whole, single = bench.robot.take_received(), other.robot.take_received()
+    assert [(f.robot_s, f.pose, f.ring_yaw) for f in whole.firings] == [
+        (f.robot_s, f.pose, f.ring_yaw) for f in single.firings
     ]
     assert len(whole.firings) == 2
     assert whole.odometry == single.odometry
@@ -104,7 +104,7 @@ def test_an_echo_that_nothing_places_is_dropped_and_counted(bench: Bench) -> Non
     assert bench.robot.late_echoes == 2, "between two samples too far apart"
     bench.say(Echo(0, 1_100_000, 0, 1, (10,)), Echo(0, 1_090_000, 0, 1, (10,)), Echo(0, 9_000_000, 0, 1, (10,)))
     assert bench.robot.late_echoes == 4, "before the one before it, and from a far future"
-    assert [f.t_s for f in bench.robot.take().firings] == pytest.approx([1.1])
+    assert [f.robot_s for f in bench.robot.take_received().firings] == pytest.approx([1.1])
 
 
 @pytest.mark.promise("P8")
@@ -131,8 +131,8 @@ def test_late_doubled_and_out_of_window_echoes_go_no_further(measured: Callable[
         if good:
             bench.say(good[-1])
         good.append(echo)
-    firings = bench.robot.take().firings
-    assert [f.t_s for f in firings] == pytest.approx([1e-6 * echo.t_us for echo in good])
+    firings = bench.robot.take_received().firings
+    assert [f.robot_s for f in firings] == pytest.approx([1e-6 * echo.t_us for echo in good])
     for firing in firings:
         heard = firing.ranges_m[np.isfinite(firing.ranges_m)]
         assert (heard <= window * 0.03048 + 1e-9).all()
@@ -151,10 +151,10 @@ def test_a_wider_window_counts_from_the_pattern_on_and_a_narrower_one_after_it(b
     narrow = CONFIG.ring.model_copy(update={"firing": FiringConfig(preset="octets", window_m=2.0)})
     bench.robot.set_firing(narrow)
     bench.say(far)
-    assert np.isfinite(bench.robot.take().firings[-1].ranges_m).sum() == 8, "an echo of the pattern before"
+    assert np.isfinite(bench.robot.take_received().firings[-1].ranges_m).sum() == 8, "an echo of the pattern before"
     t_us = bench.run(0.4, t_us=t_us)
     bench.say(replace(far, t_us=t_us - 5_000))
-    assert np.isnan(bench.robot.take().firings[-1].ranges_m).all()
+    assert np.isnan(bench.robot.take_received().firings[-1].ranges_m).all()
 
 
 @pytest.mark.promise("P9")
@@ -162,21 +162,21 @@ def test_a_wider_window_counts_from_the_pattern_on_and_a_narrower_one_after_it(b
 def test_a_leap_of_the_odometry_is_taken_out_and_told(bench: Bench, x: int, heading: int) -> None:
     """Poses go on as the wheels say; the robot's own odometry is `frame` away."""
     t_us = bench.run(0.4, t_us=0)
-    bench.robot.take()
+    bench.robot.take_received()
     for _ in range(2):  # one that leaps very far is asked who it is, and answers
         t_us += PERIOD_US
         bench.pass_time(0.02)
         bench.odom(t_us, x_0p1mm=x, heading_1em4rad=heading, ring_yaw_1em4rad=heading)
         bench.answer()
         bench.answer()
-    heard = bench.robot.take()
+    heard = bench.robot.take_received()
     assert heard.odometry is not None
     assert heard.odometry.pose == Pose(0.0, 0.0, 0.0)
     assert heard.odometry.ring_yaw == 0.0
     (note,) = heard.notes
     assert "leapt" in note
     assert "check wheels" in note
-    frame = bench.robot.frame
+    frame = bench.robot.odometry_origin
     assert (frame.x, frame.y, frame.theta) == pytest.approx((x * 1e-4, 0.0, heading * 1e-4))
     assert not heard.rebooted
 
@@ -188,7 +188,7 @@ def test_a_base_that_moves_in_leaps_is_believed(bench: Bench) -> None:
         t_us += PERIOD_US
         bench.pass_time(0.02)
         bench.odom(t_us, x_0p1mm=2000 * (k // 3))
-    heard = bench.robot.take()
+    heard = bench.robot.take_received()
     assert heard.odometry is not None
     assert heard.odometry.pose.x == pytest.approx(6.6)
     assert heard.notes == ()
@@ -200,7 +200,7 @@ def test_echoes_without_odometry_do_not_pile_up(bench: Bench) -> None:
         bench.say(Echo(0, 1000 + k, 0, 1, (10,)))
     assert bench.robot.late_echoes == 200 - 64
     bench.odom(PERIOD_US)
-    assert len(bench.robot.take().firings) == 64
+    assert len(bench.robot.take_received().firings) == 64
 
 
 def test_a_fault_of_the_sensors_beyond_the_ring_is_passed_over() -> None:
@@ -211,7 +211,7 @@ def test_a_fault_of_the_sensors_beyond_the_ring_is_passed_over() -> None:
     bench.greet()
     bench.odom(0)
     bench.say(Echo(0, 0, 0, 0x810000 | 1, (10, 11, 12)))
-    (firing,) = bench.robot.take().firings
+    (firing,) = bench.robot.take_received().firings
     assert firing.ranges_m.shape == (16,)
     assert np.nansum(firing.ranges_m) == pytest.approx(0.3048)
 
@@ -221,6 +221,6 @@ def test_firings_nobody_takes_do_not_pile_up(bench: Bench) -> None:
         bench.odom(k * PERIOD_US)
         bench.say(Echo(0, k * PERIOD_US, 0, 1, (10,)))
         bench.now += 0.02
-    firings = bench.robot.take().firings
+    firings = bench.robot.take_received().firings
     assert len(firings) == 1024
-    assert firings[-1].t_s == pytest.approx(1099 * 0.02)
+    assert firings[-1].robot_s == pytest.approx(1099 * 0.02)

@@ -21,7 +21,7 @@ from drivers.denning.frames import (
     Odom,
     Pattern,
 )
-from drivers.driver import Heard, LineState
+from drivers.driver import LineState, Received
 from drivers.emulator.faults import Fault
 from drivers.emulator.memory_transport import MemoryLine
 from drivers.emulator.uart import QUEUE_MAX, Uart
@@ -165,15 +165,15 @@ class PlainDriver:
         self._out = b""
 
     state = LineState.READY
-    trouble: str | None = None
+    problem: str | None = None
     identity: Identity | None = None
     counts = LinkCounts()
 
-    def opened(self, now_s: float) -> None:
-        self.log.append((now_s, "opened"))
+    def line_opened(self, run_s: float) -> None:
+        self.log.append((run_s, "opened"))
         self._out += encode(Hello(0)) + encode(Pattern(1, 50, 255, THIRDS))
 
-    def closed(self) -> None:
+    def line_closed(self) -> None:
         self.log.append((math.nan, "closed"))
 
     def receive(self, data: bytes, now_s: float) -> None:
@@ -197,15 +197,15 @@ class PlainDriver:
         return out
 
     @property
-    def frame(self) -> Pose:
+    def odometry_origin(self) -> Pose:
         return Pose(0.0, 0.0, 0.0)
 
     @property
-    def waiting(self) -> int:
+    def firings_waiting(self) -> int:
         return 0
 
-    def take(self) -> Heard:
-        return Heard((), None, rebooted=False)
+    def take_received(self) -> Received:
+        return Received((), None, rebooted=False)
 
 
 def memory_run(faults: Sequence[Fault] = (), cycle_s: float = 0.05) -> PlainDriver:

@@ -31,7 +31,7 @@ def test_what_goes_in_by_the_handle_comes_to_the_same() -> None:
     direct, held = (make_state(len(mounts), p) for _ in range(2))
     handle, quanta = entry.hold(held, p), 0
     for firing in list(readings(BOXES.ring, halls("boxes_45")[0], seed=3))[:48]:
-        at = (firing.pose.x, firing.pose.y, firing.ring_yaw, firing.t_s, firing.ranges_m, SHARE)
+        at = (firing.pose.x, firing.pose.y, firing.ring_yaw, firing.robot_s, firing.ranges_m, SHARE)
         told = observe.observe(direct, p, mounts, *at)
         assert entry.observe(handle, mounts, *at) == told
         if told[1]:

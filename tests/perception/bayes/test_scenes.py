@@ -107,7 +107,7 @@ def moved(world: WorldConfig, i: int, dx_ft: float, dy_ft: float) -> WorldConfig
 def drive(perception: Perception, world: WorldConfig, passed: int) -> None:
     hall = Hall("", world)
     for firing in readings(SETTINGS.ring, hall, passed):
-        perceive(perception, Firing(firing.t_s + 100.0 * passed, firing.pose, 0.0, firing.ranges_m))
+        perceive(perception, Firing(firing.robot_s + 100.0 * passed, firing.pose, 0.0, firing.ranges_m))
 
 
 @pytest.mark.compiled
@@ -227,7 +227,7 @@ def test_standing_still_says_nothing_new() -> None:
         perceive(perception, last)
     before = {(o.x, o.y) for o in perception.objects()}
     for k in range(1000):
-        seen = perceive(perception, Firing(last.t_s + 0.05 * k, last.pose, 0.0, last.ranges_m))
+        seen = perceive(perception, Firing(last.robot_s + 0.05 * k, last.pose, 0.0, last.ranges_m))
     assert all(min(math.dist((o.x, o.y), b) for b in before) < 0.001 * FT for o in seen)
     assert len(seen) == len(before) == 6
 

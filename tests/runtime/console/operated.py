@@ -17,7 +17,7 @@ from yarl import URL
 
 from config.load import load_settings
 from config.settings import Settings
-from drivers.driver import Heard, LineState
+from drivers.driver import LineState, Received
 from drivers.messages import Firing, Flags, LinkCounts, Odometry, Pose, Twist
 from perception.edits import Edit, Evidence
 from perception.pipeline import Perception
@@ -173,7 +173,7 @@ class Operated:
             ranges[self.cycle % 8 :: 8] = 1.5, np.inf, 2.5
             pose = Pose(0.02 * self.cycle, 0.0, 0.0)
             odometry = Odometry(t_s, pose, 0.0, Twist(0.3, 0.0), Flags.NONE, 0)
-            heard = Heard((Firing(t_s, pose, 0.0, ranges),), odometry, rebooted=False)
+            heard = Received((Firing(t_s, pose, 0.0, ranges),), odometry, rebooted=False)
             state = self.run.state
             state.cycle, state.odometry = self.cycle, odometry
             refused = tuple(Refused(k, why) for k, why in enumerate(outcomes) if why is not None)

@@ -135,7 +135,7 @@ def test_the_hand_is_limited_by_echoes_and_by_what_a_word_says_of_itself() -> No
 @pytest.mark.parametrize("drive_request", [Legs(), Goal(3.0, 0.0), FORWARD], ids=["legs", "goal", "hand"])
 def test_no_wish_moves_a_robot_that_is_not_driving(drive_request: DriveRequest) -> None:
     script = told()
-    for line in (LineState.CLOSED, LineState.GREETING):
+    for line in (LineState.CLOSED, LineState.HANDSHAKE):
         assert script.tell(drive_request, line=line, firing=False, odometry=False).command is None
     for _ in range(20):
         assert script.tell(drive_request).command == STANDSTILL

@@ -72,7 +72,7 @@ class Run:
     def until(self, done: Callable[[], bool], patience_s: float, request: Request | None = None) -> None:
         give_up_s = self.run_s + patience_s
         while not done():
-            assert self.run_s < give_up_s, (self.state.mode, self.driver.state, self.driver.trouble)
+            assert self.run_s < give_up_s, (self.state.mode, self.driver.state, self.driver.problem)
             self.cycle(request)
             request = None
 
@@ -137,8 +137,8 @@ def test_at_any_phase_it_stands_until_it_is_re_armed(measured: Callable[[str], N
         assert late
         assert all(truth.twist.v == 0.0 and truth.twist.w == 0.0 for truth in late)
         new = run.firings[before:]
-        assert 0.0 <= new[0].t_s < 2.0, "the robot's new clock"
-        assert all(b.t_s > a.t_s for a, b in itertools.pairwise(new))
+        assert 0.0 <= new[0].robot_s < 2.0, "the robot's new clock"
+        assert all(b.robot_s > a.robot_s for a, b in itertools.pairwise(new))
         assert max(math.hypot(f.pose.x, f.pose.y) for f in new) < 0.2, "the robot's new odometry"
 
         run.until(lambda: run.mode is Mode.DRIVE, 2.0, Request.ARM)  # noqa: B023

@@ -13,7 +13,7 @@ from tests.runtime.script import PATIENCE_S, PERIOD_S, Script
 
 def test_from_greeting_to_driving() -> None:
     script = Script()
-    for line in (LineState.CLOSED, LineState.GREETING):
+    for line in (LineState.CLOSED, LineState.HANDSHAKE):
         record = script.cycle(line=line, firing=False, odometry=False)
         assert (record.mode.mode, record.command) == (Mode.CONNECTING, None)
     script.driving()

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from drivers.driver import Heard, LineState
+from drivers.driver import LineState, Received
 from perception.paper.paper_method import PaperPerception
 from perception.pipeline import Perception
 from runtime.cycle.modes import Mode, ModeState
@@ -184,7 +184,7 @@ def test_a_reboot_clears_the_map_and_the_leg(drive: Drive) -> None:
     last = again[-1]
     assert last.segments > 20
     assert state.leg is not None
-    inputs = Inputs(last.inputs.run_s + PERIOD_S, LineState.READY, None, Heard((), None, rebooted=True))
+    inputs = Inputs(last.inputs.run_s + PERIOD_S, LineState.READY, None, Received((), None, rebooted=True))
     commands: list[Command] = []
     record = step(state, inputs, SETTINGS, commands.append, enough_quanta)
     assert commands == [Order.HALT]
@@ -199,7 +199,7 @@ def test_after_a_reboot_it_perceives_as_on_the_first_day(drive: Drive) -> None:
     used, _ = played(drive.records)
     step(
         used,
-        Inputs(1e3, LineState.READY, None, Heard((), None, rebooted=True)),
+        Inputs(1e3, LineState.READY, None, Received((), None, rebooted=True)),
         SETTINGS,
         lambda _c: None,
         enough_quanta,

@@ -27,8 +27,8 @@ def firing(t: float, ranges: list[float], pose: Pose | None = None, yaw: float =
 
 def same(a: Iterable[Firing], b: Iterable[Firing]) -> None:
     for one, other in zip(a, b, strict=True):
-        left = (one.t_s, one.pose, one.ring_yaw, one.ranges_m.tobytes())
-        assert repr(left) == repr((other.t_s, other.pose, other.ring_yaw, other.ranges_m.tobytes()))
+        left = (one.robot_s, one.pose, one.ring_yaw, one.ranges_m.tobytes())
+        assert repr(left) == repr((other.robot_s, other.pose, other.ring_yaw, other.ranges_m.tobytes()))
 
 
 def log(tmp_path: Path, content: str | bytes) -> Path:
@@ -52,7 +52,7 @@ def complaint(path: Path, sensors: int | None = None) -> str:
 def test_reads_what_the_form_says(tmp_path: Path) -> None:
     rows = "0.5,1,2,0.25,1.5,\n0.5,1e0,+2,-0.25,inf,0\n"
     first, second = read_ring_log(log(tmp_path, HEADER + rows))
-    assert (first.t_s, first.pose, first.ring_yaw) == (0.5, Pose(1.0, 2.0, 0.25), 0.25)
+    assert (first.robot_s, first.pose, first.ring_yaw) == (0.5, Pose(1.0, 2.0, 0.25), 0.25)
     assert first.ranges_m.dtype == np.float64
     np.testing.assert_array_equal(first.ranges_m, [1.5, math.nan])
     assert second.ring_yaw == -0.25
@@ -77,7 +77,7 @@ def test_ring_yaw_is_an_angle_of_its_own(tmp_path: Path) -> None:
 )
 def test_accepts_what_editors_make_of_it(tmp_path: Path, content: bytes) -> None:
     (got,) = read_ring_log(log(tmp_path, content), sensors=2)
-    assert (got.t_s, got.ranges_m.tolist()) == (1.0, [2.0, 3.0])
+    assert (got.robot_s, got.ranges_m.tolist()) == (1.0, [2.0, 3.0])
 
 
 @pytest.mark.parametrize("cell", ["inf", "Inf", "INF", "+inf", " inf", "Infinity"])
@@ -222,7 +222,7 @@ def test_absent_file_and_folder(tmp_path: Path) -> None:
 
 def test_a_complaint_comes_only_after_the_good_rows(tmp_path: Path) -> None:
     firings = read_ring_log(log(tmp_path, f"{HEADER}0,0,0,0,1,1\nbad\n"))
-    assert next(firings).t_s == 0.0
+    assert next(firings).robot_s == 0.0
     with pytest.raises(RingLogError, match="row 3"):
         next(firings)
 
@@ -252,7 +252,7 @@ def test_round_trip_to_the_bit(tmp_path: Path, firings: list[Firing]) -> None:
     path = tmp_path / "log.csv"
     write_ring_log(path, iter(firings))
     nan = np.float64(math.nan)
-    canonical = [Firing(f.t_s, f.pose, f.ring_yaw, np.where(np.isnan(f.ranges_m), nan, f.ranges_m)) for f in firings]
+    canonical = [Firing(f.robot_s, f.pose, f.ring_yaw, np.where(np.isnan(f.ranges_m), nan, f.ranges_m)) for f in firings]
     same(read_ring_log(path, len(firings[0].ranges_m)), canonical)
 
 
@@ -266,7 +266,7 @@ def test_a_damaged_file_is_read_or_refused_and_nothing_else(tmp_path: Path, data
     path = log(tmp_path, bytes(content))
     try:
         for got in read_ring_log(path):
-            assert math.isfinite(got.t_s)
+            assert math.isfinite(got.robot_s)
             assert not (got.ranges_m < 0.0).any()
     except RingLogError:
         complaint(path)

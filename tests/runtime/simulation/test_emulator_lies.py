@@ -102,7 +102,7 @@ def test_a_leap_is_told_and_the_robot_drives_on(measured: Callable[[str], None])
     (note,) = run.notes
     assert note.startswith("the odometry leapt by 0.30 m and ")
     # What is reported is in the robot's own odometry, as that is now: a foot off where it was.
-    frame = run.driver.frame
+    frame = run.driver.odometry_origin
     assert (frame.x / FT, frame.y / FT) == pytest.approx((1.0, 0.0), abs=0.02)
     for seen in run.state.perception.objects():
         assert in_frame(frame, seen).x - seen.x == pytest.approx(FT, abs=0.01)
@@ -137,7 +137,7 @@ def test_noise_stops_it_only_where_it_lasts_and_is_named(rate: float, measured: 
         firings = len(run.firings)
         run.until(FROM_S + 3.0)
         assert run.driver.state is LineState.READY
-        assert run.driver.trouble is None
+        assert run.driver.problem is None
         assert len(run.firings) > firings + 20
         assert run.state.mode == stopped, "motion never resumes by itself"
     measured(f"{rate:g} bytes of noise a second: 0.5 s are got over, after 1 s without an echo SAFE_STOP, by name")

@@ -96,7 +96,7 @@ def test_a_pass_is_81_readings_of_the_whole_ring_a_quarter_foot_apart() -> None:
     assert [f.pose.x / FT for f in firings] == pytest.approx(np.arange(-6.0, 14.01, 0.25).tolist())
     assert all(f.pose.y == 0.0 and f.pose.theta == 0.0 and f.ring_yaw == 0.0 for f in firings)
     assert not any(np.isnan(f.ranges_m).any() for f in firings)
-    assert [f.t_s for f in firings] == sorted({f.t_s for f in firings})
+    assert [f.robot_s for f in firings] == sorted({f.robot_s for f in firings})
 
 
 def test_passes_go_down_the_hall_and_up_again() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from config.load import load_settings
-from drivers.driver import Heard, LineState
+from drivers.driver import LineState, Received
 from drivers.messages import Firing, Flags, Odometry, Pose, Twist
 from perception.pipeline import Perception
 from runtime.cycle.modes import Request
@@ -268,7 +268,7 @@ def test_the_step_marks_its_phases_and_no_overrun_delays_a_stop(
         perception.refine_us = refine_us if cycle > 20 else 0
         began_us = machine.host_us
         t_s = 1.0 + 0.05 * cycle
-        heard = Heard(
+        heard = Received(
             (Firing(t_s, here, 0.0, np.full(24, 3.0)),),
             Odometry(t_s, here, 0.0, Twist(0.0, 0.0), Flags.NONE, 0),
             rebooted=False,

@@ -180,7 +180,7 @@ def test_a_ring_log_out_and_in(hall_run: Path, hall_log: Path, timeline: Timelin
     back = list(read_ring_log(hall_log))
     assert len(back) == len(heard) > 100
     for one, other in zip(heard, back, strict=True):
-        assert (one.t_s, one.pose, one.ring_yaw) == (other.t_s, other.pose, other.ring_yaw)
+        assert (one.robot_s, one.pose, one.ring_yaw) == (other.robot_s, other.pose, other.ring_yaw)
         assert one.ranges_m.tobytes() == other.ranges_m.tobytes()
     summary = tmp_path / "summary.json"
     assert run_command(["replay", str(hall_log), "--json", str(summary)]) == DONE
