@@ -47,10 +47,21 @@ def test_when_a_time_comes() -> None:
 
 @pytest.mark.parametrize(
     "line",
-    [b"time_scale", b"time_scale 1 0 0 1", b"time_scale x 0 0 1 inf", b"time_scale 1 nan 0 1 inf", b"time_scale 1 0 inf 1 inf", b"time_scale 1 0 0 0 inf",
-     b"time_scale 1 0 0 11 inf", b"time_scale 1 0 0 1 nan", b"rate 1 0 0 1 inf", b"\xff\x00", b"time_scale 1 0 0 1 inf more",
-     b"time_scale 1 " + b"0" * MESSAGE_MAX + b" 0 1 inf"],
-)  # fmt: skip
+    [
+        b"time_scale",
+        b"time_scale 1 0 0 1",
+        b"time_scale x 0 0 1 inf",
+        b"time_scale 1 nan 0 1 inf",
+        b"time_scale 1 0 inf 1 inf",
+        b"time_scale 1 0 0 0 inf",
+        b"time_scale 1 0 0 11 inf",
+        b"time_scale 1 0 0 1 nan",
+        b"rate 1 0 0 1 inf",
+        b"\xff\x00",
+        b"time_scale 1 0 0 1 inf more",
+        b"time_scale 1 " + b"0" * MESSAGE_MAX + b" 0 1 inf",
+    ],
+)
 def test_what_is_no_law_is_refused_and_changes_nothing(line: bytes) -> None:
     follower = TimeScaleFollower()
     follower.receive(line + b"\n")
