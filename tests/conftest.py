@@ -1,11 +1,11 @@
-"""What every test needs before anything else: compiled kernels in their cache, and a word on what they run as.
+"""Setup of every test run: the kernel cache, reproducible examples, a neutral terminal, and the page of promises.
 
-Numba reads its settings when it is imported, so the cache is named here, before any test module is. A run with
-`NUMBA_DISABLE_JIT=1` (coverage sees inside kernels) or `NUMBA_BOUNDSCHECK=1` is slower than real time on purpose:
-tests marked `realtime` say nothing there and are skipped. Those marked `soak` run only where they are asked for.
+Numba reads its settings on import, so the cache is configured here, before any test module is imported. A run with
+`NUMBA_DISABLE_JIT=1` (so that coverage can trace kernels) or `NUMBA_BOUNDSCHECK=1` is slower than real time; tests
+marked `realtime` are skipped there. Tests marked `soak` run only on request.
 
-What a run of the tests says must depend on nothing but the sources: so generated examples are the same in every run
-(`make soak` looks for new ones), and what the user's terminal is like is forgotten.
+The result of a run must depend on the sources alone: hypothesis generates the same examples in every run (`make soak`
+generates new ones), and the settings of the user's terminal are removed.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ use_kernel_cache()
 
 TERMINAL = ("COLUMNS", "LINES", "FORCE_COLOR", "NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE", "TTY_COMPATIBLE",
             "TTY_INTERACTIVE", "PY_COLORS", "JUPYTER_COLUMNS", "JUPYTER_LINES")  # fmt: skip
-"""What decides how wide and how colourful output is; CI systems like to set it."""
+"""Environment variables that set the width and colours of output."""
 
-WITH_KERNELS = [Path(__file__).parent / room for room in ("perception", "drivers")]
-"""Where the tests of kernels are."""
+KERNEL_TESTS = [Path(__file__).parent / package for package in ("perception", "drivers")]
+"""Folders with tests of compiled kernels."""
 
 for _name in TERMINAL:
     os.environ.pop(_name, None)
 
-# How long an example takes says something about the machine only.
+# How long an example takes depends on the machine only.
 _SLOW = [HealthCheck.too_slow]
 settings.register_profile("reproducible", deadline=None, derandomize=True, suppress_health_check=_SLOW)
 settings.register_profile(
@@ -44,8 +44,8 @@ settings.register_profile(
 settings.load_profile("reproducible")
 
 
-def slowed_down() -> str | None:
-    """Return the setting that makes kernels slow in this run, None where there is none."""
+def slow_kernel_setting() -> str | None:
+    """Return the name of the setting that makes kernels slow in this run, or None."""
     for name in ("NUMBA_DISABLE_JIT", "NUMBA_BOUNDSCHECK"):
         if os.environ.get(name, "0") not in {"", "0"}:
             return name
@@ -53,20 +53,20 @@ def slowed_down() -> str | None:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--promises", metavar="PAGE", help="write what was measured, see tests/promises.py")
-    parser.addoption("--screenshots", metavar="FOLDER", help="keep the browser tests' pictures there")
+    parser.addoption("--promises", metavar="PAGE", help="write the measurements, see tests/promises.py")
+    parser.addoption("--screenshots", metavar="FOLDER", help="save the screenshots of browser tests there")
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     promises.collect(config, items)
     for item in items:
-        if any(item.path.is_relative_to(room) for room in WITH_KERNELS):
+        if any(item.path.is_relative_to(folder) for folder in KERNEL_TESTS):
             item.add_marker("kernels")
-    slow = slowed_down()
+    slow = slow_kernel_setting()
     if slow is None:
         return
-    skip = pytest.mark.skip(reason=f"with {slow} nothing runs in real time")
+    skip = pytest.mark.skip(reason=f"with {slow} kernels are slower than real time")
     for item in items:
         if item.get_closest_marker("realtime") is not None:
             item.add_marker(skip)
@@ -74,40 +74,40 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    if any(item.get_closest_marker(name) is not None for name in (promises.CARRIES, "soak")):
-        item.user_properties.append((promises.CARRIES, ""))
+    if any(item.get_closest_marker(name) is not None for name in (promises.PROMISE, "soak")):
+        item.user_properties.append((promises.PROMISE, ""))
 
 
-class _Clerk:
-    """Enters what tests report into the ledger, and writes the page at the end."""
+class _PromisesPlugin:
+    """Collects what tests report, and writes the page at the end."""
 
     def __init__(self, config: pytest.Config) -> None:
         self._config = config
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        ledger = self._config.stash.get(promises.LEDGER, None)
-        if ledger is not None:  # None in a process that has others collect and run the tests
-            ledger.take_report(report)
+        results = self._config.stash.get(promises.RESULTS, None)
+        if results is not None:  # None in the controller of pytest-xdist
+            results.add_report(report)
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         page = self._config.getoption("promises")
         if page is None:
             return
-        ledger, path = self._config.stash.get(promises.LEDGER, promises.Ledger()), Path(page)
+        results, path = self._config.stash.get(promises.RESULTS, promises.Results()), Path(page)
         soak, day = path.name == promises.SOAK_PAGE.name, datetime.now(UTC).date().isoformat()
         try:
             before = promises.rows_in(path.read_text("utf-8")) if path.exists() else []
-            rows = promises.merged(ledger, before, soak=soak, day=day)
+            rows = promises.merged(results, before, soak=soak, day=day)
             path.write_text(promises.render(rows, soak=soak), encoding="utf-8")
         except ValueError as error:
-            self._config.get_terminal_writer().line(f"\n{page} is left as it is: {error}", red=True)
+            self._config.get_terminal_writer().line(f"\n{page} was not changed: {error}", red=True)
             session.exitstatus = pytest.ExitCode.USAGE_ERROR
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.pluginmanager.register(_Clerk(config), "promises")
+    config.pluginmanager.register(_PromisesPlugin(config), "promises")
     if getattr(config.option, "numprocesses", None):
-        # Before there are several processes, each of which would compile all of it.
+        # Compile once here; otherwise every worker process would compile everything.
         _compile_all()
 
 
@@ -117,17 +117,17 @@ def _compile_all() -> None:
 
 @pytest.fixture
 def measured(request: pytest.FixtureRequest) -> Callable[[str], None]:
-    """Tell what a test measured, for the page of promises."""
+    """Return a function that reports a measurement for the page of promises."""
     return lambda text: request.node.user_properties.append((promises.MEASURED, text))
 
 
 @pytest.fixture(scope="session", autouse=True)
 def _state_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Keep logs of runs under test out of the user's own."""
+    """Keep the logs of runs under test out of the user's state folder."""
     os.environ["XDG_STATE_HOME"] = str(tmp_path_factory.mktemp("state"))
 
 
 @pytest.fixture(scope="session")
 def warm_kernels() -> None:
-    """Have every kernel compiled before a clock runs, also for processes that a test starts."""
+    """Compile every kernel before times are measured, also for processes that a test starts."""
     _compile_all()

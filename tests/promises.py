@@ -1,9 +1,9 @@
-"""The promises this program makes, and the machinery that ties each to the tests that carry it.
+"""The promises this program makes, and their traceability to the tests that verify them.
 
-A test carries a promise by `@pytest.mark.promise("P4")` and tells what it measured by the fixture `measured`. The
-hooks in `conftest.py` call in here: an unknown ID ends every run before it begins, an ID that no test carries ends a
-run of the whole suite, and `--promises=PAGE` writes the page of what was promised and what was measured. A run of
-some tests only renews their rows and leaves the others as they are; each row has its own date.
+A test names its promises by `@pytest.mark.promise("P4")` and reports measurements by the fixture `measured`. Hooks in
+`conftest.py` use this module: an unknown ID stops every run at collection, an ID without a test stops a run of the
+whole suite, and `--promises=PAGE` writes the page of promises and measurements. A run of some tests renews only their
+rows; each row has its own date.
 
 To add a promise, add its entry to `PROMISES` and mark a test with its ID.
 """
@@ -21,15 +21,15 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "promises.md"
-"""What `make promises` writes."""
+"""Page written by `make promises`."""
 SOAK_PAGE = ROOT / "docs" / "promises-soak.md"
-"""What `make soak` writes."""
-MEASURED, CARRIES = "measured", "promise"
-"""Names of the properties that a test's report carries."""
+"""Page written by `make soak`."""
+MEASURED, PROMISE = "measured", "promise"
+"""Names of properties in a test's report."""
 
 
 class Promise(NamedTuple):
-    """What is promised, and by which figure it is kept."""
+    """A promise, and the figures that it is measured by."""
 
     text: str
     figure: str
@@ -78,13 +78,13 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "late, duplicate and out-of-window echoes never reach perception; no honest sensor masked",
         ),
         "P9": Promise(
-            "The map forgets lies",
-            "20 % outliers, a garbage burst, a 1 ft odometry jump: seen from the robot, objects are back within "
+            "The map recovers from false readings",
+            "20 % outliers, a garbage burst, a 1 ft odometry jump: the robot locates objects again within "
             ".05 ft of truth within 20 readings; no ghost of the old frame and no false object survives 10 s",
         ),
         "P10": Promise(
             "No silent death",
-            "any task or thread killed or raising: SAFE_STOP within two cycles, the culprit named; the deadman is "
+            "any task or thread killed or raising: SAFE_STOP within two cycles, the cause named; the deadman is "
             "fed only while all parts report health; never from a thread",
         ),
         "P11": Promise(
@@ -94,7 +94,7 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         ),
         "P12": Promise(
             "Disk trouble stays on disk",
-            "full disk, 5 s fsync, read-only folder, a log or terminal that takes nothing: no cycle is late beyond "
+            "full disk, 5 s fsync, read-only folder, a log or terminal that accepts nothing: no cycle is late beyond "
             "the paired control, the loss is counted and reported",
         ),
         "P13": Promise(
@@ -103,12 +103,12 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "recognised",
         ),
         "P14": Promise(
-            "Input files cannot hurt",
+            "Input files cannot do harm",
             "10⁵ mutated ring logs, worlds, models, robot files (here a share of them, in `make soak` all): clear "
             "error or right result, no traceback, no hang, memory ≤ 500 MB",
         ),
         "P15": Promise(
-            "It runs on",
+            "It runs for days",
             "half an hour in virtual time (soak: 24 h, and 1 h on the pty): memory slope < 1 MB/h, no unretrieved "
             "task exception, t_us wrap crossed",
         ),
@@ -118,10 +118,10 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
 
 
 @dataclass(frozen=True)
-class Carrier:
-    """One test function that carries promises; parameters of one function are one carrier.
+class PromiseTest:
+    """Test function that verifies promises; all parameters of one function are one entry.
 
-    A long form may carry none: it is listed all the same, for what it measured.
+    A long form may verify none; it is listed for its measurements.
     """
 
     test: str
@@ -130,93 +130,97 @@ class Carrier:
 
 
 @dataclass
-class Ledger:
-    """Who carries what in this run, and what was measured.
+class Results:
+    """Tests of promises in a run, and their measurements.
 
     Attributes
     ----------
-    carriers
-        Of everything collected, before any of it was deselected.
+    tests
+        Collected tests, including those deselected later.
     whole
-        True where the whole suite was collected.
+        Whether the whole suite was collected.
+    measured
+        Measurements of each test that passed.
+    failed
+        Tests that failed.
     """
 
-    carriers: tuple[Carrier, ...] = ()
+    tests: tuple[PromiseTest, ...] = ()
     whole: bool = False
-    results: dict[str, list[str]] = field(default_factory=dict)
+    measured: dict[str, list[str]] = field(default_factory=dict)
     failed: set[str] = field(default_factory=set)
 
-    def take_report(self, report: pytest.TestReport) -> None:
-        """Enter what one phase of one test tells."""
+    def add_report(self, report: pytest.TestReport) -> None:
+        """Add the report of one phase of a test."""
         properties = [(key, str(value)) for key, value in report.user_properties]
-        if not any(key == CARRIES for key, _ in properties):
+        if not any(key == PROMISE for key, _ in properties):
             return
         test = report.nodeid.split("[")[0]
         if report.failed:
             self.failed.add(test)
         elif report.when == "call" and report.passed:
-            told = self.results.setdefault(test, [])
-            told += [value for key, value in properties if key == MEASURED and value not in told]
+            known = self.measured.setdefault(test, [])
+            known += [value for key, value in properties if key == MEASURED and value not in known]
 
 
-LEDGER = pytest.StashKey[Ledger]()
+RESULTS = pytest.StashKey[Results]()
 
 
-def carriers_of(items: Iterable[pytest.Item]) -> tuple[Carrier, ...]:
-    """Return who carries which promises, in the order of collection.
+def tests_of(items: Iterable[pytest.Item]) -> tuple[PromiseTest, ...]:
+    """Return the tests that verify promises, in the order of collection.
 
     Raises
     ------
     pytest.UsageError
-        A marker names no ID, or one that is not in `PROMISES`.
+        A marker has no ID, or an ID that is not in `PROMISES`.
     """
-    found: dict[str, Carrier] = {}
+    found: dict[str, PromiseTest] = {}
     for item in items:
-        ids = tuple(dict.fromkeys(one for mark in item.iter_markers(CARRIES) for one in mark.args))
+        ids = tuple(dict.fromkeys(one for mark in item.iter_markers(PROMISE) for one in mark.args))
         unknown = [one for one in ids if one not in PROMISES]
-        if unknown or (not ids and item.get_closest_marker(CARRIES) is not None):
+        if unknown or (not ids and item.get_closest_marker(PROMISE) is not None):
             named = ", ".join(map(repr, unknown)) or "no ID"
             raise pytest.UsageError(
-                f"{item.nodeid}: @pytest.mark.promise names {named}; known are {', '.join(PROMISES)}: "
+                f"{item.nodeid}: @pytest.mark.promise names {named}; known IDs: {', '.join(PROMISES)}; "
                 f"correct the ID, or add it to tests/promises.py"
             )
         soak = item.get_closest_marker("soak") is not None
         if ids or soak:
             test = item.nodeid.split("[")[0]
-            found[test] = Carrier(test, ids, soak and found.get(test, Carrier("", (), soak=True)).soak)
+            found[test] = PromiseTest(test, ids, soak and found.get(test, PromiseTest("", (), soak=True)).soak)
     return tuple(found.values())
 
 
-def broken(carriers: Sequence[Carrier]) -> list[str]:
-    """Return the IDs that no test of every run carries; a soak test alone is run too seldom."""
-    kept = {one for carrier in carriers if not carrier.soak for one in carrier.ids}
-    return [one for one in PROMISES if one not in kept]
+def unverified(tests: Sequence[PromiseTest]) -> list[str]:
+    """Return the IDs without a test in ordinary runs; soak tests alone run too seldom."""
+    verified = {one for test in tests if not test.soak for one in test.ids}
+    return [one for one in PROMISES if one not in verified]
 
 
 def collect(config: pytest.Config, items: Sequence[pytest.Item]) -> None:
-    """Open the ledger of a run whose tests have been collected and not yet selected among.
+    """Attach empty results to a run whose tests have been collected and not yet deselected.
 
     Raises
     ------
     pytest.UsageError
-        A test carries an unknown ID; or, where the whole suite was collected, an ID has no test.
+        A test names an unknown ID; or the whole suite was collected and an ID has no test.
     """
     whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
-    ledger = Ledger(carriers_of(items), whole)
-    config.stash[LEDGER] = ledger
-    if whole and (without := broken(ledger.carriers)):
+    results = Results(tests_of(items), whole)
+    config.stash[RESULTS] = results
+    if whole and (without := unverified(results.tests)):
         raise pytest.UsageError(
-            f"no test carries {', '.join(without)}: mark one with @pytest.mark.promise, or take the promise back in "
+            f"no test verifies {', '.join(without)}: mark one with @pytest.mark.promise, or remove the promise from "
             f"tests/promises.py"
         )
 
 
 NO_PROMISE = "–"
-"""In place of an ID."""
+"""Stands for an ID in rows of tests without one."""
 
 
 class Row(NamedTuple):
-    """A row of the page."""
+    """Row of the page."""
 
     promise: str
     test: str
@@ -230,15 +234,15 @@ class Row(NamedTuple):
 _ROW = re.compile(r"\| (?P<promise>P\d+|–) \| `(?P<test>[^`]+)` \| (?P<measured>.*) \| (?P<day>[-\d]+) \|")
 
 
-def _place(row: tuple[str, ...]) -> tuple[int, str]:
-    """Return where a row that begins with ID and test belongs: whichever run wrote it, the page is the same."""
+def _sort_key(row: tuple[str, ...]) -> tuple[int, str]:
+    """Return the sort key of a row that starts with ID and test, so that the page does not depend on the run."""
     return [*PROMISES, NO_PROMISE].index(row[0]), row[1]
 
 
-def rows_of(carriers: Iterable[Carrier], *, soak: bool) -> list[tuple[str, str]]:
-    """Return (ID, test) as the page lists them, by ID and then by the test's name."""
-    mine = [carrier for carrier in carriers if carrier.soak == soak]
-    return sorted(((one, c.test) for c in mine for one in c.ids or (NO_PROMISE,)), key=_place)
+def rows_of(tests: Iterable[PromiseTest], *, soak: bool) -> list[tuple[str, str]]:
+    """Return the pairs (ID, test) of the page, sorted by ID and then by test."""
+    listed = [test for test in tests if test.soak == soak]
+    return sorted(((one, test.test) for test in listed for one in test.ids or (NO_PROMISE,)), key=_sort_key)
 
 
 def rows_in(page: str) -> list[Row]:
@@ -247,40 +251,51 @@ def rows_in(page: str) -> list[Row]:
 
 
 def listed_in(page: str) -> list[tuple[str, str]]:
-    """Return the (ID, test) that a written page lists."""
+    """Return the pairs (ID, test) of a written page."""
     return [(row.promise, row.test) for row in rows_in(page)]
 
 
-def merged(ledger: Ledger, before: Iterable[Row], *, soak: bool, day: str) -> list[Row]:
-    """Return the rows of the page: of what ran anew, and as it was of what did not.
+def merged(results: Results, before: Iterable[Row], *, soak: bool, day: str) -> list[Row]:
+    """Return the rows of the page: new rows of the tests that ran, and the earlier rows of the others.
+
+    Parameters
+    ----------
+    results
+        Results of this run.
+    before
+        Rows of the page before this run.
+    soak
+        Whether the page lists soak tests or ordinary ones.
+    day
+        Date of this run, YYYY-MM-DD.
 
     Raises
     ------
     ValueError
-        A test that carries a promise failed; or, in a run of the whole suite, did not run to its end.
+        A test of a promise failed; or, in a run of the whole suite, did not run.
     """
-    due = rows_of(ledger.carriers, soak=soak)
+    due = rows_of(results.tests, soak=soak)
     tests = {test for _, test in due}
-    if missing := sorted(tests & ledger.failed | (tests - ledger.results.keys() if ledger.whole else set())):
+    if missing := sorted(tests & results.failed | (tests - results.measured.keys() if results.whole else set())):
         raise ValueError(f"did not pass: {', '.join(missing)}")
     ran = {
-        (one, test): Row(one, test, "<br>".join(ledger.results[test]) or "passed", day)
+        (one, test): Row(one, test, "<br>".join(results.measured[test]) or "passed", day)
         for one, test in due
-        if test in ledger.results
+        if test in results.measured
     }
-    if ledger.whole:
+    if results.whole:
         return list(ran.values())
     known = {(row.promise, row.test): row for row in before if row.promise in {*PROMISES, NO_PROMISE}} | ran
-    return sorted(known.values(), key=_place)
+    return sorted(known.values(), key=_sort_key)
 
 
 def render(rows: Sequence[Row], *, soak: bool) -> str:
-    """Return the page: what is promised, then which test measured what, and when."""
+    """Return the page as Markdown: the promises, then the tests with their measurements and dates."""
     command, other = ("make soak", "make promises") if soak else ("make promises", "make soak")
     lines = [
-        "# What is promised, and what was measured",
+        "# Promises and measurements",
         "",
-        f"Written by `{command}` from the tests that ran; the {'short' if soak else 'long'} forms: `{other}`.",
+        f"Written by `{command}` from the tests that ran. The {'short' if soak else 'long'} forms: `{other}`.",
         f"`pytest{' -m soak' if soak else ''} TEST --promises=PAGE` renews the rows of single tests.",
         "",
     ]

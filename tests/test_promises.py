@@ -1,4 +1,4 @@
-"""What is promised is tested, and what is tested is told: the machinery of `tests/promises.py` itself."""
+"""Tests of the traceability of promises, `tests/promises.py`."""
 
 from __future__ import annotations
 
@@ -11,43 +11,43 @@ from pathlib import Path
 import pytest
 
 from tests.promises import (
-    LEDGER,
     PAGE,
     PROMISES,
+    RESULTS,
     ROOT,
     SOAK_PAGE,
-    Carrier,
-    Ledger,
-    broken,
+    PromiseTest,
+    Results,
     listed_in,
     merged,
     render,
     rows_in,
     rows_of,
+    unverified,
 )
 
 pytestmark = pytest.mark.promise("P16")
 
-EVERY = Ledger(
+EVERY = Results(
     (
-        Carrier("a.py::test_all", tuple(PROMISES), soak=False),
-        Carrier("a.py::test_long", ("P4",), soak=True),
-        Carrier("b.py::test_free", (), soak=True),
+        PromiseTest("a.py::test_all", tuple(PROMISES), soak=False),
+        PromiseTest("a.py::test_long", ("P4",), soak=True),
+        PromiseTest("b.py::test_free", (), soak=True),
     ),
     whole=True,
-    results={"a.py::test_all": ["12 of 12", "0.3 s"], "a.py::test_long": [], "b.py::test_free": ["7 to 8"]},
+    measured={"a.py::test_all": ["12 of 12", "0.3 s"], "a.py::test_long": [], "b.py::test_free": ["7 to 8"]},
 )
 
 
 def run_suite(folder: Path, test: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run a suite that consists of one file."""
+    """Run a test suite of one file."""
     (folder / "test_it.py").write_text(f"import pytest\n\n{test}\n")
     command = [sys.executable, "-m", "pytest", "-q", "-p", "tests.conftest", "-p", "no:cacheprovider", *arguments]
     return subprocess.run(command, cwd=ROOT, text=True, capture_output=True, timeout=120.0, check=False)
 
 
 @pytest.mark.parametrize("ids", ['"P99"', '"P4", "p5"', ""])
-def test_an_unknown_id_ends_every_run_before_it_begins(tmp_path: Path, ids: str) -> None:
+def test_unknown_id_stops_every_run_at_collection(tmp_path: Path, ids: str) -> None:
     test = f"@pytest.mark.promise({ids})\ndef test_it() -> None:\n    pass"
     done = run_suite(tmp_path, test, str(tmp_path / "test_it.py"))
     assert done.returncode == pytest.ExitCode.USAGE_ERROR, done.stdout
@@ -55,17 +55,17 @@ def test_an_unknown_id_ends_every_run_before_it_begins(tmp_path: Path, ids: str)
     assert "add it to tests/promises.py" in done.stderr
 
 
-def test_an_id_without_a_test_ends_a_run_of_the_whole_suite_and_no_other(tmp_path: Path) -> None:
+def test_id_without_test_stops_only_a_run_of_the_whole_suite(tmp_path: Path) -> None:
     some = ", ".join(f'"{one}"' for one in PROMISES if one != "P4")
     test = f"@pytest.mark.promise({some})\ndef test_it() -> None:\n    pass"
     whole = run_suite(tmp_path, test, "-o", f"testpaths={tmp_path}")
     assert whole.returncode == pytest.ExitCode.USAGE_ERROR, whole.stdout
-    assert "no test carries P4:" in whole.stderr
+    assert "no test verifies P4:" in whole.stderr
     part = run_suite(tmp_path, test, str(tmp_path / "test_it.py"))
     assert part.returncode == 0, part.stdout + part.stderr
 
 
-def test_a_run_writes_what_its_tests_measured_and_nothing_where_one_fails(tmp_path: Path) -> None:
+def test_run_writes_measurements_unless_a_test_fails(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     for number, passes in ((7, True), (8, False)):
         test = (
@@ -79,59 +79,61 @@ def test_a_run_writes_what_its_tests_measured_and_nothing_where_one_fails(tmp_pa
         assert text.count("found 1<br>found 7 |") == 2
         assert PROMISES["P4"].figure in text
         assert PROMISES["P5"].figure not in text
-    assert "is left as it is: did not pass: " in done.stdout
-    assert "assert 7 in (1, 8)" in done.stdout, "and what failed is told as ever"
+    assert "was not changed: did not pass: " in done.stdout
+    assert "assert 7 in (1, 8)" in done.stdout, "the failure is reported as usual"
 
 
-def test_a_promise_that_only_a_soak_test_carries_is_not_kept() -> None:
-    assert broken(EVERY.carriers) == []
-    long = [Carrier(c.test, c.ids, soak=True) for c in EVERY.carriers]
-    assert broken(long) == list(PROMISES)
+def test_promise_with_only_a_soak_test_is_unverified() -> None:
+    assert unverified(EVERY.tests) == []
+    long = [PromiseTest(c.test, c.ids, soak=True) for c in EVERY.tests]
+    assert unverified(long) == list(PROMISES)
 
 
-def written(ledger: Ledger, before: str = "", *, soak: bool = False, day: str = "2026-01-02") -> str:
-    return render(merged(ledger, rows_in(before), soak=soak, day=day), soak=soak)
+def written(results: Results, before: str = "", *, soak: bool = False, day: str = "2026-01-02") -> str:
+    return render(merged(results, rows_in(before), soak=soak, day=day), soak=soak)
 
 
-def test_the_page_reads_back_as_what_it_was_written_from() -> None:
+def test_page_round_trip() -> None:
     for soak in (False, True):
-        assert listed_in(written(EVERY, soak=soak)) == rows_of(EVERY.carriers, soak=soak)
+        assert listed_in(written(EVERY, soak=soak)) == rows_of(EVERY.tests, soak=soak)
     assert "12 of 12<br>0.3 s" in written(EVERY)
     assert "| P4 | `a.py::test_long` | passed | 2026-01-02 |" in written(EVERY, soak=True)
     assert "| – | `b.py::test_free` | 7 to 8 | 2026-01-02 |" in written(EVERY, soak=True)
     with pytest.raises(ValueError, match=r"did not pass: a\.py::test_all"):
-        written(replace(EVERY, results={"a.py::test_long": []}))
+        written(replace(EVERY, measured={"a.py::test_long": []}))
 
 
-def test_a_run_of_some_tests_renews_their_rows_and_leaves_the_others() -> None:
+def test_run_of_some_tests_renews_only_their_rows() -> None:
     whole = written(EVERY, soak=True, day="2026-01-02")
-    part = Ledger((Carrier("a.py::test_long", ("P4",), soak=True),), results={"a.py::test_long": ["9 of 9"]})
+    part = Results((PromiseTest("a.py::test_long", ("P4",), soak=True),), measured={"a.py::test_long": ["9 of 9"]})
     page = written(part, whole, soak=True, day="2026-01-03")
     changed = "| P4 | `a.py::test_long` | passed | 2026-01-02 |", "| P4 | `a.py::test_long` | 9 of 9 | 2026-01-03 |"
     assert page == whole.replace(*changed)
     assert written(part, page, soak=True, day="2026-01-03") == page
-    new = Ledger((Carrier("a.py::test_a", ("P2",), soak=True),), results={"a.py::test_a": []})
+    new = Results((PromiseTest("a.py::test_a", ("P2",), soak=True),), measured={"a.py::test_a": []})
     assert [row[0] for row in listed_in(written(new, page, soak=True))] == ["P2", "P4", "–"]
     with pytest.raises(ValueError, match=r"did not pass: a\.py::test_long"):
         written(replace(part, failed={"a.py::test_long"}), page, soak=True)
-    none = Ledger((Carrier("a.py::test_long", ("P4",), soak=True),))
-    assert written(none, page, soak=True) == page, "what was deselected or skipped says nothing"
+    none = Results((PromiseTest("a.py::test_long", ("P4",), soak=True),))
+    assert written(none, page, soak=True) == page, "deselected and skipped tests change nothing"
 
 
 @pytest.mark.parametrize("page", [PAGE, SOAK_PAGE], ids=lambda page: page.name)
-def test_the_committed_pages_list_what_the_suite_has(
+def test_committed_pages_list_the_tests_of_the_suite(
     request: pytest.FixtureRequest, measured: Callable[[str], None], page: Path
 ) -> None:
-    ledger = request.config.stash[LEDGER]
+    results = request.config.stash[RESULTS]
     soak = page == SOAK_PAGE
-    if not ledger.whole:
-        pytest.skip("only a run of the whole suite knows all tests")
+    if not results.whole:
+        pytest.skip("only a run of the whole suite collects all tests")
     if soak and not page.exists():
-        pytest.skip("no soak has been committed")
-    has = rows_of(ledger.carriers, soak=soak)
-    if request.config.getoption("promises") is None:  # else it is being written
+        pytest.skip("no page of soak tests has been committed")
+    expected = rows_of(results.tests, soak=soak)
+    if request.config.getoption("promises") is None:  # otherwise it is being written
         listed = listed_in(page.read_text("utf-8"))
-        # Of the long forms any may be run by itself; but none is listed that there is not.
-        assert set(listed) <= set(has) if soak else listed == has, f"run `make {'soak' if soak else 'promises'}`"
+        # Long forms may be run one by one, so any may be missing; but every listed one must exist.
+        assert set(listed) <= set(expected) if soak else listed == expected, (
+            f"run `make {'soak' if soak else 'promises'}`"
+        )
     if not soak:
-        measured(f"{len(PROMISES)} promises, {len({test for _, test in has})} tests")
+        measured(f"{len(PROMISES)} promises, {len({test for _, test in expected})} tests")
