@@ -1,6 +1,6 @@
-"""Fuzz one target, guided by coverage: `python -m tests.fuzz TARGET SECONDS FOLDER`; needs the extra `fuzz`.
+"""Coverage-guided fuzzing of one target: `python -m tests.fuzz TARGET SECONDS FOLDER`; needs the extra `fuzz`.
 
-What breaks a promise is left in FOLDER, with a traceback on stderr and an exit code other than 0.
+Input that makes a target fail is saved in FOLDER; the traceback goes to stderr and the exit code is not 0.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ with atheris.instrument_imports(include=["drivers", "runtime.recording.ring_log"
 
 
 def main(target: str, seconds: str, folder: str) -> None:
-    """Fuzz until the time is up; libFuzzer ends the process itself."""
+    """Fuzz for `seconds`; libFuzzer ends the process."""
     corpus = Path(folder) / "corpus"
     corpus.mkdir(parents=True, exist_ok=True)
     for number, seed in enumerate(SEEDS[target]):

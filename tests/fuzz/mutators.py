@@ -1,4 +1,4 @@
-"""Seeded harm to a good file: bytes flipped, lines swapped, numbers made extreme, words put where others belong."""
+"""Seeded mutation of valid files: flipped bytes, swapped lines, extreme numbers, misplaced words."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def _slice(rng: random.Random, data: bytes, longest: int = 64) -> tuple[int, int
 def flip(rng: random.Random, data: bytes) -> bytes:
     if not data:
         return data
-    harmed = bytearray(data)
-    harmed[rng.randrange(len(data))] = rng.randrange(256)
-    return bytes(harmed)
+    mutated = bytearray(data)
+    mutated[rng.randrange(len(data))] = rng.randrange(256)
+    return bytes(mutated)
 
 
 def insert(rng: random.Random, data: bytes) -> bytes:
@@ -73,8 +73,8 @@ def truncate(rng: random.Random, data: bytes) -> bytes:
 MUTATORS: tuple[Mutator, ...] = (flip, insert, remove, repeat, extreme, extreme, extreme, swap_lines, truncate)
 
 
-def mutated(rng: random.Random, seeds: Sequence[bytes]) -> bytes:
-    """Return one of `seeds` harmed once to four times; now and then its end is another's."""
+def mutate(rng: random.Random, seeds: Sequence[bytes]) -> bytes:
+    """Return one of `seeds` with one to four mutations; one in ten also gets the end of another seed."""
     data = rng.choice(seeds)
     if rng.random() < 0.1:
         data = truncate(rng, data) + rng.choice(seeds)[-rng.randint(1, 400) :]

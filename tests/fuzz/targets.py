@@ -1,4 +1,4 @@
-"""What the fuzzers throw bytes at: each target takes anything, and raises only where a promise is broken."""
+"""Targets of the fuzzers: each accepts any bytes, and raises only if a promise is broken."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ LOG = b"t,x,y,theta,ring_yaw,r00,r01,r02\n0.05,0,0,0,0,1.5,,inf\n0.1,0.1,-2e-3,3
 
 
 def decoder(data: bytes) -> None:
-    """Any chunking gives the same frames, and it stays in step; the first byte says who listens, in which chunks."""
+    """Check that chunking does not matter and that the decoder stays synchronised.
+
+    The first byte selects the side and the size of the chunks.
+    """
     if not data:
         return
     side: Side = "host" if data[0] & 1 else "robot"
@@ -35,38 +38,38 @@ def decoder(data: bytes) -> None:
     assert (chunked.frames, chunked.bad, chunked.lost) == (whole.frames, whole.bad, whole.lost)
     assert chunked.rejected == whole.rejected
     for frame in found:
-        again = Decoder(side)
-        assert again.feed(encode(frame)) == [frame]
+        decoded = Decoder(side)
+        assert decoded.feed(encode(frame)) == [frame]
     two: tuple[Frame, Frame] = (Halt(1), Halt(2)) if side == "host" else (Ack(1, 1), Ack(2, 2))
     assert chunked.feed(encode(two[0]) + encode(two[1]))[-1:] == [two[1]]
 
 
 def driver(data: bytes) -> None:
-    """A robot that says anything at all, in frames with good checksums: the driver believes it or not, and lives."""
+    """Check that the driver survives any content of frames with valid checksums, and sends only valid commands."""
     robot, run_s, rest = make_driver(ROBOT), 0.0, data
     robot.line_opened(run_s)
     while rest:
         length, rest = rest[0] % 48, rest[1:]
         body, rest = rest[:length], rest[length:]
         run_s += length * 0.01
-        said = encode(Ident(0, 1, 24, 381, 500, 20, length % 3, "denning")) if length % 7 == 0 else framed(body)
-        robot.receive(said, run_s)
+        sent = encode(Ident(0, 1, 24, 381, 500, 20, length % 3, "denning")) if length % 7 == 0 else framed(body)
+        robot.receive(sent, run_s)
         robot.tick(run_s)
         robot.drive(Twist(0.1, -0.1))
         if length % 11 == 0:
             robot.halt()
         if length % 13 == 0:
             robot.release()
-        heard = Decoder("host")
-        heard.feed(robot.outgoing(writable=length % 5 != 0).lstrip(b"\0"))
-        assert heard.bad == 0
+        received = Decoder("host")
+        received.feed(robot.outgoing(writable=length % 5 != 0).lstrip(b"\0"))
+        assert received.bad == 0
         for firing in robot.take_received().firings:
             assert all(map(math.isfinite, (firing.robot_s, firing.pose.x, firing.pose.y, firing.pose.theta)))
             assert firing.ranges_m.shape == (24,)
 
 
 def ring_log(data: bytes) -> None:
-    """Any file is a ring log with firings in order, or it is refused in one line that names the file."""
+    """Check that a file is read as firings in order, or refused in one line that names the file."""
     with tempfile.NamedTemporaryFile(suffix=".csv") as file:
         file.write(data)
         file.flush()
@@ -77,11 +80,11 @@ def ring_log(data: bytes) -> None:
                 assert all(r >= 0.0 or math.isnan(r) for r in firing.ranges_m.tolist())
                 last_s = firing.robot_s
         except RingLogError as error:
-            said = str(error)
+            message = str(error)
         else:
             return
-    assert said.startswith(str(path)), said
-    assert "\n" not in said
+    assert message.startswith(str(path)), message
+    assert "\n" not in message
 
 
 TARGETS: Mapping[str, Callable[[bytes], None]] = MappingProxyType(
