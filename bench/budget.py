@@ -27,13 +27,13 @@ from drivers.emulator.memory_transport import MemoryLine
 from drivers.messages import Floats
 from drivers.registry import make_device, make_driver
 from perception.pipeline import Perception
-from runtime.cycle.driver_io import gather, give
-from runtime.cycle.modes import Mode, Request
-from runtime.cycle.step import Inputs, State, step
+from runtime.cycle.inputs import Request, gather_inputs
+from runtime.cycle.modes import Mode
+from runtime.cycle.step import Inputs, State, apply_command, step
 from runtime.support.kernel_cache import prepare_kernels
 from runtime.timing.memory_policy import MemoryPolicy
 from runtime.timing.phases import Phase
-from runtime.timing.refinement_budget import ProcessorTime
+from runtime.timing.refinement_budget import CpuTimeBudget
 
 QUANTUM_MAX_US: Final = 500.0
 """Limit of a quantum's CPU time at p99.9."""
@@ -120,7 +120,7 @@ def costs_of_drive(settings: Settings, cycles: int, budget_s: float) -> DriveCos
         for cycle in range(1, SETTLED_CYCLES + cycles + 1):
             run_s = cycle / settings.cycle.rate_hz
             line.exchange(run_s)
-            inputs = gather(driver, run_s, Request.ARM if state.mode.mode is Mode.READY else None)
+            inputs = gather_inputs(driver, run_s, Request.ARM if state.mode.mode is Mode.READY else None)
             if cycle == SETTLED_CYCLES + 1:
                 costs = perception.costs = DriveCosts(1e6 * budget_s)
             _one_cycle(state, inputs, settings, driver, costs, budget_s)
@@ -133,11 +133,11 @@ def _one_cycle(
 ) -> None:
     """Run one cycle under the budget and record its costs."""
     marks: dict[Phase, float] = {}
-    budget = ProcessorTime(budget_s)
+    budget = CpuTimeBudget(budget_s)
     begin_s = time.thread_time()
     budget.begin()
     record = step(
-        state, inputs, settings, lambda command: give(driver, command), budget,
+        state, inputs, settings, lambda command: apply_command(driver, command), budget,
         lambda phase: marks.__setitem__(phase, time.thread_time()),
     )  # fmt: skip
     base_us = 1e6 * (marks[Phase.PERCEIVE] - begin_s)

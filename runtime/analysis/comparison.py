@@ -15,14 +15,14 @@ from config.world import WorldConfig
 from drivers.messages import Pose
 from perception.pipeline import DetectedObject
 from runtime.cycle.modes import Mode
-from runtime.cycle.step import Command, CycleRecord, State, step, take_over
+from runtime.cycle.step import Command, CycleRecord, State, apply_settings, step
 from runtime.cycle.summary import ObjectRow, object_row
 from runtime.recording.channels import CYCLE, SETTINGS, RawMessage, decode
 from runtime.recording.reader import Recording, RecordingError, parse_settings
 from runtime.recording.replayer import fresh_state, replay_cycle
 from runtime.recording.schema import Cycle, SettingsChange
 from runtime.simulation.evaluation import match_drums
-from runtime.timing.refinement_budget import enough_quanta
+from runtime.timing.refinement_budget import within_quanta_per_cycle
 
 
 @dataclass(slots=True)
@@ -71,14 +71,14 @@ def compare_runs(
             on_message(entry)
         if entry.topic == SETTINGS:
             mine = parse_settings(decode(SettingsChange, entry.data).settings)
-            take_over(was, mine)
+            apply_settings(was, mine)
         if entry.topic != CYCLE:
             continue
         record = decode(Cycle, entry.data).record
         begun_s = record.inputs.run_s if begun_s is None else begun_s
         at_s = record.inputs.run_s - begun_s
         first = replay_cycle(was, record, mine)
-        second = step(would_be, record.inputs, settings, _ignore, enough_quanta)
+        second = step(would_be, record.inputs, settings, _ignore, within_quanta_per_cycle)
         told.cycles += 1
         _note_stop(told.was, first, at_s)
         _note_stop(told.would_be, second, at_s)

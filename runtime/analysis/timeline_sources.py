@@ -134,9 +134,9 @@ class _Listener:
         else:
             self._timeline.gaps_s.append(run_s - self._before_s)
         t_s, self._before_s = run_s - self._begun_s, run_s
-        if record.inputs.heard.rebooted:
+        if record.inputs.received.rebooted:
             self._gathering.begin_anew(t_s)
-        for firing in record.inputs.heard.firings:
+        for firing in record.inputs.received.firings:
             self._gathering.hear(t_s, firing)
         if state.odometry is not None:
             self._gathering.move(t_s, state.odometry)

@@ -115,7 +115,7 @@ class Console:
         self.dispatcher = CommandDispatcher(
             process, self.hub, self.tuning, self._overtime, self._notes, self._spawn, clock
         )
-        timed = process.keeper.timed
+        timed = process.timing_monitor.timed
         self._timed_frame = timed(CONSOLE_FRAME, self._frame)
         self._timed_tick = timed(CONSOLE_FRAME, self._tick)
         self._last: tuple[CycleRecord, State, CycleStats, RobotDriver] | None = None
@@ -129,15 +129,15 @@ class Console:
         self.url = ""
         self.tunnel: str | None = None
 
-    def on_cycle(self, record: CycleRecord, state: State, books: CycleStats, driver: RobotDriver) -> None:
+    def on_cycle(self, record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
         """Take note of a cycle; what is to be shown of it is put together after it."""
         if self._failure is None:
             try:
-                self._note(record, state, books, driver)
+                self._note(record, state, stats, driver)
             except Exception as error:  # noqa: BLE001 - told by the probe; the cycle itself has not failed
                 self._fail(error)
 
-    def _note(self, record: CycleRecord, state: State, books: CycleStats, driver: RobotDriver) -> None:
+    def _note(self, record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
         self._encoder.take(record)
         if record.inputs.edits:
             refused = {one.edit: one.why for one in record.refused}
@@ -145,10 +145,10 @@ class Console:
         if self._last is None and self.hub.clients:
             # Now the robot has told its name.
             self.hub.greet(self._hello())
-        self._last = (record, state, books, driver)
+        self._last = (record, state, stats, driver)
         now_s = self._clock()
         # While cycles overrun, what is only looked at comes last: the ticker shows enough.
-        if self.hub.clients and now_s >= self._due_s - EARLY_S and not self._process.keeper.in_a_row:
+        if self.hub.clients and now_s >= self._due_s - EARLY_S and not self._process.timing_monitor.overruns_in_a_row:
             # From where it was due, so that a frame that comes late does not make all others later.
             self._due_s = max(self._due_s + FRAME_S, now_s + FRAME_S - 2.0 * EARLY_S)
             self._ask_for_frame()
@@ -186,7 +186,7 @@ class Console:
         token, host = new_token(), self._config.host
         own = (socket.gethostname(), f"{socket.gethostname()}.local")
         names = (host,) if is_loopback(address) else (host, *own)
-        timed = self._process.keeper.timed
+        timed = self._process.timing_monitor.timed
         house = ServerContext(
             guard=Auth(token, names, port), hub=self.hub, limits=self._limits, notes=self._notes,
             files=pages, hello=self._hello, on_message=self.dispatcher.take, on_leave=self._left,
@@ -249,11 +249,11 @@ class Console:
             self._notes.refuse(f"nothing was taken for {self._limits.stall_s:g} s", client.name)
         if not self.hub.clients:
             return
-        latest = self._process.keeper.latest()
+        latest = self._process.timing_monitor.last_cycle()
         record, state, missed, late, link = None, self._process.state, 0, 0, NO_FRAMES
         if self._last is not None:
-            record, state, books, driver = self._last
-            missed, late, link = books.missed, books.late, driver.counts
+            record, state, stats, driver = self._last
+            missed, late, link = stats.missed, stats.late, driver.counts
         time_control, recording = self._overtime.time, self._overtime.recording
         context = FrameContext(
             host_s=now_s, clients=len(self.hub.clients), phases_s=latest.phases_s, late_s=latest.late_s,
@@ -315,7 +315,7 @@ class Console:
 
         async def run() -> None:
             try:
-                await timed_coroutine(self._process.keeper.timed, CONSOLE_RECEIVE, _awaited(work))
+                await timed_coroutine(self._process.timing_monitor.timed, CONSOLE_RECEIVE, _awaited(work))
             except asyncio.CancelledError:
                 raise
             except Exception as error:  # noqa: BLE001 - told as a fault of the program

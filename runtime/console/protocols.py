@@ -13,10 +13,10 @@ from perception.edits import Edit, Evidence
 from runtime.console.clients.client import Frame
 from runtime.console.frames.frame_encoder import RecordingStatus
 from runtime.cycle.drive_requests import DriveRequest
-from runtime.cycle.modes import Request
+from runtime.cycle.inputs import Request
 from runtime.cycle.step import State
 from runtime.support.health import Health
-from runtime.timing.timekeeping import Timekeeper
+from runtime.timing.timing_monitor import TimingMonitor
 
 NOT_HERE: Final = "not available here"
 
@@ -50,7 +50,7 @@ class Run(Robot, Protocol):
         """What the last cycle left."""
 
     @property
-    def keeper(self) -> Timekeeper:
+    def timing_monitor(self) -> TimingMonitor:
         """The books of time."""
 
     @property

@@ -10,7 +10,7 @@ T = TypeVar("T")
 
 
 class Timed(Protocol):
-    """As `runtime.timing.timekeeping.Timekeeper.timed`."""
+    """As `runtime.timing.timing_monitor.TimingMonitor.timed`."""
 
     def __call__(self, name: str, call: Callable[..., Any], /) -> Callable[..., Any]:
         """Return the call as a stretch of that name."""

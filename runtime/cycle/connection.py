@@ -13,22 +13,23 @@ from drivers.messages import Flags
 from runtime.cycle.step import STANDSTILL
 
 CONNECT_MAX_S: Final = 5.0
-"""A robot that has not answered properly by then will not without help."""
+"""Time in which the robot must have answered; one that has not needs help, s."""
 
 HALT_MAX_S: Final = 0.5
-"""How long the end of a run waits for the base to confirm that it stands."""
+"""Longest wait at the end of a run until the base confirms that it stands, s."""
 
-TURN_S: Final = 0.005
-"""So often the line is looked after while there is no cycle."""
+POLL_S: Final = 0.005
+"""Period of the line's exchanges while no cycle runs, s."""
 
 
 class Connection(NamedTuple):
-    """A line and the driver on it, while no cycle looks after them."""
+    """A line and its driver while no cycle runs."""
 
     link: Link
     driver: RobotDriver
     send: Callable[[], None]
     clock: Callable[[], float]
+    """The run's."""
 
     async def connect(self, is_stopping: Callable[[], bool]) -> None:
         """Open the port and wait until the robot is ready, or until the run is to stop.
@@ -42,27 +43,26 @@ class Connection(NamedTuple):
         """
         link, driver = self.link, self.driver
         await link.open_once()
-        give_up_s = self.clock() + CONNECT_MAX_S
+        deadline_run_s = self.clock() + CONNECT_MAX_S
         while driver.state is not LineState.READY and not is_stopping():
             run_s = self.clock()
             driver.tick(run_s)
             self.send()
             lost = None if link.is_open else link.last_error
-            if run_s > give_up_s or lost is not None or driver.state is LineState.DOWN:
+            if run_s > deadline_run_s or lost is not None or driver.state is LineState.DOWN:
                 await link.stop()
-                port = link.config.port
-                nobody = f"nothing on {port} answers like the robot: check its power and link.baud"
-                raise UserError(lost or driver.problem or nobody, FAILED)
-            await asyncio.sleep(TURN_S)
+                no_answer = f"no robot answers on {link.config.port}: check its power and link.baud"
+                raise UserError(lost or driver.problem or no_answer, FAILED)
+            await asyncio.sleep(POLL_S)
 
     async def halt(self) -> bool:
-        """Halt the base and wait until it stands still; return whether it has said so."""
+        """Halt the base and wait until it stands still; return whether it has confirmed that."""
         self.driver.halt()
-        give_up_s = self.clock() + HALT_MAX_S
-        while self.link.is_open and self.clock() < give_up_s:
+        deadline_run_s = self.clock() + HALT_MAX_S
+        while self.link.is_open and self.clock() < deadline_run_s:
             self.driver.tick(self.clock())
             self.send()
-            await asyncio.sleep(TURN_S)
+            await asyncio.sleep(POLL_S)
             odometry = self.driver.take_received().odometry
             if odometry is not None and Flags.LATCHED in odometry.flags and odometry.twist == STANDSTILL:
                 return True

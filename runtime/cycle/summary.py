@@ -16,7 +16,7 @@ from perception.pipeline import DetectedObject
 from runtime.cycle.step import State
 from runtime.timing.cycle_stats import CycleStats, Quantiles
 from runtime.timing.footprint import FootprintRow
-from runtime.timing.timekeeping import Timekeeper, Timing
+from runtime.timing.timing_monitor import TimingMonitor, TimingSummary
 
 
 class ObjectRow(TypedDict):
@@ -83,7 +83,7 @@ class RunSummary(TypedDict):
     process: FootprintRow
     mode: str
     stop_reasons: list[str]
-    timing: Timing
+    timing: TimingSummary
     recording: NotRequired[RecordingRow]
     log: NotRequired[LogRow]
 
@@ -151,8 +151,8 @@ def in_frame(frame: Pose, seen: DetectedObject) -> DetectedObject:
 
 def run_summary(
     state: State,
-    books: CycleStats,
-    keeper: Timekeeper,
+    stats: CycleStats,
+    keeper: TimingMonitor,
     driver: RobotDriver,
     cost: FootprintRow,
     stop_reasons: list[str],
@@ -161,11 +161,11 @@ def run_summary(
     counts = driver.counts
     return {
         "objects": [object_row(in_frame(driver.odometry_origin, seen)) for seen in state.perception.objects()],
-        "cycles": books.cycles,
-        "cycle_us": books.cycle_us(),
-        "late": books.late,
-        "missed": books.missed,
-        "lag_us": books.lag_us(),
+        "cycles": stats.cycles,
+        "cycle_us": stats.cycle_us(),
+        "late": stats.late,
+        "missed": stats.missed,
+        "lag_us": stats.lag_us(),
         "sensors": [
             {"sensor": r.sensor, "fault": r.fault, "reason": r.reason} for r in state.perception.sensor_reports()
         ],

@@ -18,7 +18,7 @@ import orjson
 from config.settings import Settings
 from perception.pipeline import Perception
 from perception.snapshot import Snapshot
-from runtime.cycle.step import CycleRecord, State, step, take_over
+from runtime.cycle.step import CycleRecord, State, apply_settings, step
 from runtime.recording.channels import CYCLE, KEYFRAME, RUN_INFO, SETTINGS, RawMessage, decode, encode
 from runtime.recording.reader import NS_PER_S, Recording, parse_settings
 from runtime.recording.schema import (
@@ -196,7 +196,7 @@ class Replayer:
             return
         self._told, self._settings = told, parse_settings(told)
         if self.state is not None:
-            take_over(self.state, self._settings)
+            apply_settings(self.state, self._settings)
 
     def _cycle(self, record: CycleRecord, data: bytes) -> None:
         result, before = self.result, self._last
@@ -211,7 +211,7 @@ class Replayer:
             return
         began_s = time.perf_counter()
         replayed = replay_cycle(self.state, record, self._settings)
-        result.cycle_stats.enter(time.perf_counter() - began_s)
+        result.cycle_stats.add_cycle(time.perf_counter() - began_s)
         result.cycles += 1
         result.refinement_stops[record.refinement] += 1
         if result.first_cycle is None:

@@ -10,7 +10,7 @@ from drivers.messages import Firing
 from perception.pipeline import Perception
 from runtime.cycle.summary import ReplaySummary, object_row
 from runtime.timing.cycle_stats import CycleStats
-from runtime.timing.refinement_budget import enough_quanta
+from runtime.timing.refinement_budget import within_quanta_per_cycle
 
 
 def replay_firings(
@@ -33,10 +33,10 @@ def replay_firings(
         began = time.perf_counter()
         perception.observe(firing)
         quanta = 0
-        while perception.can_refine and enough_quanta(quanta):
+        while perception.can_refine and within_quanta_per_cycle(quanta):
             perception.refine()
             quanta += 1
-        cycle_stats.enter(time.perf_counter() - began)
+        cycle_stats.add_cycle(time.perf_counter() - began)
         if on_firing is not None:
             on_firing(firing, perception)
     return {

@@ -58,7 +58,7 @@ class SettingsChange(Payload):
 
 
 class RunEnd(Payload):
-    """What a run that came to its own end says of itself: its books, line counts and stop reasons."""
+    """What a run that came to its own end says of itself: its stats, line counts and stop reasons."""
 
     summary: dict[str, Any]
 

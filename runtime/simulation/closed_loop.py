@@ -19,11 +19,11 @@ from drivers.emulator.robot_device import GroundTruth
 from drivers.messages import LinkCounts, Pose
 from drivers.registry import make_device, make_driver
 from perception.pipeline import Perception
-from runtime.cycle.driver_io import gather, give
-from runtime.cycle.modes import Mode, Request
-from runtime.cycle.step import CycleRecord, DriveRequest, Edit, State, step, take_over
+from runtime.cycle.inputs import Request, gather_inputs
+from runtime.cycle.modes import Mode
+from runtime.cycle.step import CycleRecord, DriveRequest, Edit, State, apply_command, apply_settings, step
 from runtime.timing.cycle_stats import CycleStats
-from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, Quanta, RefinementBudget
+from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, QuantumBudget, RefinementBudget
 
 SETTLING_S: Final = 1.0
 """How long a robot that has arrived still listens, so that the last echoes count."""
@@ -95,7 +95,7 @@ def simulate(
         Asked with the number of each cycle, and the state before it, for what an operator says in it. It arms only
         where it says so, and a drive does not end by itself.
     """
-    refinement_budget = Quanta(QUANTA_PER_CYCLE) if refinement_budget is None else refinement_budget
+    refinement_budget = QuantumBudget(QUANTA_PER_CYCLE) if refinement_budget is None else refinement_budget
     robot = make_device(settings, world, seed, clock_start_us=clock_start_us)
     driver = make_driver(settings)
     line = MemoryLine(driver, robot, on_bytes=on_bytes)
@@ -109,15 +109,15 @@ def simulate(
         if reload is not None and (other := reload(cycle_stats.cycles + 1)) is not None:
             settings = other
             driver.set_firing(settings.ring)
-            take_over(state, settings)
+            apply_settings(state, settings)
         line.exchange(now)
         request = Request.ARM if state.mode.mode is Mode.READY else None
         said = OperatorInput(request) if operator is None else operator(cycle_stats.cycles + 1, state)
-        inputs = replace(gather(driver, now, said.request), drive_request=said.drive_request, edits=said.edits)
+        inputs = replace(gather_inputs(driver, now, said.request), drive_request=said.drive_request, edits=said.edits)
         step_s = time.perf_counter()
         refinement_budget.begin()
-        record = step(state, inputs, settings, lambda c: give(driver, c), refinement_budget)
-        cycle_stats.enter(time.perf_counter() - step_s)
+        record = step(state, inputs, settings, lambda c: apply_command(driver, c), refinement_budget)
+        cycle_stats.add_cycle(time.perf_counter() - step_s)
         if on_cycle is not None:
             on_cycle(record, robot.truth)
         if on_state is not None:

@@ -13,8 +13,8 @@ from typing import Final, NamedTuple
 from config.errors import FAILED, WRONG_CALL, UserError
 from runtime.support.child_process import ECHOLOCATE, start_child
 from runtime.support.temp_folder import temp_folder
-from runtime.timing.run_clock import PacedClock
-from runtime.timing.time_control import EmulatorControl
+from runtime.timing.run_clock import ScaledClock
+from runtime.timing.time_control import EmulatorTimeControl
 
 READY_WORD: Final = "ready"
 """First word of the one line the emulator prints."""
@@ -30,12 +30,12 @@ class EmulatorHandle(NamedTuple):
 
     port: str
     """The port it answers on."""
-    control: EmulatorControl
+    control: EmulatorTimeControl
     """Holds its time; `control.clock` is the clock for the run on it."""
 
 
 @contextlib.asynccontextmanager
-async def start_emulator(arguments: Sequence[str], clock: PacedClock | None = None) -> AsyncIterator[EmulatorHandle]:
+async def start_emulator(arguments: Sequence[str], clock: ScaledClock | None = None) -> AsyncIterator[EmulatorHandle]:
     """Run ``echolocate emulate`` beside this process.
 
     It gets a session of its own, so that Ctrl-C on the terminal reaches this process only, which then halts the
@@ -45,7 +45,7 @@ async def start_emulator(arguments: Sequence[str], clock: PacedClock | None = No
     ----------
     arguments : sequence of str
         Further arguments of the command.
-    clock : PacedClock, optional
+    clock : ScaledClock, optional
         The run's, where it must be known before the emulator is.
 
     Raises
@@ -60,7 +60,7 @@ async def start_emulator(arguments: Sequence[str], clock: PacedClock | None = No
         listener: asyncio.Task[None] | None = None
         try:
             await _wait_until_ready(process)
-            control = EmulatorControl(lambda line: _write(process, line), PacedClock() if clock is None else clock)
+            control = EmulatorTimeControl(lambda line: _write(process, line), ScaledClock() if clock is None else clock)
             listener = asyncio.create_task(_listen(process, control), name="emulator's time")
             yield EmulatorHandle(str(port), control)
         finally:
@@ -81,12 +81,12 @@ def _folder(stack: contextlib.ExitStack) -> Path:
         ) from error
 
 
-async def _listen(process: asyncio.subprocess.Process, control: EmulatorControl) -> None:
+async def _listen(process: asyncio.subprocess.Process, control: EmulatorTimeControl) -> None:
     try:
         while process.stdout is not None and (line := await process.stdout.readline()):
-            control.heard(line)
+            control.receive(line)
     finally:
-        control.gone()
+        control.emulator_ended()
 
 
 def _write(process: asyncio.subprocess.Process, line: bytes) -> None:

@@ -81,7 +81,7 @@ def run_hall(settings: Settings, hall: Hall, seed: int) -> HallOutcome:
     for firing in heard:
         begin = time.perf_counter()
         seen = perceive(perception, firing)
-        cycle_stats.enter(time.perf_counter() - begin)
+        cycle_stats.add_cycle(time.perf_counter() - begin)
         watch.look(float(firing.pose.x), seen)
     drums, boxes, false = match_objects(hall.world, seen, settings.models)
     return HallOutcome(drums, boxes, false, heard[-1].robot_s, cycle_stats, inside_ellipse(drums, seen), watch.fixes())

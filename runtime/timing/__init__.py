@@ -1,1 +1,1 @@
-"""When a cycle runs, what it costs, and who is to blame where it is late: clocks, waking, pacing, and the books."""
+"""When a cycle runs, what it costs, and what delayed it: clocks, timers, pacing and measurements."""

@@ -1,4 +1,4 @@
-"""The timing books: how long cycles took, how late they began and by whose fault, in memory that never grows."""
+"""How long cycles took, how late they began and what delayed them, in memory that never grows."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from typing import Final, TypedDict
 
 import numpy as np
 
-KEPT: Final = 65_536
-"""Cycles over which quantiles are taken: 55 minutes at 20 Hz."""
+KEPT_MAX: Final = 65_536
+"""Newest values over which quantiles are taken: 55 minutes of cycles at 20 Hz."""
 
-CULPRITS_MAX: Final = 32
+CAUSES_MAX: Final = 32
+"""Most causes that are counted by name."""
 OTHERS: Final = "others"
-"""More names than that are one."""
+"""Name under which further causes are counted."""
 
 
 class Quantiles(TypedDict):
@@ -39,55 +40,55 @@ def worst_of(runs: Sequence[Quantiles]) -> Quantiles:
 
 
 class Series:
-    """The newest `KEPT` of a row of times, and the largest of all.
+    """The newest `KEPT_MAX` of a series of times, and the largest and the sum of all.
 
     Parameters
     ----------
     is_touched : bool
-        Have the memory now rather than page by page as it is used.
+        Allocate the memory now rather than page by page as it is used.
     """
 
     def __init__(self, *, is_touched: bool = False) -> None:
-        self._values_s = np.full(KEPT, 0.0) if is_touched else np.zeros(KEPT)
+        self._values_s = np.full(KEPT_MAX, 0.0) if is_touched else np.zeros(KEPT_MAX)
         self.count = 0
         self.worst_s = 0.0
         self.total_s = 0.0
 
     def add(self, value_s: float) -> None:
-        """Book a time."""
-        self._values_s[self.count % KEPT] = value_s
+        """Add a time, s."""
+        self._values_s[self.count % KEPT_MAX] = value_s
         self.count += 1
         self.worst_s = max(self.worst_s, value_s)
         self.total_s += value_s
 
     @property
     def newest_s(self) -> float:
-        """The last one booked."""
-        return float(self._values_s[(self.count - 1) % KEPT])
+        """The last value added."""
+        return float(self._values_s[(self.count - 1) % KEPT_MAX])
 
     def spread(self) -> Spread:
-        """Return median, tail and worst."""
+        """Return median, tail and maximum, µs."""
         if not self.count:
             return {"p50": 0.0, "p99": 0.0, "p999": 0.0, "max": 0.0}
-        values = self._values_s[: min(self.count, KEPT)]
+        values = self._values_s[: min(self.count, KEPT_MAX)]
         p50, p99, p999 = (round(float(q), 1) for q in 1e6 * np.quantile(values, [0.5, 0.99, 0.999]))
         return {"p50": p50, "p99": p99, "p999": p999, "max": round(1e6 * self.worst_s, 1)}
 
     def quantiles(self) -> Quantiles:
-        """Return the same in the form of the public surface."""
+        """Return median, 99th percentile and maximum, µs: the form of the public surface."""
         spread = self.spread()
         return {"p50": spread["p50"], "p99": spread["p99"], "max": spread["max"]}
 
 
 class CycleStats:
-    """Durations and lateness of cycles.
+    """Durations, lateness and causes of delay of a run's cycles.
 
     Parameters
     ----------
     late_after_s : float
         A cycle that begins later than this after its deadline is late.
     is_touched : bool
-        Have all memory now.
+        Allocate all memory now.
     """
 
     def __init__(self, late_after_s: float, *, is_touched: bool = False) -> None:
@@ -96,36 +97,36 @@ class CycleStats:
         self.lag = Series(is_touched=is_touched)
         self.late = 0
         self.missed = 0
-        """Cycles that should have been and were not."""
-        self.faults: dict[str, int] = {}
-        """Late and overrun cycles by culprit."""
+        """Cycles that were due and did not take place."""
+        self.causes: dict[str, int] = {}
+        """Late and overrun cycles by cause."""
 
     @property
     def cycles(self) -> int:
-        """Cycles booked."""
+        """Number of cycles."""
         return self.took.count
 
     @property
     def total_s(self) -> float:
-        """All cycles together."""
+        """Duration of all cycles together, s."""
         return self.took.total_s
 
-    def enter(self, took_s: float, lag_s: float = 0.0) -> None:
-        """Book one cycle: how long it took and how long after its deadline it began."""
+    def add_cycle(self, took_s: float, lag_s: float = 0.0) -> None:
+        """Add one cycle: how long it took, and how long after its deadline it began, s."""
         self.took.add(took_s)
         self.lag.add(lag_s)
         self.late += lag_s > self.late_after_s
 
-    def blame(self, culprit: str) -> None:
-        """Book by whose fault a cycle was late or the one before it overran."""
-        known = culprit in self.faults or len(self.faults) < CULPRITS_MAX
-        name = culprit if known else OTHERS
-        self.faults[name] = self.faults.get(name, 0) + 1
+    def add_cause(self, cause: str) -> None:
+        """Count what delayed a cycle, or made the one before it overrun."""
+        is_known = cause in self.causes or len(self.causes) < CAUSES_MAX
+        name = cause if is_known else OTHERS
+        self.causes[name] = self.causes.get(name, 0) + 1
 
     def cycle_us(self) -> Quantiles:
-        """Return how long cycles took."""
+        """Return how long cycles took, µs."""
         return self.took.quantiles()
 
     def lag_us(self) -> Quantiles:
-        """Return how long after their deadlines cycles began."""
+        """Return how long after their deadlines cycles began, µs."""
         return self.lag.quantiles()

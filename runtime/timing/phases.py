@@ -1,4 +1,4 @@
-"""The parts of a cycle by name, so that the step can say where it is and the books can say what took the time."""
+"""The parts of a cycle by name, for the step to report and the timing monitor to measure."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ class Phase(Enum):
     """A part of the cycle, in the order in which they follow each other."""
 
     GATHER = "gather"
-    """Drain the link."""
+    """Take what arrived on the line."""
     PERCEIVE = "perceive"
     """The part of perception that always runs."""
     DECIDE = "decide"
     """Modes, schemas, arbiter."""
     COMMAND = "command"
-    """Put the command on the line."""
+    """Send the command."""
     REFINE = "refine"
     """Perception's refinement, within its budget."""
     OBSERVERS = "observers"
     """View and recorder."""
 
 
-def unmarked(_phase: Phase) -> None:
-    """Mark nothing: for those who do not care what takes the time."""
+def ignore_phase(_phase: Phase) -> None:
+    """Do nothing at the end of a phase: for callers that measure nothing."""

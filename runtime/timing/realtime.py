@@ -24,7 +24,7 @@ _CURRENT, _FUTURE, _ONFAULT = 1, 2, 4
 """MCL_CURRENT and so on. Pages are locked as they come into use: libraries of which little is used stay small."""
 
 
-def ask(config: RealtimeConfig) -> list[str]:
+def apply_realtime(config: RealtimeConfig) -> list[str]:
     """Ask for everything the settings name, for the calling thread and its memory.
 
     Returns
@@ -45,7 +45,7 @@ def ask(config: RealtimeConfig) -> list[str]:
 def ask_slice(slice_s: float) -> str | None:
     """Ask for short turns: a thread that wants little at a time is let in before those that want much.
 
-    A slice of 0 gives the system's own back. Returns what is refused, as `ask` does.
+    A slice of 0 gives the system's own back. Returns what is refused, as `apply_realtime` does.
 
     Since Linux 6.12 (EEVDF) a thread's virtual deadline follows from the slice it asks for; before, nothing happens.
     """

@@ -1,8 +1,8 @@
-"""The clock of a run: the host's, or one that can be held where the robot's own time can be held with it.
+"""The clock of a run: the host's, or one that can be paused and scaled together with an emulated robot's time.
 
-Deadlines, silence, the base's deadman and the rhythm of cycles are all counted in the run's time. So where that
-stands still nothing is late, nothing is silent and no cycle begins; and when it goes on, nobody can tell that it
-stood. Only work is counted by the host's clock: a budget is for the machine, whatever the time of day in the run.
+Deadlines, timeouts, the base's deadman and the schedule of cycles are all measured by the run's clock. So while it
+stands still nothing is late, nothing times out and no cycle begins; and when it goes on, no part of the run can tell
+that it stood. Only work is measured by the host's clock: a budget belongs to the machine.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from typing import Final
 from drivers.emulator.time_scale import REAL_TIME, TimeScale
 
 LEASE_S: Final = 0.002
-"""Where time is not free it goes on so far beyond the next cycle's deadline, and no farther until that is over.
+"""How far time goes on past the next cycle's deadline where it is scaled, s.
 
-So however slow the machine is, no cycle misses its time; nothing else needs the room.
+It goes no farther until that cycle has begun, so that no cycle misses its deadline, however slow the machine is.
 """
 
-LEASE_LEAST_S: Final = 0.0005
-"""A smaller extension is not worth telling."""
+LEASE_MIN_S: Final = 0.0005
+"""Smallest extension of the lease that is sent to the emulator, s."""
 
 
 class RunClock:
-    """The host's clock, as it is.
+    """The host's clock, unchanged.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class RunClock:
         return self.host()
 
     def at(self, host_s: float) -> float:
-        """Return the run's time at a moment of the host's clock that is now."""
+        """Return the run's time at the present moment `host_s` of the host's clock."""
         return host_s
 
     def both(self) -> tuple[float, float]:
@@ -50,20 +50,20 @@ class RunClock:
         return self.at(host_s), host_s
 
     def expect(self, due_s: float) -> float:
-        """Take note of when the next cycle is due and return how long that is, s; inf where nobody knows.
+        """Announce the next cycle and return the time until it is due, by the host's clock; inf where unknown.
 
-        What it returns is for the host's clock; not above zero where the cycle may begin.
+        Not above zero where the cycle may begin.
         """
         return due_s - self.host()
 
-    def begun(self) -> None:
-        """Take note that a cycle begins."""
+    def cycle_began(self) -> None:
+        """Count the beginning of a cycle."""
 
     def release(self) -> None:
-        """Let time go by freely from here on: the run comes to its end."""
+        """Go on in real time until the end of the run."""
 
-    def listen(self, call: Callable[[], None]) -> None:
-        """Have `call` called whenever `expect` would answer otherwise than by the passing of time."""
+    def on_change(self, call: Callable[[], None]) -> None:
+        """Have `call` called whenever the answer of `expect` changes other than by the passing of time."""
 
 
 def run_clock(clock: Callable[[], float]) -> RunClock:
@@ -71,36 +71,38 @@ def run_clock(clock: Callable[[], float]) -> RunClock:
     return clock if isinstance(clock, RunClock) else RunClock(clock)
 
 
-class PacedClock(RunClock):
-    """A clock that shares its law with the emulator, and never goes beyond what the emulated robot has lived.
+class ScaledClock(RunClock):
+    """A clock that shares its time scale with the emulator, and never passes the time that the emulator has reached.
 
     Parameters
     ----------
     host : callable
         Monotonic, s; the emulator's as well.
-    tell : callable
-        Gets every new law for the emulator.
+    send : callable
+        Sends each new time scale to the emulator.
 
     Attributes
     ----------
-    pace
-        The law in force.
+    time_scale
+        The one in force.
     factor
         How fast time goes, or will when it goes on.
     """
 
     def __init__(
-        self, host: Callable[[], float] = time.monotonic, tell: Callable[[TimeScale], None] = lambda _: None
+        self, host: Callable[[], float] = time.monotonic, send: Callable[[TimeScale], None] = lambda _: None
     ) -> None:
         super().__init__(host)
-        self.tell = tell
-        self.pace: TimeScale = REAL_TIME
+        self.send = send
+        self.time_scale: TimeScale = REAL_TIME
         self.factor = 1.0
-        self._lived_s = math.inf
-        self._told_s = -math.inf
-        self._shown_s = -math.inf
+        self._limit_run_s = math.inf
+        """The run's time never passes this: where the emulator has acknowledged its time, or time was resumed."""
+        self._acknowledged_run_s = -math.inf
+        self._latest_run_s = -math.inf
         self._due_s: float | None = None
-        self._turns: int | None = None
+        self._cycles_left: int | None = None
+        """Cycles that may still begin; None while time is not paused."""
         self._calls: list[Callable[[], None]] = []
 
     def __call__(self) -> float:
@@ -108,106 +110,106 @@ class PacedClock(RunClock):
         return self.at(self.host())
 
     def at(self, host_s: float) -> float:
-        """Return the run's time at a moment of the host's clock that is now; it never goes back."""
-        self._shown_s = max(self._shown_s, min(self.pace.run_at(host_s), self._lived_s))
-        return self._shown_s
+        """Return the run's time at the present moment `host_s` of the host's clock; it never goes back."""
+        self._latest_run_s = max(self._latest_run_s, min(self.time_scale.run_at(host_s), self._limit_run_s))
+        return self._latest_run_s
 
     def expect(self, due_s: float) -> float:
-        """Take note of when the next cycle is due and return how long that is; inf while time is held before it."""
+        """Announce the next cycle and return the time until it is due; inf while time is paused before it."""
         self._due_s = due_s
-        if self._turns == 0:
+        if self._cycles_left == 0:
             return math.inf
         self._extend(due_s)
         host_s = self.host()
         run_s = self.at(host_s)
         if due_s <= run_s:
             return due_s - run_s
-        return math.inf if due_s > self._lived_s else self.pace.host_at(due_s) - host_s
+        return math.inf if due_s > self._limit_run_s else self.time_scale.host_at(due_s) - host_s
 
-    def begun(self) -> None:
-        """Take note that a cycle begins."""
-        if self._turns:
-            self._turns -= 1
-            self._news()
+    def cycle_began(self) -> None:
+        """Count the beginning of a cycle."""
+        if self._cycles_left:
+            self._cycles_left -= 1
+            self._notify()
 
     def release(self) -> None:
-        """Let time go by freely from here on, whether the emulator follows or not."""
+        """Go on in real time until the end of the run, whether the emulator follows or not."""
         self.factor = 1.0
-        if self._turns is not None or not self.pace.is_real_time:
-            self.go()
+        if self._cycles_left is not None or not self.time_scale.is_real_time:
+            self.resume()
 
-    def listen(self, call: Callable[[], None]) -> None:
-        """Have `call` called whenever `expect` would answer otherwise than by the passing of time."""
+    def on_change(self, call: Callable[[], None]) -> None:
+        """Have `call` called whenever the answer of `expect` changes other than by the passing of time."""
         self._calls.append(call)
 
     @property
-    def is_held(self) -> bool:
+    def is_paused(self) -> bool:
         """Whether time goes on only step by step."""
-        return self._turns is not None
+        return self._cycles_left is not None
 
     @property
     def is_still(self) -> bool:
-        """Whether both sides stand at the same time, and no cycle is to come."""
-        return self._turns == 0 and self._told_s >= self.pace.until_s
+        """Whether run and emulator stand at the same time, and no cycle is to come."""
+        return self._cycles_left == 0 and self._acknowledged_run_s >= self.time_scale.until_s
 
     @property
-    def has_beat(self) -> bool:
-        """Whether anybody waits for cycles by this clock."""
+    def has_cycles(self) -> bool:
+        """Whether cycles are scheduled by this clock."""
         return self._due_s is not None
 
-    def hold(self, lead_s: float) -> None:
-        """Begin no further cycle, and let time stand still `lead_s` of the host's from now, on both sides."""
-        self._turns = 0
+    def pause(self, lead_s: float) -> None:
+        """Begin no further cycle, and stop time `lead_s` of the host's from now, for run and emulator."""
+        self._cycles_left = 0
         host_s = self.host()
-        here = self.at(host_s), self.pace.run_at(host_s)
-        until_s = min(self.pace.until_s, max(here) + lead_s * self.pace.factor)
-        self._told_s = -math.inf
-        self._change(self.pace._replace(until_s=until_s))
+        here = self.at(host_s), self.time_scale.run_at(host_s)
+        until_s = min(self.time_scale.until_s, max(here) + lead_s * self.time_scale.factor)
+        self._acknowledged_run_s = -math.inf
+        self._change(self.time_scale._replace(until_s=until_s))
 
     def step(self) -> None:
-        """Let time go by, from where it is held, until the next cycle is due, and let that one begin."""
-        self._turns = 1
+        """Let paused time go on until the next cycle is due, and let that one begin."""
+        self._cycles_left = 1
         run_s = self()
-        self._lived_s, self._told_s = run_s, -math.inf
+        self._limit_run_s, self._acknowledged_run_s = run_s, -math.inf
         self._change(TimeScale(self.host(), run_s, self.factor, max(run_s, self._due_s or run_s)))
 
-    def go(self) -> None:
-        """Let time go by from where it is held."""
-        self._turns = None
+    def resume(self) -> None:
+        """Let paused time go on."""
+        self._cycles_left = None
         host_s = self.host()
         run_s = self.at(host_s)
         is_free = self.factor == 1.0
         until_s = math.inf if is_free else max(run_s, self._due_s or run_s) + LEASE_S
-        self._lived_s = math.inf if is_free else run_s
+        self._limit_run_s = math.inf if is_free else run_s
         self._change(TimeScale(host_s, run_s, self.factor, until_s))
 
-    def lived(self, run_s: float) -> None:
-        """Take the emulator's word for how far its robot has lived, with what it sent by then on the line."""
-        if self.pace.is_real_time:
+    def acknowledged(self, run_s: float) -> None:
+        """Note the time that the emulator has reached; all it sent by then is on the line."""
+        if self.time_scale.is_real_time:
             return
-        self._lived_s = self._told_s = run_s
-        if run_s > self.pace.until_s:
-            # The law came too late for it; so both stand where it stands.
-            self.pace = self.pace._replace(until_s=run_s)
-        self._news()
+        self._limit_run_s = self._acknowledged_run_s = run_s
+        if run_s > self.time_scale.until_s:
+            # The time scale reached the emulator too late; so both stand where the emulator stands.
+            self.time_scale = self.time_scale._replace(until_s=run_s)
+        self._notify()
 
     def _extend(self, due_s: float) -> None:
-        """Let time that is not free go on to the next cycle, and where it had to wait, at the same pace from here."""
-        pace = self.pace
-        beyond_s, least_s = (LEASE_S, LEASE_LEAST_S) if self._turns is None else (0.0, 0.0)
-        if pace.is_real_time or due_s + beyond_s <= pace.until_s + least_s:
+        """Let scaled time go on past the next cycle's deadline, and at the same pace from here where it had to wait."""
+        scale = self.time_scale
+        beyond_s, least_s = (LEASE_S, LEASE_MIN_S) if self._cycles_left is None else (0.0, 0.0)
+        if scale.is_real_time or due_s + beyond_s <= scale.until_s + least_s:
             return
         host_s = self.host()
-        if pace.host_at(pace.until_s) < host_s:
-            pace = TimeScale(host_s, pace.until_s, pace.factor, pace.until_s)
-        self.pace = pace._replace(until_s=due_s + beyond_s)
-        self.tell(self.pace)
+        if scale.host_at(scale.until_s) < host_s:
+            scale = TimeScale(host_s, scale.until_s, scale.factor, scale.until_s)
+        self.time_scale = scale._replace(until_s=due_s + beyond_s)
+        self.send(self.time_scale)
 
-    def _news(self) -> None:
+    def _notify(self) -> None:
         for call in self._calls:
             call()
 
-    def _change(self, pace: TimeScale) -> None:
-        self.pace = pace
-        self.tell(pace)
-        self._news()
+    def _change(self, time_scale: TimeScale) -> None:
+        self.time_scale = time_scale
+        self.send(time_scale)
+        self._notify()

@@ -21,7 +21,8 @@ from drivers.denning.frames import Halt
 from drivers.driver import RobotDriver
 from runtime.cli.commands.run import on_port
 from runtime.console.console import Console
-from runtime.cycle.modes import Mode, Request
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import LOG
@@ -228,8 +229,8 @@ async def test_halt_from_a_page_in_time(tmp_path: Path, measured: Callable[[str]
             operator.asked_s, operator.halted_s = None, host_s
             operator.halted.set()
 
-    def on_cycle(record: CycleRecord, state: State, books: CycleStats, driver: RobotDriver) -> None:
-        console.on_cycle(record, state, books, driver)
+    def on_cycle(record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
+        console.on_cycle(record, state, stats, driver)
         mode = record.mode
         if mode.mode is Mode.DRIVE:
             if operator.asked_s is None:

@@ -20,7 +20,8 @@ from drivers.denning.frames import Halt
 from drivers.driver import RobotDriver
 from drivers.messages import Flags
 from runtime.cli.commands.run import on_port
-from runtime.cycle.modes import Mode, Request
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.recorder import Recorder
@@ -103,7 +104,7 @@ async def halts(folder: Path, monkeypatch: pytest.MonkeyPatch, trials: int) -> O
             operator.asked_s, operator.halted_s = None, host_s
             operator.halted.set()
 
-    def on_cycle(record: CycleRecord, state: State, _books: CycleStats, _driver: RobotDriver) -> None:
+    def on_cycle(record: CycleRecord, state: State, _stats: CycleStats, _driver: RobotDriver) -> None:
         recorder.on_cycle(record, state)
         mode = record.mode
         if mode.mode is Mode.DRIVE:

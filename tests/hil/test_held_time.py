@@ -18,7 +18,8 @@ from config.settings import LogConfig
 from drivers.driver import RobotDriver
 from drivers.messages import Flags
 from runtime.cli.commands.run import on_port
-from runtime.cycle.modes import Mode, Request
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
 from runtime.cycle.summary import RunSummary
@@ -29,8 +30,8 @@ from runtime.recording.storage import SingleFile
 from runtime.simulation.emulator_process import start_emulator
 from runtime.support.logs import open_log
 from runtime.timing.cycle_stats import CycleStats
-from runtime.timing.run_clock import PacedClock
-from runtime.timing.time_control import GONE, HANGS, EmulatorControl
+from runtime.timing.run_clock import ScaledClock
+from runtime.timing.time_control import ENDED, HANGS, EmulatorTimeControl
 from tests.hil.machine import PATIENCE_S, stalls_excused
 from tests.hil.truth import rows
 
@@ -41,7 +42,7 @@ PERIOD_S = 1.0 / SETTINGS.cycle.rate_hz
 PAUSE_S = 1.0
 """Twice the base's deadman, and more than any patience with the line."""
 
-Act = Callable[[RobotProcess, EmulatorControl, list[CycleRecord]], Awaitable[None]]
+Act = Callable[[RobotProcess, EmulatorTimeControl, list[CycleRecord]], Awaitable[None]]
 
 
 async def until(done: Callable[[], bool]) -> None:
@@ -53,14 +54,14 @@ async def until(done: Callable[[], bool]) -> None:
 async def run(folder: Path, act: Act) -> tuple[RunSummary, list[CycleRecord], Path, Path]:
     """Drive on an emulator of our own, do something to its time, and end; returns truth and recording as well."""
     trace, recorded, records = folder / "trace.csv", folder / "run.mcap", list[CycleRecord]()
-    clock = PacedClock()
+    clock = ScaledClock()
     async with start_emulator(["--trace", str(trace)], clock) as (port, control):
         with (
             open_log(LogConfig(file=str(folder / "log.jsonl")), terminal=False) as log,
             Recorder(SETTINGS, SingleFile(recorded), clock, emulated=True) as recorder,
         ):
 
-            def on_cycle(record: CycleRecord, state: State, _books: CycleStats, _driver: RobotDriver) -> None:
+            def on_cycle(record: CycleRecord, state: State, _stats: CycleStats, _driver: RobotDriver) -> None:
                 records.append(record)
                 recorder.on_cycle(record, state)
 
@@ -83,7 +84,7 @@ def replays_to_the_bit(recorded: Path) -> bool:
 
 @stalls_excused
 async def test_held_stepped_and_sped_up_the_robot_drives_on(tmp_path: Path) -> None:
-    async def act(_process: RobotProcess, control: EmulatorControl, records: list[CycleRecord]) -> None:
+    async def act(_process: RobotProcess, control: EmulatorTimeControl, records: list[CycleRecord]) -> None:
         assert await control.pause() is None
         cycles, here_s = len(records), control.clock()
         await asyncio.sleep(PAUSE_S)
@@ -119,7 +120,7 @@ async def test_held_stepped_and_sped_up_the_robot_drives_on(tmp_path: Path) -> N
 
 @stalls_excused
 async def test_a_halt_while_it_is_held_leaves_nothing_to_move(tmp_path: Path) -> None:
-    async def act(process: RobotProcess, control: EmulatorControl, records: list[CycleRecord]) -> None:
+    async def act(process: RobotProcess, control: EmulatorTimeControl, records: list[CycleRecord]) -> None:
         await until(lambda: rows(trace)[-1].v > 0.2)
         assert await control.pause() is None
         held_s.append(control.clock())
@@ -141,7 +142,7 @@ async def test_a_halt_while_it_is_held_leaves_nothing_to_move(tmp_path: Path) ->
 async def test_an_emulator_that_is_stopped_and_one_that_is_killed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async def act(_process: RobotProcess, control: EmulatorControl, records: list[CycleRecord]) -> None:
+    async def act(_process: RobotProcess, control: EmulatorTimeControl, records: list[CycleRecord]) -> None:
         (pid,) = children()
         os.kill(pid, signal.SIGSTOP)
         try:
@@ -154,8 +155,8 @@ async def test_an_emulator_that_is_stopped_and_one_that_is_killed(
         assert await control.pause() is None
         os.kill(pid, signal.SIGKILL)
         await until(lambda: not control.is_paused)
-        assert await control.resume() == GONE
-        assert await control.single_step() == GONE
+        assert await control.resume() == ENDED
+        assert await control.single_step() == ENDED
         cycles = len(records)
         await until(lambda: len(records) >= cycles + 5)
 

@@ -110,7 +110,7 @@ async def test_an_echo_waits_for_no_timer(tmp_path: Path) -> None:
     control_s: list[float] = []
 
     def note(record: CycleRecord, *_: State | CycleStats | RobotDriver) -> None:
-        for firing in record.inputs.heard.firings:
+        for firing in record.inputs.received.firings:
             began[round(firing.robot_s * 1e6)] = record.inputs.run_s
         if record.inputs.echo_age_s is not None:
             waited_s.append(record.inputs.echo_age_s)

@@ -35,13 +35,13 @@ STARTS_MAX = 12
 
 async def bare_loop(running_too: Running) -> CycleStats:
     """Do nothing at all at 20 Hz while the robot drives: what this machine does to any loop just now."""
-    books, pacer = CycleStats(LATE_SHARE * PERIOD_S), Pacer(time.monotonic(), PERIOD_S)
+    stats, pacer = CycleStats(LATE_SHARE * PERIOD_S), Pacer(time.monotonic(), PERIOD_S)
     while running_too.process.poll() is None:
         start_s = time.monotonic()
-        books.enter(0.0, start_s - pacer.deadline_s)
-        books.missed += max(0, math.floor((start_s - pacer.deadline_s) / PERIOD_S))
+        stats.add_cycle(0.0, start_s - pacer.deadline_s)
+        stats.missed += max(0, math.floor((start_s - pacer.deadline_s) / PERIOD_S))
         await asyncio.sleep(max(0.0, pacer.advance(time.monotonic()) - time.monotonic()))
-    return books
+    return stats
 
 
 def summary_of(path: Path) -> dict[str, Any]:

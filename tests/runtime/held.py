@@ -16,8 +16,8 @@ from drivers.emulator.faults import Fault
 from drivers.emulator.robot_device import RobotDevice
 from drivers.emulator.time_channel import TimeScaleFollower
 from drivers.registry import make_device
-from runtime.timing.run_clock import PacedClock
-from runtime.timing.time_control import EmulatorControl
+from runtime.timing.run_clock import ScaledClock
+from runtime.timing.time_control import EmulatorTimeControl
 from runtime.timing.wake import LoopTimer
 from tests.runtime.virtual import STEP_S, MemoryLink, VirtualLoop
 
@@ -29,14 +29,14 @@ class HeldLink(MemoryLink):
     """A line to a robot that lives by its follower's time; exchanges go on where that stands still."""
 
     follower: TimeScaleFollower
-    control: EmulatorControl
+    control: EmulatorTimeControl
     is_hung = False
 
     def live(self) -> bytes:
         run_s = self.follower.run_at(self._loop.time())
         data = self._robot.advance(run_s - self._begin_s)
         for line in self.follower.acknowledge(run_s).splitlines():
-            self._loop.call_soon(self.control.heard, line)
+            self._loop.call_soon(self.control.receive, line)
         return data
 
     def _exchange(self) -> None:
@@ -57,7 +57,7 @@ class Held(NamedTuple):
     settings: Settings
     robot: RobotDevice
     links: list[HeldLink]
-    control: EmulatorControl
+    control: EmulatorTimeControl
     follower: TimeScaleFollower
 
 
@@ -76,7 +76,7 @@ def held(monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] 
             on_the_way.append(line)
             loop.call_later(DEAF_S, lambda: follower.receive(on_the_way.popleft()))
 
-    control = EmulatorControl(send, PacedClock(loop.time))
+    control = EmulatorTimeControl(send, ScaledClock(loop.time))
 
     def link(*args: object) -> HeldLink:
         made = HeldLink(robot, loop, *args)  # type: ignore[arg-type]
@@ -86,7 +86,7 @@ def held(monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] 
 
     monkeypatch.setattr("runtime.cycle.process.Link", link)
     monkeypatch.setattr("runtime.timing.wake.best_alarm", LoopTimer)
-    monkeypatch.setattr("runtime.cycle.process.ask", lambda _realtime: ())
+    monkeypatch.setattr("runtime.cycle.process.apply_realtime", lambda _realtime: ())
     asyncio.set_event_loop(None)
     try:
         yield Held(loop, settings, robot, links, control, follower)

@@ -14,10 +14,10 @@ from drivers.emulator.memory_transport import MemoryLine
 from drivers.messages import Firing, Pose
 from drivers.registry import make_device, make_driver
 from perception.pipeline import Perception
-from runtime.cycle.driver_io import gather, give
-from runtime.cycle.modes import Mode, Request
-from runtime.cycle.step import CycleRecord, State, step
-from runtime.timing.refinement_budget import enough_quanta
+from runtime.cycle.inputs import Request, gather_inputs
+from runtime.cycle.modes import Mode
+from runtime.cycle.step import CycleRecord, State, apply_command, step
+from runtime.timing.refinement_budget import within_quanta_per_cycle
 
 FT = 0.3048
 
@@ -50,10 +50,10 @@ class Run:
         self.cycles += 1
         self.line.exchange(self.run_s)
         request = Request.ARM if self.arms and self.state.mode.mode is Mode.READY else None
-        inputs = gather(self.driver, self.run_s, request)
-        record = step(self.state, inputs, self.settings, lambda c: give(self.driver, c), enough_quanta)
-        self.firings += inputs.heard.firings
-        self.notes += inputs.heard.notes
+        inputs = gather_inputs(self.driver, self.run_s, request)
+        record = step(self.state, inputs, self.settings, lambda c: apply_command(self.driver, c), within_quanta_per_cycle)
+        self.firings += inputs.received.firings
+        self.notes += inputs.received.notes
         return record
 
     def until(self, run_s: float) -> None:

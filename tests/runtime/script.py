@@ -11,7 +11,8 @@ from config.settings import Settings
 from drivers.driver import LineState, Received
 from drivers.messages import Firing, Flags, Odometry, Pose, Twist
 from perception.pipeline import Perception
-from runtime.cycle.modes import Mode, Request
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode
 from runtime.cycle.step import STANDSTILL, CycleRecord, DriveRequest, Inputs, Order, State, step
 
 SETTINGS = load_settings("hallway", ["perception.method=paper"])

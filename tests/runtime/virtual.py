@@ -149,7 +149,7 @@ def in_virtual_time(
 
     monkeypatch.setattr("runtime.cycle.process.Link", link)
     monkeypatch.setattr("runtime.timing.wake.best_alarm", LoopTimer)
-    monkeypatch.setattr("runtime.cycle.process.ask", lambda _realtime: ())
+    monkeypatch.setattr("runtime.cycle.process.apply_realtime", lambda _realtime: ())
     try:
         yield loop, settings, robot, links
     finally:

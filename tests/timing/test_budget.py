@@ -22,7 +22,7 @@ from runtime.cycle.step import CycleRecord
 from runtime.simulation.budget_sweep import BudgetRow, drive, long_hall_settings
 from runtime.simulation.closed_loop import simulate
 from runtime.simulation.long_hall import A_SIDE, long_hall
-from runtime.timing.refinement_budget import ProcessorTime, Quanta, RefinementBudget
+from runtime.timing.refinement_budget import CpuTimeBudget, QuantumBudget, RefinementBudget
 
 ROOT = Path(__file__).parents[2]
 CYCLES = 3000
@@ -42,13 +42,13 @@ def asked(refinement_budget: RefinementBudget, cycles: int) -> list[int]:
 
 
 def test_quanta_are_counted_by_the_cycle() -> None:
-    assert asked(Quanta(3), 3) == [3, 3, 3]
-    assert asked(Quanta(0.25), 9) == [0, 0, 0, 1, 0, 0, 0, 1, 0]
-    assert asked(Quanta(0), 3) == [0, 0, 0]
+    assert asked(QuantumBudget(3), 3) == [3, 3, 3]
+    assert asked(QuantumBudget(0.25), 9) == [0, 0, 0, 1, 0, 0, 0, 1, 0]
+    assert asked(QuantumBudget(0), 3) == [0, 0, 0]
 
 
 def test_what_is_not_used_is_not_saved_up() -> None:
-    refinement_budget = Quanta(2)
+    refinement_budget = QuantumBudget(2)
     for _ in range(5):
         refinement_budget.begin()
     assert asked(refinement_budget, 1) == [2]
@@ -62,8 +62,8 @@ def test_processor_time_begins_anew_each_cycle() -> None:
         spent_s += 0.001  # a quantum between two looks
         return spent_s
 
-    assert asked(ProcessorTime(0.0035, clock), 3) == [3, 3, 3]
-    assert asked(ProcessorTime(0.0, clock), 2) == [0, 0]
+    assert asked(CpuTimeBudget(0.0035, clock), 3) == [3, 3, 3]
+    assert asked(CpuTimeBudget(0.0, clock), 2) == [0, 0]
 
 
 def test_the_long_hall_holds_forty_drums_that_stand_apart() -> None:
@@ -94,7 +94,7 @@ def test_the_record_says_how_many_quanta_ran_and_why_no_more() -> None:
     settings = load_settings("hallway")
     assert settings.world is not None
     records: list[CycleRecord] = []
-    for refinement_budget in (Quanta(50), Quanta(0.5)):
+    for refinement_budget in (QuantumBudget(50), QuantumBudget(0.5)):
         simulate(
             settings,
             settings.world,
@@ -112,7 +112,7 @@ def test_the_record_says_how_many_quanta_ran_and_why_no_more() -> None:
 @pytest.fixture(scope="module")
 def sweep() -> dict[float, BudgetRow]:
     """Return a drive under each of several budgets in counted quanta."""
-    return {most: drive(SETTINGS, most, partial(Quanta, most), (0,)) for most in (0.25, 1, 2, 50)}
+    return {most: drive(SETTINGS, most, partial(QuantumBudget, most), (0,)) for most in (0.25, 1, 2, 50)}
 
 
 @pytest.mark.compiled

@@ -19,7 +19,7 @@ from perception.bayes.bayes_method import BayesPerception
 from perception.pipeline import Perception
 from runtime.cycle.step import CycleRecord, State, step
 from runtime.simulation.closed_loop import simulate
-from runtime.timing.refinement_budget import enough_quanta
+from runtime.timing.refinement_budget import within_quanta_per_cycle
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
@@ -48,7 +48,7 @@ def cost_ms(perception: Perception, firing: Firing) -> float:
     begin_ns = time.thread_time_ns()
     perception.observe(firing)
     done = 0
-    while perception.can_refine and enough_quanta(done):
+    while perception.can_refine and within_quanta_per_cycle(done):
         perception.refine()
         done += 1
     return 1e-6 * (time.thread_time_ns() - begin_ns)
@@ -65,7 +65,7 @@ def control_ms(scratch: np.typing.NDArray[np.float64]) -> float:
 
 
 def test_cost_of_a_ring_reading(records: list[CycleRecord]) -> None:
-    firings = [firing for record in records for firing in record.inputs.heard.firings]
+    firings = [firing for record in records for firing in record.inputs.received.firings]
     assert len(firings) > 300
     scratch = np.random.default_rng(1).random(4096)
     perception, costs, controls = fresh(), [], []
@@ -85,7 +85,7 @@ def test_cost_of_a_ring_reading(records: list[CycleRecord]) -> None:
 
 def test_the_cost_does_not_grow_with_the_way(records: list[CycleRecord]) -> None:
     """Old segments leave, so that the third lap past the same drums costs what the first did."""
-    firings = [firing for record in records for firing in record.inputs.heard.firings]
+    firings = [firing for record in records for firing in record.inputs.received.firings]
     lap_s = firings[-1].robot_s - firings[0].robot_s + 1.0
     perception, medians = fresh(), []
     for lap in range(4):

@@ -37,5 +37,5 @@ def _heard(recording: Recording) -> Iterator[tuple[tuple[Firing, ...], bool]]:
     """Yield the firings of each cycle, and whether the robot had restarted before them."""
     for entry in recording.messages():
         if entry.topic == CYCLE:
-            heard = decode(Cycle, entry.data).record.inputs.heard
+            heard = decode(Cycle, entry.data).record.inputs.received
             yield heard.firings, heard.rebooted

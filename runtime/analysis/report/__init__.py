@@ -1,1 +1,1 @@
-"""A run on one page of HTML that needs nothing else: tables, pictures, books and settings."""
+"""A run on one page of HTML that needs nothing else: tables, pictures, stats and settings."""

@@ -40,15 +40,15 @@ def run_budgets(
     from runtime.cli.tables import budget_table
     from runtime.cycle.summary import write_json
     from runtime.simulation.budget_sweep import drive, long_hall_settings
-    from runtime.timing.refinement_budget import ProcessorTime, Quanta
+    from runtime.timing.refinement_budget import CpuTimeBudget, QuantumBudget
 
     settings = long_hall_settings(settings)
     makers: list[tuple[float, Callable[[], RefinementBudget]]] = (
-        [(most, partial(Quanta, most)) for most in quanta]
-        or [(most, partial(ProcessorTime, 1e-3 * most)) for most in budgets_ms]
+        [(most, partial(QuantumBudget, most)) for most in quanta]
+        or [(most, partial(CpuTimeBudget, 1e-3 * most)) for most in budgets_ms]
     )  # fmt: skip
     # The first drive pays for what is allocated and loaded at first need.
-    drive(settings, 0, lambda: Quanta(1), (0,))
+    drive(settings, 0, lambda: QuantumBudget(1), (0,))
     runs = track(makers, "driving", console=console, transient=True, disable=not console.is_terminal)
     rows = [drive(settings, budget, maker, range(seeds)) for budget, maker in runs]
     if json_file is not None:

@@ -185,7 +185,7 @@ def watching(recording: Recording, span: Span, units: Units) -> Iterator[tuple[O
 
     settings, console = recording.settings, Console(stderr=True)
     view = View(settings, console, units) if console.is_terminal and not console.is_dumb_terminal else None
-    driver, books = make_driver(settings), CycleStats(late_after_s=math.inf)
+    driver, stats = make_driver(settings), CycleStats(late_after_s=math.inf)
     driver.line_opened(0.0)
     begun: list[tuple[float, float]] = []
 
@@ -202,9 +202,9 @@ def watching(recording: Recording, span: Span, units: Units) -> Iterator[tuple[O
         due_s = begun[0][1] + (recorded_s - begun[0][0]) / (span.speed or math.inf)
         if due_s > host_s:
             time.sleep(due_s - host_s)
-        books.enter(0.0, max(0.0, host_s - due_s))
+        stats.add_cycle(0.0, max(0.0, host_s - due_s))
         if view is not None:
-            view.on_cycle(record, state, books, driver)
+            view.on_cycle(record, state, stats, driver)
 
     with contextlib.ExitStack() as stack:
         if view is not None:

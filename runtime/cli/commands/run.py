@@ -25,7 +25,7 @@ from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.length_format import Units
 from runtime.support.logs import LogStatus, open_log
 from runtime.support.sd_notify import SdNotifier
-from runtime.timing.run_clock import PacedClock, RunClock
+from runtime.timing.run_clock import RunClock, ScaledClock
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
@@ -95,7 +95,7 @@ def run_robot(
     with contextlib.ExitStack() as stack:
         if record is not None:
             stack.enter_context(file_lock(Path(record), f"--record {record}"))
-        clock = PacedClock() if port is None else RunClock()
+        clock = ScaledClock() if port is None else RunClock()
         keeping = stack.enter_context(kept(settings, record, no_record=no_record, emulated=port is None, clock=clock))
         log = stack.enter_context(open_log(settings.log, terminal=not live, listener=keeping.on_log, status=lines))
         log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
@@ -109,7 +109,7 @@ def run_robot(
             async with contextlib.AsyncExitStack() as running:
                 chosen = settings
                 control: TimeControl = NoTimeControl()
-                if isinstance(clock, PacedClock):
+                if isinstance(clock, ScaledClock):
                     words = emulation.arguments(config, sets)
                     emulated, control = await running.enter_async_context(start_emulator(words, clock))
                     chosen = on_port(settings, emulated)
@@ -214,9 +214,9 @@ async def watch(
         view = View(settings, console, units) if live else None
         watchers: list[OnCycle] = [] if view is None else [view.on_cycle]
 
-        def on_cycle(record: CycleRecord, state: State, books: CycleStats, driver: RobotDriver) -> None:
+        def on_cycle(record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
             for watcher in watchers:
-                watcher(record, state, books, driver)
+                watcher(record, state, stats, driver)
 
         observers = keeping.observers(on_cycle, log)
         process = RobotProcess(
@@ -257,7 +257,7 @@ def signals(process: RobotProcess, reloader: Reloader) -> Iterator[None]:
 
     HUP has the configuration read again; what is wrong with it is told in the log and the last good one kept.
     """
-    from runtime.cycle.modes import Request
+    from runtime.cycle.inputs import Request
 
     loop = asyncio.get_running_loop()
     calls: dict[signal.Signals, Callable[[], None]] = {

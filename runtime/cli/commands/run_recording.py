@@ -65,7 +65,7 @@ class RunRecording:
         recorder, ring_log = self._recorder, self._ring_log
         parts = (recorder,) if ring_log is None else (ring_log, recorder)
 
-        def on_cycle(record: CycleRecord, state: State, books: CycleStats, driver: RobotDriver) -> None:
+        def on_cycle(record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
             recorder.on_cycle(record, state)
             for part in parts:
                 standing = part.status
@@ -73,7 +73,7 @@ class RunRecording:
                     self._told[part] = standing.last_error
                     log.warning("the recording has trouble", reason=standing.last_error, dropped=standing.dropped)
             if view is not None:
-                view(record, state, books, driver)
+                view(record, state, stats, driver)
 
         on_firing = None if ring_log is None else ring_log.put
         return Observers(on_cycle, on_firing, recorder.on_bytes, recorder.on_settings)

@@ -32,7 +32,8 @@ from drivers.messages import Floats, LinkCounts, Pose
 from perception.pipeline import DetectedObject
 from runtime.cli.tables import objects_table
 from runtime.cli.terminal.plan import draw_plan
-from runtime.cycle.modes import ModeState, Request
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import ModeState
 from runtime.cycle.step import CycleRecord, State
 from runtime.cycle.summary import object_row
 from runtime.support.health import Worker
@@ -109,9 +110,9 @@ class View:
         """Say how its thread ended; None while it draws. See `runtime.support.health`."""
         return self._painter.probe()
 
-    def on_cycle(self, record: CycleRecord, state: State, books: CycleStats, driver: RobotDriver) -> None:
+    def on_cycle(self, record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
         """Leave the ingredients of the next picture in the slot."""
-        for firing in record.inputs.heard.firings:
+        for firing in record.inputs.received.firings:
             fired = ~np.isnan(firing.ranges_m)
             self._ranges[fired] = firing.ranges_m[fired]
         if record.cycle % EVERY_CYCLES:
@@ -119,11 +120,11 @@ class View:
         pose = None if state.odometry is None else state.odometry.pose
         if pose is not None:
             self._trail.append((pose.x, pose.y))
-        mode = record.mode if state.standing is None else replace(record.mode, reason=state.standing)
+        mode = record.mode if state.hold_reason is None else replace(record.mode, reason=state.hold_reason)
         self._slot = Snapshot(
             mode, pose, list(self._trail), state.perception.segment_geometry(), record.clusters,
             state.perception.labelled_objects(), self._ranges.copy(), driver.counts,
-            books.cycles, books.late, books.cycle_us(), books.lag_us(), books.missed, tuple(books.faults.items()),
+            stats.cycles, stats.late, stats.cycle_us(), stats.lag_us(), stats.missed, tuple(stats.causes.items()),
             tuple(report.reason for report in state.perception.sensor_reports()),
         )  # fmt: skip
         self._wake.set()

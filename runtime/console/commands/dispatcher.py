@@ -24,7 +24,7 @@ from runtime.console.commands.tuning import Tuning
 from runtime.console.http.client_limits import ConsoleLog
 from runtime.console.protocols import Robot
 from runtime.cycle.drive_requests import DriveRequest, Legs
-from runtime.cycle.modes import Request
+from runtime.cycle.inputs import Request
 
 FORBIDDEN: Final = "this page only watches: open the start URL with its token to do more"
 NOT_IN_CONTROL: Final = "another client has the control: ask for it first"

@@ -104,7 +104,7 @@ class FrameEncoder:
 
     def take(self, record: CycleRecord) -> None:
         """Take note of a cycle, whether or not anybody looks on."""
-        heard = record.inputs.heard
+        heard = record.inputs.received
         if heard.rebooted:
             self._ranges[:] = self._heard_s[:] = np.nan
         if heard.rebooted or record.inputs.edits:
@@ -127,7 +127,7 @@ class FrameEncoder:
             "host_s": round(context.host_s, 4),
             "mode": state.mode.mode.value,
             "reason": state.mode.reason,
-            "hold_reason": state.standing,
+            "hold_reason": state.hold_reason,
             "arming": state.mode.arming_run_s is not None,
             "pose": [0.0, 0.0, 0.0],
             "ring_yaw": 0.0,

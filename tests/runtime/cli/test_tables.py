@@ -14,7 +14,7 @@ from runtime.simulation.evaluation import Outcome
 from runtime.support.length_format import Units, format_length, format_point
 from runtime.timing.cycle_stats import Spread
 from runtime.timing.footprint import FootprintRow
-from runtime.timing.timekeeping import Timing
+from runtime.timing.timing_monitor import TimingSummary
 
 OUTCOME: Outcome = {
     "drums": [
@@ -79,7 +79,7 @@ def test_objects() -> None:
 
 def test_where_the_time_went_and_by_whose_fault() -> None:
     spread: Spread = {"p50": 170.0, "p99": 1250.0, "p999": 8004.0, "max": 49_653.0}
-    timing: Timing = {
+    timing: TimingSummary = {
         "period": 50_000.0, "following": 0.9958, "late": spread, "echo_wait": spread, "phases": {"refine": spread},
         "callbacks": {"link receive": spread}, "overruns": 2, "missed": 1,
         "faults": {"outside the process": 6, "callback Recorder.flush": 1},

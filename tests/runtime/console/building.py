@@ -42,7 +42,7 @@ class Telling:
 
     def take(self, record: CycleRecord) -> None:
         """Take note of a cycle."""
-        for firing in record.inputs.heard.firings:
+        for firing in record.inputs.received.firings:
             self._heard |= ~np.isnan(firing.ranges_m)
 
     def frame(self, shown: Shown, at: At) -> Picture:

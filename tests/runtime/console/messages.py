@@ -16,7 +16,7 @@ from perception.edits import (
     RejectObject,
 )
 from runtime.cycle.drive_requests import Legs
-from runtime.cycle.modes import Request
+from runtime.cycle.inputs import Request
 
 ASKED: list[tuple[dict[str, Any], object]] = [
     ({"type": "halt"}, Request.HALT),

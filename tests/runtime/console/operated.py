@@ -25,14 +25,15 @@ from runtime.console.commands.async_commands import AsyncCommands
 from runtime.console.console import Console
 from runtime.console.http.client_limits import Limits
 from runtime.cycle.drive_requests import DriveRequest
-from runtime.cycle.modes import Mode, ModeState, Request
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode, ModeState
 from runtime.cycle.process import CALLBACKS
 from runtime.cycle.step import CycleRecord, Inputs, Refused, State
 from runtime.support.health import Health
 from runtime.support.kernel_loader import KernelLoader
 from runtime.timing.clock_sampler import ClockSampler
 from runtime.timing.cycle_stats import CycleStats
-from runtime.timing.timekeeping import Timekeeper
+from runtime.timing.timing_monitor import TimingMonitor
 
 PATIENCE_S = 20.0
 FREE_PORT = "console.port=0"
@@ -57,8 +58,8 @@ class FakeRun:
 
     def __post_init__(self) -> None:
         self.health = Health(self.log)
-        self.books = CycleStats(0.005)
-        self.keeper = Timekeeper(self.books, ClockSampler().read, callbacks=CALLBACKS)
+        self.stats = CycleStats(0.005)
+        self.timing_monitor = TimingMonitor(self.stats, ClockSampler().read, callbacks=CALLBACKS)
         self.state = State(Perception(self.settings.ring, self.settings.models, self.settings.perception))
 
     def request(self, request: Request) -> None:
@@ -183,7 +184,7 @@ class Operated:
                 Twist(0.3, 0.0), made, state.perception.counts.segments, state.perception.counts.hypotheses, 2, 2,
                 "quota", refused,
             )  # fmt: skip
-            self.console.on_cycle(record, state, self.run.books, Counted())  # type: ignore[arg-type]
+            self.console.on_cycle(record, state, self.run.stats, Counted())  # type: ignore[arg-type]
 
     def refusals(self) -> list[str]:
         """Return what the log says was refused."""

@@ -16,7 +16,8 @@ from config.load import load_settings
 from drivers.driver import LineState
 from drivers.messages import Flags, Pose, Twist
 from runtime.cycle.drive_requests import Legs
-from runtime.cycle.modes import Mode, Request
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode
 from runtime.cycle.step import STANDSTILL, CycleRecord, DriveRequest, Order
 from tests.runtime.script import PERIOD_S, Script
 
@@ -52,7 +53,7 @@ def driving(*sets: str) -> Told:
 
 def standing(script: Told) -> str:
     """Return why it stands, nothing where it does not."""
-    return script.state.standing or ""
+    return script.state.hold_reason or ""
 
 
 def arm(script: Told) -> CycleRecord:
@@ -111,7 +112,7 @@ def test_the_hand_drives_while_it_speaks_and_stops_within_a_quarter_second() -> 
         assert record.command == near(0.2, 0.1)
     assert 0.19 < script.run_s - last_s < 0.251
     assert record.mode.mode is Mode.DRIVE
-    assert "nobody is at the controls" in standing(script)
+    assert "no velocity arrives from an operator" in standing(script)
     assert script.state.drive_request == TELEOPERATION_ENDED
     for _ in range(50):
         assert script.tell(None).command == STANDSTILL
@@ -170,7 +171,7 @@ def test_after_a_stop_goal_and_hand_do_not_resume(
     for _ in range(20):
         record = script.tell(None)
         assert (record.mode.mode, record.command) == (Mode.DRIVE, STANDSTILL)
-    assert "nobody is at the controls" in standing(script)
+    assert "no velocity arrives from an operator" in standing(script)
     assert script.tell(Legs()).command == near(0.3, 0.0)
 
 

@@ -13,7 +13,8 @@ from drivers.denning.codec import Decoder
 from drivers.denning.frames import Drive, Frame, Halt
 from drivers.driver import RobotDriver
 from drivers.messages import Flags
-from runtime.cycle.modes import Mode, Request
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
 from runtime.timing.cycle_stats import CycleStats
@@ -74,7 +75,7 @@ def test_a_thousand_halts_at_any_moment(monkeypatch: pytest.MonkeyPatch, measure
                 assert robot.truth.flags & Flags.LATCHED, "one frame stops the whole base"
                 sent.frames.clear()
 
-        def on_cycle(record: CycleRecord, _state: State, _books: CycleStats, _driver: RobotDriver) -> None:
+        def on_cycle(record: CycleRecord, _state: State, _stats: CycleStats, _driver: RobotDriver) -> None:
             mode = record.mode
             if pending and mode.mode is Mode.SAFE_STOP and links[0].is_open:
                 match_objects()
@@ -113,7 +114,7 @@ def test_a_velocity_that_was_held_up_on_its_way_out_is_followed_by_a_halt(monkey
                 held.append(loop.time())
                 loop.spend(1.0)
 
-        def on_cycle(_record: CycleRecord, state: State, _books: CycleStats, _driver: RobotDriver) -> None:
+        def on_cycle(_record: CycleRecord, state: State, _stats: CycleStats, _driver: RobotDriver) -> None:
             if held:
                 reasons.append(str(state.mode.reason))
                 kinds.append([type(frame) for at_s, frame in sent.frames if at_s >= held[0]])

@@ -1,4 +1,4 @@
-"""The modes: every transition in a table, and what must hold after any sequence of situations."""
+"""The modes: every transition in a table, and what must hold after any sequence of inputs_of_a_cycle."""
 
 from __future__ import annotations
 
@@ -10,20 +10,12 @@ from hypothesis import strategies as st
 
 from drivers.driver import LineState
 from drivers.messages import Flags
-from runtime.cycle.modes import (
-    ARMING_MAX_S,
-    ARMING_MIN_S,
-    DEADMAN_GRACE_S,
-    GAP_MAX_S,
-    Mode,
-    ModeState,
-    Request,
-    Situation,
-    advance,
-)
+from runtime.cycle.inputs import GAP_MAX_S, Request
+from runtime.cycle.modes import ARMING_MAX_S, ARMING_MIN_S, DEADMAN_GRACE_S, Mode, ModeState
+from tests.runtime.cycle.mode_inputs import ModeInputs, advance_by
 
 NOW = 100.0
-QUIET = Situation(NOW, LineState.READY, None, Flags.NONE, rebooted=False, request=None)
+QUIET = ModeInputs(NOW, LineState.READY, None, Flags.NONE, rebooted=False, request=None)
 ARM, HALT = replace(QUIET, request=Request.ARM), replace(QUIET, request=Request.HALT)
 DISARM = replace(QUIET, request=Request.DISARM)
 
@@ -36,11 +28,11 @@ def arming(state: ModeState, for_s: float) -> ModeState:
     return replace(state, arming_run_s=NOW - for_s)
 
 
-def line(state: LineState, trouble: str | None = None) -> Situation:
+def line(state: LineState, trouble: str | None = None) -> ModeInputs:
     return replace(QUIET, line=state, trouble=trouble)
 
 
-def flags(value: Flags) -> Situation:
+def flags(value: Flags) -> ModeInputs:
     return replace(QUIET, flags=value)
 
 
@@ -118,8 +110,8 @@ TRANSITIONS = [
 
 
 @pytest.mark.parametrize(("before", "seen", "mode", "reason", "is_arming"), TRANSITIONS)
-def test_transition(before: ModeState, seen: Situation, mode: Mode, reason: str | None, is_arming: bool) -> None:
-    after = advance(before, seen)
+def test_transition(before: ModeState, seen: ModeInputs, mode: Mode, reason: str | None, is_arming: bool) -> None:
+    after = advance_by(before, seen)
     assert after.mode is mode
     assert (after.reason is None) if reason is None else (after.reason is not None and reason in after.reason)
     assert (after.arming_run_s is not None) == is_arming
@@ -130,18 +122,18 @@ def test_transition(before: ModeState, seen: Situation, mode: Mode, reason: str 
 def test_a_part_that_has_failed_ends_every_mode_but_a_fault_and_an_arm_changes_nothing() -> None:
     seen = replace(QUIET, fault="the part `link` has ended")
     for before in (CONNECTING, READY, DRIVE, STOPPED, arming(READY, WAITED), arming(STOPPED, WAITED)):
-        after = advance(before, seen)
+        after = advance_by(before, seen)
         assert (after.mode, after.reason, after.entered_run_s) == (Mode.SAFE_STOP, seen.fault, NOW)
         assert after.arming_run_s is None
         later = replace(seen, run_s=NOW + 0.05)
-        assert advance(after, later) == after, "it is entered once"
-        armed = advance(after, replace(later, request=Request.ARM))
+        assert advance_by(after, later) == after, "it is entered once"
+        armed = advance_by(after, replace(later, request=Request.ARM))
         assert armed == ModeState(Mode.SAFE_STOP, NOW + 0.05, seen.fault), "and told again to whoever arms"
         lost = replace(later, line=LineState.CLOSED)
-        assert advance(after, lost) == after
-        assert "halted by the operator" in str(advance(after, replace(later, request=Request.HALT)).reason)
-    assert advance(FAULT, seen) == FAULT
-    assert advance(DRIVE, replace(seen, line=LineState.CLOSED)).reason == seen.fault, "the cause, not what it does"
+        assert advance_by(after, lost) == after
+        assert "halted by the operator" in str(advance_by(after, replace(later, request=Request.HALT)).reason)
+    assert advance_by(FAULT, seen) == FAULT
+    assert advance_by(DRIVE, replace(seen, line=LineState.CLOSED)).reason == seen.fault, "the cause, not what it does"
 
 
 def test_the_table_shows_every_mode_from_every_other_that_leads_there() -> None:
@@ -156,8 +148,8 @@ def test_the_table_shows_every_mode_from_every_other_that_leads_there() -> None:
     assert shown == {(a, b) for a, many in everywhere.items() for b in many}
 
 
-situations = st.builds(
-    Situation,
+inputs_of_a_cycle = st.builds(
+    ModeInputs,
     run_s=st.sampled_from([0.02, 0.05, 0.3, 1.5]),  # how long after the one before
     line=st.sampled_from([LineState.READY] * 8 + list(LineState)),
     trouble=st.sampled_from([None, "some trouble"]),
@@ -167,13 +159,13 @@ situations = st.builds(
 )
 
 
-@given(st.lists(situations, min_size=5, max_size=40), st.sampled_from([CONNECTING, READY, DRIVE, STOPPED, FAULT]))
-def test_motion_never_resumes_by_itself(steps: list[Situation], begin: ModeState) -> None:
+@given(st.lists(inputs_of_a_cycle, min_size=5, max_size=40), st.sampled_from([CONNECTING, READY, DRIVE, STOPPED, FAULT]))
+def test_motion_never_resumes_by_itself(steps: list[ModeInputs], begin: ModeState) -> None:
     state, run_s, armed = begin, NOW, False
     for step in steps:
         run_s += step.run_s
         seen = replace(step, run_s=run_s, gap_s=step.run_s)
-        before, state = state, advance(state, seen)
+        before, state = state, advance_by(state, seen)
         if begin.mode is Mode.FAULT:
             assert state == begin
         assert state.mode is not Mode.FAULT or begin.mode is Mode.FAULT
@@ -197,12 +189,12 @@ def test_motion_never_resumes_by_itself(steps: list[Situation], begin: ModeState
 def test_cycles_that_overrun_too_often_stop_a_drive_and_end_an_arming() -> None:
     reason = "10 cycles in a row left no time"
     seen = replace(QUIET, overrun=reason)
-    stopped = advance(ModeState(Mode.DRIVE, NOW - 5.0), seen)
+    stopped = advance_by(ModeState(Mode.DRIVE, NOW - 5.0), seen)
     assert (stopped.mode, stopped.reason) == (Mode.SAFE_STOP, reason)
-    arming = advance(ModeState(Mode.READY, NOW - 5.0, arming_run_s=NOW - 0.2), seen)
+    arming = advance_by(ModeState(Mode.READY, NOW - 5.0, arming_run_s=NOW - 0.2), seen)
     assert (arming.mode, arming.reason) == (Mode.SAFE_STOP, reason)
-    assert advance(ModeState(Mode.READY, NOW - 5.0), seen).mode is Mode.READY
-    assert advance(ModeState(Mode.DRIVE, NOW - 5.0), replace(seen, request=Request.HALT)).reason != reason
+    assert advance_by(ModeState(Mode.READY, NOW - 5.0), seen).mode is Mode.READY
+    assert advance_by(ModeState(Mode.DRIVE, NOW - 5.0), replace(seen, request=Request.HALT)).reason != reason
 
 
 @pytest.mark.parametrize(
@@ -215,8 +207,8 @@ def test_cycles_that_overrun_too_often_stop_a_drive_and_end_an_arming() -> None:
     ],
     ids=["waited just long enough", "the latch has its whole second", "a gap as long as may be", "grace to its end"],
 )
-def test_to_the_very_end_of_a_patience(before: ModeState, seen: Situation, mode: Mode) -> None:
-    assert advance(before, seen).mode is mode
+def test_to_the_very_end_of_a_patience(before: ModeState, seen: ModeInputs, mode: Mode) -> None:
+    assert advance_by(before, seen).mode is mode
 
 
 def test_patience_in_seconds() -> None:

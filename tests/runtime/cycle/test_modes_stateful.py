@@ -10,7 +10,9 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
 from drivers.driver import LineState
 from drivers.messages import Flags
-from runtime.cycle.modes import ARMING_MAX_S, ARMING_MIN_S, GAP_MAX_S, Mode, ModeState, Request, Situation, advance
+from runtime.cycle.inputs import GAP_MAX_S, Request
+from runtime.cycle.modes import ARMING_MAX_S, ARMING_MIN_S, Mode, ModeState
+from tests.runtime.cycle.mode_inputs import ModeInputs, advance_by
 
 CYCLE_S = 0.05
 
@@ -27,14 +29,14 @@ class ModesMachine(RuleBasedStateMachine):
     def __init__(self) -> None:
         super().__init__()
         self.state = ModeState()
-        self.seen = Situation(0.0, LineState.CLOSED, None, Flags.NONE, rebooted=False, request=None)
+        self.seen = ModeInputs(0.0, LineState.CLOSED, None, Flags.NONE, rebooted=False, request=None)
         self.armed_s: float | None = None
         self.entries: list[Mode] = [Mode.CONNECTING]
 
     def cycle(self, request: Request | None = None, *, gap_s: float = CYCLE_S, rebooted: bool = False) -> None:
         run_s = self.seen.run_s + gap_s
         self.seen = replace(self.seen, run_s=run_s, request=request, gap_s=gap_s, rebooted=rebooted)
-        before, self.state = self.state, advance(self.state, self.seen)
+        before, self.state = self.state, advance_by(self.state, self.seen)
         after = self.state
         if after.mode is not before.mode:
             self.entries.append(after.mode)

@@ -20,10 +20,10 @@ from drivers.emulator.robot_device import GroundTruth
 from drivers.messages import Firing, Pose
 from drivers.registry import make_driver
 from perception.pipeline import Perception
-from runtime.cycle.driver_io import gather, give
-from runtime.cycle.modes import Mode, Request
-from runtime.cycle.step import CycleRecord, State, step
-from runtime.timing.refinement_budget import enough_quanta
+from runtime.cycle.inputs import Request, gather_inputs
+from runtime.cycle.modes import Mode
+from runtime.cycle.step import CycleRecord, State, apply_command, step
+from runtime.timing.refinement_budget import within_quanta_per_cycle
 
 pytestmark = [pytest.mark.compiled, pytest.mark.promise("P7")]
 
@@ -62,9 +62,11 @@ class Run:
     def cycle(self, request: Request | None = None) -> CycleRecord:
         self.run_s = (len(self.records) + 1) * PERIOD_S
         self.line.exchange(self.run_s)
-        inputs = gather(self.driver, self.run_s, request)
-        record = step(self.state, inputs, self.settings, lambda c: give(self.driver, c), enough_quanta)
-        self.firings += inputs.heard.firings
+        inputs = gather_inputs(self.driver, self.run_s, request)
+        record = step(
+            self.state, inputs, self.settings, lambda c: apply_command(self.driver, c), within_quanta_per_cycle
+        )
+        self.firings += inputs.received.firings
         self.records.append(record)
         self.truths.append(self.robot.truth)
         return record
@@ -81,7 +83,7 @@ class Run:
         return self.state.mode.mode
 
     def reboot_seen(self) -> bool:
-        return self.records[-1].inputs.heard.rebooted
+        return self.records[-1].inputs.received.rebooted
 
     def drive(self) -> None:
         self.until(lambda: self.mode is Mode.READY, 2.0)
@@ -93,7 +95,7 @@ class Run:
         self.until(lambda: self.run_s >= self.reboot_s, self.reboot_s + 1.0)
         self.until(lambda: self.mode is Mode.SAFE_STOP, 2.0)
         stopped_s = self.run_s - self.reboot_s
-        if not any(record.inputs.heard.rebooted for record in self.records):
+        if not any(record.inputs.received.rebooted for record in self.records):
             self.until(self.reboot_seen, self.down_s + 2.0)
         return stopped_s
 

@@ -6,7 +6,8 @@ import pytest
 
 from drivers.driver import LineState
 from drivers.messages import Flags, Pose, Twist
-from runtime.cycle.modes import Mode, Request
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode
 from runtime.cycle.step import STANDSTILL, Command, Order
 from tests.runtime.script import PATIENCE_S, PERIOD_S, Script
 

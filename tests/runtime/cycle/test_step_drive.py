@@ -18,7 +18,7 @@ from perception.pipeline import Perception
 from runtime.cycle.modes import Mode, ModeState
 from runtime.cycle.step import Command, CycleRecord, Inputs, Order, State, step
 from runtime.simulation.closed_loop import simulate
-from runtime.timing.refinement_budget import enough_quanta
+from runtime.timing.refinement_budget import within_quanta_per_cycle
 from tests.runtime.script import NOTHING, PERIOD_S, SETTINGS, Script
 
 # A drive through the hallway, every input of it on record.
@@ -74,7 +74,7 @@ def fresh() -> State:
 
 
 def played(
-    records: list[CycleRecord], may_refine: Callable[[int], bool] = enough_quanta
+    records: list[CycleRecord], may_refine: Callable[[int], bool] = within_quanta_per_cycle
 ) -> tuple[State, list[CycleRecord]]:
     state, commands = fresh(), list[Command]()
     again = [step(state, record.inputs, SETTINGS, commands.append, may_refine) for record in records]
@@ -92,11 +92,11 @@ def test_a_change_of_one_bit_is_seen(drive: Drive) -> None:
     """That the comparison above can fail."""
     k = next(k for k, record in enumerate(drive.records) if record.new_segments)
     record = drive.records[k]
-    firing = record.inputs.heard.firings[0]
+    firing = record.inputs.received.firings[0]
     ranges = np.nextafter(firing.ranges_m, np.inf)
-    heard = replace(record.inputs.heard, firings=(replace(firing, ranges_m=ranges),))
+    heard = replace(record.inputs.received, firings=(replace(firing, ranges_m=ranges),))
     changed = [*drive.records]
-    changed[k] = replace(record, inputs=replace(record.inputs, heard=heard))
+    changed[k] = replace(record, inputs=replace(record.inputs, received=heard))
     state, again = played(changed)
     assert bits(again) != bits(drive.records)
     assert left_behind(state) != left_behind(drive.state)
@@ -186,7 +186,7 @@ def test_a_reboot_clears_the_map_and_the_leg(drive: Drive) -> None:
     assert state.leg is not None
     inputs = Inputs(last.inputs.run_s + PERIOD_S, LineState.READY, None, Received((), None, rebooted=True))
     commands: list[Command] = []
-    record = step(state, inputs, SETTINGS, commands.append, enough_quanta)
+    record = step(state, inputs, SETTINGS, commands.append, within_quanta_per_cycle)
     assert commands == [Order.HALT]
     assert (record.segments, record.clusters, record.refinement) == (0, 0, "nothing")
     assert state.perception.objects() == ()
@@ -202,13 +202,13 @@ def test_after_a_reboot_it_perceives_as_on_the_first_day(drive: Drive) -> None:
         Inputs(1e3, LineState.READY, None, Received((), None, rebooted=True)),
         SETTINGS,
         lambda _c: None,
-        enough_quanta,
+        within_quanta_per_cycle,
     )
     new = fresh()
     for record in drive.records:
         for state in (used, new):
             state.mode = ModeState(Mode.READY)
-        one, other = (step(s, record.inputs, SETTINGS, lambda _c: None, enough_quanta) for s in (used, new))
+        one, other = (step(s, record.inputs, SETTINGS, lambda _c: None, within_quanta_per_cycle) for s in (used, new))
         assert bits(one.new_segments) == bits(other.new_segments)
     assert numberless(used) == numberless(new)
     assert {o.number for o in used.perception.objects()}.isdisjoint(

@@ -26,7 +26,8 @@ from perception.edits import (
 )
 from runtime.cli.app import run_command
 from runtime.cycle.drive_requests import Legs
-from runtime.cycle.modes import Mode, Request
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord, Edit, State
 from runtime.recording.channels import CYCLE, KEYFRAME, RawMessage, decode
 from runtime.recording.reader import open_recording
@@ -119,7 +120,7 @@ def test_the_record_tells_what_was_done_and_what_was_refused(edited: Path) -> No
         DeleteSegments, PinSegments, PlaceModel, MoveObject, RejectObject, ConfirmObject, ClearMap,
     }  # fmt: skip
     assert "no object 999999" in refused[330, 2]
-    assert "is no place" in refused[460, None]
+    assert "invalid goal" in refused[460, None]
     assert all(why.isprintable() for why in refused.values())
     by_cycle = {r.cycle: r for r in records}
     assert by_cycle[200].inputs.drive_request == Goal(0.9, 0.2)

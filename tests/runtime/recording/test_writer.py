@@ -175,7 +175,7 @@ async def in_folder_of(
         def on_state(record: CycleRecord, state: State, _start: Pose) -> None:
             assert observers.on_cycle is not None
             observers.on_cycle(record, state, None, None)  # type: ignore[arg-type]
-            for firing in record.inputs.heard.firings:
+            for firing in record.inputs.received.firings:
                 if observers.on_firing is not None:
                     observers.on_firing(firing)
             if record.cycle == 20:

@@ -150,10 +150,10 @@ def test_a_robot_with_broken_sensors_drives_on_and_says_which(measured: Callable
         StuckSensor(kind="stuck_sensor", at_s=2.0, duration_s=1e3, sensor=7),
         StuckSensor(kind="stuck_sensor", at_s=2.0, duration_s=1e3, sensor=5, range_m=1.2),
     )
-    run, notices, lines = hallway(0, *faults), Alerts(), list[str]()
+    run, alerts, lines = hallway(0, *faults), Alerts(), list[str]()
     while run.run_s < UNTIL_S:
         record = run.cycle()
-        lines += notices.news(record.inputs.heard, run.state.perception)
+        lines += alerts.update(record.inputs.received, run.state.perception)
     assert {r.sensor: r.fault for r in run.state.perception.sensor_reports()} == {5: "stuck", 7: "failing"}
     assert len(lines) == 2
     assert "sensor 7 never answers when it should fire" in lines[0]

@@ -21,7 +21,8 @@ from drivers.denning.frames import Drive, Frame
 from drivers.driver import RobotDriver
 from drivers.messages import Flags
 from runtime.cli.terminal.view import View
-from runtime.cycle.modes import Mode, Request
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.reloader import Reloader
 from runtime.cycle.step import CycleRecord, State
@@ -70,7 +71,7 @@ class Watched:
             if way == "out":
                 self.sent += [(len(self.modes), frame) for frame in ears.feed(data)]
 
-        def on_cycle(record: CycleRecord, state: State, _books: CycleStats, _driver: RobotDriver) -> None:
+        def on_cycle(record: CycleRecord, state: State, _stats: CycleStats, _driver: RobotDriver) -> None:
             self.modes[record.cycle] = record.mode.mode
             for observer in self.observers:
                 observer(record, state)

@@ -233,7 +233,8 @@ from perception.edits import (
     ClearMap, ConfirmObject, DeleteSegments, MoveObject, PinSegments, PlaceModel, RejectObject,
 )
 from runtime.console.frames.frame_encoder import FrameContext, FrameEncoder
-from runtime.cycle.modes import Mode, Request
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode
 from runtime.simulation.closed_loop import OperatorInput, simulate
 
 further = settings.model_copy(update={"models": (*settings.models, load_model(sys.argv[3]))})

@@ -21,9 +21,9 @@ import json
 import numpy as np
 from runtime.timing.footprint import Footprint
 from runtime.timing.memory_policy import MemoryPolicy
-books = Footprint(MemoryPolicy())
+stats = Footprint(MemoryPolicy())
 block = np.full(8_000_000, 1.0)
-print(json.dumps(books.close()), block[0])
+print(json.dumps(stats.close()), block[0])
 """
 
 
@@ -38,11 +38,11 @@ def test_memory_that_is_filled_is_seen() -> None:
 
 def test_processor_time_is_a_share_of_the_wall_clock() -> None:
     """Not asserted is how large the share of a busy loop is: others may run on this machine."""
-    books = Footprint(MemoryPolicy())
+    stats = Footprint(MemoryPolicy())
     end_cpu_s = time.process_time() + 0.05
     while time.process_time() < end_cpu_s:
         pass
-    row = books.close()
+    row = stats.close()
     assert row["cpu_share"] > 0.0
     assert row["compilations"] == 0
     assert row["collections"] == [0, 0, 0]

@@ -97,10 +97,10 @@ class Ring:
         """When the oldest echo of each cycle came, nan where none did."""
         self.waiting_s: list[float] = []
 
-    def _read(self, held_since_s: float | None) -> None:
+    def _read(self, busy_since_s: float | None) -> None:
         while self.echoes_s and self.echoes_s[0] <= self.run_s:
             self.waiting_s.append(self.echoes_s.popleft())
-            self.pacer.hear(self.run_s, held_since_s)
+            self.pacer.on_echo(self.run_s, busy_since_s)
 
     def cycle(self, took_s: float = 0.001, held_s: float = 0.0) -> CycleStart:
         """Wait for a cycle, run it, and have the loop held for a while after it."""

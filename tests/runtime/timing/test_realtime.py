@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from config.settings import RealtimeConfig
-from runtime.timing.realtime import ask
+from runtime.timing.realtime import apply_realtime
 
 ROOT = Path(__file__).parents[3]
 NOTHING = RealtimeConfig()
@@ -48,7 +48,7 @@ def refusing(monkeypatch: pytest.MonkeyPatch) -> Libc:
 
 
 def test_nothing_is_asked_for_that_nobody_named(refusing: Libc) -> None:
-    assert ask(NOTHING) == []
+    assert apply_realtime(NOTHING) == []
     assert refusing.calls == []
 
 
@@ -61,7 +61,7 @@ def test_nothing_is_asked_for_by_default() -> None:
 def test_every_refusal_names_the_setting_the_reason_and_the_way_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("runtime.timing.realtime.platform.machine", lambda: "x86_64")
     core = min(os.sched_getaffinity(0))
-    refusals = ask(RealtimeConfig(slice_s=0.001, priority=7, core=core, lock_memory=True))
+    refusals = apply_realtime(RealtimeConfig(slice_s=0.001, priority=7, core=core, lock_memory=True))
     names = [line.split(" ")[0] for line in refusals]
     assert names == ["realtime.slice_s", "realtime.core", "realtime.lock_memory", "realtime.priority"]
     assert all("Operation not permitted" in line and "leave it out" in line for line in refusals)
@@ -71,7 +71,7 @@ def test_every_refusal_names_the_setting_the_reason_and_the_way_out(monkeypatch:
 
 
 def test_a_core_that_is_not_there_is_named_beside_those_that_are() -> None:
-    (line,) = ask(RealtimeConfig(core=4_000))
+    (line,) = apply_realtime(RealtimeConfig(core=4_000))
     assert line.startswith("realtime.core = 4000 is not a core this process may use (")
     assert str(min(os.sched_getaffinity(0))) in line
 
@@ -80,16 +80,16 @@ def test_a_machine_whose_system_call_is_not_known_is_left_alone(
     refusing: Libc, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("runtime.timing.realtime.platform.machine", lambda: "abacus")
-    assert ask(RealtimeConfig()) == []
+    assert apply_realtime(RealtimeConfig()) == []
     assert refusing.calls == []
 
 
 IN_EARNEST = """
 import os, sys
 from config.settings import RealtimeConfig
-from runtime.timing.realtime import ask
+from runtime.timing.realtime import apply_realtime
 core = min(os.sched_getaffinity(0))
-refusals = ask(RealtimeConfig(slice_s=0.001, priority=5, core=core, lock_memory=True))
+refusals = apply_realtime(RealtimeConfig(slice_s=0.001, priority=5, core=core, lock_memory=True))
 policy = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
 named = {line.split(" ")[0] for line in refusals}
 assert ("realtime.priority" in named) == (policy != os.SCHED_FIFO), (refusals, policy)

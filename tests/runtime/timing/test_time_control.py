@@ -14,12 +14,13 @@ from config.settings import Settings
 from drivers.driver import RobotDriver
 from drivers.emulator.robot_device import RobotDevice
 from drivers.messages import Flags
-from runtime.cycle.modes import Mode, Request
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
 from runtime.cycle.summary import RunSummary
 from runtime.timing.cycle_stats import CycleStats
-from runtime.timing.time_control import GONE, HANGS, LEAD_S, NO_CYCLE, NOT_OURS, EmulatorControl, NoTimeControl
+from runtime.timing.time_control import ENDED, HANGS, LEAD_S, NO_CYCLE, REAL_ROBOT, EmulatorTimeControl, NoTimeControl
 from tests.runtime.held import Held, held
 
 pytestmark = pytest.mark.compiled
@@ -39,7 +40,7 @@ class Watched:
     """What a cycle takes."""
     spend: Callable[[float], None] = lambda _s: None
 
-    def on_cycle(self, record: CycleRecord, _state: State, _books: CycleStats, _driver: RobotDriver) -> None:
+    def on_cycle(self, record: CycleRecord, _state: State, _stats: CycleStats, _driver: RobotDriver) -> None:
         self.records.append(record)
         self.spend(self.busy_s)
 
@@ -110,7 +111,7 @@ def test_a_pause_of_any_length_is_not_there(monkeypatch: pytest.MonkeyPatch) -> 
     times = [record.inputs.run_s for record in watched.records]
     gaps = [b - a for a, b in itertools.pairwise(times)]
     assert max(gaps) < 1.8 * CYCLE_S, "the run's time knows of no pause"
-    firings = [f.robot_s for record in watched.records for f in record.inputs.heard.firings]
+    firings = [f.robot_s for record in watched.records for f in record.inputs.received.firings]
     step_s = it.settings.ring.firing.step_period_s
     assert max(b - a for a, b in itertools.pairwise(firings)) < 1.5 * step_s, "no firing is missing"
 
@@ -155,7 +156,7 @@ def test_one_step_is_one_cycle_and_its_time(monkeypatch: pytest.MonkeyPatch) -> 
                 assert len(watched.records) == cycles + 1
             first, last = watched.records[-60], watched.records[-1]
             assert last.inputs.run_s - first.inputs.run_s == pytest.approx(59 * CYCLE_S, rel=0.05)
-            assert sum(len(record.inputs.heard.firings) for record in watched.records[-60:]) >= 58
+            assert sum(len(record.inputs.received.firings) for record in watched.records[-60:]) >= 58
             assert await it.control.resume() is None
             await until(lambda: len(watched.records) >= 160)
 
@@ -300,11 +301,11 @@ def test_an_emulator_that_dies_is_told_and_the_run_goes_on_to_its_stop(
                 asked = asyncio.create_task(it.control.pause())
                 await asyncio.sleep(0.5 * LEAD_S)
             it.links[0].pull()
-            it.control.gone()
-            assert asked is None or await asked == GONE
+            it.control.emulator_ended()
+            assert asked is None or await asked == ENDED
             for call in (it.control.pause, it.control.resume, it.control.single_step):
-                assert await call() == GONE
-            assert await it.control.set_speed(2.0) == GONE
+                assert await call() == ENDED
+            assert await it.control.set_speed(2.0) == ENDED
             await until(lambda: watched.records[-1].mode.mode is Mode.SAFE_STOP)
 
         summary, _ = run(it, act)
@@ -334,7 +335,7 @@ def test_a_thousand_random_commands(monkeypatch: pytest.MonkeyPatch) -> None:
         summary, watched = run(it, act)
     assert (summary["mode"], summary["stop_reasons"]) == ("DRIVE", [])
     assert (summary["link"]["bad"], summary["link"]["lost"]) == (0, 0)
-    firings = [f.robot_s for record in watched.records for f in record.inputs.heard.firings]
+    firings = [f.robot_s for record in watched.records for f in record.inputs.received.firings]
     step_s = it.settings.ring.firing.step_period_s
     assert max(b - a for a, b in itertools.pairwise(firings)) < 1.5 * step_s
 
@@ -342,7 +343,7 @@ def test_a_thousand_random_commands(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_cannot_be_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     with held(monkeypatch) as it:
 
-        async def before_the_first_cycle(control: EmulatorControl) -> None:
+        async def before_the_first_cycle(control: EmulatorTimeControl) -> None:
             assert await control.pause() == NO_CYCLE
             assert await control.single_step() == NO_CYCLE
             for factor in (0.0, -1.0, 0.05, 11.0, float("nan"), float("inf")):
@@ -355,7 +356,7 @@ async def test_a_real_robot_s_time_is_nobody_s() -> None:
     control = NoTimeControl()
     for answer in (await control.pause(), await control.resume(), await control.single_step(),
                    await control.set_speed(2.0)):  # fmt: skip
-        assert answer == NOT_OURS
+        assert answer == REAL_ROBOT
     assert (control.is_paused, control.speed) == (False, 1.0)
 
 

@@ -176,7 +176,7 @@ def test_a_ring_log_out_and_in(hall_run: Path, hall_log: Path, timeline: Timelin
     heard: list[Firing] = []
     for entry in entries_of(hall_run):
         if entry.topic == CYCLE:
-            heard += decode(Cycle, entry.data).record.inputs.heard.firings
+            heard += decode(Cycle, entry.data).record.inputs.received.firings
     back = list(read_ring_log(hall_log))
     assert len(back) == len(heard) > 100
     for one, other in zip(heard, back, strict=True):

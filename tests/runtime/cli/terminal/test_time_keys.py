@@ -8,7 +8,7 @@ from structlog import get_logger
 from structlog.testing import capture_logs
 
 from runtime.cli.terminal.time_keys import TimeKeys
-from runtime.timing.time_control import NOT_OURS, NoTimeControl
+from runtime.timing.time_control import REAL_ROBOT, NoTimeControl
 
 
 class Control:
@@ -61,4 +61,4 @@ async def test_what_cannot_be_done_is_told() -> None:
         for key in ("p", "s"):
             keys.press(key)
             await settle()
-    assert [line["reason"] for line in lines] == [NOT_OURS, NOT_OURS]
+    assert [line["reason"] for line in lines] == [REAL_ROBOT, REAL_ROBOT]

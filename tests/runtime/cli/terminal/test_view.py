@@ -25,7 +25,8 @@ from drivers.registry import make_driver
 from perception.pipeline import DetectedObject
 from runtime.cli.terminal.plan import ARROWS, MARGIN_M, Plan, draw_plan
 from runtime.cli.terminal.view import EVERY_CYCLES, SWITCH_INTERVAL_S, Snapshot, View, keys
-from runtime.cycle.modes import Mode, ModeState, Request
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode, ModeState
 from runtime.cycle.step import CycleRecord
 from runtime.simulation.closed_loop import simulate
 from runtime.timing.cycle_stats import CycleStats
@@ -154,13 +155,13 @@ def test_a_drive_is_drawn_by_the_thread_and_the_loop_never_waits_for_it(monkeypa
     run = simulate(SETTINGS, SETTINGS.world, 0, 8.0, lambda record, _truth: records.append(record))
     file = Terminal()
     view = View(SETTINGS, Console(file=file, width=100, force_terminal=True), "m")
-    driver, books = make_driver(SETTINGS), CycleStats(0.005)
+    driver, stats = make_driver(SETTINGS), CycleStats(0.005)
     before_s = sys.getswitchinterval()
     with view.shown():
         assert sys.getswitchinterval() == pytest.approx(SWITCH_INTERVAL_S, abs=1e-6)
         for record in records:
-            books.enter(0.001)
-            view.on_cycle(record, run.state, books, driver)
+            stats.add_cycle(0.001)
+            view.on_cycle(record, run.state, stats, driver)
         until(lambda: "DRIVE" in file.getvalue())
     assert sys.getswitchinterval() == pytest.approx(before_s)
     assert all(thread.name != "view" for thread in threading.enumerate())
@@ -172,9 +173,9 @@ def test_pictures_are_taken_every_few_cycles_only() -> None:
     records: list[CycleRecord] = []
     run = simulate(SETTINGS, SETTINGS.world, 0, 2.0, lambda record, _truth: records.append(record))
     view = View(SETTINGS, Console(file=io.StringIO()), "m")
-    driver, books, taken = make_driver(SETTINGS), CycleStats(0.005), 0
+    driver, stats, taken = make_driver(SETTINGS), CycleStats(0.005), 0
     for record in records:
-        view.on_cycle(record, run.state, books, driver)
+        view.on_cycle(record, run.state, stats, driver)
         taken += view._slot is not None
         view._slot = None
     assert taken == len(records) // EVERY_CYCLES
@@ -184,7 +185,7 @@ def test_why_it_stands_though_it_may_drive_is_shown() -> None:
     assert SETTINGS.world is not None
     records: list[CycleRecord] = []
     run = simulate(SETTINGS, SETTINGS.world, 0, 2.0, lambda record, _truth: records.append(record))
-    run.state.standing = "the goal is reached"
+    run.state.hold_reason = "the goal is reached"
     view = View(SETTINGS, Console(file=io.StringIO()), "m")
     for record in records[:EVERY_CYCLES]:
         view.on_cycle(record, run.state, CycleStats(0.005), make_driver(SETTINGS))

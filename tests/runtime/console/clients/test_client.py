@@ -13,7 +13,7 @@ from runtime.console.clients.client import Client
 from runtime.console.clients.control import PATIENCE_S as CONTROL_S
 from runtime.console.frames.frame_encoder import EncodedFrame
 from runtime.console.http.client_limits import Limits
-from runtime.cycle.modes import Request
+from runtime.cycle.inputs import Request
 from tests.rawpage import RawPage
 from tests.runtime.console.operated import Operated, operated
 
@@ -132,12 +132,12 @@ async def test_while_cycles_overrun_nothing_is_shown() -> None:
     async with operated() as case:
         page = await case.page()
         before = case.console._encoder._number
-        case.run.keeper.in_a_row = 1
+        case.run.timing_monitor.overruns_in_a_row = 1
         for _ in range(10):
             case.cycles()
             await asyncio.sleep(0.0)
         assert case.console._encoder._number == before
-        case.run.keeper.in_a_row = 0
+        case.run.timing_monitor.overruns_in_a_row = 0
         case.cycles()
         assert (await page.next("state"))["cycle"] == 11
 

@@ -22,7 +22,7 @@ from runtime.cycle.step import CycleRecord, State
 from runtime.simulation.emulator_process import start_emulator
 from runtime.support.logs import open_log
 from runtime.timing.cycle_stats import CycleStats
-from runtime.timing.run_clock import PacedClock
+from runtime.timing.run_clock import ScaledClock
 from tests.hil.machine import PATIENCE_S, stalls_excused
 from tests.recorded import hall, record
 from tests.runtime.console.playback.test_replay_client import PROGRAM, Page
@@ -42,12 +42,12 @@ async def test_a_player_and_a_report_beside_a_robot_that_drives(tmp_path: Path) 
     busy, records = [False], list[CycleRecord]()
     frames = 0
 
-    def on_cycle(record: CycleRecord, _state: State, books: CycleStats, _driver: RobotDriver) -> None:
+    def on_cycle(record: CycleRecord, _state: State, stats: CycleStats, _driver: RobotDriver) -> None:
         records.append(record)
-        if books.lag.count:
-            late_s[busy[0]].append(books.lag.newest_s)
+        if stats.lag.count:
+            late_s[busy[0]].append(stats.lag.newest_s)
 
-    clock = PacedClock()
+    clock = ScaledClock()
     players = ReplayClient(tmp_path, PROGRAM, lambda: str(recorded))
     async with start_emulator([], clock) as (port, _):
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:

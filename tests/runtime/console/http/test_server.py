@@ -14,7 +14,7 @@ from aiohttp import WSServerHandshakeError
 
 from runtime.console.commands.async_commands import AsyncCommands
 from runtime.console.http.client_limits import Limits
-from runtime.cycle.modes import Request
+from runtime.cycle.inputs import Request
 from tests.runtime.console.operated import PATIENCE_S, Operated, operated
 
 

@@ -20,7 +20,8 @@ from drivers.driver import RobotDriver
 from runtime.console.commands.messages import MalformedMessage, read_message
 from runtime.console.console import Console
 from runtime.console.http.client_limits import Limits
-from runtime.cycle.modes import Mode, Request
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
 from runtime.support.kernel_loader import KernelLoader
@@ -184,7 +185,7 @@ def test_a_whole_process_does_not_move(monkeypatch: pytest.MonkeyPatch, *, armed
     moved: list[float] = []
     modes: set[Mode] = set()
 
-    def on_cycle(record: CycleRecord, state: State, _books: CycleStats, _driver: RobotDriver) -> None:
+    def on_cycle(record: CycleRecord, state: State, _stats: CycleStats, _driver: RobotDriver) -> None:
         modes.add(record.mode.mode)
         if armed and record.cycle == 10:
             process.request(Request.ARM)

@@ -14,7 +14,8 @@ from runtime.console.playback.replay_client import ReplayClient
 from runtime.console.playback.replay_cursor import ReplayCursor
 from runtime.console.playback.replay_frames import make
 from runtime.console.playback.replay_worker import At
-from runtime.cycle.modes import Mode, Request
+from runtime.cycle.inputs import Request
+from runtime.cycle.modes import Mode
 from runtime.cycle.step import State
 from runtime.recording.reader import open_recording, parse_settings
 from runtime.simulation.closed_loop import OperatorInput

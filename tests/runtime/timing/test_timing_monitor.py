@@ -16,14 +16,14 @@ from config.load import load_settings
 from drivers.driver import LineState, Received
 from drivers.messages import Firing, Flags, Odometry, Pose, Twist
 from perception.pipeline import Perception
-from runtime.cycle.modes import Request
+from runtime.cycle.inputs import Request
 from runtime.cycle.step import Command, Inputs, Order, State, step
 from runtime.timing.clock_sampler import ClockSample, ClockSampler
-from runtime.timing.cycle_stats import CULPRITS_MAX, OTHERS, CycleStats
+from runtime.timing.cycle_stats import CAUSES_MAX, OTHERS, CycleStats
 from runtime.timing.pacing import CycleStart, Pacer
 from runtime.timing.phases import Phase
 from runtime.timing.stall_sampler import StackSample, StallSampler
-from runtime.timing.timekeeping import OUTSIDE, THREAD, UNTIMED, Timekeeper
+from runtime.timing.timing_monitor import OUTSIDE, THREAD, UNTIMED, TimingMonitor
 
 US = 1e-6
 PERIOD_US, LATE_US = 50_000, 5_000
@@ -38,7 +38,8 @@ class Machine:
         self.host_us, self.thread_us, self.process_us, self.waits = BEGIN_US, 0, 0, 0
 
     def read(self) -> ClockSample:
-        return ClockSample(self.host_us * US, self.host_us * US, self.thread_us * US, self.process_us * US, self.waits)
+        host_s = self.host_us * US
+        return ClockSample(host_s, host_s, self.thread_us * US, self.process_us * US, self.waits)
 
     def work(self, us: int) -> None:
         self.host_us, self.thread_us, self.process_us = self.host_us + us, self.thread_us + us, self.process_us + us
@@ -60,7 +61,7 @@ class Delay:
     place: str
     us: int
     how: Callable[[Machine, int], None]
-    culprit: str
+    cause: str
 
 
 def delays(count: int, seed: int) -> list[Delay]:
@@ -68,16 +69,16 @@ def delays(count: int, seed: int) -> list[Delay]:
     made = []
     for _ in range(count):
         place = chance.choice([*(phase.value for phase in Phase), "link receive", "untimed", "asleep", "nowhere"])
-        how, culprit = chance.choice(
+        how, cause = chance.choice(
             [(Machine.work, place), (Machine.block, place), (Machine.be_put_aside, OUTSIDE),
              (Machine.wait_for_thread, THREAD)]
         )  # fmt: skip
         if place == "untimed":
-            how, culprit = Machine.work, UNTIMED
+            how, cause = Machine.work, UNTIMED
         elif place == "asleep":
-            how, culprit = chance.choice([(Machine.block, OUTSIDE), (Machine.wait_for_thread, THREAD)])
+            how, cause = chance.choice([(Machine.block, OUTSIDE), (Machine.wait_for_thread, THREAD)])
         us = 0 if place == "nowhere" else round(chance.choice([2e3, 60e3, 400e3]) * chance.random()) + 300
-        made.append(Delay(place, us, how, culprit))
+        made.append(Delay(place, us, how, cause))
     return made
 
 
@@ -87,9 +88,9 @@ class Run:
     def __init__(self) -> None:
         self.machine = Machine()
         self.pacer = Pacer(BEGIN_US * US, PERIOD_US * US)
-        self.books = CycleStats(LATE_US * US)
-        self.keeper = Timekeeper(self.books, self.machine.read, callbacks=("link receive",))
-        self.receive = self.keeper.timed("link receive", self._at_receive)
+        self.stats = CycleStats(LATE_US * US)
+        self.timing_monitor = TimingMonitor(self.stats, self.machine.read, callbacks=("link receive",))
+        self.receive = self.timing_monitor.timed("link receive", self._at_receive)
         self._delay = Delay("nowhere", 0, Machine.work, "")
         # The account.
         self.due_us = self.deadline_us = BEGIN_US
@@ -112,8 +113,8 @@ class Run:
             machine.work(PHASE_US)
             self._meet(phase.value)
             self.phase_us[phase.value] += PHASE_US + (delay.us if delay.place == phase.value else 0)
-            self.keeper.mark(phase)
-        self.keeper.end()
+            self.timing_monitor.mark(phase)
+        self.timing_monitor.end()
         ended_us = machine.host_us
         self.pacer.advance(ended_us * US)
         self.receive()
@@ -138,12 +139,12 @@ class Run:
         self.late += late
         self.overruns += overrun
         if late or overrun:
-            self.faults[self._delay.culprit] += 1
+            self.faults[self._delay.cause] += 1
 
     def begin(self) -> CycleStart:
         now, period_s = self.machine.read(), self.pacer.period_s
         begun = self.pacer.begin(now.run_s)
-        self.keeper.begin(now, begun, period_s, is_following=False)
+        self.timing_monitor.begin(now, begun, period_s, is_following=False)
         if self.missed or self.machine.host_us > BEGIN_US:
             self.due_us += PERIOD_US
             self.deadline_us = self.due_us
@@ -158,16 +159,16 @@ def test_ten_thousand_delays_are_booked_to_whoever_made_them_and_none_is_invente
     injected = delays(10_000, 11)
     for number, delay in enumerate(injected):
         run.slot(delay)
-        assert run.books.faults == dict(run.faults), (number, delay)
-        assert (run.pacer.missed, run.keeper.overruns) == (run.missed, run.overruns), (number, delay)
-    timing = run.keeper.timing()
-    assert (run.books.cycles, run.books.missed, timing["missed"]) == (10_000, run.missed, run.missed)
+        assert run.stats.causes == dict(run.faults), (number, delay)
+        assert (run.pacer.missed, run.timing_monitor.overruns) == (run.missed, run.overruns), (number, delay)
+    timing = run.timing_monitor.summary()
+    assert (run.stats.cycles, run.stats.missed, timing["missed"]) == (10_000, run.missed, run.missed)
     # The lateness of the last cycle, which has not ended, is not booked yet.
-    assert run.late - 1 <= run.books.late <= run.late
+    assert run.late - 1 <= run.stats.late <= run.late
     assert sum(run.faults.values()) > 2_000
     assert set(run.faults) == {*(phase.value for phase in Phase), "link receive", UNTIMED, OUTSIDE, THREAD}
     for phase in Phase:
-        total_us = run.keeper._phases[phase].total_s / US
+        total_us = run.timing_monitor._phases[phase].total_s / US
         assert total_us == pytest.approx(run.phase_us[phase.value], abs=1.0)
         worst = max((d.us for d in injected if d.place == phase.value), default=0)
         assert timing["phases"][phase.value]["max"] == pytest.approx(PHASE_US + worst, abs=0.2)
@@ -179,8 +180,8 @@ def test_without_delays_there_is_nothing_to_blame() -> None:
     run.begin()
     for _ in range(2_000):
         run.slot(Delay("nowhere", 0, Machine.work, ""))
-    timing = run.keeper.timing()
-    assert (timing["faults"], timing["overruns"], timing["missed"], run.books.late) == ({}, 0, 0, 0)
+    timing = run.timing_monitor.summary()
+    assert (timing["faults"], timing["overruns"], timing["missed"], run.stats.late) == ({}, 0, 0, 0)
     assert all(spread["max"] == pytest.approx(PHASE_US, abs=0.2) for spread in timing["phases"].values())
     assert timing["late"]["max"] == pytest.approx(0.0, abs=0.2)
 
@@ -191,35 +192,35 @@ def test_overruns_in_a_row_are_counted_until_a_cycle_keeps_its_time() -> None:
     rows = []
     for us in (60_000, 60_000, 90_000, 10_000, 60_000):
         run.slot(Delay("refine", us, Machine.work, "refine"))
-        rows.append(run.keeper.in_a_row)
+        rows.append(run.timing_monitor.overruns_in_a_row)
     assert rows == [1, 2, 3, 0, 1]
-    for culprit in ("perceive", "perceive"):
-        assert run.keeper.culprit == "refine"
-        run.slot(Delay(culprit, 60_000, Machine.work, culprit))
-    assert run.keeper.culprit == "perceive", "the most frequent one of the row"
+    for cause in ("perceive", "perceive"):
+        assert run.timing_monitor.main_cause == "refine"
+        run.slot(Delay(cause, 60_000, Machine.work, cause))
+    assert run.timing_monitor.main_cause == "perceive", "the most frequent one of the row"
     run.slot(Delay("nowhere", 0, Machine.work, ""))
-    assert (run.keeper.in_a_row, run.keeper.culprit) == (0, "")
+    assert (run.timing_monitor.overruns_in_a_row, run.timing_monitor.main_cause) == (0, "")
 
 
 def test_what_the_watch_saw_has_a_name() -> None:
     run, sights = Run(), [StackSample("Recorder.flush", "fsync"), StackSample("RobotProcess.run", "View.on_cycle")]
-    run.keeper = Timekeeper(run.books, run.machine.read, lambda: sights[0], ("link receive",))
-    run.receive = run.keeper.timed("link receive", run._at_receive)
+    run.timing_monitor = TimingMonitor(run.stats, run.machine.read, lambda: sights[0], ("link receive",))
+    run.receive = run.timing_monitor.timed("link receive", run._at_receive)
     run.begin()
     run.slot(Delay("untimed", 70_000, Machine.work, ""))
     run.slot(Delay("untimed", 70_000, Machine.block, ""))
-    assert run.books.faults == {"callback Recorder.flush": 2}
+    assert run.stats.causes == {"callback Recorder.flush": 2}
     sights.pop(0)
     run.slot(Delay("observers", 70_000, Machine.work, ""))
-    assert run.books.faults["observers (in View.on_cycle)"] == 1
+    assert run.stats.causes["observers (in View.on_cycle)"] == 1
 
 
 def test_names_are_bounded() -> None:
-    books = CycleStats(LATE_US * US)
+    stats = CycleStats(LATE_US * US)
     for number in range(1000):
-        books.blame(f"callback {number}")
-    assert len(books.faults) == CULPRITS_MAX + 1
-    assert books.faults[OTHERS] == 1000 - CULPRITS_MAX
+        stats.add_cause(f"callback {number}")
+    assert len(stats.causes) == CAUSES_MAX + 1
+    assert stats.causes[OTHERS] == 1000 - CAUSES_MAX
 
 
 # The real step.
@@ -255,8 +256,8 @@ def test_the_step_marks_its_phases_and_no_overrun_delays_a_stop(
     machine = Machine()
     perception = Slow(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
     perception.machine, perception.observe_us = machine, observe_us
-    books = CycleStats(LATE_US * US)
-    keeper = Timekeeper(books, machine.read)
+    stats = CycleStats(LATE_US * US)
+    keeper = TimingMonitor(stats, machine.read)
     state, commands = State(perception), list[tuple[Command, int]]()
 
     def carry_out(command: Command) -> None:
@@ -279,7 +280,7 @@ def test_the_step_marks_its_phases_and_no_overrun_delays_a_stop(
         record = step(state, inputs, SETTINGS, carry_out, lambda done: done < 1, keeper.mark)
         keeper.end()
         assert commands[-1][1] - began_us == observe_us, "the command waits for nothing but the part that always runs"
-        took = {stretch.name: round(stretch.took_s / US) for stretch in keeper._stretches}
+        took = {span.name: round(span.took_s / US) for span in keeper._spans}
         assert took == {
             "perceive": observe_us, "decide": 0, "command": command_us, "refine": perception.refine_us
         }  # fmt: skip
@@ -309,36 +310,36 @@ def test_the_meter_tells_work_from_sleep() -> None:
 
 def hold(watch: StallSampler) -> None:
     # Set in here: whoever runs when it rings is seen, and a busy machine may let it ring at once.
-    watch.expect(0.01)
+    watch.sample_after(0.01)
     end_s = time.monotonic() + 60.0
-    while watch.seen is None and time.monotonic() < end_s:
+    while watch.sample is None and time.monotonic() < end_s:
         pass
 
 
 async def test_the_watch_names_the_callback_that_holds_the_loop() -> None:
     watch = StallSampler()
-    with watch.on_duty():
+    with watch.active():
         asyncio.get_running_loop().call_soon(hold, watch)
         async with asyncio.timeout(60.0):
-            while watch.seen is None:
+            while watch.sample is None:
                 await asyncio.sleep(0.001)
-        assert watch.seen in {("hold", "hold"), ("hold", "StallSampler.expect")}
-        watch.expect(600.0)
-        assert watch.seen is None
+        assert watch.sample in {("hold", "hold"), ("hold", "StallSampler.sample_after")}
+        watch.sample_after(600.0)
+        assert watch.sample is None
 
 
 async def test_the_watch_sees_nobody_where_the_loop_sleeps() -> None:
     watch, looks = StallSampler(), list[None]()
-    look = watch._look
+    look = watch._take_sample
 
     def counted(number: int, frame: object) -> None:
         looks.append(None)
         look(number, frame)  # type: ignore[arg-type]
 
-    watch._look = counted  # type: ignore[method-assign, assignment]
-    with watch.on_duty():
-        watch.expect(0.005)
+    watch._take_sample = counted  # type: ignore[method-assign, assignment]
+    with watch.active():
+        watch.sample_after(0.005)
         async with asyncio.timeout(60.0):
             while not looks:
                 await asyncio.sleep(0.2)
-    assert watch.seen is None or watch.seen.callback.startswith("test_the_watch_sees_nobody")
+    assert watch.sample is None or watch.sample.callback.startswith("test_the_watch_sees_nobody")

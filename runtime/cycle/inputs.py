@@ -1,0 +1,105 @@
+"""What one cycle takes in: everything that arrived from the robot, the operator and the process since the last one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from drivers.driver import LineState, Received, RobotDriver
+from perception.edits import Edit
+from runtime.cycle.drive_requests import DriveRequest
+
+GAP_SHARE: Final = 0.9
+"""Largest time between two commands as a share of the base's deadman: beyond it the base has stopped or is about to."""
+
+GAP_MAX_S: Final = GAP_SHARE * 0.5
+"""Largest time between two commands, s, for the protocol's usual deadman of 0.5 s, until the robot reports its own."""
+
+
+class Request(Enum):
+    """A change of mode that an operator asks for."""
+
+    ARM = "arm"
+    HALT = "halt"
+    DISARM = "disarm"
+    """From DRIVE back to READY: the robot stands, without the base's latch, and waits to be armed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """The inputs of the cycle that begins at `run_s` of the run's clock."""
+
+    run_s: float
+    line: LineState
+    trouble: str | None
+    """Why the line is not READY, where the driver knows."""
+    received: Received
+    """Echoes and odometry that arrived."""
+    request: Request | None = None
+    gap_max_s: float = GAP_MAX_S
+    """Largest time between two commands that the base's deadman allows."""
+    echo_age_s: float | None = None
+    """How long the oldest of the firings has waited for this cycle; None without a firing and in virtual time."""
+    overrun: str | None = None
+    """Why the cycle can no longer keep its period; None while it can."""
+    fault: str | None = None
+    """Which part of the program has failed; None while all work."""
+    drive_request: DriveRequest | None = None
+    """What the robot is to drive from now on; None leaves the request in force."""
+    edits: tuple[Edit, ...] = ()
+    """The operator's edits of the map, in this order."""
+    host_s: float | None = None
+    """The same moment by the host's clock; None in virtual time. For the record only: no decision depends on it."""
+
+
+def gather_inputs(
+    driver: RobotDriver,
+    run_s: float,
+    request: Request | None,
+    *,
+    echo_age_s: float | None = None,
+    overrun: str | None = None,
+    fault: str | None = None,
+    edits: tuple[Edit, ...] = (),
+    drive_request: DriveRequest | None = None,
+    host_s: float | None = None,
+) -> Inputs:
+    """Return the inputs of a cycle, among them everything that the driver has received.
+
+    Parameters
+    ----------
+    driver : RobotDriver
+        Gives up what it has received since the last cycle.
+    run_s, host_s : float
+        The cycle's beginning by the run's clock and by the host's; virtual time has only the former.
+    request, drive_request, edits
+        What the operator asks for.
+    echo_age_s : float, optional
+        How long the oldest of the firings has waited.
+    overrun, fault : str, optional
+        Why the robot must not drive.
+    """
+    driver.tick(run_s)
+    gap_max_s = command_gap_max_s(driver)
+    line, trouble, received = driver.state, driver.problem, driver.take_received()
+    return Inputs(
+        run_s,
+        line,
+        trouble,
+        received,
+        request,
+        gap_max_s,
+        echo_age_s,
+        overrun,
+        fault,
+        drive_request,
+        edits,
+        host_s,
+    )
+
+
+def command_gap_max_s(driver: RobotDriver) -> float:
+    """Return the longest time between two commands that the base's deadman allows, s."""
+    identity = driver.identity
+    return GAP_MAX_S if identity is None else GAP_SHARE * identity.deadman_s
