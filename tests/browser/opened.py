@@ -43,7 +43,7 @@ class Opened:
     async def world(self, expression: str) -> Any:
         """Return the value of an expression of what the page's main module exports."""
         return await self.page.evaluate(
-            f"async () => {{ const {{ connection, hand, selection, tools, units, view, world }} = await {MODULE};"
+            f"async () => {{ const {{ connection, teleoperation, selection, tools, units, view, run }} = await {MODULE};"
             f" return {expression}; }}"
         )
 
@@ -63,7 +63,7 @@ class Opened:
 
     async def steady(self) -> None:
         """Stop the map from being fitted by itself, so that places stay where they are."""
-        await self.until("world.fresh && world.state.objects.length > 0", "objects on the map")
+        await self.until("run.fresh && run.state.objects.length > 0", "objects on the map")
         await self.page.evaluate(f"async () => {{ const {{ view }} = await {MODULE}; view.touched = true; }}")
 
     async def tab(self, name: str) -> None:
@@ -122,7 +122,7 @@ class Opener:
         self._opened.append(opened)
         await page.goto(url)
         if live:
-            await opened.until("world.fresh", "a first state")
+            await opened.until("run.fresh", "a first state")
         return opened
 
     def check(self) -> None:

@@ -118,7 +118,7 @@ async def test_the_focus_goes_round_and_is_always_seen(server: FakeServer, opene
         where = await opened.probe("focus")
         met.append(where[0])
         assert where[1], f"{where[0]} has the focus and does not show it"
-    assert {"halt", "map-front", "tool-pan", "fit", "tab-drive", "disarm", "pad", "hand-limit", "goal-x"} <= set(met)
+    assert {"halt", "map-front", "tool-pan", "fit", "tab-drive", "disarm", "pad", "teleop-limit", "goal-x"} <= set(met)
 
 
 async def test_tools_are_radio_buttons(server: FakeServer, opener: Opener) -> None:
@@ -136,7 +136,7 @@ async def test_tools_are_radio_buttons(server: FakeServer, opener: Opener) -> No
 async def test_keys_are_listed(server: FakeServer, opener: Opener) -> None:
     opened = await scene(server, opener, DESK)
     await opened.page.keyboard.press("?")
-    await opened.says("#dialog", "HALT, wherever you do not write text")
+    await opened.says("#dialog", "HALT, except while you type text")
     await opened.shot("keys")
     await opened.page.keyboard.press("Escape")
     await expect(opened.page.locator("#dialog")).to_be_hidden()
@@ -144,7 +144,7 @@ async def test_keys_are_listed(server: FakeServer, opener: Opener) -> None:
 
 async def test_the_map_has_words(server: FakeServer, opener: Opener) -> None:
     opened = await scene(server, opener, DESK)
-    await opened.says("#map-words", "6 objects: drum at 7.0, 4.0 ft")
+    await opened.says("#map-text", "6 objects: drum at 7.0, 4.0 ft")
 
 
 async def test_nothing_moves_for_those_who_want_it_calm(server: FakeServer, opener: Opener) -> None:

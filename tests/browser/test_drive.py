@@ -13,7 +13,7 @@ from tests.browser.opened import PHONE, Opened, Opener, until
 
 pytestmark = [pytest.mark.realtime, pytest.mark.asyncio(loop_scope="session")]
 
-FOCI = ("body", "#map-front", "#tab-log", "#hand-keys", "#ellipse-scale", "#hand-limit", "#fit")
+FOCI = ("body", "#map-front", "#tab-log", "#teleop-keys", "#ellipse-scale", "#teleop-limit", "#fit")
 
 CAPITAL = "() => document.body.dispatchEvent(new KeyboardEvent('keydown', { key: 'A', bubbles: true }))"
 
@@ -65,7 +65,7 @@ async def test_halt_latches_and_says_why(server: FakeServer, opener: Opener) -> 
     assert await server.wait("halt") == {}
     await opened.says("#mode-name", "SAFE STOP")
     await opened.says("#reason", "halted by the operator")
-    await opened.says("#said", "Mode safe stop: halted by the operator")
+    await opened.says("#announce", "Mode safe stop: halted by the operator")
     await opened.says("#banner-stopped", "halted by the operator")
     await opened.shot("halted")
     assert not server.of("arm"), "nothing arms by itself"
@@ -78,7 +78,7 @@ async def test_halt_latches_and_says_why(server: FakeServer, opener: Opener) -> 
 @pytest.mark.parametrize("target", FOCI)
 async def test_the_space_bar_halts_wherever_the_focus_is(server: FakeServer, opener: Opener, target: str) -> None:
     opened = await opener.open(server.url)
-    if target in {"#hand-keys", "#hand-limit"}:
+    if target in {"#teleop-keys", "#teleop-limit"}:
         await opened.tab("Drive")
     elif target == "#ellipse-scale":
         await opened.tab("Layers")
@@ -86,7 +86,7 @@ async def test_the_space_bar_halts_wherever_the_focus_is(server: FakeServer, ope
     scale = await opened.world("view.scale")
     await opened.page.keyboard.press("Space")
     await server.wait("halt")
-    assert await opened.page.locator("#hand-keys").is_checked() is False
+    assert await opened.page.locator("#teleop-keys").is_checked() is False
     assert await opened.world("view.scale") == scale or target != "#fit", "and presses no button besides"
     assert len(server.of("halt")) == 1
 
@@ -136,7 +136,7 @@ async def test_who_watches_can_halt_but_not_drive(server: FakeServer, opener: Op
     server.controller = 99
     opened = await opener.open(server.url)
     await opened.tab("Drive")
-    await opened.says("#role-words", "You watch")
+    await opened.says("#role-text", "You watch")
     await opened.says("#banner-watching", "You are watching")
     for name in ("Arm", "Disarm", "As configured", "Goal on the map"):
         await expect(opened.page.get_by_role("button", name=name, exact=True)).to_be_disabled()
@@ -166,12 +166,12 @@ async def test_control_is_asked_for_and_handed_over(server: FakeServer, opener: 
     assert await server.wait("grant_control") == {"client": 2}
     server.controller = 2
     await second.tab("Drive")
-    await second.says("#role-words", "You control")
+    await second.says("#role-text", "You control")
     await first.tab("Drive")
-    await first.says("#role-words", "You watch")
+    await first.says("#role-text", "You watch")
     await second.page.get_by_role("button", name="Give control away").click()
     await server.wait("release_control")
-    await second.says("#role-words", "You watch")
+    await second.says("#role-text", "You watch")
 
 
 async def press_pad(opened: Opened, x: float, y: float) -> None:
@@ -195,11 +195,11 @@ async def test_the_pad_drives_while_it_is_held(server: FakeServer, opener: Opene
         "half the speed at most, as far forward as the knob"
     )
     assert last["w"] == pytest.approx(0.5 * 1.0 * 0.447, abs=0.03), "left is counter-clockwise"
-    await opened.says("#hand-state", "held:")
+    await opened.says("#teleop-state", "driving:")
     await opened.shot("pad")
     await opened.page.mouse.up()
     await has_let_go(server)
-    await opened.says("#hand-state", "not held")
+    await opened.says("#teleop-state", "released")
 
 
 async def test_commands_come_often_enough(server: FakeServer, opener: Opener) -> None:
@@ -220,9 +220,9 @@ async def test_keys_drive_only_where_that_is_switched_on(server: FakeServer, ope
     await page.keyboard.up("w")
     assert not server.of("teleoperate")
     await opened.tab("Drive")
-    await page.locator("#hand-keys").focus()
+    await page.locator("#teleop-keys").focus()
     await page.keyboard.press("Enter")
-    await expect(page.locator("#hand-keys")).to_be_checked()
+    await expect(page.locator("#teleop-keys")).to_be_checked()
     await page.keyboard.down("w")
     await page.keyboard.down("d")
     await still_sends(server)
@@ -242,9 +242,9 @@ async def test_arrows_drive_on_the_pad_with_a_limit(server: FakeServer, opener: 
     opened = await opener.open(server.url)
     page = opened.page
     await opened.tab("Drive")
-    await page.locator("#hand-limit").focus()
+    await page.locator("#teleop-limit").focus()
     await page.keyboard.press("End")
-    await opened.says("#hand-limit-value", "100 %")
+    await opened.says("#teleop-limit-value", "100 %")
     await page.locator("#pad").focus()
     await page.keyboard.down("ArrowDown")
     await still_sends(server)
@@ -258,7 +258,7 @@ async def test_a_gamepad_drives_only_with_its_shoulder_button(server: FakeServer
     page = opened.page
     await page.evaluate("() => plugIn()")
     await opened.tab("Drive")
-    await opened.says("#hand-gamepad", "a pad")
+    await opened.says("#teleop-gamepad", "a pad")
     await page.evaluate("() => { padUnderTest.axes[1] = -1; }")
     await asyncio.sleep(0.2)
     assert not server.of("teleoperate"), "the stick alone moves nothing"
@@ -267,7 +267,7 @@ async def test_a_gamepad_drives_only_with_its_shoulder_button(server: FakeServer
     assert server.of("teleoperate")[-1]["v"] == 0.25
     await page.evaluate("() => { padUnderTest.connected = false; dispatchEvent(new Event('gamepaddisconnected')); }")
     await has_let_go(server)
-    await opened.says("#hand-gamepad", "no gamepad")
+    await opened.says("#teleop-gamepad", "no gamepad")
 
 
 LOSSES: dict[str, str] = {
@@ -314,7 +314,7 @@ async def test_halt_and_a_lost_mode_let_go(server: FakeServer, opener: Opener) -
     await still_sends(server)
     server.mode, server.reason = "SAFE_STOP", "bumper contact"
     await has_let_go(server)
-    await opened.says("#hand-state", "let go: the mode is SAFE STOP")
+    await opened.says("#teleop-state", "stopped: the mode is SAFE STOP")
 
 
 async def test_losing_control_lets_go(server: FakeServer, opener: Opener) -> None:

@@ -77,15 +77,15 @@ async def test_the_page_shows_six_recognised_drums(tmp_path: Path, opener: Opene
         await expect(rows).to_have_count(6, timeout=1000 * PATIENCE_S)
         assert time.monotonic() - began_s < PATIENCE_S
         await opened.says("#mode-name", "DRIVE")
-        truth = await opened.world("world.session.truth.drums")
+        truth = await opened.world("run.session.truth.drums")
         known = await opened.world(
-            "world.state.objects.filter((o) => o.model === 'semicircle').map((o) => [o.x, o.y])"
+            "run.state.objects.filter((o) => o.model === 'semicircle').map((o) => [o.x, o.y])"
         )
         for x, y, _ in truth:
             assert min(abs(x - kx) + abs(y - ky) for kx, ky in known) < 0.1
-        assert await opened.world("world.segments.size") > 20
-        assert await opened.world("world.state.ranges.some((r) => r > 0)")
-        assert await opened.world("world.chart.length") > 10
+        assert await opened.world("run.segments.size") > 20
+        assert await opened.world("run.state.ranges.some((r) => r > 0)")
+        assert await opened.world("run.chart.length") > 10
         await opened.shot("six-drums")
 
 
@@ -95,7 +95,7 @@ async def test_a_wrong_token_shows_nothing(tmp_path: Path, opener: Opener) -> No
         wrong = robot.url.split("token=", maxsplit=1)[0] + "token=" + "A" * 22
         opened = await opener.open(wrong, live=False)
         await opened.says("#banner-connection", "token is missing or wrong")
-        assert not await opened.world("world.fresh")
+        assert not await opened.world("run.fresh")
         opened.complaints.clear()  # the browser's own words on the refusal
 
 
@@ -186,7 +186,7 @@ async def test_what_a_person_does_is_replayed_to_the_bit(tmp_path: Path, opener:
     async with run(tmp_path, opener) as robot:
         opened = await opener.open(robot.url)
         page = opened.page
-        await opened.until("world.state.objects.length >= 3 && world.segments.size > 30", "something to handle")
+        await opened.until("run.state.objects.length >= 3 && run.segments.size > 30", "something to handle")
         await opened.steady()
 
         await page.keyboard.press("2")
@@ -195,9 +195,9 @@ async def test_what_a_person_does_is_replayed_to_the_bit(tmp_path: Path, opener:
         chosen = await opened.world("[...selection.segments].slice(0, 12)")
         await opened.world(f"selection.choose({json.dumps(chosen)})")
         await page.keyboard.press("p")
-        await opened.until(f"{json.dumps(chosen)}.some((n) => world.segments.get(n)?.pinned)", "pins")
+        await opened.until(f"{json.dumps(chosen)}.some((n) => run.segments.get(n)?.pinned)", "pins")
         await page.keyboard.press("Delete")
-        await opened.until(f"{json.dumps(chosen)}.every((n) => !world.segments.has(n))", "segments that are gone")
+        await opened.until(f"{json.dumps(chosen)}.every((n) => !run.segments.has(n))", "segments that are gone")
 
         await page.locator("#objects li").first.click()
         await opened.says("#evidence", "for it")
@@ -206,7 +206,7 @@ async def test_what_a_person_does_is_replayed_to_the_bit(tmp_path: Path, opener:
         await page.get_by_role("button", name="Confirm").click()
         await opened.says("#toasts", "confirmed")
         await page.get_by_role("button", name="Reject").click()
-        await opened.until(f"!world.state.objects.some((o) => o.number === {number})", "an object that is gone")
+        await opened.until(f"!run.state.objects.some((o) => o.number === {number})", "an object that is gone")
 
         await page.keyboard.press("4")
         await page.mouse.click(*await opened.screen(1.5, 0.9))
@@ -230,7 +230,7 @@ async def test_what_a_person_does_is_replayed_to_the_bit(tmp_path: Path, opener:
         await opened.tab("Objects")
         await page.get_by_role("button", name="Clear the map…").click()
         await page.get_by_role("button", name="Clear the map", exact=True).click()
-        await opened.until("world.state.objects.length < 2", "a map that is empty")
+        await opened.until("run.state.objects.length < 2", "a map that is empty")
         await page.keyboard.press("Space")
         await robot.sees(lambda now: now.still, "a base that stands")
         robot.command.process.terminate()

@@ -28,7 +28,7 @@ CONTROL_FRAMES_PER_S = 45.0
 async def test_thirty_frames_a_second(server: FakeServer, opener: Opener, measured: Callable[[str], None]) -> None:
     opened = await opener.open(server.url, DESK)
     await opened.steady()
-    await opened.until("world.segments.size === 500 && world.state.objects.length === 40", "the whole scene")
+    await opened.until("run.segments.size === 500 && run.state.objects.length === 40", "the whole scene")
     renderer = await opened.probe("renderer")
     assert renderer == "none" or "SwiftShader" in renderer or "llvmpipe" in renderer, (
         f"not drawn in software: {renderer}"
@@ -50,7 +50,7 @@ async def test_it_draws_only_what_changed(server: FakeServer, opener: Opener) ->
     server.paused = True
     opened = await opener.open(server.url)
     await opened.steady()
-    await opened.until("world.segments.size === 500", "the whole scene")
+    await opened.until("run.segments.size === 500", "the whole scene")
     server.silent = True
     counts = await opened.probe("repaints")
     assert counts[0] == {"back": 0, "front": 0}, "it draws although nothing changed"

@@ -26,7 +26,7 @@ async def still(server: FakeServer, opener: Opener, size: tuple[int, int] | None
 
 async def middle(opened: Opened, number: int) -> tuple[float, float]:
     """Where the middle of a segment is on the screen."""
-    s = await opened.world(f"world.segments.get({number})")
+    s = await opened.world(f"run.segments.get({number})")
     x, y = (s["x1"] + s["x2"]) / 2, (s["y1"] + s["y2"]) / 2
     return await opened.screen(x, y)
 
@@ -52,11 +52,11 @@ async def test_a_click_selects_a_segment_and_delete_removes_it(server: FakeServe
     await page.mouse.move(*await middle(opened, 8))
     await opened.says("#tip", f"segment {chosen[0]}, ")
     await opened.says("#tip", " s old")
-    await expect(page.locator("#chosen-count")).to_have_text("1 segment")
+    await expect(page.locator("#selection-count")).to_have_text("1 segment")
     await page.keyboard.press("Delete")
     assert await server.wait("delete_segments") == {"numbers": chosen}
-    await opened.until(f"!world.segments.has({chosen[0]})", "the segment gone")
-    await expect(page.locator("#chosen")).to_be_hidden()
+    await opened.until(f"!run.segments.has({chosen[0]})", "the segment gone")
+    await expect(page.locator("#selection-bar")).to_be_hidden()
 
 
 async def test_a_lasso_selects_what_lies_in_it_to_pin_and_unpin(server: FakeServer, opener: Opener) -> None:
@@ -65,18 +65,18 @@ async def test_a_lasso_selects_what_lies_in_it_to_pin_and_unpin(server: FakeServ
     await page.keyboard.press("2")
     await lasso(opened, *DRUMS[1], 1.35 * RADIUS)
     inside = sorted(await opened.world(
-        f"[...world.segments.values()].filter((s) => Math.hypot((s.x1 + s.x2) / 2 - {DRUMS[1][0]},"
+        f"[...run.segments.values()].filter((s) => Math.hypot((s.x1 + s.x2) / 2 - {DRUMS[1][0]},"
         f" (s.y1 + s.y2) / 2 - {DRUMS[1][1]}) < {1.3 * RADIUS}).map((s) => s.number)"
     ))  # fmt: skip
     assert len(inside) > 10
-    await expect(page.locator("#chosen-count")).to_have_text(f"{len(inside)} segments")
+    await expect(page.locator("#selection-count")).to_have_text(f"{len(inside)} segments")
     await opened.shot("lasso")
-    await page.locator("#chosen-pin").click()
+    await page.locator("#selection-pin").click()
     pinned = await server.wait("pin_segments")
     assert sorted(pinned["numbers"]) == inside
     assert pinned["pinned"] is True
-    await opened.until(f"world.segments.get({inside[0]}).pinned", "a pin")
-    await page.locator("#chosen-unpin").click()
+    await opened.until(f"run.segments.get({inside[0]}).pinned", "a pin")
+    await page.locator("#selection-unpin").click()
     assert (await server.wait("pin_segments", 2))["pinned"] is False
     await page.keyboard.press("Escape")
 
@@ -98,7 +98,7 @@ async def test_segments_are_selected_with_the_keyboard_alone(server: FakeServer,
     await page.locator("#map-front").focus()
     await page.keyboard.press("2")
     await page.keyboard.press("a")
-    assert await opened.world("selection.segments.size === world.segments.size")
+    assert await opened.world("selection.segments.size === run.segments.size")
     await page.keyboard.press("Escape")
     await page.keyboard.press("ArrowUp")
     for _ in range(40):  # up along the middle of the map until something is within reach
@@ -200,14 +200,14 @@ async def test_a_model_file_is_loaded_and_what_is_wrong_stands_beside_it(
     file = tmp_path / "post.toml"
     file.write_text(text)
     await opened.tab("Tune")
-    await opened.page.get_by_label("Load a further model").set_input_files(file)
+    await opened.page.get_by_label("Load another model").set_input_files(file)
     assert await server.wait("load_model") == {"toml": text}
     await opened.says("#toasts", "post.toml is loaded")
     server.refusals["load_model"] = ("vertices_m: at least 3 are wanted", "vertices_m")
-    await opened.page.get_by_label("Load a further model").set_input_files(file)
+    await opened.page.get_by_label("Load another model").set_input_files(file)
     await opened.says("#model-error", "at least 3 are wanted")
     file.write_bytes(b"#" * 70_000)
-    await opened.page.get_by_label("Load a further model").set_input_files(file)
+    await opened.page.get_by_label("Load another model").set_input_files(file)
     await opened.says("#model-error", "70 kB long")
     assert len(server.of("load_model")) == 2
 
@@ -282,7 +282,7 @@ async def test_a_finger_selects_on_a_phone(server: FakeServer, opener: Opener) -
     opened = await still(server, opener, PHONE)
     await opened.page.locator("#tool-select").tap()
     await opened.page.touchscreen.tap(*await middle(opened, 8))
-    await expect(opened.page.locator("#chosen-count")).to_have_text("1 segment")
+    await expect(opened.page.locator("#selection-count")).to_have_text("1 segment")
     await opened.shot("phone-chosen")
     await opened.page.get_by_role("button", name="Delete").tap()
     assert len((await server.wait("delete_segments"))["numbers"]) == 1

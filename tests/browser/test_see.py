@@ -30,7 +30,7 @@ async def test_every_layer_draws_something_and_can_be_switched(server: FakeServe
     server.drive_request = {"kind": "goal", "x": 3.0, "y": 0.3}
     server.cycle = 170
     opened = await opener.open(server.url)
-    await opened.until("world.trail.length > 5", "a trail")
+    await opened.until("run.trail.length > 5", "a trail")
     server.paused = True
     await opened.steady()
     await opened.page.get_by_role("option").nth(1).click()  # the picked object's readings are a layer too
@@ -41,8 +41,8 @@ async def test_every_layer_draws_something_and_can_be_switched(server: FakeServe
     names = await opened.page.locator("#layers label").all_inner_texts()
     assert len(names) == 15
     assert [name for name in names if "arc" in name or "beam" in name] == [
-        "arcs of late echoes",
-        "beams that fire now",
+        "arcs of recent echoes",
+        "beams firing now",
     ]
     whole = await picture(opened)
     for index, name in enumerate(names):
@@ -70,8 +70,8 @@ async def test_beams_are_those_that_fire_now(server: FakeServer, opener: Opener)
     for layer in ("arcs", "segments", "clusters", "models", "grid", "truth", "vectors", "labels"):
         await opened.page.evaluate(f"() => document.getElementById('layer-{layer}').click()")
     first = await picture(opened)
-    await opened.page.evaluate("async () => { const { world, scene } = await import('/page/main.js');"
-                               " world.state.firing = [0]; scene.invalidate('front'); }")  # fmt: skip
+    await opened.page.evaluate("async () => { const { run, scene } = await import('/page/main.js');"
+                               " run.state.firing = [0]; scene.invalidate('front'); }")  # fmt: skip
     assert await picture(opened) != first
 
 
@@ -80,8 +80,8 @@ async def test_age_makes_segments_thinner(server: FakeServer, opener: Opener) ->
     opened = await still(server, opener)
     server.silent = True
     young = await picture(opened)
-    await opened.page.evaluate("async () => { const { world, scene } = await import('/page/main.js');"
-                               " for (const s of world.segments.values()) s.t -= 90; world.segmentsVersion++;"
+    await opened.page.evaluate("async () => { const { run, scene } = await import('/page/main.js');"
+                               " for (const s of run.segments.values()) s.t -= 90; run.segmentsVersion++;"
                                " scene.invalidate('back'); }")  # fmt: skip
     assert await picture(opened) != young
 
@@ -123,9 +123,9 @@ async def test_follow_keeps_the_robot_in_the_middle_until_somebody_pans(server: 
     follow = opened.page.get_by_role("button", name="Follow the robot")
     await follow.click()
     await expect(follow).to_have_attribute("aria-pressed", "true")
-    x = await opened.world("world.state.pose[0]")
-    await opened.until(f"world.state.pose[0] > {x} + 0.1", "a robot that drives")
-    assert await opened.world("view.x === world.state.pose[0] && view.y === world.state.pose[1]")
+    x = await opened.world("run.state.pose[0]")
+    await opened.until(f"run.state.pose[0] > {x} + 0.1", "a robot that drives")
+    assert await opened.world("view.x === run.state.pose[0] && view.y === run.state.pose[1]")
     await opened.page.locator("#map-front").focus()
     await opened.page.keyboard.press("ArrowUp")
     await expect(follow).to_have_attribute("aria-pressed", "false")
@@ -175,14 +175,14 @@ async def test_tape_measures_from_drum_to_drum(server: FakeServer, opener: Opene
     await page.mouse.down()
     await page.mouse.move(*end, steps=5)
     await page.mouse.up()
-    await opened.says("#said", "Tape: 3.0")
-    assert "ft at 0°" in (await page.locator("#said").inner_text())
+    await opened.says("#announce", "Tape: 3.0")
+    assert "ft at 0°" in (await page.locator("#announce").inner_text())
     await opened.shot("tape")
 
     await page.locator("#map-front").press("Escape")
     await page.mouse.click(*start)
     await page.mouse.click(*end)
-    await opened.says("#said", "Tape: 3.0")
+    await opened.says("#announce", "Tape: 3.0")
 
 
 async def test_a_list_of_objects_in_words(server: FakeServer, opener: Opener) -> None:
@@ -207,14 +207,14 @@ async def test_a_list_of_objects_in_words(server: FakeServer, opener: Opener) ->
 async def test_ring_charts_and_facts(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     server.recording = {"file": "runs/now.mcap", "bytes": 1_200_000, "dropped": 2}
-    await opened.says("#ring-words", "nearest")
-    await opened.says("#ring-words", "not trusted: 17 (weak)")
+    await opened.says("#ring-text", "nearest")
+    await opened.says("#ring-text", "not trusted: 17 (weak)")
     for phase in ("gather", "perceive", "decide", "command", "refine", "observers"):
         await opened.says("#phases-legend", phase)
     server.cycle = 171
     await opened.says("#late-legend", "1 missed")
     await opened.says("#late-legend", "ended by budget")
-    assert await opened.world("world.chart.some((one) => one.missed === 1)")
+    assert await opened.world("run.chart.some((one) => one.missed === 1)")
     await opened.says("#fact-link", "1 / 0")
     server.flags = ["BUMPER"]
     await opened.says("#fact-flags", "bumper")
@@ -263,7 +263,7 @@ async def test_it_connects_again_by_itself_and_takes_the_whole_map(server: FakeS
     await opened.says("#banners", "No connection")
     server.controller = 2
     await expect(opened.page.locator("#banner-connection")).to_have_count(0, timeout=30_000)
-    await opened.until(f"world.segments.size >= {server.hall.known(server.cycle) - 5}", "the whole map")
+    await opened.until(f"run.segments.size >= {server.hall.known(server.cycle) - 5}", "the whole map")
 
 
 async def test_a_wrong_token_is_told(server: FakeServer, opener: Opener) -> None:
@@ -277,7 +277,7 @@ async def test_the_token_does_not_stay_in_the_address(server: FakeServer, opener
     opened = await opener.open(server.url)
     assert "token" not in opened.page.url
     await opened.page.reload()
-    await opened.until("world.fresh", "the page after a reload")
+    await opened.until("run.fresh", "the page after a reload")
     assert "token" not in opened.page.url
 
 
@@ -291,17 +291,17 @@ async def test_what_has_no_model_is_shown_too(server: FakeServer, opener: Opener
 
 async def test_segments_that_left_are_gone(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
-    size = await opened.world("world.segments.size")
+    size = await opened.world("run.segments.size")
     server.deleted |= {1, 2, 3}
-    await until(lambda: opened.world(f"world.segments.size === {size - 3}"), "three segments fewer")
+    await until(lambda: opened.world(f"run.segments.size === {size - 3}"), "three segments fewer")
 
 
 async def test_a_whole_map_after_a_gap_takes_the_place_of_the_old_one(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
-    assert await opened.world("world.segments.has(5) && world.segments.has(6)")
+    assert await opened.world("run.segments.has(5) && run.segments.has(6)")
     server.deleted |= {5, 6}
     for client in server.clients:  # one that missed the frame in which they went
         client.gone |= {5, 6}
         client.whole = True
-    await opened.until("!world.segments.has(5) && !world.segments.has(6)", "a map without them")
-    assert await opened.world("world.segments.has(7)")
+    await opened.until("!run.segments.has(5) && !run.segments.has(6)", "a map without them")
+    assert await opened.world("run.segments.has(7)")

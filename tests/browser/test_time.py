@@ -21,7 +21,7 @@ async def test_pause_single_step_and_speed(server: FakeServer, opener: Opener) -
     await opened.tab("Time")
     await page.get_by_role("button", name="Pause").click()
     assert await server.wait("pause") == {}
-    await opened.says("#time-words", "paused")
+    await opened.says("#time-text", "paused")
     await page.get_by_role("button", name="One cycle", exact=True).click()
     assert await server.wait("single_step") == {}
     await page.locator("#map-front").focus()
@@ -29,7 +29,7 @@ async def test_pause_single_step_and_speed(server: FakeServer, opener: Opener) -
     await server.wait("resume")
     await page.locator("#speed").select_option("4")
     assert await server.wait("set_speed") == {"factor": 4}
-    await opened.says("#time-words", "× 4")
+    await opened.says("#time-text", "× 4")
 
 
 async def test_a_robot_on_a_port_has_no_time_to_hold(server: FakeServer, opener: Opener) -> None:
@@ -48,7 +48,7 @@ async def test_record_and_bookmark(server: FakeServer, opener: Opener) -> None:
     await record.click()
     assert await server.wait("record") == {"on": True}
     await expect(record).to_have_attribute("aria-pressed", "true")
-    await opened.says("#record-words", "now.mcap")
+    await opened.says("#record-text", "now.mcap")
     await page.get_by_label("Bookmark", exact=True).first.fill("here it slipped")
     await page.keyboard.press("Enter")
     assert await server.wait("bookmark") == {"text": "here it slipped"}
@@ -64,7 +64,7 @@ async def test_a_recording_is_opened_scrubbed_played_and_left(server: FakeServer
     await page.locator("#recordings").select_option("2026-01-02-first.mcap")
     await page.get_by_role("button", name="Open").click()
     assert await server.wait("open_recording") == {"file": "2026-01-02-first.mcap"}
-    await opened.says("#banner-playback", "You look at a recording, not at the robot: 2026-01-02-first.mcap")
+    await opened.says("#banner-playback", "This is a recording, not the live run: 2026-01-02-first.mcap")
     await opened.says("#mode-name", "then: DRIVE")
     await opened.says("#robot-name", "older")
     await page.locator("#scrub").focus()
@@ -103,7 +103,7 @@ async def test_nothing_is_driven_by_hand_while_one_looks_at_a_recording(server: 
     await opened.tab("Drive")
     await opened.page.locator("#pad").focus()
     await opened.page.keyboard.press("ArrowUp")
-    await opened.says("#toasts", "you look at a recording")
+    await opened.says("#toasts", "a recording is shown")
     assert not server.of("teleoperate")
     await opened.steady()
     await opened.page.locator("#map-front").focus()

@@ -1,7 +1,7 @@
-// Strip charts: what each phase of the last cycles took, stacked, against budget and period, and how late they began.
-// A cycle that was late or missed has a mark above it, so that nobody has to tell it by a colour.
+// Strip charts: the duration of each phase of the last cycles, stacked, against budget and period, and their lateness.
+// A late or missed cycle also has a mark above its column, because colour alone is not enough for every reader.
 
-import { el, mark, say } from "./dom.js";
+import { el, setAttribute, setText } from "./dom.js";
 import { fitted } from "./theme.js";
 
 const COLUMN_PX = 3;
@@ -46,7 +46,7 @@ class Strip {
     return this.width - 3 - (count - index) * COLUMN_PX;
   }
 
-  line(ms, words, dash) {
+  line(ms, text, dash) {
     if (!(ms > 0) || ms > this.top_ms) return;
     const { ctx } = this, y = this.y(ms);
     ctx.strokeStyle = this.theme.ink;
@@ -62,9 +62,9 @@ class Strip {
     ctx.textBaseline = "bottom";
     ctx.lineWidth = 3;
     ctx.strokeStyle = this.theme.panel;
-    ctx.strokeText(words, LEFT + 4, y - 1);
+    ctx.strokeText(text, LEFT + 4, y - 1);
     ctx.fillStyle = this.theme.ink;
-    ctx.fillText(words, LEFT + 4, y - 1);
+    ctx.fillText(text, LEFT + 4, y - 1);
   }
 
   // Crosses where a cycle was missed, triangles where one was late.
@@ -97,28 +97,28 @@ export class Charts {
   #late;
   #legend;
   #lateLegend;
-  #world;
+  #run;
   #theme;
   #names = [];
   #values = [];
 
-  constructor({ phases, late, legend, lateLegend, world, theme }) {
+  constructor({ phases, late, legend, lateLegend, run, theme }) {
     this.#phases = new Strip(phases, theme);
     this.#late = new Strip(late, theme);
-    [this.#legend, this.#lateLegend, this.#world, this.#theme] = [legend, lateLegend, world, theme];
+    [this.#legend, this.#lateLegend, this.#run, this.#theme] = [legend, lateLegend, run, theme];
   }
 
   draw() {
     if (this.#phases.canvas.clientWidth === 0) return;
-    const chart = this.#world.chart;
+    const chart = this.#run.chart;
     this.#drawPhases(chart);
     this.#drawLate(chart);
   }
 
   #drawPhases(chart) {
     const strip = this.#phases;
-    const names = Object.keys(this.#world.state.phases);
-    const budget = 1000 * (this.#world.session?.budget_s ?? 0), period = 1000 * (this.#world.session?.period_s ?? 0);
+    const names = Object.keys(this.#run.state.phases);
+    const budget = 1000 * (this.#run.session?.budget_s ?? 0), period = 1000 * (this.#run.session?.period_s ?? 0);
     const shownMax = Math.floor((strip.canvas.clientWidth - LEFT - 6) / COLUMN_PX);
     const shown = chart.slice(-Math.max(1, shownMax));
     const sums = shown.map(({ phases }) => names.reduce((sum, name) => sum + (phases[name] ?? 0) / 1000, 0));
@@ -138,10 +138,10 @@ export class Charts {
     strip.line(budget, `budget ${Number(budget.toPrecision(3))} ms`, [6, 4]);
     strip.line(period, `period ${Number(period.toPrecision(3))} ms`, []);
     strip.marks(shown);
-    this.#tell(names, shown.at(-1)?.phases ?? {});
+    this.#updateLegend(names, shown.at(-1)?.phases ?? {});
   }
 
-  #tell(names, phases) {
+  #updateLegend(names, phases) {
     if (names.join() !== this.#names.join()) {
       this.#names = names;
       this.#values = names.map(() => el("b"));
@@ -151,7 +151,7 @@ export class Charts {
         return el("span", {}, swatch, `${name} `, this.#values[k]);
       }), el("span", {}, "✕ missed  ▼ late"));
     }
-    names.forEach((name, k) => say(this.#values[k], ((phases[name] ?? 0) / 1000).toFixed(2)));
+    names.forEach((name, k) => setText(this.#values[k], ((phases[name] ?? 0) / 1000).toFixed(2)));
   }
 
   #drawLate(chart) {
@@ -166,11 +166,11 @@ export class Charts {
     strip.ctx.fillStyle = this.#theme.accent;
     strip.ctx.fill(path);
     strip.marks(shown);
-    const { missed, late, quanta, refinement } = this.#world.state;
-    say(this.#lateLegend, `${missed} missed, ${late} late; ${quanta} quanta, ended by ${refinement || "–"}`);
+    const { missed, late, quanta, refinement } = this.#run.state;
+    setText(this.#lateLegend, `${missed} missed, ${late} late; ${quanta} quanta, ended by ${refinement || "–"}`);
     const last = shown.at(-1);
     if (last && shown.length % 20 === 0) {
-      mark(strip.canvas, "aria-label", `Lateness of the last ${shown.length} cycles, the last one ${last.late_ms.toFixed(2)} ms`);
+      setAttribute(strip.canvas, "aria-label", `Lateness of the last ${shown.length} cycles, the last one ${last.late_ms.toFixed(2)} ms`);
     }
   }
 }

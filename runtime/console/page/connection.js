@@ -1,4 +1,4 @@
-// The one websocket: reconnects by itself, matches answers to what was asked, and knows when the line is congested.
+// The websocket: reconnects, matches answers to requests, and detects congestion.
 
 import { Emitter } from "./emitter.js";
 
@@ -7,19 +7,19 @@ const RETRY_MAX_MS = 4000;
 const ANSWER_MAX_MS = 10_000;
 const SILENCE_MAX_MS = 10_000;
 const MESSAGE_MAX = 65_536;
-// Numbers in a recording are not those of the live map, and what it shows is not where the robot is.
+// Refused while a recording is shown: its object numbers and poses are not those of the live run.
 const LIVE_ONLY = new Set([
   "arm", "legs", "goal", "teleoperate", "delete_segments", "pin_segments", "place_model", "move_object", "reject_object",
   "confirm_object", "clear_map", "evidence",
 ]);
-// More than this unsent means that the network stalls: what is sent now would move the robot at some later time.
+// With more than this unsent the network is stalled: a command sent now would move the robot too late.
 const CONGESTED_BYTES = 4096;
 
-export class Refusal extends Error {
+export class RequestError extends Error {
   constructor(message, { field = null, answered = true } = {}) {
     super(message);
     this.field = field;
-    this.answered = answered; // or nobody knows whether it arrived
+    this.answered = answered; // false: it is unknown whether the message arrived
   }
 }
 
@@ -27,10 +27,10 @@ export class Connection extends Emitter {
   #address;
   #socket = null;
   #next = 1;
-  #asked = new Map();
+  #pending = new Map();
   #retry_ms = RETRY_FIRST_MS;
   #timer = null;
-  #heard_ms = 0;
+  #received_ms = 0;
   #halting = false;
   #probing = false;
   showsRecording = () => false;
@@ -38,7 +38,7 @@ export class Connection extends Emitter {
   constructor(address) {
     super();
     this.#address = address;
-    setInterval(() => this.#notice(), 1000);
+    setInterval(() => this.#checkSilence(), 1000);
   }
 
   get open() {
@@ -53,7 +53,7 @@ export class Connection extends Emitter {
     clearTimeout(this.#timer);
     const socket = new WebSocket(this.#address);
     this.#socket = socket;
-    this.#heard_ms = performance.now();
+    this.#received_ms = performance.now();
     let opened = false;
     socket.onopen = () => {
       opened = true;
@@ -61,44 +61,44 @@ export class Connection extends Emitter {
       if (this.#halting) this.halt().catch(() => {});
       this.emit("open");
     };
-    socket.onmessage = (event) => this.#hear(event.data);
+    socket.onmessage = (event) => this.#onMessage(event.data);
     socket.onclose = (event) => {
       if (this.#socket !== socket) return;
       this.#socket = null;
-      for (const { refuse, timer } of this.#asked.values()) {
+      for (const { refuse, timer } of this.#pending.values()) {
         clearTimeout(timer);
-        refuse(new Refusal("the connection was lost before an answer came", { answered: false }));
+        refuse(new RequestError("the connection was lost before an answer came", { answered: false }));
       }
-      this.#asked.clear();
+      this.#pending.clear();
       this.emit("closed", { opened, reason: event.reason, code: event.code });
       this.#timer = setTimeout(() => this.connect(), this.#retry_ms);
       this.#retry_ms = Math.min(2 * this.#retry_ms, RETRY_MAX_MS);
     };
   }
 
-  // Sends a message and resolves to its answer's data; rejects with a Refusal that says why not.
-  ask(message, patience_ms = ANSWER_MAX_MS) {
+  // Sends a message and resolves to its answer's data; rejects with a RequestError that says why not.
+  request(message, patience_ms = ANSWER_MAX_MS) {
     return new Promise((resolve, refuse) => {
-      const id = this.#put(message, refuse);
+      const id = this.#transmit(message, refuse);
       if (id === null) return;
       const timer = setTimeout(() => {
-        this.#asked.delete(id);
-        refuse(new Refusal(`no answer to "${message.type}" in ${patience_ms / 1000} s`, { answered: false }));
+        this.#pending.delete(id);
+        refuse(new RequestError(`no answer to "${message.type}" in ${patience_ms / 1000} s`, { answered: false }));
       }, patience_ms);
-      this.#asked.set(id, { resolve, refuse, timer });
+      this.#pending.set(id, { resolve, refuse, timer });
     });
   }
 
-  // Sends a message whose answer nobody waits for; says whether it went out.
-  post(message) {
-    return this.#put(message, () => {}) !== null;
+  // Sends a message without waiting for its answer; returns whether it was sent.
+  send(message) {
+    return this.#transmit(message, () => {}) !== null;
   }
 
-  // A HALT of which nobody knows whether it arrived is sent again, first thing once there is a connection.
+  // A HALT that may not have arrived is sent again as the first message of the next connection.
   async halt() {
     this.#halting = true;
     try {
-      await this.ask({ type: "halt" });
+      await this.request({ type: "halt" });
       this.#halting = false;
     } catch (error) {
       this.#halting = !error.answered;
@@ -106,7 +106,7 @@ export class Connection extends Emitter {
     }
   }
 
-  // The status with which the same address answers a plain request; null where nobody answers.
+  // The HTTP status of a plain request to the same address; null without an answer.
   async probe() {
     try {
       const address = this.#address.replace(/^ws/, "http");
@@ -116,56 +116,56 @@ export class Connection extends Emitter {
     }
   }
 
-  #put(message, refuse) {
+  #transmit(message, refuse) {
     if (!this.open) {
-      refuse(new Refusal("there is no connection to the robot's process", { answered: false }));
+      refuse(new RequestError("there is no connection to the robot's process", { answered: false }));
       return null;
     }
     if (LIVE_ONLY.has(message.type) && this.showsRecording() && !(message.v === 0 && message.w === 0)) {
-      refuse(new Refusal("you look at a recording: go back to the live run first"));
+      refuse(new RequestError("a recording is shown: go back to the live run first"));
       return null;
     }
     const id = this.#next++;
     const text = JSON.stringify({ id, ...message });
     if (text.length > MESSAGE_MAX) {
-      refuse(new Refusal("that is too long to be sent"));
+      refuse(new RequestError("the message is too long"));
       return null;
     }
     this.#socket.send(text);
     return id;
   }
 
-  #hear(text) {
-    this.#heard_ms = performance.now();
+  #onMessage(text) {
+    this.#received_ms = performance.now();
     let message;
     try {
       message = JSON.parse(text);
     } catch {
       return;
     }
-    if (message.type === "answer") this.#settle(message);
+    if (message.type === "answer") this.#resolve(message);
     else this.emit(message.type, message);
   }
 
-  #settle({ id, ok, error, field, data }) {
-    const asked = this.#asked.get(id);
-    if (asked === undefined) {
-      if (!ok) this.emit("refused", new Refusal(error ?? "refused", { field }));
+  #resolve({ id, ok, error, field, data }) {
+    const pending = this.#pending.get(id);
+    if (pending === undefined) {
+      if (!ok) this.emit("refused", new RequestError(error ?? "refused", { field }));
       return;
     }
-    this.#asked.delete(id);
-    clearTimeout(asked.timer);
-    if (ok) asked.resolve(data ?? null);
-    else asked.refuse(new Refusal(error ?? "refused", { field }));
+    this.#pending.delete(id);
+    clearTimeout(pending.timer);
+    if (ok) pending.resolve(data ?? null);
+    else pending.refuse(new RequestError(error ?? "refused", { field }));
   }
 
-  // A laptop that slept leaves a socket that looks open and is not. Silence alone says nothing, a recording may be held:
-  // so something harmless is asked, and who does not answer that either is gone.
-  #notice() {
-    if (!this.open || performance.now() - this.#heard_ms < SILENCE_MAX_MS || this.#probing) return;
+  // After a laptop's sleep a socket can look open and be dead. Silence alone proves nothing, because playback may be paused:
+  // so send a harmless request, and close the socket if that is not answered either.
+  #checkSilence() {
+    if (!this.open || performance.now() - this.#received_ms < SILENCE_MAX_MS || this.#probing) return;
     this.#probing = true;
     const socket = this.#socket;
-    this.ask({ type: "save_toml" }).catch((error) => {
+    this.request({ type: "save_toml" }).catch((error) => {
       if (!error.answered) socket.close();
     }).finally(() => {
       this.#probing = false;

@@ -1,4 +1,4 @@
-// Elements in a line each; text always goes in as text, so that nothing a recording or a robot says becomes markup.
+// Helpers that build elements. Text is always inserted as text, so that no string from a robot or a recording becomes markup.
 
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -34,11 +34,11 @@ export function svg(tag, attributes, ...children) {
 }
 
 // Writing the same text again would make the browser lay the page out again, twenty times a second.
-export function say(element, text) {
+export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-export function mark(element, name, value) {
+export function setAttribute(element, name, value) {
   const text = String(value);
   if (element.getAttribute(name) !== text) element.setAttribute(name, text);
 }

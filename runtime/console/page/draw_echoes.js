@@ -1,15 +1,15 @@
-// Raw data as the ring gives it: the beams that fire now, and the arcs on which the echoes of late may lie.
+// Raw data: the beams that fire now, and the arcs on which recent echoes lie.
 
-import { haloed } from "./scene.js";
+import { textWithHalo } from "./scene.js";
 
 const AGES = [[0.3, 0.9, 1.8], [1.5, 0.45, 1.2], [Infinity, 0.2, 1]]; // up to s, opacity, px
 
 export function drawArcs(f) {
-  const { ctx, world, px } = f;
-  const half = world.session?.ring?.half_angle ?? 0;
+  const { ctx, run, px } = f;
+  const half = run.session?.ring?.half_angle ?? 0;
   const paths = AGES.map(() => new Path2D());
-  for (const echo of world.echoes) {
-    const age = world.state.robot_s - echo.t;
+  for (const echo of run.echoes) {
+    const age = run.state.robot_s - echo.t;
     const path = paths[AGES.findIndex(([until]) => age < until)] ?? paths.at(-1);
     const from = echo.angle - half;
     path.moveTo(echo.x + echo.range * Math.cos(from), echo.y + echo.range * Math.sin(from));
@@ -25,15 +25,15 @@ export function drawArcs(f) {
 }
 
 export function drawBeams(f) {
-  const { ctx, world, px, theme } = f;
-  const ring = world.session?.ring;
+  const { ctx, run, px, theme } = f;
+  const ring = run.session?.ring;
   if (!ring) return;
   const heard = new Path2D(), unheard = new Path2D();
   const places = [];
-  for (const index of world.state.firing) {
-    const at = world.sensor(index);
+  for (const index of run.state.firing) {
+    const at = run.sensor(index);
     if (at === null) continue;
-    const range = world.state.ranges[index];
+    const range = run.state.ranges[index];
     const echo = range !== null && range !== undefined && range >= 0;
     const reach = echo ? range : ring.range_max;
     const path = echo ? heard : unheard;
@@ -63,6 +63,6 @@ export function drawBeams(f) {
   ctx.textBaseline = "middle";
   for (const [index, at] of places) {
     const [x, y] = f.view.toScreen(at.x + 0.1 * Math.cos(at.angle), at.y + 0.1 * Math.sin(at.angle));
-    haloed(f, String(index), x, y, theme.echo);
+    textWithHalo(f, String(index), x, y, theme.echo);
   }
 }

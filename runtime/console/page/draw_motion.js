@@ -1,6 +1,6 @@
 // The robot and what moves it: body and heading, the trail, each schema's vector with its name, their sum, the goal.
 
-import { haloed, overlap } from "./scene.js";
+import { textWithHalo, overlap } from "./scene.js";
 
 const UNIT_PX = 70; // a vector of magnitude one; longer where the robot is large, so that it shows beyond the rim
 const LENGTH_MAX = 2; // in units
@@ -10,11 +10,11 @@ export function trailDrawer() {
   let version = -1;
   let path = null;
   return (f) => {
-    const { ctx, world, px, theme } = f;
-    if (world.trailVersion !== version) {
-      version = world.trailVersion;
+    const { ctx, run, px, theme } = f;
+    if (run.trailVersion !== version) {
+      version = run.trailVersion;
       path = new Path2D();
-      world.trail.forEach(({ x, y }, i) => (i === 0 ? path.moveTo(x, y) : path.lineTo(x, y)));
+      run.trail.forEach(({ x, y }, i) => (i === 0 ? path.moveTo(x, y) : path.lineTo(x, y)));
     }
     f.inWorld();
     ctx.strokeStyle = theme.robot;
@@ -26,10 +26,10 @@ export function trailDrawer() {
 }
 
 export function drawRobot(f) {
-  const { ctx, world, px, theme } = f;
-  if (!world.fresh) return;
-  const [x, y, theta] = world.state.pose;
-  const r = world.session?.body?.radius ?? 0.2;
+  const { ctx, run, px, theme } = f;
+  if (!run.fresh) return;
+  const [x, y, theta] = run.state.pose;
+  const r = run.session?.body?.radius ?? 0.2;
   f.inWorld();
   ctx.beginPath();
   ctx.arc(x, y, r, 0, 2 * Math.PI);
@@ -49,7 +49,7 @@ export function drawRobot(f) {
   ctx.closePath();
   ctx.fillStyle = theme.robot;
   ctx.fill();
-  const yaw = world.state.ring_yaw; // the ring does not turn with the wheels: its own mark, on the rim
+  const yaw = run.state.ring_yaw; // the ring does not turn with the wheels: its own mark, on the rim
   ctx.beginPath();
   ctx.moveTo(x + 0.86 * r * Math.cos(yaw), y + 0.86 * r * Math.sin(yaw));
   ctx.lineTo(x + 1.12 * r * Math.cos(yaw), y + 1.12 * r * Math.sin(yaw));
@@ -73,14 +73,14 @@ function arrow(ctx, x, y, dx, dy, head) {
 }
 
 export function drawVectors(f) {
-  const { ctx, world, theme, view } = f;
-  if (!world.fresh) return;
-  const [x, y] = view.toScreen(world.state.pose[0], world.state.pose[1]);
+  const { ctx, run, theme, view } = f;
+  if (!run.fresh) return;
+  const [x, y] = view.toScreen(run.state.pose[0], run.state.pose[1]);
   f.onScreen();
   ctx.textBaseline = "middle";
-  const unit = Math.max(UNIT_PX, 1.7 * (world.session?.body?.radius ?? 0) * view.scale);
+  const unit = Math.max(UNIT_PX, 1.7 * (run.session?.body?.radius ?? 0) * view.scale);
   const roomy = view.width > 480;
-  world.state.vectors.forEach(([name, vx, vy], i) => {
+  run.state.vectors.forEach(([name, vx, vy], i) => {
     const size = Math.hypot(vx, vy);
     if (!(size > 0.01)) return;
     const length = Math.min(size, LENGTH_MAX) * unit;
@@ -92,23 +92,23 @@ export function drawVectors(f) {
     arrow(ctx, x, y, dx, dy, Math.min(sum ? 13 : 10, length));
     ctx.font = theme.font(roomy ? 11.5 : 10, sum ? 700 : 600);
     ctx.textAlign = "left";
-    const words = `${name.replaceAll("_", "-")}${roomy ? ` ${size.toFixed(2)}` : ""}`;
-    const width = ctx.measureText(words).width;
+    const text = `${name.replaceAll("_", "-")}${roomy ? ` ${size.toFixed(2)}` : ""}`;
+    const width = ctx.measureText(text).width;
     const tx = Math.max(4, Math.min(view.width - width - 4, dx >= 0 ? x + dx + 7 : x + dx - 7 - width));
     let ty = y + dy + (sum ? 0 : dy > 0 ? 8 : -8);
     const box = () => [tx - 2, ty - 7, tx + width + 2, ty + 7];
     while (f.labels.some((taken) => overlap(taken, box()))) ty += 13;
     f.labels.push(box());
-    haloed(f, words, tx, ty, sum ? theme.ink : theme.vector);
+    textWithHalo(f, text, tx, ty, sum ? theme.ink : theme.vector);
   });
 }
 
-export function drawWish(f) {
-  const { ctx, world, theme, view } = f;
-  const drive_request = world.state.drive_request;
+export function drawGoal(f) {
+  const { ctx, run, theme, view } = f;
+  const drive_request = run.state.drive_request;
   if (drive_request?.kind !== "goal") return;
   const [x, y] = view.toScreen(drive_request.x, drive_request.y);
-  const [rx, ry] = view.toScreen(world.state.pose[0], world.state.pose[1]);
+  const [rx, ry] = view.toScreen(run.state.pose[0], run.state.pose[1]);
   f.onScreen();
   ctx.strokeStyle = ctx.fillStyle = theme.drive;
   ctx.lineWidth = 1.5;
@@ -135,5 +135,5 @@ export function drawWish(f) {
   ctx.font = theme.font(12, 650);
   ctx.textAlign = "left";
   ctx.textBaseline = "middle";
-  haloed(f, "goal", x + 21, y - 20, theme.drive);
+  textWithHalo(f, "goal", x + 21, y - 20, theme.drive);
 }

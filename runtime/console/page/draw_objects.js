@@ -1,7 +1,7 @@
 // What was recognised: the model's outline with its label and probability, the 95 % ellipse of its place, the clusters
 // it grew from, and for the one that is picked the readings that speak for and against it.
 
-import { haloed, overlap } from "./scene.js";
+import { textWithHalo, overlap } from "./scene.js";
 
 const CHI2_95 = 5.991;
 const SURE = 0.8; // below this the outline is dashed
@@ -9,7 +9,7 @@ const SURE = 0.8; // below this the outline is dashed
 export function drawClusters(f) {
   const { ctx, px, theme } = f;
   const path = new Path2D();
-  for (const [x, y, length, width, angle, , cx = x, cy = y] of f.world.state.clusters) {
+  for (const [x, y, length, width, angle, , cx = x, cy = y] of f.run.state.clusters) {
     const c = Math.cos(angle), s = Math.sin(angle);
     const corner = (a, b) => [x + (a * c * length) / 2 - (b * s * width) / 2, y + (a * s * length) / 2 + (b * c * width) / 2];
     const corners = [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
@@ -25,9 +25,9 @@ export function drawClusters(f) {
   f.onScreen();
   ctx.font = theme.font(11, 600);
   ctx.textAlign = "center";
-  for (const [x, y, , , , count, cx = x, cy = y] of f.world.state.clusters) {
+  for (const [x, y, , , , count, cx = x, cy = y] of f.run.state.clusters) {
     const [sx, sy] = f.view.toScreen(cx, cy);
-    haloed(f, String(Math.round(count)), sx + 14, sy + 4, theme.cluster);
+    textWithHalo(f, String(Math.round(count)), sx + 14, sy + 4, theme.cluster);
   }
 }
 
@@ -69,10 +69,10 @@ export function ellipseOf(covariance) {
 export const percent = (share) => `${share > 0.995 && share < 1 ? "> 99" : Math.round(100 * share)} %`;
 
 export function drawModels(f) {
-  const { ctx, world, theme, px, selection } = f;
+  const { ctx, run, theme, px, selection } = f;
   const sure = new Path2D(), unsure = new Path2D(), picked = new Path2D();
-  for (const object of world.state.objects) {
-    const model = world.model(object.model);
+  for (const object of run.state.objects) {
+    const model = run.model(object.model);
     const chance = object.probability ?? object.score;
     outlinePath(chance >= SURE ? sure : unsure, model, object, px);
     if (object.number !== null && object.number === selection.object) outlinePath(picked, model, object, px);
@@ -96,10 +96,10 @@ export function drawModels(f) {
 }
 
 export function drawEllipses(f) {
-  const { ctx, world, theme, px } = f;
+  const { ctx, run, theme, px } = f;
   const times = f.options.ellipseScale;
   const path = new Path2D(), centres = new Path2D();
-  for (const { x, y, covariance } of world.state.objects) {
+  for (const { x, y, covariance } of run.state.objects) {
     const arm = 3.5 * px;
     centres.moveTo(x - arm, y);
     centres.lineTo(x + arm, y);
@@ -120,16 +120,16 @@ export function drawEllipses(f) {
 
 // Labels look for a place of their own, within the outline first, and are only a number where none is free.
 export function drawLabels(f) {
-  const { ctx, world, theme, view } = f;
+  const { ctx, run, theme, view } = f;
   f.onScreen();
   ctx.textBaseline = "middle";
-  const spots = world.state.objects.map((object) => {
+  const spots = run.state.objects.map((object) => {
     const [x, y] = view.toScreen(object.x, object.y);
-    return { object, x, y, r: Math.max(6, (world.model(object.model)?.arc_radius_m ?? 0.1) * view.scale) };
+    return { object, x, y, r: Math.max(6, (run.model(object.model)?.arc_radius_m ?? 0.1) * view.scale) };
   }).filter(({ x, y }) => x > -50 && y > -50 && x < view.width + 50 && y < view.height + 50);
   const taken = f.labels;
-  const [rx, ry] = view.toScreen(world.state.pose[0], world.state.pose[1]);
-  const robot = { x: rx, y: ry, r: (world.session?.body?.radius ?? 0.2) * view.scale };
+  const [rx, ry] = view.toScreen(run.state.pose[0], run.state.pose[1]);
+  const robot = { x: rx, y: ry, r: (run.session?.body?.radius ?? 0.2) * view.scale };
   const misses = ({ x, y, r }, [left, top, right, bottom]) =>
     Math.hypot(x - Math.max(left, Math.min(x, right)), y - Math.max(top, Math.min(y, bottom))) > r;
   const free = (box, own) => taken.every((one) => !overlap(one, box))
@@ -138,9 +138,9 @@ export function drawLabels(f) {
     const { object, x, y, r } = spot;
     const numbered = object.number !== null && object.number !== undefined;
     const chance = percent(object.probability ?? object.score);
-    const words = `${numbered ? `${object.number} ` : ""}${object.model}  ${chance}`;
+    const text = `${numbered ? `${object.number} ` : ""}${object.model}  ${chance}`;
     ctx.font = theme.font(12, 650);
-    const half = ctx.measureText(words).width / 2;
+    const half = ctx.measureText(text).width / 2;
     const inside = Math.hypot(half, 0.45 * r + 8) < r ? [[x, y - 0.45 * r]] : [];
     const places = [...inside, [x, y + r + 11], [x, y - r - 11], [x + r + 6 + half, y], [x - r - 6 - half, y]];
     const place = places.find(([tx, ty]) => free([tx - half - 2, ty - 8, tx + half + 2, ty + 8], spot));
@@ -148,10 +148,10 @@ export function drawLabels(f) {
     if (place) {
       const [tx, ty] = place;
       taken.push([tx - half - 2, ty - 8, tx + half + 2, ty + 8]);
-      haloed(f, words, tx, ty, theme.model);
+      textWithHalo(f, text, tx, ty, theme.model);
     } else if (numbered) {
       ctx.font = theme.font(11, 650);
-      haloed(f, String(object.number), x, r > 14 ? y - 0.5 * r : y, theme.model);
+      textWithHalo(f, String(object.number), x, r > 14 ? y - 0.5 * r : y, theme.model);
     }
   }
 }
@@ -165,12 +165,12 @@ function cross(path, x, y, arm) {
 
 // Readings for an object are whole arcs, those against it are dashed and crossed out in the middle.
 export function drawEvidence(f) {
-  const { ctx, world, theme, px, selection } = f;
-  const evidence = world.evidence;
+  const { ctx, run, theme, px, selection } = f;
+  const evidence = run.evidence;
   if (!evidence || evidence.object !== selection.object) return;
-  const half = world.session?.ring?.half_angle ?? 0;
+  const half = run.session?.ring?.half_angle ?? 0;
   const speaks = new Path2D(), against = new Path2D(), crosses = new Path2D(), rays = new Path2D();
-  const reachMax = world.session?.ring?.range_max ?? 0;
+  const reachMax = run.session?.ring?.range_max ?? 0;
   for (const { x1, y1, x2, y2, supports } of evidence.lines) {
     const path = supports ? speaks : against;
     path.moveTo(x1, y1);
@@ -178,7 +178,7 @@ export function drawEvidence(f) {
     if (!supports) cross(crosses, (x1 + x2) / 2, (y1 + y2) / 2, 4 * px);
   }
   for (const { x, y, range: heard, angle, nats } of evidence.readings) {
-    const range = heard ?? reachMax; // nothing heard: it would have been, up to there
+    const range = heard ?? reachMax; // without an echo: anything up to this range would have been heard
     const path = nats < 0 ? against : speaks;
     path.moveTo(x + range * Math.cos(angle - half), y + range * Math.sin(angle - half));
     path.arc(x, y, range, angle - half, angle + half);

@@ -2,7 +2,7 @@
 
 const AGES = [[2, 1, 2.8], [10, 0.85, 2.2], [30, 0.65, 1.8], [60, 0.5, 1.4], [Infinity, 0.36, 1.1]]; // s, opacity, px
 
-export const AGE_WORDS = "bold: new, thin: old";
+export const AGE_LEGEND = "bold: new, thin: old";
 
 // One path for all segments of like age: five strokes draw any number of them.
 class Paths {
@@ -10,14 +10,14 @@ class Paths {
   paths = [];
   pins = [];
 
-  refresh(world) {
-    const key = `${world.segmentsVersion} ${Math.floor(world.state.robot_s)}`;
+  refresh(run) {
+    const key = `${run.segmentsVersion} ${Math.floor(run.state.robot_s)}`;
     if (key === this.key) return;
     this.key = key;
     this.paths = AGES.map(() => new Path2D());
     this.pins = [];
-    for (const s of world.segments.values()) {
-      const age = world.state.robot_s - s.t;
+    for (const s of run.segments.values()) {
+      const age = run.state.robot_s - s.t;
       const path = this.paths[AGES.findIndex(([until]) => age < until)] ?? this.paths.at(-1);
       path.moveTo(s.x1, s.y1);
       path.lineTo(s.x2, s.y2);
@@ -29,13 +29,13 @@ class Paths {
 export function segmentsDrawer() {
   const cache = new Paths();
   return (f) => {
-    const { ctx, world, px, theme, selection } = f;
-    cache.refresh(world);
+    const { ctx, run, px, theme, selection } = f;
+    cache.refresh(run);
     f.inWorld();
     if (selection.segments.size > 0) {
       const chosen = new Path2D();
       for (const number of selection.segments) {
-        const s = world.segments.get(number);
+        const s = run.segments.get(number);
         if (s === undefined) continue;
         chosen.moveTo(s.x1, s.y1);
         chosen.lineTo(s.x2, s.y2);
@@ -66,9 +66,9 @@ export function segmentsDrawer() {
 }
 
 // The segment nearest to a point of the plane, within reach (m).
-export function nearestSegment(world, x, y, reach) {
+export function nearestSegment(run, x, y, reach) {
   let best = null, nearest = reach;
-  for (const s of world.segments.values()) {
+  for (const s of run.segments.values()) {
     const dx = s.x2 - s.x1, dy = s.y2 - s.y1;
     const square = dx * dx + dy * dy;
     const along = square > 0 ? Math.max(0, Math.min(1, ((x - s.x1) * dx + (y - s.y1) * dy) / square)) : 0;

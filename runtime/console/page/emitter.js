@@ -1,4 +1,4 @@
-// Who has news tells it by name, and knows nothing of who listens.
+// A minimal event emitter.
 
 export class Emitter {
   #listeners = new Map();
@@ -8,7 +8,7 @@ export class Emitter {
     this.#listeners.get(name).push(listener);
   }
 
-  emit(name, ...news) {
-    for (const listener of this.#listeners.get(name) ?? []) listener(...news);
+  emit(name, ...update) {
+    for (const listener of this.#listeners.get(name) ?? []) listener(...update);
   }
 }

@@ -1,10 +1,10 @@
-// Keys that work everywhere. The space bar is HALT wherever one does not write text; what a space bar does otherwise,
-// Enter does: press a button, switch a box.
+// Global keys. The space bar is HALT everywhere except in text fields; Enter takes over what it usually does: press a
+// button, toggle a checkbox.
 
 import { byId, el, writesText } from "./dom.js";
 
 const WORDS = [
-  ["Space", "HALT, wherever you do not write text"],
+  ["Space", "HALT, except while you type text"],
   ["Shift+A", "arm, or re-arm"],
   ["1 … 6", "tools: move the map, select, move an object, place a model, goal, tape"],
   ["arrows", "on the map: move it, or the crosshair of a tool (Shift: finely)"],
@@ -13,21 +13,21 @@ const WORDS = [
   ["F", "fit everything"],
   ["L", "follow the robot"],
   ["U", "feet or metres"],
-  ["A", "with the select tool: everything in view"],
+  ["A", "with the select tool: select everything in view"],
   ["Delete", "delete the selected segments"],
   ["P  Shift+P", "pin or unpin the selected segments"],
-  ["[  ]", "turn the picked object or the model to place"],
-  ["arrows, Shift+arrows", "with the move tool: nudge the picked object by 1 cm or 10 cm"],
-  ["W A S D", "drive while held, where that is switched on; arrows on the driving pad"],
-  ["K", "pause the emulator, or let it go on"],
+  ["[  ]", "rotate the selected object or the model to place"],
+  ["arrows, Shift+arrows", "with the move tool: nudge the selected object by 1 cm or 10 cm"],
+  ["W A S D", "drive while held, if enabled; arrows on the driving pad"],
+  ["K", "pause or resume the emulator"],
   ["Ctrl+Z", "undo the last parameter"],
-  ["Escape", "give up what you began; select nothing"],
+  ["Escape", "cancel; clear the selection"],
   ["?", "this list"],
 ];
 
-export function watchKeyboard({ drive, tools, view, fit, units, chosen, time, parameters, notices, drivingByKeys }) {
-  const help = () => notices.ask("Keys", el("dl", { class: "keys" }, ...WORDS.flatMap(([key, words]) =>
-    [el("dt", {}, el("kbd", {}, key)), el("dd", {}, words)])), [["Close", null]]);
+export function watchKeyboard({ drive, tools, view, fit, units, chosen, time, parameters, notifications, drivingByKeys }) {
+  const help = () => notifications.confirm("Keys", el("dl", { class: "keys" }, ...WORDS.flatMap(([key, text]) =>
+    [el("dt", {}, el("kbd", {}, key)), el("dd", {}, text)])), [["Close", null]]);
   byId("keys").addEventListener("click", help);
 
   const acts = {
@@ -63,7 +63,7 @@ export function watchKeyboard({ drive, tools, view, fit, units, chosen, time, pa
       return;
     }
     if (target instanceof HTMLSelectElement) return; // letters and arrows choose there
-    if (key === "Escape") notices.close();
+    if (key === "Escape") notifications.close();
     if (drivingByKeys() && "wasdWASD".includes(key)) return;
     const act = acts[key];
     if (!act) return;

@@ -1,27 +1,27 @@
-// The layers of the map in the order in which they lie on one another; each is a draw function that can be switched.
+// The layers of the map, bottom to top; each is a draw function that can be switched on and off.
 
 import { el, svg } from "./dom.js";
 import { drawArcs, drawBeams } from "./draw_echoes.js";
-import { drawGrid, drawScale, drawTruth } from "./draw_frame.js";
-import { drawRobot, drawVectors, drawWish, trailDrawer } from "./draw_motion.js";
+import { drawGrid, drawScale, drawTruth } from "./draw_grid.js";
+import { drawRobot, drawVectors, drawGoal, trailDrawer } from "./draw_motion.js";
 import { drawClusters, drawEllipses, drawEvidence, drawLabels, drawModels } from "./draw_objects.js";
-import { AGE_WORDS, segmentsDrawer } from "./draw_segments.js";
+import { AGE_LEGEND, segmentsDrawer } from "./draw_segments.js";
 import { prefer, preferred } from "./preferences.js";
 
 // [id, plane, name, draw, on, how it looks: SVG path, and its style sheet's colour]
 const TABLE = [
-  ["truth", "back", "truth, as the emulator has it", drawTruth, true, "M20 2a8 8 0 1 1-.1 0Z", "truth", "3 2"],
+  ["truth", "back", "true outlines (emulator)", drawTruth, true, "M20 2a8 8 0 1 1-.1 0Z", "truth", "3 2"],
   ["grid", "back", "grid", drawGrid, true, "M3 7h34M3 14h34M10 2v16M20 2v16M30 2v16", "axis"],
-  ["segments", "back", `outline segments (${AGE_WORDS})`, segmentsDrawer(), true, "M4 6l12-3M18 10h16M6 16l14-2", "segment"],
+  ["segments", "back", `outline segments (${AGE_LEGEND})`, segmentsDrawer(), true, "M4 6l12-3M18 10h16M6 16l14-2", "segment"],
   ["clusters", "front", "clusters: rectangle and X", drawClusters, true, "M6 3h28v14H6zl28 14M34 3 6 17", "cluster"],
-  ["arcs", "front", "arcs of late echoes", drawArcs, true, "M8 16c6-8 18-8 24 0M12 18c5-6 11-6 16 0", "echo"],
-  ["beams", "front", "beams that fire now", drawBeams, true, "M20 19 6 4c8-4 20-4 28 0Z", "echo"],
-  ["evidence", "front", "readings of the picked object", drawEvidence, true, "M5 14c6-8 14-8 18 0M29 6l7 7m0-7-7 7", "stop"],
-  ["models", "front", "models (dashed: not sure)", drawModels, true, "M20 3a7 7 0 1 1-.1 0Z", "model"],
-  ["ellipses", "front", "95 % ellipses of their places", drawEllipses, true, "M8 12c2-6 22-10 24-4s-22 10-24 4Z", "ellipse"],
+  ["arcs", "front", "arcs of recent echoes", drawArcs, true, "M8 16c6-8 18-8 24 0M12 18c5-6 11-6 16 0", "echo"],
+  ["beams", "front", "beams firing now", drawBeams, true, "M20 19 6 4c8-4 20-4 28 0Z", "echo"],
+  ["evidence", "front", "readings of the selected object", drawEvidence, true, "M5 14c6-8 14-8 18 0M29 6l7 7m0-7-7 7", "stop"],
+  ["models", "front", "models (dashed: uncertain)", drawModels, true, "M20 3a7 7 0 1 1-.1 0Z", "model"],
+  ["ellipses", "front", "95 % ellipses of their positions", drawEllipses, true, "M8 12c2-6 22-10 24-4s-22 10-24 4Z", "ellipse"],
   ["trail", "front", "trail", trailDrawer(), true, "M4 15c8-12 14 6 32-9", "robot"],
   ["robot", "front", "robot", drawRobot, true, "M20 2a8 8 0 1 1-.1 0Zm8 8-12-4 3 4-3 4z", "robot"],
-  ["drive_request", "front", "goal", drawWish, true, "M14 18V3l14 4-14 4", "drive"],
+  ["drive_request", "front", "goal", drawGoal, true, "M14 18V3l14 4-14 4", "drive"],
   ["vectors", "front", "schema vectors and their sum", drawVectors, true, "M4 16 30 5m0 0-8 0m8 0-5 6", "vector"],
   ["labels", "front", "labels and probability", drawLabels, true, "M14 17 20 3l6 14m-9.5-5h7", "model"],
   ["scale", "front", "scale", drawScale, true, "M5 7v6h30V7", "ink"],

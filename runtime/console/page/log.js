@@ -1,4 +1,4 @@
-// The event log, newest first, with a filter by level and by words.
+// The event log, newest first, filtered by level and text.
 
 import { byId, el } from "./dom.js";
 
@@ -6,10 +6,10 @@ const LEVELS = ["debug", "info", "warning", "error"];
 const SHOWN_MAX = 300;
 const MARKS = { debug: "·", info: "○", warning: "▲", error: "■" };
 
-const told = (fields) => Object.entries(fields ?? {}).map(([key, value]) =>
+const formatFields = (fields) => Object.entries(fields ?? {}).map(([key, value]) =>
   `${key}=${typeof value === "object" ? JSON.stringify(value) : value}`).join(" ").slice(0, 600);
 
-// Seconds of a run, or a moment as the log writes it: of that the time of day.
+// Seconds of the run, or the time of day of a log time stamp.
 function when(t) {
   if (typeof t === "number") return `${t.toFixed(1)} s`;
   const time = /[T ](\d\d:\d\d:\d\d)/.exec(String(t));
@@ -19,32 +19,32 @@ function when(t) {
 }
 
 export class Log {
-  #world;
+  #run;
   #list = byId("log");
   #level = byId("log-level");
   #filter = byId("log-filter");
 
-  constructor(world) {
-    this.#world = world;
-    world.on("log", (entry) => this.#add(entry));
-    this.#level.addEventListener("change", () => this.#again());
-    this.#filter.addEventListener("input", () => this.#again());
+  constructor(run) {
+    this.#run = run;
+    run.on("log", (entry) => this.#add(entry));
+    this.#level.addEventListener("change", () => this.#rebuild());
+    this.#filter.addEventListener("input", () => this.#rebuild());
   }
 
-  #wanted({ level, event, fields }) {
+  #matches({ level, event, fields }) {
     const found = LEVELS.indexOf(level), least = LEVELS.indexOf(this.#level.value);
-    const words = this.#filter.value.trim().toLowerCase();
-    return (found < 0 || found >= least) && (words === "" || `${event} ${told(fields)}`.toLowerCase().includes(words));
+    const text = this.#filter.value.trim().toLowerCase();
+    return (found < 0 || found >= least) && (text === "" || `${event} ${formatFields(fields)}`.toLowerCase().includes(text));
   }
 
   #add(entry) {
-    if (!this.#wanted(entry)) return;
+    if (!this.#matches(entry)) return;
     this.#list.prepend(this.#line(entry));
     while (this.#list.children.length > SHOWN_MAX) this.#list.lastChild.remove();
   }
 
-  #again() {
-    const lines = this.#world.log.filter((entry) => this.#wanted(entry)).slice(-SHOWN_MAX).reverse();
+  #rebuild() {
+    const lines = this.#run.log.filter((entry) => this.#matches(entry)).slice(-SHOWN_MAX).reverse();
     this.#list.replaceChildren(...lines.map((entry) => this.#line(entry)));
   }
 
@@ -52,6 +52,6 @@ export class Log {
     return el("li", { "data-level": level },
       el("span", {}, when(timestamp)),
       el("span", { class: "level" }, `${MARKS[level] ?? "○"} ${level}`),
-      el("span", {}, `${event} `, el("span", { class: "more" }, told(fields))));
+      el("span", {}, `${event} `, el("span", { class: "more" }, formatFields(fields))));
   }
 }

@@ -1,14 +1,14 @@
-// The operator console: makes the parts and joins them. What each does is in its own module.
+// The operator console: creates the modules and connects them.
 
-import { byId, el, mark, say } from "./dom.js";
+import { byId, el, setAttribute, setText } from "./dom.js";
 import { Charts } from "./charts.js";
 import { Connection } from "./connection.js";
 import { Drive } from "./drive.js";
 import { watchKeyboard } from "./keyboard.js";
 import { listLayers, makeLayers } from "./layers.js";
 import { Log } from "./log.js";
-import { Notices } from "./notices.js";
-import { mapWords, Objects } from "./objects.js";
+import { Notifications } from "./notifications.js";
+import { describeMap, Objects } from "./objects.js";
 import { Parameters } from "./parameters.js";
 import { watchPointers } from "./pointer.js";
 import { prefer, preferred } from "./preferences.js";
@@ -22,16 +22,16 @@ import { Theme } from "./theme.js";
 import { screenshot, Time } from "./time.js";
 import { moveTool, placeTool } from "./tool_objects.js";
 import { goalTool, tapeTool } from "./tool_points.js";
-import { chosenRow, panTool, selectTool } from "./tool_select.js";
+import { selectionBar, panTool, selectTool } from "./tool_select.js";
 import { Toolbox } from "./tools.js";
 import { Units } from "./units.js";
 import { extent, View } from "./view.js";
-import { World } from "./world.js";
+import { RunState } from "./run_state.js";
 
-const WORDS_EVERY_MS = 5000;
+const DESCRIPTION_EVERY_MS = 5000;
 const ROOM_M = 0.6;
 
-// The token does not stay in the address bar, where a projector would show it; a reload finds it again.
+// Remove the token from the address bar, where a projector would show it; session storage keeps it for a reload.
 function takeToken() {
   const given = new URLSearchParams(location.search).get("token");
   if (given !== null) {
@@ -44,9 +44,9 @@ function takeToken() {
 const token = takeToken();
 const query = token === "" ? "" : `?token=${encodeURIComponent(token)}`;
 const connection = new Connection(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws${query}`);
-const world = new World(), view = new View(), units = new Units(), notices = new Notices();
-connection.showsRecording = () => world.watchesRecording;
-const selection = new Selection(world);
+const run = new RunState(), view = new View(), units = new Units(), notifications = new Notifications();
+connection.showsRecording = () => run.watchesRecording;
+const selection = new Selection(run);
 const options = { ellipseScale: preferred("ellipse scale", 10) };
 const front = byId("map-front");
 const layers = makeLayers();
@@ -59,32 +59,32 @@ const theme = new Theme(() => {
   drawInstruments();
 });
 
-const drive = {}; // filled below: the goal tool and the drive panel know of each other
-const said = (words) => say(byId("said"), words);
+const drive = {}; // filled in below: the goal tool and the drive panel need each other
+const announce = (text) => setText(byId("announce"), text);
 const tools = new Toolbox({
   box: byId("tools"), canvas: front, view, redraw,
   tools: [
     panTool(view),
-    selectTool({ world, view, selection, redraw }),
-    moveTool({ world, view, selection, connection, notices, redraw }),
-    placeTool({ world, view, connection, notices, redraw }),
-    goalTool({ sendGoal: (x, y) => drive.panel.goal(x, y).then(() => notices.toast(`Goal: ${units.place(x, y)}`), notices.refused), after: () => tools.choose("pan") }),
-    tapeTool({ units, said, redraw }),
+    selectTool({ run, view, selection, redraw }),
+    moveTool({ run, view, selection, connection, notifications, redraw }),
+    placeTool({ run, view, connection, notifications, redraw }),
+    goalTool({ sendGoal: (x, y) => drive.panel.goal(x, y).then(() => notifications.toast(`Goal: ${units.place(x, y)}`), notifications.showError), after: () => tools.choose("pan") }),
+    tapeTool({ units, announce, redraw }),
   ],
 });
-scene = new Scene({ back: byId("map-back"), front, layers, overlay: (f) => tools.draw(f), world, view, theme, units, selection, options });
+scene = new Scene({ back: byId("map-back"), front, layers, overlay: (f) => tools.draw(f), run, view, theme, units, selection, options });
 watchPointers(front, view, () => tools.current);
 
-const hand = new Teleoperation({ connection, world });
-drive.panel = new Drive({ world, units, connection, notices, hand, tools });
-const status = new Status({ world, units, connection, notices });
-const objects = new Objects({ world, units, selection, connection, notices, tools });
-const parameters = new Parameters({ world, connection, notices });
-const log = new Log(world);
-const time = new Time({ world, connection, notices, shoot: () => screenshot({ scene, view, world, theme, units }) });
-const ring = new Ring({ canvas: byId("ring"), words: byId("ring-words"), world, theme, units });
-const charts = new Charts({ phases: byId("phases"), late: byId("late"), legend: byId("phases-legend"), lateLegend: byId("late-legend"), world, theme });
-const chosen = chosenRow({ world, selection, connection, notices });
+const teleoperation = new Teleoperation({ connection, run });
+drive.panel = new Drive({ run, units, connection, notifications, teleoperation, tools });
+const status = new Status({ run, units, connection, notifications });
+const objects = new Objects({ run, units, selection, connection, notifications, tools });
+const parameters = new Parameters({ run, connection, notifications });
+const log = new Log(run);
+const time = new Time({ run, connection, notifications, shoot: () => screenshot({ scene, view, run, theme, units }) });
+const ring = new Ring({ canvas: byId("ring"), text: byId("ring-text"), run, theme, units });
+const charts = new Charts({ phases: byId("phases"), late: byId("late"), legend: byId("phases-legend"), lateLegend: byId("late-legend"), run, theme });
+const chosen = selectionBar({ run, selection, connection, notifications });
 const tabs = new Tabs((name) => {
   drawInstruments();
   if (name === "time") time.shown();
@@ -102,7 +102,7 @@ function drawInstruments() {
 }
 new ResizeObserver(() => drawInstruments()).observe(byId("panel-cycle"));
 
-// What lies over the map, so that what is fitted is not hidden under it: a row takes height, a column width.
+// Measure what covers the map, so that fitting keeps clear of it: a row takes height, a column width.
 function measureInsets() {
   const map = byId("map").getBoundingClientRect();
   const insets = { left: 20, right: 20, top: 20, bottom: 34 };
@@ -117,24 +117,24 @@ function measureInsets() {
 }
 new ResizeObserver(() => {
   measureInsets();
-  if (!view.touched && world.fresh) fitUntouched();
+  if (!view.touched && run.fresh) fitUntouched();
 }).observe(byId("map"));
 
 // The view.
-const fit = () => view.fit(extent(world));
+const fit = () => view.fit(extent(run));
 for (const [id, act] of Object.entries({
   "zoom-in": () => view.zoom(1.25), "zoom-out": () => view.zoom(0.8), fit, follow: () => view.setFollow(!view.follow),
   units: () => units.choose(units.name === "m" ? "ft" : "m"),
 })) byId(id).addEventListener("click", act);
 view.on("changed", redrawAll);
 view.on("follow", (on) => {
-  mark(byId("follow"), "aria-pressed", on);
-  if (on) view.followTo(world.state.pose[0], world.state.pose[1]);
+  setAttribute(byId("follow"), "aria-pressed", on);
+  if (on) view.followTo(run.state.pose[0], run.state.pose[1]);
 });
 let unitsGiven = preferred("units", "");
 units.on("changed", () => {
-  say(byId("units"), units.name);
-  mark(byId("units"), "aria-label", `Units: ${units.word}`);
+  setText(byId("units"), units.name);
+  setAttribute(byId("units"), "aria-label", `Units: ${units.word}`);
   redrawAll();
   drawInstruments();
 });
@@ -148,53 +148,53 @@ byId("ellipse-scale").addEventListener("change", (event) => {
 listLayers(byId("layers"), layers, redrawAll);
 selection.on("segments", redrawAll);
 selection.on("object", redraw);
-world.on("evidence", redraw);
+run.on("evidence", redraw);
 
-// What comes from the robot.
-world.on("session", (session) => {
+// Messages from the robot.
+run.on("session", (session) => {
   units.choose(unitsGiven || session.units);
   redrawAll();
 });
 let fitted = false;
-let drawnVersion = -1, drawnSecond = -1, words_ms = -Infinity;
-world.on("state", (state) => {
+let drawnVersion = -1, drawnSecond = -1, described_ms = -Infinity;
+run.on("state", (state) => {
   const now = performance.now();
-  if (!view.touched && !(fitted && view.shows(extent(world)))) fitUntouched(fitted ? ROOM_M : 0);
+  if (!view.touched && !(fitted && view.shows(extent(run)))) fitUntouched(fitted ? ROOM_M : 0);
   view.followTo(state.pose[0], state.pose[1]);
   const second = Math.floor(state.robot_s);
-  if (world.segmentsVersion !== drawnVersion || second !== drawnSecond) {
-    [drawnVersion, drawnSecond] = [world.segmentsVersion, second];
+  if (run.segmentsVersion !== drawnVersion || second !== drawnSecond) {
+    [drawnVersion, drawnSecond] = [run.segmentsVersion, second];
     scene.invalidate("back");
   }
   redraw();
   drawInstruments();
-  if (now - words_ms > WORDS_EVERY_MS) {
-    words_ms = now;
-    say(byId("map-words"), mapWords(world, units));
+  if (now - described_ms > DESCRIPTION_EVERY_MS) {
+    described_ms = now;
+    setText(byId("map-text"), describeMap(run, units));
   }
 });
-// Until somebody moves the map, everything stays in view; what grew out of it once has room to grow on.
+// Keep everything in view until the operator moves the map; leave a margin once the content has outgrown the view.
 function fitUntouched(room = 0) {
-  const { left, right, bottom, top } = extent(world);
+  const { left, right, bottom, top } = extent(run);
   view.fit({ left: left - room, right: right + room, bottom: bottom - room, top: top + room });
   view.touched = false;
   fitted = true;
 }
 
-connection.on("session", (session) => world.beginSession(session));
-connection.on("state", (state) => world.apply(state, performance.now()));
-connection.on("log", (entry) => world.note(entry));
-connection.on("role", (message) => world.emit("role", message));
-connection.on("evidence", (message) => objects.hear(message));
+connection.on("session", (session) => run.beginSession(session));
+connection.on("state", (state) => run.apply(state, performance.now()));
+connection.on("log", (entry) => run.note(entry));
+connection.on("role", (message) => run.emit("role", message));
+connection.on("evidence", (message) => objects.showEvidence(message));
 connection.on("parameters", (message) => parameters.show(message.parameters));
-connection.on("refused", (refusal) => notices.toast(refusal.message));
+connection.on("refused", (refusal) => notifications.toast(refusal.message));
 
 byId("report").href = `/report${query}`;
-byId("clear-map").addEventListener("click", () => notices.ask("Clear the map?", el("p", {}, "All segments, clusters and objects are forgotten; recognition begins anew."), [
+byId("clear-map").addEventListener("click", () => notifications.confirm("Clear the map?", el("p", {}, "All segments, clusters and objects are deleted; recognition starts again."), [
   ["Keep it", null],
-  ["Clear the map", () => void connection.ask({ type: "clear_map" }).catch(notices.refused)],
+  ["Clear the map", () => void connection.request({ type: "clear_map" }).catch(notifications.showError)],
 ]));
-watchKeyboard({ drive: drive.panel, tools, view, fit, units, chosen, time, parameters, notices, drivingByKeys: () => byId("hand-keys").checked });
+watchKeyboard({ drive: drive.panel, tools, view, fit, units, chosen, time, parameters, notifications, drivingByKeys: () => byId("teleop-keys").checked });
 connection.connect();
 
-export { connection, hand, log, scene, selection, status, tabs, tools, units, view, world };
+export { connection, teleoperation, log, scene, selection, status, tabs, tools, units, view, run };

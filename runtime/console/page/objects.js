@@ -1,7 +1,7 @@
-// The list of objects in words, and the one that is picked: place, uncertainty, evidence for and against. It is also
-// what a screen reader reads in place of the map.
+// The object list and the selected object: pose, uncertainty, evidence for and against. Screen readers read it in place
+// of the map.
 
-import { byId, el, mark, say } from "./dom.js";
+import { byId, el, setAttribute, setText } from "./dom.js";
 import { ellipseOf, percent } from "./draw_objects.js";
 import { degrees } from "./units.js";
 
@@ -13,23 +13,23 @@ export class Objects {
   #asked_ms = 0;
   #asking = false;
 
-  constructor({ world, units, selection, connection, notices, tools }) {
-    Object.assign(this, { world, units, selection, connection, notices });
-    world.on("state", () => this.refresh());
-    world.on("evidence", () => this.#tellEvidence());
+  constructor({ run, units, selection, connection, notifications, tools }) {
+    Object.assign(this, { run, units, selection, connection, notifications });
+    run.on("state", () => this.refresh());
+    run.on("evidence", () => this.#refreshEvidence());
     units.on("changed", () => this.refresh());
-    selection.on("object", () => this.#picked());
+    selection.on("object", () => this.#onSelected());
     this.#list.addEventListener("keydown", (event) => this.#key(event));
-    const act = (type) => () => connection.ask({ type, object: selection.object }).then(
-      () => notices.toast(`Object ${selection.object}: ${type === "confirm_object" ? "confirmed" : "rejected"}`), notices.refused);
+    const act = (type) => () => connection.request({ type, object: selection.object }).then(
+      () => notifications.toast(`Object ${selection.object}: ${type === "confirm_object" ? "confirmed" : "rejected"}`), notifications.showError);
     byId("object-confirm").addEventListener("click", act("confirm_object"));
     byId("object-reject").addEventListener("click", act("reject_object"));
     byId("object-move").addEventListener("click", () => tools.choose("move", { focus: true }));
   }
 
   refresh() {
-    const { objects } = this.world.state;
-    say(byId("objects-count"), `${objects.length}`);
+    const { objects } = this.run.state;
+    setText(byId("objects-count"), `${objects.length}`);
     byId("objects-empty").hidden = objects.length > 0;
     const seen = new Set();
     objects.forEach((object, index) => {
@@ -37,13 +37,13 @@ export class Objects {
       seen.add(key);
       if (!this.#rows.has(key)) this.#rows.set(key, this.#row(object.number));
       const row = this.#rows.get(key);
-      say(row.number, object.number === null || object.number === undefined ? "–" : `${object.number}`);
-      say(row.name, object.model);
-      say(row.sure, percent(object.probability ?? object.score));
-      say(row.where, `${this.units.place(object.x, object.y)}, ${degrees(object.theta)}`);
-      say(row.off, `± ${this.units.length(object.sigma, 3)}`);
+      setText(row.number, object.number === null || object.number === undefined ? "–" : `${object.number}`);
+      setText(row.name, object.model);
+      setText(row.sure, percent(object.probability ?? object.score));
+      setText(row.where, `${this.units.place(object.x, object.y)}, ${degrees(object.theta)}`);
+      setText(row.off, `± ${this.units.length(object.sigma, 3)}`);
       const picked = object.number !== null && object.number === this.selection.object;
-      mark(row.element, "aria-selected", picked);
+      setAttribute(row.element, "aria-selected", picked);
       if (this.#list.children[index] !== row.element) this.#list.insertBefore(row.element, this.#list.children[index] ?? null);
     });
     for (const [key, row] of this.#rows) {
@@ -51,7 +51,7 @@ export class Objects {
       row.element.remove();
       this.#rows.delete(key);
     }
-    this.#tellPicked();
+    this.#refreshSelected();
     this.#askEvidence();
   }
 
@@ -64,7 +64,7 @@ export class Objects {
   }
 
   #key(event) {
-    const numbers = this.world.state.objects.map(({ number }) => number).filter((number) => number !== null);
+    const numbers = this.run.state.objects.map(({ number }) => number).filter((number) => number !== null);
     const at = numbers.indexOf(this.selection.object);
     const to = { ArrowDown: at + 1, ArrowUp: at < 0 ? numbers.length - 1 : at - 1, Home: 0, End: numbers.length - 1 }[event.key];
     if (event.key === "Escape") this.selection.pick(null);
@@ -73,8 +73,8 @@ export class Objects {
     this.selection.pick(numbers[Math.max(0, Math.min(to, numbers.length - 1))]);
   }
 
-  #picked() {
-    this.world.evidence = null;
+  #onSelected() {
+    this.run.evidence = null;
     this.#asked_ms = 0;
     byId("evidence").replaceChildren();
     this.refresh();
@@ -86,16 +86,16 @@ export class Objects {
     }
   }
 
-  #tellPicked() {
-    const object = this.selection.object === null ? null : this.world.object(this.selection.object);
+  #refreshSelected() {
+    const object = this.selection.object === null ? null : this.run.object(this.selection.object);
     byId("object").hidden = this.selection.object === null;
     if (this.selection.object === null) return;
     if (object === null) {
-      say(byId("object-name"), `Object ${this.selection.object} is not known any more`);
+      setText(byId("object-name"), `Object ${this.selection.object} no longer exists`);
       byId("object-facts").replaceChildren();
       return;
     }
-    say(byId("object-name"), `${object.number} ${object.model}`);
+    setText(byId("object-name"), `${object.number} ${object.model}`);
     const facts = [
       ["certainty", object.probability === null || object.probability === undefined
         ? `fit ${percent(object.score)}` : `probability ${percent(object.probability)}`],
@@ -110,9 +110,9 @@ export class Objects {
     facts.push(["readings", `${object.support}`]);
     const list = byId("object-facts");
     if (list.children.length !== 2 * facts.length) list.replaceChildren(...facts.flatMap(() => [el("dt"), el("dd")]));
-    facts.forEach(([name, words], i) => {
-      say(list.children[2 * i], name);
-      say(list.children[2 * i + 1], words);
+    facts.forEach(([name, text], i) => {
+      setText(list.children[2 * i], name);
+      setText(list.children[2 * i + 1], text);
     });
   }
 
@@ -122,27 +122,27 @@ export class Objects {
     if (object === null || this.#asking || now - this.#asked_ms < EVIDENCE_EVERY_MS) return;
     this.#asking = true;
     this.#asked_ms = now;
-    this.connection.ask({ type: "evidence", object }).then((data) => {
-      if (data?.readings) this.hear({ object, ...data });
-    }, (error) => this.#tellWhyNot(error)).finally(() => {
+    this.connection.request({ type: "evidence", object }).then((data) => {
+      if (data?.readings) this.showEvidence({ object, ...data });
+    }, (error) => this.#showEvidenceError(error)).finally(() => {
       this.#asking = false;
     });
   }
 
-  // Evidence comes as the answer, or as a message of its own.
-  hear(message) {
+  // Evidence arrives as an answer, or as a message of its own.
+  showEvidence(message) {
     const readings = message.readings.map(([x, y, range, angle, nats]) => ({ x, y, range, angle, nats }));
     const lines = (message.lines ?? []).map(([number, x1, y1, x2, y2, supports]) => ({ number, x1, y1, x2, y2, supports }));
-    this.world.evidence = { object: message.object, pro: message.for, contra: message.against, readings, lines, rivals: message.rivals ?? [] };
-    this.world.emit("evidence");
+    this.run.evidence = { object: message.object, pro: message.for, contra: message.against, readings, lines, rivals: message.rivals ?? [] };
+    this.run.emit("evidence");
   }
 
-  #tellWhyNot(error) {
+  #showEvidenceError(error) {
     byId("evidence").replaceChildren(el("p", { class: "hint" }, error.message));
   }
 
-  #tellEvidence() {
-    const { evidence } = this.world;
+  #refreshEvidence() {
+    const { evidence } = this.run;
     if (evidence === null || evidence.object !== this.selection.object) return;
     const most = Math.max(evidence.pro, evidence.contra, 1e-9);
     const bar = (kind, name, nats) => {
@@ -159,9 +159,9 @@ export class Objects {
   }
 }
 
-// The map in a sentence, for those who cannot see it.
-export function mapWords(world, units) {
-  const { objects, pose } = world.state;
+// Describes the map in a sentence, for screen readers.
+export function describeMap(run, units) {
+  const { objects, pose } = run.state;
   const named = objects.slice(0, 12).map((object) => `${object.model} at ${units.place(object.x, object.y, 1)}`).join("; ");
-  return `Robot at ${units.place(pose[0], pose[1], 1)}, heading ${degrees(pose[2])}. ${objects.length} objects${named ? `: ${named}` : ""}. ${world.segments.size} segments.`;
+  return `Robot at ${units.place(pose[0], pose[1], 1)}, heading ${degrees(pose[2])}. ${objects.length} objects${named ? `: ${named}` : ""}. ${run.segments.size} segments.`;
 }

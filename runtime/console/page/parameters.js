@@ -1,18 +1,18 @@
-// Parameters that a running process follows: each checked where it is used, its error beside its field. The schemas'
-// gains are shown once more beside the driving; both places show the same value.
+// The live settings: each is validated by the robot's process, and its error is shown beside its field. The schemas' gains
+// appear in the drive panel as well; both places show the same value.
 
-import { byId, download, el, mark, say } from "./dom.js";
+import { byId, download, el, setAttribute, setText } from "./dom.js";
 
 const GAIN = /^behaviors\.(?!arbiter)[a-z_]+\.[a-z_]*gain$/;
 const MODEL_BYTES_MAX = 60_000;
-const LOADING_MAX_MS = 600_000; // the first model with corners may have to wait for a compiler
+const LOADING_MAX_MS = 600_000; // the first model with corners may have to wait for its kernels to compile
 
 export class Parameters {
   #fields = new Map(); // path → the fields that show it
 
-  constructor({ world, connection, notices }) {
-    Object.assign(this, { world, connection, notices });
-    world.on("session", ({ parameters }) => this.#list(parameters ?? []));
+  constructor({ run, connection, notifications }) {
+    Object.assign(this, { run, connection, notifications });
+    run.on("session", ({ parameters }) => this.#list(parameters ?? []));
     byId("tune-filter").addEventListener("input", () => this.#filter());
     byId("tune-undo").addEventListener("click", () => this.undo());
     byId("tune-save").addEventListener("click", () => this.#save());
@@ -22,7 +22,7 @@ export class Parameters {
   #list(parameters) {
     const typing = document.activeElement?.closest?.(".field") !== null && parameters.length > 0
       && parameters.every(({ path }) => this.#fields.has(path)) && parameters.length === this.#fields.size;
-    if (typing) { // the same ones once more: somebody else may have changed a value, nobody loses what they write
+    if (typing) { // the same parameters again: another client may have changed a value, but text being typed is kept
       this.show(parameters);
       return;
     }
@@ -48,11 +48,11 @@ export class Parameters {
     else input = el("input", { id, type: "text", inputmode: kind === "float" ? "decimal" : kind === "int" ? "numeric" : null, autocomplete: "off", spellcheck: "false" });
     input.className = "control";
     const error = el("output", { class: "error", id: `${id}-error`, for: id });
-    const range = rangeWords(low, high);
-    const words = [help, range, parameter.optional ? "Empty: none." : ""].filter(Boolean).join(" ");
-    mark(input, "aria-describedby", `${id}-help ${id}-error`);
+    const range = describeRange(low, high);
+    const text = [help, range, parameter.optional ? "Empty: none." : ""].filter(Boolean).join(" ");
+    setAttribute(input, "aria-describedby", `${id}-help ${id}-error`);
     const element = el("div", { class: "field", "data-path": path }, el("label", { for: id }, label || path.split(".").at(-1).replaceAll("_", " ")),
-      input, error, el("span", { class: "help", id: `${id}-help` }, words));
+      input, error, el("span", { class: "help", id: `${id}-help` }, text));
     const field = { parameter, element, input, error };
     input.addEventListener("change", () => this.#set(field));
     input.addEventListener("keydown", (event) => {
@@ -67,13 +67,13 @@ export class Parameters {
   #showIn({ parameter, input, error, element }, value) {
     if (input.type === "checkbox") input.checked = value === true;
     else input.value = value === null || value === undefined ? "" : String(value);
-    say(error, "");
+    setText(error, "");
     input.removeAttribute("aria-invalid");
     parameter.first ??= { value };
     element.classList.toggle("changed", value !== parameter.first.value);
   }
 
-  // Shows values that are in force now, in every place that shows them.
+  // Shows the values now in force in every field that displays them.
   show(parameters) {
     for (const { path, value } of parameters) {
       for (const field of this.#fields.get(path) ?? []) {
@@ -91,42 +91,42 @@ export class Parameters {
       return;
     }
     try {
-      const data = await this.connection.ask({ type: "set_parameter", path, value });
+      const data = await this.connection.request({ type: "set_parameter", path, value });
       for (const one of this.#fields.get(path) ?? []) {
         one.parameter.value = value;
         this.#showIn(one, value);
       }
-      this.#heed(data); // more may have changed with it
+      this.#onMode(data); // more may have changed with it
     } catch (error) {
       const other = error.field && error.field !== path ? this.#fields.get(error.field) : null;
       this.#refuse(field, other ? `${error.field}: ${error.message}` : error.message);
     }
   }
 
-  #refuse({ input, error }, words) {
-    say(error, words);
-    mark(input, "aria-invalid", "true");
+  #refuse({ input, error }, text) {
+    setText(error, text);
+    setAttribute(input, "aria-invalid", "true");
   }
 
-  #heed(data) {
+  #onMode(data) {
     if (Array.isArray(data)) this.show(data);
     else if (Array.isArray(data?.parameters)) this.show(data.parameters);
     else if (data?.path !== undefined) this.show([data]);
   }
 
   undo() {
-    return this.connection.ask({ type: "undo_parameter" }).then((data) => {
-      this.#heed(data);
-      this.notices.toast(data?.path ? `${data.path} is ${data.value} again` : "The last change is undone");
-    }, this.notices.refused);
+    return this.connection.request({ type: "undo_parameter" }).then((data) => {
+      this.#onMode(data);
+      this.notifications.toast(data?.path ? `${data.path} is ${data.value} again` : "The last change is undone");
+    }, this.notifications.showError);
   }
 
   #filter() {
-    const words = byId("tune-filter").value.trim().toLowerCase();
+    const text = byId("tune-filter").value.trim().toLowerCase();
     for (const section of byId("tune-fields").children) {
       let some = false;
       for (const field of section.querySelectorAll(".field")) {
-        const found = words === "" || `${field.dataset.path} ${field.textContent}`.toLowerCase().includes(words);
+        const found = text === "" || `${field.dataset.path} ${field.textContent}`.toLowerCase().includes(text);
         field.hidden = !found;
         some ||= found;
       }
@@ -137,15 +137,15 @@ export class Parameters {
   async #save() {
     let text;
     try {
-      const data = await this.connection.ask({ type: "save_toml" });
+      const data = await this.connection.request({ type: "save_toml" });
       text = typeof data === "string" ? data : data?.toml ?? "";
     } catch (error) {
-      this.notices.refused(error);
+      this.notifications.showError(error);
       return;
     }
     const area = el("textarea", { readonly: true, "aria-label": "The settings in force, as TOML", id: "toml" });
     area.value = text;
-    this.notices.ask("Settings as TOML", area, [
+    this.notifications.confirm("Settings as TOML", area, [
       ["Close", null],
       ["Save as a file", () => download("echolocate.toml", new Blob([text], { type: "application/toml" }))],
     ]);
@@ -155,16 +155,16 @@ export class Parameters {
     const input = byId("model-file"), error = byId("model-error");
     const [file] = input.files;
     if (!file) return;
-    say(error, "");
+    setText(error, "");
     if (file.size > MODEL_BYTES_MAX) {
-      say(error, `${file.name} is ${Math.round(file.size / 1000)} kB long; a model file has less than 60`);
+      setText(error, `${file.name} is ${Math.round(file.size / 1000)} kB long; a model file has less than 60`);
       return;
     }
     try {
-      await this.connection.ask({ type: "load_model", toml: await file.text() }, LOADING_MAX_MS);
-      this.notices.toast(`${file.name} is loaded`);
+      await this.connection.request({ type: "load_model", toml: await file.text() }, LOADING_MAX_MS);
+      this.notifications.toast(`${file.name} is loaded`);
     } catch (problem) {
-      say(error, problem.message);
+      setText(error, problem.message);
     }
     input.value = ""; // so that the same file can be chosen again after it was mended
   }
@@ -181,7 +181,7 @@ function read(kind, input, optional) {
   return Number.isFinite(value) && (kind === "float" || Number.isInteger(value)) ? value : undefined;
 }
 
-function rangeWords(low, high) {
+function describeRange(low, high) {
   const known = (bound) => bound !== null && bound !== undefined;
   if (known(low) && known(high)) return `${low} to ${high}.`;
   if (known(low)) return `${low} or more.`;

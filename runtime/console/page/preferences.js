@@ -1,4 +1,4 @@
-// What somebody set on this page for themselves: units, layers. Lost quietly where the browser keeps nothing.
+// Preferences of this browser: units, layers. Silently not kept where the browser has no storage.
 
 const KEY = "echolocate";
 

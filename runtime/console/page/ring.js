@@ -1,30 +1,30 @@
 // The ring as it stands: a wedge a sensor, as long as its range. A rim without a wedge: heard nothing; a cross: not to
 // be trusted; nothing: never fired. The outline is bold while it fires.
 
-import { say } from "./dom.js";
+import { setText } from "./dom.js";
 import { fitted } from "./theme.js";
 
 const OLD_S = 1;
 
 export class Ring {
   #canvas;
-  #words;
-  #world;
+  #text;
+  #run;
   #theme;
   #units;
 
-  constructor({ canvas, words, world, theme, units }) {
-    [this.#canvas, this.#words, this.#world, this.#theme, this.#units] = [canvas, words, world, theme, units];
+  constructor({ canvas, text, run, theme, units }) {
+    [this.#canvas, this.#text, this.#run, this.#theme, this.#units] = [canvas, text, run, theme, units];
   }
 
   draw() {
     const canvas = this.#canvas;
     if (canvas.clientWidth === 0) return;
-    const world = this.#world, theme = this.#theme, ring = world.session?.ring;
+    const run = this.#run, theme = this.#theme, ring = run.session?.ring;
     const { ctx, width, height } = fitted(canvas);
     ctx.clearRect(0, 0, width, height);
-    if (!ring || !world.fresh) return;
-    const { ranges, age, firing, sensors, ring_yaw, pose } = world.state;
+    if (!ring || !run.fresh) return;
+    const { ranges, age, firing, sensors, ring_yaw, pose } = run.state;
     const cx = width / 2, cy = height / 2;
     const rim = Math.min(width, height) / 2 - 15;
     // What is near matters most: along a radius goes the square root of the range.
@@ -96,10 +96,10 @@ export class Ring {
     ctx.stroke(crosses);
     this.#scale(ctx, cx, cy, reach, ring.range_max);
     this.#heading(ctx, cx, cy, -pose[2]);
-    const words = [];
-    if (nearest !== null) words.push(`nearest ${this.#units.length(ranges[nearest])}, by sensor ${nearest}`);
-    if (sensors.length > 0) words.push(`not trusted: ${sensors.slice(0, 3).map(([index, fault]) => `${index} (${fault})`).join(", ")}${sensors.length > 3 ? "…" : ""}`);
-    say(this.#words, words.join("; ") || "nothing heard");
+    const text = [];
+    if (nearest !== null) text.push(`nearest ${this.#units.length(ranges[nearest])}, by sensor ${nearest}`);
+    if (sensors.length > 0) text.push(`not trusted: ${sensors.slice(0, 3).map(([index, fault]) => `${index} (${fault})`).join(", ")}${sensors.length > 3 ? "…" : ""}`);
+    setText(this.#text, text.join("; ") || "nothing heard");
   }
 
   #scale(ctx, cx, cy, reach, range_max) {

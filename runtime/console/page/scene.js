@@ -7,11 +7,11 @@ export class Scene {
   #planes;
   #requested = false;
 
-  constructor({ back, front, layers, overlay, world, view, theme, units, selection, options }) {
+  constructor({ back, front, layers, overlay, run, view, theme, units, selection, options }) {
     this.#planes = { back: { canvas: back, dirty: true }, front: { canvas: front, dirty: true } };
     this.layers = layers;
     this.overlay = overlay;
-    this.shared = { world, view, theme, units, selection, options };
+    this.shared = { run, view, theme, units, selection, options };
     new ResizeObserver(() => {
       view.resize(front.clientWidth, front.clientHeight);
       this.invalidate("back", "front");
@@ -80,7 +80,7 @@ function frame(ctx, ratio, shared) {
 // Whether two boxes [left, top, right, bottom] do.
 export const overlap = (a, b) => !(a[2] < b[0] || a[0] > b[2] || a[3] < b[1] || a[1] > b[3]);
 
-export function haloed(f, text, x, y, colour) {
+export function textWithHalo(f, text, x, y, colour) {
   const { ctx } = f;
   ctx.lineJoin = "round";
   ctx.lineWidth = 3.5;

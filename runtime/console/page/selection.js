@@ -6,9 +6,9 @@ export class Selection extends Emitter {
   segments = new Set();
   object = null;
 
-  constructor(world) {
+  constructor(run) {
     super();
-    world.on("state", () => this.#forgetGone(world));
+    run.on("state", () => this.#dropDeleted(run));
   }
 
   choose(numbers) {
@@ -32,8 +32,8 @@ export class Selection extends Emitter {
     this.emit("object", number);
   }
 
-  #forgetGone(world) {
-    const gone = [...this.segments].filter((number) => !world.segments.has(number));
+  #dropDeleted(run) {
+    const gone = [...this.segments].filter((number) => !run.segments.has(number));
     for (const number of gone) this.segments.delete(number);
     if (gone.length > 0) this.emit("segments");
   }

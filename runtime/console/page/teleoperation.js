@@ -1,42 +1,42 @@
-// Driving by hand with a dead-man: a velocity goes out at 20 Hz for as long as somebody holds something, and zero as
-// soon as nobody does, the page loses the focus, is hidden or left, a pointer or gamepad goes away, or the network
-// stalls. The base stops by itself 250 ms after the last message; this is for stopping sooner.
+// Teleoperation with a deadman: sends a velocity at 20 Hz while a control is held, and zero as soon as it is released, the
+// page loses focus, is hidden or left, a pointer or gamepad disappears, or the network stalls. The robot's process stops
+// by itself 250 ms after the last message; this code stops it sooner.
 
 import { Emitter } from "./emitter.js";
 
 const EVERY_MS = 50;
 
 export class Teleoperation extends Emitter {
-  #held = new Map(); // what is held → {v, w}, each from -1 to 1
+  #held = new Map(); // held control → {v, w}, each from -1 to 1
   #timer = null;
   limit = 0.5;
 
-  constructor({ connection, world }) {
+  constructor({ connection, run }) {
     super();
-    Object.assign(this, { connection, world });
+    Object.assign(this, { connection, run });
     addEventListener("blur", () => this.stop("the window lost the focus"));
     addEventListener("pagehide", () => this.stop("the page was left"));
     document.addEventListener("visibilitychange", () => document.hidden && this.stop("the page was hidden"));
     connection.on("closed", () => this.stop("the connection was lost"));
-    world.on("mode", ({ mode }) => mode !== "DRIVE" && this.stop(`the mode is ${mode.replace("_", " ")}`));
+    run.on("mode", ({ mode }) => mode !== "DRIVE" && this.stop(`the mode is ${mode.replace("_", " ")}`));
   }
 
   get holding() {
     return this.#held.size > 0;
   }
 
-  whyNot() {
+  refusalReason() {
     if (!this.connection.open) return "there is no connection";
-    if (!document.hasFocus()) return "the window has not the focus"; // a gamepad would drive all the same
-    if (this.world.watchesRecording) return "you look at a recording: go back to the live run";
-    if (!this.world.state.controller) return "you watch: ask for control first";
-    if (this.world.state.mode !== "DRIVE") return "it is not armed";
+    if (!document.hasFocus()) return "the window does not have the focus"; // a gamepad would drive all the same
+    if (this.run.watchesRecording) return "a recording is shown: go back to the live run first";
+    if (!this.run.state.controller) return "this page only watches: ask for control first";
+    if (this.run.state.mode !== "DRIVE") return "the robot is not armed";
     return null;
   }
 
-  // Holds on to a velocity; says why not where that is refused.
+  // Starts or changes a held velocity; emits the reason if it is refused.
   hold(source, v, w) {
-    const why = this.whyNot();
+    const why = this.refusalReason();
     if (why !== null) {
       this.emit("refused", why);
       return false;
@@ -66,12 +66,12 @@ export class Teleoperation extends Emitter {
   #end(why) {
     clearInterval(this.#timer);
     this.#timer = null;
-    this.connection.post({ type: "teleoperate", v: 0, w: 0 });
+    this.connection.send({ type: "teleoperate", v: 0, w: 0 });
     this.emit("changed", why);
   }
 
   velocity() {
-    const { speed_max = 0, turn_max = 0 } = this.world.session?.body ?? {};
+    const { speed_max = 0, turn_max = 0 } = this.run.session?.body ?? {};
     let v = 0, w = 0;
     for (const held of this.#held.values()) {
       v += held.v;
@@ -87,6 +87,6 @@ export class Teleoperation extends Emitter {
       return;
     }
     const { v, w } = this.velocity();
-    this.connection.post({ type: "teleoperate", v, w });
+    this.connection.send({ type: "teleoperate", v, w });
   }
 }

@@ -1,4 +1,4 @@
-// The style sheet's colours for those who draw on canvases; read again when the scheme changes.
+// The style sheet's colours for canvas drawing; read again when the colour scheme changes.
 
 const NAMES = [
   "paper", "panel", "ink", "muted", "line", "edge", "accent", "map", "grid", "axis", "truth", "truth-fill", "echo", "segment",
@@ -30,7 +30,7 @@ export class Theme {
   }
 }
 
-// A canvas as large as it is shown, in the device's own pixels; returns its context, drawn on in CSS pixels.
+// Resizes a canvas to its displayed size in device pixels and returns its context, scaled to CSS pixels.
 export function fitted(canvas) {
   const ratio = Math.min(window.devicePixelRatio || 1, 2);
   const width = canvas.clientWidth, height = canvas.clientHeight;

@@ -1,6 +1,6 @@
-// Time: hold the emulator, let it go on a cycle at a time or faster, record, and look at what was recorded.
+// The time panel: pause, single-step and speed of the emulator, recording, and playback.
 
-import { byId, download, el, mark, say } from "./dom.js";
+import { byId, download, el, setAttribute, setText } from "./dom.js";
 
 const clock = (s) => `${s.toFixed(1)} s`;
 
@@ -9,13 +9,13 @@ export class Time {
   #liveSession = null; // the live run's greeting meanwhile
   #scrubbing = false;
 
-  constructor({ world, connection, notices, shoot }) {
-    Object.assign(this, { world, connection, notices, shoot });
+  constructor({ run, connection, notifications, shoot }) {
+    Object.assign(this, { run, connection, notifications, shoot });
     const on = (id, act) => byId(id).addEventListener("click", act);
     on("pause", () => this.pause());
     on("single-step", () => this.#ask({ type: "single_step" }));
-    on("record", () => this.#ask({ type: "record", on: world.state.recording === null }));
-    on("recordings-again", () => this.#list(notices.refused));
+    on("record", () => this.#ask({ type: "record", on: run.state.recording === null }));
+    on("recordings-again", () => this.#list(notifications.showError));
     on("open", () => this.#open());
     on("play", () => this.#ask({ type: "play_recording", speed: this.#playing ? 0 : Number(byId("play-speed").value) }));
     on("play-step", () => this.#ask({ type: "step_recording", cycles: 1 }));
@@ -28,42 +28,42 @@ export class Time {
     const scrub = byId("scrub");
     scrub.addEventListener("input", () => this.#scrub(Number(scrub.value)));
     scrub.addEventListener("change", () => this.#scrub(Number(scrub.value)));
-    world.on("state", () => this.#refresh());
+    run.on("state", () => this.#refresh());
     connection.on("session", (session) => {
       if (this.#liveSession !== null) this.#liveSession = session;
     });
-    connection.on("closed", () => this.#forget()); // whoever comes back is shown the live run
+    connection.on("closed", () => this.#discard()); // a new connection shows the live run
   }
 
-  // The list is asked for when somebody looks.
+  // The list is pending for when somebody looks.
   shown() {
     if (byId("recordings").options.length === 0) this.#list();
   }
 
   #ask(message) {
-    return this.connection.ask(message).catch((error) => this.notices.refused(error));
+    return this.connection.request(message).catch((error) => this.notifications.showError(error));
   }
 
   get #playing() {
-    return this.world.state.playback?.is_playing ?? false;
+    return this.run.state.playback?.is_playing ?? false;
   }
 
   pause() {
-    return this.#ask({ type: this.world.state.paused ? "resume" : "pause" });
+    return this.#ask({ type: this.run.state.paused ? "resume" : "pause" });
   }
 
   #refresh() {
-    const { robot_s, cycle, paused, speed, recording, playback, controller } = this.world.state;
-    const emulated = this.world.session?.emulated ?? false;
+    const { robot_s, cycle, paused, speed, recording, playback, controller } = this.run.state;
+    const emulated = this.run.session?.emulated ?? false;
     const where = playback ? `Recording ${name(this.#file)}` : emulated ? "Live, in the emulator" : "Live";
-    say(byId("time-words"), `${where}: ${clock(robot_s)}, cycle ${cycle}${paused ? ", paused" : ""}${speed !== 1 ? `, × ${speed}` : ""}`);
-    say(byId("pause"), paused ? "Go on" : "Pause");
+    setText(byId("time-text"), `${where}: ${clock(robot_s)}, cycle ${cycle}${paused ? ", paused" : ""}${speed !== 1 ? `, × ${speed}` : ""}`);
+    setText(byId("pause"), paused ? "Resume" : "Pause");
     for (const id of ["pause", "single-step", "speed"]) byId(id).disabled = !controller || !emulated;
     if (document.activeElement !== byId("speed")) choose(byId("speed"), String(speed));
-    mark(byId("record"), "aria-pressed", recording !== null);
-    say(byId("record-words"), recording ? `to ${name(recording.file)}` : "off");
+    setAttribute(byId("record"), "aria-pressed", recording !== null);
+    setText(byId("record-text"), recording ? `to ${name(recording.file)}` : "off");
     if (playback) this.#follow(playback);
-    this.notices.banner("playback", playback ? `You look at a recording, not at the robot: ${name(this.#file)}` : null,
+    this.notifications.banner("playback", playback ? `This is a recording, not the live run: ${name(this.#file)}` : null,
       { buttons: [["Back to the live run", () => this.#backToLive()]] });
   }
 
@@ -71,19 +71,19 @@ export class Time {
     const scrub = byId("scrub");
     if (!this.#scrubbing) {
       scrub.value = String(s);
-      say(byId("scrub-value"), clock(s));
-      mark(scrub, "aria-valuetext", clock(s));
+      setText(byId("scrub-value"), clock(s));
+      setAttribute(scrub, "aria-valuetext", clock(s));
     }
-    say(byId("play"), playing ? "Hold" : "Play");
+    setText(byId("play"), playing ? "Hold" : "Play");
   }
 
   async #backToLive() {
     if ((await this.#ask({ type: "close_recording" })) === undefined) return;
-    if (this.#liveSession !== null) this.world.beginSession(this.#liveSession);
-    this.#forget();
+    if (this.#liveSession !== null) this.run.beginSession(this.#liveSession);
+    this.#discard();
   }
 
-  #forget() {
+  #discard() {
     this.#file = this.#liveSession = null;
     byId("player").hidden = true;
   }
@@ -92,7 +92,7 @@ export class Time {
     const chooser = byId("recordings"), chosen = chooser.value;
     let list;
     try {
-      list = await this.connection.ask({ type: "list_recordings" });
+      list = await this.connection.request({ type: "list_recordings" });
     } catch (error) {
       refused(error);
       return;
@@ -107,7 +107,7 @@ export class Time {
   async #open() {
     const file = byId("recordings").value;
     if (!file) {
-      this.notices.toast("There is no recording to open");
+      this.notifications.toast("There is no recording to open");
       return;
     }
     const data = await this.#ask({ type: "open_recording", file });
@@ -117,19 +117,19 @@ export class Time {
     byId("scrub").max = String(data?.duration_s ?? 1);
     const places = [...(data?.bookmarks ?? []).map(([s, text]) => [s, `✎ ${text}`]),
       ...(data?.modes ?? []).map(([s, mode, reason]) => [s, `${mode.replace("_", " ")}${reason ? `: ${reason}` : ""}`])];
-    byId("bookmarks").replaceChildren(...places.sort(([a], [b]) => a - b).map(([s, words]) =>
-      el("li", {}, el("button", { type: "button", onclick: () => this.#scrub(s) }, `${clock(s)}  ${words}`))));
-    if (data?.about) { // another robot may have driven then, and found other things
-      this.#liveSession ??= this.world.session;
-      this.world.beginSession({ ...this.#liveSession, ...data.about, parameters: this.#liveSession.parameters });
+    byId("bookmarks").replaceChildren(...places.sort(([a], [b]) => a - b).map(([s, text]) =>
+      el("li", {}, el("button", { type: "button", onclick: () => this.#scrub(s) }, `${clock(s)}  ${text}`))));
+    if (data?.about) { // the recording may be of another robot with other models
+      this.#liveSession ??= this.run.session;
+      this.run.beginSession({ ...this.#liveSession, ...data.about, parameters: this.#liveSession.parameters });
     }
     this.#follow({ s: 0, is_playing: false });
   }
 
-  // While the slider is dragged, one request at a time: the newest place after the answer to the one before.
+  // While the slider is dragged, one request at a time: the newest position after the answer to the previous one.
   #wanted = null;
   async #scrub(s) {
-    say(byId("scrub-value"), clock(s));
+    setText(byId("scrub-value"), clock(s));
     this.#wanted = s;
     if (this.#scrubbing) return;
     this.#scrubbing = true;
@@ -144,11 +144,11 @@ export class Time {
   #bookmark(event) {
     event.preventDefault();
     const input = byId("bookmark-text");
-    const text = input.value.trim() || `cycle ${this.world.state.cycle}`;
-    this.connection.ask({ type: "bookmark", text }).then(() => {
+    const text = input.value.trim() || `cycle ${this.run.state.cycle}`;
+    this.connection.request({ type: "bookmark", text }).then(() => {
       input.value = "";
-      this.notices.toast(`Bookmarked: ${text}`);
-    }, this.notices.refused);
+      this.notifications.toast(`Bookmarked: ${text}`);
+    }, this.notifications.showError);
   }
 }
 
@@ -158,8 +158,8 @@ function choose(select, value) {
   if ([...select.options].some((option) => option.value === value)) select.value = value;
 }
 
-// The map as a picture with a line that says what, when and in which mode.
-export function screenshot({ scene, view, world, theme, units }) {
+// Saves the map as a picture with a caption: robot, time, mode.
+export function screenshot({ scene, view, run, theme, units }) {
   const ratio = 2, foot = 34;
   const canvas = el("canvas");
   canvas.width = view.width * ratio;
@@ -173,8 +173,8 @@ export function screenshot({ scene, view, world, theme, units }) {
   ctx.fillStyle = theme.ink;
   ctx.font = theme.font(13);
   ctx.textBaseline = "middle";
-  const { robot_s, mode, cycle, objects } = world.state;
-  const words = `${world.session?.name ?? "robot"}, ${clock(robot_s)}, cycle ${cycle}, ${mode}, ${objects.length} objects, in ${units.word}`;
-  ctx.fillText(words, 12, view.height + foot / 2);
+  const { robot_s, mode, cycle, objects } = run.state;
+  const text = `${run.session?.name ?? "robot"}, ${clock(robot_s)}, cycle ${cycle}, ${mode}, ${objects.length} objects, in ${units.word}`;
+  ctx.fillText(text, 12, view.height + foot / 2);
   canvas.toBlob((blob) => download(`echolocate-${robot_s.toFixed(1)}s.png`, blob));
 }

@@ -1,7 +1,7 @@
-// Objects by hand: move one and turn it, put a model where one should stand. The model then relaxes from there.
+// Tools that move and rotate an object, or place a model, which then relaxes from there.
 
 import { byId, el } from "./dom.js";
-import { drawGhost } from "./tool_marks.js";
+import { drawPreview } from "./tool_overlays.js";
 import { objectAt } from "./tool_select.js";
 
 const HANDLE_PX = 20;
@@ -20,11 +20,11 @@ function handleOf(view, model, { x, y, theta }) {
   return { x: x + reach * Math.cos(theta), y: y + reach * Math.sin(theta) };
 }
 
-export function moveTool({ world, view, selection, connection, notices, redraw }) {
+export function moveTool({ run, view, selection, connection, notifications, redraw }) {
   let held = null; // {pose, dx, dy, turning}
 
-  const send = (number, { x, y, theta }) => connection.ask({ type: "move_object", object: number, x, y, theta }).catch(notices.refused);
-  const picked = () => (selection.object === null ? null : world.object(selection.object));
+  const send = (number, { x, y, theta }) => connection.request({ type: "move_object", object: number, x, y, theta }).catch(notifications.showError);
+  const picked = () => (selection.object === null ? null : run.object(selection.object));
   const poseOf = ({ x, y, theta }) => ({ x, y, theta });
   const drop = () => {
     held = null;
@@ -35,13 +35,13 @@ export function moveTool({ world, view, selection, connection, notices, redraw }
     down(at) {
       const object = picked();
       if (object !== null) {
-        const handle = handleOf(view, world.model(object.model), object);
+        const handle = handleOf(view, run.model(object.model), object);
         if (Math.hypot(handle.x - at.x, handle.y - at.y) < HANDLE_PX / view.scale) {
           held = { pose: poseOf(object), turning: true, model: object.model };
           return;
         }
       }
-      const hit = objectAt(world, view, at);
+      const hit = objectAt(run, view, at);
       selection.pick(hit?.number ?? null);
       held = hit === null ? null : { pose: poseOf(hit), dx: hit.x - at.x, dy: hit.y - at.y, turning: false, model: hit.model, began: at };
       redraw();
@@ -63,7 +63,7 @@ export function moveTool({ world, view, selection, connection, notices, redraw }
     key(event, spot) {
       const object = picked();
       if (event.key === "Enter") {
-        selection.pick(objectAt(world, view, spot())?.number ?? null);
+        selection.pick(objectAt(run, view, spot())?.number ?? null);
         return true;
       }
       if (object === null) return false;
@@ -77,25 +77,25 @@ export function moveTool({ world, view, selection, connection, notices, redraw }
     },
     draw(f) {
       const object = picked();
-      if (held) drawGhost(f, world.model(held.model), held.pose, handleOf(view, world.model(held.model), held.pose));
-      else if (object) drawGhost(f, world.model(object.model), object, handleOf(view, world.model(object.model), object));
+      if (held) drawPreview(f, run.model(held.model), held.pose, handleOf(view, run.model(held.model), held.pose));
+      else if (object) drawPreview(f, run.model(object.model), object, handleOf(view, run.model(object.model), object));
     },
   };
 }
 
-export function placeTool({ world, view, connection, notices, redraw }) {
+export function placeTool({ run, view, connection, notifications, redraw }) {
   const chooser = byId("placing-model");
   let pose = null;
-  let last = 0; // the heading of the one before, for a row of like things
+  let last = 0; // the previous heading, for placing a row of equal objects
 
-  world.on("session", ({ models }) => {
+  run.on("session", ({ models }) => {
     const chosen = chooser.value;
     chooser.replaceChildren(...models.map(({ name }) => el("option", { value: name }, name)));
     if (models.some(({ name }) => name === chosen)) chooser.value = chosen;
   });
-  const put = ({ x, y, theta }) => connection.ask({ type: "place_model", model: chooser.value, x, y, theta })
-    .then(() => notices.toast(`${chooser.value} placed; it relaxes from there`), notices.refused);
-  const forget = () => {
+  const put = ({ x, y, theta }) => connection.request({ type: "place_model", model: chooser.value, x, y, theta })
+    .then(() => notifications.toast(`${chooser.value} placed; it relaxes from there`), notifications.showError);
+  const discard = () => {
     pose = null;
     redraw();
   };
@@ -112,7 +112,7 @@ export function placeTool({ world, view, connection, notices, redraw }) {
       pose = { x: at.x, y: at.y, theta: last };
       redraw();
     },
-    leave: forget,
+    leave: discard,
     down(at) {
       pose = { x: at.x, y: at.y, theta: last, pressed: true };
       redraw();
@@ -127,7 +127,7 @@ export function placeTool({ world, view, connection, notices, redraw }) {
         last = pose.theta;
         put(pose);
       }
-      forget();
+      discard();
     },
     key(event) {
       const turn = { "[": TURN, "]": -TURN }[event.key];
@@ -136,10 +136,10 @@ export function placeTool({ world, view, connection, notices, redraw }) {
       if (pose) pose.theta = last;
       return true;
     },
-    cancel: forget,
+    cancel: discard,
     draw(f) {
-      const model = world.model(chooser.value);
-      if (pose && model) drawGhost(f, model, pose, pose.pressed ? handleOf(view, model, pose) : null);
+      const model = run.model(chooser.value);
+      if (pose && model) drawPreview(f, model, pose, pose.pressed ? handleOf(view, model, pose) : null);
     },
   };
 }

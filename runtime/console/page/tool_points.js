@@ -1,6 +1,6 @@
-// Tools that want points: the goal to drive to, and the measuring tape.
+// Tools that take points: the goal to drive to, and the measuring tape.
 
-import { drawTape, tapeWords } from "./tool_marks.js";
+import { drawTape, describeTape } from "./tool_overlays.js";
 
 export function goalTool({ sendGoal, after }) {
   return {
@@ -12,10 +12,10 @@ export function goalTool({ sendGoal, after }) {
   };
 }
 
-export function tapeTool({ units, said, redraw }) {
+export function tapeTool({ units, announce, redraw }) {
   let from = null, to = null, pulling = false;
 
-  const tell = () => said(`Tape: ${tapeWords(units, from, to)}`);
+  const tell = () => announce(`Tape: ${describeTape(units, from, to)}`);
   return {
     id: "tape", name: "Measuring tape", icon: "i-tape",
     down(at) {

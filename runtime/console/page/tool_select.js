@@ -1,8 +1,8 @@
-// Pan, and select: a click takes the object or segment under it, a drag lassoes segments; with Shift they are added.
+// Pan and select: a click selects the object or segment under it, a drag lassoes segments; Shift adds to the selection.
 
-import { byId, say } from "./dom.js";
+import { byId, setText } from "./dom.js";
 import { nearestSegment } from "./draw_segments.js";
-import { drawLasso } from "./tool_marks.js";
+import { drawLasso } from "./tool_overlays.js";
 
 const CLICK_PX = 4;
 const REACH_PX = 12;
@@ -14,18 +14,18 @@ export const panTool = (view) => ({
 });
 
 // The object under a point: inside its outline's circle, or near its middle.
-export function objectAt(world, view, { x, y, touch }) {
+export function objectAt(run, view, { x, y, touch }) {
   let best = null, nearest = Infinity;
-  for (const object of world.state.objects) {
+  for (const object of run.state.objects) {
     if (object.number === null || object.number === undefined) continue;
-    const radius = world.model(object.model)?.arc_radius_m ?? 0;
+    const radius = run.model(object.model)?.arc_radius_m ?? 0;
     const away = Math.hypot(object.x - x, object.y - y);
     if (away < Math.max(radius, (touch ? TOUCH_PX : REACH_PX) / view.scale) && away < nearest) [best, nearest] = [object, away];
   }
   return best;
 }
 
-export function selectTool({ world, view, selection, redraw }) {
+export function selectTool({ run, view, selection, redraw }) {
   const tip = byId("tip");
   const hideTip = () => {
     tip.hidden = true;
@@ -35,13 +35,13 @@ export function selectTool({ world, view, selection, redraw }) {
 
   const click = (at) => {
     const reach = (at.touch ? TOUCH_PX : REACH_PX) / view.scale;
-    const segment = nearestSegment(world, at.x, at.y, reach);
+    const segment = nearestSegment(run, at.x, at.y, reach);
     if (segment !== null) {
       if (at.shift) selection.toggle(segment.number);
       else selection.choose([segment.number]);
       return;
     }
-    const object = objectAt(world, view, at);
+    const object = objectAt(run, view, at);
     if (object !== null) selection.pick(object.number);
     else if (!at.shift) {
       selection.choose([]);
@@ -54,13 +54,13 @@ export function selectTool({ world, view, selection, redraw }) {
   };
   return {
     id: "select", name: "Select segments and objects", icon: "i-select",
-    // What a segment is, and how old, in words beside the pointer.
+    // Shows a segment's number and age beside the pointer.
     hover(at) {
-      const segment = nearestSegment(world, at.x, at.y, REACH_PX / view.scale);
+      const segment = nearestSegment(run, at.x, at.y, REACH_PX / view.scale);
       tip.hidden = segment === null;
       if (segment === null) return;
-      const age = Number.isFinite(segment.t) ? `${Math.max(0, world.state.robot_s - segment.t).toFixed(1)} s old` : "of unknown age";
-      say(tip, `segment ${segment.number}, ${age}${segment.pinned ? ", pinned" : ""}`);
+      const age = Number.isFinite(segment.t) ? `${Math.max(0, run.state.robot_s - segment.t).toFixed(1)} s old` : "of unknown age";
+      setText(tip, `segment ${segment.number}, ${age}${segment.pinned ? ", pinned" : ""}`);
       const left = at.sx + 220 > view.width ? at.sx - 190 : at.sx + 14;
       tip.style.transform = `translate(${left}px, ${Math.max(4, at.sy - 34)}px)`;
     },
@@ -81,7 +81,7 @@ export function selectTool({ world, view, selection, redraw }) {
       const moved = lasso.some(({ sx, sy }) => Math.hypot(sx - began.sx, sy - began.sy) > CLICK_PX);
       if (!moved) click(at);
       else {
-        const inside = within(world, lasso);
+        const inside = within(run, lasso);
         if (began.shift) selection.add(inside);
         else selection.choose(inside);
       }
@@ -91,7 +91,7 @@ export function selectTool({ world, view, selection, redraw }) {
     key(event) {
       if (event.key.toLowerCase() !== "a" || event.shiftKey) return false;
       const [left, top] = view.toWorld(0, 0), [right, bottom] = view.toWorld(view.width, view.height);
-      selection.choose(within(world, [{ x: left, y: top }, { x: right, y: top }, { x: right, y: bottom }, { x: left, y: bottom }]));
+      selection.choose(within(run, [{ x: left, y: top }, { x: right, y: top }, { x: right, y: bottom }, { x: left, y: bottom }]));
       return true;
     },
     none() {
@@ -104,9 +104,9 @@ export function selectTool({ world, view, selection, redraw }) {
 }
 
 // The segments whose middle lies within a polygon.
-function within(world, polygon) {
+function within(run, polygon) {
   const found = [];
-  for (const s of world.segments.values()) {
+  for (const s of run.segments.values()) {
     const x = (s.x1 + s.x2) / 2, y = (s.y1 + s.y2) / 2;
     let inside = false;
     for (let i = 0, j = polygon.length - 1; i < polygon.length; j = i++) {
@@ -118,17 +118,17 @@ function within(world, polygon) {
   return found;
 }
 
-// The row of buttons for what is selected.
-export function chosenRow({ world, selection, connection, notices }) {
+// The row of buttons for the selected segments.
+export function selectionBar({ run, selection, connection, notifications }) {
   const numbers = () => [...selection.segments];
   const refresh = () => {
     const count = selection.segments.size;
-    byId("chosen").hidden = count === 0;
-    say(byId("chosen-count"), `${count} segment${count === 1 ? "" : "s"}`);
+    byId("selection-bar").hidden = count === 0;
+    setText(byId("selection-count"), `${count} segment${count === 1 ? "" : "s"}`);
   };
   const act = (message, done) => {
     if (selection.segments.size === 0) return;
-    connection.ask({ ...message, numbers: numbers() }).then(done, notices.refused);
+    connection.request({ ...message, numbers: numbers() }).then(done, notifications.showError);
   };
   const actions = {
     delete: () => act({ type: "delete_segments" }, () => selection.choose([])),
@@ -138,6 +138,6 @@ export function chosenRow({ world, selection, connection, notices }) {
   };
   for (const [name, action] of Object.entries(actions)) byId(`chosen-${name}`).addEventListener("click", action);
   selection.on("segments", refresh);
-  world.on("state", refresh);
+  run.on("state", refresh);
   return actions;
 }

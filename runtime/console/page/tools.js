@@ -1,7 +1,7 @@
-// The tools of the map as a row of radio buttons, and the crosshair with which the keyboard does what a pointer does.
+// The map tools as a row of radio buttons, and the crosshair that stands in for the pointer when the keyboard is used.
 
-import { el, icon, mark } from "./dom.js";
-import { drawCross } from "./tool_marks.js";
+import { el, icon, setAttribute } from "./dom.js";
+import { drawCross } from "./tool_overlays.js";
 
 const STEP_PX = 24;
 const FINE_PX = 4;
@@ -43,10 +43,10 @@ export class Toolbox {
       tool.begin?.();
     }
     for (const [name, button] of this.#buttons) {
-      mark(button, "aria-checked", name === id);
+      setAttribute(button, "aria-checked", name === id);
       button.tabIndex = name === id ? 0 : -1;
     }
-    mark(this.canvas, "data-tool", id);
+    setAttribute(this.canvas, "data-tool", id);
     if (focus) this.canvas.focus();
     this.redraw();
   }

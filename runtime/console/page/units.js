@@ -1,4 +1,4 @@
-// Feet or metres: everything on the wire is SI, everything a person reads is in the units they chose.
+// Feet or metres: the wire is SI; everything displayed is in the chosen unit.
 
 import { Emitter } from "./emitter.js";
 

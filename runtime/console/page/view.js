@@ -1,4 +1,4 @@
-// From metres in the odometry's frame (y up) to pixels on the screen (y down), and back: pan, zoom, follow, fit.
+// Converts metres in the odometry frame (y up) to screen pixels (y down) and back; pan, zoom, follow, fit.
 
 import { Emitter } from "./emitter.js";
 
@@ -12,8 +12,8 @@ export class View extends Emitter {
   y = 0;
   scale = 60; // pixels a metre
   follow = false;
-  insets = { left: 20, right: 20, top: 20, bottom: 30 }; // px taken by what lies over the map
-  touched = false; // by a person: from then on nothing is fitted by itself
+  insets = { left: 20, right: 20, top: 20, bottom: 30 }; // px covered by controls over the map
+  touched = false; // by the operator: from then on the view is not fitted automatically
 
   resize(width, height) {
     this.width = Math.max(1, width);
@@ -29,7 +29,7 @@ export class View extends Emitter {
     return [this.x + (sx - this.width / 2) / this.scale, this.y - (sy - this.height / 2) / this.scale];
   }
 
-  // Moves what is seen by as many pixels.
+  // Moves the view by this many pixels.
   pan(dx, dy) {
     this.x -= dx / this.scale;
     this.y += dy / this.scale;
@@ -38,7 +38,7 @@ export class View extends Emitter {
     this.emit("changed");
   }
 
-  // Zooms so that what is under (sx, sy) stays there; while following, the robot does.
+  // Zooms about (sx, sy), or about the robot while following it.
   zoom(factor, sx = this.width / 2, sy = this.height / 2) {
     const scale = Math.min(SCALE_MAX, Math.max(SCALE_MIN, this.scale * factor));
     if (!this.follow) {
@@ -62,7 +62,7 @@ export class View extends Emitter {
     this.emit("changed");
   }
 
-  // Whether a box lies in what is seen.
+  // Whether a box lies within the view.
   shows({ left, right, bottom, top }) {
     const [x1, y1] = this.toScreen(left, top), [x2, y2] = this.toScreen(right, bottom);
     return x1 >= 0 && y1 >= 0 && x2 <= this.width && y2 <= this.height;
@@ -83,8 +83,8 @@ export class View extends Emitter {
   }
 }
 
-// The box round everything there is to see.
-export function extent(world) {
+// The bounding box of everything on the map.
+export function extent(run) {
   const box = { left: Infinity, right: -Infinity, bottom: Infinity, top: -Infinity };
   const add = (x, y, r = 0) => {
     box.left = Math.min(box.left, x - r);
@@ -92,20 +92,20 @@ export function extent(world) {
     box.bottom = Math.min(box.bottom, y - r);
     box.top = Math.max(box.top, y + r);
   };
-  const [x, y] = world.state.pose;
+  const [x, y] = run.state.pose;
   add(x, y, 0.5);
-  for (const s of world.segments.values()) {
+  for (const s of run.segments.values()) {
     add(s.x1, s.y1);
     add(s.x2, s.y2);
   }
-  for (const object of world.state.objects) add(object.x, object.y, 0.4);
-  const truth = world.session?.truth;
+  for (const object of run.state.objects) add(object.x, object.y, 0.4);
+  const truth = run.session?.truth;
   for (const [dx, dy, r] of truth?.drums ?? []) add(dx, dy, r);
   for (const [x1, y1, x2, y2] of truth?.walls ?? []) {
     add(x1, y1);
     add(x2, y2);
   }
   for (const polygon of truth?.polygons ?? []) for (const [px, py] of polygon) add(px, py);
-  for (const point of world.trail) add(point.x, point.y);
+  for (const point of run.trail) add(point.x, point.y);
   return box;
 }

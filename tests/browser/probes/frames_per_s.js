@@ -30,7 +30,7 @@ async (mode) => {
       if (mode === "control") lines(frames);
       else {
         view.x += 0.001;
-        world.segmentsVersion++;
+        run.segmentsVersion++;
         scene.invalidate("back", "front");
       }
       requestAnimationFrame(frame);

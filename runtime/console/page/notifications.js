@@ -1,11 +1,10 @@
-// What the page has to say to the person in front of it: banners on the map, short notes, questions. Dialogs are never
-// modal, because HALT must stay within reach of pointer and keyboard whatever is open.
+// Banners on the map, toasts and dialogs. Dialogs are never modal: HALT must stay reachable by pointer and keyboard.
 
-import { byId, el, say } from "./dom.js";
+import { byId, el, setText } from "./dom.js";
 
 const TOAST_MS = 7000;
 
-export class Notices {
+export class Notifications {
   #banners = byId("banners");
   #toasts = byId("toasts");
   #dialog = byId("dialog");
@@ -18,7 +17,7 @@ export class Notices {
     });
   }
 
-  // A banner stays until it is taken away; the same words again change nothing.
+  // A banner stays until it is removed; showing the same text again changes nothing.
   banner(name, text, { bad = false, buttons = [] } = {}) {
     const key = `${text}|${bad}|${buttons.map(([label]) => label)}`;
     const shown = this.#shown.get(name);
@@ -35,10 +34,10 @@ export class Notices {
     this.#shown.set(name, { key, element });
   }
 
-  // The words of a banner that counts, without a new element each time.
-  retell(name, text) {
+  // Replaces the text of a banner that counts, without a new element each time.
+  updateBanner(name, text) {
     const shown = this.#shown.get(name);
-    if (shown) say(shown.element.firstChild, text);
+    if (shown) setText(shown.element.firstChild, text);
   }
 
   toast(text) {
@@ -48,12 +47,12 @@ export class Notices {
     setTimeout(() => element.remove(), TOAST_MS);
   }
 
-  // For promises whose refusal belongs to no field.
-  refused = (error) => this.toast(error.message);
+  // For rejected requests that belong to no input field.
+  showError = (error) => this.toast(error.message);
 
-  ask(title, body, buttons) {
+  confirm(title, body, buttons) {
     this.#before ??= document.activeElement;
-    say(byId("dialog-title"), title);
+    setText(byId("dialog-title"), title);
     byId("dialog-body").replaceChildren(body);
     byId("dialog-buttons").replaceChildren(...buttons.map(([label, act]) => el("button", { type: "button", onclick: () => {
       if (act?.() !== false) this.close();

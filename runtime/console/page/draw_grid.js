@@ -1,6 +1,6 @@
-// What everything else is measured by: the grid, the scale, and what truly stands there where the emulator tells it.
+// The reference layers: grid, scale bar, and the true outlines that the emulator reports.
 
-import { haloed } from "./scene.js";
+import { textWithHalo } from "./scene.js";
 
 const STEPS = [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100];
 const GRID_PX = 44;
@@ -44,7 +44,7 @@ export function drawGrid(f) {
   });
   for (const [text, x, y, align] of labels) {
     ctx.textAlign = align;
-    haloed(f, text, x, y, theme.muted);
+    textWithHalo(f, text, x, y, theme.muted);
   }
 }
 
@@ -65,12 +65,12 @@ export function drawScale(f) {
   ctx.font = theme.font(12, 600);
   ctx.textAlign = "center";
   const digits = step / f.units.metres < 0.1 ? 2 : step / f.units.metres < 1 ? 1 : 0;
-  haloed(f, f.units.length(step, digits), x + width / 2, y - 7, theme.ink);
+  textWithHalo(f, f.units.length(step, digits), x + width / 2, y - 7, theme.ink);
 }
 
 export function drawTruth(f) {
   const { ctx, theme, px } = f;
-  const truth = f.world.session?.truth;
+  const truth = f.run.session?.truth;
   if (!truth) return;
   f.inWorld();
   const closed = new Path2D(), lines = new Path2D();

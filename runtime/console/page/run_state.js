@@ -1,4 +1,4 @@
-// What is known of the run: the frames received, put together. Nothing here draws and nothing here sends.
+// The state of the run, assembled from the frames received. Nothing here draws or sends.
 
 import { Emitter } from "./emitter.js";
 
@@ -15,16 +15,16 @@ const EMPTY = {
   recording: null, paused: false, speed: 1, playback: null,
 };
 
-export class World extends Emitter {
+export class RunState extends Emitter {
   session = null;
   state = EMPTY;
-  fresh = false; // whether a state has come since the last session
-  heard_ms = 0;
+  fresh = false; // whether a state has arrived since the session began
+  received_ms = 0;
   segments = new Map();
   segmentsVersion = 0;
   trail = [];
   trailVersion = 0;
-  echoes = []; // {x, y, angle, range, t}: arcs of what was heard lately
+  echoes = []; // {x, y, angle, range, t}: arcs of recent echoes
   chart = []; // {phases, late_ms, missed}: a column a frame
   evidence = null;
   log = [];
@@ -63,9 +63,9 @@ export class World extends Emitter {
     const before = this.state;
     const state = { ...EMPTY, ...frame };
     const jumped = state.robot_s < before.robot_s - 1e-9 || (state.playback === null) !== (before.playback === null);
-    state.objects = [...state.objects].sort((a, b) => (a.number ?? Infinity) - (b.number ?? Infinity)); // as they come, they change places
+    state.objects = [...state.objects].sort((a, b) => (a.number ?? Infinity) - (b.number ?? Infinity)); // frames list them by score, which changes
     this.state = state;
-    this.heard_ms = now_ms;
+    this.received_ms = now_ms;
     if (jumped) this.#forgetTime();
     this.#applySegments(frame.segments);
     this.#applyTrail(state);
@@ -85,27 +85,27 @@ export class World extends Emitter {
     this.chart = [];
   }
 
-  #applySegments(news) {
-    if (!news) return;
-    if (news.whole) this.segments.clear();
-    for (const number of news.removed ?? []) this.segments.delete(number);
-    for (const [number, x1, y1, x2, y2, normal, t] of news.added ?? []) {
+  #applySegments(update) {
+    if (!update) return;
+    if (update.whole) this.segments.clear();
+    for (const number of update.removed ?? []) this.segments.delete(number);
+    for (const [number, x1, y1, x2, y2, normal, t] of update.added ?? []) {
       this.segments.set(number, { number, x1, y1, x2, y2, normal, t, pinned: false });
     }
-    const pinned = new Set(news.pinned ?? []);
+    const pinned = new Set(update.pinned ?? []);
     let repinned = false;
     for (const segment of this.segments.values()) {
       const now = pinned.has(segment.number);
       repinned ||= now !== segment.pinned;
       segment.pinned = now;
     }
-    if (news.whole || repinned || news.added?.length || news.removed?.length) this.segmentsVersion++;
+    if (update.whole || repinned || update.added?.length || update.removed?.length) this.segmentsVersion++;
   }
 
   #applyTrail({ pose: [x, y], robot_s: t }) {
     const last = this.trail.at(-1);
     if (last && Math.hypot(x - last.x, y - last.y) < TRAIL_STEP_M) return;
-    if (last && Math.hypot(x - last.x, y - last.y) > 1) this.trail = []; // odometry began anew
+    if (last && Math.hypot(x - last.x, y - last.y) > 1) this.trail = []; // odometry restarted
     this.trail.push({ x, y, t });
     if (this.trail.length > TRAIL_MAX) this.trail.splice(0, TRAIL_MAX / 4);
     this.trailVersion++;
@@ -136,8 +136,8 @@ export class World extends Emitter {
     this.emit("log", entry);
   }
 
-  // How old what is on screen is, in seconds: since it came, as the page's own clock has it.
+  // The age of the displayed state by the page's clock, s.
   age(now_ms) {
-    return this.fresh ? (now_ms - this.heard_ms) / 1000 : Infinity;
+    return this.fresh ? (now_ms - this.received_ms) / 1000 : Infinity;
   }
 }

@@ -1,4 +1,4 @@
-// What a person holds to drive: the pad under a pointer, keys, a gamepad's stick with its shoulder button pressed.
+// Teleoperation inputs: the pad under a pointer, keys, and a gamepad's stick with its shoulder button pressed.
 
 import { byId } from "./dom.js";
 
@@ -24,7 +24,7 @@ export function watchPad(drive) {
     put(dx, dy);
     return true;
   };
-  const let_go = () => {
+  const release = () => {
     pointer = null;
     put(0, 0);
     drive.release("pad");
@@ -39,7 +39,7 @@ export function watchPad(drive) {
   });
   pad.addEventListener("pointermove", (event) => event.pointerId === pointer && drive.holding && pull(event));
   for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) {
-    pad.addEventListener(name, (event) => event.pointerId === pointer && let_go());
+    pad.addEventListener(name, (event) => event.pointerId === pointer && release());
   }
   drive.on("changed", () => !drive.holding && put(0, 0));
   holdKeys(drive, pad, (event) => PAD_KEYS[event.key], "pad key");
@@ -49,7 +49,7 @@ export function watchKeys(drive, enabled, elsewhere) {
   holdKeys(drive, window, (event) => (enabled() && !elsewhere() ? KEYS[event.code] : undefined), "key");
 }
 
-// Keys count as held from keydown to keyup; one that repeats by itself is one that is held already.
+// A key counts as held from keydown to keyup; auto-repeat changes nothing.
 function holdKeys(drive, target, directionOf, name) {
   target.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
@@ -62,7 +62,7 @@ function holdKeys(drive, target, directionOf, name) {
   if (target !== window) target.addEventListener("blur", () => Object.keys(PAD_KEYS).forEach((code) => drive.release(`${name} ${code}`)));
 }
 
-// A gamepad tells nothing by itself and is looked at once a frame of the screen, while there is one.
+// Gamepads send no events for their sticks: poll once per animation frame while one is connected.
 export function watchGamepad(drive, tell) {
   let known = 0;
   let looking = false;
@@ -86,7 +86,7 @@ export function watchGamepad(drive, tell) {
     }
     requestAnimationFrame(look);
   };
-  let pressedInVain = false; // refused once, it wants to be let go before it is tried again
+  let pressedInVain = false; // after a refusal the button must be released before the next attempt
   drive.on("changed", (why) => {
     if (why !== null) pressedInVain = true;
   });

@@ -1,7 +1,7 @@
-// What tools leave on the map while they work: the crosshair, the lasso, the outline that is being moved, the tape.
+// What the tools draw on the map: the crosshair, the lasso, the outline being moved, the tape.
 
 import { outlinePath } from "./draw_objects.js";
-import { haloed } from "./scene.js";
+import { textWithHalo } from "./scene.js";
 import { degrees } from "./units.js";
 
 export function drawCross(f, { x, y }) {
@@ -21,7 +21,7 @@ export function drawCross(f, { x, y }) {
   }
   ctx.font = theme.font(11.5, 600);
   ctx.textAlign = "left";
-  haloed(f, f.units.place(x, y), sx + 12, sy - 10, theme.ink);
+  textWithHalo(f, f.units.place(x, y), sx + 12, sy - 10, theme.ink);
   ctx.restore();
 }
 
@@ -44,8 +44,8 @@ export function drawLasso(f, points) {
   ctx.restore();
 }
 
-// An outline that is not there yet, with the handle that turns it.
-export function drawGhost(f, model, pose, handle) {
+// Previews an outline at its new pose, with the handle that rotates it.
+export function drawPreview(f, model, pose, handle) {
   const { x, y, theta } = pose;
   const { ctx, theme, px } = f;
   const path = new Path2D();
@@ -74,7 +74,7 @@ export function drawGhost(f, model, pose, handle) {
   ctx.font = theme.font(11.5, 600);
   ctx.textAlign = "left";
   const [sx, sy] = f.view.toScreen(x, y);
-  haloed(f, `${f.units.place(x, y)}, ${degrees(theta)}`, sx + 14, sy + 20, theme.ink);
+  textWithHalo(f, `${f.units.place(x, y)}, ${degrees(theta)}`, sx + 14, sy + 20, theme.ink);
   ctx.restore();
 }
 
@@ -100,12 +100,12 @@ export function drawTape(f, from, to) {
   ctx.font = theme.font(13, 700);
   ctx.textAlign = "center";
   ctx.textBaseline = "middle";
-  const words = tapeWords(f.units, from, to);
-  haloed(f, words, (ax + bx) / 2, (ay + by) / 2 - 14, theme.ink);
+  const text = describeTape(f.units, from, to);
+  textWithHalo(f, text, (ax + bx) / 2, (ay + by) / 2 - 14, theme.ink);
   ctx.restore();
 }
 
-export function tapeWords(units, from, to) {
+export function describeTape(units, from, to) {
   const dx = to.x - from.x, dy = to.y - from.y;
   return `${units.length(Math.hypot(dx, dy), 3)} at ${degrees(Math.atan2(dy, dx))}`;
 }
