@@ -335,7 +335,7 @@ async def test_a_goal_by_click_and_by_numbers(server: FakeServer, opener: Opener
     await page.mouse.click(*await opened.screen(3.2, -0.2))
     goal = await server.wait("goal")
     assert (goal["x"], goal["y"]) == pytest.approx((3.2, -0.2), abs=0.02)
-    await opened.says("#drive-request-words", "To the goal at 10.5")
+    await opened.says("#drive-request-text", "To the goal at 10.5")
     await opened.shot("goal")
     await page.locator("#goal-x").fill("10")
     await page.locator("#goal-y").fill("-1,5")
@@ -352,7 +352,7 @@ async def test_a_goal_by_click_and_by_numbers(server: FakeServer, opener: Opener
     server.refusals.clear()
     await page.get_by_role("button", name="As configured").click()
     assert await server.wait("legs") == {}
-    await opened.says("#drive-request-words", "as configured")
+    await opened.says("#drive-request-text", "as configured")
 
 
 async def test_a_goal_with_the_keyboard_alone(server: FakeServer, opener: Opener) -> None:

@@ -223,7 +223,7 @@ async def test_what_a_person_does_is_replayed_to_the_bit(tmp_path: Path, opener:
         await page.locator("#goal-x").fill("1")
         await page.locator("#goal-y").fill("0")
         await page.locator("#goal-y").press("Enter")
-        await opened.says("#drive-request-words", "goal at 1.00, 0.00")
+        await opened.says("#drive-request-text", "goal at 1.00, 0.00")
         await opened.tab("Tune")
         await page.get_by_role("button", name="Undo").click()
         await expect(page.locator("#drive-gains .changed")).to_have_count(0)

@@ -136,7 +136,7 @@ export function selectionBar({ run, selection, connection, notifications }) {
     unpin: () => act({ type: "pin_segments", pinned: false }),
     none: () => selection.choose([]),
   };
-  for (const [name, action] of Object.entries(actions)) byId(`chosen-${name}`).addEventListener("click", action);
+  for (const [name, action] of Object.entries(actions)) byId(`selection-${name}`).addEventListener("click", action);
   selection.on("segments", refresh);
   run.on("state", refresh);
   return actions;

@@ -1,0 +1,49 @@
+"""The documents name only what exists: paths in backticks, and in the walk along an echo each function passed."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+ROOMS = ("behaviors/", "bench/", "config/", "docs/", "drivers/", "perception/", "runtime/", "tests/")
+ROW = re.compile(r"^\| `(?P<module>[\w/]+\.py)` \| (?P<functions>.+?) \|", re.MULTILINE)
+
+
+def paths_in(text: str) -> set[str]:
+    """Return every path of the project that `text` names in backticks or links to."""
+    named = re.findall(r"`([\w./-]+)`", text) + re.findall(r"\]\(([\w./-]+)", text)
+    return {path for path in named if path.startswith(ROOMS)}
+
+
+def definitions(path: Path) -> set[str]:
+    """Return the functions, classes and methods that a module defines, methods as `Class.method`."""
+    found = set()
+    for node in ast.parse(path.read_text("utf-8")).body:
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            found.add(node.name)
+        if isinstance(node, ast.ClassDef):
+            found |= {
+                f"{node.name}.{part.name}" for part in node.body if isinstance(part, ast.FunctionDef | ast.AsyncFunctionDef)
+            }
+    return found
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_every_path_exists(document: Path) -> None:
+    missing = {path for path in paths_in(document.read_text("utf-8")) if not (ROOT / path).exists()}
+    assert not missing
+
+
+def test_the_walk_names_functions_that_exist() -> None:
+    rows = ROW.findall((ROOT / "docs" / "following-an-echo.md").read_text("utf-8"))
+    assert len(rows) >= 20
+    for module, cell in rows:
+        named = re.findall(r"`([A-Za-z_][\w.]*)`", cell)
+        assert named, module
+        unknown = set(named) - definitions(ROOT / module)
+        assert not unknown, f"{module} does not define {sorted(unknown)}"
