@@ -99,7 +99,7 @@ async def test_a_recording_is_opened_scrubbed_played_and_left(server: FakeServer
 async def test_nothing_is_driven_by_hand_while_one_looks_at_a_recording(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     server.playback = {"s": 1.0, "is_playing": False, "speed": 1.0}
-    await opened.says("#banner-playback", "not at the robot")
+    await opened.says("#banner-playback", "not the live run")
     await opened.tab("Drive")
     await opened.page.locator("#pad").focus()
     await opened.page.keyboard.press("ArrowUp")

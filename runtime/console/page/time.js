@@ -35,7 +35,7 @@ export class Time {
     connection.on("closed", () => this.#discard()); // a new connection shows the live run
   }
 
-  // The list is pending for when somebody looks.
+  // Request the list when the panel is first shown.
   shown() {
     if (byId("recordings").options.length === 0) this.#list();
   }
