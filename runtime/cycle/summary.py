@@ -1,4 +1,4 @@
-"""What a run has to show at its end, in the JSON forms of the public surface."""
+"""The summary of a run in the JSON forms of the public surface."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ class ObjectRow(TypedDict):
     support: int
     score: float
     probability: NotRequired[float]
-    """That it is this model."""
+    """Probability that it is this model."""
     covariance: NotRequired[tuple[float, float, float]]
     """xx, xy, yy of the position, m²."""
 
 
 class LinkRow(TypedDict):
-    """Frames heard, frames that were no frames, frames that never came."""
+    """Frames received, malformed frames, and frames lost on the line."""
 
     frames: int
     bad: int
@@ -44,7 +44,7 @@ class LinkRow(TypedDict):
 
 
 class SensorRow(TypedDict):
-    """A sensor that is not believed, and why; `fault` as in `perception.sensor_report`."""
+    """A sensor whose ranges are not used, and why; `fault` as in `perception.sensor_report`."""
 
     sensor: int
     fault: str
@@ -52,7 +52,7 @@ class SensorRow(TypedDict):
 
 
 class RecordingRow(TypedDict):
-    """The recording that a run left: the newest of its files, bytes in all of them, messages that are missing."""
+    """The recording of a run: the newest of its files, bytes in all of them, messages that are missing."""
 
     file: str | None
     files: int
@@ -63,7 +63,7 @@ class RecordingRow(TypedDict):
 
 
 class LogRow(TypedDict):
-    """Lines of the log that did not get into its file, and why."""
+    """Lines of the log that are missing in its file, and why."""
 
     lost: int
     trouble: str | None
@@ -133,7 +133,7 @@ def object_row(seen: DetectedObject) -> ObjectRow:
 
 
 def in_frame(frame: Pose, seen: DetectedObject) -> DetectedObject:
-    """Return an object of ours in a frame in which our origin is `frame`."""
+    """Return an object in another frame, in which the present origin lies at `frame`."""
     if frame == Pose(0.0, 0.0, 0.0):
         return seen
     place = frame.compose(Pose(seen.x, seen.y, seen.theta))
@@ -152,12 +152,28 @@ def in_frame(frame: Pose, seen: DetectedObject) -> DetectedObject:
 def run_summary(
     state: State,
     stats: CycleStats,
-    keeper: TimingMonitor,
+    timing_monitor: TimingMonitor,
     driver: RobotDriver,
-    cost: FootprintRow,
+    footprint: FootprintRow,
     stop_reasons: list[str],
 ) -> RunSummary:
-    """Return the summary of a run that ends in `state`; objects are in the robot's own odometry, leaps and all."""
+    """Return the summary of a run.
+
+    Parameters
+    ----------
+    state : State
+        What the last cycle left. Objects are given in the robot's own odometry, with its jumps.
+    stats : CycleStats
+        Durations and lateness of the cycles.
+    timing_monitor : TimingMonitor
+        What delayed them.
+    driver : RobotDriver
+        Counts of the line, and the origin of the odometry.
+    footprint : FootprintRow
+        What the process used of its machine.
+    stop_reasons : list of str
+        Of every stop, in order.
+    """
     counts = driver.counts
     return {
         "objects": [object_row(in_frame(driver.odometry_origin, seen)) for seen in state.perception.objects()],
@@ -170,10 +186,10 @@ def run_summary(
             {"sensor": r.sensor, "fault": r.fault, "reason": r.reason} for r in state.perception.sensor_reports()
         ],
         "link": {"frames": counts.frames, "bad": counts.bad, "lost": counts.lost},
-        "process": cost,
+        "process": footprint,
         "mode": state.mode.mode.value,
         "stop_reasons": stop_reasons,
-        "timing": keeper.timing(),
+        "timing": timing_monitor.summary(),
     }
 
 
