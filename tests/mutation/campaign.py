@@ -1,7 +1,7 @@
-"""Runs the tests of a module against each of its mutants, each in a forked process; writes docs/mutants.md.
+"""Runs a module's tests on each of its mutants, each in a forked process; writes docs/mutants.md.
 
-`NUMBA_DISABLE_JIT=1 python -m tests.mutation.campaign [MODULE …]`. The parent has loaded every library but none of
-our modules that could be under test, so that a mutant costs its tests and little more; a mutant that hangs is killed.
+`NUMBA_DISABLE_JIT=1 python -m tests.mutation.campaign [MODULE …]`. The parent imports the libraries but none of our
+modules, so that a mutant costs little more than its tests. A mutant that hangs is killed.
 """
 
 from __future__ import annotations
@@ -38,30 +38,40 @@ TARGETS: dict[str, tuple[str, ...]] = {
     "runtime/cycle/modes.py": ("tests/runtime/cycle/test_modes.py",),
 }
 KILLED_MIN = 0.85
-PATIENCE_S = 180
+"""Share of the mutants that the tests must detect."""
+TIMEOUT_S = 180
+INTRODUCTION = (
+    "Each module below was changed in one place at a time, and its tests were run on every change, without compiled",
+    "kernels. `make mutants` repeats that and writes this page. Every change that no test detects is listed with the",
+    "reason why that is acceptable.",
+)
 JOBS = 2 * (os.cpu_count() or 1)
-"""More than processors: much of a run is waiting for files."""
+"""More than processors, because much of a run waits for files."""
 LIBRARIES = ("hypothesis", "numba", "numpy", "orjson", "pydantic", "pytest", "pytest_asyncio", "rich.console",
              "structlog", "cobs.cobs", "serial")  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Outcome:
+    """Mutants of a module that the tests detected, and those that survived."""
+
     module: str
     killed: tuple[Mutant, ...]
     survived: tuple[Mutant, ...]
 
     @property
     def share(self) -> float:
+        """Share of the mutants that were killed."""
         return len(self.killed) / max(1, len(self.killed) + len(self.survived))
 
     @property
     def unexplained(self) -> list[str]:
+        """Keys of the survivors without an accepted reason."""
         return [m.key for m in self.survived if m.key not in ACCEPTED.get(self.module, {})]
 
 
-class _Liar(importlib.abc.MetaPathFinder, importlib.abc.Loader):
-    """Gives a module another source."""
+class _SourceReplacer(importlib.abc.MetaPathFinder, importlib.abc.Loader):
+    """Import hook that loads one module from another source."""
 
     def __init__(self, module: str, source: str) -> None:
         self._name = module.removesuffix(".py").replace("/", ".")
@@ -81,17 +91,18 @@ class _Liar(importlib.abc.MetaPathFinder, importlib.abc.Loader):
 
 
 def load_libraries() -> None:
+    """Import the libraries that tests need, before processes are forked."""
     for name in LIBRARIES:
         importlib.import_module(name)
 
 
 def start(module: str, source: str, tests: Sequence[str]) -> int:
-    """Run `tests` with another source of `module` in a process of its own, and return its number."""
+    """Fork a process that runs `tests` with `source` as the source of `module`; return its process ID."""
     child = os.fork()
     if child == 0:
         code = 1
         try:
-            signal.alarm(PATIENCE_S)
+            signal.alarm(TIMEOUT_S)
             code = _run(module, source, tests)
         finally:
             os._exit(code)
@@ -99,7 +110,7 @@ def start(module: str, source: str, tests: Sequence[str]) -> int:
 
 
 def survivors(module: str, sources: Sequence[str], tests: Sequence[str]) -> list[int]:
-    """Return the numbers of the sources with which `tests` pass; they run a few at a time."""
+    """Return the indices of the sources with which `tests` pass; a few run at a time."""
     running: dict[int, int] = {}
     passed = []
     todo = list(enumerate(sources))[::-1]
@@ -115,7 +126,7 @@ def survivors(module: str, sources: Sequence[str], tests: Sequence[str]) -> list
 
 
 def _run(module: str, source: str, tests: Sequence[str]) -> int:
-    """Run the tests in this process, without a word, to the first failure; examples are not shrunk."""
+    """Run the tests in this process without output, up to the first failure; examples are not shrunk."""
     import hypothesis
     import pytest
 
@@ -127,24 +138,24 @@ def _run(module: str, source: str, tests: Sequence[str]) -> int:
     hypothesis.settings.register_profile("mutants", phases=phases, database=None, derandomize=True, deadline=None)
     hypothesis.settings.load_profile("mutants")
     os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
-    sys.meta_path.insert(0, _Liar(module, source))
+    sys.meta_path.insert(0, _SourceReplacer(module, source))
     options = ["-x", "-q", "-p", "no:cacheprovider", "-p", "pytest_asyncio.plugin", "-m", "not soak and not realtime"]
-    options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # libraries are loaded already, on purpose
-    with tempfile.TemporaryDirectory() as folder:  # pytest's own folders are not for several runs at a time
+    options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # the libraries are already imported
+    with tempfile.TemporaryDirectory() as folder:  # pytest's default folders are not safe for parallel runs
         return int(pytest.main([*options, "--basetemp", f"{folder}/tests", *tests]))
 
 
 def campaign(module: str, tests: Sequence[str]) -> Outcome:
-    """Return what became of every mutant of `module`.
+    """Return the outcome of every mutant of `module`.
 
     Raises
     ------
     RuntimeError
-        The tests fail without any mutant.
+        The tests fail on the unchanged module.
     """
     source = (ROOT / module).read_text("utf-8")
     if not survivors(module, [source], tests):
-        raise RuntimeError(f"{module}: its tests fail without any mutant")
+        raise RuntimeError(f"{module}: its tests fail on the unchanged module")
     found = list(mutants(source))
     alive = set(survivors(module, [m.source for m in found], tests))
     killed = tuple(m for k, m in enumerate(found) if k not in alive)
@@ -152,13 +163,11 @@ def campaign(module: str, tests: Sequence[str]) -> Outcome:
 
 
 def page(outcomes: Iterable[Outcome]) -> str:
-    """Return the document."""
+    """Return the page as Markdown."""
     lines = [
         "# Mutants",
         "",
-        "Each module below was changed in one place at a time, and its own tests were run on the change, without",
-        "compiled kernels. `make mutants` repeats that and writes this page. A change that no test notices is listed",
-        "with the reason why it may stay.",
+        *INTRODUCTION,
         "",
         "| module | mutants | killed | share |",
         "|---|---|---|---|",
@@ -176,16 +185,17 @@ def page(outcomes: Iterable[Outcome]) -> str:
 
 
 def main(modules: Sequence[str]) -> int:
+    """Test the mutants of `modules`, or of all targets; return 0 if enough are killed and all survivors accepted."""
     load_libraries()
     outcomes = []
     for module in modules or list(TARGETS):
-        begun_s = time.monotonic()
+        start_s = time.monotonic()
         outcome = campaign(module, TARGETS[module])
         outcomes.append(outcome)
         many = len(outcome.killed) + len(outcome.survived)
         sys.stdout.write(
             f"{module}: {len(outcome.killed)} of {many} killed ({100 * outcome.share:.1f} %), "
-            f"{time.monotonic() - begun_s:.0f} s\n"
+            f"{time.monotonic() - start_s:.0f} s\n"
         )
         for m in outcome.survived:
             sys.stdout.write(f"  {'' if m.key in ACCEPTED.get(module, {}) else 'NEW '}line {m.line} {m.key}\n")

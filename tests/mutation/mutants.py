@@ -1,4 +1,7 @@
-"""Small lies put into a module's source, one at a time: what tests do not notice, they do not test."""
+"""Mutants of a module: its source with one small change. A change that no test detects is not tested.
+
+Unlike mutmut, it also changes module-level code and decorated functions, and leaves prose alone.
+"""
 
 from __future__ import annotations
 
@@ -17,15 +20,15 @@ SWAPS: dict[type[ast.AST], type[ast.AST]] = {
 NAMES = {"min": "max", "max": "min", "any": "all", "all": "any", "floor": "ceil", "ceil": "floor", "sin": "cos",
          "cos": "sin"}  # fmt: skip
 WORD_MAX = 12
-"""Longer texts, and those of several words, are for people."""
+"""Longest string that is changed; longer strings, and those of several words, are prose."""
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A module with one change."""
+    """Module with one change."""
 
     where: str
-    """Class and function, then the number among the same changes there: stays when lines move."""
+    """Class and function, then the number among equal changes there; it does not depend on line numbers."""
     line: int
     before: str
     after: str
@@ -35,19 +38,20 @@ class Mutant:
 
     @property
     def source(self) -> str:
-        """The whole module with the change in it."""
+        """Source of the whole module with the change."""
         changed = copy.deepcopy(self.module)
-        twin = next(node for k, (node, _) in enumerate(_places(changed, ())) if k == self.number)
-        _replace(changed, twin, list(_variants(twin))[self.variant])
+        target = next(node for k, (node, _) in enumerate(_places(changed, ())) if k == self.number)
+        _replace(changed, target, list(_variants(target))[self.variant])
         return ast.unparse(ast.fix_missing_locations(changed))
 
     @property
     def key(self) -> str:
+        """Identifier of the mutant within its module."""
         return f"{self.where}: {self.before} → {self.after}"
 
 
 def mutants(source: str) -> Iterator[Mutant]:
-    """Yield every mutant of a module that is another program."""
+    """Yield every mutant of a module."""
     tree = ast.parse(source)
     counts: dict[str, int] = {}
     for number, (node, where) in enumerate(_places(tree, ())):
@@ -64,7 +68,7 @@ def mutants(source: str) -> Iterator[Mutant]:
 
 
 def _places(node: ast.AST, where: tuple[str, ...]) -> Iterator[tuple[ast.AST, tuple[str, ...]]]:
-    """Yield the nodes that may be changed, with the class and function they are in; no types, no texts for people."""
+    """Yield the nodes that may be changed, with their class and function; types and prose are left out."""
     inner = (*where, node.name) if isinstance(node, ast.ClassDef | ast.FunctionDef) else where
     yield node, inner
     for name, value in ast.iter_fields(node):
@@ -83,7 +87,7 @@ def _is_alias(node: ast.AnnAssign) -> bool:
 
 
 def _variants(node: ast.AST) -> Iterator[ast.AST]:
-    """Yield what a node may become."""
+    """Yield the replacements of a node."""
     match node:
         case ast.Compare(ops=[op]) if type(op) in SWAPS:
             yield _with(node, ops=[SWAPS[type(op)]()])
@@ -119,10 +123,10 @@ def _variants(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def _with(node: ast.AST, **fields: object) -> ast.AST:
-    twin = copy.copy(node)
+    changed = copy.copy(node)
     for name, value in fields.items():
-        setattr(twin, name, value)
-    return twin
+        setattr(changed, name, value)
+    return changed
 
 
 def _replace(tree: ast.AST, old: ast.AST, new: ast.AST) -> None:
@@ -139,7 +143,7 @@ def _replace(tree: ast.AST, old: ast.AST, new: ast.AST) -> None:
 
 
 def _shown(node: ast.AST) -> str:
-    """Return a change's head: the test of an `if`, not all that hangs on it."""
+    """Return a node as text for the page: of an `if` or `while` only the condition."""
     head: ast.AST = node.test if isinstance(node, ast.If | ast.While) else node
     text = " ".join(ast.unparse(ast.fix_missing_locations(copy.deepcopy(head))).split())
     return text if len(text) <= 100 else text[:99] + "…"

@@ -1,4 +1,4 @@
-"""That the mutator lies as it should, and (in the long form) that the tests notice."""
+"""Tests of the mutants, and (in the long form) that the tests detect them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SOURCE = '''
 LIMIT: Final = 3
 Name: TypeAlias = Literal["b"]
 
-class Thing:
+class Example:
     """Another."""
     def whole(self, a: float, *, least: int = 1) -> float | None:
         """A third."""
@@ -32,25 +32,25 @@ class Thing:
 def test_each_mutant_is_one_small_change() -> None:
     found = list(mutants(SOURCE))
     assert [(m.before, m.after) for m in found if m.where.startswith("module")] == [("3", "4")]
-    assert [m.key for m in found if m.where.startswith("Thing")] == [
-        "Thing.whole: 1 → 2",
-        "Thing.whole: a < LIMIT and (not least) → not (a < LIMIT and (not least))",
-        "Thing.whole: a < LIMIT and (not least) → a < LIMIT or not least",
-        "Thing.whole: a < LIMIT → a <= LIMIT",
-        "Thing.whole: not least → least",
-        "Thing.whole: raise ValueError(f'{a + 1} is too little, at least 3') → pass",
-        "Thing.whole: self.seen += 1 → self.seen -= 1",
-        "Thing.whole #2: 1 → 2",
-        "Thing.whole: return min(a, -2.0) → return None",
-        "Thing.whole: min → max",
-        "Thing.whole: -2.0 → 2.0",
-        "Thing.whole: 2.0 → 3.0",
+    assert [m.key for m in found if m.where.startswith("Example")] == [
+        "Example.whole: 1 → 2",
+        "Example.whole: a < LIMIT and (not least) → not (a < LIMIT and (not least))",
+        "Example.whole: a < LIMIT and (not least) → a < LIMIT or not least",
+        "Example.whole: a < LIMIT → a <= LIMIT",
+        "Example.whole: not least → least",
+        "Example.whole: raise ValueError(f'{a + 1} is too little, at least 3') → pass",
+        "Example.whole: self.seen += 1 → self.seen -= 1",
+        "Example.whole #2: 1 → 2",
+        "Example.whole: return min(a, -2.0) → return None",
+        "Example.whole: min → max",
+        "Example.whole: -2.0 → 2.0",
+        "Example.whole: 2.0 → 3.0",
     ]
     assert len({m.source for m in found}) == len(found)
 
 
-def test_what_is_accepted_is_a_mutant_there_is() -> None:
-    """A reason outlives neither its module nor its line."""
+def test_accepted_mutants_exist() -> None:
+    """A reason is removed together with its module or line."""
     for module, reasons in ACCEPTED.items():
         keys = {m.key for m in mutants((ROOT / module).read_text("utf-8"))}
         assert reasons.keys() <= keys, reasons.keys() - keys
@@ -59,8 +59,8 @@ def test_what_is_accepted_is_a_mutant_there_is() -> None:
 
 @pytest.mark.soak
 @pytest.mark.parametrize("module", TARGETS)
-def test_mutants_are_noticed(module: str, record_property: Callable[[str, object], None]) -> None:
-    """At least 85 of 100, and every survivor has a reason."""
+def test_mutants_are_detected(module: str, record_property: Callable[[str, object], None]) -> None:
+    """At least 85 % are killed, and every survivor has a reason."""
     env = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-m", "tests.mutation.campaign", module]
     done = subprocess.run(command, capture_output=True, text=True, env=env, timeout=3600, check=False)
