@@ -27,7 +27,7 @@ ACCEPTED: Mapping[str, Mapping[str, str]] = MappingProxyType(
             ),
             "arbitrate: return _outside(v, w) → return None": "the same safety check: no value reaches it",
             "limit_velocity: asked.v > 0.0 → asked.v >= 0.0": "zero speed stays zero, ahead or back",
-            "limit_velocity: percept.pose.theta + math.pi → percept.pose.theta - math.pi": "both are the same direction",
+            "limit_velocity: percept.pose.theta + math.pi → percept.pose.theta - math.pi": "the same direction",
             "limit_velocity: abs(v) <= body.speed_max_m_s and abs(w) <= body.turn_max_rad_s → "
             "abs(v) <= body.speed_max_m_s or abs(w) <= body.turn_max_rad_s": "the second safety check, as above",
             "limit_velocity: return _outside(v, w) → return None": "no value reaches it",

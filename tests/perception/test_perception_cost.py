@@ -1,6 +1,6 @@
-"""What perception costs a ring reading, kernels warm, and that its budget holds to one quantum.
+"""Cost of perception per ring reading with compiled kernels, and its budget, which holds to one quantum.
 
-CPU time of this thread, not the wall clock: other programs on the machine cost nothing here.
+Times are CPU times of this thread, so that other programs on the machine do not count.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
 SETTINGS = load_settings("hallway")
 MANY_QUANTA = load_settings("hallway", ["perception.method=paper"])
-"""The paper's method wakes every candidate whose cluster changed, so that a budget has something to cut short."""
+"""The paper's method refines every candidate whose cluster changed, so that a budget can interrupt it."""
 MEDIAN_MS, P99_MS = 1.0, 5.0
-"""The figures that perception is held to."""
+"""Limits of the CPU time per ring reading."""
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def fresh() -> Perception:
 
 
 def cost_ms(perception: Perception, firing: Firing) -> float:
-    """Take in one reading and refine to rest or for as many quanta as a cycle has; return the CPU time."""
+    """Process one reading, with up to a cycle's quanta of refinement; return the CPU time, ms."""
     begin_ns = time.thread_time_ns()
     perception.observe(firing)
     done = 0
@@ -55,7 +55,7 @@ def cost_ms(perception: Perception, firing: Firing) -> float:
 
 
 def control_ms(scratch: np.typing.NDArray[np.float64]) -> float:
-    """Do a fixed piece of interpreter and array work: how fast this machine is just now."""
+    """Return the CPU time of a fixed piece of interpreter and array work, ms, as a measure of the machine's speed."""
     begin_ns = time.thread_time_ns()
     total = 0.0
     for k in range(1000):
@@ -79,18 +79,19 @@ def test_cost_of_a_ring_reading(records: list[CycleRecord]) -> None:
     logging.getLogger(__name__).info("%s", figures)
     assert median <= MEDIAN_MS, figures
     assert p99 <= P99_MS, figures
-    # Compiled a reading takes half as long as the control, in the interpreter nearly ten times as long.
+    # Compiled, a reading takes half as long as the control; interpreted, nearly ten times as long.
     assert ratio <= 2.0, figures
 
 
-def test_the_cost_does_not_grow_with_the_way(records: list[CycleRecord]) -> None:
-    """Old segments leave, so that the third lap past the same drums costs what the first did."""
+def test_cost_does_not_grow_with_distance(records: list[CycleRecord]) -> None:
+    """Old segments are dropped, so that later laps past the same drums cost what the first did."""
     firings = [firing for record in records for firing in record.inputs.received.firings]
     lap_s = firings[-1].robot_s - firings[0].robot_s + 1.0
     perception, medians = fresh(), []
     for lap in range(4):
         costs = [
-            cost_ms(perception, Firing(f.robot_s + lap * 10.0 * lap_s, f.pose, f.ring_yaw, f.ranges_m)) for f in firings
+            cost_ms(perception, Firing(f.robot_s + lap * 10.0 * lap_s, f.pose, f.ring_yaw, f.ranges_m))
+            for f in firings
         ]
         medians.append(float(np.median(costs)))
     assert max(medians) <= MEDIAN_MS, medians
@@ -118,14 +119,14 @@ def test_a_handle_goes_over_for_less_than_two_tuples() -> None:
 
 
 class VirtualClock:
-    """A clock that only quanta move."""
+    """Clock that advances by `quantum_s` per quantum only."""
 
     def __init__(self, quantum_s: float) -> None:
         self.spent_s, self.quantum_s = 0.0, quantum_s
 
 
-class Clocked(Perception):
-    """Perception whose every quantum takes the same time."""
+class VirtualTimePerception(Perception):
+    """Perception whose every quantum takes the same virtual time."""
 
     clock: VirtualClock
 
@@ -135,8 +136,8 @@ class Clocked(Perception):
 
 
 def budgeted(records: list[CycleRecord], budget_s: float, quantum_s: float) -> Iterator[tuple[CycleRecord, float]]:
-    """Play the drive as `runtime.cycle.process` does; yield each record and how long refinement took."""
-    perception = Clocked(MANY_QUANTA.ring, MANY_QUANTA.models, MANY_QUANTA.perception)
+    """Repeat the drive under a budget; yield each record and the time of its refinement, s."""
+    perception = VirtualTimePerception(MANY_QUANTA.ring, MANY_QUANTA.models, MANY_QUANTA.perception)
     clock = perception.clock = VirtualClock(quantum_s)
     state = State(perception)
     for record in records:
@@ -149,27 +150,27 @@ def budgeted(records: list[CycleRecord], budget_s: float, quantum_s: float) -> I
 
 
 @pytest.mark.parametrize("budget_s", [0.0001, 0.001, 0.0015, 0.0025])
-def test_the_budget_is_overdrawn_by_less_than_one_quantum(records: list[CycleRecord], budget_s: float) -> None:
+def test_budget_is_exceeded_by_less_than_one_quantum(records: list[CycleRecord], budget_s: float) -> None:
     quantum_s = 0.001
     causes = []
     for record, spent_s in budgeted(records, budget_s, quantum_s):
         assert spent_s < budget_s + quantum_s
         if record.refinement == "budget":
-            assert spent_s >= budget_s, "it stopped although there was time"
+            assert spent_s >= budget_s, "refinement stopped before its budget was spent"
         causes.append(record.refinement)
     assert {"budget", "nothing"} <= set(causes)
 
 
-def test_without_a_budget_there_is_no_refinement_and_no_object(records: list[CycleRecord]) -> None:
-    """A budget of zero turns refinement off: the robot drives and avoids, and recognises nothing."""
+def test_zero_budget_turns_refinement_off(records: list[CycleRecord]) -> None:
+    """The robot still drives and avoids obstacles, but recognises no objects."""
     for record, spent_s in budgeted(records, 0.0, 0.001):
         assert (record.quanta, spent_s) == (0, 0.0)
         assert record.refinement in {"budget", "nothing"}
 
 
-def test_the_least_budget_makes_progress(records: list[CycleRecord]) -> None:
-    """One quantum a cycle, and the drums are found all the same."""
-    perception = Clocked(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
+def test_one_quantum_per_cycle_makes_progress(records: list[CycleRecord]) -> None:
+    """One quantum per cycle is enough to find the drums."""
+    perception = VirtualTimePerception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
     perception.clock = VirtualClock(1.0)
     state = State(perception)
     once: Callable[[int], bool] = lambda done: done < 1  # noqa: E731

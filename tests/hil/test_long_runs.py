@@ -1,4 +1,4 @@
-"""P15: it runs on, and on: memory, tasks and the robot's clock, which begins anew every 71.6 minutes."""
+"""P15: long runs: memory, tasks, and the robot's clock, which wraps every 71.6 minutes."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ RATE_HZ = 20
 WRAP_S = 2**32 * 1e-6
 
 
-def drive_on(hours: float, wrap_s: float, patience_s: float) -> dict[str, Any]:
-    """Drive for so long in virtual time, in a process of its own, and return what is left behind."""
+def drive_for(hours: float, wrap_s: float, timeout_s: float) -> dict[str, Any]:
+    """Drive for `hours` in virtual time, in a process of its own, and return the figures of `bench.growth`."""
     cycles = round(hours * 3600 * RATE_HZ)
     done = subprocess.run(
         [sys.executable, "-X", "dev", "-m", "bench.growth", str(cycles), "--wrap-s", str(wrap_s)],
-        cwd=ROOT, text=True, capture_output=True, timeout=patience_s, check=False,
+        cwd=ROOT, text=True, capture_output=True, timeout=timeout_s, check=False,
     )  # fmt: skip
     assert done.stdout, done.stderr
     figures: dict[str, Any] = json.loads(done.stdout)
@@ -38,20 +38,20 @@ def drive_on(hours: float, wrap_s: float, patience_s: float) -> dict[str, Any]:
 
 
 def test_half_an_hour_in_virtual_time(measured: Callable[[str], None]) -> None:
-    figures = drive_on(0.5, 900.0, 600.0)
+    figures = drive_for(0.5, 900.0, 600.0)
     assert figures["wraps"] == 1
     measured(f"0.5 h in virtual time, t_us wrapped once: {figures['slope_mb_h']:+.2f} MB/h, always in DRIVE")
 
 
 @pytest.mark.soak
 def test_a_day_in_virtual_time(measured: Callable[[str], None]) -> None:
-    figures = drive_on(24.0, 900.0, 6 * 3600.0)
+    figures = drive_for(24.0, 900.0, 6 * 3600.0)
     assert figures["wraps"] == 20
     measured(f"24 h in virtual time, t_us wrapped 20 times: {figures['slope_mb_h']:+.3f} MB/h, always in DRIVE")
 
 
 def on_the_pty(folder: Path, seconds: float, wrap_s: float) -> dict[str, Any]:
-    """Drive for so long on a pseudo-terminal, and return the summary."""
+    """Drive for `seconds` on a pseudo-terminal, and return the summary of the run."""
     path = folder / "summary.json"
     command = ["run", "hallway", "--arm", "--seconds", str(seconds), "--json", str(path), "--no-record"]
     with (
@@ -71,22 +71,22 @@ def on_the_pty(folder: Path, seconds: float, wrap_s: float) -> dict[str, Any]:
     return summary
 
 
-def unharmed(summary: dict[str, Any]) -> None:
-    """Assert that nothing but a machine too busy has stopped the robot."""
+def check_stops(summary: dict[str, Any]) -> None:
+    """Assert that the robot was stopped by nothing but a busy machine."""
     others = [reason for reason in summary["stop_reasons"] if "held up for" not in reason]
     assert not others, summary["stop_reasons"]
 
 
-def test_the_robots_clock_wraps_on_the_pty(tmp_path: Path, measured: Callable[[str], None]) -> None:
+def test_robot_clock_wraps_on_the_pty(tmp_path: Path, measured: Callable[[str], None]) -> None:
     summary = on_the_pty(tmp_path, 8.0, 6.0)
-    unharmed(summary)
-    measured(f"the robot's clock wrapped on the pty in mid-drive: {summary['link']['lost']} frames lost, no stop")
+    check_stops(summary)
+    measured(f"the robot's clock wrapped on the pty during a drive: {summary['link']['lost']} frames lost, no stop")
 
 
 @pytest.mark.soak
 def test_an_hour_on_the_pty(tmp_path: Path, measured: Callable[[str], None]) -> None:
     summary = on_the_pty(tmp_path, 3600.0, 1800.0)
-    unharmed(summary)
+    check_stops(summary)
     growth_mb = summary["process"]["growth_mb"]
     assert growth_mb < 1.0, summary["process"]
     measured(f"1 h on the pty, t_us wrapped: {growth_mb:+.2f} MB")

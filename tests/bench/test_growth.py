@@ -1,4 +1,4 @@
-"""A drive leaves nothing behind: the short form of `make soak`."""
+"""Short form of `python -m bench.growth`: a drive grows, compiles and collects nothing."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ ROOT = Path(__file__).parents[2]
 CYCLES = 2000
 
 
-def test_a_drive_grows_by_nothing_and_compiles_and_collects_nothing() -> None:
+def test_drive_does_not_grow_compile_or_collect() -> None:
     done = subprocess.run(
         [sys.executable, "-m", "bench.growth", str(CYCLES)],
         cwd=ROOT, text=True, capture_output=True, timeout=300, check=False,
     )  # fmt: skip
     assert done.stdout, done.stderr
     figures = json.loads(done.stdout)
-    assert figures["signatures"] > 10, "the count sees no kernels: it would miss a late one"
+    assert figures["signatures"] > 10, "the kernels are not counted, so a late compilation would be missed"
     assert figures["compilations"] == 0, figures
     assert figures["collections"][1] > 0, figures
     assert figures["collections"][2] == 0, figures
