@@ -1,14 +1,12 @@
-"""What the console asks of others, as protocols: the robot's process, and whoever records and plays.
+"""What the console needs from the rest of the run, as protocols: the robot's process, recording and replay.
 
-A part that is not there answers so: a robot on a port has no time that could be held, and a run without a recording
-nothing to mark.
+Recording and replay are optional: commands that need a part which this run does not have are refused.
 """
 
 from __future__ import annotations
 
 from typing import Any, Final, Protocol
 
-from config.settings import Settings
 from perception.edits import Edit, Evidence
 from runtime.console.clients.client import Frame
 from runtime.console.frames.frame_encoder import RecordingStatus
@@ -18,103 +16,100 @@ from runtime.cycle.step import State
 from runtime.support.health import Health
 from runtime.timing.timing_monitor import TimingMonitor
 
-NOT_HERE: Final = "not available here"
+NOT_AVAILABLE: Final = "not available in this run"
 
 
 class Robot(Protocol):
-    """The robot's process, as far as an operator reaches it."""
+    """The robot's process, as far as commands act on it."""
 
     def request(self, request: Request) -> None:
-        """Take a request into the next cycle; a HALT goes out at once."""
+        """Pass a change of mode to the next cycle; HALT goes out at once."""
 
     def drive_request(self, drive_request: DriveRequest) -> None:
-        """Take what is to be driven into the next cycle; the newest counts."""
+        """Pass a drive request to the next cycle; the newest counts."""
 
     def edit(self, edit: Edit) -> bool:
-        """Take a change of the map into the next cycle; False where too many wait already."""
+        """Pass an edit of the map to the next cycle; return False if too many are queued."""
 
     def evidence(self, number: int) -> Evidence | None:
-        """Return what speaks for and against an object, None where there is no such object."""
-
-    def reconfigure(self, settings: Settings) -> None:
-        """Go on with other settings from the next cycle on."""
+        """Return what supports and opposes an object, None if there is no such object."""
 
 
 class Run(Robot, Protocol):
-    """The same, as far as the console follows it."""
+    """The robot's process, as far as the console shows it."""
 
     health: Health
 
     @property
     def state(self) -> State:
-        """What the last cycle left."""
+        """The state after the last cycle."""
 
     @property
     def timing_monitor(self) -> TimingMonitor:
-        """The books of time."""
+        """Measures the cycle's phases and the loop's callbacks."""
 
     @property
     def name(self) -> str | None:
-        """What the robot calls itself, None until it has."""
+        """What the robot calls itself, None until it has answered."""
 
 
 class Viewer(Protocol):
-    """A client, to whoever shows it something else than the run itself."""
+    """A client to whom a recording is shown."""
 
     @property
     def is_gone(self) -> bool:
-        """Whether it has left: nothing needs to be shown any more."""
+        """Whether it has left."""
 
     def switch(self, *, live: bool) -> None:
-        """Have it shown the run itself, or only what `show` gives it."""
+        """Show the run itself from now on, or only the frames given to `show`."""
 
     def show(self, frame: Frame) -> None:
-        """Have a frame ready for it."""
+        """Send a frame, in place of one that has not been sent yet."""
 
-    def say(self, message: dict[str, Any]) -> None:
-        """Send it a message of its own."""
+    def send(self, message: dict[str, Any]) -> None:
+        """Queue a message."""
 
 
 class RecordingControl(Protocol):
-    """Begins, ends and marks the recording of the run; every call returns None, or why it cannot be done."""
+    """Starts, stops and marks the recording of the run; each call returns None, or why it cannot be done."""
 
     @property
     def now(self) -> RecordingStatus | None:
-        """The recording under way, None where there is none."""
+        """The recording in progress, None if there is none."""
 
     async def record(self, *, on: bool) -> str | None:
-        """Begin or end a recording."""
+        """Start or stop recording."""
 
     async def bookmark(self, text: str) -> str | None:
-        """Put a mark into it."""
+        """Add a bookmark."""
 
 
 class ReplayControl(Protocol):
-    """Shows recordings, to each client its own; a `CommandError` that is raised is told to who asked."""
+    """Shows recordings, to each client its own; a CommandError of any call is the client's answer."""
 
     async def recordings(self) -> list[dict[str, Any]]:
-        """Return which recordings there are."""
+        """Return the recordings that can be opened."""
 
     async def open(self, viewer: Viewer, file: str) -> dict[str, Any]:
-        """Show a recording to a client from now on; return what there is to know of it."""
+        """Show a recording to a client from now on; return its description."""
 
-    async def scrub(self, viewer: Viewer, s: float) -> None:
-        """Go to a time in it."""
+    async def seek(self, viewer: Viewer, s: float) -> None:
+        """Go to a time in the recording, s after its first cycle."""
 
     async def play(self, viewer: Viewer, speed: float) -> None:
-        """Let it go by."""
+        """Play the recording `speed` times as fast as it was made; 0 pauses it."""
 
     async def step(self, viewer: Viewer, cycles: int) -> None:
-        """Go so many cycles on, or back."""
+        """Go forward by this many cycles; backward where negative."""
 
-    async def live(self, viewer: Viewer) -> None:
-        """Go back to the run itself."""
+    async def close_recording(self, viewer: Viewer) -> None:
+        """Show the client the run itself again."""
 
     def leave(self, viewer: Viewer) -> None:
-        """Take note that a client is gone."""
+        """End what is shown to a client that is gone."""
 
     async def report(self) -> bytes:
-        """Return the run up to now as a page of its own."""
+        """Return the report of the run so far, as an HTML page."""
 
     async def close(self) -> None:
-        """End whatever is shown: the run is over."""
+        """End everything that is shown."""

@@ -1,4 +1,4 @@
-"""Has every step of a coroutine timed as if it were a callback, so that the books name it where it takes long."""
+"""Timing of coroutines: each step is measured like a callback, so that long steps appear in the timing table."""
 
 from __future__ import annotations
 
@@ -13,17 +13,22 @@ class Timed(Protocol):
     """As `runtime.timing.timing_monitor.TimingMonitor.timed`."""
 
     def __call__(self, name: str, call: Callable[..., Any], /) -> Callable[..., Any]:
-        """Return the call as a stretch of that name."""
-
-
-def untimed(_name: str, call: Callable[..., Any], /) -> Callable[..., Any]:
-    """Return the call as it is."""
-    return call
+        """Return a function that does the same and is measured under `name`."""
 
 
 @coroutine
 def timed_coroutine(timed: Timed, name: str, work: Coroutine[Any, Any, T]) -> Generator[Any, Any, T]:
-    """Await `work`, each of its steps timed under `name`."""
+    """Await `work` with each of its steps measured under `name`; return its result.
+
+    Parameters
+    ----------
+    timed : Timed
+        Measures a callback.
+    name : str
+        Of the work, in the timing table.
+    work : coroutine
+        Not yet started; closed at the end.
+    """
     send, throw = timed(name, work.send), timed(name, work.throw)
     step, value = send, None
     try:
@@ -36,7 +41,7 @@ def timed_coroutine(timed: Timed, name: str, work: Coroutine[Any, Any, T]) -> Ge
             value = None
             try:
                 value, step = (yield waits_for), send
-            except BaseException as error:  # noqa: BLE001 - a cancellation as well is the work's own affair
+            except BaseException as error:  # noqa: BLE001 - a cancellation too is for the work to handle
                 value, step = error, throw
     finally:
         work.close()

@@ -7,7 +7,6 @@ from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Final
 
 from config.settings import Settings
-from runtime.console.commands.async_commands import AsyncCommands
 from runtime.console.console import Console
 from runtime.console.frames.frame_encoder import RecordingStatus
 from runtime.console.playback.replay_client import ReplayClient
@@ -90,7 +89,7 @@ async def paged(
     players = ReplayClient(recordings_folder(settings.recording), PLAYED, current, units)
     console = Console(
         process, settings, log, take_over, ready, emulated=emulated, units=units,
-        async_commands=AsyncCommands(control, recording, players),
+        time=control, recording=recording, replay=players,
     )  # fmt: skip
     try:
         async with console.open():

@@ -1,1 +1,1 @@
-"""Connected browsers: their send queues, the hub, and who holds control."""
+"""Connected browsers: their send queues, the hub that knows them all, and control of the robot."""

@@ -1,7 +1,7 @@
-"""One client: a slot for the newest frame, a short queue for what must not be lost, and one task that sends.
+"""One client: a slot for the newest frame, a short queue for messages, and one task that sends both.
 
-Nobody ever waits for a client. A frame that it has not taken is replaced by the next one; what is queued is bounded;
-and one that takes nothing at all for a while is let go.
+The cycle never waits for a client. A frame that has not been sent is replaced by the next one, the queue is bounded,
+and a client that takes nothing for a while is disconnected.
 """
 
 from __future__ import annotations
@@ -17,140 +17,152 @@ from runtime.console.http.client_limits import Limits, TokenBucket
 
 
 class Frame(Protocol):
-    """A moment of a run, or of a recording, as it is shown."""
+    """One moment of a run or of a recording, as it is shown."""
 
     @property
     def source(self) -> object:
-        """Whose frames these are; changes count from the one before of the same source."""
+        """Identifies the sequence of frames; changes are relative to the previous frame of the same source."""
 
     @property
     def number(self) -> int:
-        """Its place among them."""
+        """The frame's number in its source."""
 
     def encode(self, *, follows: bool, dropped: int, controls: bool) -> bytes:
-        """Return the frame for one client: its changes only where it follows what that one saw last."""
+        """Return the message for one client; segments as changes if it `follows` the client's previous frame."""
 
 
-class Wire(Protocol):
+class Transport(Protocol):
     """The connection of a client."""
 
     def send(self, data: bytes) -> Awaitable[None]:
-        """Put a message on the way, and wait for as long as the other end takes nothing."""
+        """Send a message, and wait for as long as the peer takes nothing."""
 
     def abort(self) -> None:
-        """Cut the connection."""
+        """Drop the connection."""
 
 
 class Client:
-    """A page that is open somewhere.
+    """A page that is open in a browser.
 
     Parameters
     ----------
     number : int
-        Its own among all of this run.
+        Unique in this run.
     name : str
-        For people.
-    has_token : bool
-        Whether it may do more than watch.
-    wire : Wire
+        For operators and the log.
+    transport : Transport
         The connection.
     limits : Limits
-        What it may cost.
+        Bounds of its queue and its messages.
     clock : callable
         Monotonic, s.
+    has_token : bool
+        Whether it may do more than watch.
 
     Attributes
     ----------
     is_live
-        Whether it watches the run itself, and not a recording of its own choice.
+        Whether it is shown the run itself, not a recording.
+    is_gone
+        Whether it has left.
+    has_control
+        Whether it has control of the robot.
+    task
+        Runs its current asynchronous command.
     """
 
     def __init__(
-        self, number: int, name: str, wire: Wire, limits: Limits, clock: Callable[[], float], *, has_token: bool
+        self,
+        number: int,
+        name: str,
+        transport: Transport,
+        limits: Limits,
+        clock: Callable[[], float],
+        *,
+        has_token: bool,
     ) -> None:
         self.number = number
         self.name = name
         self.has_token = has_token
-        self.controls = False
+        self.has_control = False
         self.is_live = True
         self.is_gone = False
-        self.bucket = TokenBucket(limits.messages_per_s, limits.messages_per_s)
+        self.message_bucket = TokenBucket(limits.messages_per_s, limits.messages_per_s)
         self.task: asyncio.Task[None] | None = None
-        """Does what it asked for that takes its time; one thing at once."""
-        self._wire = wire
+        self._transport = transport
         self._limits = limits
         self._clock = clock
-        self._slot: Frame | None = None
-        self._seen: tuple[object, int] = (None, 0)
+        self._frame: Frame | None = None
+        self._last_sent: tuple[object, int] = (None, 0)
         self._dropped = 0
-        self._waiting: deque[bytes] = deque()
-        self._waiting_bytes = 0
+        self._queue: deque[bytes] = deque()
+        self._queue_bytes = 0
         self._wake = asyncio.Event()
         self._sending_since_s: float | None = None
 
     @property
     def is_busy(self) -> bool:
-        """Whether something that it asked for is still under way."""
+        """Whether an asynchronous command of this client is still running."""
         return self.task is not None and not self.task.done()
 
     def switch(self, *, live: bool) -> None:
-        """Have it shown the run itself, or only what `show` gives it."""
+        """Show the run itself from now on, or only the frames given to `show`."""
         self.is_live = live
-        self._slot = None
+        self._frame = None
 
-    def begin_anew(self) -> None:
-        """Take note that it forgets all that it was shown: the next frame is a whole one."""
-        self._slot, self._seen = None, (None, 0)
+    def forget_frames(self) -> None:
+        """Send all segments with the next frame: the page discards what it has."""
+        self._frame, self._last_sent = None, (None, 0)
 
     def show(self, frame: Frame) -> None:
-        """Have a frame ready for it, in place of one it has not taken yet."""
+        """Send a frame, in place of one that has not been sent yet."""
         if self.is_gone:
             return
-        self._dropped += self._slot is not None
-        self._slot = frame
+        self._dropped += self._frame is not None
+        self._frame = frame
         self._wake.set()
 
-    def say(self, message: dict[str, Any]) -> None:
-        """Send it a message of its own."""
-        self.say_encoded(orjson.dumps(message, option=orjson.OPT_SERIALIZE_DATACLASS))
+    def send(self, message: dict[str, Any]) -> None:
+        """Queue a message."""
+        self.send_encoded(orjson.dumps(message, option=orjson.OPT_SERIALIZE_DATACLASS))
 
-    def say_encoded(self, data: bytes) -> None:
-        """Send it a message; it is let go where too many wait for it already."""
+    def send_encoded(self, data: bytes) -> None:
+        """Queue a message in JSON; disconnect the client if its queue is full."""
         if self.is_gone:
             return
-        full = len(self._waiting) >= self._limits.waiting
-        if full or self._waiting_bytes + len(data) > self._limits.waiting_bytes:
-            self.cut()
+        is_full = len(self._queue) >= self._limits.queue_messages
+        if is_full or self._queue_bytes + len(data) > self._limits.queue_bytes:
+            self.disconnect()
             return
-        self._waiting.append(data)
-        self._waiting_bytes += len(data)
+        self._queue.append(data)
+        self._queue_bytes += len(data)
         self._wake.set()
 
-    def mention(self, data: bytes) -> None:
-        """Send it a message that may be lost where many wait already."""
-        if len(self._waiting) < self._limits.waiting // 2:
-            self.say_encoded(data)
+    def send_if_room(self, data: bytes) -> None:
+        """Queue a message in JSON that may be dropped; drop it if the queue is half full."""
+        if len(self._queue) < self._limits.queue_messages // 2:
+            self.send_encoded(data)
 
-    def is_stalled(self, now_s: float) -> bool:
-        """Say whether it has taken nothing for too long."""
+    def is_stalled(self, host_s: float) -> bool:
+        """Return whether the client has taken nothing for longer than the limits allow."""
         since_s = self._sending_since_s
-        return since_s is not None and now_s - since_s > self._limits.stall_s
+        return since_s is not None and host_s - since_s > self._limits.stall_s
 
-    def cut(self) -> None:
-        """Let it go without a word, as one that does not listen."""
+    def disconnect(self) -> None:
+        """Drop the connection without a closing handshake, as for a peer that does not read."""
         self.leave()
-        self._wire.abort()
+        self._transport.abort()
 
     def leave(self) -> None:
-        """Take note that it is gone: nothing is kept for it any more."""
+        """Mark the client as gone and discard what is queued for it."""
         self.is_gone = True
-        self._slot = None
-        self._waiting.clear()
-        self._waiting_bytes = 0
+        self._frame = None
+        self._queue.clear()
+        self._queue_bytes = 0
         self._wake.set()
 
     async def send_all(self) -> None:
-        """Send what there is, until it is gone; messages of its own before frames."""
+        """Send queued messages and then the newest frame, again and again until the client is gone."""
         while not self.is_gone:
             data = self._next()
             if data is None:
@@ -159,18 +171,19 @@ class Client:
                 continue
             self._sending_since_s = self._clock()
             try:
-                await self._wire.send(data)
+                await self._transport.send(data)
             finally:
                 self._sending_since_s = None
 
     def _next(self) -> bytes | None:
-        if self._waiting:
-            data = self._waiting.popleft()
-            self._waiting_bytes -= len(data)
+        """Return what to send next, None if there is nothing."""
+        if self._queue:
+            data = self._queue.popleft()
+            self._queue_bytes -= len(data)
             return data
-        frame, self._slot = self._slot, None
+        frame, self._frame = self._frame, None
         if frame is None:
             return None
-        follows = self._seen == (frame.source, frame.number - 1)
-        self._seen = (frame.source, frame.number)
-        return frame.encode(follows=follows, dropped=self._dropped, controls=self.controls)
+        follows = self._last_sent == (frame.source, frame.number - 1)
+        self._last_sent = (frame.source, frame.number)
+        return frame.encode(follows=follows, dropped=self._dropped, controls=self.has_control)

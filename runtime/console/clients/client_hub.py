@@ -1,4 +1,4 @@
-"""All clients together: who is there, who has the control, and what each is told."""
+"""All clients of a run: who is connected, who has control, and what is sent to all of them."""
 
 from __future__ import annotations
 
@@ -9,104 +9,123 @@ from typing import TYPE_CHECKING, Any, Final
 
 import orjson
 
-from runtime.console.clients.client import Client, Frame, Wire
+from runtime.console.clients.client import Client, Frame, Transport
 from runtime.console.clients.control import Control, Holder
 from runtime.console.http.client_limits import Limits
 
 if TYPE_CHECKING:
     from asyncio import AbstractEventLoop
 
-LINES_KEPT: Final = 200
-"""Newest lines of the log."""
-LINES_TOLD: Final = 50
-"""So many of them are told to who comes later."""
+LOG_LINES_KEPT: Final = 200
+"""The newest lines of the log, for `/log`."""
+LOG_LINES_SENT: Final = 50
+"""How many of them a new client is sent."""
 TEXT_MAX: Final = 500
-"""Of a value in the log; a page has no use for more."""
+"""Characters of a value in the log; a page has no use for more."""
 
 
-class Hub:
+class ClientHub:
     """The clients of one run.
 
     Parameters
     ----------
     limits : Limits
-        What they may cost.
+        How many there may be, and the bounds of each.
     clock : callable
         Monotonic, s.
-    left : callable
-        Called when the client that had the control has it no longer.
+    on_control_lost : callable
+        Called when the client that had control no longer has it.
+
+    Attributes
+    ----------
+    clients
+        Every connected client by its number.
+    control
+        Which of them has control of the robot.
     """
 
-    def __init__(self, limits: Limits, clock: Callable[[], float], left: Callable[[], None]) -> None:
+    def __init__(self, limits: Limits, clock: Callable[[], float], on_control_lost: Callable[[], None]) -> None:
         self.clients: dict[int, Client] = {}
-        self.control = Control(self._tell_role, lambda _client: left())
+        self.control = Control(self._send_role, lambda _client: on_control_lost())
         self._limits = limits
         self._clock = clock
-        self._lines: deque[bytes] = deque(maxlen=LINES_KEPT)
+        self._log_lines: deque[bytes] = deque(maxlen=LOG_LINES_KEPT)
         self._number = 0
         self._loop: AbstractEventLoop | None = None
         self._thread = threading.get_ident()
 
     def bind(self, loop: AbstractEventLoop) -> None:
-        """Take note of the loop that the clients live in."""
+        """Use this loop for log lines that come from other threads."""
         self._loop, self._thread = loop, threading.get_ident()
 
     @property
     def is_full(self) -> bool:
-        """Whether there may be no further client."""
+        """Whether no further client may join."""
         return len(self.clients) >= self._limits.clients
 
-    def join(self, wire: Wire, address: str, hello: Mapping[str, Any], *, has_token: bool) -> Client:
-        """Take a client in and greet it."""
+    @property
+    def log_lines(self) -> bytes:
+        """The newest lines of the log in JSON, one a line."""
+        return b"".join(line + b"\n" for line in self._log_lines)
+
+    def join(self, transport: Transport, address: str, session: Mapping[str, Any], *, has_token: bool) -> Client:
+        """Add a client and send it the session information; return it.
+
+        Parameters
+        ----------
+        transport : Transport
+            Its connection.
+        address : str
+            Of the peer, for its name.
+        session : mapping
+            The session information.
+        has_token : bool
+            Whether it may do more than watch.
+        """
         self._number += 1
         name = f"client {self._number} ({address})"
-        client = Client(self._number, name, wire, self._limits, self._clock, has_token=has_token)
+        client = Client(self._number, name, transport, self._limits, self._clock, has_token=has_token)
         self.clients[client.number] = client
         self.control.join(client)
-        client.controls = self.control.has(client)
-        self._greet(client, hello)
-        for line in list(self._lines)[-LINES_TOLD:]:
-            client.mention(line)
+        client.has_control = self.control.is_held_by(client)
+        self._begin_session(client, session)
+        for line in list(self._log_lines)[-LOG_LINES_SENT:]:
+            client.send_if_room(line)
         return client
 
     def leave(self, client: Client) -> None:
-        """Take note that a client is gone."""
+        """Remove a client that is gone."""
         if self.clients.pop(client.number, None) is not None:
             self.control.leave(client)
 
     def publish(self, frame: Frame) -> None:
-        """Show all who watch the run a frame of it."""
+        """Show a frame of the run to every client that watches the run itself."""
         for client in self.clients.values():
             if client.is_live:
                 client.show(frame)
 
-    def tell(self, message: Mapping[str, Any]) -> None:
-        """Tell all clients the same."""
+    def broadcast(self, message: Mapping[str, Any]) -> None:
+        """Send every client the same message."""
         data = orjson.dumps(message)
         for client in list(self.clients.values()):
-            client.say_encoded(data)
+            client.send_encoded(data)
 
-    def greet(self, hello: Mapping[str, Any]) -> None:
-        """Tell all clients what they are told first, and show them everything anew."""
+    def begin_session(self, session: Mapping[str, Any]) -> None:
+        """Send every client new session information, and with its next frame all segments."""
         for client in list(self.clients.values()):
-            self._greet(client, hello)
+            self._begin_session(client, session)
 
-    @property
-    def lines(self) -> bytes:
-        """The newest lines of the log, JSON, a line each."""
-        return b"".join(line + b"\n" for line in self._lines)
-
-    def look_after(self, now_s: float) -> list[Client]:
-        """Let those go that take nothing any more, and return them; hand the control over where it is time."""
-        stalled = [client for client in self.clients.values() if client.is_stalled(now_s)]
+    def disconnect_stalled(self, host_s: float) -> list[Client]:
+        """Disconnect and return the clients that take nothing any more; hand control over if a request is due."""
+        stalled = [client for client in self.clients.values() if client.is_stalled(host_s)]
         for client in stalled:
-            client.cut()
+            client.disconnect()
             self.leave(client)
-        self.control.expire(now_s)
+        self.control.expire(host_s)
         return stalled
 
     def on_log(self, event: Mapping[str, Any]) -> None:
-        """Take a line of the log, from whichever thread."""
+        """Send a line of the log to every client; may be called from any thread."""
         if threading.get_ident() != self._thread:
             if self._loop is not None and not self._loop.is_closed():
                 self._loop.call_soon_threadsafe(self.on_log, dict(event))
@@ -121,29 +140,29 @@ class Hub:
             "fields": fields,
         }
         data = orjson.dumps(line)
-        self._lines.append(data)
+        self._log_lines.append(data)
         for client in list(self.clients.values()):
-            client.mention(data)
+            client.send_if_room(data)
 
-    def _greet(self, client: Client, hello: Mapping[str, Any]) -> None:
-        client.begin_anew()
-        client.say({**hello, "role": role_of(client), "client": client.number, "has_token": client.has_token})
+    def _begin_session(self, client: Client, session: Mapping[str, Any]) -> None:
+        client.forget_frames()
+        client.send({**session, "role": role_of(client), "client": client.number, "has_token": client.has_token})
 
-    def _tell_role(self, holder: Holder, asker: Holder | None) -> None:
+    def _send_role(self, holder: Holder, requester: Holder | None) -> None:
         client = self.clients.get(holder.number)
         if client is None:
             return
-        client.controls = self.control.has(client)
-        client.say(
+        client.has_control = self.control.is_held_by(client)
+        client.send(
             {
                 "type": "role",
                 "role": role_of(client),
-                "asked_by": None if asker is None else asker.name,
-                "client": None if asker is None else asker.number,
+                "asked_by": None if requester is None else requester.name,
+                "client": None if requester is None else requester.number,
             }
         )
 
 
 def role_of(client: Client) -> str:
-    """Return what a client is, in the wire's words."""
-    return "control" if client.controls else "watch"
+    """Return a client's role in the wire's words: "control" or "watch"."""
+    return "control" if client.has_control else "watch"

@@ -1,7 +1,8 @@
-"""Who has the control: one client at a time, handed over on request, lost with the connection.
+"""Control of the robot: held by one client at a time, handed over on request, released when its connection ends.
 
-Whoever comes first with the token has it; later ones watch, and may ask. A holder who is asked and stays idle for a
-while loses it, so that a page left open somewhere cannot keep everybody from the controls; to halt nobody needs it.
+The first client with the token gets control; later ones watch and may request it. A holder who is asked and then does
+nothing for a while loses control, so that a page left open somewhere cannot keep everyone else out. HALT needs no
+control.
 """
 
 from __future__ import annotations
@@ -9,20 +10,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, Protocol
 
-PATIENCE_S: Final = 10.0
-"""A holder who is asked and does nothing for so long gives it up."""
+REQUEST_TIMEOUT_S: Final = 10.0
+"""A holder who is asked for control and does not use it for this long loses it: time enough to answer a banner."""
 
 
 class Holder(Protocol):
-    """A client, as far as this file cares."""
+    """A client, as far as control depends on it."""
 
     @property
     def number(self) -> int:
-        """Its own among all of this run."""
+        """Unique in this run."""
 
     @property
     def name(self) -> str:
-        """For people."""
+        """For operators."""
 
     @property
     def has_token(self) -> bool:
@@ -30,80 +31,83 @@ class Holder(Protocol):
 
 
 class Control:
-    """The control over one robot.
+    """Which client has control of the robot, and which has requested it.
 
     Parameters
     ----------
-    tell : callable
-        Gets every client whose role is another one or that should know who asks, and who that is.
-    left : callable
-        Gets the client that had the control until now.
+    notify : callable
+        Gets each client whose role changed or that is asked for control, and the client that asks, if any.
+    on_lost : callable
+        Gets the client that had control until now.
     """
 
-    def __init__(self, tell: Callable[[Holder, Holder | None], None], left: Callable[[Holder], None]) -> None:
-        self._tell = tell
-        self._left = left
+    def __init__(self, notify: Callable[[Holder, Holder | None], None], on_lost: Callable[[Holder], None]) -> None:
+        self._notify = notify
+        self._on_lost = on_lost
         self._holder: Holder | None = None
-        self._asker: Holder | None = None
-        self._patience_ends_s = 0.0
+        self._requester: Holder | None = None
+        self._expires_s = 0.0
 
-    def has(self, client: Holder) -> bool:
-        """Say whether this one has the control."""
+    def is_held_by(self, client: Holder) -> bool:
+        """Return whether this client has control."""
         return self._holder is client
 
     def join(self, client: Holder) -> None:
-        """Take note of a new client, which has the control where nobody else does; nobody is told."""
+        """Add a client; it gets control if that is free and it has the token. No one is notified."""
         if self._holder is None and client.has_token:
             self._holder = client
 
     def leave(self, client: Holder) -> None:
-        """Take note that a client is gone."""
-        if self._asker is client:
-            self._asker = None
+        """Remove a client; control it had passes to the client that requested it."""
+        if self._requester is client:
+            self._requester = None
         if self._holder is client:
-            self._pass_to(self._asker)
+            self._pass_to(self._requester)
 
-    def take(self, client: Holder, now_s: float) -> str | None:
-        """Take the control, or ask for it; return why it is not taken yet. Who has it keeps it so when asked."""
+    def request(self, client: Holder, host_s: float) -> str | None:
+        """Take control, or ask the holder for it; return why it is not taken yet.
+
+        A holder that requests control itself declines the request of another client.
+        """
         if self._holder is client:
-            self._asker = None
+            self._requester = None
             return None
         if self._holder is None:
             self._pass_to(client)
             return None
-        self._patience_ends_s = now_s + PATIENCE_S
-        self._asker = client
-        self._tell(self._holder, client)
+        self._expires_s = host_s + REQUEST_TIMEOUT_S
+        self._requester = client
+        self._notify(self._holder, client)
         return (
-            f"{self._holder.name} has the control and has been asked for it; "
-            f"unless it is used, it is yours in {PATIENCE_S:.0f} s"
+            f"{self._holder.name} has control and was asked for it; "
+            f"you get it in {REQUEST_TIMEOUT_S:.0f} s unless it is used"
         )
 
-    def give(self) -> None:
-        """Give it up: to whoever asked for it, or to nobody."""
-        self._pass_to(self._asker)
+    def release(self) -> None:
+        """Pass control to the client that requested it; otherwise no client has it."""
+        self._pass_to(self._requester)
 
     def grant(self, number: int) -> str | None:
-        """Hand it over to the client that asked; return why not."""
-        if self._asker is None or self._asker.number != number:
-            return f"client {number} does not ask for the control"
-        self._pass_to(self._asker)
+        """Pass control to the client that requested it; return why not."""
+        if self._requester is None or self._requester.number != number:
+            return f"client {number} does not ask for control"
+        self._pass_to(self._requester)
         return None
 
-    def used(self, client: Holder, now_s: float) -> None:
-        """Take note that a client did something with it."""
+    def note_use(self, client: Holder, host_s: float) -> None:
+        """Postpone a pending hand-over, because the holder used its control."""
         if self._holder is client:
-            self._patience_ends_s = now_s + PATIENCE_S
+            self._expires_s = host_s + REQUEST_TIMEOUT_S
 
-    def expire(self, now_s: float) -> None:
-        """Hand it over where a request has been left unanswered for too long."""
-        if self._asker is not None and now_s >= self._patience_ends_s:
-            self._pass_to(self._asker)
+    def expire(self, host_s: float) -> None:
+        """Pass control to the client that requested it, if the holder left the request unanswered for too long."""
+        if self._requester is not None and host_s >= self._expires_s:
+            self._pass_to(self._requester)
 
     def _pass_to(self, client: Holder | None) -> None:
-        before, self._holder, self._asker = self._holder, client, None
+        before, self._holder, self._requester = self._holder, client, None
         if before is not None and before is not client:
-            self._left(before)
-            self._tell(before, None)
+            self._on_lost(before)
+            self._notify(before, None)
         if client is not None:
-            self._tell(client, None)
+            self._notify(client, None)

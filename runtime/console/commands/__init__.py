@@ -1,1 +1,1 @@
-"""Messages from the page: their types, their validation, and what carries each of them out."""
+"""Commands of operators: one registry of what a page may ask for, and what is done about each request."""

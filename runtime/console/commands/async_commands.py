@@ -1,103 +1,131 @@
-"""What takes its time: holding the emulator's time, recordings, the player. None of it is done in the client's turn.
+"""Handlers of the commands that take time: the emulator's clock, recording, replay, and loading a model.
 
-Each is done by a task of its own, one at once for each client, so that a HALT from the same page never waits behind a
+Each runs as a task of its own, one at a time for each client, so that a HALT from the same page never waits behind a
 file that is being opened.
 """
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
-from typing import Any, TypeAlias
+from collections.abc import Awaitable
+from typing import Any, TypeVar
 
-from runtime.console.commands import messages as forms
+from runtime.console.commands.command import Call
 from runtime.console.commands.command_error import CommandError
-from runtime.console.protocols import NOT_HERE, RecordingControl, ReplayControl, Viewer
+from runtime.console.commands.messages import (
+    AddBookmark,
+    LoadModel,
+    NoArguments,
+    OpenRecording,
+    PlayRecording,
+    Record,
+    SeekRecording,
+    SetSpeed,
+    StepRecording,
+)
+from runtime.console.protocols import NOT_AVAILABLE, RecordingControl, ReplayControl
 from runtime.timing.time_control import TimeControl
 
-Work: TypeAlias = Callable[[], Awaitable[Any]]
+Part = TypeVar("Part")
 
 
-class AsyncCommands:
-    """Whoever holds the run's time, as far as they are there.
+async def load_model(call: Call, model: LoadModel) -> dict[str, str]:
+    """Recognise a further model; return its name."""
+    return {"name": (await call.context.tuning.add_model(model.toml)).name}
 
-    Parameters
-    ----------
-    time : TimeControl, optional
-        Of the emulator.
-    recording : RecordingControl, optional
-        Of the run.
-    player : ReplayControl, optional
-        Of recordings.
+
+async def pause(call: Call, _: NoArguments) -> None:
+    """Pause the run and its emulator."""
+    await _refuse_if(_time(call).pause())
+
+
+async def resume(call: Call, _: NoArguments) -> None:
+    """Resume the run and its emulator."""
+    await _refuse_if(_time(call).resume())
+
+
+async def single_step(call: Call, _: NoArguments) -> None:
+    """Run one cycle, then pause."""
+    await _refuse_if(_time(call).single_step())
+
+
+async def set_speed(call: Call, speed: SetSpeed) -> None:
+    """Run faster or slower than real time."""
+    await _refuse_if(_time(call).set_speed(speed.factor))
+
+
+async def record(call: Call, switch: Record) -> None:
+    """Start or stop recording."""
+    await _refuse_if(_recording(call).record(on=switch.on))
+
+
+async def add_bookmark(call: Call, bookmark: AddBookmark) -> None:
+    """Add a bookmark to the recording."""
+    await _refuse_if(_recording(call).bookmark(bookmark.text))
+
+
+async def list_recordings(call: Call, _: NoArguments) -> list[dict[str, Any]]:
+    """Return the recordings that can be opened."""
+    return await _replay(call).recordings()
+
+
+async def open_recording(call: Call, recording: OpenRecording) -> dict[str, Any]:
+    """Show the client a recording in place of the live run; return its description."""
+    return await _replay(call).open(call.client, recording.file)
+
+
+async def seek_recording(call: Call, to: SeekRecording) -> None:
+    """Go to a time in the client's recording."""
+    await _replay(call).seek(call.client, to.s)
+
+
+async def play_recording(call: Call, at: PlayRecording) -> None:
+    """Play or pause the client's recording."""
+    await _replay(call).play(call.client, at.speed)
+
+
+async def step_recording(call: Call, by: StepRecording) -> None:
+    """Go forward or backward in the client's recording by single cycles."""
+    await _replay(call).step(call.client, by.cycles)
+
+
+async def close_recording(call: Call, _: NoArguments) -> None:
+    """Show the client the live run again."""
+    await _replay(call).close_recording(call.client)
+
+
+def _time(call: Call) -> TimeControl:
+    return _available(call, call.context.time)
+
+
+def _recording(call: Call) -> RecordingControl:
+    return _available(call, call.context.recording)
+
+
+def _replay(call: Call) -> ReplayControl:
+    return _available(call, call.context.replay)
+
+
+def _available(call: Call, part: Part | None) -> Part:
+    """Return a part of the run.
+
+    Raises
+    ------
+    CommandError
+        This run does not have it.
     """
-
-    def __init__(
-        self,
-        time: TimeControl | None = None,
-        recording: RecordingControl | None = None,
-        player: ReplayControl | None = None,
-    ) -> None:
-        self.time = time
-        self.recording = recording
-        self.player = player
-
-    def of(self, viewer: Viewer, message: forms.OfTime) -> Work:
-        """Return what does what a message asks for.
-
-        Raises
-        ------
-        CommandError
-            Nobody here can.
-        """
-        match message:
-            case forms.Pause() | forms.Resume() | forms.SingleStep() | forms.Speed() if self.time is not None:
-                return _settled(_of_emulator(self.time, message))
-            case forms.Record(on=on) if self.recording is not None:
-                recording = self.recording
-                return _settled(lambda: recording.record(on=on))
-            case forms.Bookmark(text=text) if self.recording is not None:
-                recording = self.recording
-                return _settled(lambda: recording.bookmark(text))
-            case (
-                forms.Recordings() | forms.Open() | forms.Scrub() | forms.Play() | forms.Step() | forms.Live()
-            ) if self.player is not None:  # fmt: skip
-                return _of_player(self.player, viewer, message)
-        raise CommandError(f"{message.type}: {NOT_HERE}")
+    if part is None:
+        raise CommandError(f"{call.name}: {NOT_AVAILABLE}")
+    return part
 
 
-def _of_emulator(time: TimeControl, message: forms.OfEmulator) -> Callable[[], Awaitable[str | None]]:
-    match message:
-        case forms.Pause():
-            return time.pause
-        case forms.Resume():
-            return time.resume
-        case forms.SingleStep():
-            return time.single_step
-        case forms.Speed(factor=factor):
-            return lambda: time.set_speed(factor)
+async def _refuse_if(outcome: Awaitable[str | None]) -> None:
+    """Wait for an outcome.
 
-
-def _of_player(player: ReplayControl, viewer: Viewer, message: forms.OfPlayer) -> Work:
-    match message:
-        case forms.Recordings():
-            return player.recordings
-        case forms.Open(file=file):
-            return lambda: player.open(viewer, file)
-        case forms.Scrub(s=s):
-            return lambda: player.scrub(viewer, s)
-        case forms.Play(speed=speed):
-            return lambda: player.play(viewer, speed)
-        case forms.Step(cycles=cycles):
-            return lambda: player.step(viewer, cycles)
-        case forms.Live():
-            return lambda: player.live(viewer)
-
-
-def _settled(ask: Callable[[], Awaitable[str | None]]) -> Work:
-    """Return work that refuses with what `ask` returns, where that is anything."""
-
-    async def work() -> None:
-        validate = await ask()
-        if validate is not None:
-            raise CommandError(validate)
-
-    return work
+    Raises
+    ------
+    CommandError
+        The outcome is a reason why it was not done.
+    """
+    reason = await outcome
+    if reason is not None:
+        raise CommandError(reason)

@@ -1,346 +1,243 @@
-"""What a page may say, as strict and bounded forms: a message that fits none of them is answered, and does nothing.
+"""The wire form of the console's commands: the type of each argument with its bounds, and the strict JSON reader.
 
-The names are the wire's. What is checked here is the form only; whether it may be done now, and by whom, is decided
-by `runtime.console.commands.dispatcher`.
+A command's arguments are a frozen dataclass. Edits and drive requests are those of `perception.edits`,
+`behaviors.move_to_goal` and `behaviors.teleoperation`; the dataclasses below are the console's own. A message is a
+JSON object of `id`, `type` (the command's name) and the arguments.
 """
 
 from __future__ import annotations
 
-from enum import Enum
-from typing import Annotated, ClassVar, Final, Literal, TypeAlias
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, dataclass, fields
+from types import MappingProxyType
+from typing import Annotated, Any, Final, Literal, NamedTuple, TypeAlias, Union, get_origin, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, create_model
 from pydantic_core import from_json
 
 from config.errors import UserError
+from perception.edits import COORDINATE_MAX_M
 
-MESSAGE_MAX: Final = 64 * 1024
-"""Bytes."""
+MESSAGE_MAX_BYTES: Final = 64 * 1024
 TEXT_MAX: Final = 500
+"""Characters of a text value, of a bookmark and of an error message."""
 TOML_MAX: Final = 32 * 1024
-PICKED_MAX: Final = 8192
+"""Characters of an object model's file; the shipped ones have a tenth of that."""
+SELECTION_MAX: Final = 8192
+"""Segments that one edit may name; the map holds fewer."""
 ID_MAX: Final = 2**53
+"""A page keeps numbers as 64-bit floats, which hold whole numbers up to this one."""
 FIELD_MAX: Final = 120
+"""Characters of a field's path in an error message."""
 
-Place: TypeAlias = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
+Coordinate: TypeAlias = Annotated[float, Field(ge=-COORDINATE_MAX_M, le=COORDINATE_MAX_M)]
 Angle: TypeAlias = Annotated[float, Field(ge=-1e6, le=1e6)]
 Number: TypeAlias = Annotated[int, Field(ge=0, le=ID_MAX)]
-Numbers: TypeAlias = Annotated[tuple[Number, ...], Field(min_length=1, max_length=PICKED_MAX)]
-Name: TypeAlias = Annotated[str, Field(min_length=1, max_length=100)]
-Scalar: TypeAlias = bool | int | float | Annotated[str, Field(max_length=TEXT_MAX)] | None
+Text: TypeAlias = Annotated[str, Field(max_length=TEXT_MAX)]
+Scalar: TypeAlias = Annotated[bool | int | float | Text | None, Field()]
+
+BOUNDS: Final[Mapping[str, Any]] = MappingProxyType({
+    "x": Coordinate,
+    "y": Coordinate,
+    "theta": Angle,
+    "object": Number,
+    "numbers": Annotated[tuple[Number, ...], Field(min_length=1, max_length=SELECTION_MAX)],
+    "model": Annotated[str, Field(min_length=1, max_length=100)],
+    "v": Annotated[float, Field(ge=-10.0, le=10.0)],
+    "w": Annotated[float, Field(ge=-20.0, le=20.0)],
+})  # fmt: skip
+"""Bounds of the arguments of edits and drive requests, by field name: m, rad, m/s, rad/s."""
 
 
-class Right(Enum):
-    """What it takes to ask for something."""
-
-    TOKEN = "token"  # noqa: S105 - a right, no secret
-    """Any client with the token."""
-    CONTROL = "control"
-    """The one client that has the control."""
+@dataclass(frozen=True, slots=True)
+class NoArguments:
+    """The command's name says it all."""
 
 
-class Form(BaseModel):
-    """A message; its `id` comes back with the answer."""
+@dataclass(frozen=True, slots=True)
+class GrantControl:
+    """Hand control over to the client that requested it."""
 
-    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
-
-    right: ClassVar[Right] = Right.CONTROL
-    id: Number
-
-
-class Halt(Form):
-    """Stop at once and latch."""
-
-    right: ClassVar[Right] = Right.TOKEN
-    type: Literal["halt"]
-
-
-class Arm(Form):
-    """Arm, and drive."""
-
-    type: Literal["arm"]
-
-
-class Disarm(Form):
-    """Stop driving, and stand until armed again."""
-
-    type: Literal["disarm"]
-
-
-class TakeControl(Form):
-    """Take the control, or ask whoever has it."""
-
-    right: ClassVar[Right] = Right.TOKEN
-    type: Literal["take_control"]
-
-
-class GiveControl(Form):
-    """Give the control up."""
-
-    type: Literal["release_control"]
-
-
-class Grant(Form):
-    """Hand the control over to who asked for it."""
-
-    type: Literal["grant_control"]
     client: Number
 
 
-class ClearMap(Form):
-    """Forget all segments and objects."""
+@dataclass(frozen=True, slots=True)
+class GetEvidence:
+    """Ask for the readings that support and oppose an object."""
 
-    type: Literal["clear_map"]
-
-
-class DeleteSegments(Form):
-    """Take outline segments out of the map."""
-
-    type: Literal["delete_segments"]
-    numbers: Numbers
-
-
-class PinSegments(Form):
-    """Keep outline segments whatever their age, or no longer."""
-
-    type: Literal["pin_segments"]
-    numbers: Numbers
-    pinned: bool
-
-
-class PlaceModel(Form):
-    """Put a model somewhere by hand."""
-
-    type: Literal["place_model"]
-    model: Name
-    x: Place
-    y: Place
-    theta: Angle
-
-
-class MoveObject(Form):
-    """Put an object somewhere else."""
-
-    type: Literal["move_object"]
-    object: Number
-    x: Place
-    y: Place
-    theta: Angle
-
-
-class RejectObject(Form):
-    """Say that an object is none."""
-
-    type: Literal["reject_object"]
     object: Number
 
 
-class ConfirmObject(Form):
-    """Say that an object is what it is called."""
+@dataclass(frozen=True, slots=True)
+class LoadModel:
+    """Recognise a further object model, given as the text of its TOML file."""
 
-    type: Literal["confirm_object"]
-    object: Number
-
-
-class Evidence(Form):
-    """Ask what speaks for and against an object."""
-
-    right: ClassVar[Right] = Right.TOKEN
-    type: Literal["evidence"]
-    object: Number
-
-
-class LoadModel(Form):
-    """Look for a further model from now on."""
-
-    type: Literal["load_model"]
     toml: Annotated[str, Field(max_length=TOML_MAX)]
 
 
-class Set(Form):
-    """Change one parameter."""
+@dataclass(frozen=True, slots=True)
+class SetParameter:
+    """Change one setting; `path` is its dotted name."""
 
-    type: Literal["set_parameter"]
     path: Annotated[str, Field(min_length=1, max_length=200)]
     value: Scalar
 
 
-class Undo(Form):
-    """Take the last change of parameters or models back."""
+@dataclass(frozen=True, slots=True)
+class SetSpeed:
+    """Run the emulator `factor` times as fast as real time."""
 
-    type: Literal["undo_parameter"]
-
-
-class SaveToml(Form):
-    """Ask for all settings as a file."""
-
-    right: ClassVar[Right] = Right.TOKEN
-    type: Literal["save_toml"]
-
-
-class RequestLegs(Form):
-    """Move ahead as configured."""
-
-    type: Literal["legs"]
-
-
-class RequestGoal(Form):
-    """Move to a place."""
-
-    type: Literal["goal"]
-    x: Place
-    y: Place
-
-
-class Teleoperate(Form):
-    """Drive by hand; said again and again for as long as it is meant."""
-
-    type: Literal["teleoperate"]
-    v: Annotated[float, Field(ge=-10.0, le=10.0)]
-    w: Annotated[float, Field(ge=-20.0, le=20.0)]
-
-
-class Pause(Form):
-    """Let the emulated world stand still."""
-
-    type: Literal["pause"]
-
-
-class Resume(Form):
-    """Let it go on."""
-
-    type: Literal["resume"]
-
-
-class SingleStep(Form):
-    """Let it go on for one cycle."""
-
-    type: Literal["single_step"]
-
-
-class Speed(Form):
-    """Let it go so many times as fast."""
-
-    type: Literal["set_speed"]
     factor: Annotated[float, Field(ge=0.01, le=100.0)]
 
 
-class Record(Form):
-    """Begin or end a recording."""
+@dataclass(frozen=True, slots=True)
+class Record:
+    """Start or stop recording."""
 
-    type: Literal["record"]
     on: bool
 
 
-class Bookmark(Form):
-    """Put a mark with a text into the recording."""
+@dataclass(frozen=True, slots=True)
+class AddBookmark:
+    """Add a bookmark with a text to the recording."""
 
-    type: Literal["bookmark"]
-    text: Annotated[str, Field(max_length=TEXT_MAX)]
-
-
-class Recordings(Form):
-    """Ask which recordings there are."""
-
-    right: ClassVar[Right] = Right.TOKEN
-    type: Literal["list_recordings"]
+    text: Text
 
 
-class Open(Form):
-    """Show a recording in place of the live run, to this client."""
+@dataclass(frozen=True, slots=True)
+class OpenRecording:
+    """Show this client a recording in place of the live run."""
 
-    right: ClassVar[Right] = Right.TOKEN
-    type: Literal["open_recording"]
     file: Annotated[str, Field(min_length=1, max_length=300)]
 
 
-class Scrub(Form):
-    """Go to a time in it, seconds from its beginning."""
+@dataclass(frozen=True, slots=True)
+class SeekRecording:
+    """Go to a time in the recording, s after its first cycle."""
 
-    right: ClassVar[Right] = Right.TOKEN
-    type: Literal["seek_recording"]
     s: Annotated[float, Field(ge=0.0, le=1e9)]
 
 
-class Play(Form):
-    """Play it so many times as fast; 0 stands still."""
+@dataclass(frozen=True, slots=True)
+class PlayRecording:
+    """Play the recording `speed` times as fast as it was made; 0 pauses it."""
 
-    right: ClassVar[Right] = Right.TOKEN
-    type: Literal["play_recording"]
     speed: Annotated[float, Field(ge=0.0, le=100.0)]
 
 
-class Step(Form):
-    """Go so many cycles on, or back."""
+@dataclass(frozen=True, slots=True)
+class StepRecording:
+    """Go forward by this many cycles; backward where negative."""
 
-    right: ClassVar[Right] = Right.TOKEN
-    type: Literal["step_recording"]
     cycles: Annotated[int, Field(ge=-10_000, le=10_000)]
 
 
-class Live(Form):
-    """Go back to the live run."""
+class Message(NamedTuple):
+    """A well-formed message of a client."""
 
-    right: ClassVar[Right] = Right.TOKEN
-    type: Literal["close_recording"]
-
-
-OfEmulator: TypeAlias = Pause | Resume | SingleStep | Speed
-OfRecorder: TypeAlias = Record | Bookmark
-OfPlayer: TypeAlias = Recordings | Open | Scrub | Play | Step | Live
-OfTime: TypeAlias = OfEmulator | OfRecorder | OfPlayer
-Message: TypeAlias = (
-    Halt | Arm | Disarm | TakeControl | GiveControl | Grant | ClearMap | DeleteSegments | PinSegments | PlaceModel
-    | MoveObject | RejectObject | ConfirmObject | Evidence | LoadModel | Set | Undo | SaveToml
-    | RequestLegs | RequestGoal | Teleoperate | OfTime
-)  # fmt: skip
-
-_READER: Final[TypeAdapter[Message]] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
+    id: int
+    """Comes back with the answer."""
+    name: str
+    """Of the command."""
+    arguments: Any
+    """An instance of the command's type."""
 
 
-class MalformedMessage(UserError):  # noqa: N818 - told to a client
-    """A message that is none.
+class MalformedMessage(UserError):  # noqa: N818 - names the message, which the caller answers
+    """A message that is no command of the console.
 
     Parameters
     ----------
     text : str
         What is wrong with it.
-    number : int, optional
-        Its id, where it has one.
+    id : int, optional
+        Its id, if it has a valid one.
     field : str, optional
-        Where in it.
+        The path of the argument that is wrong.
     """
 
-    def __init__(self, text: str, number: int | None, field: str | None = None) -> None:
+    def __init__(self, text: str, id: int | None, field: str | None = None) -> None:  # noqa: A002 - the wire's name
         super().__init__(text)
-        self.number = number
+        self.id = id
         self.field = field
 
 
-def read_message(text: str | bytes) -> Message:
-    """Return what a message says.
+class _Envelope(BaseModel):
+    """What every message has, and how strictly it is read."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
+
+    id: Number
+
+
+class MessageReader:
+    """Reads and validates messages.
+
+    Parameters
+    ----------
+    types : mapping of str to type
+        The dataclass of each command's arguments, by the command's name. Its fields without a default are the
+        arguments.
 
     Raises
     ------
-    MalformedMessage
-        It has none of the forms above.
+    TypeError
+        An argument has no bounds.
     """
-    try:
-        return _READER.validate_json(text)
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False, include_input=False)[0]
-        if first["type"] in {"union_tag_invalid", "union_tag_not_found"}:
-            raise MalformedMessage("there is no such message", _id_of(text), "type") from None
-        place = [str(key) for key in first["loc"][1:]]
-        if place[:1] == ["value"]:
-            raise MalformedMessage("must be a number, a text, true, false or null", _id_of(text), "value") from None
-        words = first["msg"][:TEXT_MAX]
-        raise MalformedMessage(
-            words[:1].lower() + words[1:], _id_of(text), ".".join(place)[:FIELD_MAX] or None
-        ) from None
+
+    def __init__(self, types: Mapping[str, type]) -> None:
+        self._types = dict(types)
+        models = tuple(_wire_model(name, of) for name, of in types.items())
+        union = Union[models]  # type: ignore[valid-type]  # noqa: UP007 - made of a list
+        self._adapter: TypeAdapter[Any] = TypeAdapter(Annotated[union, Field(discriminator="type")])
+
+    def read(self, text: str | bytes) -> Message:
+        """Return a message after checking it.
+
+        Raises
+        ------
+        MalformedMessage
+            It is not JSON, names no command, or its arguments are missing, unknown, of another type or out of bounds.
+        """
+        try:
+            wire = self._adapter.validate_json(text)
+        except ValidationError as error:
+            raise _malformed(error, text) from None
+        of = self._types[wire.type]
+        return Message(wire.id, wire.type, of(*(getattr(wire, name) for name in _arguments(of))))
+
+
+def _arguments(of: type) -> Iterable[str]:
+    """Return the names of the fields that a message gives."""
+    return (f.name for f in fields(of) if f.default is MISSING and f.default_factory is MISSING)
+
+
+def _wire_model(name: str, of: type) -> type[BaseModel]:
+    """Return the model of a command's messages."""
+    hints = get_type_hints(of, include_extras=True)
+    arguments = {key: BOUNDS.get(key, hints[key]) for key in _arguments(of)}
+    for key, hint in arguments.items():
+        if hint is not bool and get_origin(hint) is not Annotated:
+            raise TypeError(f"the argument {key} of {name} has no bounds: add it to BOUNDS")
+    definitions: dict[str, Any] = {"type": (Literal[name], ...)}
+    definitions |= {key: (hint, ...) for key, hint in arguments.items()}
+    return create_model(name, __base__=_Envelope, **definitions)
+
+
+def _malformed(error: ValidationError, text: str | bytes) -> MalformedMessage:
+    """Return the first problem in the page's words."""
+    first = error.errors(include_url=False, include_context=False, include_input=False)[0]
+    if first["type"] in {"union_tag_invalid", "union_tag_not_found"}:
+        return MalformedMessage("unknown command", _id_of(text), "type")
+    path = [str(key) for key in first["loc"][1:]]  # the first key is the command's name
+    if path[:1] == ["value"]:
+        return MalformedMessage("must be a number, a text, true, false or null", _id_of(text), "value")
+    problem = first["msg"][:TEXT_MAX]
+    return MalformedMessage(problem[:1].lower() + problem[1:], _id_of(text), ".".join(path)[:FIELD_MAX] or None)
 
 
 def _id_of(text: str | bytes) -> int | None:
+    """Return the id of a malformed message, None if it has no valid one."""
     try:
         found = from_json(text)
     except ValueError:

@@ -1,7 +1,7 @@
-"""Changing settings from the page: each change validated whole, taken over whole or refused, and taken back again.
+"""Live settings changed from the page: each change is validated as a whole, applied or refused, and can be undone.
 
-What `config.reload` says of a changed file holds here as well: a change that a running process cannot follow is
-refused, and on any error the last good settings stay in force.
+The rules are those of a changed file (`config.reload`): a change that a running process cannot follow is refused, and
+after any error the last valid settings stay in force.
 """
 
 from __future__ import annotations
@@ -18,29 +18,30 @@ from config.model import ModelConfig
 from config.problems import shown
 from config.reload import Difference, ReloadResult, differences, reload
 from config.settings import Settings
-from runtime.cli.commands.firing_check import refuse_impossible_firing
+from drivers.registry import make_driver
 from runtime.console.commands.command_error import CommandError
 from runtime.cycle.reloader import Ready
 
 UNDO_MAX: Final = 100
-PAGE: Final = "page"
-"""What the source of a value is called in complaints."""
+"""Changes that can be undone."""
+SOURCE: Final = "page"
+"""What error messages of the configuration call the source of a value."""
 PRESET: Final = ("ring", "firing", "preset")
 
 
 class Tuning:
-    """The settings in force, and those before them, all with the models of now.
+    """The settings in force and those before them.
 
     Parameters
     ----------
     current : Settings
-        What the run was started with.
+        With which the run was started.
     take_over : callable
-        Gets settings that are good and that a running process follows.
+        Gets settings that are valid and that a running process can follow.
     ready : Ready
-        Awaited before a further model is looked for.
+        Awaited before a further model is recognised.
     emulated : bool
-        Whether the port is an emulator's, which nobody wants to find in a file.
+        Whether the port is an emulator's, which a saved file leaves out.
     """
 
     def __init__(
@@ -54,33 +55,40 @@ class Tuning:
         self._before: list[Settings] = []
 
     def adopt(self, settings: Settings) -> None:
-        """Take note of settings that came from elsewhere; nothing before them can be brought back."""
+        """Continue from settings that were changed elsewhere; earlier changes can no longer be undone."""
         self.current = settings
         self._before.clear()
 
     def set(self, path: str, value: bool | float | str | None) -> tuple[Difference, ...]:
-        """Change one value; return what is new.
+        """Change one value; return what changed.
+
+        Parameters
+        ----------
+        path : str
+            The dotted name of the setting.
+        value : bool, int, float, str or None
+            Its new value.
 
         Raises
         ------
         CommandError
-            Why not; its field is `path`.
+            The settings would be invalid, or need a restart; its field is `path`.
         """
         location: Location = tuple(path.split("."))
         if location == PRESET:
-            # Naming a pattern replaces one of one's own, as in a file.
+            # As in a file, a preset replaces a firing pattern given as sets.
             location, given = PRESET[:-1], {**self._firing(), "preset": value, "sets": None}
         else:
             given = value  # type: ignore[assignment]
-        return self._try(path, lambda: with_value(self.current, PAGE, location, given), f" = {shown(value)}")
+        return self._apply(path, lambda: with_value(self.current, SOURCE, location, given), f" = {shown(value)}")
 
     async def add_model(self, toml: str) -> ModelConfig:
-        """Look for a further model, as soon as this process can; return it.
+        """Recognise a further model once its kernels are compiled; return it.
 
         Raises
         ------
         CommandError
-            Why not.
+            The model is invalid, has the name of another one, or is one too many.
         """
         try:
             model = parse_model(toml, "model")
@@ -90,30 +98,28 @@ class Tuning:
         def proposed() -> Settings:
             models = (*self.current.models, model)
             if len(models) > MODELS_MAX:
-                raise CommandError(
-                    f"{MODELS_MAX} models are looked for already: that is the most there may be", "toml"
-                )
-            return with_value(self.current, PAGE, ("models",), [m.model_dump(mode="json") for m in models])
+                raise CommandError(f"{MODELS_MAX} models are recognised already, which is the limit", "toml")
+            return with_value(self.current, SOURCE, ("models",), [m.model_dump(mode="json") for m in models])
 
-        validate = await self._ready(self.current, self._weighed("toml", proposed).settings)
-        if validate is not None:
-            raise CommandError(validate, "toml")
+        problem = await self._ready(self.current, self._validated("toml", proposed).settings)
+        if problem is not None:
+            raise CommandError(problem, "toml")
         before = self._before
-        self._try("toml", proposed)
-        # A model cannot be forgotten while the robot runs: what is taken back from now on are other changes.
+        self._apply("toml", proposed)
+        # A model cannot be removed while the robot runs, so undo restores other changes and keeps the models.
         self._before = [settings.model_copy(update={"models": self.current.models}) for settings in before]
         return model
 
     def undo(self) -> tuple[Difference, ...]:
-        """Take the last change back; return what is new.
+        """Undo the last change; return what changed.
 
         Raises
         ------
         CommandError
-            There is nothing to take back.
+            There is no change to undo.
         """
         if not self._before:
-            raise CommandError("there is no change to take back")
+            raise CommandError("there is no change to undo")
         before = self._before.pop()
         changed = tuple(differences(self.current, before))
         self.current = before
@@ -121,7 +127,7 @@ class Tuning:
         return changed
 
     def saved(self) -> str:
-        """Return all settings as a run file, with what was changed since the start in its first lines."""
+        """Return all settings as the text of a run file that begins with the changes since the start."""
         table: dict[str, Any] = without_none(self.current.model_dump(mode="json"))
         if self._emulated:
             table["link"].pop("port", None)
@@ -132,40 +138,47 @@ class Tuning:
     def _firing(self) -> dict[str, Any]:
         return self.current.ring.firing.model_dump(mode="json")
 
-    def _try(self, path: str, propose: Callable[[], Settings], given: str = "") -> tuple[Difference, ...]:
-        outcome = self._weighed(path, propose, given)
-        if outcome.changed:
+    def _apply(self, path: str, propose: Callable[[], Settings], given: str = "") -> tuple[Difference, ...]:
+        """Put a change into force; return what changed."""
+        result = self._validated(path, propose, given)
+        if result.changed:
             self._before = [*self._before[-UNDO_MAX + 1 :], self.current]
-            self.current = outcome.settings
-            self._take_over(outcome.settings)
-        return outcome.changed
+            self.current = result.settings
+            self._take_over(result.settings)
+        return result.changed
 
-    def _weighed(self, path: str, propose: Callable[[], Settings], given: str = "") -> ReloadResult:
-        """Return what a change comes to, or refuse it; nothing is taken over."""
+    def _validated(self, path: str, propose: Callable[[], Settings], given: str = "") -> ReloadResult:
+        """Return what a change would result in; nothing is put into force.
+
+        Raises
+        ------
+        CommandError
+            The settings would be invalid, or need a restart.
+        """
 
         def proposed() -> Settings:
             settings = propose()
             try:
-                refuse_impossible_firing(settings)
-            except UserError as complaint:
-                raise ConfigError(str(complaint)) from complaint
+                make_driver(settings)  # refuses a firing pattern that the robot cannot carry out
+            except UserError as error:
+                raise ConfigError(str(error)) from error
             return settings
 
-        outcome = reload(self.current, proposed)
-        if outcome.problems:
-            raise CommandError("; ".join(_beside(path, given, line) for line in outcome.problems), path)
-        return outcome
+        result = reload(self.current, proposed)
+        if result.problems:
+            raise CommandError("; ".join(_next_to_field(path, given, line) for line in result.problems), path)
+        return result
 
 
-def _beside(path: str, given: str, line: str) -> str:
-    """Return a complaint as it is told beside its field, which need not be named again."""
-    text = line.removeprefix(f"{PAGE}: ").removeprefix(f"{path}{given}: ")
+def _next_to_field(path: str, given: str, line: str) -> str:
+    """Return an error message without the names of source and field, because the page shows it next to the field."""
+    text = line.removeprefix(f"{SOURCE}: ").removeprefix(f"{path}{given}: ")
     parent = path.rpartition(".")[0]
     return text.removeprefix(f"{parent}: ") if parent else text
 
 
-def without_none(value: Any) -> Any:  # noqa: ANN401 - whatever JSON holds
-    """Return a tree without what is None, which TOML cannot say: what is not there is not given."""
+def without_none(value: Any) -> Any:  # noqa: ANN401 - any JSON value
+    """Return a tree of dicts and lists without the keys whose value is None, which TOML cannot express."""
     if isinstance(value, dict):
         return {key: without_none(inner) for key, inner in value.items() if inner is not None}
     return [without_none(inner) for inner in value] if isinstance(value, list) else value

@@ -1,1 +1,1 @@
-"""What the page is sent: session information once, then one frame after each cycle."""
+"""What the page is sent: session information at first, then one frame after each cycle."""

@@ -1,7 +1,7 @@
-"""A run's state as the page sees it: built once a frame, in JSON, for all clients together.
+"""Frames: the state of a run after a cycle, encoded once in JSON for all clients, live or replayed.
 
-The parts that differ from client to client are few (what it has missed, whether it has the control), so a frame is a
-head that all share, the segments as changes or whole, and a short tail.
+Only little differs from client to client: what it has missed, and whether it has control. So a frame is a head shared
+by all, the segments as changes or whole, and a short tail.
 """
 
 from __future__ import annotations
@@ -20,56 +20,71 @@ from config.settings import Settings
 from drivers.messages import Firing, Floats, LinkCounts
 from perception.detected_object import DetectedObject
 from perception.paper.cluster_view import ClusterView
-from runtime.console.frames.segment_delta import SegmentTable
+from runtime.console.frames.segment_delta import SegmentDelta
 from runtime.cycle.drive_requests import DriveRequest
 from runtime.cycle.step import CycleRecord, State
 
-NO_FRAMES: Final = LinkCounts()
-NOTHING_HEARD: Final = -1.0
-"""Stands for an infinite range, which JSON has no number for."""
+NO_LINK_COUNTS: Final = LinkCounts()
+NO_ECHO: Final = -1.0
+"""The wire's form of an infinite range, for which JSON has no number."""
 
 
 class RecordingStatus(NamedTuple):
-    """The recording under way."""
+    """The recording in progress."""
 
     file: str | None
     bytes: int
     dropped: int
+    """Messages that were not recorded."""
 
 
 @dataclass(frozen=True, slots=True)
 class FrameContext:
-    """What a frame tells besides the state that a cycle left."""
+    """What a frame shows besides the cycle's state."""
 
     host_s: float
+    """When it was encoded; for a replayed frame, s after the recording's first cycle."""
     clients: int = 0
     phases_s: Mapping[str, float] | None = None
-    """What each phase of the last cycle took."""
+    """Duration of each phase of the last cycle."""
     late_s: float = 0.0
-    """How long after its time that cycle began."""
+    """How long after its deadline that cycle began."""
     missed: int = 0
     late: int = 0
-    link: LinkCounts = NO_FRAMES
+    link: LinkCounts = NO_LINK_COUNTS
     recording: RecordingStatus | None = None
     is_paused: bool = False
     speed: float = 1.0
     playback: Mapping[str, Any] | None = None
-    """Which recording this is of, and where in it; None for the run itself."""
+    """Position in the recording that is replayed; None for the run itself."""
 
 
 class EncodedFrame(NamedTuple):
-    """A frame of the run, as far as clients share it."""
+    """A frame in JSON, as far as all clients share it."""
 
     source: object
-    """Whose frames these are; changes count from the one before of the same source."""
+    """Identifies the sequence of frames; changes are relative to the previous frame of the same source."""
     number: int
+    """Of the frame in its source."""
     head: bytes
+    """Everything but the segments and what differs between clients, without the closing brace."""
     changes: bytes
+    """The segments that were added or removed since the previous frame."""
     whole: Callable[[], bytes]
     """Returns all segments; valid while this is the newest frame of its source."""
 
     def encode(self, *, follows: bool, dropped: int, controls: bool) -> bytes:
-        """Return the frame for one client."""
+        """Return the message for one client.
+
+        Parameters
+        ----------
+        follows : bool
+            Whether the previous frame of this source is the last one the client was sent.
+        dropped : int
+            Frames that the client was not sent.
+        controls : bool
+            Whether the client has control.
+        """
         segments = self.changes if follows else self.whole()
         return b'%b,"segments":%b,"dropped":%d,"controller":%b}' % (
             self.head, segments, dropped, b"true" if controls else b"false"
@@ -77,7 +92,7 @@ class EncodedFrame(NamedTuple):
 
 
 class FrameEncoder:
-    """Follows a run and puts its frames together, be it a live one or one that is played again.
+    """Encodes the frames of one run, live or replayed.
 
     Parameters
     ----------
@@ -87,43 +102,53 @@ class FrameEncoder:
 
     def __init__(self, settings: Settings) -> None:
         count = len(settings.ring.mounts)
-        self._ranges = np.full(count, np.nan)
-        self._heard_s = np.full(count, np.nan)
+        self._ranges_m = np.full(count, np.nan)
+        self._fired_s = np.full(count, np.nan)
         self._fired: set[int] = set()
-        self._table = SegmentTable()
+        self._segments = SegmentDelta()
         self._clusters = ClusterView(settings.perception)
         self._cluster_rows: list[list[float]] = []
-        self._counts: tuple[int, int] | None = None
+        self._segment_counts: tuple[int, int] | None = None
         self._is_stale = True
         self._number = 0
 
     def adopt(self, settings: Settings) -> None:
-        """Go on with other settings."""
+        """Use other settings from the next frame on."""
         self._clusters = ClusterView(settings.perception)
         self._is_stale = True
 
     def take(self, record: CycleRecord) -> None:
-        """Take note of a cycle, whether or not anybody looks on."""
+        """Take in a cycle, whether or not a frame of it will be encoded."""
         heard = record.inputs.received
         if heard.rebooted:
-            self._ranges[:] = self._heard_s[:] = np.nan
+            self._ranges_m[:] = self._fired_s[:] = np.nan
         if heard.rebooted or record.inputs.edits:
-            # The map may be another one though its numbers of segments are as before.
+            # The segments may differ although their counts do not.
             self._is_stale = True
         for firing in heard.firings:
-            self._hear(firing)
+            self._take_firing(firing)
 
     def frame(self, state: State, record: CycleRecord | None, context: FrameContext) -> EncodedFrame:
-        """Return the frame of what a cycle left."""
+        """Return the frame of the state after a cycle.
+
+        Parameters
+        ----------
+        state : State
+            After the cycle.
+        record : CycleRecord, optional
+            Of the cycle; None before the first one.
+        context : FrameContext
+            What is not in the state.
+        """
         self._number += 1
-        segments = self._segments(state)
+        segments = self._encode_segments(state)
         odometry = state.odometry
-        t_s = 0.0 if odometry is None else odometry.robot_s
+        robot_s = 0.0 if odometry is None else odometry.robot_s
         link, phases_s = context.link, context.phases_s or {}
         head: dict[str, Any] = {
             "type": "state",
             "cycle": state.cycle,
-            "robot_s": t_s,
+            "robot_s": robot_s,
             "host_s": round(context.host_s, 4),
             "mode": state.mode.mode.value,
             "reason": state.mode.reason,
@@ -134,10 +159,10 @@ class FrameEncoder:
             "twist": [0.0, 0.0],
             "flags": [],
             "firing": sorted(self._fired),
-            "ranges": _told(np.where(np.isinf(self._ranges), NOTHING_HEARD, self._ranges), 4),
-            "age": _told(t_s - self._heard_s, 3),
+            "ranges": _json_numbers(np.where(np.isinf(self._ranges_m), NO_ECHO, self._ranges_m), 4),
+            "age": _json_numbers(robot_s - self._fired_s, 3),
             "clusters": self._cluster_rows,
-            "objects": [_object(seen) for seen in state.perception.labelled_objects()],
+            "objects": [_object(detected) for detected in state.perception.labelled_objects()],
             "vectors": [[r.schema, round(r.x, 4), round(r.y, 4)] for r in state.vectors],
             "drive_request": _drive_request(state.drive_request),
             "phases": {name: round(1e6 * s, 1) for name, s in phases_s.items()},
@@ -162,45 +187,46 @@ class FrameEncoder:
             head["twist"] = [round(twist.v, 4), round(twist.w, 4)]
             head["flags"] = [flag.name for flag in odometry.flags]
         self._fired.clear()
-        return EncodedFrame(self, self._number, orjson.dumps(head)[:-1], segments, self._table.whole)
+        return EncodedFrame(self, self._number, orjson.dumps(head)[:-1], segments, self._segments.whole)
 
-    def _hear(self, firing: Firing) -> None:
+    def _take_firing(self, firing: Firing) -> None:
         fired = np.flatnonzero(~np.isnan(firing.ranges_m))
-        self._ranges[fired] = firing.ranges_m[fired]
-        self._heard_s[fired] = firing.robot_s
+        self._ranges_m[fired] = firing.ranges_m[fired]
+        self._fired_s[fired] = firing.robot_s
         self._fired.update(fired.tolist())
 
-    def _segments(self, state: State) -> bytes:
+    def _encode_segments(self, state: State) -> bytes:
+        """Return the changes of the map's segments; list them only if they may have changed."""
         perception = state.perception
         counts = (perception.counts.segments_total, perception.counts.segments)
-        if counts == self._counts and not self._is_stale:
-            return self._table.unchanged()
-        self._counts, self._is_stale = counts, False
+        if counts == self._segment_counts and not self._is_stale:
+            return self._segments.unchanged()
+        self._segment_counts, self._is_stale = counts, False
         now = perception.segments()
         self._cluster_rows = self._clusters.rows(now.geometry)
         rows = np.column_stack([now.geometry, now.times])
-        return self._table.update(now.numbers, rows, now.numbers[now.pinned == 1])
+        return self._segments.update(now.numbers, rows, now.numbers[now.pinned == 1])
 
 
-def _told(values: Floats, places: int) -> list[float | None]:
-    """Return numbers for JSON, null where there is none."""
+def _json_numbers(values: Floats, places: int) -> list[float | None]:
+    """Return rounded numbers, None in place of NaN."""
     return [None if math.isnan(value) else value for value in np.round(values, places).tolist()]
 
 
-def _object(seen: DetectedObject) -> dict[str, Any]:
+def _object(detected: DetectedObject) -> dict[str, Any]:
     return {
-        "number": seen.number,
-        "model": seen.model,
-        "x": round(seen.x, 4),
-        "y": round(seen.y, 4),
-        "theta": round(seen.theta, 4),
-        "sigma": round(seen.sigma, 5),
-        "covariance": seen.covariance,
-        "probability": seen.probability,
-        "support": seen.support,
-        "score": round(seen.score, 4),
-        "confirmed": seen.confirmed,
-        "placed": seen.placed,
+        "number": detected.number,
+        "model": detected.model,
+        "x": round(detected.x, 4),
+        "y": round(detected.y, 4),
+        "theta": round(detected.theta, 4),
+        "sigma": round(detected.sigma, 5),
+        "covariance": detected.covariance,
+        "probability": detected.probability,
+        "support": detected.support,
+        "score": round(detected.score, 4),
+        "confirmed": detected.confirmed,
+        "placed": detected.placed,
     }
 
 

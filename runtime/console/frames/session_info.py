@@ -1,4 +1,4 @@
-"""What a page is told first: the robot's shape, what it looks for, and, of an emulated one, what stands there."""
+"""Session information: what the page is sent first about the robot, its models and an emulator's true world."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from runtime.support.length_format import Units
 
 
 def session_info(settings: Settings, *, name: str | None, emulated: bool, units: Units) -> dict[str, Any]:
-    """Return what every client is greeted with; the greeting of one of them adds its role.
+    """Return the session message that all clients are sent; the hub adds the client's role.
 
     Parameters
     ----------
@@ -23,9 +23,9 @@ def session_info(settings: Settings, *, name: str | None, emulated: bool, units:
     name : str, optional
         What the robot calls itself.
     emulated : bool
-        Whether the settings' world is what the robot meets.
+        Whether the robot is emulated in the settings' world.
     units : {"m", "ft"}
-        In which figures are to be shown.
+        In which the page shows lengths at first.
     """
     ring, body = settings.ring, settings.body
     return {
@@ -45,29 +45,29 @@ def session_info(settings: Settings, *, name: str | None, emulated: bool, units:
             {"name": m.name, "vertices": m.vertices_m, "closed": m.closed, "arc_radius_m": m.arc_radius_m}
             for m in settings.models
         ],
-        "truth": truth(settings.world) if emulated and settings.world is not None else None,
+        "truth": true_world(settings.world) if emulated and settings.world is not None else None,
         "parameters": parameters(settings),
         "budget_s": settings.cycle.perception_budget_s,
         "period_s": 1.0 / settings.cycle.rate_hz,
     }
 
 
-def truth(world: WorldConfig) -> dict[str, Any]:
-    """Return what stands in a world, in the frame of an odometry that begins at its start, m."""
-    frame = _pose(world.start).inverse()
+def true_world(world: WorldConfig) -> dict[str, Any]:
+    """Return the drums, walls and polygons of a world, m, in the frame of an odometry that begins at its start."""
+    odom_from_world = _pose(world.start).inverse()
 
-    def point(x: float, y: float) -> tuple[float, float]:
-        there = frame.compose(Pose(x, y, 0.0))
-        return there.x, there.y
+    def in_odom(x: float, y: float) -> tuple[float, float]:
+        place = odom_from_world.compose(Pose(x, y, 0.0))
+        return place.x, place.y
 
-    polygons = [[point(*vertex) for vertex in polygon.vertices_m] for polygon in world.polygon]
+    polygons = [[in_odom(*vertex) for vertex in polygon.vertices_m] for polygon in world.polygon]
     for box in world.box:
-        w, d, middle = 0.5 * box.width_m, 0.5 * box.depth_m, Pose(box.x_m, box.y_m, math.radians(box.angle_deg))
-        corners = [middle.compose(Pose(x, y, 0.0)) for x, y in ((w, -d), (w, d), (-w, d), (-w, -d))]
-        polygons.append([point(corner.x, corner.y) for corner in corners])
+        w, d, centre = 0.5 * box.width_m, 0.5 * box.depth_m, Pose(box.x_m, box.y_m, math.radians(box.angle_deg))
+        corners = [centre.compose(Pose(x, y, 0.0)) for x, y in ((w, -d), (w, d), (-w, d), (-w, -d))]
+        polygons.append([in_odom(corner.x, corner.y) for corner in corners])
     return {
-        "drums": [[*point(drum.x_m, drum.y_m), drum.radius_m] for drum in world.drum],
-        "walls": [[*point(wall.x1_m, wall.y1_m), *point(wall.x2_m, wall.y2_m)] for wall in world.wall],
+        "drums": [[*in_odom(drum.x_m, drum.y_m), drum.radius_m] for drum in world.drum],
+        "walls": [[*in_odom(wall.x1_m, wall.y1_m), *in_odom(wall.x2_m, wall.y2_m)] for wall in world.wall],
         "polygons": polygons,
     }
 

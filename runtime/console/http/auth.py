@@ -1,7 +1,7 @@
-"""Who may come in: the token of this run, and requests that name this server and come from its own page.
+"""Authentication of requests: the token of this run, and the Host and Origin headers.
 
-Any web page open in the operator's browser can send requests to this machine. It cannot know the token; it cannot
-hide where it comes from (Origin); and a name of its own that leads here, as in DNS rebinding, shows in Host.
+Any web page open in the operator's browser can send requests to this machine. Such a page does not know the token,
+cannot forge Origin, and, with DNS rebinding, sends its own name in Host.
 """
 
 from __future__ import annotations
@@ -13,59 +13,60 @@ from dataclasses import dataclass, field
 from typing import Final
 
 TOKEN_BYTES: Final = 16
+"""128 bits cannot be guessed over a network."""
 SCHEME: Final = "http"
 HTTP_PORT: Final = 80
-SHOWN_MAX: Final = 80
-"""Of what a stranger sent: more does not go into the log."""
+LOGGED_MAX: Final = 80
+"""Characters of a header that go into the log."""
 
 
 def new_token() -> str:
-    """Return 128 random bits as text that can stand in an address."""
+    """Return a random token as text that is safe in a URL."""
     return secrets.token_urlsafe(TOKEN_BYTES)
 
 
 def is_loopback(host: str) -> bool:
-    """Say whether an address or name reaches this machine only."""
+    """Return whether an address or host name reaches this machine only."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return host == "localhost"
 
 
-def in_address(host: str) -> str:
-    """Return a host as it stands in an address: IPv6 in brackets."""
+def url_host(host: str) -> str:
+    """Return a host as it is written in a URL: IPv6 in brackets."""
     return f"[{host}]" if ":" in host else host
 
 
 @dataclass(frozen=True, slots=True)
 class Auth:
-    """Knows the token, and by which names this server is called."""
+    """Checks requests against the token and the names of this server."""
 
     token: str = field(repr=False)
     names: tuple[str, ...]
-    """Names besides the address that a request came to: of this machine, as in the settings."""
+    """Host names of this server besides the address to which a request came."""
     port: int
 
-    def knows(self, token: str) -> bool:
-        """Say whether this is the token, in a time that tells nothing about it."""
+    def accepts(self, token: str) -> bool:
+        """Return whether this is the token, comparing in constant time."""
         return hmac.compare_digest(token.encode("utf-8", "surrogatepass"), self.token.encode())
 
-    def trouble_with_host(self, host: str | None, address: str) -> str | None:
-        """Say what is wrong with a Host header of a request that came to a local address; None where nothing is."""
-        return None if host in self._hosts(address) else f"Host {_shown(host)} is not this console's"
+    def host_error(self, host: str | None, address: str) -> str | None:
+        """Return why a Host header is wrong for a request that came to this local address, None if it is right."""
+        return None if host in self._hosts(address) else f"Host {_quoted(host)} is not this console's"
 
-    def trouble_with_origin(self, origin: str | None, host: str | None) -> str | None:
-        """Say what is wrong with an Origin beside a Host that is good; None where nothing is."""
-        return None if origin == f"{SCHEME}://{host}" else f"Origin {_shown(origin)} is not this console's page"
+    def origin_error(self, origin: str | None, host: str) -> str | None:
+        """Return why an Origin header is wrong for a request with this valid Host, None if it is right."""
+        return None if origin == f"{SCHEME}://{host}" else f"Origin {_quoted(origin)} is not this console's page"
 
     def _hosts(self, address: str) -> tuple[str, ...]:
         names = {address, *self.names}
         if is_loopback(address):
             names.add("localhost")
-        hosts = tuple(f"{in_address(name)}:{self.port}" for name in names)
-        # A browser leaves out the port that goes without saying.
-        return hosts if self.port != HTTP_PORT else (*hosts, *map(in_address, names))
+        hosts = tuple(f"{url_host(name)}:{self.port}" for name in names)
+        # A browser leaves out the default port.
+        return hosts if self.port != HTTP_PORT else (*hosts, *map(url_host, names))
 
 
-def _shown(text: str | None) -> str:
-    return "(none)" if text is None else ascii(text[:SHOWN_MAX])
+def _quoted(text: str | None) -> str:
+    return "(none)" if text is None else ascii(text[:LOGGED_MAX])

@@ -1,4 +1,4 @@
-"""Bounds on what clients may cost: messages, silence, lines in the log."""
+"""Bounds on what clients may cost the run: messages, queued data, connections, lines in the log."""
 
 from __future__ import annotations
 
@@ -6,94 +6,98 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from runtime.console.commands.messages import MESSAGE_MAX
+from runtime.console.commands.messages import MESSAGE_MAX_BYTES
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
-LINES_PER_S: Final = 1.0
-LINES_BURST: Final = 10.0
+LOG_LINES_PER_S: Final = 1.0
+LOG_LINES_BURST: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one client may do, and all together."""
+    """What one client may do, and all of them together."""
 
     clients: int = 16
     """Pages open at a time."""
     connections: int = 64
-    """Connections at a time that are no websockets (yet)."""
-    message_bytes: int = MESSAGE_MAX
+    """Connections at a time that are not websockets, or not yet."""
+    message_bytes: int = MESSAGE_MAX_BYTES
     messages_per_s: float = 200.0
+    """Ten times what a page sends while it teleoperates the robot."""
     stall_s: float = 10.0
-    """A client that takes nothing for so long is let go."""
-    waiting: int = 256
-    """Answers and lines of the log that may wait for a client, at most."""
-    waiting_bytes: int = 1 << 20
+    """A client that takes nothing for this long is disconnected."""
+    queue_messages: int = 256
+    """Answers and lines of the log that may wait for a client."""
+    queue_bytes: int = 1 << 20
 
 
 class TokenBucket:
-    """So many a second, and so many at once.
+    """Limits a rate: so many events a second on average, and so many at once.
 
     Parameters
     ----------
-    rate_per_s, burst : float
-        What flows in, and what it holds.
+    rate_per_s : float
+        Tokens added each second.
+    burst : float
+        Tokens the bucket holds; it starts full.
     """
 
     def __init__(self, rate_per_s: float, burst: float) -> None:
         self._rate_per_s = rate_per_s
         self._burst = burst
-        self._level = burst
-        self._since_s: float | None = None
+        self._tokens = burst
+        self._updated_s: float | None = None
 
-    def take(self, now_s: float) -> bool:
-        """Say whether one more is within bounds, and count it where it is."""
-        if self._since_s is not None:
-            self._level = min(self._burst, self._level + self._rate_per_s * max(0.0, now_s - self._since_s))
-        self._since_s = now_s
-        if self._level < 1.0:
+    def take(self, host_s: float) -> bool:
+        """Take a token and return True; return False if there is none."""
+        if self._updated_s is not None:
+            added = self._rate_per_s * max(0.0, host_s - self._updated_s)
+            self._tokens = min(self._burst, self._tokens + added)
+        self._updated_s = host_s
+        if self._tokens < 1.0:
             return False
-        self._level -= 1.0
+        self._tokens -= 1.0
         return True
 
 
 class ConsoleLog:
-    """Tells the log who came and went, asked and was refused, and does not let anybody fill it.
+    """Logs what clients do and what is refused to them, at a bounded rate so that no client can flood the log.
 
     Parameters
     ----------
     log : structlog logger
-        Told.
+        The run's log.
     clock : callable
         Monotonic, s.
 
     Attributes
     ----------
     refusals
-        All refusals, told or not.
+        Number of all refusals, logged or not.
     """
 
     def __init__(self, log: FilteringBoundLogger, clock: Callable[[], float]) -> None:
         self._log = log
         self._clock = clock
-        self._lines = {True: TokenBucket(LINES_PER_S, LINES_BURST), False: TokenBucket(LINES_PER_S, LINES_BURST)}
-        self._untold = {True: 0, False: 0}
+        self._buckets = {level: TokenBucket(LOG_LINES_PER_S, LOG_LINES_BURST) for level in ("info", "warning")}
+        self._suppressed = dict.fromkeys(self._buckets, 0)
         self.refusals = 0
 
-    def refuse(self, why: str, client: str) -> None:
-        """Take note that somebody was refused something."""
+    def refuse(self, reason: str, client: str) -> None:
+        """Log that something was refused to a client."""
         self.refusals += 1
-        self._tell("the console refused", is_bad=True, why=why, client=client)
+        self._write("warning", "console refused", reason=reason, client=client)
 
-    def tell(self, event: str, client: str) -> None:
-        """Take note of something that somebody did."""
-        self._tell(event, is_bad=False, client=client)
+    def note(self, event: str, client: str) -> None:
+        """Log what a client did."""
+        self._write("info", event, client=client)
 
-    def _tell(self, event: str, *, is_bad: bool, **fields: str) -> None:
-        if not self._lines[is_bad].take(self._clock()):
-            self._untold[is_bad] += 1
+    def _write(self, level: str, event: str, **fields: str) -> None:
+        if not self._buckets[level].take(self._clock()):
+            self._suppressed[level] += 1
             return
-        more = {"untold_before": self._untold[is_bad]} if self._untold[is_bad] else {}
-        self._untold[is_bad] = 0
-        (self._log.warning if is_bad else self._log.info)(event, **fields, **more)
+        suppressed, self._suppressed[level] = self._suppressed[level], 0
+        more = {"suppressed_before": suppressed} if suppressed else {}
+        (self._log.warning if level == "warning" else self._log.info)(event, **fields, **more)

@@ -1,7 +1,7 @@
-"""Where connections come in: a port to listen on, and bounds that hold before anybody has said a word.
+"""The listening socket, and the limits on connections before their first request.
 
-What a connection brings is parsed in the loop, so its time is booked by name; buffers are small, so that no peer can
-bring much at once, nor have much kept for it; and there are only so many connections, and so many new ones a second.
+Requests are parsed in the run's loop, so the time that takes is measured. Socket buffers are small, which bounds what
+one peer can have in flight, and both the number of connections and their rate are limited.
 """
 
 from __future__ import annotations
@@ -11,92 +11,94 @@ import socket
 from collections.abc import Callable
 from typing import Final
 
-from config.errors import FAILED, WRONG_CALL, UserError
+from config.errors import WRONG_CALL, UserError
 from config.settings import ConsoleConfig
 from runtime.console.http.client_limits import TokenBucket
 from runtime.console.timed_coroutine import Timed
 from runtime.cycle.process import CONSOLE_RECEIVE
 
 PORTS_TRIED: Final = 20
-ANY_FREE: Final = 0
+"""How many successive ports are tried before any free one is taken."""
+ANY_FREE_PORT: Final = 0
+PORT_MAX: Final = 65_535
 BACKLOG: Final = 16
-RECEIVE_BYTES: Final = 16 * 1024
-"""The system doubles it for its own books; nothing larger arrives in one piece."""
-SEND_BYTES: Final = 64 * 1024
-"""So much may be on its way to a client; all of it is older than the newest frame."""
-NEW_PER_S: Final = 200.0
-NEW_BURST: Final = 600.0
-"""A page is half a hundred files."""
+RECEIVE_BUFFER_BYTES: Final = 16 * 1024
+"""The system doubles it for its own bookkeeping; nothing larger arrives in one piece."""
+SEND_BUFFER_BYTES: Final = 64 * 1024
+"""What may be in flight to a client; all of it is older than the newest frame."""
+CONNECTIONS_PER_S: Final = 200.0
+CONNECTIONS_BURST: Final = 600.0
+"""A page is half a hundred files, each fetched by its own connection."""
 
 
 async def listen(config: ConsoleConfig) -> socket.socket:
-    """Return a socket that listens where the settings say, or on the next port that is free.
+    """Return a socket that listens on the configured host and port, or on the next free port.
 
     Raises
     ------
     UserError
-        There is no such address on this machine, or no port is free.
+        This machine has no such address, or no port is free.
     """
     loop = asyncio.get_running_loop()
     try:
         found = await loop.getaddrinfo(config.host, 0, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
     except OSError as error:
         raise UserError(
-            f"console.host = {config.host!r} is no address: {error.strerror}; 127.0.0.1 is this machine alone",
+            f"console.host = {config.host!r} is not an address of this machine: {error.strerror}; "
+            "use 127.0.0.1 to serve this machine alone",
             WRONG_CALL,
         ) from error
     family, _, _, _, address = found[0]
-    trouble = ""
-    wanted = range(config.port, min(config.port + PORTS_TRIED, 65_536)) if config.port else ()
-    for port in (*wanted, ANY_FREE):
-        one = socket.socket(family, socket.SOCK_STREAM)
+    problem = ""
+    wanted = range(config.port, min(config.port + PORTS_TRIED, PORT_MAX + 1)) if config.port else ()
+    for port in (*wanted, ANY_FREE_PORT):
+        listening = socket.socket(family, socket.SOCK_STREAM)
         try:
-            one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
-            one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BYTES)
-            one.bind((address[0], port, *address[2:]))
-            one.listen(BACKLOG)
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
+            listening.bind((address[0], port, *address[2:]))
+            listening.listen(BACKLOG)
         except OSError as error:
-            one.close()
-            trouble = error.strerror or str(error)
+            listening.close()
+            problem = error.strerror or str(error)
             continue
-        one.setblocking(False)  # noqa: FBT003 - its name says it
-        return one
+        listening.setblocking(False)  # noqa: FBT003 - the method's name says what the flag means
+        return listening
     raise UserError(
-        f"the console cannot listen on {config.host}, port {config.port}: {trouble}; choose another console.port, "
-        "or run without it (--no-console)",
-        FAILED,
+        f"the console cannot listen on {config.host}, port {config.port}: {problem}; choose another console.host or "
+        "console.port, or run with --no-console"
     )
 
 
 class TimedProtocol(asyncio.Protocol):
-    """Hands everything on to another protocol, and has the time it takes booked.
+    """Forwards everything to another protocol and measures the time that takes.
 
     Parameters
     ----------
     inner : Protocol
-        Does the work.
+        Handles the connection.
     timed : Timed
-        Books it.
-    lost : callable
-        Told when the connection is over.
+        Measures its callbacks.
+    on_lost : callable
+        Called when the connection has ended.
     """
 
-    def __init__(self, inner: asyncio.Protocol, timed: Timed, lost: Callable[[TimedProtocol], None]) -> None:
+    def __init__(self, inner: asyncio.Protocol, timed: Timed, on_lost: Callable[[TimedProtocol], None]) -> None:
         self._inner = inner
-        self._lost = lost
+        self._on_lost = on_lost
         self._transport: asyncio.Transport | None = None
-        self._is_cut = False
+        self._is_aborted = False
         self.connection_made = timed(CONSOLE_RECEIVE, self._made)  # type: ignore[method-assign]
         self.data_received = timed(CONSOLE_RECEIVE, inner.data_received)  # type: ignore[method-assign]
-        self.connection_lost = timed(CONSOLE_RECEIVE, self._over)  # type: ignore[method-assign]
+        self.connection_lost = timed(CONSOLE_RECEIVE, self._lost)  # type: ignore[method-assign]
         self.eof_received = inner.eof_received  # type: ignore[method-assign]
         self.pause_writing = inner.pause_writing  # type: ignore[method-assign]
         self.resume_writing = inner.resume_writing  # type: ignore[method-assign]
 
-    def cut(self) -> None:
-        """Cut the connection."""
-        self._is_cut = True
+    def abort(self) -> None:
+        """Drop the connection, at once or as soon as it is made."""
+        self._is_aborted = True
         if self._transport is not None:
             self._transport.abort()
 
@@ -104,78 +106,77 @@ class TimedProtocol(asyncio.Protocol):
         self._inner.connection_made(transport)
         if isinstance(transport, asyncio.Transport):
             self._transport = transport
-        if self._is_cut:
-            self.cut()
+        if self._is_aborted:
+            self.abort()
 
-    def _over(self, error: Exception | None) -> None:
-        self._lost(self)
+    def _lost(self, error: Exception | None) -> None:
+        self._on_lost(self)
         self._inner.connection_lost(error)
 
 
 class RejectingProtocol(asyncio.Protocol):
-    """Cuts a connection as soon as it is made."""
+    """Drops a connection as soon as it is made."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Cut it."""
+        """Drop it."""
         if isinstance(transport, asyncio.Transport):
             transport.abort()
 
 
 class ConnectionLimiter:
-    """Makes the protocol of each new connection.
+    """The protocol factory of the server, which limits the connections that are not websockets yet.
 
-    There may be so many that have not become a websocket yet; a further one has the oldest of them cut, so that
-    nobody keeps others out by holding connections.
+    One connection too many has the oldest dropped, so that holding connections open keeps no one else out.
 
     Parameters
     ----------
-    inner : callable
-        Makes the one that does the work.
-    young_max : int
-        How many there may be that are no websockets.
+    make_protocol : callable
+        Makes the protocol that handles a connection.
+    pending_max : int
+        How many connections there may be that are not websockets.
     timed : Timed
-        Books their time.
-    refused : callable
-        Told why a connection is not let in, or cut.
+        Measures their callbacks.
+    on_refused : callable
+        Gets the reason why a connection is rejected or dropped.
     clock : callable
         Monotonic, s.
     """
 
     def __init__(
         self,
-        inner: Callable[[], asyncio.Protocol],
-        young_max: int,
+        make_protocol: Callable[[], asyncio.Protocol],
+        pending_max: int,
         timed: Timed,
-        refused: Callable[[str], None],
+        on_refused: Callable[[str], None],
         clock: Callable[[], float],
     ) -> None:
-        self._inner = inner
-        self._young: dict[TimedProtocol, None] = {}
-        self._young_max = young_max
+        self._make_protocol = make_protocol
+        self._pending: dict[TimedProtocol, None] = {}  # in the order in which they came
+        self._pending_max = pending_max
         self._timed = timed
-        self._refused = refused
+        self._on_refused = on_refused
         self._clock = clock
-        self._bucket = TokenBucket(NEW_PER_S, NEW_BURST)
+        self._bucket = TokenBucket(CONNECTIONS_PER_S, CONNECTIONS_BURST)
 
     def __call__(self) -> asyncio.Protocol:
         """Return the protocol of a new connection."""
         if not self._bucket.take(self._clock()):
-            self._refused("there are too many new connections")
+            self._on_refused("too many new connections a second")
             return RejectingProtocol()
-        if len(self._young) >= self._young_max:
-            self._refused("there are too many connections: the oldest is cut")
-            oldest = next(iter(self._young))
-            self._lost(oldest)
-            oldest.cut()
-        one = TimedProtocol(self._inner(), self._timed, self._lost)
-        self._young[one] = None
-        return one
+        if len(self._pending) >= self._pending_max:
+            self._on_refused("too many connections: the oldest is dropped")
+            oldest = next(iter(self._pending))
+            self._remove(oldest)
+            oldest.abort()
+        protocol = TimedProtocol(self._make_protocol(), self._timed, self._remove)
+        self._pending[protocol] = None
+        return protocol
 
-    def settle(self, transport: asyncio.Transport) -> None:
-        """Take note that a connection has become a websocket; those are counted by others."""
+    def release(self, transport: asyncio.Transport) -> None:
+        """Count a connection no longer: it has become a websocket, and the hub limits those."""
         protocol = transport.get_protocol()
         if isinstance(protocol, TimedProtocol):
-            self._lost(protocol)
+            self._remove(protocol)
 
-    def _lost(self, one: TimedProtocol) -> None:
-        self._young.pop(one, None)
+    def _remove(self, protocol: TimedProtocol) -> None:
+        self._pending.pop(protocol, None)

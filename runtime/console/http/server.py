@@ -1,7 +1,7 @@
-"""The console's side of the network: pages, and the websocket of each client, behind the guard.
+"""The console's web server: the page's files, the report, the log, and the websocket of each client.
 
-A request brings nothing but its address: there is no form to fill in, no file to send. Each is answered and its
-connection closed, so that nobody holds one for long; only a websocket stays.
+A request carries nothing but its path and its token: the server takes no forms and no uploads. Each response closes
+its connection; only websockets stay open.
 """
 
 from __future__ import annotations
@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING, Any, Final
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from runtime.console.clients.client import Client
-from runtime.console.clients.client_hub import Hub
+from runtime.console.clients.client_hub import ClientHub
 from runtime.console.commands.command_error import CommandError
 from runtime.console.http.auth import Auth
 from runtime.console.http.client_limits import ConsoleLog, Limits
 from runtime.console.http.connection_limits import ConnectionLimiter
-from runtime.console.http.static_files import File, headers
+from runtime.console.http.log_forwarder import LogForwarder
+from runtime.console.http.static_files import StaticFile, security_headers
 from runtime.console.timed_coroutine import Timed, timed_coroutine
 from runtime.cycle.process import CONSOLE_RECEIVE, CONSOLE_SEND
 
@@ -30,62 +31,54 @@ if TYPE_CHECKING:
     import socket
 
 IDLE_MAX_S: Final = 10.0
-"""For a connection that asks for nothing."""
+"""A connection that sends no request for this long is closed."""
 CLOSE_MAX_S: Final = 1.0
-HALT_WORD: Final = '"halt"'
+"""Time for the closing handshakes at the end of the run."""
+REASON_MAX: Final = 200
+"""Characters of a peer's words that go into the log."""
+HALT_MARK: Final = '"halt"'
+"""A message with this near its beginning is read even if its client sends too many."""
+WRONG_TOKEN: Final = "a wrong token, or none"  # noqa: S105 - a text
 
 
 @dataclass(frozen=True, slots=True)
 class ServerContext:
-    """What the server serves, and whom it tells."""
+    """What the server serves, and whom it calls."""
 
-    guard: Auth
-    hub: Hub
+    auth: Auth
+    hub: ClientHub
     limits: Limits
-    notes: ConsoleLog
-    files: Mapping[str, File]
-    hello: Callable[[], Mapping[str, Any]]
-    """What a new client is told."""
+    log: ConsoleLog
+    files: Mapping[str, StaticFile]
+    session: Callable[[], Mapping[str, Any]]
+    """Returns the session information for a new client."""
     on_message: Callable[[Client, str], None]
-    """Gets what a client says; it does not raise for that."""
+    """Gets a client's message; does not raise for what a client can cause."""
     on_leave: Callable[[Client], None]
     on_fault: Callable[[str, BaseException], None]
-    """Gets the name of a part and what it should never have met."""
+    """Gets the name of a part and the unexpected error in it."""
     report: Callable[[], Awaitable[bytes]]
-    """Returns the run up to now as a page; raises a CommandError."""
+    """Returns the report of the run so far; raises a CommandError."""
     watch_without_token: bool
     timed: Timed
     clock: Callable[[], float]
+    """Monotonic, s."""
 
 
-class _Wire:
-    """A websocket, as a client sees it."""
+class _WebSocketTransport:
+    """A websocket as a client's transport."""
 
-    def __init__(self, talk: web.WebSocketResponse, transport: asyncio.Transport) -> None:
-        self._talk = talk
+    def __init__(self, websocket: web.WebSocketResponse, transport: asyncio.Transport) -> None:
+        self._websocket = websocket
         self._transport = transport
 
     async def send(self, data: bytes) -> None:
-        """Put a message on the way; `writer_limit` has it wait while the system takes nothing more."""
-        await self._talk.send_frame(data, WSMsgType.TEXT)
+        """Send a message; `writer_limit` makes it wait while the system takes nothing more."""
+        await self._websocket.send_frame(data, WSMsgType.TEXT)
 
     def abort(self) -> None:
-        """Cut the connection."""
+        """Drop the connection."""
         self._transport.abort()
-
-
-class _Murmur(logging.Handler):
-    """Tells of what aiohttp would print with a traceback: a peer that does not speak HTTP, mostly."""
-
-    def __init__(self, notes: ConsoleLog) -> None:
-        super().__init__()
-        self._notes = notes
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Take a line."""
-        error = record.exc_info[1] if record.exc_info else None
-        why = f"{record.getMessage()}{f': {type(error).__name__}' if error else ''}"
-        self._notes.refuse(ascii(why)[1:-1][:200], "a connection")
 
 
 class Server:
@@ -93,31 +86,34 @@ class Server:
 
     Parameters
     ----------
-    house : ServerContext
+    context : ServerContext
         What it serves.
     """
 
-    def __init__(self, house: ServerContext) -> None:
-        self._house = house
-        self._talks: dict[Client, web.WebSocketResponse] = {}
+    def __init__(self, context: ServerContext) -> None:
+        self._context = context
+        self._websockets: dict[Client, web.WebSocketResponse] = {}
         self._web: web.Server | None = None
         self._server: asyncio.Server | None = None
-        self._door: ConnectionLimiter | None = None
+        self._limiter: ConnectionLimiter | None = None
         self._is_closing = False
 
     async def open(self, listening: socket.socket) -> None:
-        """Serve whoever comes to a socket that listens."""
-        murmur = logging.Logger("console")
-        murmur.addHandler(_Murmur(self._house.notes))
-        self._web = server = web.Server(
-            self._answer, access_log=None, logger=murmur, keepalive_timeout=IDLE_MAX_S, lingering_time=0.0
+        """Serve the connections of a listening socket."""
+        context = self._context
+        logger = logging.Logger("console")
+        logger.addHandler(LogForwarder(context.log))
+        self._web = web_server = web.Server(
+            self._answer, access_log=None, logger=logger, keepalive_timeout=IDLE_MAX_S, lingering_time=0.0
         )
-        house = self._house
-        self._door = door = ConnectionLimiter(
-            server, house.limits.connections, house.timed, lambda why: house.notes.refuse(why, "a connection"),
-            house.clock,
-        )  # fmt: skip
-        self._server = await asyncio.get_running_loop().create_server(door, sock=listening)
+        self._limiter = ConnectionLimiter(
+            web_server,
+            context.limits.connections,
+            context.timed,
+            lambda reason: context.log.refuse(reason, "a connection"),
+            context.clock,
+        )
+        self._server = await asyncio.get_running_loop().create_server(self._limiter, sock=listening)
 
     @property
     def is_open(self) -> bool:
@@ -125,25 +121,26 @@ class Server:
         return self._server is not None and self._server.is_serving()
 
     async def close(self) -> None:
-        """Let everybody go, and leave nothing behind."""
+        """Close every connection and stop listening."""
         self._is_closing = True
         if self._server is not None:
             self._server.close()
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(CLOSE_MAX_S):
-                await asyncio.gather(*(_bye(talk) for talk in list(self._talks.values())), return_exceptions=True)
-        for client in list(self._talks):
-            client.cut()
+                closing = (_close_run_over(websocket) for websocket in list(self._websockets.values()))
+                await asyncio.gather(*closing, return_exceptions=True)
+        for client in list(self._websockets):
+            client.disconnect()
         if self._web is not None:
             await self._web.shutdown(CLOSE_MAX_S)
 
     async def _answer(self, request: web.BaseRequest) -> web.StreamResponse:
-        """Answer one request."""
+        """Return the response to a request, with its headers; report unexpected errors."""
         host = request.headers.get("Host")
-        trouble = self._house.guard.trouble_with_host(host, local_address(request))
-        if trouble is not None or host is None:
-            response: web.StreamResponse = self._refused(
-                request, HTTPStatus.MISDIRECTED_REQUEST, trouble or "no Host"
+        problem = self._context.auth.host_error(host, local_address(request))
+        if problem is not None or host is None:
+            response: web.StreamResponse = self._refuse(
+                request, HTTPStatus.MISDIRECTED_REQUEST, problem or "no Host header"
             )
             response.force_close()
             return response
@@ -152,137 +149,140 @@ class Server:
         except ConnectionError:
             raise
         except web.HTTPException as error:
-            # A handshake that is none, as aiohttp has it.
-            response = self._refused(request, HTTPStatus(error.status), "a request that is none")
-        except Exception as error:  # noqa: BLE001 - told as a fault of the program, without ending anything
-            self._house.on_fault("the console", error)
+            # aiohttp rejects a malformed websocket handshake this way.
+            response = self._refuse(request, HTTPStatus(error.status), "a malformed request")
+        except Exception as error:  # noqa: BLE001 - reported as a fault of the program; the server goes on
+            self._context.on_fault("the console", error)
             response = web.Response(status=500, text="the console failed: see the log")
         if not isinstance(response, web.WebSocketResponse):
-            response.headers.update(headers(host))
+            response.headers.update(security_headers(host))
             response.force_close()
         return response
 
     async def _respond(self, request: web.BaseRequest, host: str) -> web.StreamResponse:
-        house, path = self._house, request.path
+        context, path = self._context, request.path
         if request.method != "GET":
-            return self._refused(request, HTTPStatus.METHOD_NOT_ALLOWED, f"the method {request.method[:20]!a}")
+            return self._refuse(request, HTTPStatus.METHOD_NOT_ALLOWED, f"the method {request.method[:20]!a}")
         if path == "/ws":
-            return await self._talk(request, host)
-        if path in house.files:
-            file = house.files[path]
-            return web.Response(body=file.body, headers={"Content-Type": file.kind})
+            return await self._open_websocket(request, host)
+        if path in context.files:
+            file = context.files[path]
+            return web.Response(body=file.body, headers={"Content-Type": file.content_type})
         if path not in {"/report", "/log"}:
             return web.Response(status=404, text="there is no such page")
-        if not self._knows(request):
-            return self._refused(request, HTTPStatus.FORBIDDEN, "a wrong token, or none")
+        if not self._has_token(request):
+            return self._refuse(request, HTTPStatus.FORBIDDEN, WRONG_TOKEN)
         if path == "/log":
-            return web.Response(body=house.hub.lines, content_type="application/x-ndjson")
+            return web.Response(body=context.hub.log_lines, content_type="application/x-ndjson")
         try:
-            page = await house.report()
-        except CommandError as refusal:
-            return web.Response(status=HTTPStatus.CONFLICT, text=str(refusal))
+            page = await context.report()
+        except CommandError as error:
+            return web.Response(status=HTTPStatus.CONFLICT, text=str(error))
         return web.Response(body=page, content_type="text/html", charset="utf-8")
 
-    async def _talk(self, request: web.BaseRequest, host: str) -> web.StreamResponse:
-        """Talk to a client for as long as it stays."""
-        house = self._house
-        has_token = self._knows(request)
-        if not has_token and not (house.watch_without_token and "token" not in request.query):
-            return self._refused(request, HTTPStatus.FORBIDDEN, "a wrong token, or none")
+    async def _open_websocket(self, request: web.BaseRequest, host: str) -> web.StreamResponse:
+        """Add a client and serve its websocket until it leaves; return the response, or why it is refused."""
+        context = self._context
+        has_token = self._has_token(request)
+        if not has_token and not (context.watch_without_token and "token" not in request.query):
+            return self._refuse(request, HTTPStatus.FORBIDDEN, WRONG_TOKEN)
         if request.headers.get("Upgrade", "").lower() != "websocket":
-            return web.Response(status=HTTPStatus.UPGRADE_REQUIRED, text="this is for websockets")
-        trouble = house.guard.trouble_with_origin(request.headers.get("Origin"), host)
-        if trouble is not None:
-            return self._refused(request, HTTPStatus.FORBIDDEN, trouble)
-        if house.hub.is_full:
-            return self._refused(request, HTTPStatus.SERVICE_UNAVAILABLE, "as many pages are open as there may be")
-        talk = web.WebSocketResponse(
-            compress=False, max_msg_size=house.limits.message_bytes + 1, writer_limit=1, timeout=CLOSE_MAX_S
+            return web.Response(status=HTTPStatus.UPGRADE_REQUIRED, text="this address serves websockets only")
+        problem = context.auth.origin_error(request.headers.get("Origin"), host)
+        if problem is not None:
+            return self._refuse(request, HTTPStatus.FORBIDDEN, problem)
+        if context.hub.is_full:
+            return self._refuse(request, HTTPStatus.SERVICE_UNAVAILABLE, "too many pages are open")
+        websocket = web.WebSocketResponse(
+            compress=False, max_msg_size=context.limits.message_bytes + 1, writer_limit=1, timeout=CLOSE_MAX_S
         )
-        await talk.prepare(request)
+        await websocket.prepare(request)
         transport = request.transport
         if transport is None or self._is_closing:
-            return talk
+            return websocket
         transport.set_write_buffer_limits(high=0)
-        if self._door is not None:
-            self._door.settle(transport)
-        client = house.hub.join(_Wire(talk, transport), str(request.remote), house.hello(), has_token=has_token)
-        self._talks[client] = talk
-        house.notes.tell("a page of the console is open", client.name)
-        await timed_coroutine(house.timed, CONSOLE_RECEIVE, self._stay(client, talk))
-        return talk
+        if self._limiter is not None:
+            self._limiter.release(transport)
+        client = context.hub.join(
+            _WebSocketTransport(websocket, transport), str(request.remote), context.session(), has_token=has_token
+        )
+        self._websockets[client] = websocket
+        context.log.note("console page opened", client.name)
+        await timed_coroutine(context.timed, CONSOLE_RECEIVE, self._serve(client, websocket))
+        return websocket
 
-    async def _stay(self, client: Client, talk: web.WebSocketResponse) -> None:
-        """Hear a client and send to it, until either ends."""
-        house = self._house
+    async def _serve(self, client: Client, websocket: web.WebSocketResponse) -> None:
+        """Receive from a client and send to it until either ends."""
+        context = self._context
         sender = asyncio.create_task(self._send(client), name=f"console sender {client.number}")
         try:
-            await self._hear(client, talk)
+            await self._receive(client, websocket)
         except asyncio.CancelledError as error:
             if not self._is_closing:
-                house.on_fault(f"task `console client {client.number}`", error)
+                context.on_fault(f"task `console client {client.number}`", error)
             raise
-        except Exception as error:  # noqa: BLE001 - told as a fault of the program; only this client goes
-            house.on_fault(f"task `console client {client.number}`", error)
-            client.cut()
+        except Exception as error:  # noqa: BLE001 - reported as a fault of the program; only this client is dropped
+            context.on_fault(f"task `console client {client.number}`", error)
+            client.disconnect()
         finally:
-            self._talks.pop(client, None)
+            self._websockets.pop(client, None)
             client.leave()
-            house.hub.leave(client)
-            house.on_leave(client)
-            house.notes.tell("a page of the console is gone", client.name)
+            context.hub.leave(client)
+            context.on_leave(client)
+            context.log.note("console page closed", client.name)
             sender.cancel()
             await asyncio.gather(sender, return_exceptions=True)
 
-    async def _hear(self, client: Client, talk: web.WebSocketResponse) -> None:
-        house = self._house
+    async def _receive(self, client: Client, websocket: web.WebSocketResponse) -> None:
+        context = self._context
         while True:
-            message = await talk.receive()
+            message = await websocket.receive()
             if message.type is not WSMsgType.TEXT:
                 if message.type is WSMsgType.BINARY:
-                    house.notes.refuse("a message that is no text", client.name)
-                    await talk.close(code=WSCloseCode.UNSUPPORTED_DATA, message=b"text only")
+                    context.log.refuse("a binary message", client.name)
+                    await websocket.close(code=WSCloseCode.UNSUPPORTED_DATA, message=b"text only")
                 elif message.type is WSMsgType.ERROR:
-                    house.notes.refuse(f"a message that is none: {message.data}"[:200], client.name)
+                    context.log.refuse(f"a malformed message: {message.data}"[:REASON_MAX], client.name)
                 return
-            is_over = not client.bucket.take(house.clock())
-            if not is_over or HALT_WORD in message.data[:200]:
-                house.on_message(client, message.data)
-            if is_over:
-                house.notes.refuse(f"more than {house.limits.messages_per_s:g} messages a second", client.name)
-                await talk.close(code=WSCloseCode.POLICY_VIOLATION, message=b"too many messages")
+            is_too_fast = not client.message_bucket.take(context.clock())
+            if not is_too_fast or HALT_MARK in message.data[:200]:
+                context.on_message(client, message.data)
+            if is_too_fast:
+                context.log.refuse(f"more than {context.limits.messages_per_s:g} messages a second", client.name)
+                await websocket.close(code=WSCloseCode.POLICY_VIOLATION, message=b"too many messages")
                 return
 
     async def _send(self, client: Client) -> None:
-        """Send to a client; that it is gone is no fault, anything else is."""
+        """Send to a client until it is gone; report every end but that one as a fault."""
+        context = self._context
         try:
-            await timed_coroutine(self._house.timed, CONSOLE_SEND, client.send_all())
+            await timed_coroutine(context.timed, CONSOLE_SEND, client.send_all())
         except ConnectionError:
             client.leave()
         except asyncio.CancelledError as error:
             if not client.is_gone:
-                self._house.on_fault(f"task `console sender {client.number}`", error)
-                client.cut()
+                context.on_fault(f"task `console sender {client.number}`", error)
+                client.disconnect()
             raise
-        except Exception as error:  # noqa: BLE001 - told as a fault of the program; only this client goes
-            self._house.on_fault(f"task `console sender {client.number}`", error)
-            client.cut()
+        except Exception as error:  # noqa: BLE001 - reported as a fault of the program; only this client is dropped
+            context.on_fault(f"task `console sender {client.number}`", error)
+            client.disconnect()
 
-    def _knows(self, request: web.BaseRequest) -> bool:
+    def _has_token(self, request: web.BaseRequest) -> bool:
         token = request.query.get("token")
-        return token is not None and self._house.guard.knows(token)
+        return token is not None and self._context.auth.accepts(token)
 
-    def _refused(self, request: web.BaseRequest, status: HTTPStatus, why: str) -> web.Response:
-        self._house.notes.refuse(why, str(request.remote))
-        return web.Response(status=status, text=why)
+    def _refuse(self, request: web.BaseRequest, status: HTTPStatus, reason: str) -> web.Response:
+        self._context.log.refuse(reason, str(request.remote))
+        return web.Response(status=status, text=reason)
 
 
 def local_address(request: web.BaseRequest) -> str:
-    """Return the address of ours to which a request came."""
+    """Return the address of this machine to which a request came, empty if unknown."""
     name = None if request.transport is None else request.transport.get_extra_info("sockname")
-    # An IPv4 peer of an IPv6 socket asks for the address as it knows it.
+    # An IPv6 socket shows an IPv4 address in its mapped form; the peer knows the plain one.
     return str(name[0]).removeprefix("::ffff:") if name else ""
 
 
-async def _bye(talk: web.WebSocketResponse) -> None:
-    await talk.close(code=WSCloseCode.GOING_AWAY, message=b"the run is over")
+async def _close_run_over(websocket: web.WebSocketResponse) -> None:
+    await websocket.close(code=WSCloseCode.GOING_AWAY, message=b"the run is over")

@@ -1,4 +1,4 @@
-"""The page's own files: read once, held in memory, served by name from a fixed list, so that no path leads out."""
+"""The files of the page: read once and served from memory by their exact path, so that no path escapes the folder."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from config.errors import FAILED, UserError
+from config.errors import UserError
 
-KINDS: Final = MappingProxyType(
+CONTENT_TYPES: Final = MappingProxyType(
     {
         ".html": "text/html; charset=utf-8",
         ".js": "text/javascript; charset=utf-8",
@@ -20,15 +20,15 @@ KINDS: Final = MappingProxyType(
 INDEX: Final = "index.html"
 
 
-class File(NamedTuple):
+class StaticFile(NamedTuple):
     """A file as it is served."""
 
     body: bytes
-    kind: str
+    content_type: str
 
 
-def page_files() -> dict[str, File]:
-    """Return every file of the page by the path it is asked for.
+def page_files() -> dict[str, StaticFile]:
+    """Return every file of the page by its URL path.
 
     Raises
     ------
@@ -38,24 +38,24 @@ def page_files() -> dict[str, File]:
     served, folder = {}, files("runtime.console") / "page"
     for entry in folder.iterdir() if folder.is_dir() else ():
         name = entry.name
-        kind = KINDS.get(name[name.rfind(".") :])
-        if kind is not None and entry.is_file():
-            served[f"/page/{name}"] = File(entry.read_bytes(), kind)
+        content_type = CONTENT_TYPES.get(name[name.rfind(".") :])
+        if content_type is not None and entry.is_file():
+            served[f"/page/{name}"] = StaticFile(entry.read_bytes(), content_type)
     index = served.get(f"/page/{INDEX}")
     if index is None:
         raise UserError(
-            "the console's page is not installed: install the program again, or run without it (--no-console)", FAILED
+            "the console's page is missing from the installation: install the program again, or run with --no-console"
         )
     return {"/": index, **served}
 
 
-def headers(host: str) -> dict[str, str]:
-    """Return what every answer carries: nothing from elsewhere, in no frame, kept nowhere, told to nobody.
+def security_headers(host: str) -> dict[str, str]:
+    """Return the headers of every response: no foreign content, no embedding, no caching, no referrer.
 
     Parameters
     ----------
     host : str
-        As the browser calls this server; named for the websocket, which not every browser counts as 'self'.
+        The request's Host, named for the websocket because not every browser counts that as 'self'.
     """
     policy = (
         f"default-src 'self'; connect-src 'self' ws://{host}; img-src 'self' data: blob:; object-src 'none'; "

@@ -1,1 +1,1 @@
-"""Recordings shown in the console: a cursor, a worker process that replays, and its client."""
+"""Recordings shown in the console: a cursor that replays, the worker process that runs it, and its client."""

@@ -1,7 +1,7 @@
-"""Recordings on the page: each client may look at one of its own while the robot drives on.
+"""The clients of replay workers: each page may watch one recording while the robot drives on.
 
-The robot's process only forwards what a child process (`replay_worker`) has put together. Nothing
-here runs the step, reads a recording or waits for a disk in the loop.
+The robot's process only forwards what a child process (`replay_worker`) has encoded. Nothing here runs the step,
+reads a recording or waits for a disk in the loop.
 """
 
 from __future__ import annotations
@@ -26,73 +26,76 @@ from runtime.support.child_process import ECHOLOCATE, kill_child, start_child
 from runtime.support.length_format import Units
 
 WORKERS_MAX: Final = 3
-"""Recordings open at a time: each is a process with the whole of perception in its memory."""
+"""Recordings open at a time: each worker holds the whole of perception in memory."""
 OPEN_MAX_S: Final = 30.0
+"""A long recording is indexed in a few seconds; on a busy machine it takes several times that."""
 REPORT_MAX_S: Final = 300.0
 STEP_MAX: Final = 100_000
+"""Cycles of one step: more than an hour of a run."""
 
 
 class ReplayError(CommandError):
-    """Something about recordings that cannot be done; its text is one line for the operator."""
+    """A recording cannot be listed, opened or played, or its report cannot be made."""
 
 
 class ReplayProcess:
-    """A recording that is open, and the process that plays it.
+    """A worker process and the recording it has open.
 
     Parameters
     ----------
     process : asyncio.subprocess.Process
-        Of `runtime.console.playback.replay_worker`.
-    show : callable
+        Runs `runtime.console.playback.replay_worker`.
+    on_frame : callable
         Gets each frame.
-    tell : callable
+    on_answer : callable
         Gets each answer but the first.
     """
 
     def __init__(
         self,
         process: asyncio.subprocess.Process,
-        show: Callable[[EncodedFrame], None],
-        tell: Callable[[dict[str, Any]], None],
+        on_frame: Callable[[EncodedFrame], None],
+        on_answer: Callable[[dict[str, Any]], None],
     ) -> None:
         self._process = process
-        self._show = show
-        self._tell = tell
-        self._listener: asyncio.Task[None] | None = None
+        self._on_frame = on_frame
+        self._on_answer = on_answer
+        self._reader: asyncio.Task[None] | None = None
 
     async def begin(self) -> dict[str, Any]:
-        """Wait until it is open and return what there is to know of it.
+        """Wait until the recording is open and return its description.
 
         Raises
         ------
         ReplayError
-            It cannot be opened; the process is ended then.
+            It cannot be opened; the process has ended then.
         """
         try:
             async with asyncio.timeout(OPEN_MAX_S):
                 _, _, (body, _, _) = await self._read()
         except TimeoutError:
             await self.close()
-            raise ReplayError(f"the recording did not open within {OPEN_MAX_S:.0f} s: the machine is busy") from None
+            raise ReplayError(
+                f"the recording did not open within {OPEN_MAX_S:.0f} s, likely because the machine is busy: try again"
+            ) from None
         except (asyncio.IncompleteReadError, OSError):
-            words = b"" if self._process.stderr is None else await self._process.stderr.read()
+            output = b"" if self._process.stderr is None else await self._process.stderr.read()
             await self.close()
-            last = words.decode(errors="replace").strip().rpartition("\n")[2]
-            raise ReplayError(f"the recording cannot be played: {last or 'its player has ended'}") from None
-        about: dict[str, Any] = orjson.loads(body)
-        if "error" in about:
+            raise ReplayError(f"cannot replay the recording: {_last_line(output) or 'its process ended'}") from None
+        description: dict[str, Any] = orjson.loads(body)
+        if "error" in description:
             await self.close()
-            raise ReplayError(str(about["error"]))
-        self._listener = asyncio.create_task(self._listen(), name="player")
-        return about
+            raise ReplayError(str(description["error"]))
+        self._reader = asyncio.create_task(self._read_all(), name="replay reader")
+        return description
 
     @property
     def is_over(self) -> bool:
-        """Whether its process has ended."""
+        """Whether the process has ended."""
         return self._process.returncode is not None
 
-    def do(self, command: dict[str, Any]) -> None:
-        """Have something done; frames follow.
+    def command(self, command: dict[str, Any]) -> None:
+        """Send the worker a command; frames follow.
 
         Raises
         ------
@@ -100,46 +103,46 @@ class ReplayProcess:
             The process has ended.
         """
         if self._process.stdin is None or self.is_over or self._process.stdin.is_closing():
-            raise ReplayError("the recording's player has ended: open the recording again")
+            raise ReplayError("the process that replays the recording has ended: open the recording again")
         self._process.stdin.write(orjson.dumps(command) + b"\n")
 
     async def close(self) -> None:
-        """End its process."""
-        if self._listener is not None:
-            self._listener.cancel()
-            await asyncio.gather(self._listener, return_exceptions=True)
+        """End the process."""
+        if self._reader is not None:
+            self._reader.cancel()
+            await asyncio.gather(self._reader, return_exceptions=True)
         await kill_child(self._process)
 
-    async def _listen(self) -> None:
+    async def _read_all(self) -> None:
         with contextlib.suppress(asyncio.IncompleteReadError, OSError):
             while True:
-                kind, (source, number), parts = await self._read()
+                kind, (source, number), (head, changes, whole) = await self._read()
                 if kind == ANSWER:
-                    self._tell(orjson.loads(parts[0]))
+                    self._on_answer(orjson.loads(head))
                 else:
-                    head, changes, whole = parts
-                    self._show(EncodedFrame((self, source), number, head, changes, partial(bytes, whole)))
+                    self._on_frame(EncodedFrame((self, source), number, head, changes, partial(bytes, whole)))
 
     async def _read(self) -> tuple[bytes, tuple[int, int], tuple[bytes, bytes, bytes]]:
+        """Return the next message: its kind, a frame's source and number, and its parts."""
         out = self._process.stdout
         if out is None:
-            raise OSError("it was started without pipes")
+            raise OSError("the process was started without pipes")
         kind, source, number, *sizes = HEADER.unpack(await out.readexactly(HEADER.size))
         head, changes, whole = [await out.readexactly(size) for size in sizes]
         return kind, (source, number), (head, changes, whole)
 
 
 class ReplayClient:
-    """The recordings that clients look at, and the page of the run so far.
+    """The recordings that clients watch, and the report of the run so far.
 
     Parameters
     ----------
     folder : Path
-        Where recordings are.
+        Of the recordings.
     program : str
-        The module that plays one: `runtime.console.playback.replay_worker.play` with a maker of frames.
+        The module of the worker process: it calls `replay_worker.run_worker`.
     current : callable
-        Returns the file of the recording under way, None where there is none.
+        Returns the file of the recording in progress, None if there is none.
     units : {"m", "ft"}
         Of the report.
     """
@@ -151,120 +154,152 @@ class ReplayClient:
         self._units: Units = units
         self._open: dict[int, ReplayProcess] = {}
         self._opening = 0
-        self._ending: set[asyncio.Task[None]] = set()
-        self._reporting = asyncio.Lock()
+        self._closing: set[asyncio.Task[None]] = set()
+        self._report_lock = asyncio.Lock()
 
     async def recordings(self) -> list[dict[str, Any]]:
-        """Return which recordings there are, newest first; `live` is the one under way."""
+        """Return the recordings that can be opened, newest first; `live` marks the one in progress."""
         found = await asyncio.to_thread(list_recordings, self._folder)
         current = self._current()
-        here = [{**one._asdict(), "live": str(self._folder / one.file) == current} for one in found]
-        if current is not None and not any(one["live"] for one in here):
-            here.insert(0, {"file": current, "bytes": None, "modified_s": None, "live": True})
-        return here
+        rows = [{**one._asdict(), "live": str(self._folder / one.file) == current} for one in found]
+        if current is not None and not any(row["live"] for row in rows):
+            rows.insert(0, {"file": current, "bytes": None, "modified_s": None, "live": True})
+        return rows
 
     async def open(self, viewer: Viewer, file: str) -> dict[str, Any]:
-        """Show a recording of the folder, or the one under way, to a client from now on; return what is known of it.
+        """Show a client a recording of the folder, or the one in progress; return its description.
+
+        Parameters
+        ----------
+        viewer : Viewer
+            The client.
+        file : str
+            As listed by `recordings`.
 
         Raises
         ------
         ReplayError
-            There is none of that name, it cannot be played, or too many are open.
+            There is no such recording, it cannot be replayed, or too many are open.
         """
         current = self._current()
         path = Path(file) if file == current else await asyncio.to_thread(find_recording, self._folder, file)
         if path is None:
-            raise ReplayError(f"there is no recording {file!r} in {self._folder}: ask for the list again")
+            raise ReplayError(f"there is no recording {file!r} in {self._folder}: list the recordings again")
         await self._close(viewer)
         if len(self._open) + self._opening >= WORKERS_MAX:
-            raise ReplayError(f"{WORKERS_MAX} recordings are open already, by other pages: have one closed first")
+            raise ReplayError(f"{WORKERS_MAX} recordings are open already, in other pages: close one of them first")
         self._opening += 1
         try:
             process = await start_child(self._program, [str(path)], pipes=True, low_priority=True)
-            playing = ReplayProcess(process, lambda frame: self._pass_on(viewer, frame), viewer.say)
-            about = await playing.begin()
+            replay = ReplayProcess(process, partial(_forward, viewer), viewer.send)
+            description = await replay.begin()
         finally:
             self._opening -= 1
         if viewer.is_gone:
-            await playing.close()
+            await replay.close()
             raise ReplayError("the page is gone")
-        self._open[id(viewer)] = playing
+        self._open[id(viewer)] = replay
         viewer.switch(live=False)
-        return {"file": file, **about}
+        return {"file": file, **description}
 
-    async def scrub(self, viewer: Viewer, s: float) -> None:
-        """Go to a time in the recording, s after its first cycle."""
-        if not math.isfinite(s):
-            raise ReplayError("the time must be a finite number")
-        self._of(viewer).do({"do": "scrub", "s": s})
-
-    async def play(self, viewer: Viewer, speed: float) -> None:
-        """Let it go by, so many times as fast as it was; 0 stops it."""
-        if speed != 0.0 and not SPEED_MIN <= speed <= SPEED_MAX:
-            raise ReplayError(f"the speed must be 0, or from {SPEED_MIN:g} to {SPEED_MAX:g}")
-        self._of(viewer).do({"do": "play", "speed": speed})
-
-    async def step(self, viewer: Viewer, cycles: int) -> None:
-        """Go so many cycles on, or back."""
-        if abs(cycles) > STEP_MAX:
-            raise ReplayError(f"a step has {STEP_MAX} cycles at most")
-        self._of(viewer).do({"do": "step", "cycles": cycles})
-
-    async def live(self, viewer: Viewer) -> None:
-        """Go back to the run itself."""
-        await self._close(viewer)
-        viewer.switch(live=True)
-
-    def leave(self, viewer: Viewer) -> None:
-        """Take note that a client is gone."""
-        task = asyncio.get_running_loop().create_task(self._close(viewer), name="player's end")
-        self._ending.add(task)
-        task.add_done_callback(self._ending.discard)
-
-    async def close(self) -> None:
-        """End every player."""
-        open_now, self._open = list(self._open.values()), {}
-        await asyncio.gather(*(playing.close() for playing in open_now), *self._ending, return_exceptions=True)
-
-    async def report(self) -> bytes:
-        """Return the run up to now as a page of its own: made of the recording under way, by a process beside.
+    async def seek(self, viewer: Viewer, s: float) -> None:
+        """Go to a time in the recording, s after its first cycle.
 
         Raises
         ------
         ReplayError
-            Nothing is being recorded, another report is under way, or it cannot be made.
+            No recording is open, or the time is not finite.
+        """
+        if not math.isfinite(s):
+            raise ReplayError("the time must be a finite number")
+        self._replay_of(viewer).command({"do": "seek", "s": s})
+
+    async def play(self, viewer: Viewer, speed: float) -> None:
+        """Play the recording `speed` times as fast as it was made; 0 pauses it.
+
+        Raises
+        ------
+        ReplayError
+            No recording is open, or the speed is out of range.
+        """
+        if speed != 0.0 and not SPEED_MIN <= speed <= SPEED_MAX:
+            raise ReplayError(f"the speed must be 0, or from {SPEED_MIN:g} to {SPEED_MAX:g}")
+        self._replay_of(viewer).command({"do": "play", "speed": speed})
+
+    async def step(self, viewer: Viewer, cycles: int) -> None:
+        """Go forward by this many cycles; backward where negative.
+
+        Raises
+        ------
+        ReplayError
+            No recording is open, or the step is too long.
+        """
+        if abs(cycles) > STEP_MAX:
+            raise ReplayError(f"a step may have at most {STEP_MAX} cycles")
+        self._replay_of(viewer).command({"do": "step", "cycles": cycles})
+
+    async def close_recording(self, viewer: Viewer) -> None:
+        """Show the client the run itself again."""
+        await self._close(viewer)
+        viewer.switch(live=True)
+
+    def leave(self, viewer: Viewer) -> None:
+        """End the worker of a client that is gone."""
+        task = asyncio.get_running_loop().create_task(self._close(viewer), name="replay close")
+        self._closing.add(task)
+        task.add_done_callback(self._closing.discard)
+
+    async def close(self) -> None:
+        """End every worker."""
+        replays, self._open = list(self._open.values()), {}
+        await asyncio.gather(*(replay.close() for replay in replays), *self._closing, return_exceptions=True)
+
+    async def report(self) -> bytes:
+        """Return the report of the run so far as an HTML page, made from the recording in progress.
+
+        Raises
+        ------
+        ReplayError
+            The run is not being recorded, another report is in progress, or it cannot be made.
         """
         current = self._current()
         if current is None:
-            raise ReplayError("nothing is being recorded, and a report is made of a recording: switch it on first")
-        if self._reporting.locked():
-            raise ReplayError("a report is being made already: wait for it")
-        async with self._reporting:
-            return await report_of(Path(current), self._units)
+            raise ReplayError(
+                "this run is not being recorded, and a report is made from its recording: start recording"
+            )
+        if self._report_lock.locked():
+            raise ReplayError("a report is in progress: wait for it")
+        async with self._report_lock:
+            return await make_report(Path(current), self._units)
 
-    def _of(self, viewer: Viewer) -> ReplayProcess:
-        playing = self._open.get(id(viewer))
-        if playing is None:
+    def _replay_of(self, viewer: Viewer) -> ReplayProcess:
+        replay = self._open.get(id(viewer))
+        if replay is None:
             raise ReplayError("no recording is open: open one first")
-        return playing
+        return replay
 
     async def _close(self, viewer: Viewer) -> None:
-        playing = self._open.pop(id(viewer), None)
-        if playing is not None:
-            await playing.close()
-
-    def _pass_on(self, viewer: Viewer, frame: EncodedFrame) -> None:
-        if not viewer.is_gone:
-            viewer.show(frame)
+        replay = self._open.pop(id(viewer), None)
+        if replay is not None:
+            await replay.close()
 
 
-async def report_of(file: Path, units: Units, patience_s: float = REPORT_MAX_S) -> bytes:
-    """Return the page of a recording, be it one under way, made by a process beside.
+async def make_report(file: Path, units: Units, timeout_s: float = REPORT_MAX_S) -> bytes:
+    """Return the report of a recording as an HTML page, made by a child process.
+
+    Parameters
+    ----------
+    file : Path
+        The recording; it may be in progress.
+    units : {"m", "ft"}
+        Of the report.
+    timeout_s : float
+        The child process is ended after this time.
 
     Raises
     ------
     ReplayError
-        It cannot be made, or not within `patience_s`.
+        It cannot be made, or not in time.
     """
     with tempfile.TemporaryDirectory(prefix="echolocate-") as folder:
         target = Path(folder) / f"{file.stem}.html"
@@ -272,15 +307,24 @@ async def report_of(file: Path, units: Units, patience_s: float = REPORT_MAX_S) 
             ECHOLOCATE, ["report", str(file), "--out", str(target), "--units", units], pipes=False, low_priority=True
         )
         try:
-            async with asyncio.timeout(patience_s):
-                _, words = await process.communicate()
+            async with asyncio.timeout(timeout_s):
+                _, output = await process.communicate()
         except TimeoutError:
             raise ReplayError(
-                f"the report was not done within {patience_s:.0f} s: make it later, by `echolocate report {file}`"
+                f"the report was not done within {timeout_s:.0f} s: make it later with `echolocate report {file}`"
             ) from None
         finally:
             await kill_child(process)
         if process.returncode:
-            last = words.decode(errors="replace").strip().rpartition("\n")[2]
-            raise ReplayError(f"no report: {last.removeprefix('echolocate: ') or 'its process has ended'}")
+            reason = _last_line(output).removeprefix("echolocate: ") or "its process ended"
+            raise ReplayError(f"cannot make the report: {reason}")
         return await asyncio.to_thread(target.read_bytes)
+
+
+def _forward(viewer: Viewer, frame: EncodedFrame) -> None:
+    if not viewer.is_gone:
+        viewer.show(frame)
+
+
+def _last_line(output: bytes) -> str:
+    return output.decode(errors="replace").strip().rpartition("\n")[2]

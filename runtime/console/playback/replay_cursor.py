@@ -1,8 +1,8 @@
-"""A recording as something to move about in: to a time, on cycle by cycle, and back.
+"""A position in a recording that can be moved anywhere, and the state of the run there.
 
-The state of a run at a moment is what its cycles up to then have left. So going to a time is running the step again
-from the nearest moment before it whose state is known: a keyframe of the file, or one that was passed earlier and is
-kept. Cycles are given out one by one, so that whoever shows them can do something else in between.
+The state at a cycle is the result of all cycles up to it. So a seek runs the step again from the nearest earlier
+cycle whose state is known: a keyframe of the file, or a state that was kept when the cursor passed it. Cycles are
+yielded one by one, so that the caller can do something else in between.
 """
 
 from __future__ import annotations
@@ -35,23 +35,23 @@ from runtime.recording.schema import perception_snapshot as memory_in
 
 NUMBER: Final = re.compile(rb'\{"record":\{"cycle":(\d{1,15}),')
 LOOK_BACK: Final = 20
-"""So many cycles are given out before the one that is gone to, where there are: by then the whole ring has fired."""
-KEPT_EVERY: Final = 100
-"""Of so many cycles one's state is kept, so that the way back is short."""
+"""Cycles that a seek yields before its target, if there are so many: within them every sensor has fired."""
+KEEP_PERIOD: Final = 100
+"""Cycles between kept states, which make a seek backward short."""
 KEPT_BYTES: Final = 64_000_000
-"""Kept at most; what was not used for longest goes first."""
+"""Memory for kept states; the least recently used ones are dropped."""
 
 
-class Shown(NamedTuple):
-    """A cycle, and what it left; good until the next one is asked for."""
+class ReplayedCycle(NamedTuple):
+    """A replayed cycle and the state after it; valid until the next one is replayed."""
 
     record: CycleRecord
     state: State
 
 
 @dataclass(slots=True)
-class _Place:
-    """A moment whose state is known: what it takes to go on from there."""
+class _KnownState:
+    """A cycle whose state is kept: what it takes to continue from there."""
 
     chunk_at: int
     told: dict[str, Any]
@@ -61,43 +61,43 @@ class _Place:
 
 @dataclass(slots=True)
 class _Index:
-    """What is where in the file."""
+    """Where in the file each cycle and keyframe is."""
 
     numbers: list[int] = field(default_factory=list)
-    """Of the cycles, in the order of the file."""
+    """Of the cycles, in file order."""
     times_s: list[float] = field(default_factory=list)
-    """Of the cycles, from the first one on."""
+    """Of the cycles, after the first one."""
     chunks_at: list[int] = field(default_factory=list)
-    """Where each cycle's chunk begins."""
+    """File offset of each cycle's chunk."""
     keyframes: list[tuple[int, int, dict[str, Any]]] = field(default_factory=list)
-    """How many cycles stand before it, where its chunk begins, and the settings in force."""
+    """Of each keyframe: the cycles before it, the offset of its chunk, and the settings in force."""
 
 
 class ReplayCursor:
-    """Runs the step again over a recording, from anywhere to anywhere.
+    """Replays a recording from anywhere to anywhere.
 
     Parameters
     ----------
     recording : Recording
-        Stays open meanwhile.
+        Open for as long as the cursor is used.
 
     Attributes
     ----------
     duration_s
-        From the first cycle to the last.
+        Time from the first cycle to the last.
     cycles
-        In the recording.
+        Number of cycles in the recording.
     bookmarks
-        When, after the first cycle, and what it says.
+        Time of each, s after the first cycle, and its text.
     modes
-        When each was entered, and why.
+        Time at which each was entered, s after the first cycle, and the mode with its reason.
     jumps
-        How often it went on elsewhere than after the last cycle given out.
+        How often the cursor continued elsewhere than after the last cycle it yielded.
 
     Raises
     ------
     RecordingError
-        It holds no cycle.
+        The recording has no cycle.
     """
 
     def __init__(self, recording: Recording) -> None:
@@ -105,47 +105,47 @@ class ReplayCursor:
         self._index = _Index()
         self.bookmarks: list[tuple[float, str]] = []
         self.modes: list[tuple[float, ModeState]] = []
-        self._survey()
+        self._index_file()
         if not self._index.numbers:
             raise RecordingError(f"{recording.path}: holds no cycle: the run ended before its first one")
         self.cycles = len(self._index.numbers)
         self.duration_s = self._index.times_s[-1]
-        self._kept: OrderedDict[int, _Place] = OrderedDict()
+        self._kept: OrderedDict[int, _KnownState] = OrderedDict()
         self._kept_bytes = 0
-        self._replayed: list[Shown] = []
-        self._rerun = Replayer(recording, self._take, begun=True)
+        self._replayed: list[ReplayedCycle] = []
+        self._replayer = Replayer(recording, self._take, begun=True)
         self._entries: Iterator[tuple[int, RawMessage]] = iter(())
         self._next = self.jumps = 0
         self._begin_at(0)
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings in force at this place, as the recording tells them."""
-        return self._rerun.told
+        """The settings in force at this position, as the recording has them."""
+        return self._replayer.told
 
     @property
     def position(self) -> int:
-        """How many cycles of the file are behind."""
+        """The number of cycles up to and including the last one that was replayed."""
         return self._next
 
     @property
     def t_s(self) -> float:
-        """The time of the last cycle that is behind, after the first one."""
+        """The time of the last replayed cycle, s after the first one."""
         return self._index.times_s[max(0, self._next - 1)]
 
     def time_of(self, position: int) -> float:
-        """Return the time of the last cycle that is behind once so many are."""
+        """Return the time of the last cycle at a position, s after the first one."""
         return self._index.times_s[min(max(0, position - 1), self.cycles - 1)]
 
     def position_at(self, s: float) -> int:
-        """Return how many cycles are behind at a time; the first one always is."""
+        """Return the position at a time, s after the first cycle; at least 1."""
         return max(1, bisect_right(self._index.times_s, s))
 
-    def on(self) -> Shown | None:
-        """Run the next cycle that can be; None at the end."""
+    def next_cycle(self) -> ReplayedCycle | None:
+        """Replay and return the next cycle whose state is known; None at the end."""
         self._replayed.clear()
         for chunk_at, entry in self._entries:
-            self._rerun.take(entry)
+            self._replayer.take(entry)
             if entry.topic == CYCLE:
                 self._next += 1
                 if self._replayed:
@@ -153,17 +153,17 @@ class ReplayCursor:
                     return self._replayed[0]
         return None
 
-    def to(self, position: int) -> Iterator[Shown]:
-        """Go to where so many cycles are behind; yields each cycle on the way, the last of which is there."""
+    def seek(self, position: int) -> Iterator[ReplayedCycle]:
+        """Go to a position; yield each cycle that is replayed on the way, the last of them at the position."""
         position = min(max(1, position), self.cycles)
         base = self._nearest(position)
         if not base <= self._next < position:
             self._begin_at(base)
-        while self._next < position and (shown := self.on()) is not None:
-            yield shown
+        while self._next < position and (replayed := self.next_cycle()) is not None:
+            yield replayed
 
-    def _survey(self) -> None:
-        """Note what is where."""
+    def _index_file(self) -> None:
+        """Fill the index, the bookmarks and the modes."""
         index, recording = self._index, self._recording
         told, raw = recording.info.settings, b""
         first_ns: int | None = None
@@ -189,28 +189,28 @@ class ReplayCursor:
                     self.modes.append((at_s, decode(ModeChange, entry.data).mode))
 
     def _nearest(self, position: int) -> int:
-        """Return how many cycles are behind at the last known state that is far enough before `position`."""
+        """Return the last position with a known state that is far enough before `position`."""
         latest = position - LOOK_BACK
         known = [at for at, _, _ in self._index.keyframes if at <= latest]
         known += [at for at in self._kept if at <= latest]
         return max(known, default=0)
 
     def _begin_at(self, position: int) -> None:
-        """Go to a place whose state is known, or to the beginning."""
+        """Go to a position with a known state, or to the beginning."""
         place = self._kept.get(position)
         frame = next((frame for frame in self._index.keyframes if frame[0] == position), None)
-        self._rerun = Replayer(self._recording, self._take, begun=False)
+        self._replayer = Replayer(self._recording, self._take, begun=False)
         self._next = position
         self.jumps += 1
         if place is not None:
             self._kept.move_to_end(position)
-            self._rerun.go_on(place.told, place.left, place.memory)
+            self._replayer.go_on(place.told, place.left, place.memory)
             self._entries = self._after(place.chunk_at, self._index.numbers[position - 1])
         elif frame is not None:
             _, chunk_at, told = frame
             self._entries = self._from_keyframe(chunk_at, told)
         else:
-            self._rerun = Replayer(self._recording, self._take, begun=True)
+            self._replayer = Replayer(self._recording, self._take, begun=True)
             self._entries = self._since(BEGIN)
 
     def _since(self, begin_at: int) -> Iterator[tuple[int, RawMessage]]:
@@ -219,7 +219,7 @@ class ReplayCursor:
                 yield chunk_at, entry
 
     def _after(self, chunk_at: int, number: int) -> Iterator[tuple[int, RawMessage]]:
-        """Yield what comes after a cycle."""
+        """Yield the messages after a cycle."""
         rest = self._since(chunk_at)
         for _, entry in rest:
             if entry.topic == CYCLE and _number(entry) == number:
@@ -227,7 +227,7 @@ class ReplayCursor:
         yield from rest
 
     def _from_keyframe(self, begin_at: int, told: dict[str, Any]) -> Iterator[tuple[int, RawMessage]]:
-        """Put the keyframe's state in force and yield what comes after it."""
+        """Restore the keyframe's state and yield the messages after it."""
         rest = self._since(begin_at)
         skipped = self._next - bisect_left(self._index.chunks_at, begin_at)
         for _, entry in rest:
@@ -235,30 +235,30 @@ class ReplayCursor:
             if entry.topic == KEYFRAME and skipped == 0:
                 frame = decode(Keyframe, entry.data)
                 left = {name: getattr(frame.left, name) for name in type(frame.left).model_fields}
-                self._rerun.go_on(told, left, memory_in(frame))
+                self._replayer.go_on(told, left, memory_in(frame))
                 break
         yield from rest
 
     def _take(self, record: CycleRecord, state: State) -> None:
-        self._replayed.append(Shown(record, state))
+        self._replayed.append(ReplayedCycle(record, state))
 
     def _keep(self, chunk_at: int) -> None:
-        """Keep the state now and then, for the way back."""
-        if self._next % KEPT_EVERY or self._next in self._kept or self._rerun.state is None:
+        """Keep the state of every so many cycles, for seeks backward."""
+        if self._next % KEEP_PERIOD or self._next in self._kept or self._replayer.state is None:
             return
-        state = self._rerun.state
-        place = _Place(chunk_at, self._rerun.told, carried_state(state), state.perception.snapshot())
+        state = self._replayer.state
+        place = _KnownState(chunk_at, self._replayer.told, carried_state(state), state.perception.snapshot())
         self._kept[self._next] = place
         self._kept_bytes += _size(place)
         while self._kept_bytes > KEPT_BYTES and len(self._kept) > 1:
             self._kept_bytes -= _size(self._kept.popitem(last=False)[1])
 
 
-def _size(place: _Place) -> int:
+def _size(place: _KnownState) -> int:
     return sum(array.nbytes for array in place.memory.values())
 
 
 def _number(entry: RawMessage) -> int:
-    """Return a cycle's number, which its record begins with: to read all of it takes long."""
+    """Return a cycle's number from the beginning of its record, because parsing all of it takes long."""
     found = NUMBER.match(entry.data)
     return decode(Cycle, entry.data).record.cycle if found is None else int(found[1])

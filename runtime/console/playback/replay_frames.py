@@ -1,7 +1,4 @@
-"""The program that plays a recording for one page: frames as of a live run, of cycles that are run again.
-
-Of time a recording's frames tell only where in it they are: whether the live run is paused is not theirs to say.
-"""
+"""The program of the worker process: frames of replayed cycles, made by the same encoder as those of a live run."""
 
 from __future__ import annotations
 
@@ -11,20 +8,20 @@ from typing import Any
 from config.settings import Settings
 from runtime.console.frames.frame_encoder import FrameContext, FrameEncoder
 from runtime.console.frames.session_info import session_info
-from runtime.console.playback.replay_cursor import Shown
-from runtime.console.playback.replay_worker import At, Picture, play
+from runtime.console.playback.replay_cursor import ReplayedCycle
+from runtime.console.playback.replay_worker import FrameParts, PlaybackPosition, run_worker
 from runtime.cycle.step import CycleRecord
 
 
 class ReplayFrames:
-    """Makes frames of a recording's cycles.
+    """Makes the frames of a recording's cycles.
 
     Parameters
     ----------
     settings : Settings
         In force in the recording.
     emulated : bool
-        Whether their world is what stood there.
+        Whether the robot was emulated in the settings' world.
     """
 
     def __init__(self, settings: Settings, *, emulated: bool) -> None:
@@ -32,26 +29,27 @@ class ReplayFrames:
         self._emulated = emulated
         self._encoder = FrameEncoder(settings)
 
-    def about(self) -> dict[str, Any]:
-        """Return what a page is told first; in which units it shows things is its own affair."""
-        told = session_info(self._settings, name=None, emulated=self._emulated, units="m") | {"recording": True}
-        del told["units"]
-        return told
+    def session(self) -> dict[str, Any]:
+        """Return the session information of the recorded run; the page keeps its own choice of units."""
+        info = session_info(self._settings, name=None, emulated=self._emulated, units="m") | {"recording": True}
+        del info["units"]
+        return info
 
     def take(self, record: CycleRecord) -> None:
-        """Take note of a cycle, whether or not it is shown."""
+        """Take in a cycle, whether or not it is shown."""
         self._encoder.take(record)
 
-    def frame(self, shown: Shown, at: At) -> Picture:
+    def frame(self, replayed: ReplayedCycle, position: PlaybackPosition) -> FrameParts:
         """Return the frame of a cycle."""
-        frame = self._encoder.frame(shown.state, shown.record, FrameContext(host_s=at.s, playback=at._asdict()))
-        return Picture(frame.head, frame.changes, frame.whole())
+        context = FrameContext(host_s=position.s, playback=position._asdict())
+        frame = self._encoder.frame(replayed.state, replayed.record, context)
+        return FrameParts(frame.head, frame.changes, frame.whole())
 
 
-def make(settings: Settings, *, emulated: bool) -> ReplayFrames:
-    """Return what makes frames for these settings."""
+def make_replay_frames(settings: Settings, *, emulated: bool) -> ReplayFrames:
+    """Return the frame maker for settings of a recording."""
     return ReplayFrames(settings, emulated=emulated)
 
 
 if __name__ == "__main__":
-    sys.exit(play(sys.argv[1], make))
+    sys.exit(run_worker(sys.argv[1], make_replay_frames))

@@ -1,7 +1,7 @@
-"""The program that plays a recording: commands come in as lines, frames go out, and in between the step is run again.
+"""The worker process that replays a recording for one client: commands come in as lines, frames go out.
 
-It is a process of its own (see `runtime.support.child_process`). Seeking is cut into cycles, and the next command is
-read between any two of them: dragging a slider costs one seek, not one per position.
+The robot's process starts it at low priority. A seek is done cycle by cycle,
+and the next command is read between any two cycles, so dragging a slider costs one seek, not one for each position.
 """
 
 from __future__ import annotations
@@ -19,255 +19,258 @@ from typing import Any, Final, NamedTuple, Protocol
 import orjson
 
 from config.settings import Settings
-from runtime.console.playback.replay_cursor import ReplayCursor, Shown
+from runtime.console.playback.replay_cursor import ReplayCursor, ReplayedCycle
 from runtime.cycle.step import CycleRecord
 from runtime.recording.reader import RecordingError, open_recording, parse_settings
 
-FRAME_S: Final = 0.05
-"""Frames are no closer than this, however fast it goes."""
-BEHIND_S: Final = 0.25
-"""Where this much cannot be kept up with it is slower than it was asked to be, and does not hurry after."""
+FRAME_PERIOD_S: Final = 0.05
+"""Shortest time between frames, at any speed."""
+LAG_MAX_S: Final = 0.25
+"""A replay that falls this far behind plays on slower than asked; it does not catch up."""
 SPEED_MIN, SPEED_MAX = 0.05, 100.0
-LINE_MAX: Final = 4096
+READ_BYTES: Final = 4096
 HEADER: Final = struct.Struct("!cIIIII")
-"""Kind, whose frame (a jump begins another source), its number, and the lengths of head, changes and whole."""
+"""Before each message to the client: its kind, source and number of a frame, and the lengths of three parts."""
 ANSWER, FRAME = b"a", b"f"
 
 
-class At(NamedTuple):
+class PlaybackPosition(NamedTuple):
     """Where in the recording a frame is from."""
 
     s: float
-    """After its first cycle."""
+    """After the first cycle."""
     is_playing: bool
     speed: float
 
 
-class Picture(NamedTuple):
-    """A frame in JSON: all but the segments, without its closing brace; these as changes; these whole."""
+class FrameParts(NamedTuple):
+    """A frame in JSON, in the parts that are sent separately: see `EncodedFrame`."""
 
     head: bytes
     changes: bytes
     whole: bytes
 
 
-class Builder(Protocol):
-    """Makes frames of cycles, as for a live run."""
+class FrameMaker(Protocol):
+    """Makes the frames of replayed cycles."""
 
-    def about(self) -> dict[str, Any]:
-        """Return what a page is told first."""
+    def session(self) -> dict[str, Any]:
+        """Return the session information of the recorded run."""
 
     def take(self, record: CycleRecord) -> None:
-        """Take note of a cycle, whether or not it is shown."""
+        """Take in a cycle, whether or not it is shown."""
 
-    def frame(self, shown: Shown, at: At) -> Picture:
+    def frame(self, replayed: ReplayedCycle, position: PlaybackPosition) -> FrameParts:
         """Return the frame of a cycle."""
 
 
-class Make(Protocol):
-    """Makes builders."""
+class MakeFrameMaker(Protocol):
+    """Constructs frame makers."""
 
-    def __call__(self, settings: Settings, *, emulated: bool) -> Builder:
-        """Return a builder for these settings of a recording; `emulated` where their world is what stood there."""
+    def __call__(self, settings: Settings, *, emulated: bool) -> FrameMaker:
+        """Return a frame maker for settings of a recording, whose robot was `emulated` or not."""
 
 
 class ReplayWorker:
-    """Plays a recording.
+    """Plays a recording as commands ask.
 
     Parameters
     ----------
-    playback : ReplayCursor
+    cursor : ReplayCursor
         The recording.
-    build : callable
-        Makes a builder for the settings in force.
+    make_frames : callable
+        Returns a frame maker for the settings in force, given as the recording has them.
     show : callable
-        Gets each frame: its source, its number, the frame.
+        Gets each frame: the number of its source, its number in the source, and its parts.
     clock : callable
         Monotonic, s.
     """
 
     def __init__(
         self,
-        playback: ReplayCursor,
-        build: Callable[[dict[str, Any]], Builder],
-        show: Callable[[int, int, Picture], None],
+        cursor: ReplayCursor,
+        make_frames: Callable[[dict[str, Any]], FrameMaker],
+        show: Callable[[int, int, FrameParts], None],
         clock: Callable[[], float],
     ) -> None:
-        self._playback = playback
-        self._build = build
+        self._cursor = cursor
+        self._make_frames = make_frames
         self._show = show
         self._clock = clock
         self._source = self._number = self._jumps = self._target = 0
-        self._last: Shown | None = None
-        self._told: dict[str, Any] | None = None
-        self._builder: Builder | None = None
-        self._going: Iterator[Shown] | None = None
-        self._goes_on: tuple[float, float] | None = None
-        """Playing: since when by the clock, and from where, s."""
+        self._last: ReplayedCycle | None = None
+        self._settings: dict[str, Any] | None = None
+        self._frames: FrameMaker | None = None
+        self._seek: Iterator[ReplayedCycle] | None = None
+        self._playing_from: tuple[float, float] | None = None
+        """Host time and position, s, from which it plays; None while it does not."""
         self._speed = 1.0
         self._shown_s = -math.inf
 
-    def do(self, command: dict[str, Any]) -> None:
-        """Take a command: scrub to `s`, play at `speed` (0 stops), step so many `cycles`.
+    def execute(self, command: dict[str, Any]) -> None:
+        """Begin what a command asks for: seek to `s`, play at `speed` (0 pauses), or step by so many `cycles`.
 
         Raises
         ------
         ValueError, KeyError, TypeError
-            It is none.
+            The command is malformed.
         """
-        playback = self._playback
+        cursor = self._cursor
         match command["do"]:
-            case "scrub":
-                self._go(playback.position_at(float(command["s"])))
+            case "seek":
+                self._seek_to(cursor.position_at(float(command["s"])))
             case "step":
-                self._goes_on = None
-                here = playback.position if self._going is None else self._target
-                self._go(here + int(command["cycles"]))
+                self._playing_from = None
+                current = cursor.position if self._seek is None else self._target
+                self._seek_to(current + int(command["cycles"]))
             case "play":
-                speed = float(command["speed"])
-                if speed and not SPEED_MIN <= speed <= SPEED_MAX:
-                    raise ValueError(f"the speed must be 0, or from {SPEED_MIN:g} to {SPEED_MAX:g}")
-                if speed:
-                    self._speed = speed
-                    if playback.position >= playback.cycles and self._going is None:
-                        self._go(1)
-                self._goes_on = (self._clock(), playback.t_s) if speed else None
-                self._shown_s = -math.inf
+                self._play(float(command["speed"]))
             case _:
                 raise ValueError("no such command")
 
     @property
     def wait_s(self) -> float:
-        """How long there is nothing to do, s; inf until the next command."""
-        if self._going is not None:
+        """Time until there is something to do, s; inf until the next command."""
+        if self._seek is not None:
             return 0.0
-        if self._goes_on is None:
+        if self._playing_from is None:
             return math.inf
-        since_s, from_s = self._goes_on
-        next_s = self._playback.time_of(self._playback.position + 1)
+        since_s, from_s = self._playing_from
+        next_s = self._cursor.time_of(self._cursor.position + 1)
         return max(0.0, since_s + (next_s - from_s) / self._speed - self._clock())
 
-    def work(self) -> None:
-        """Do a little of what is to be done: one cycle at most."""
-        if self._going is not None:
-            self._get_there()
-        elif self._goes_on is not None and self.wait_s <= 0.0:
-            self._play_on(*self._goes_on)
+    def advance(self) -> None:
+        """Replay one cycle at most, if one is due."""
+        if self._seek is not None:
+            self._advance_seek(self._seek)
+        elif self._playing_from is not None and self.wait_s <= 0.0:
+            self._advance_playing(*self._playing_from)
 
-    def _go(self, position: int) -> None:
-        self._target = min(max(1, position), self._playback.cycles)
-        self._going, self._last = self._playback.to(self._target), None
+    def _play(self, speed: float) -> None:
+        if speed and not SPEED_MIN <= speed <= SPEED_MAX:
+            raise ValueError(f"the speed must be 0, or from {SPEED_MIN:g} to {SPEED_MAX:g}")
+        if speed:
+            self._speed = speed
+            if self._cursor.position >= self._cursor.cycles and self._seek is None:
+                self._seek_to(1)
+        self._playing_from = (self._clock(), self._cursor.t_s) if speed else None
+        self._shown_s = -math.inf
 
-    def _get_there(self) -> None:
-        shown = None if self._going is None else next(self._going, None)
-        if shown is None:
-            self._going = None
-            if self._goes_on is not None:
-                self._goes_on = (self._clock(), self._playback.t_s)
-            if self._last is not None:
-                self._frame(self._last)
+    def _seek_to(self, position: int) -> None:
+        self._target = min(max(1, position), self._cursor.cycles)
+        self._seek, self._last = self._cursor.seek(self._target), None
+
+    def _advance_seek(self, seek: Iterator[ReplayedCycle]) -> None:
+        replayed = next(seek, None)
+        if replayed is not None:
+            self._last = replayed
+            self._take(replayed)
             return
-        self._last = shown
-        self._take(shown)
+        self._seek = None
+        if self._playing_from is not None:
+            self._playing_from = (self._clock(), self._cursor.t_s)
+        if self._last is not None:
+            self._show_frame(self._last)
 
-    def _play_on(self, since_s: float, from_s: float) -> None:
-        shown = self._playback.on()
-        if shown is None:
-            self._goes_on = None
-            self._go(self._playback.cycles)
+    def _advance_playing(self, since_s: float, from_s: float) -> None:
+        replayed = self._cursor.next_cycle()
+        if replayed is None:
+            self._playing_from = None
+            self._seek_to(self._cursor.cycles)
             return
-        self._take(shown)
-        now_s, t_s = self._clock(), self._playback.t_s
-        if now_s - since_s - (t_s - from_s) / self._speed > BEHIND_S:
-            self._goes_on = (now_s, t_s)
-        if now_s - self._shown_s >= FRAME_S:
-            self._shown_s = now_s
-            self._frame(shown)
+        self._take(replayed)
+        host_s, t_s = self._clock(), self._cursor.t_s
+        if host_s - since_s - (t_s - from_s) / self._speed > LAG_MAX_S:
+            self._playing_from = (host_s, t_s)
+        if host_s - self._shown_s >= FRAME_PERIOD_S:
+            self._shown_s = host_s
+            self._show_frame(replayed)
 
-    def _take(self, shown: Shown) -> None:
-        told = self._playback.settings
-        if self._builder is None or told is not self._told or self._jumps != self._playback.jumps:
-            self._jumps = self._playback.jumps
-            self._told, self._builder = told, self._build(told)
+    def _take(self, replayed: ReplayedCycle) -> None:
+        """Take in a cycle, with a new source of frames after a jump or a change of settings."""
+        settings = self._cursor.settings
+        if self._frames is None or settings is not self._settings or self._jumps != self._cursor.jumps:
+            self._jumps = self._cursor.jumps
+            self._settings, self._frames = settings, self._make_frames(settings)
             self._source += 1
             self._number = 0
-        self._builder.take(shown.record)
+        self._frames.take(replayed.record)
 
-    def _frame(self, shown: Shown) -> None:
-        if self._builder is not None:
+    def _show_frame(self, replayed: ReplayedCycle) -> None:
+        if self._frames is not None:
             self._number += 1
-            at = At(round(self._playback.t_s, 3), self._goes_on is not None, self._speed)
-            self._show(self._source, self._number, self._builder.frame(shown, at))
+            position = PlaybackPosition(round(self._cursor.t_s, 3), self._playing_from is not None, self._speed)
+            self._show(self._source, self._number, self._frames.frame(replayed, position))
 
 
-def about_recording(playback: ReplayCursor, more: dict[str, Any]) -> dict[str, Any]:
-    """Return what there is to know of a recording before it is played."""
+def describe(cursor: ReplayCursor, more: dict[str, Any]) -> dict[str, Any]:
+    """Return what the page shows of a recording before it is played."""
     return {
-        "duration_s": round(playback.duration_s, 3),
-        "cycles": playback.cycles,
-        "bookmarks": [[round(s, 3), text] for s, text in playback.bookmarks],
-        "modes": [[round(s, 3), mode.mode.value, mode.reason] for s, mode in playback.modes],
+        "duration_s": round(cursor.duration_s, 3),
+        "cycles": cursor.cycles,
+        "bookmarks": [[round(s, 3), text] for s, text in cursor.bookmarks],
+        "modes": [[round(s, 3), mode.mode.value, mode.reason] for s, mode in cursor.modes],
         **more,
     }
 
 
-def play(file: str, make: Make) -> int:
-    """Play a recording for whoever holds the other ends of standard input and output, until they are closed.
+def run_worker(file: str, make: MakeFrameMaker) -> int:
+    """Replay a recording until standard input or output is closed; return the process's exit code.
 
     Parameters
     ----------
     file : str
         The recording.
-    make : Make
-        Makes builders.
+    make : MakeFrameMaker
+        Constructs frame makers.
     """
     try:
         with open_recording(Path(file)) as recording:
-            playback = ReplayCursor(recording)
+            cursor = ReplayCursor(recording)
             emulated = recording.info.emulated
 
-            def build(told: dict[str, Any]) -> Builder:
-                return make(parse_settings(told), emulated=emulated)
+            def make_frames(settings: dict[str, Any]) -> FrameMaker:
+                return make(parse_settings(settings), emulated=emulated)
 
-            about = build(recording.info.settings).about()
-            _answer(about_recording(playback, {"about": about, "started": recording.info.started}))
-            player = ReplayWorker(playback, build, _show, time.monotonic)
-            player.do({"do": "scrub", "s": 0.0})
-            _serve(player)
+            session = make_frames(recording.info.settings).session()
+            _write_answer(describe(cursor, {"about": session, "started": recording.info.started}))
+            worker = ReplayWorker(cursor, make_frames, _write_frame, time.monotonic)
+            worker.execute({"do": "seek", "s": 0.0})
+            _serve(worker)
     except RecordingError as error:
-        _answer({"error": str(error)})
-    except BrokenPipeError:  # nobody looks on any more
+        _write_answer({"error": str(error)})
+    except BrokenPipeError:  # the client has gone
         return 0
     return 0
 
 
-def _serve(player: ReplayWorker) -> None:
-    """Hear commands and work in turn."""
+def _serve(worker: ReplayWorker) -> None:
+    """Read commands and replay cycles in turn until standard input is closed."""
     fd, rest = sys.stdin.fileno(), b""
     while True:
-        wait_s = player.wait_s
+        wait_s = worker.wait_s
         ready, _, _ = select.select([fd], [], [], None if wait_s == math.inf else wait_s)
         if ready:
-            data = os.read(fd, LINE_MAX)
+            data = os.read(fd, READ_BYTES)
             if not data:
                 return
             *lines, rest = (rest + data).split(b"\n")
             for line in lines:
                 try:
-                    player.do(orjson.loads(line))
+                    worker.execute(orjson.loads(line))
                 except (ValueError, KeyError, TypeError) as error:
-                    _answer({"error": f"{error}"})
-        player.work()
+                    _write_answer({"error": f"{error}"})
+        worker.advance()
 
 
-def _answer(told: dict[str, Any]) -> None:
-    body = orjson.dumps(told)
+def _write_answer(answer: dict[str, Any]) -> None:
+    body = orjson.dumps(answer)
     _write(HEADER.pack(ANSWER, 0, 0, len(body), 0, 0) + body)
 
 
-def _show(source: int, number: int, picture: Picture) -> None:
-    sizes = (len(part) for part in picture)
-    _write(HEADER.pack(FRAME, source, number, *sizes) + b"".join(picture))
+def _write_frame(source: int, number: int, parts: FrameParts) -> None:
+    sizes = (len(part) for part in parts)
+    _write(HEADER.pack(FRAME, source, number, *sizes) + b"".join(parts))
 
 
 def _write(data: bytes) -> None:

@@ -10,12 +10,12 @@ import pytest
 
 from perception.edits import ConfirmObject, RejectObject
 from runtime.console.clients.client import Client
-from runtime.console.clients.control import PATIENCE_S as CONTROL_S
+from runtime.console.clients.control import REQUEST_TIMEOUT_S as CONTROL_S
 from runtime.console.frames.frame_encoder import EncodedFrame
 from runtime.console.http.client_limits import Limits
 from runtime.cycle.inputs import Request
 from tests.rawpage import RawPage
-from tests.runtime.console.operated import Operated, operated
+from tests.runtime.console.console_case import ConsoleCase, open_console
 
 Segments = dict[int, list[float]]
 
@@ -31,7 +31,7 @@ def apply(segments: Segments, told: dict[str, Any]) -> None:
         segments[number] = row
 
 
-def agree(segments: Segments, case: Operated) -> None:
+def agree(segments: Segments, case: ConsoleCase) -> None:
     """Assert that the page knows what is in the map."""
     now = case.run.state.perception.segments()
     assert sorted(segments) == sorted(now.numbers.tolist())
@@ -40,9 +40,9 @@ def agree(segments: Segments, case: Operated) -> None:
 
 
 async def test_the_greeting() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
-        session = page.heard[0]
+        session = page.received[0]
         assert session["role"] == "control"
         assert session["name"] == "denning"
         assert session["emulated"] is True
@@ -52,26 +52,26 @@ async def test_the_greeting() -> None:
         assert session["period_s"] == 0.05
         paths = {parameter["path"] for parameter in session["parameters"]}
         assert {"behaviors.avoid_static_obstacle.avoid_obstacle_gain", "cycle.perception_budget_s"} <= paths
-        assert (await case.page()).heard[0]["role"] == "watch"
+        assert (await case.page()).received[0]["role"] == "watch"
 
 
 async def test_on_a_port_nobody_knows_the_truth() -> None:
-    async with operated(emulated=False) as case:
-        assert (await case.page()).heard[0]["truth"] is None
+    async with open_console(emulated=False) as case:
+        assert (await case.page()).received[0]["truth"] is None
 
 
 async def test_who_came_before_the_robot_had_answered_hears_its_name() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         case.run.name = None
         page = await case.page()
-        assert page.heard[0]["name"] is None
+        assert page.received[0]["name"] is None
         case.run.name = "denning"
         case.cycles()
         assert (await page.next("session"))["name"] == "denning"
 
 
 async def test_a_frame() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
         case.cycles(3)
         frame = await page.next("state")
@@ -93,15 +93,15 @@ async def test_a_frame() -> None:
 
 
 async def test_frames_are_built_only_while_somebody_looks_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    async with operated() as case:
+    async with open_console() as case:
         made: list[int] = []
-        encode = case.console._encoder.frame
+        encode = case.console._publisher._encoder.frame
 
         def counted(*how: Any) -> EncodedFrame:
             made.append(1)
             return encode(*how)
 
-        monkeypatch.setattr(case.console._encoder, "frame", counted)
+        monkeypatch.setattr(case.console._publisher._encoder, "frame", counted)
         case.cycles(50)
         await asyncio.sleep(0.0)
         assert sum(made) == 0
@@ -113,37 +113,37 @@ async def test_frames_are_built_only_while_somebody_looks_on(monkeypatch: pytest
 
 
 async def test_no_more_than_twenty_a_second() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
-        before = case.console._encoder._number
+        before = case.console._publisher._encoder._number
         for _ in range(200):
             case.cycles(step_s=0.005)
             await asyncio.sleep(0.0)
-        assert 19 <= case.console._encoder._number - before <= 22
-        before = case.console._encoder._number
+        assert 19 <= case.console._publisher._encoder._number - before <= 22
+        before = case.console._publisher._encoder._number
         for _ in range(40):
             case.cycles(step_s=0.051)
             await asyncio.sleep(0.0)
-        assert case.console._encoder._number - before == 40, "a cycle that is a little late has its frame"
+        assert case.console._publisher._encoder._number - before == 40, "a cycle that is a little late has its frame"
         await page.next("state")
 
 
 async def test_while_cycles_overrun_nothing_is_shown() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
-        before = case.console._encoder._number
+        before = case.console._publisher._encoder._number
         case.run.timing_monitor.overruns_in_a_row = 1
         for _ in range(10):
             case.cycles()
             await asyncio.sleep(0.0)
-        assert case.console._encoder._number == before
+        assert case.console._publisher._encoder._number == before
         case.run.timing_monitor.overruns_in_a_row = 0
         case.cycles()
         assert (await page.next("state"))["cycle"] == 11
 
 
 async def test_changes_add_up_to_the_whole() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page, segments = await case.page(), Segments()
         for k in range(60):
             case.cycles()
@@ -156,7 +156,7 @@ async def test_changes_add_up_to_the_whole() -> None:
 
 
 async def test_who_comes_later_gets_the_whole() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         first = await case.page()
         case.cycles(40)
         await first.next("state")
@@ -188,10 +188,10 @@ class DeafWire:
 
 
 async def test_a_slow_client_misses_frames_and_gets_the_newest_with_the_whole() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         case.cycles()
         wire = DeafWire(2)
-        client = case.console.hub.join(wire, "slow", case.console._hello(), has_token=False)
+        client = case.console.hub.join(wire, "slow", case.console._session(), has_token=False)
         sender = asyncio.create_task(client.send_all())
         quick = await case.page()
         for _ in range(30):
@@ -213,7 +213,7 @@ async def test_a_slow_client_misses_frames_and_gets_the_newest_with_the_whole() 
 
 async def test_one_that_never_reads_costs_no_more_than_its_slot() -> None:
     limits = Limits(stall_s=10.0)
-    async with operated(limits=limits) as case:
+    async with open_console(limits=limits) as case:
         deaf = await asyncio.to_thread(RawPage, case.console.url, receive_bytes=4096)
         client, page = case.console.hub.clients[1], await case.page()
         held: list[int] = []
@@ -230,38 +230,38 @@ async def test_one_that_never_reads_costs_no_more_than_its_slot() -> None:
         assert max(held) < 32_768, "no frame waits behind another"
         case.cycles(step_s=300.0)
         await case.settled(lambda: 1 not in case.console.hub.clients, "that it is let go")
-        assert any("nothing was taken for 10 s" in why for why in case.refusals())
+        assert any("it took nothing for 10 s" in why for why in case.refusals())
         deaf.close()
 
 
-def buffered(case: Operated) -> int:
+def buffered(case: ConsoleCase) -> int:
     """Return how much this process keeps for a client that does not take it."""
     assert case.console._server is not None
-    talks = case.console._server._talks.values()
+    talks = case.console._server._websockets.values()
     return max(talk._writer.transport.get_write_buffer_size() for talk in talks)  # type: ignore[union-attr]
 
 
 async def test_answers_that_nobody_takes_are_bounded() -> None:
     wire = DeafWire()
-    client = Client(1, "deaf", wire, Limits(waiting=10), lambda: 0.0, has_token=True)
+    client = Client(1, "deaf", wire, Limits(queue_messages=10), lambda: 0.0, has_token=True)
     for _ in range(10):
         assert not client.is_gone
-        client.say({"type": "answer"})
-    client.say({"type": "answer"})
+        client.send({"type": "answer"})
+    client.send({"type": "answer"})
     assert wire.aborted
     assert client.is_gone
-    client.say({"type": "answer"})
+    client.send({"type": "answer"})
     another = Client(
-        2, "deaf", wire := DeafWire(), Limits(waiting=1000, waiting_bytes=1000), lambda: 0.0, has_token=True
+        2, "deaf", wire := DeafWire(), Limits(queue_messages=1000, queue_bytes=1000), lambda: 0.0, has_token=True
     )
     for _ in range(200):
-        another.mention(b"x" * 10)
-    another.say_encoded(b"x" * 1000)
+        another.send_if_room(b"x" * 10)
+    another.send_encoded(b"x" * 1000)
     assert wire.aborted
 
 
 async def test_lines_of_the_log_also_for_those_who_come_later() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
         case.console.hub.on_log({"event": "mode", "level": "info", "timestamp": "now", "mode": "READY", "cycle": 3})
         line = await page.next("log")
@@ -274,11 +274,11 @@ async def test_lines_of_the_log_also_for_those_who_come_later() -> None:
 
 
 async def test_the_control_changes_hands() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         first, second = await case.page(), await case.page()
         answer = await second.ask(type="arm")
         assert not answer["ok"]
-        assert answer["error"] == "another client has the control: ask for it first"
+        assert answer["error"] == "another client has control: ask for it first"
         assert case.refusals()[-1] == answer["error"], "two that want to drive: refused, and logged"
         assert not (await second.ask(type="take_control"))["ok"]
         asked = await first.next("role")
@@ -296,7 +296,7 @@ async def test_the_control_changes_hands() -> None:
 
 
 async def test_a_holder_who_is_asked_and_idle_loses_it() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         _first, second = await case.page(), await case.page()
         await second.ask(type="take_control")
         case.cycles(step_s=CONTROL_S + 1.0)
@@ -304,7 +304,7 @@ async def test_a_holder_who_is_asked_and_idle_loses_it() -> None:
 
 
 async def test_a_page_that_is_closed_takes_its_hand_off_the_stick() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page, other = await case.page(), await case.page()
         assert (await page.ask(type="teleoperate", v=0.2, w=0.0))["ok"]
         transport = page.socket._conn.transport  # type: ignore[union-attr]
@@ -316,7 +316,7 @@ async def test_a_page_that_is_closed_takes_its_hand_off_the_stick() -> None:
 
 
 async def test_a_page_that_is_closed_leaves_a_goal_alone() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
         await page.ask(type="teleoperate", v=0.2, w=0.0)
         await page.ask(type="goal", x=1.0, y=2.0)
@@ -326,10 +326,10 @@ async def test_a_page_that_is_closed_leaves_a_goal_alone() -> None:
 
 
 async def test_edits_are_answered_once_a_cycle_has_done_them() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
-        first = await page.say(type="confirm_object", object=3)
-        second = await page.say(type="reject_object", object=4)
+        first = await page.send(type="confirm_object", object=3)
+        second = await page.send(type="reject_object", object=4)
         await case.settled(lambda: len(case.run.asked) == 2, "both")
         case.cycles()
         edits = (ConfirmObject(3), RejectObject(4))
@@ -338,12 +338,12 @@ async def test_edits_are_answered_once_a_cycle_has_done_them() -> None:
         assert (await page.answer(first))["ok"]
         assert (await page.answer(second))["error"] == "there is no object 4"
         case.run.room = 0
-        assert "too many changes" in (await page.ask(type="clear_map"))["error"]
+        assert "too many edits" in (await page.ask(type="clear_map"))["error"]
 
 
 async def test_frames_go_on_while_no_cycle_ends(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("runtime.console.console.STILL_S", 0.02)
-    async with operated() as case:
+    monkeypatch.setattr("runtime.console.frames.frame_publisher.IDLE_PERIOD_S", 0.02)
+    async with open_console() as case:
         page = await case.page()
         case.clock[0] += 1.0
         assert (await page.next("state"))["cycle"] == 0
@@ -352,9 +352,9 @@ async def test_frames_go_on_while_no_cycle_ends(monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize("where", ["frame", "take"])
 async def test_a_console_that_fails_says_so(where: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A display with a fault in it must neither go on in silence nor take the loop with it."""
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
-        monkeypatch.setattr(case.console._encoder, where, lambda *_: 1 / 0)
+        monkeypatch.setattr(case.console._publisher._encoder, where, lambda *_: 1 / 0)
         assert case.run.health.fault() is None
         case.cycles(3)
         await asyncio.sleep(0.0)
@@ -364,17 +364,17 @@ async def test_a_console_that_fails_says_so(where: str, monkeypatch: pytest.Monk
         assert "the part `console` of this program has ended (ZeroDivisionError" in fault
         assert len([line for line in case.log if "cannot show the run" in str(line["event"])]) == 1
         assert (await page.ask(type="halt"))["ok"], "to halt works to the last"
-        case.console._failure = None
+        case.console._publisher.failure = None
         case.run.health._ended.clear()
 
 
 @pytest.mark.parametrize("name", ["console sender 1", "console client 1"])
 async def test_a_task_of_a_client_that_is_killed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
         if name == "console client 1":
-            monkeypatch.setattr(case.console.dispatcher, "_do", lambda *_: 1 / 0)
-            await page.say(type="halt")
+            monkeypatch.setattr(case.console.dispatcher, "_run", lambda *_: 1 / 0)
+            await page.send(type="halt")
         else:
             (task,) = [task for task in asyncio.all_tasks() if task.get_name() == name]
             task.cancel()

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from runtime.console.clients.control import PATIENCE_S, Control, Holder
+from runtime.console.clients.control import REQUEST_TIMEOUT_S, Control, Holder
 
 
 @dataclass(eq=False)
@@ -46,8 +46,8 @@ Case = tuple[Controlled, Control, Somebody, Somebody]
 
 def test_the_first_has_it(case: Case) -> None:
     controlled, control, first, second = case
-    assert control.has(first)
-    assert not control.has(second)
+    assert control.is_held_by(first)
+    assert not control.is_held_by(second)
     assert controlled.told == []
 
 
@@ -55,56 +55,56 @@ def test_who_may_only_watch_never_has_it() -> None:
     control = Controlled().control
     watcher = Somebody(1, has_token=False)
     control.join(watcher)
-    assert not control.has(watcher)
+    assert not control.is_held_by(watcher)
 
 
 def test_it_is_asked_for_and_granted(case: Case) -> None:
     controlled, control, first, second = case
-    validate = control.take(second, 0.0)
+    validate = control.request(second, 0.0)
     assert validate is not None
-    assert "client 1 has the control" in validate
-    assert control.has(first)
+    assert "client 1 has control" in validate
+    assert control.is_held_by(first)
     assert controlled.told == [(1, 2)]
-    assert control.grant(3) == "client 3 does not ask for the control"
+    assert control.grant(3) == "client 3 does not ask for control"
     assert control.grant(2) is None
-    assert control.has(second)
+    assert control.is_held_by(second)
     assert controlled.told[1:] == [(1, None), (2, None)]
     assert controlled.left == [1]
 
 
 def test_it_is_kept_by_who_takes_it_again(case: Case) -> None:
     _, control, first, second = case
-    control.take(second, 0.0)
-    assert control.take(first, 1.0) is None
-    control.expire(2.0 * PATIENCE_S)
-    assert control.has(first)
+    control.request(second, 0.0)
+    assert control.request(first, 1.0) is None
+    control.expire(2.0 * REQUEST_TIMEOUT_S)
+    assert control.is_held_by(first)
 
 
 def test_who_is_idle_loses_it_once_asked(case: Case) -> None:
     _, control, first, second = case
     control.expire(1e9)
-    assert control.has(first), "nobody has asked"
-    control.take(second, 0.0)
-    control.used(first, PATIENCE_S - 1.0)
-    control.used(second, PATIENCE_S)
-    control.expire(2.0 * PATIENCE_S - 1.5)
-    assert control.has(first)
-    control.expire(2.0 * PATIENCE_S - 1.0)
-    assert control.has(second)
+    assert control.is_held_by(first), "nobody has asked"
+    control.request(second, 0.0)
+    control.note_use(first, REQUEST_TIMEOUT_S - 1.0)
+    control.note_use(second, REQUEST_TIMEOUT_S)
+    control.expire(2.0 * REQUEST_TIMEOUT_S - 1.5)
+    assert control.is_held_by(first)
+    control.expire(2.0 * REQUEST_TIMEOUT_S - 1.0)
+    assert control.is_held_by(second)
 
 
 def test_it_goes_to_who_asked_when_it_is_given_up_or_lost(case: Case) -> None:
     controlled, control, first, second = case
-    control.give()
-    assert not control.has(first)
-    assert not control.has(second)
-    assert control.take(first, 0.0) is None
-    control.take(second, 0.0)
+    control.release()
+    assert not control.is_held_by(first)
+    assert not control.is_held_by(second)
+    assert control.request(first, 0.0) is None
+    control.request(second, 0.0)
     control.leave(first)
-    assert control.has(second)
+    assert control.is_held_by(second)
     assert controlled.left == [1, 1]
     control.leave(second)
-    assert not control.has(second)
+    assert not control.is_held_by(second)
 
 
 @given(st.lists(st.tuples(st.sampled_from(["join", "leave", "take", "give", "grant", "used", "expire"]),
@@ -124,15 +124,15 @@ def test_never_two(steps: list[tuple[str, int, float]]) -> None:
                     there.remove(who)
                     control.leave(one)
                 case "take" if one.has_token:
-                    control.take(one, now_s)
-                case "give" if control.has(one):
-                    control.give()
-                case "grant" if control.has(one):
+                    control.request(one, now_s)
+                case "give" if control.is_held_by(one):
+                    control.release()
+                case "grant" if control.is_held_by(one):
                     control.grant(int(now_s) % 4)
                 case "used":
-                    control.used(one, now_s)
+                    control.note_use(one, now_s)
                 case "expire":
                     control.expire(now_s)
-        holders = [n for n in range(4) if control.has(people[n])]
+        holders = [n for n in range(4) if control.is_held_by(people[n])]
         assert len(holders) <= 1
         assert set(holders) <= there - {3}

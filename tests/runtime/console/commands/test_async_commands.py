@@ -7,12 +7,11 @@ from typing import Any
 
 import pytest
 
-from runtime.console.commands.async_commands import AsyncCommands
 from runtime.console.commands.command_error import CommandError
 from runtime.console.frames.frame_encoder import RecordingStatus
 from runtime.console.protocols import Viewer
-from tests.runtime.console.messages import OF_TIME
-from tests.runtime.console.operated import operated
+from tests.runtime.console.console_case import open_console
+from tests.runtime.console.sample_messages import ASYNC_COMMANDS
 
 
 class Held:
@@ -65,8 +64,8 @@ class Held:
         viewer.switch(live=False)
         return {"seconds": 3.0}
 
-    async def scrub(self, _viewer: Viewer, s: float) -> None:
-        await self._show(f"scrub {s}")
+    async def seek(self, _viewer: Viewer, s: float) -> None:
+        await self._show(f"seek {s}")
 
     async def play(self, _viewer: Viewer, speed: float) -> None:
         await self._show(f"play {speed}")
@@ -74,8 +73,8 @@ class Held:
     async def step(self, _viewer: Viewer, cycles: int) -> None:
         await self._show(f"step {cycles}")
 
-    async def live(self, viewer: Viewer) -> None:
-        await self._show("live")
+    async def close_recording(self, viewer: Viewer) -> None:
+        await self._show("close_recording")
         viewer.switch(live=True)
 
     def leave(self, viewer: Viewer) -> None:
@@ -90,10 +89,10 @@ class Held:
         self.did.append("close")
 
 
-@pytest.mark.parametrize(("message", "done"), OF_TIME, ids=lambda value: str(value)[:30])
+@pytest.mark.parametrize(("message", "done"), ASYNC_COMMANDS, ids=lambda value: str(value)[:30])
 async def test_what_takes_its_time(message: dict[str, Any], done: str) -> None:
     held = Held()
-    async with operated(async_commands=AsyncCommands(held, held, held)) as case:
+    async with open_console(time=held, recording=held, replay=held) as case:
         page = await case.page()
         assert (await page.ask(**message))["ok"]
         assert held.did == [done]
@@ -101,22 +100,22 @@ async def test_what_takes_its_time(message: dict[str, Any], done: str) -> None:
         assert (await page.ask(**message))["error"] == "not just now"
         held.validate = None
         held.go.clear()
-        slow = await page.say(**message)
-        assert "still under way" in (await page.ask(**message))["error"]
+        slow = await page.send(**message)
+        assert "still running" in (await page.ask(**message))["error"]
         assert (await page.ask(type="halt"))["ok"], "a HALT does not wait behind it"
         held.go.set()
         assert (await page.answer(slow))["ok"]
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
-        assert (await page.ask(**message))["error"] == f"{message['type']}: not available here"
+        assert (await page.ask(**message))["error"] == f"{message['type']}: not available in this run"
 
 
 async def test_a_page_that_leaves_in_the_middle_of_it() -> None:
     held = Held()
-    async with operated(async_commands=AsyncCommands(held, held, held)) as case:
+    async with open_console(time=held, recording=held, replay=held) as case:
         page = await case.page()
         held.go.clear()
-        await page.say(type="open_recording", file="run.mcap")
+        await page.send(type="open_recording", file="run.mcap")
         await case.settled(lambda: bool(case.console._tasks), "the work")
         await page.socket.close()
         await case.settled(lambda: not case.console._tasks, "that it is given up")
@@ -126,23 +125,23 @@ async def test_a_page_that_leaves_in_the_middle_of_it() -> None:
 async def test_work_that_fails_is_a_fault_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
     held = Held()
     monkeypatch.setattr(held, "_do", lambda _what: 1 / 0)
-    async with operated(async_commands=AsyncCommands(held, held, held)) as case:
+    async with open_console(time=held, recording=held, replay=held) as case:
         page = await case.page()
-        await page.say(type="pause")
+        await page.send(type="pause")
         await case.settled(lambda: any(line["event"] == "a part failed" for line in case.log), "a line in the log")
-        assert "console work 1" in str(case.run.health.fault())
+        assert "console command 1" in str(case.run.health.fault())
 
 
 async def test_a_recording_is_shown_to_who_opened_it_only() -> None:
     held = Held()
-    async with operated(async_commands=AsyncCommands(held, held, held)) as case:
+    async with open_console(time=held, recording=held, replay=held) as case:
         page, other = await case.page(), await case.page()
         assert (await page.ask(type="open_recording", file="run.mcap"))["data"] == {"seconds": 3.0}
         case.cycles()
         frame = await other.next("state")
         assert (frame["paused"], frame["speed"]) == (True, 2.0)
         assert frame["recording"] == {"file": "run.mcap", "bytes": 10, "dropped": 0}
-        assert not [message for message in page.heard if message["type"] == "state"]
+        assert not [message for message in page.received if message["type"] == "state"]
         await page.ask(type="close_recording")
         case.cycles()
         assert (await page.next("state"))["segments"]["whole"]

@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import pytest
 
 from config.load import load_settings
 from config.settings import Settings
-from runtime.console.commands import messages as forms
-from tests.runtime.console.messages import ASKED, EDITS, OF_TIME, OTHERS
-from tests.runtime.console.operated import operated
+from runtime.console.commands.registry import COMMANDS
+from tests.runtime.console.console_case import open_console
+from tests.runtime.console.sample_messages import ALL, EDITS, ROBOT_REQUESTS
 
 GAIN = "behaviors.avoid_static_obstacle.avoid_obstacle_gain"
 
 
 def test_no_message_is_left_out() -> None:
     """So a new message is tested the day it is added."""
-    known = {get_args(form.model_fields["type"].annotation)[0] for form in forms.Form.__subclasses__()}
-    tested: set[str] = OTHERS.union(*({row[0]["type"] for row in table} for table in (ASKED, EDITS, OF_TIME)))
-    assert known == tested
+    assert set(COMMANDS) == {message["type"] for message in ALL}
 
 
-@pytest.mark.parametrize(("message", "asked"), ASKED, ids=lambda value: str(value)[:40])
+@pytest.mark.parametrize(("message", "asked"), ROBOT_REQUESTS, ids=lambda value: str(value)[:40])
 async def test_what_goes_to_the_robot(message: dict[str, Any], asked: object) -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
         assert (await page.ask(**message)) == {
             "type": "answer", "id": 1, "ok": True, "error": None, "field": None, "data": None
@@ -35,21 +33,21 @@ async def test_what_goes_to_the_robot(message: dict[str, Any], asked: object) ->
 
 @pytest.mark.parametrize(("message", "edit"), EDITS, ids=lambda value: str(value)[:40])
 async def test_what_goes_to_the_map(message: dict[str, Any], edit: object) -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
-        number = await page.say(**message)
+        number = await page.send(**message)
         await case.settled(lambda: case.run.asked == [edit], "the edit")
         case.cycles(edits=(edit,), outcomes=(None,))
         assert (await page.answer(number))["ok"]
 
 
-@pytest.mark.parametrize("message", [row[0] for row in (*ASKED[1:], *EDITS)], ids=lambda m: str(m["type"]))
+@pytest.mark.parametrize("message", [row[0] for row in (*ROBOT_REQUESTS[1:], *EDITS)], ids=lambda m: str(m["type"]))
 async def test_who_has_not_the_control_is_refused(message: dict[str, Any]) -> None:
-    async with operated() as case:
+    async with open_console() as case:
         _first, second = await case.page(), await case.page()
         assert not (await second.ask(**message))["ok"]
         assert case.run.asked == []
-        assert case.refusals() == ["another client has the control: ask for it first"]
+        assert case.refusals() == ["another client has control: ask for it first"]
 
 
 BAD: list[tuple[str, str | None]] = [
@@ -72,7 +70,7 @@ BAD: list[tuple[str, str | None]] = [
 
 @pytest.mark.parametrize(("text", "field"), BAD)
 async def test_what_has_no_form_is_answered_and_does_nothing(text: str, field: str | None) -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
         await page.socket.send_str(text)
         answer = await page.next("answer")
@@ -89,7 +87,7 @@ NUMBERLESS = [
 
 @pytest.mark.parametrize("text", NUMBERLESS)
 async def test_what_has_no_number_is_answered_without(text: str) -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
         await page.socket.send_str(text)
         answer = await page.next("answer")
@@ -98,12 +96,12 @@ async def test_what_has_no_number_is_answered_without(text: str) -> None:
 
 
 async def test_a_parameter_is_changed_for_all_to_see_and_taken_back() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page, other = await case.page(), await case.page()
         answer = await page.ask(type="set_parameter", path=GAIN, value=2)
         assert answer["data"] == [{"path": GAIN, "value": 2.0}]
         for one in (page, other):
-            told = next((m for m in one.heard if m["type"] == "parameters"), None) or await one.next("parameters")
+            told = next((m for m in one.received if m["type"] == "parameters"), None) or await one.next("parameters")
             assert {p["path"]: p["value"] for p in told["parameters"]}[GAIN] == 2.0
         (settings,) = case.run.asked
         assert isinstance(settings, Settings)
@@ -111,7 +109,7 @@ async def test_a_parameter_is_changed_for_all_to_see_and_taken_back() -> None:
         answer = await page.ask(type="undo_parameter")
         assert answer["data"] == {"path": GAIN, "value": 1.0}
         assert case.run.asked[1] == case.run.settings
-        assert (await page.ask(type="undo_parameter"))["error"] == "there is no change to take back"
+        assert (await page.ask(type="undo_parameter"))["error"] == "there is no change to undo"
 
 
 @pytest.mark.parametrize(
@@ -129,7 +127,7 @@ async def test_a_parameter_is_changed_for_all_to_see_and_taken_back() -> None:
     ],
 )  # fmt: skip
 async def test_a_parameter_that_is_refused(path: str, value: Any, error: str) -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
         answer = await page.ask(type="set_parameter", path=path, value=value)
         assert not answer["ok"]
@@ -139,7 +137,7 @@ async def test_a_parameter_that_is_refused(path: str, value: Any, error: str) ->
 
 
 async def test_a_firing_pattern_by_name_and_what_is_not_given() -> None:
-    async with operated("ring.firing={sets=[[0,8],[1,9]]}") as case:
+    async with open_console("ring.firing={sets=[[0,8],[1,9]]}") as case:
         page = await case.page()
         assert (await page.ask(type="set_parameter", path="ring.firing.preset", value="quadrants"))["ok"]
         assert (await page.ask(type="set_parameter", path="behaviors.move_ahead.distance_m", value=None))["ok"]
@@ -149,7 +147,7 @@ async def test_a_firing_pattern_by_name_and_what_is_not_given() -> None:
 
 
 async def test_all_settings_as_a_file_that_gives_them_again(tmp_path: Path) -> None:
-    async with operated("link.port=/dev/pts/7") as case:
+    async with open_console("link.port=/dev/pts/7") as case:
         page = await case.page()
         await page.ask(type="set_parameter", path=GAIN, value=3.5)
         text = (await page.ask(type="save_toml"))["data"]
@@ -161,11 +159,11 @@ async def test_all_settings_as_a_file_that_gives_them_again(tmp_path: Path) -> N
 
 
 async def test_settings_from_elsewhere_are_shown_and_end_what_can_be_taken_back() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
         await page.ask(type="set_parameter", path=GAIN, value=3.5)
         case.console.adopt(case.run.settings)
-        while (await page.next("parameters"))["parameters"] != page.heard[0]["parameters"]:
+        while (await page.next("parameters"))["parameters"] != page.received[0]["parameters"]:
             pass
         assert not (await page.ask(type="undo_parameter"))["ok"]
 
@@ -180,7 +178,7 @@ async def test_settings_from_elsewhere_are_shown_and_end_what_can_be_taken_back(
     ],
 )
 async def test_a_model_that_is_none(toml: str, error: str) -> None:
-    async with operated() as case:
+    async with open_console() as case:
         answer = await (await case.page()).ask(type="load_model", toml=toml)
         assert not answer["ok"]
         assert answer["field"] == "toml"
@@ -192,7 +190,7 @@ BOX = 'name = "crate"\nclosed = true\nvertices_m = [[0.4, 0.3], [-0.4, 0.3], [-0
 
 
 async def test_a_further_model_is_greeted_and_not_taken_back() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         case.cycles()
         page, other = await case.page(), await case.page()
         case.cycles()
@@ -200,7 +198,7 @@ async def test_a_further_model_is_greeted_and_not_taken_back() -> None:
         await page.ask(type="set_parameter", path=GAIN, value=2.0)
         assert (await page.ask(type="load_model", toml=BOX))["data"] == {"name": "crate"}
         for one in (page, other):
-            sessions = [message for message in one.heard if message["type"] == "session"]
+            sessions = [message for message in one.received if message["type"] == "session"]
             session = sessions[1] if len(sessions) > 1 else await one.next("session")
             assert [model["name"] for model in session["models"]] == ["semicircle", "crate"]
             assert session["role"] == ("control" if one is page else "watch")
@@ -212,8 +210,8 @@ async def test_a_further_model_is_greeted_and_not_taken_back() -> None:
 
 
 async def test_why_an_object_is_believed() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         _first, page = await case.page(), await case.page()
         data = (await page.ask(type="evidence", object=1))["data"]
         assert (data["object"], data["model"], data["for"], data["against"]) == (1, "semicircle", 3.5, 1.0)
-        assert (await page.ask(type="evidence", object=2))["error"] == "object 2 is not there any more"
+        assert "object 2 no longer exists" in (await page.ask(type="evidence", object=2))["error"]

@@ -64,7 +64,7 @@ async def test_a_player_and_a_report_beside_a_robot_that_drives(tmp_path: Path) 
                 end_s = clock() + WINDOW_S
                 while clock() < end_s:
                     if busy[0]:
-                        await players.scrub(page, rng.uniform(0.0, 12.0))
+                        await players.seek(page, rng.uniform(0.0, 12.0))
                     await asyncio.sleep(0.1)
                 if busy[0] and report is not None:
                     frames = len(page.frames)

@@ -12,13 +12,12 @@ import orjson
 import pytest
 from aiohttp import WSServerHandshakeError
 
-from runtime.console.commands.async_commands import AsyncCommands
 from runtime.console.http.client_limits import Limits
 from runtime.cycle.inputs import Request
-from tests.runtime.console.operated import PATIENCE_S, Operated, operated
+from tests.runtime.console.console_case import TIMEOUT_S, ConsoleCase, open_console
 
 
-async def refused(case: Operated, **how: str | None) -> tuple[int, str]:
+async def refused(case: ConsoleCase, **how: str | None) -> tuple[int, str]:
     """Return how a page is refused, and what the log says of it."""
     before = len(case.refusals())
     with pytest.raises(WSServerHandshakeError) as caught:
@@ -29,7 +28,7 @@ async def refused(case: Operated, **how: str | None) -> tuple[int, str]:
 
 
 async def test_the_page_and_what_it_carries() -> None:
-    async with operated() as case, case.session.get(case.url) as answer:
+    async with open_console() as case, case.session.get(case.url) as answer:
         assert answer.status == 200
         assert answer.content_type == "text/html"
         headers = answer.headers
@@ -45,12 +44,12 @@ RAW = ["/page/../console.py", "/page/%2e%2e/console.py", "/page/..%2fconsole.py"
        "/page/\\..\\console.py", "/.git/config", "/page//index.html", "/ws/", "/page/./console.py"]  # fmt: skip
 
 
-async def raw(case: Operated, *lines: str) -> bytes:
+async def raw(case: ConsoleCase, *lines: str) -> bytes:
     """Send a request as it is, and return the answer; a connection that is cut has none."""
     reader, writer = await asyncio.open_connection("127.0.0.1", case.url.port)
     try:
         writer.write("".join(f"{line}\r\n" for line in (*lines, "")).encode("latin-1", "replace"))
-        return await asyncio.wait_for(reader.read(), PATIENCE_S)
+        return await asyncio.wait_for(reader.read(), TIMEOUT_S)
     except ConnectionError:
         return b""
     finally:
@@ -61,14 +60,14 @@ async def raw(case: Operated, *lines: str) -> bytes:
 
 @pytest.mark.parametrize("path", RAW)
 async def test_no_path_leads_out(path: str) -> None:
-    async with operated() as case:
+    async with open_console() as case:
         answer = await raw(case, f"GET {path} HTTP/1.1", f"Host: 127.0.0.1:{case.url.port}")
         assert answer.startswith((b"HTTP/1.1 404", b"HTTP/1.1 400"))
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "HEAD", "TRACE", "CONNECT"])
 async def test_nothing_but_get(method: str) -> None:
-    async with operated() as case:
+    async with open_console() as case:
         answer = await raw(case, f"{method} / HTTP/1.1", f"Host: 127.0.0.1:{case.url.port}")
         assert answer.startswith(b"HTTP/1.1 4")
 
@@ -76,7 +75,7 @@ async def test_nothing_but_get(method: str) -> None:
 @pytest.mark.parametrize("host", ["evil.example", "evil.example:{port}", "127.0.0.1", "127.0.0.1:80", ""])
 async def test_a_host_of_another_name(host: str) -> None:
     """As after DNS rebinding: the page of a stranger that is reached under this address."""
-    async with operated() as case:
+    async with open_console() as case:
         name = host.format(port=case.url.port)
         answer = await raw(case, "GET / HTTP/1.1", f"Host: {name}")
         assert answer.startswith(b"HTTP/1.1 421")
@@ -86,7 +85,7 @@ async def test_a_host_of_another_name(host: str) -> None:
 
 
 async def test_by_another_name_of_this_machine() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         name = f"localhost:{case.url.port}"
         page = await case.connect(host=name, origin=f"http://{name}")
         assert (await page.next("session"))["role"] == "control"
@@ -94,7 +93,7 @@ async def test_by_another_name_of_this_machine() -> None:
 
 @pytest.mark.parametrize("token", [None, "wrong", "%00", "x" * 5000])
 async def test_a_wrong_token_or_none(token: str | None) -> None:
-    async with operated() as case:
+    async with open_console() as case:
         assert await refused(case, token=token) == (403, "a wrong token, or none")
         for path in ("/log", "/report", "/ws"):
             async with case.session.get(case.url.with_path(path).with_query({"token": token or ""})) as answer:
@@ -105,7 +104,7 @@ async def test_a_wrong_token_or_none(token: str | None) -> None:
     "origin", [None, "http://evil.example", "null", "http://127.0.0.1:1", "https://127.0.0.1:{port}"]
 )
 async def test_a_page_from_elsewhere(origin: str | None) -> None:
-    async with operated() as case:
+    async with open_console() as case:
         given = None if origin is None else origin.format(port=case.url.port)
         status, why = await refused(case, origin=given)
         assert status == 403
@@ -113,7 +112,7 @@ async def test_a_page_from_elsewhere(origin: str | None) -> None:
 
 
 async def test_who_has_no_token_may_be_let_watch_and_nothing_more() -> None:
-    async with operated("console.watch_without_token=true") as case:
+    async with open_console("console.watch_without_token=true") as case:
         page = await case.connect(token=None)
         session = await page.next("session")
         assert session["role"] == "watch"
@@ -121,17 +120,17 @@ async def test_who_has_no_token_may_be_let_watch_and_nothing_more() -> None:
         for kind in ("halt", "arm", "take_control", "undo_parameter", "save_toml", "list_recordings"):
             answer = await page.ask(type=kind)
             assert not answer["ok"]
-            assert "only watches" in answer["error"]
+            assert "may only watch" in answer["error"]
         assert case.run.asked == []
         case.cycles()
         assert (await page.next("state"))["cycle"] == 1
         assert await refused(case, token="wrong") == (403, "a wrong token, or none")
-        assert "token=" not in orjson.dumps(page.heard).decode()
-        assert case.token not in orjson.dumps(page.heard).decode()
+        assert "token=" not in orjson.dumps(page.received).decode()
+        assert case.token not in orjson.dumps(page.received).decode()
 
 
 async def test_the_log_tells_where_it_is_and_only_the_log_has_the_token() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         line = next(line for line in case.log if line["event"] == "console")
         assert line["start_url"] == str(case.url)
         assert case.token not in str(line["url"])
@@ -146,22 +145,22 @@ async def test_the_log_tells_where_it_is_and_only_the_log_has_the_token() -> Non
 
 
 async def test_a_message_that_is_too_long() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
         await page.socket.send_str("x" * 65_537)
         assert await page.closed() == aiohttp.WSCloseCode.MESSAGE_TOO_BIG
-        await case.settled(lambda: any("a message that is none" in why for why in case.refusals()), "a refusal")
+        await case.settled(lambda: any("a malformed message" in why for why in case.refusals()), "a refusal")
 
 
 async def test_the_longest_message_there_may_be() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
         await page.socket.send_str(" " * (65_536 - 24) + '{"id": 7, "type":"halt"}')
         assert (await page.answer(7))["ok"]
 
 
 async def test_bytes_are_no_message() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         page = await case.page()
         await page.socket.send_bytes(b'{"id":1,"type":"halt"}')
         assert await page.closed() == aiohttp.WSCloseCode.UNSUPPORTED_DATA
@@ -169,20 +168,20 @@ async def test_bytes_are_no_message() -> None:
 
 
 async def test_too_many_messages_end_it_and_a_halt_among_them_holds() -> None:
-    async with operated(limits=Limits(messages_per_s=50.0)) as case:
+    async with open_console(limits=Limits(messages_per_s=50.0)) as case:
         page = await case.page()
         for _ in range(50):
-            await page.say(type="take_control")
-        await page.say(type="halt")
-        await page.say(type="halt")
+            await page.send(type="take_control")
+        await page.send(type="halt")
+        await page.send(type="halt")
         assert await page.closed() == aiohttp.WSCloseCode.POLICY_VIOLATION
         assert case.run.asked == [Request.HALT]
         assert any("50 messages a second" in why for why in case.refusals())
-        assert (await case.page()).heard[0]["role"] == "control", "the console goes on"
+        assert (await case.page()).received[0]["role"] == "control", "the console goes on"
 
 
 async def test_more_pages_than_there_may_be() -> None:
-    async with operated("console.clients_max=2") as case:
+    async with open_console("console.clients_max=2") as case:
         first, _second = await case.page(), await case.page()
         assert (await refused(case))[0] == 503
         await first.socket.close()
@@ -191,13 +190,13 @@ async def test_more_pages_than_there_may_be() -> None:
 
 
 async def test_more_connections_than_there_may_be() -> None:
-    async with operated(limits=Limits(connections=8)) as case:
+    async with open_console(limits=Limits(connections=8)) as case:
         page = await case.page()
         held = [socket.create_connection(("127.0.0.1", case.url.port or 0)) for _ in range(18)]
         await case.settled(lambda: len(case.refusals()) == 10, "ten that are cut")
-        assert set(case.refusals()) == {"there are too many connections: the oldest is cut"}
+        assert set(case.refusals()) == {"too many connections: the oldest is dropped"}
         assert (await page.ask(type="halt"))["ok"]
-        assert (await case.page()).heard[0]["role"] == "watch", "nobody is kept out"
+        assert (await case.page()).received[0]["role"] == "watch", "nobody is kept out"
         for one in held:
             one.close()
 
@@ -214,11 +213,11 @@ GARBAGE = [
 
 @pytest.mark.parametrize("garbage", GARBAGE)
 async def test_what_is_no_http(garbage: bytes, capfd: pytest.CaptureFixture[str]) -> None:
-    async with operated() as case:
+    async with open_console() as case:
         reader, writer = await asyncio.open_connection("127.0.0.1", case.url.port)
         writer.write(garbage)
         writer.write_eof()
-        await asyncio.wait_for(reader.read(), PATIENCE_S)
+        await asyncio.wait_for(reader.read(), TIMEOUT_S)
         writer.close()
         assert (await (await case.page()).ask(type="halt"))["ok"]
     out, err = capfd.readouterr()
@@ -230,7 +229,7 @@ HANDSHAKES = ["Sec-WebSocket-Key: x", "Sec-WebSocket-Version: 99", "Sec-WebSocke
 
 @pytest.mark.parametrize("header", HANDSHAKES)
 async def test_a_handshake_that_is_none(header: str) -> None:
-    async with operated() as case:
+    async with open_console() as case:
         answer = await raw(
             case,
             f"GET /ws?token={case.token} HTTP/1.1",
@@ -262,7 +261,7 @@ VALUES = [
 async def test_requests_that_make_no_sense(capfd: pytest.CaptureFixture[str]) -> None:
     """Whatever a stranger asks for is no fault of the program, and stops no robot."""
     rng = random.Random(4)
-    async with operated() as case:
+    async with open_console() as case:
         port = case.url.port
         for _ in range(400):
             lines = [f"{rng.choice(METHODS)} {rng.choice(PIECES)} HTTP/1.{rng.choice('01')}"]
@@ -278,14 +277,14 @@ async def test_requests_that_make_no_sense(capfd: pytest.CaptureFixture[str]) ->
 
 
 async def test_requests_in_a_row_on_one_connection_are_answered_once() -> None:
-    async with operated() as case:
+    async with open_console() as case:
         request = f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{case.url.port}\r\n\r\n"
         answer = await raw(case, request * 1000)
         assert answer.count(b"HTTP/1.1 200") <= 1
 
 
 async def test_the_end_is_told_and_leaves_nothing() -> None:
-    async with operated(async_commands=AsyncCommands()) as case:
+    async with open_console() as case:
         pages = [await case.page() for _ in range(3)]
         codes = asyncio.gather(*(page.closed() for page in pages))
         await asyncio.sleep(0)
@@ -297,9 +296,9 @@ async def test_the_next_port_where_one_is_taken() -> None:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        async with operated(f"console.port={port}") as case:
+        async with open_console(f"console.port={port}") as case:
             assert case.url.port is not None
             assert port < case.url.port <= port + 20
-            async with operated(f"console.port={port}") as another:
+            async with open_console(f"console.port={port}") as another:
                 assert another.url.port not in {port, case.url.port}
                 assert another.token != case.token

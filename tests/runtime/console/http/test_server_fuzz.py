@@ -17,7 +17,8 @@ import structlog
 
 from behaviors.teleoperation import Teleoperate
 from drivers.driver import RobotDriver
-from runtime.console.commands.messages import MalformedMessage, read_message
+from runtime.console.commands.messages import MalformedMessage
+from runtime.console.commands.registry import READER
 from runtime.console.console import Console
 from runtime.console.http.client_limits import Limits
 from runtime.cycle.inputs import Request
@@ -26,17 +27,17 @@ from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
 from runtime.support.kernel_loader import KernelLoader
 from runtime.timing.cycle_stats import CycleStats
-from tests.runtime.console.messages import ASKED, EDITS, OF_TIME
-from tests.runtime.console.operated import FREE_PORT, Operated, operated
+from tests.runtime.console.console_case import FREE_PORT, ConsoleCase, open_console
+from tests.runtime.console.sample_messages import ASYNC_COMMANDS, EDITS, ROBOT_REQUESTS
 from tests.runtime.virtual import in_virtual_time
 
 AT_THE_DESK = 70_000
 OVER_THE_WIRE = 30_000
 IN_A_RUN = 4_000
-BOUNDLESS = Limits(messages_per_s=1e9, waiting=10**9, waiting_bytes=10**12)
+BOUNDLESS = Limits(messages_per_s=1e9, queue_messages=10**9, queue_bytes=10**12)
 
 GOOD: list[dict[str, Any]] = [
-    *(row[0] for row in ASKED), *(row[0] for row in EDITS), *(row[0] for row in OF_TIME),
+    *(row[0] for row in ROBOT_REQUESTS), *(row[0] for row in EDITS), *(row[0] for row in ASYNC_COMMANDS),
     {"type": "take_control"}, {"type": "release_control"}, {"type": "grant_control", "client": 2},
     {"type": "evidence", "object": 1}, {"type": "load_model", "toml": "name = 1"}, {"type": "undo_parameter"},
     {"type": "set_parameter", "path": "behaviors.arbiter.base_velocity_m_s", "value": 0.4}, {"type": "save_toml"},
@@ -108,7 +109,7 @@ class NoWire:
 
 def has_form(text: str) -> bool:
     try:
-        read_message(text)
+        READER.read(text)
     except MalformedMessage:
         return False
     return True
@@ -117,7 +118,7 @@ def has_form(text: str) -> bool:
 async def test_at_the_desk() -> None:
     """What has no form does nothing even from who has the control; from a watcher only a HALT does anything."""
     rng = random.Random(1)
-    async with operated(limits=BOUNDLESS) as case:
+    async with open_console(limits=BOUNDLESS) as case:
         hub = case.console.hub
         controller, watcher = (hub.join(NoWire(), name, {}, has_token=True) for name in ("first", "second"))
         stranger = hub.join(NoWire(), "third", {}, has_token=False)
@@ -125,20 +126,20 @@ async def test_at_the_desk() -> None:
         for k, text in enumerate(messages(rng, AT_THE_DESK)):
             if k % 5000 == 0:
                 for client in (controller, watcher, stranger):
-                    client._waiting.clear()
-            case.console.dispatcher.take(stranger, text)
+                    client._queue.clear()
+            case.console.dispatcher.receive(stranger, text)
             assert case.run.asked == []
             if has_form(text):
                 formed += 1
                 if '"take_control"' not in text:
-                    case.console.dispatcher.take(watcher, text)
+                    case.console.dispatcher.receive(watcher, text)
                     assert set(case.run.asked) <= {Request.HALT}
             else:
-                case.console.dispatcher.take(controller, text)
+                case.console.dispatcher.receive(controller, text)
                 assert case.run.asked == []
-                assert orjson.loads(controller._waiting[-1])["ok"] is False
+                assert orjson.loads(controller._queue[-1])["ok"] is False
             case.run.asked.clear()
-        assert hub.control.has(controller)
+        assert hub.control.is_held_by(controller)
         assert formed > 0.01 * AT_THE_DESK, "nothing came near a message: this says little"
         for client in (controller, watcher, stranger):
             hub.leave(client)
@@ -146,7 +147,7 @@ async def test_at_the_desk() -> None:
 
 async def test_over_the_wire() -> None:
     rng = random.Random(2)
-    async with operated(limits=BOUNDLESS) as case:
+    async with open_console(limits=BOUNDLESS) as case:
         first, second = await case.page(), await case.page()
         sent = {id(first): 0, id(second): 0}
         for k, text in enumerate(messages(rng, OVER_THE_WIRE)):
@@ -164,11 +165,11 @@ async def test_over_the_wire() -> None:
         assert case.run.asked[-1] is Request.ARM
 
 
-async def answered(case: Operated, page: Any, count: int) -> None:
+async def answered(case: ConsoleCase, page: Any, count: int) -> None:
     """Hear as many answers as there were messages."""
     for _ in range(count):
         await page.next("answer")
-    page.heard.clear()
+    page.received.clear()
     assert case.run.health.fault() is None
 
 
@@ -200,9 +201,9 @@ def test_a_whole_process_does_not_move(monkeypatch: pytest.MonkeyPatch, *, armed
                     return
                 is_halt = has_form(text) and '"halt"' in text
                 if not is_halt and '"take_control"' not in text:
-                    console.dispatcher.take(watcher if has_form(text) else controller, text)
+                    console.dispatcher.receive(watcher if has_form(text) else controller, text)
             for client in (watcher, controller):
-                client._waiting.clear()
+                client._queue.clear()
 
     with in_virtual_time(monkeypatch, "perception.method=paper", FREE_PORT) as (loop, settings, robot, _links):
         start = robot.truth.pose

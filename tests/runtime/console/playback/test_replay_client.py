@@ -15,7 +15,7 @@ import pytest
 
 from runtime.console.clients.client import Frame
 from runtime.console.frames.frame_encoder import EncodedFrame
-from runtime.console.playback.replay_client import WORKERS_MAX, ReplayClient, ReplayError, report_of
+from runtime.console.playback.replay_client import WORKERS_MAX, ReplayClient, ReplayError, make_report
 from runtime.recording.storage import find_recording, list_recordings
 from runtime.support.child_process import ECHOLOCATE, NICENESS, kill_child, start_child
 from tests.hil.machine import PATIENCE_S
@@ -23,7 +23,7 @@ from tests.recorded import hall, record
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
-PROGRAM = "tests.runtime.console.building"
+PROGRAM = "tests.runtime.console.stub_frames"
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ class Page:
         assert isinstance(frame, EncodedFrame)
         self.frames.append(frame)
 
-    def say(self, message: dict[str, Any]) -> None:
+    def send(self, message: dict[str, Any]) -> None:
         self.said.append(message)
 
     @property
@@ -85,16 +85,16 @@ async def test_a_recording_on_the_page(folder: Path) -> None:
         assert (page.last["cycle"], page.last["segments"]) == (1, {"whole": True})
         changes = orjson.loads(page.frames[-1].encode(follows=True, dropped=3, controls=False))
         assert (changes["segments"], changes["dropped"], changes["controller"]) == ({"whole": False}, 3, False)
-        await made.scrub(page, 3.0)
+        await made.seek(page, 3.0)
         await until(lambda: page.last["cycle"] == 61)
         await made.step(page, -1)
         await until(lambda: page.last["cycle"] == 60)
         await made.play(page, 50.0)
         await until(lambda: page.last["cycle"] == 100 and not page.last["playing"])
-        await made.live(page)
+        await made.close_recording(page)
         assert page.live == [False, True]
         with pytest.raises(ReplayError, match="no recording is open"):
-            await made.scrub(page, 1.0)
+            await made.seek(page, 1.0)
         count = len(page.frames)
         await asyncio.sleep(0)
         assert len(page.frames) == count
@@ -110,7 +110,7 @@ async def test_what_cannot_be_opened(folder: Path) -> None:
             await made.open(page, "broken.mcap")
         assert page.live == []
         with pytest.raises(ReplayError, match="finite"):
-            await made.scrub(page, float("nan"))
+            await made.seek(page, float("nan"))
         for speed in (1e9, -1.0, float("nan")):
             with pytest.raises(ReplayError, match="speed"):
                 await made.play(page, speed)
@@ -126,7 +126,7 @@ async def test_only_so_many_at_a_time_and_none_is_left_behind(folder: Path) -> N
         with pytest.raises(ReplayError, match="open already"):
             await made.open(Page(), "hall.mcap")
         made.leave(pages[0])
-        await until(lambda: not made._ending)
+        await until(lambda: not made._closing)
         another = Page()
         await made.open(another, "hall.mcap")
     for pid in processes:
@@ -142,7 +142,7 @@ async def test_a_player_that_dies_is_told(folder: Path) -> None:
         playing._process.kill()
         await until(lambda: playing.is_over)
         with pytest.raises(ReplayError, match="has ended"):
-            await made.scrub(page, 1.0)
+            await made.seek(page, 1.0)
         await made.open(page, "hall.mcap")
 
 
@@ -189,9 +189,9 @@ async def test_the_page_of_a_run_that_goes_on(folder: Path, tmp_path: Path) -> N
         with pytest.raises(ReplayError, match="nothing is being recorded"):
             await made.report()
     with pytest.raises(ReplayError, match=r"broken\.mcap: holds no message"):
-        await report_of(folder / "broken.mcap", "m")
+        await make_report(folder / "broken.mcap", "m")
     with pytest.raises(ReplayError, match="not done within"):
-        await report_of(cut, "m", patience_s=0.01)
+        await make_report(cut, "m", timeout_s=0.01)
 
 
 async def test_a_process_beside_is_ended_whatever_it_does() -> None:

@@ -14,7 +14,7 @@ from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, RUN_INFO, RawM
 from runtime.recording.reader import RecordingError, open_recording
 from runtime.recording.schema import Bookmark
 from tests.recorded import entries_of, hall, record, rewrite
-from tests.runtime.console.building import told
+from tests.runtime.console.stub_frames import fingerprint
 
 pytestmark = pytest.mark.compiled
 
@@ -37,8 +37,8 @@ def truth(run: Path) -> list[dict[str, Any]]:
     with open_recording(run) as recording:
         playback = ReplayCursor(recording)
         seen = []
-        while (shown := playback.on()) is not None:
-            seen.append(told(shown))
+        while (shown := playback.next_cycle()) is not None:
+            seen.append(fingerprint(shown))
     assert [one["cycle"] for one in seen] == list(range(1, CYCLES + 1))
     return seen
 
@@ -52,11 +52,11 @@ def playback(run: Path) -> Iterator[ReplayCursor]:
 def arrive(playback: ReplayCursor, position: int) -> dict[str, Any]:
     """Go somewhere and return what is there."""
     last, steps = None, 0
-    for shown in playback.to(position):
+    for shown in playback.seek(position):
         last, steps = shown, steps + 1
     assert last is not None
     assert steps <= 2.0 * 20 + LOOK_BACK + 1, "a keyframe is every two seconds"
-    return told(last)
+    return fingerprint(last)
 
 
 def test_what_there_is_to_know(playback: ReplayCursor) -> None:
@@ -78,35 +78,35 @@ def test_anywhere_from_anywhere(playback: ReplayCursor, truth: list[dict[str, An
         assert playback.position == position
         assert playback.t_s == pytest.approx(0.05 * (position - 1))
         if position < CYCLES:
-            shown = playback.on()
+            shown = playback.next_cycle()
             assert shown is not None
-            assert told(shown) == truth[position]
+            assert fingerprint(shown) == truth[position]
     assert arrive(playback, CYCLES + 50) == truth[-1]
-    assert playback.on() is None
+    assert playback.next_cycle() is None
     assert arrive(playback, -3) == truth[0]
 
 
 def test_the_way_back_is_short_once_it_was_gone(
     playback: ReplayCursor, monkeypatch: pytest.MonkeyPatch, truth: list[dict[str, Any]]
 ) -> None:
-    monkeypatch.setattr("runtime.console.playback.replay_cursor.KEPT_EVERY", 10)
-    while playback.on() is not None:
+    monkeypatch.setattr("runtime.console.playback.replay_cursor.KEEP_PERIOD", 10)
+    while playback.next_cycle() is not None:
         pass
     for position in range(CYCLES - 1, CYCLES - 30, -1):
         steps, last = 0, {}
-        for shown in playback.to(position):
-            steps, last = steps + 1, told(shown) if playback.position == position else {}
+        for shown in playback.seek(position):
+            steps, last = steps + 1, fingerprint(shown) if playback.position == position else {}
         assert steps <= 10 + LOOK_BACK
         assert last == truth[position - 1]
     assert playback._kept_bytes <= KEPT_BYTES
 
 
 def test_little_is_kept(playback: ReplayCursor, monkeypatch: pytest.MonkeyPatch, truth: list[dict[str, Any]]) -> None:
-    monkeypatch.setattr("runtime.console.playback.replay_cursor.KEPT_EVERY", 10)
-    list(playback.to(40))
+    monkeypatch.setattr("runtime.console.playback.replay_cursor.KEEP_PERIOD", 10)
+    list(playback.seek(40))
     one = playback._kept_bytes // len(playback._kept)
     monkeypatch.setattr("runtime.console.playback.replay_cursor.KEPT_BYTES", 3 * one)
-    list(playback.to(CYCLES))
+    list(playback.seek(CYCLES))
     assert playback._kept_bytes <= 3 * one
     assert arrive(playback, 120) == truth[119]
 
@@ -120,8 +120,8 @@ def test_a_recording_that_begins_in_the_middle(run: Path, tmp_path: Path, truth:
     with open_recording(path) as recording:
         playback = ReplayCursor(recording)
         seen = []
-        while (shown := playback.on()) is not None:
-            seen.append(told(shown))
+        while (shown := playback.next_cycle()) is not None:
+            seen.append(fingerprint(shown))
         assert 0 < len(seen) < CYCLES
         assert seen == truth[-len(seen) :]
         for position in (len(seen), 1, len(seen) // 2):
@@ -140,8 +140,8 @@ def test_over_a_gap(run: Path, tmp_path: Path, truth: list[dict[str, Any]]) -> N
     with open_recording(path) as recording:
         playback = ReplayCursor(recording)
         assert playback.cycles == CYCLES - 10
-        shown = list(playback.to(playback.position_at(3.0)))[-1]
-        assert told(shown) == truth[shown.record.cycle - 1]
+        shown = list(playback.seek(playback.position_at(3.0)))[-1]
+        assert fingerprint(shown) == truth[shown.record.cycle - 1]
         assert shown.record.cycle > 60
 
 

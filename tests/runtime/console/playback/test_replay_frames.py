@@ -12,8 +12,8 @@ from perception.edits import DeleteSegments
 from runtime.cli.commands.serve_console import PLAYED
 from runtime.console.playback.replay_client import ReplayClient
 from runtime.console.playback.replay_cursor import ReplayCursor
-from runtime.console.playback.replay_frames import make
-from runtime.console.playback.replay_worker import At
+from runtime.console.playback.replay_frames import make_replay_frames
+from runtime.console.playback.replay_worker import PlaybackPosition
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import State
@@ -43,10 +43,10 @@ def test_the_changes_of_all_frames_come_to_the_map_of_the_last(folder: Path) -> 
     seen: dict[int, Any] = {}
     with open_recording(folder / "hall.mcap") as recording:
         playback = ReplayCursor(recording)
-        played = make(parse_settings(recording.info.settings), emulated=recording.info.emulated)
-        for shown in playback.to(playback.cycles):
+        played = make_replay_frames(parse_settings(recording.info.settings), emulated=recording.info.emulated)
+        for shown in playback.seek(playback.cycles):
             played.take(shown.record)
-            picture = played.frame(shown, At(playback.t_s, is_playing=True, speed=2.0))
+            picture = played.frame(shown, PlaybackPosition(playback.t_s, is_playing=True, speed=2.0))
             changes, whole = orjson.loads(picture.changes), orjson.loads(picture.whole)
             if changes["whole"]:
                 seen.clear()
@@ -71,7 +71,7 @@ async def test_a_page_is_shown_a_recording(folder: Path) -> None:
         about = (await players.open(page, "hall.mcap"))["about"]
         assert (len(about["ring"]["mounts"]), about["emulated"], "units" in about) == (24, True, False)
         assert len(about["truth"]["drums"]) > 0
-        await players.scrub(page, 4.0)
+        await players.seek(page, 4.0)
         await until(lambda: bool(page.frames) and page.last["playback"]["s"] == pytest.approx(4.0))
         assert page.last["segments"]["whole"]
         assert len(page.last["segments"]["added"]) > 10

@@ -12,10 +12,10 @@ import orjson
 import pytest
 
 from runtime.console.playback.replay_cursor import ReplayCursor
-from runtime.console.playback.replay_worker import FRAME_S, Picture, ReplayWorker
+from runtime.console.playback.replay_worker import FRAME_PERIOD_S, FrameParts, ReplayWorker
 from runtime.recording.reader import open_recording, parse_settings
 from tests.recorded import hall, record
-from tests.runtime.console.building import make
+from tests.runtime.console.stub_frames import make_stub_frames
 
 pytestmark = pytest.mark.compiled
 
@@ -36,22 +36,25 @@ class Watching:
         self.now_s = 50.0
         self.frames: list[tuple[float, int, int, dict[str, Any]]] = []
         self.worked = 0
-        self.player = ReplayWorker(
-            playback, lambda told: make(parse_settings(told), emulated=True), self._show, lambda: self.now_s
+        self.worker = ReplayWorker(
+            playback,
+            lambda told: make_stub_frames(parse_settings(told), emulated=True),
+            self._show,
+            lambda: self.now_s,
         )
 
-    def _show(self, source: int, number: int, picture: Picture) -> None:
+    def _show(self, source: int, number: int, picture: FrameParts) -> None:
         self.frames.append((self.now_s, source, number, orjson.loads(picture.head + b"}")))
 
     def do(self, **command: object) -> None:
-        self.player.do(command)
+        self.worker.execute(command)
 
     def live(self, seconds: float, work_s: float = 0.0) -> None:
         """Let time go by; each cycle's work takes `work_s`."""
         end_s = self.now_s + seconds
-        while (wait_s := self.player.wait_s) < end_s - self.now_s:
+        while (wait_s := self.worker.wait_s) < end_s - self.now_s:
             self.now_s += wait_s
-            self.player.work()
+            self.worker.advance()
             self.now_s += work_s
             self.worked += 1
         self.now_s = max(self.now_s, end_s)
@@ -68,34 +71,34 @@ def it(run: Path) -> Iterator[Watching]:
 
 
 def test_nothing_happens_by_itself(it: Watching) -> None:
-    assert it.player.wait_s == math.inf
-    it.player.work()
+    assert it.worker.wait_s == math.inf
+    it.worker.advance()
     assert it.frames == []
 
 
 def test_a_scrub_shows_one_frame(it: Watching) -> None:
-    it.do(do="scrub", s=4.0)
+    it.do(do="seek", s=4.0)
     it.live(1.0)
     assert len(it.frames) == 1
     assert (it.last["cycle"], it.last["s"], it.last["playing"]) == (81, 4.0, False)
-    assert it.last["heard"] == 24, "by then the whole ring has been heard"
-    assert it.player.wait_s == math.inf
+    assert it.last["fired"] == 24, "by then the whole ring has been heard"
+    assert it.worker.wait_s == math.inf
 
 
 def test_only_the_last_of_many_scrubs_is_gone_to(it: Watching) -> None:
-    it.do(do="scrub", s=9.0)
+    it.do(do="seek", s=9.0)
     it.live(1.0)
     it.worked = 0
     for s in (1.0, 8.0, 3.0, 7.0):
-        it.do(do="scrub", s=s)
-        it.player.work()
-        it.player.work()
+        it.do(do="seek", s=s)
+        it.worker.advance()
+        it.worker.advance()
     it.live(1.0)
     assert [frame["cycle"] for _, _, _, frame in it.frames] == [181, 141]
 
 
 def test_it_plays_at_its_pace_and_stops_at_the_end(it: Watching) -> None:
-    it.do(do="scrub", s=2.0)
+    it.do(do="seek", s=2.0)
     it.live(0.5)
     it.frames.clear()
     it.do(do="play", speed=1.0)
@@ -107,7 +110,7 @@ def test_it_plays_at_its_pace_and_stops_at_the_end(it: Watching) -> None:
         assert frame["playing"]
     it.live(20.0)
     assert (it.last["cycle"], it.last["playing"]) == (CYCLES, False)
-    assert it.player.wait_s == math.inf
+    assert it.worker.wait_s == math.inf
     it.do(do="play", speed=2.0)
     it.live(1.0)
     assert it.last["s"] == pytest.approx(2.0, abs=0.12), "from the beginning again"
@@ -118,7 +121,7 @@ def test_frames_are_no_closer_however_fast_it_goes(it: Watching) -> None:
     it.live(0.4)
     times = [now_s for now_s, _, _, _ in it.frames]
     assert len(times) >= 4
-    assert min(b - a for a, b in itertools.pairwise(times)) >= FRAME_S - 1e-9
+    assert min(b - a for a, b in itertools.pairwise(times)) >= FRAME_PERIOD_S - 1e-9
     assert it.last["s"] == pytest.approx(8.0, abs=1.1)
     numbers = [(source, number) for _, source, number, _ in it.frames]
     assert numbers == [(1, n + 1) for n in range(len(numbers))]
@@ -141,7 +144,7 @@ def test_steps_on_and_back(it: Watching) -> None:
         it.do(do="step", cycles=cycles)
         it.live(0.5)
         at += cycles
-        assert (it.last["cycle"], it.last["playing"], it.last["heard"]) == (at, False, 24)
+        assert (it.last["cycle"], it.last["playing"], it.last["fired"]) == (at, False, 24)
     it.do(do="step", cycles=5)
     it.do(do="step", cycles=5)
     it.live(0.5)
@@ -152,11 +155,11 @@ def test_steps_on_and_back(it: Watching) -> None:
 
 
 def test_a_jump_begins_another_source_and_going_on_does_not(it: Watching) -> None:
-    it.do(do="scrub", s=1.0)
+    it.do(do="seek", s=1.0)
     it.live(0.5)
     it.do(do="step", cycles=1)
     it.live(0.5)
-    it.do(do="scrub", s=0.2)
+    it.do(do="seek", s=0.2)
     it.live(0.5)
     assert [source for _, source, _, _ in it.frames] == [1, 1, 2]
     assert [number for _, _, number, _ in it.frames] == [1, 2, 1]
@@ -165,7 +168,7 @@ def test_a_jump_begins_another_source_and_going_on_does_not(it: Watching) -> Non
 def test_a_scrub_while_it_plays_goes_on_from_there(it: Watching) -> None:
     it.do(do="play", speed=1.0)
     it.live(1.0)
-    it.do(do="scrub", s=6.0)
+    it.do(do="seek", s=6.0)
     it.live(1.0)
     assert it.last["s"] == pytest.approx(7.0, abs=0.1)
     it.do(do="play", speed=0)
@@ -176,9 +179,9 @@ def test_a_scrub_while_it_plays_goes_on_from_there(it: Watching) -> None:
 
 @pytest.mark.parametrize(
     "command",
-    [{}, {"do": "dance"}, {"do": "scrub"}, {"do": "play", "speed": 1e9}, {"do": "play", "speed": -1.0},
+    [{}, {"do": "dance"}, {"do": "seek"}, {"do": "play", "speed": 1e9}, {"do": "play", "speed": -1.0},
      {"do": "step", "cycles": None}],
 )  # fmt: skip
 def test_what_is_no_command(it: Watching, command: dict[str, Any]) -> None:
     with pytest.raises((ValueError, KeyError, TypeError)):
-        it.player.do(command)
+        it.worker.execute(command)

@@ -1,4 +1,4 @@
-"""Every message that a page may send, and what it comes to."""
+"""A sample message of every command, and what it results in."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from perception.edits import (
 from runtime.cycle.drive_requests import Legs
 from runtime.cycle.inputs import Request
 
-ASKED: list[tuple[dict[str, Any], object]] = [
+ROBOT_REQUESTS: list[tuple[dict[str, Any], object]] = [
     ({"type": "halt"}, Request.HALT),
     ({"type": "arm"}, Request.ARM),
     ({"type": "disarm"}, Request.DISARM),
@@ -26,6 +26,7 @@ ASKED: list[tuple[dict[str, Any], object]] = [
     ({"type": "goal", "x": 1, "y": -2.5}, Goal(1.0, -2.5)),
     ({"type": "teleoperate", "v": 0.2, "w": -1}, Teleoperate(0.2, -1.0, 0.25)),
 ]
+"""With what the robot's process is asked for."""
 EDITS: list[tuple[dict[str, Any], object]] = [
     ({"type": "clear_map"}, ClearMap()),
     ({"type": "delete_segments", "numbers": [3, 1]}, DeleteSegments((3, 1))),
@@ -38,17 +39,8 @@ EDITS: list[tuple[dict[str, Any], object]] = [
     ({"type": "reject_object", "object": 4}, RejectObject(4)),
     ({"type": "confirm_object", "object": 4}, ConfirmObject(4)),
 ]
-OTHERS = {
-    "take_control",
-    "release_control",
-    "grant_control",
-    "evidence",
-    "load_model",
-    "set_parameter",
-    "undo_parameter",
-    "save_toml",
-}
-OF_TIME: list[tuple[dict[str, Any], str]] = [
+"""With the edit that the next cycle carries out."""
+ASYNC_COMMANDS: list[tuple[dict[str, Any], str]] = [
     ({"type": "pause"}, "pause"),
     ({"type": "resume"}, "resume"),
     ({"type": "single_step"}, "single_step"),
@@ -57,8 +49,23 @@ OF_TIME: list[tuple[dict[str, Any], str]] = [
     ({"type": "bookmark", "text": "here"}, "bookmark here"),
     ({"type": "list_recordings"}, "recordings"),
     ({"type": "open_recording", "file": "run.mcap"}, "open run.mcap"),
-    ({"type": "seek_recording", "s": 1.5}, "scrub 1.5"),
+    ({"type": "seek_recording", "s": 1.5}, "seek 1.5"),
     ({"type": "play_recording", "speed": 1}, "play 1.0"),
     ({"type": "step_recording", "cycles": -3}, "step -3"),
-    ({"type": "close_recording"}, "live"),
+    ({"type": "close_recording"}, "close_recording"),
+]
+"""With what the stub of time control, recording and replay notes."""
+OTHERS: list[dict[str, Any]] = [
+    {"type": "take_control"},
+    {"type": "release_control"},
+    {"type": "grant_control", "client": 2},
+    {"type": "evidence", "object": 1},
+    {"type": "load_model", "toml": "name = 1"},
+    {"type": "set_parameter", "path": "behaviors.arbiter.base_velocity_m_s", "value": 0.4},
+    {"type": "undo_parameter"},
+    {"type": "save_toml"},
+]
+ALL: list[dict[str, Any]] = [
+    *(message for table in (ROBOT_REQUESTS, EDITS, ASYNC_COMMANDS) for message, _ in table),
+    *OTHERS,
 ]

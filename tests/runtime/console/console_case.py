@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import time
+import time as host_time
 from collections.abc import AsyncIterator, Callable, Mapping, MutableMapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -21,9 +21,9 @@ from drivers.driver import LineState, Received
 from drivers.messages import Firing, Flags, LinkCounts, Odometry, Pose, Twist
 from perception.edits import Edit, Evidence
 from perception.pipeline import Perception
-from runtime.console.commands.async_commands import AsyncCommands
 from runtime.console.console import Console
 from runtime.console.http.client_limits import Limits
+from runtime.console.protocols import RecordingControl, ReplayControl
 from runtime.cycle.drive_requests import DriveRequest
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode, ModeState
@@ -33,9 +33,10 @@ from runtime.support.health import Health
 from runtime.support.kernel_loader import KernelLoader
 from runtime.timing.clock_sampler import ClockSampler
 from runtime.timing.cycle_stats import CycleStats
+from runtime.timing.time_control import TimeControl
 from runtime.timing.timing_monitor import TimingMonitor
 
-PATIENCE_S = 20.0
+TIMEOUT_S = 20.0
 FREE_PORT = "console.port=0"
 
 
@@ -86,20 +87,20 @@ class Page:
 
     def __init__(self, socket: aiohttp.ClientWebSocketResponse) -> None:
         self.socket = socket
-        self.heard: list[dict[str, Any]] = []
+        self.received: list[dict[str, Any]] = []
         self._id = 0
 
     async def next(self, *kinds: str) -> dict[str, Any]:
         """Return the next message of some kind, keeping all on the way to it."""
         while True:
-            message = await asyncio.wait_for(self.socket.receive(), PATIENCE_S)
+            message = await asyncio.wait_for(self.socket.receive(), TIMEOUT_S)
             assert message.type is aiohttp.WSMsgType.TEXT, message
             told: dict[str, Any] = orjson.loads(message.data)
-            self.heard.append(told)
+            self.received.append(told)
             if told["type"] in kinds:
                 return told
 
-    async def say(self, **message: Any) -> int:
+    async def send(self, **message: Any) -> int:
         self._id += 1
         await self.socket.send_str(orjson.dumps({"id": self._id, **message}).decode())
         return self._id
@@ -111,19 +112,19 @@ class Page:
 
     async def ask(self, **message: Any) -> dict[str, Any]:
         """Say something and return the answer."""
-        return await self.answer(await self.say(**message))
+        return await self.answer(await self.send(**message))
 
     async def closed(self) -> int | None:
         """Wait until the server has closed the connection; return its code."""
         while True:
-            message = await asyncio.wait_for(self.socket.receive(), PATIENCE_S)
+            message = await asyncio.wait_for(self.socket.receive(), TIMEOUT_S)
             if message.type in {aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSED, aiohttp.WSMsgType.CLOSING,
                                 aiohttp.WSMsgType.ERROR}:  # fmt: skip
                 return self.socket.close_code
 
 
 @dataclass
-class Operated:
+class ConsoleCase:
     """A console, its robot, and whoever looks at it."""
 
     run: FakeRun
@@ -188,20 +189,25 @@ class Operated:
 
     def refusals(self) -> list[str]:
         """Return what the log says was refused."""
-        return [str(line["why"]) for line in self.log if line["event"] == "the console refused"]
+        return [str(line["reason"]) for line in self.log if line["event"] == "console refused"]
 
     async def settled(self, done: Callable[[], bool], what: str) -> None:
         """Let the loop go on until something is so."""
-        end_s = time.monotonic() + PATIENCE_S
+        end_s = host_time.monotonic() + TIMEOUT_S
         while not done():
-            assert time.monotonic() < end_s, f"it never came: {what}"
+            assert host_time.monotonic() < end_s, f"it never came: {what}"
             await asyncio.sleep(0.001)
 
 
 @contextlib.asynccontextmanager
-async def operated(
-    *sets: str, async_commands: AsyncCommands | None = None, limits: Limits | None = None, emulated: bool = True
-) -> AsyncIterator[Operated]:
+async def open_console(
+    *sets: str,
+    time: TimeControl | None = None,
+    recording: RecordingControl | None = None,
+    replay: ReplayControl | None = None,
+    limits: Limits | None = None,
+    emulated: bool = True,
+) -> AsyncIterator[ConsoleCase]:
     """Open a console; its clock goes on with cycles only."""
     lines: list[dict[str, Any]] = []
     clock = [1000.0]
@@ -214,13 +220,13 @@ async def operated(
     settings = load_settings("hallway", ["perception.method=paper", FREE_PORT, *sets])
     run = FakeRun(settings, log)
     console = Console(
-        run, settings, log, run.reconfigure, KernelLoader(log), emulated=emulated, async_commands=async_commands,
-        limits=limits, clock=lambda: clock[0],
+        run, settings, log, run.reconfigure, KernelLoader(log), emulated=emulated, time=time,
+        recording=recording, replay=replay, limits=limits, clock=lambda: clock[0],
     )  # fmt: skip
     before = asyncio.all_tasks()
     with run.health.catching_unhandled_errors():
         async with aiohttp.ClientSession() as session, console.open():
-            yield Operated(run, console, session, lines, clock)
+            yield ConsoleCase(run, console, session, lines, clock)
         left = [task for task in asyncio.all_tasks() - before if "aiohttp.connector" not in repr(task)]
         assert not left, "a task outlived the console"
     assert run.health.fault() is None

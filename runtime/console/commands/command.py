@@ -1,0 +1,79 @@
+"""What a console command consists of, and what its handler is given."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, Final, Generic, NamedTuple, TypeVar
+
+from runtime.console.clients.client import Client
+from runtime.console.clients.client_hub import ClientHub
+from runtime.console.commands.tuning import Tuning
+from runtime.console.protocols import RecordingControl, ReplayControl, Robot
+from runtime.timing.time_control import TimeControl
+
+Arguments = TypeVar("Arguments")
+
+ANSWERED_LATER: Final = object()
+"""A handler returns this if the answer is sent by others once the outcome is known."""
+
+
+class Permission(Enum):
+    """What a client needs in order to give a command."""
+
+    TOKEN = "token"  # noqa: S105 - the name of a permission, no secret
+    """The run's token."""
+    CONTROL = "control"
+    """The run's token and control of the robot, which one client has at a time."""
+
+
+class PendingEdit(NamedTuple):
+    """An edit that the next cycle carries out, and the message to answer then."""
+
+    client: Client
+    id: int
+
+
+@dataclass(slots=True)
+class CommandContext:
+    """The parts of the run that commands act on."""
+
+    robot: Robot
+    hub: ClientHub
+    tuning: Tuning
+    clock: Callable[[], float]
+    """Monotonic, s."""
+    time: TimeControl | None = None
+    recording: RecordingControl | None = None
+    replay: ReplayControl | None = None
+    pending_edits: deque[PendingEdit] = field(default_factory=deque)
+    """In the order in which the cycle carries them out."""
+    is_teleoperated: bool = False
+    """Whether the last drive request was a velocity from a client's teleoperation."""
+
+
+class Call(NamedTuple):
+    """One command given by one client."""
+
+    context: CommandContext
+    client: Client
+    id: int
+    """Of the message."""
+    name: str
+    """Of the command."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command(Generic[Arguments]):
+    """A command that clients may give."""
+
+    name: str
+    """The `type` of its messages."""
+    type: type[Arguments]
+    """A frozen dataclass of its arguments: an edit or a drive request itself, or one of `messages`."""
+    permission: Permission
+    handler: Callable[[Call, Arguments], Any]
+    """Carries it out and returns the data of the answer; raises CommandError if it cannot. A coroutine function runs
+    as a task of its own, one at a time for each client."""

@@ -1,0 +1,128 @@
+"""Handlers of the commands that are carried out at once or by the next cycle.
+
+Everything that moves the robot or changes its map becomes an input of the next cycle. Only HALT goes out at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from behaviors.move_to_goal import Goal
+from behaviors.teleoperation import Teleoperate
+from config.reload import Difference
+from perception.edits import Edit
+from runtime.console.commands.command import ANSWERED_LATER, Call, PendingEdit
+from runtime.console.commands.command_error import CommandError
+from runtime.console.commands.messages import GetEvidence, GrantControl, NoArguments, SetParameter
+from runtime.cycle.drive_requests import Legs
+from runtime.cycle.inputs import Request
+
+
+def request_mode(call: Call, _: NoArguments) -> None:
+    """Request HALT, ARM or DISARM, whichever the command is called."""
+    call.context.robot.request(Request(call.name))
+
+
+def request_drive(call: Call, request: Legs | Goal) -> None:
+    """Replace the drive request."""
+    call.context.is_teleoperated = False
+    call.context.robot.drive_request(request)
+
+
+def teleoperate(call: Call, request: Teleoperate) -> None:
+    """Replace the drive request by a velocity, which expires unless it is repeated."""
+    limit_s = call.context.tuning.current.behaviors.teleoperation.message_age_max_s
+    call.context.is_teleoperated = True
+    call.context.robot.drive_request(replace(request, valid_s=limit_s))
+
+
+def take_control(call: Call, _: NoArguments) -> None:
+    """Give the client control of the robot if it is free; otherwise ask the client that has it.
+
+    Raises
+    ------
+    CommandError
+        Another client has control and was asked.
+    """
+    _refuse_if(call.context.hub.control.request(call.client, call.context.clock()))
+
+
+def release_control(call: Call, _: NoArguments) -> None:
+    """Take control away from the client that has it."""
+    call.context.hub.control.release()
+
+
+def grant_control(call: Call, to: GrantControl) -> None:
+    """Hand control over to the client that requested it.
+
+    Raises
+    ------
+    CommandError
+        That client did not request it.
+    """
+    _refuse_if(call.context.hub.control.grant(to.client))
+
+
+def edit(call: Call, edit: Edit) -> object:
+    """Queue an edit of the map for the next cycle; the answer follows that cycle.
+
+    Raises
+    ------
+    CommandError
+        Too many edits are queued.
+    """
+    if not call.context.robot.edit(edit):
+        raise CommandError("too many edits are waiting for the next cycle: try again")
+    call.context.pending_edits.append(PendingEdit(call.client, call.id))
+    return ANSWERED_LATER
+
+
+def get_evidence(call: Call, about: GetEvidence) -> dict[str, Any]:
+    """Return what supports and opposes an object, as the page shows it.
+
+    Raises
+    ------
+    CommandError
+        There is no such object.
+    """
+    found = call.context.robot.evidence(about.object)
+    if found is None:
+        raise CommandError(f"object {about.object} no longer exists: choose one from the list of objects")
+    return {
+        "object": found.object,
+        "model": found.model,
+        "for": found.supporting,
+        "against": -found.opposing,
+        "readings": [[a.x, a.y, a.range_m, a.direction, a.nats] for a in found.arcs],
+        "lines": [[line.number, line.x1, line.y1, line.x2, line.y2, line.supports] for line in found.lines],
+        "rivals": found.rivals,
+    }
+
+
+def set_parameter(call: Call, change: SetParameter) -> list[dict[str, Any]]:
+    """Change one live setting; return the values that changed."""
+    return _changed_values(call.context.tuning.set(change.path, change.value))
+
+
+def undo_parameter(call: Call, _: NoArguments) -> dict[str, Any] | list[dict[str, Any]]:
+    """Take the last change of settings back; return the value that changed, or the values."""
+    rows = _changed_values(call.context.tuning.undo())
+    return rows[0] if len(rows) == 1 else rows
+
+
+def save_toml(call: Call, _: NoArguments) -> str:
+    """Return all settings as the text of a run file."""
+    return call.context.tuning.saved()
+
+
+def _refuse_if(reason: str | None) -> None:
+    if reason is not None:
+        raise CommandError(reason)
+
+
+def _changed_values(changed: Sequence[Difference]) -> list[dict[str, Any]]:
+    """Return the changes of plain values, as the page shows them."""
+    plain = (bool, int, float, str, type(None))
+    return [{"path": d.path, "value": d.after} for d in changed if isinstance(d.after, plain)]

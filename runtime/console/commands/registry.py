@@ -1,0 +1,64 @@
+"""The one list of all console commands: name, arguments, permission and handler of each."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import Any, Final
+
+from behaviors.move_to_goal import Goal
+from behaviors.teleoperation import Teleoperate
+from perception.edits import (
+    ClearMap,
+    ConfirmObject,
+    DeleteSegments,
+    MoveObject,
+    PinSegments,
+    PlaceModel,
+    RejectObject,
+)
+from runtime.console.commands import async_commands, handlers
+from runtime.console.commands import messages as arguments
+from runtime.console.commands.command import Command, Permission
+from runtime.console.commands.messages import MessageReader, NoArguments
+from runtime.cycle.drive_requests import Legs
+
+TOKEN, CONTROL = Permission.TOKEN, Permission.CONTROL
+
+_ALL: Final[tuple[Command[Any], ...]] = (
+    Command("halt", NoArguments, TOKEN, handlers.request_mode),
+    Command("arm", NoArguments, CONTROL, handlers.request_mode),
+    Command("disarm", NoArguments, CONTROL, handlers.request_mode),
+    Command("take_control", NoArguments, TOKEN, handlers.take_control),
+    Command("release_control", NoArguments, CONTROL, handlers.release_control),
+    Command("grant_control", arguments.GrantControl, CONTROL, handlers.grant_control),
+    Command("legs", Legs, CONTROL, handlers.request_drive),
+    Command("goal", Goal, CONTROL, handlers.request_drive),
+    Command("teleoperate", Teleoperate, CONTROL, handlers.teleoperate),
+    Command("clear_map", ClearMap, CONTROL, handlers.edit),
+    Command("delete_segments", DeleteSegments, CONTROL, handlers.edit),
+    Command("pin_segments", PinSegments, CONTROL, handlers.edit),
+    Command("place_model", PlaceModel, CONTROL, handlers.edit),
+    Command("move_object", MoveObject, CONTROL, handlers.edit),
+    Command("reject_object", RejectObject, CONTROL, handlers.edit),
+    Command("confirm_object", ConfirmObject, CONTROL, handlers.edit),
+    Command("evidence", arguments.GetEvidence, TOKEN, handlers.get_evidence),
+    Command("load_model", arguments.LoadModel, CONTROL, async_commands.load_model),
+    Command("set_parameter", arguments.SetParameter, CONTROL, handlers.set_parameter),
+    Command("undo_parameter", NoArguments, CONTROL, handlers.undo_parameter),
+    Command("save_toml", NoArguments, TOKEN, handlers.save_toml),
+    Command("pause", NoArguments, CONTROL, async_commands.pause),
+    Command("resume", NoArguments, CONTROL, async_commands.resume),
+    Command("single_step", NoArguments, CONTROL, async_commands.single_step),
+    Command("set_speed", arguments.SetSpeed, CONTROL, async_commands.set_speed),
+    Command("record", arguments.Record, CONTROL, async_commands.record),
+    Command("bookmark", arguments.AddBookmark, CONTROL, async_commands.add_bookmark),
+    Command("list_recordings", NoArguments, TOKEN, async_commands.list_recordings),
+    Command("open_recording", arguments.OpenRecording, TOKEN, async_commands.open_recording),
+    Command("seek_recording", arguments.SeekRecording, TOKEN, async_commands.seek_recording),
+    Command("play_recording", arguments.PlayRecording, TOKEN, async_commands.play_recording),
+    Command("step_recording", arguments.StepRecording, TOKEN, async_commands.step_recording),
+    Command("close_recording", NoArguments, TOKEN, async_commands.close_recording),
+)
+
+COMMANDS: Final = MappingProxyType({command.name: command for command in _ALL})
+READER: Final = MessageReader({command.name: command.type for command in _ALL})
