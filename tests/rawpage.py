@@ -11,7 +11,7 @@ import threading
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-PATIENCE_S = 30.0
+TIMEOUT_S = 30.0
 READ_BYTES = 65_536
 
 
@@ -30,7 +30,7 @@ class RawPage:
         parts = urlsplit(url)
         token = parse_qs(parts.query)["token"][0]
         self.socket = socket.socket()
-        self.socket.settimeout(PATIENCE_S)
+        self.socket.settimeout(TIMEOUT_S)
         if receive_bytes is not None:
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_bytes)
         self.socket.connect((parts.hostname, parts.port))

@@ -14,7 +14,7 @@ import serial
 
 from config.robot import LinkConfig
 from drivers.link import Link
-from tests.hil.machine import PATIENCE_S
+from tests.hil.machine import TIMEOUT_S
 
 T = TypeVar("T")
 
@@ -51,7 +51,7 @@ class Ends:
 
         loop.add_reader(self.master, ready)
         try:
-            await asyncio.wait_for(full.wait(), PATIENCE_S)
+            await asyncio.wait_for(full.wait(), TIMEOUT_S)
         finally:
             loop.remove_reader(self.master)
         return bytes(got)
@@ -77,7 +77,7 @@ class Host:
 
 
 async def soon(queue: asyncio.Queue[T]) -> T:
-    return await asyncio.wait_for(queue.get(), PATIENCE_S)
+    return await asyncio.wait_for(queue.get(), TIMEOUT_S)
 
 
 @contextlib.asynccontextmanager
@@ -88,5 +88,5 @@ async def running(link: Link) -> AsyncIterator[asyncio.Task[None]]:
     finally:
         task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
-            await asyncio.wait_for(task, PATIENCE_S)
+            await asyncio.wait_for(task, TIMEOUT_S)
         assert not link.is_open

@@ -15,7 +15,7 @@ import serial
 from config.robot import LinkConfig
 from drivers.link import Link, LinkError
 from tests.drivers.ends import Ends, Host, running, soon
-from tests.hil.machine import PATIENCE_S, stalls_excused
+from tests.hil.machine import TIMEOUT_S, stalls_excused
 
 pytestmark = pytest.mark.usefixtures("loop_complaints")
 
@@ -51,7 +51,7 @@ async def test_what_is_sent_leaves_though_the_loop_is_held_up_right_then(ends: E
         await soon(host.opened)
         assert link.send(b"drive")
         assert link.waiting == 0
-        ready, _, _ = select.select([ends.master], [], [], PATIENCE_S)
+        ready, _, _ = select.select([ends.master], [], [], TIMEOUT_S)
         assert ready, "it waits for a turn of the loop"
         assert os.read(ends.master, 64) == b"drive"
 
@@ -162,13 +162,13 @@ async def test_a_port_that_never_opens_does_not_hold_the_loop(ends: Ends) -> Non
     late = Late()  # kept here, or the garbage collector would close it
 
     def opener(_: LinkConfig) -> serial.Serial:
-        release.wait(PATIENCE_S)
+        release.wait(TIMEOUT_S)
         return late
 
     with pytest.raises(LinkError, match="does not come to an end"):
-        await asyncio.wait_for(host.link(ends.path, opener=opener, open_timeout_s=0.02).open_once(), PATIENCE_S)
+        await asyncio.wait_for(host.link(ends.path, opener=opener, open_timeout_s=0.02).open_once(), TIMEOUT_S)
     release.set()
-    assert await asyncio.to_thread(closed.wait, PATIENCE_S), "what opens too late is closed again"
+    assert await asyncio.to_thread(closed.wait, TIMEOUT_S), "what opens too late is closed again"
 
 
 @stalls_excused

@@ -17,7 +17,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from config.robot import LinkConfig
 from drivers.link import Link
 from tests.drivers.ends import Ends
-from tests.hil.machine import PATIENCE_S
+from tests.hil.machine import TIMEOUT_S
 
 WAITING_MAX = 4096
 
@@ -62,7 +62,7 @@ class LinkMachine(RuleBasedStateMachine):
 
     def until(self, done: Callable[[], bool], what: str) -> None:
         async def wait() -> None:
-            async with asyncio.timeout(PATIENCE_S):
+            async with asyncio.timeout(TIMEOUT_S):
                 while not done():
                     await asyncio.sleep(0.001)
 
@@ -172,7 +172,7 @@ class LinkMachine(RuleBasedStateMachine):
         assert self.task is not None
         self.task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
-            self.loop.run_until_complete(asyncio.wait_for(self.task, PATIENCE_S))
+            self.loop.run_until_complete(asyncio.wait_for(self.task, TIMEOUT_S))
 
     @invariant()
     def nothing_piles_up_and_nothing_is_told_twice(self) -> None:

@@ -14,7 +14,7 @@ from config.robot import LinkConfig
 from drivers.link import Link, LinkError
 from drivers.serial_port import open_port
 from tests.drivers.ends import Ends, Host, running, soon
-from tests.hil.machine import PATIENCE_S
+from tests.hil.machine import TIMEOUT_S
 
 pytestmark = pytest.mark.usefixtures("loop_complaints")
 
@@ -65,7 +65,7 @@ async def test_close_on_a_stalled_peer_never_reports_connection_lost(ends: Ends)
         await soon(host.opened)
         while link.send(bytes(64)):
             await asyncio.sleep(0)
-        await asyncio.wait_for(link.stop(), PATIENCE_S)
+        await asyncio.wait_for(link.stop(), TIMEOUT_S)
         assert host.closed.get_nowait() == "it was closed at this end"
         assert not link.is_open
         assert link.waiting == 0
@@ -98,17 +98,17 @@ async def test_opening_blocks(ends: Ends) -> None:
 
     def opener(config: LinkConfig) -> serial.Serial:
         assert threading.current_thread() is not threading.main_thread()
-        release.wait(PATIENCE_S)
+        release.wait(TIMEOUT_S)
         return open_port(config)
 
-    link = host.link(ends.path, opener=opener, open_timeout_s=PATIENCE_S)
+    link = host.link(ends.path, opener=opener, open_timeout_s=TIMEOUT_S)
     opening = asyncio.create_task(link.open_once())
     while ticks < 20:
         await asyncio.sleep(0.001)
         ticks += 1
         assert not opening.done()
     release.set()
-    await asyncio.wait_for(opening, PATIENCE_S)
+    await asyncio.wait_for(opening, TIMEOUT_S)
     await soon(host.opened)
     await link.stop()
 
@@ -119,20 +119,20 @@ async def test_wait_for_swallows_a_cancellation_that_comes_with_the_result(ends:
     host, release, ports = Host(), threading.Event(), list[serial.Serial]()
 
     def opener(config: LinkConfig) -> serial.Serial:
-        release.wait(PATIENCE_S)
+        release.wait(TIMEOUT_S)
         if not opens:
             raise serial.SerialException(2, "no such port")
         ports.append(open_port(config))
         return ports[-1]
 
-    link = host.link(ends.path, opener=opener, open_timeout_s=PATIENCE_S)
+    link = host.link(ends.path, opener=opener, open_timeout_s=TIMEOUT_S)
     task = asyncio.create_task(link.run())
     await asyncio.sleep(0)
     (thread,) = [one for one in threading.enumerate() if one.name == f"open {ends.path}"]
     release.set()
     thread.join()  # what it has to say waits for the loop's next turn; so does the cancellation behind it
     asyncio.get_running_loop().call_soon(task.cancel)
-    done, _ = await asyncio.wait([task], timeout=PATIENCE_S)
+    done, _ = await asyncio.wait([task], timeout=TIMEOUT_S)
     assert done, "it was told to end and goes on for ever"
     assert task.cancelled()
     assert not any(port.is_open for port in ports)

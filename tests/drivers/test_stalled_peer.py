@@ -23,7 +23,7 @@ from drivers.link import Link
 from drivers.messages import Twist
 from tests.drivers.cable import CYCLE_STEPS, ROBOT, STEP_S, Cable
 from tests.drivers.ends import Ends, running
-from tests.hil.machine import PATIENCE_S, stalls_excused
+from tests.hil.machine import TIMEOUT_S, stalls_excused
 
 pytestmark = pytest.mark.promise("P6")
 
@@ -162,7 +162,7 @@ class Host:
             await asyncio.sleep(CYCLE_S)
 
     async def until(self, done: Callable[[], bool]) -> None:
-        async with asyncio.timeout(PATIENCE_S):
+        async with asyncio.timeout(TIMEOUT_S):
             while not done():
                 await asyncio.sleep(TICK_S)
 
@@ -261,7 +261,7 @@ async def test_the_newest_drive_wins_over_a_full_line(tmp_path: Path, measured: 
             assert host.unsent_max <= UNSENT_MAX
             assert host.down_s is None
             peer.deaf = False
-            async with asyncio.timeout(PATIENCE_S):
+            async with asyncio.timeout(TIMEOUT_S):
                 while not any(isinstance(f, Drive) and f.v_mm_s == newest for f in peer.heard[-3:]):
                     host.send()
                     host.driver.tick(time.monotonic())

@@ -1,9 +1,8 @@
-"""What this machine does to any program just now: whether it stood still, and how long a start takes it.
+"""State of the machine during a test: whether it stalled, and how long a bare start takes.
 
-Tests in real time judge a program, not the machine they run on. A virtual machine that is put aside for half a second
-stops the robot, as it must, and fails a test that says nothing is wrong with the program. So a witness that does
-nothing but wake runs beside each trial: where it saw the machine stand still a failed trial says nothing, and is
-repeated. Where it saw no such thing a failure is one, and no trial is repeated.
+Real-time tests check a program, not the machine that runs it. A virtual machine that stalls for half a second stops
+the robot, as it must, and fails a test although the program is correct. Therefore a witness that only sleeps and wakes
+runs during each trial. A failed trial during which the machine stalled is repeated; any other failure counts.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
-PATIENCE_S: Final = 60.0
+TIMEOUT_S: Final = 60.0
 """For what must come at once on any machine: only what hangs takes so long."""
 
 TRIALS: Final = 4
@@ -84,13 +83,13 @@ def _may_repeat(witness: Witness, number: int, error: Exception) -> bool:
     return True
 
 
-def _anew(told: dict[str, Any], number: int) -> dict[str, Any]:
+def _arguments_of_trial(arguments: dict[str, Any], number: int) -> dict[str, Any]:
     """Give a repeated trial a folder of its own."""
-    if number == 1 or not isinstance(told.get("tmp_path"), Path):
-        return told
-    folder = told["tmp_path"] / f"trial{number}"
+    if number == 1 or not isinstance(arguments.get("tmp_path"), Path):
+        return arguments
+    folder = arguments["tmp_path"] / f"trial{number}"
     folder.mkdir()
-    return {**told, "tmp_path": folder}
+    return {**arguments, "tmp_path": folder}
 
 
 def stalls_excused(test: AnyTest) -> AnyTest:
@@ -98,11 +97,11 @@ def stalls_excused(test: AnyTest) -> AnyTest:
     if inspect.iscoroutinefunction(test):
 
         @functools.wraps(test)
-        async def repeated_async(**told: Any) -> None:
+        async def repeated_async(**arguments: Any) -> None:
             for number in range(1, TRIALS + 1):
                 with Witness() as witness:
                     try:
-                        await test(**_anew(told, number))
+                        await test(**_arguments_of_trial(arguments, number))
                     except Exception as error:
                         if not _may_repeat(witness, number, error):
                             raise
@@ -112,11 +111,11 @@ def stalls_excused(test: AnyTest) -> AnyTest:
         return cast(AnyTest, repeated_async)
 
     @functools.wraps(test)
-    def repeated(**told: Any) -> None:
+    def repeated(**arguments: Any) -> None:
         for number in range(1, TRIALS + 1):
             with Witness() as witness:
                 try:
-                    test(**_anew(told, number))
+                    test(**_arguments_of_trial(arguments, number))
                 except Exception as error:
                     if not _may_repeat(witness, number, error):
                         raise
@@ -127,7 +126,7 @@ def stalls_excused(test: AnyTest) -> AnyTest:
 
 
 class BareStarts:
-    """Starts Python and imports numba, over and over, beside what is tried: a start that is not ours.
+    """Starts Python and imports numba, repeatedly, during a trial: the start-up time of the machine itself.
 
     Attributes
     ----------

@@ -15,15 +15,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from tests.hil.machine import PATIENCE_S
+from tests.hil.machine import TIMEOUT_S
 
 ROOT = Path(__file__).parents[2]
 DEADMAN_S = 0.5
 
 
 def wait_for(done: Callable[[], bool], what: str, seen: Callable[[], object] = str) -> None:
-    """Wait until `done`, and fail where it never is, telling what is `seen` by then."""
-    end_s = time.monotonic() + PATIENCE_S
+    """Wait until `done`; on timeout fail with what is `seen`."""
+    end_s = time.monotonic() + TIMEOUT_S
     while not done():
         assert time.monotonic() < end_s, f"it never came: {what}; {seen()}"
         time.sleep(0.01)
@@ -53,7 +53,7 @@ class Running:
         return (self.folder / f"{self.name}.err").read_text("utf-8")
 
     @property
-    def complaints(self) -> list[str]:
+    def error_lines(self) -> list[str]:
         return [line for line in self.err.splitlines() if line.startswith("echolocate: ")]
 
     def signal(self, number: signal.Signals) -> Signalled:
@@ -64,7 +64,7 @@ class Running:
 
     def end(self) -> int:
         """Wait for its own end and return the exit code."""
-        code = self.process.wait(PATIENCE_S)
+        code = self.process.wait(TIMEOUT_S)
         assert "Traceback" not in self.err, self.err
         return code
 
@@ -120,13 +120,13 @@ def emulated(folder: Path, *arguments: str) -> Iterator[Emulated]:
 
 
 def start_url(run: Running) -> str:
-    """Wait for the line that tells where the console is, and return the address."""
+    """Wait for the line with the console's address, and return the address."""
     found: list[str] = []
 
-    def told() -> bool:
+    def is_printed() -> bool:
         assert run.process.poll() is None, run.err
         found[:] = re.findall(r"start_url='?(http[^\s']+)", run.err)
         return bool(found)
 
-    wait_for(told, "the start URL")
+    wait_for(is_printed, "the start URL")
     return found[0]

@@ -31,7 +31,7 @@ from runtime.simulation.emulator_process import start_emulator
 from runtime.support.kernel_loader import KernelLoader
 from runtime.support.logs import open_log
 from runtime.timing.cycle_stats import CycleStats
-from tests.hil.machine import PATIENCE_S, stalls_excused
+from tests.hil.machine import TIMEOUT_S, stalls_excused
 from tests.hil.running import emulated, running, start_url
 from tests.hil.truth import Truth
 from tests.rawpage import RawPage
@@ -83,8 +83,8 @@ def test_from_the_start_url_to_the_end_of_the_run(tmp_path: Path) -> None:
         log = (tmp_path / "run.jsonl").read_text("utf-8")
         assert token in log
         assert '"event":"a part' not in log
-        with open_recording(recording) as told:
-            lines = [bytes(entry.data).decode() for entry in told.messages() if entry.topic == LOG]
+        with open_recording(recording) as recorded:
+            lines = [bytes(entry.data).decode() for entry in recorded.messages() if entry.topic == LOG]
         assert [line for line in lines if '"console"' in line]
         assert not [line for line in lines if token in line]
 
@@ -105,8 +105,8 @@ def test_where_there_is_nowhere_to_listen(tmp_path: Path) -> None:
                 tmp_path, name, "run", "--port", robot.port, "--no-record", "--set", f"console.host={host}"
             ) as run:
                 assert run.end() == code
-                assert len(run.complaints) == 1
-                assert host in run.complaints[0]
+                assert len(run.error_lines) == 1
+                assert host in run.error_lines[0]
 
 
 class Hand:
@@ -188,7 +188,7 @@ class Operator:
         page = RawPage(self.url)
         page.read_on()
         while len(self.waits_s) < TRIALS and self.failure is None:
-            if not self.drives.wait(PATIENCE_S):
+            if not self.drives.wait(TIMEOUT_S):
                 self.failure = "it does not drive"
                 break
             time.sleep(rng.uniform(0.0, CYCLE_S))
@@ -210,7 +210,7 @@ class Operator:
         worst_s, last_s = 0.0, time.monotonic()
         self.asked_s = asked_s = last_s
         page.say(type="halt")
-        while not self.halted.is_set() and last_s < asked_s + PATIENCE_S:
+        while not self.halted.is_set() and last_s < asked_s + TIMEOUT_S:
             time.sleep(TURN_S)
             host_s = time.monotonic()
             worst_s, last_s = max(worst_s, host_s - last_s - TURN_S), host_s
@@ -219,7 +219,7 @@ class Operator:
 
 @pytest.mark.promise("P2")
 async def test_halt_from_a_page_in_time(tmp_path: Path, measured: Callable[[str], None]) -> None:
-    """Within one cycle and 10 ms, cycles busy for most of their time and a page beside that never reads."""
+    """Within one cycle and 10 ms, with cycles busy for most of their time and another page that never reads."""
     operator = Operator(asyncio.get_running_loop())
     ears, settings = Decoder("host"), load_settings("hallway", ["console.port=0"])
 
@@ -251,7 +251,7 @@ async def test_halt_from_a_page_in_time(tmp_path: Path, measured: Callable[[str]
                 deaf = await asyncio.to_thread(RawPage, console.url)
                 asking = threading.Thread(target=operator.work)
                 asking.start()
-                await process.run(arm=True, seconds=PATIENCE_S + 3.0 * TRIALS)
+                await process.run(arm=True, seconds=TIMEOUT_S + 3.0 * TRIALS)
                 operator.failure = operator.failure or ("it ended too soon" if asking.is_alive() else None)
                 deaf.close()
                 asking.join()
@@ -269,7 +269,7 @@ BOX = 'name = "crate"\nclosed = true\nvertices_m = [[0.4, 0.3], [-0.4, 0.3], [-0
 
 @stalls_excused
 def test_the_first_model_with_corners_while_it_drives(tmp_path: Path) -> None:
-    """Its kernels are readied beside the cycle: the robot drives on, and none is compiled or loaded later."""
+    """Its kernels are prepared in another process: the robot drives on, and none is compiled or loaded later."""
     summary = tmp_path / "summary.json"
     with emulated(tmp_path) as robot, running(
         tmp_path, "run", "run", "--port", robot.port, "--arm", "--no-record", "--json", str(summary), *FREE_PORT

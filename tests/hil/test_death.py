@@ -72,9 +72,9 @@ def test_stopped_while_driving_and_continued(tmp_path: Path, stopped_s: float) -
         assert rows(robot.trace)[-1].flags & Flags.LATCHED
 
         run.signal(signal.SIGUSR1)
-        wait_for(lambda: is_driving(robot.trace), "driving, now that it was told to")
+        wait_for(lambda: is_driving(robot.trace), "driving after it was armed")
         run.signal(signal.SIGTERM)
         assert run.end() == 0
     summary = json.loads(path.read_bytes())
     assert len(summary["stop_reasons"]) == 1
-    assert run.complaints == []
+    assert run.error_lines == []

@@ -1,4 +1,4 @@
-"""A failure of the program itself: the base is halted first, the mode is FAULT, and the reason names the culprit."""
+"""A failure of the program itself: the base is halted first, the mode is FAULT, and the reason names the cause."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from runtime.cycle.step import CycleRecord, State
 from runtime.simulation.emulator_process import start_emulator
 from runtime.support.logs import open_log
 from runtime.timing.cycle_stats import CycleStats
-from tests.hil.machine import PATIENCE_S, stalls_excused
+from tests.hil.machine import TIMEOUT_S, stalls_excused
 from tests.hil.truth import rows
 
 
@@ -31,7 +31,7 @@ async def test_a_cycle_that_fails_halts_the_base_and_ends_in_fault(tmp_path: Pat
     async with start_emulator(["--trace", str(trace)]) as (port, _):
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
             process = RobotProcess(on_port(load_settings("hallway"), port), log, Observers(on_cycle=fail))
-            summary = await process.run(arm=True, seconds=PATIENCE_S)
+            summary = await process.run(arm=True, seconds=TIMEOUT_S)
     assert summary["mode"] == "FAULT"
     assert summary["cycles"] == 39
     assert "ZeroDivisionError: planted" in summary["stop_reasons"][-1]

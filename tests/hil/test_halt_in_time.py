@@ -29,7 +29,7 @@ from runtime.recording.storage import SingleFile
 from runtime.simulation.emulator_process import start_emulator
 from runtime.support.logs import open_log
 from runtime.timing.cycle_stats import CycleStats
-from tests.hil.machine import PATIENCE_S
+from tests.hil.machine import TIMEOUT_S
 from tests.hil.truth import Truth
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels"), pytest.mark.promise("P2")]
@@ -61,7 +61,7 @@ class Operator:
     def work(self) -> None:
         rng, failed = random.Random(5), 0
         while len(self.waits_s) < self.trials and self.failure is None:
-            if not self.drives.wait(PATIENCE_S):
+            if not self.drives.wait(TIMEOUT_S):
                 self.failure = "it does not drive"
                 break
             time.sleep(rng.uniform(0.0, CYCLE_S))
@@ -83,7 +83,7 @@ class Operator:
         worst_s, last_s = 0.0, time.monotonic()
         self.asked_s = asked_s = last_s
         self.loop.call_soon_threadsafe(self.process.request, Request.HALT)
-        while not self.halted.is_set() and last_s < asked_s + PATIENCE_S:
+        while not self.halted.is_set() and last_s < asked_s + TIMEOUT_S:
             time.sleep(TURN_S)
             host_s = time.monotonic()
             worst_s, last_s = max(worst_s, host_s - last_s - TURN_S), host_s
@@ -123,7 +123,7 @@ async def halts(folder: Path, monkeypatch: pytest.MonkeyPatch, trials: int) -> O
                 )
                 asking = threading.Thread(target=operator.work)
                 asking.start()
-                await process.run(arm=True, seconds=PATIENCE_S + 3.0 * trials)
+                await process.run(arm=True, seconds=TIMEOUT_S + 3.0 * trials)
                 operator.failure = operator.failure or ("it ended too soon" if asking.is_alive() else None)
                 asking.join()
     last = Truth(trace).read()[-1]
@@ -133,7 +133,7 @@ async def halts(folder: Path, monkeypatch: pytest.MonkeyPatch, trials: int) -> O
     return operator
 
 
-def tell(operator: Operator, measured: Callable[[str], None]) -> None:
+def report(operator: Operator, measured: Callable[[str], None]) -> None:
     assert operator.failure is None, operator.failure
     worst = max(range(len(operator.waits_s)), key=lambda k: operator.waits_s[k])
     wait_ms, control_ms = 1e3 * operator.waits_s[worst], 1e3 * operator.controls_s[worst]
@@ -146,11 +146,11 @@ def tell(operator: Operator, measured: Callable[[str], None]) -> None:
 async def test_thirty_halts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, measured: Callable[[str], None]
 ) -> None:  # fmt: skip
-    tell(await halts(tmp_path, monkeypatch, 30), measured)
+    report(await halts(tmp_path, monkeypatch, 30), measured)
 
 
 @pytest.mark.soak
 async def test_a_thousand_halts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, measured: Callable[[str], None]
 ) -> None:  # fmt: skip
-    tell(await halts(tmp_path, monkeypatch, 1000), measured)
+    report(await halts(tmp_path, monkeypatch, 1000), measured)

@@ -32,7 +32,7 @@ from runtime.support.logs import open_log
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.run_clock import ScaledClock
 from runtime.timing.time_control import ENDED, HANGS, EmulatorTimeControl
-from tests.hil.machine import PATIENCE_S, stalls_excused
+from tests.hil.machine import TIMEOUT_S, stalls_excused
 from tests.hil.truth import rows
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
@@ -40,13 +40,13 @@ pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 SETTINGS = load_settings("hallway")
 PERIOD_S = 1.0 / SETTINGS.cycle.rate_hz
 PAUSE_S = 1.0
-"""Twice the base's deadman, and more than any patience with the line."""
+"""Twice the base's deadman, and more than any timeout of the line."""
 
 Act = Callable[[RobotProcess, EmulatorTimeControl, list[CycleRecord]], Awaitable[None]]
 
 
 async def until(done: Callable[[], bool]) -> None:
-    async with asyncio.timeout(PATIENCE_S):
+    async with asyncio.timeout(TIMEOUT_S):
         while not done():
             await asyncio.sleep(0.002)
 

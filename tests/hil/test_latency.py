@@ -11,7 +11,7 @@ import pytest
 
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Drive, Echo, Hello, Pattern
-from tests.hil.machine import PATIENCE_S
+from tests.hil.machine import TIMEOUT_S
 from tests.hil.running import emulated
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
@@ -26,14 +26,14 @@ def test_echo_and_command_are_stamped_by_the_hosts_clock(tmp_path: Path) -> None
             os.write(line, b"\0" + encode(Hello(0)) + encode(Pattern(1, 60, 100, (0b1,))))
             decoder, heard = Decoder("robot", midway=True), False
             while not heard:
-                assert time.monotonic() < begin_s + PATIENCE_S
+                assert time.monotonic() < begin_s + TIMEOUT_S
                 if select.select([line], [], [], 0.1)[0]:
                     heard = any(isinstance(frame, Echo) for frame in decoder.feed(os.read(line, 4096)))
             heard_s = time.monotonic()
             os.write(line, encode(Drive(2, 0, 0)))
             answered = False
-            while not answered:  # odometry tells which command the robot has taken
-                assert time.monotonic() < heard_s + PATIENCE_S
+            while not answered:  # odometry holds the last command the robot accepted
+                assert time.monotonic() < heard_s + TIMEOUT_S
                 if select.select([line], [], [], 0.1)[0]:
                     frames = decoder.feed(os.read(line, 4096))
                     answered = any(getattr(frame, "last_drive_seq", None) == 2 for frame in frames)

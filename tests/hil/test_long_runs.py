@@ -59,7 +59,7 @@ def on_the_pty(folder: Path, seconds: float, wrap_s: float) -> dict[str, Any]:
         running(folder, "run", *command, "--port", robot.port) as run,
     ):
         assert run.process.wait(seconds + 60.0) == 0, run.err
-        assert run.complaints == []
+        assert run.error_lines == []
         assert "Traceback" not in run.err
         assert Truth(robot.trace).read()[-1].t_s > wrap_s
         assert max(row.v for row in Truth(robot.trace).read()) > 0.1

@@ -18,7 +18,7 @@ from tests.hil.running import wait_for
 def witness_of(*stalls_s: float) -> type[Witness]:
     """Return a witness that has seen these standstills."""
 
-    class Told(Witness):
+    class Scripted(Witness):
         def __init__(self) -> None: ...
 
         def __exit__(self, *_: object) -> None: ...
@@ -26,7 +26,7 @@ def witness_of(*stalls_s: float) -> type[Witness]:
         def stalls_s(self) -> list[float]:
             return list(stalls_s)
 
-    return Told
+    return Scripted
 
 
 def failing(times: int) -> tuple[Callable[..., None], list[Path]]:
@@ -49,7 +49,7 @@ def test_a_failure_on_a_machine_that_kept_its_time_is_one(monkeypatch: pytest.Mo
     assert folders == [tmp_path]
 
 
-def test_a_trial_on_a_machine_that_stood_still_is_repeated_and_told(
+def test_trial_on_a_stalled_machine_is_repeated_and_reported(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(machine, "Witness", witness_of(0.7))

@@ -25,7 +25,7 @@ from runtime.cycle.step import CycleRecord, State
 from runtime.simulation.emulator_process import start_emulator
 from runtime.support.logs import open_log
 from runtime.timing.cycle_stats import CycleStats
-from tests.hil.machine import PATIENCE_S, stalls_excused
+from tests.hil.machine import TIMEOUT_S, stalls_excused
 from tests.hil.running import ROOT
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
@@ -37,13 +37,13 @@ from drivers.denning.frames import Echo
 from drivers.emulator.pty_transport import PtyPort
 from runtime.cli.app import main
 decoder, write, log = Decoder("robot"), PtyPort.write, open(sys.argv[1], "w", buffering=1)
-def told(port, data):
+def traced(port, data):
     host_s = time.monotonic()
     write(port, data)
     for frame in decoder.feed(data):
         if isinstance(frame, Echo):
             log.write(f"{frame.t_us} {host_s!r}\\n")
-PtyPort.write = told
+PtyPort.write = traced
 main(["emulate", "--config", "hallway", "--link", sys.argv[2]])
 """
 """The emulator, noting when it has put the last byte of each echo on the line."""
@@ -55,7 +55,7 @@ while True:
     time.sleep(0.0471)
     os.write(line, f"{time.monotonic()!r}\\n".encode())
 """
-"""A program that says on a pty what time it is: how long any news takes on such a line to any loop just now."""
+"""Program that writes the time to a pty: the delay of any line to any loop on this machine, as a control."""
 
 ECHOES = 150
 PLANTED_FROM = 40
@@ -65,7 +65,7 @@ PERIOD_S = 1.0 / SETTINGS.cycle.rate_hz
 
 @contextlib.asynccontextmanager
 async def program(text: str, *arguments: str) -> AsyncIterator[asyncio.StreamReader]:
-    """Run a few lines of Python beside this process and give what they print."""
+    """Run a few lines of Python in another process and yield its output."""
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-c", text, *arguments, stdout=asyncio.subprocess.PIPE, env=env
@@ -79,7 +79,7 @@ async def program(text: str, *arguments: str) -> AsyncIterator[asyncio.StreamRea
 
 
 @contextlib.contextmanager
-def news(ages_s: list[float]) -> Iterator[str]:
+def control_line(ages_s: list[float]) -> Iterator[str]:
     """Give a line on which a program may say what time it is, and note how long each word took to this loop."""
     master, slave = os.openpty()
     tty.setraw(slave)
@@ -118,14 +118,14 @@ async def test_an_echo_waits_for_no_timer(tmp_path: Path) -> None:
             process.stop()
 
     log_path, port = tmp_path / "echoes", str(tmp_path / "robot")
-    async with contextlib.AsyncExitStack() as beside:
-        ready = await beside.enter_async_context(program(EMULATOR, str(log_path), port))
-        await asyncio.wait_for(ready.readline(), PATIENCE_S)
-        line = beside.enter_context(news(control_s))
-        await beside.enter_async_context(program(CONTROL, line))
+    async with contextlib.AsyncExitStack() as stack:
+        ready = await stack.enter_async_context(program(EMULATOR, str(log_path), port))
+        await asyncio.wait_for(ready.readline(), TIMEOUT_S)
+        line = stack.enter_context(control_line(control_s))
+        await stack.enter_async_context(program(CONTROL, line))
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
             process = RobotProcess(on_port(SETTINGS, port), log, Observers(on_cycle=note))
-            summary = await process.run(arm=True, seconds=PATIENCE_S)
+            summary = await process.run(arm=True, seconds=TIMEOUT_S)
     written = {int(t_us): float(at_s) for t_us, at_s in map(str.split, log_path.read_text().splitlines())}
     # The emulator is ended in the middle of whatever it does: the last echoes may not be in its log.
     ages_s = [at_s - written[t_us] for t_us, at_s in began.items() if t_us in written][5:]
@@ -159,7 +159,7 @@ async def test_overruns_in_a_row_end_in_a_safe_stop_that_names_the_callback(tmp_
     async with start_emulator([]) as (port, _):
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
             process = RobotProcess(on_port(settings, port), log, Observers(on_cycle=plant))
-            summary = await process.run(arm=True, seconds=PATIENCE_S)
+            summary = await process.run(arm=True, seconds=TIMEOUT_S)
     assert summary["mode"] == "SAFE_STOP"
     (reason,) = summary["stop_reasons"]
     assert reason.startswith("5 cycles in a row left no time for the next one"), reason
@@ -168,5 +168,5 @@ async def test_overruns_in_a_row_end_in_a_safe_stop_that_names_the_callback(tmp_
     # A busy machine may have made the row one or two longer at its beginning, and made one of them worse.
     assert PLANTED_FROM < summary["cycles"] <= PLANTED_FROM + 20  # five in a row; one that is none begins anew
     assert timing["overruns"] >= 5
-    named = sum(count for culprit, count in timing["faults"].items() if "hold_the_loop" in culprit)
+    named = sum(count for cause, count in timing["faults"].items() if "hold_the_loop" in cause)
     assert named >= 3, timing

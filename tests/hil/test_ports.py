@@ -25,8 +25,8 @@ from tests.hil.truth import is_driving
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
 STARTS_MAX = 12
-"""So many bare starts of Python with numba, each as slow as the slowest beside it, may go by until it has its ports;
-on an idle machine it takes four."""
+"""Number of bare starts of Python with numba (the slowest measured) within which it opens its ports; an idle machine
+needs four."""
 
 
 class Stranger:
@@ -70,21 +70,21 @@ class Stranger:
 
 
 @contextlib.contextmanager
-def run_on(folder: Path, port: str, patience_s: float = 0.0) -> Iterator[Running]:
-    """Run on a port with which it must have come to an end after its start and `patience_s`."""
+def run_on(folder: Path, port: str, timeout_s: float = 0.0) -> Iterator[Running]:
+    """Run on a port, and check that the run ends within `timeout_s` after its start."""
     with BareStarts() as bare:
-        begun_s = time.monotonic()
+        start_s = time.monotonic()
         with running(folder, "run", "run", "--port", port, "--arm", "--seconds", "600") as run:
             yield run
-            took_s = time.monotonic() - begun_s
+            took_s = time.monotonic() - start_s
     # A second for what is neither: taking Python down again, and looking whether it has ended.
-    assert took_s < patience_s + 1.0 + STARTS_MAX * bare.longest_s
+    assert took_s < timeout_s + 1.0 + STARTS_MAX * bare.longest_s
 
 
 def check(run: Running, code: int, *pieces: str) -> None:
     assert run.end() == code
     assert run.out == ""
-    (line,) = run.complaints
+    (line,) = run.error_lines
     for piece in pieces:
         assert piece in line, line
 

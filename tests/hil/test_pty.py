@@ -22,7 +22,7 @@ from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Ack, Drive, Echo, Frame, Hello, Ident, Odom, Pattern
 from drivers.emulator.pty_transport import LAG_MAX_S, LINGER_S, EmulatorError, PtyPort, SlippingClock
 from drivers.emulator.truth_trace import HEADER
-from tests.hil.machine import PATIENCE_S, AnyTest, stalls_excused
+from tests.hil.machine import TIMEOUT_S, AnyTest, stalls_excused
 
 F = TypeVar("F", bound=Frame)
 ROOT = Path(__file__).parents[2]
@@ -67,8 +67,8 @@ def arguments(
     faults: list[dict[str, object]] | None = None,
     exit_with_parent: bool = False,
 ) -> list[str]:
-    told = [link and str(link), trace and str(trace), baud, faults or [], exit_with_parent]
-    return [sys.executable, "-c", PROGRAM, json.dumps(told)]
+    options = [link and str(link), trace and str(trace), baud, faults or [], exit_with_parent]
+    return [sys.executable, "-c", PROGRAM, json.dumps(options)]
 
 
 @contextlib.contextmanager
@@ -78,7 +78,7 @@ def emulator(command: list[str]) -> Iterator[tuple[subprocess.Popen[str], str]]:
         assert process.stdout is not None
         try:
             word, _, path = process.stdout.readline().strip().partition(" ")
-            assert word == "ready", process.communicate(timeout=PATIENCE_S)[1]
+            assert word == "ready", process.communicate(timeout=TIMEOUT_S)[1]
             yield process, path
         finally:
             process.send_signal(signal.SIGCONT)
@@ -118,14 +118,14 @@ class Host:
         return [frame for _, frame in self.heard if isinstance(frame, kind)]
 
     def until(self, done: Callable[[], bool]) -> None:
-        end = time.monotonic() + PATIENCE_S
+        end = time.monotonic() + TIMEOUT_S
         while not done():
             assert time.monotonic() < end, "it never came"
             self.pump()
 
 
 def wait_for(done: Callable[[], bool]) -> None:
-    end = time.monotonic() + PATIENCE_S
+    end = time.monotonic() + TIMEOUT_S
     while not done():
         assert time.monotonic() < end, "it never came"
         time.sleep(0.005)
@@ -155,7 +155,7 @@ def test_it_answers_fires_and_ends_cleanly(link: Path) -> None:
             assert times == list(range(times[0], times[-1] + 1, 20_000))
             assert host.decoder.bad == 0
         process.send_signal(signal.SIGTERM)
-        assert process.wait(PATIENCE_S) == 0
+        assert process.wait(TIMEOUT_S) == 0
         assert not link.is_symlink()
         assert process.communicate() == ("", "")
 
@@ -170,7 +170,7 @@ def test_its_time_is_real_time(link: Path) -> None:
 
 
 @in_real_time
-def test_without_a_link_it_tells_the_pty(link: Path) -> None:
+def test_without_a_link_it_prints_the_pty(link: Path) -> None:
     with emulator(arguments(None)) as (_, path), Host(path) as host:
         assert path.startswith("/dev/")
         assert not link.exists()
@@ -180,7 +180,7 @@ def test_without_a_link_it_tells_the_pty(link: Path) -> None:
 @in_real_time
 def test_real_file_is_never_overwritten(link: Path) -> None:
     link.write_text("precious")
-    done = subprocess.run(arguments(link), cwd=ROOT, text=True, capture_output=True, timeout=PATIENCE_S, check=False)
+    done = subprocess.run(arguments(link), cwd=ROOT, text=True, capture_output=True, timeout=TIMEOUT_S, check=False)
     assert done.returncode == 1
     assert done.stdout == ""
     assert str(link) in done.stderr
@@ -277,7 +277,7 @@ def test_emulator_outlives_a_host_that_does_not_read(link: Path, tmp_path: Path)
         host.until(lambda: any(odom.t_us > 1_500_000 for odom in host.of(Odom)))
         host.send(Hello(1))
         host.until(lambda: len(host.of(Ident)) == 1)
-        assert host.bytes < 150_000, "what nobody read was not kept"
+        assert host.bytes < 150_000, "unread output is not kept"
 
 
 @in_real_time
@@ -300,8 +300,8 @@ def test_unplugging_hangs_up_and_plugging_in_links_again(link: Path) -> None:
 @stalls_excused
 def test_base_stops_by_itself_when_everything_above_it_is_killed(link: Path, tmp_path: Path) -> None:
     trace = tmp_path / "truth.csv"
-    told = arguments(link, trace=trace, exit_with_parent=True)
-    middle = f"import subprocess, sys; sys.exit(subprocess.call({told!r}))"
+    command = arguments(link, trace=trace, exit_with_parent=True)
+    middle = f"import subprocess, sys; sys.exit(subprocess.call({command!r}))"
     with subprocess.Popen([sys.executable, "-c", middle], cwd=ROOT, stdout=subprocess.PIPE) as parent:
         assert parent.stdout is not None
         assert parent.stdout.readline().startswith(b"ready")
@@ -309,7 +309,7 @@ def test_base_stops_by_itself_when_everything_above_it_is_killed(link: Path, tmp
             while not rows(trace) or rows(trace)[-1]["v_m_s"] < 0.25:
                 host.send(Drive(0, 300, 0))
                 host.pump(0.02)
-            begun = time.monotonic()
+            started = time.monotonic()
             parent.kill()
             killed = time.monotonic()
         wait_for(lambda: rows(trace)[-1]["host_s"] > killed + 2.9)
@@ -319,21 +319,21 @@ def test_base_stops_by_itself_when_everything_above_it_is_killed(link: Path, tmp
         assert {row["v_m_s"] for row in after} == {0.0}
         assert {int(row["flags"]) for row in after} == {8}
         wait_for(lambda: not link.is_symlink())
-        assert begun + LINGER_S - LAG_MAX_S <= rows(trace)[-1]["host_s"] <= killed + LINGER_S + 1.0
+        assert started + LINGER_S - LAG_MAX_S <= rows(trace)[-1]["host_s"] <= killed + LINGER_S + 1.0
 
 
 @in_real_time
 @stalls_excused
-def test_truth_is_told_while_it_runs(link: Path, tmp_path: Path) -> None:
+def test_truth_is_written_while_it_runs(link: Path, tmp_path: Path) -> None:
     trace = tmp_path / "truth.csv"
     with emulator(arguments(link, trace=trace)):
         wait_for(lambda: len(rows(trace)) >= 60)
-        told, now = rows(trace), time.monotonic()
+        written, now = rows(trace), time.monotonic()
         assert trace.read_text().startswith(HEADER + "\n")
-        assert max(b["t_s"] - a["t_s"] for a, b in itertools.pairwise(told)) <= 0.0201
-        assert now - 5.0 < told[-1]["host_s"] <= now
-        shift = [row["host_s"] - row["t_s"] for row in told]
-        rounding = 2e-6  # each column is told to the microsecond
+        assert max(b["t_s"] - a["t_s"] for a, b in itertools.pairwise(written)) <= 0.0201
+        assert now - 5.0 < written[-1]["host_s"] <= now
+        shift = [row["host_s"] - row["t_s"] for row in written]
+        rounding = 2e-6  # each column is written to the microsecond
         assert all(b >= a - rounding for a, b in itertools.pairwise(shift)), (
             "the robot's clock never gains on the host's"
         )
@@ -346,7 +346,7 @@ def test_unwritable_trace_is_one_clear_line(link: Path, tmp_path: Path) -> None:
         cwd=ROOT,
         text=True,
         capture_output=True,
-        timeout=PATIENCE_S,
+        timeout=TIMEOUT_S,
         check=False,
     )
     assert done.returncode == 1
@@ -369,8 +369,8 @@ def test_frozen_emulator_goes_on_without_a_burst(link: Path) -> None:
         began = time.monotonic()
         process.send_signal(signal.SIGCONT)
         host.until(lambda: len(host.of(Odom)) >= seen + 20)
-        lived = (host.of(Odom)[-1].t_us - host.of(Odom)[seen - 1].t_us) * 1e-6
-        assert lived <= time.monotonic() - began + LAG_MAX_S + 0.05
+        robot_passed_s = (host.of(Odom)[-1].t_us - host.of(Odom)[seen - 1].t_us) * 1e-6
+        assert robot_passed_s <= time.monotonic() - began + LAG_MAX_S + 0.05
         assert host.decoder.bad == 0
 
 

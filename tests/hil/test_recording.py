@@ -63,25 +63,25 @@ def check(folder: Path, seconds: float, replays: int, *more: str) -> str:
     assert (kept["dropped"], kept["trouble"], kept["files"]) == (0, None, 1)
     path = folder / "hall.mcap"
     assert kept["bytes"] == path.stat().st_size
-    told = verify(path)
-    assert told["cycles"] == summary["cycles"]
-    assert told["objects"] == summary["objects"], "what was seen at the end, to the bit"
+    result = verify(path)
+    assert result["cycles"] == summary["cycles"]
+    assert result["objects"] == summary["objects"], "what was seen at the end, to the bit"
     frames = keyframe_times(path)
-    assert told["verify"]["keyframes"] == len(frames) >= replays
+    assert result["verify"]["keyframes"] == len(frames) >= replays
     for at_s in random.Random(1).sample(frames, replays):
         part = verify(path, "--from", str(at_s + 1e-6))
         assert part["cycles"] >= summary["cycles"] - 20.0 * at_s - summary["missed"] - 10
         assert part["objects"] == summary["objects"]
     if seconds > 60.0:
-        assert set(told["verify"]["refinement"]) >= {"budget", "converged", "nothing"}
-        assert told["cycles"] >= 12_000
-        assert told["verify"]["times_real_time"] >= 30.0
+        assert set(result["verify"]["refinement"]) >= {"budget", "converged", "nothing"}
+        assert result["cycles"] >= 12_000
+        assert result["verify"]["times_real_time"] >= 30.0
         assert hour_mb(path.stat().st_size, seconds) <= HOUR_MB
-    logging.getLogger(__name__).info("%s", {**told["verify"], "bytes": kept["bytes"], "lag": summary["lag_us"]})
-    causes = ", ".join(f"{count} {cause}" for cause, count in sorted(told["verify"]["refinement"].items()))
+    logging.getLogger(__name__).info("%s", {**result["verify"], "bytes": kept["bytes"], "lag": summary["lag_us"]})
+    causes = ", ".join(f"{count} {cause}" for cause, count in sorted(result["verify"]["refinement"].items()))
     return (
-        f"{told['cycles']:,} cycles over the pty replayed, and from {replays} keyframes: 0 differences; refinement "
-        f"ended by {causes}; {told['verify']['times_real_time']:.0f} × real time, "
+        f"{result['cycles']:,} cycles over the pty replayed, and from {replays} keyframes: 0 differences; refinement "
+        f"ended by {causes}; {result['verify']['times_real_time']:.0f} × real time, "
         f"{hour_mb(kept['bytes'], seconds):.1f} MB an hour"
     )
 
@@ -153,7 +153,7 @@ def test_a_killed_run_is_restored(tmp_path: Path) -> None:
 
 
 @stalls_excused
-def test_every_run_leaves_a_recording_unless_told_otherwise(tmp_path: Path) -> None:
+def test_every_run_is_recorded_by_default(tmp_path: Path) -> None:
     where = ("--set", f"recording.folder={json.dumps(str(tmp_path / 'runs'))}")
     with running(tmp_path, "none", "run", "--seconds", "0.5", "--no-record", *where) as run:
         assert run.end() == 0
@@ -177,7 +177,7 @@ def test_a_full_disk_fails_the_call_and_not_the_run(tmp_path: Path) -> None:
     with running(tmp_path, "run", "run", "--seconds", "3", "--record", "/dev/full", "--json", str(path)) as run:
         assert run.process.wait(60.0) == FAILED
     assert "Traceback" not in run.err
-    (line,) = run.complaints
+    (line,) = run.error_lines
     assert "No space left" in line
     summary = json.loads(path.read_bytes())
     assert summary["cycles"] + summary["missed"] >= 55
@@ -190,10 +190,10 @@ def test_a_folder_that_cannot_be_written_stops_nothing(tmp_path: Path) -> None:
     where = ("--set", f"recording.folder={json.dumps(str(tmp_path / 'file'))}")
     with running(tmp_path, "run", "run", "--seconds", "2", *where) as run:
         assert run.end() == 0
-    assert run.complaints == []
+    assert run.error_lines == []
     events = [json.loads(line) for line in (tmp_path / "run.jsonl").read_text("utf-8").splitlines()]
-    (told,) = [event for event in events if event["event"] == "the recording has trouble"]
-    assert str(tmp_path / "file") in told["reason"]
+    (warning,) = [event for event in events if event["event"] == "the recording has trouble"]
+    assert str(tmp_path / "file") in warning["reason"]
 
 
 @pytest.mark.soak

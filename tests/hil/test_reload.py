@@ -62,4 +62,4 @@ def test_a_configuration_reloaded_while_driving(tmp_path: Path) -> None:
     assert sum(entry.topic == SETTINGS for entry in entries_of(recorded)) == 1
     assert run_command(["replay", str(recorded), "--verify"]) == DONE
     with open_recording(recorded) as recording:
-        assert recording.world is None, "on a port that was given nobody knows what stands there"
+        assert recording.world is None, "the world of a real port is unknown"

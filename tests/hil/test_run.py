@@ -30,7 +30,7 @@ PERIOD_S = 1.0 / SETTINGS.cycle.rate_hz
 DRIVE_S = 26
 """Down the hallway and out of it; the drums are all known by then."""
 STARTS_MAX = 12
-"""So many bare starts of Python with numba, each as slow as the slowest beside it; an idle machine needs five."""
+"""Number of bare starts of Python with numba (the slowest measured); an idle machine needs five."""
 
 
 async def bare_loop(running_too: Running) -> CycleStats:
@@ -51,12 +51,12 @@ def summary_of(path: Path) -> dict[str, Any]:
 
 
 @stalls_excused
-def test_six_drums_in_real_time_beside_a_bare_loop(tmp_path: Path) -> None:
+def test_six_drums_in_real_time_with_a_control_loop(tmp_path: Path) -> None:
     path = tmp_path / "summary.json"
     with running(tmp_path, "run", "run", "--seconds", str(DRIVE_S), "--json", str(path)) as run:
         bare = asyncio.run(bare_loop(run))
         assert run.end() == 0
-    assert run.complaints == []
+    assert run.error_lines == []
     summary = summary_of(path)
 
     world = SETTINGS.world
@@ -104,14 +104,14 @@ def test_an_interrupt_halts_the_base_before_the_end(tmp_path: Path, number: sign
         wait_for(lambda: reaches(robot.trace, ended_s + 0.3), "trace beyond the end")
         latched = next(row for row in rows(robot.trace) if row.flags & Flags.LATCHED)
         signalled_at_s = robot_time(robot.trace, signalled.before_s)
-        assert latched.t_s > signalled_at_s - 0.02, "it halted before it was told to"
+        assert latched.t_s > signalled_at_s - 0.02, "it halted before the signal"
         assert latched.host_s < ended_s, "the base latched before the program ended"
         after = [row for row in rows(robot.trace) if row.t_s > latched.t_s + 0.15]
         assert after
         assert all(row.still and row.flags & Flags.LATCHED for row in after)
         # Half a second at most for the halt, a fifth for the last bytes, and to take a Python down.
         assert ended_s - signalled.after_s < 1.0 + STARTS_MAX * bare.longest_s
-    assert run.complaints == []
+    assert run.error_lines == []
     summary = summary_of(path)
     assert summary["mode"] == "DRIVE"
     assert summary["link"]["bad"] == 0
@@ -130,7 +130,7 @@ def test_unarmed_it_waits_until_it_is_armed_and_drives_only_then(tmp_path: Path)
         run.comes_to("DRIVE")
         run.signal(signal.SIGINT)
         assert run.end() == 0
-        assert run.complaints == []
+        assert run.error_lines == []
 
 
 @stalls_excused
@@ -139,12 +139,12 @@ def test_two_runs_in_a_row_on_the_same_robot(tmp_path: Path) -> None:
     with emulated(tmp_path) as robot:
         for name in ("first", "second"):
             path = tmp_path / f"{name}.json"
-            begun_s = time.monotonic()
+            start_s = time.monotonic()
             with drive(tmp_path, robot, name, "--arm", "--seconds", "2.5", "--json", str(path)) as run:
                 assert run.end() == 0
             assert run.modes() == ["READY", "DRIVE"]
-            assert run.complaints == []
-            assert max(row.v for row in rows(robot.trace) if row.host_s > begun_s) > 0.2
+            assert run.error_lines == []
+            assert max(row.v for row in rows(robot.trace) if row.host_s > start_s) > 0.2
             summary = summary_of(path)
             assert (summary["mode"], summary["stop_reasons"]) == ("DRIVE", [])
             assert (summary["link"]["bad"], summary["link"]["lost"]) == (0, 0)
@@ -154,10 +154,10 @@ def test_two_runs_in_a_row_on_the_same_robot(tmp_path: Path) -> None:
 @stalls_excused
 def test_from_start_to_first_cycle_takes_as_long_as_a_few_bare_starts(tmp_path: Path) -> None:
     with emulated(tmp_path) as robot, BareStarts() as bare:
-        begun_s = time.monotonic()
+        start_s = time.monotonic()
         with drive(tmp_path, robot) as run:
             run.comes_to("READY")
-            took_s = time.monotonic() - begun_s
+            took_s = time.monotonic() - start_s
     logging.getLogger(__name__).info("%.2f s, a bare start %.2f s", took_s, bare.longest_s)
     # On an idle machine, whose bare start is 0.35 s, that is five seconds.
     assert took_s < 1.0 + STARTS_MAX * bare.longest_s

@@ -30,7 +30,7 @@ WATCHDOG_S = 0.4
 
 @dataclass
 class Manager:
-    """Whoever started the process, on a socket of its own."""
+    """Service manager that started the process, on its own socket."""
 
     address: str
     heard: list[tuple[float, str]] = field(default_factory=list)
@@ -88,7 +88,7 @@ def test_what_a_manager_hears(tmp_path: Path, kind: str) -> None:
         wait_for(lambda: any(line.startswith("STATUS=SAFE_STOP: ") for line in heard.words()), "the reason")
         wait_for(lambda: len(heard.times("WATCHDOG=1")) > before + 8, "signs of life")
         fed_s = heard.times("WATCHDOG=1")[before:]
-        # Fed by the cycle: a thread would have fed it on. Half of the time is for whoever listens here.
+        # Fed by the cycle: a thread would have fed it on. Half of the time is for the listener here.
         assert max(b - a for a, b in itertools.pairwise(fed_s)) > 0.5 * SHORT_S
         run.signal(signal.SIGUSR1)
         wait_for(lambda: heard.words().count("STATUS=DRIVE") == 2, "the mode")
@@ -102,7 +102,7 @@ def test_what_a_manager_hears(tmp_path: Path, kind: str) -> None:
         assert heard.times("WATCHDOG=1")[-1] < heard.times("STOPPING=1")[0] + 0.05
 
 
-def test_nobody_to_tell() -> None:
+def test_no_manager() -> None:
     for notifier in (
         SdNotifier(),
         SdNotifier.from_environment({}),
@@ -115,7 +115,7 @@ def test_nobody_to_tell() -> None:
         assert notifier.lost == 0
 
 
-def test_a_manager_that_is_gone_or_full_holds_up_nobody(tmp_path: Path) -> None:
+def test_missing_or_blocked_manager_does_not_block_the_run(tmp_path: Path) -> None:
     path = str(tmp_path / "notify")
     environment = {"NOTIFY_SOCKET": path, "WATCHDOG_USEC": "400000", "WATCHDOG_PID": str(os.getpid())}
     with SdNotifier.from_environment(environment) as notifier:
@@ -128,7 +128,7 @@ def test_a_manager_that_is_gone_or_full_holds_up_nobody(tmp_path: Path) -> None:
                 notifier.alive(1.0 + k)
                 if notifier.lost > 2:
                     break
-            assert notifier.lost == 3, "full, and nobody waited"
+            assert notifier.lost == 3, "the socket is full, and the run did not wait"
             assert ears.recv(100) == b"WATCHDOG=1"
             notifier.alive(1e6)
             assert notifier.lost == 3, "and there is room again"
@@ -139,12 +139,12 @@ def test_the_watchdog_is_fed_in_time_and_no_more(tmp_path: Path) -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as ears:
         ears.bind(path)
         ears.settimeout(0.0)
-        told: list[str] = []
+        received: list[str] = []
 
         def hear() -> None:
             with contextlib.suppress(BlockingIOError):
                 while True:
-                    told.append(ears.recv(4096).decode())
+                    received.append(ears.recv(4096).decode())
 
         with SdNotifier(path, 2.0) as notifier:
             for cycle in range(200):
@@ -153,15 +153,15 @@ def test_the_watchdog_is_fed_in_time_and_no_more(tmp_path: Path) -> None:
             for _ in range(2):
                 notifier.status("SAFE_STOP: " + "x\ny " * STATUS_MAX)
             hear()
-    assert told.count("READY=1") == 1
-    assert 19 <= told.count("WATCHDOG=1") <= 21
-    (status,) = [line for line in told if line.startswith("STATUS=")]
+    assert received.count("READY=1") == 1
+    assert 19 <= received.count("WATCHDOG=1") <= 21
+    (status,) = [line for line in received if line.startswith("STATUS=")]
     assert "\n" not in status
     assert len(status) <= STATUS_MAX + len("STATUS=")
 
 
-def test_another_processs_watchdog_is_not_ours() -> None:
-    other = {"NOTIFY_SOCKET": "@nobody", "WATCHDOG_USEC": "1000000", "WATCHDOG_PID": str(os.getpid() + 1)}
+def test_watchdog_of_another_process_is_ignored() -> None:
+    other = {"NOTIFY_SOCKET": "@absent", "WATCHDOG_USEC": "1000000", "WATCHDOG_PID": str(os.getpid() + 1)}
     with SdNotifier.from_environment(other) as notifier:
         notifier.alive(0.0)
         assert notifier.lost == 1, "READY alone"

@@ -1,9 +1,9 @@
 """P1: whatever becomes of the main process or its line, at whatever moment, the base stops by itself and stays so.
 
 Judged by the emulator's truth and on its own clock: however busy the machine is, the robot's half second is half a
-second. Four robots at a time, one for each thing that can happen.
+second. Four robots at a time, one for each kind of fault.
 
-One thing no program can rule out: that it is stopped between its last look at the clock and the write of a DRIVE.
+No program can rule out that it is stopped between its last look at the clock and the write of a DRIVE.
 That one leaves when it goes on, with a HALT right behind it; a machine that stands still just then lets the wheels
 turn until the HALT comes.
 """
@@ -20,7 +20,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.hil.machine import PATIENCE_S, stalls_excused
+from tests.hil.machine import TIMEOUT_S, stalls_excused
 from tests.hil.planted import LONG_S, planted
 from tests.hil.running import DEADMAN_S, Running, emulated, wait_for
 from tests.hil.truth import Truth
@@ -38,11 +38,11 @@ x_m = 2.0
 y_m = 3.0
 radius_m = 0.3
 """
-"""A drum beside the way, and nothing on it."""
+"""A drum next to the path, and nothing on it."""
 
 
 class Drive:
-    """A robot under way, and whoever arms it again after each fault."""
+    """A robot under way, and the operator who arms it again after each fault."""
 
     def __init__(self, run: Running, truth: Truth) -> None:
         self.run = run
@@ -54,7 +54,7 @@ class Drive:
 
     def get_under_way(self) -> None:
         """Arm until it drives; a busy machine may have stopped it once more by itself."""
-        end_s, armed_s = time.monotonic() + PATIENCE_S, 0.0
+        end_s, armed_s = time.monotonic() + TIMEOUT_S, 0.0
         while not self.truth.read()[-1].driving:
             host_s = time.monotonic()
             assert host_s < end_s, (self.run.modes(), self.run.err)
@@ -72,7 +72,7 @@ class Drive:
         self.worst_s = max(self.worst_s, moving[-1] if moving else 0.0)
 
     def suffer(self, fault: Callable[[], object], over: Callable[[], object], rng: random.Random) -> None:
-        """Have a fault happen at a random moment of a drive, and drive on after it when told to, not before."""
+        """Have a fault happen at a random moment of a drive, and drive on after it only once armed."""
         while True:
             self.get_under_way()
             before = self.stops()
@@ -82,7 +82,7 @@ class Drive:
             self.match_objects(at.t_s)
             over()
             wait_for(lambda: self.stops() > before, f"a SAFE_STOP after {self.run.modes()}")  # noqa: B023
-            # As long again (what is called here is called within the turn): nobody has armed it.
+            # As long again (what is called here is called within the turn): it was not armed.
             until_s = self.truth.read()[-1].t_s + STOPPED_WITHIN_S / 2.0
             self.truth.wait(lambda row: row.t_s > until_s, "a while in SAFE_STOP")  # noqa: B023
             self.match_objects(at.t_s)
@@ -113,9 +113,9 @@ def busy(folder: Path, count: int, longest: int) -> float:
         drive = Drive(run, Truth(robot.trace))
         for k in range(count):
             number = signal.SIGURG if k < longest else signal.SIGWINCH
-            begun_s = time.monotonic()
+            start_s = time.monotonic()
             drive.suffer(lambda n=number: run.signal(n), lambda: None, rng)  # type: ignore[misc]
-            assert k >= longest or time.monotonic() - begun_s > LONG_S
+            assert k >= longest or time.monotonic() - start_s > LONG_S
         assert "held up for" in (folder / "run.jsonl").read_text("utf-8")
         return end(drive)
 
@@ -156,12 +156,12 @@ def started_while_plugged_in(runs: contextlib.ExitStack, folder: Path, port: str
         wait_for(lambda run=run: bool(run.modes()) or run.process.poll() is not None, "a start")  # type: ignore[misc]
         if run.modes():
             return run
-        assert len(run.complaints) == 1, run.err
+        assert len(run.error_lines) == 1, run.err
     raise AssertionError(f"pulled out just then {PATIENT_STARTS} times: {run.err}")
 
 
 def killed(folder: Path, count: int) -> float:
-    """SIGKILL; whoever comes up in its place stands until it is armed."""
+    """SIGKILL; the restarted process stands until it is armed."""
     rng = random.Random(4)
     worst_s = 0.0
     with emulated(folder, "--world", world(folder)) as robot:
@@ -195,7 +195,7 @@ def end(drive: Drive) -> float:
     """End the run in good order; return how long the wheels turned after a fault, at worst."""
     drive.run.signal(signal.SIGTERM)
     assert drive.run.end() == 0
-    assert drive.run.complaints == []
+    assert drive.run.error_lines == []
     return drive.worst_s
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from drivers.emulator.truth_trace import HEADER
 from drivers.messages import Flags
-from tests.hil.machine import PATIENCE_S
+from tests.hil.machine import TIMEOUT_S
 
 DRIVING_M_S = 0.2
 _OF = [HEADER.split(",").index(name) for name in ("t_s", "host_s", "v_m_s", "w_rad_s", "flags")]
@@ -70,9 +70,9 @@ class Truth:
         """Return the rows after a moment of the robot's clock."""
         return [row for row in self.read() if row.t_s > t_s]
 
-    def wait(self, done: Callable[[Row], bool], what: str, patience_s: float = PATIENCE_S) -> Row:
+    def wait(self, done: Callable[[Row], bool], what: str, timeout_s: float = TIMEOUT_S) -> Row:
         """Wait until the newest row is as it should be, and return it."""
-        end_s = time.monotonic() + patience_s
+        end_s = time.monotonic() + timeout_s
         while not ((rows := self.read()) and done(rows[-1])):
             assert time.monotonic() < end_s, f"it never came: {what}"
             time.sleep(0.01)

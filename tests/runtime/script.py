@@ -25,7 +25,7 @@ NOTHING = Received((), None, rebooted=False)
 
 HERE = Pose(0.0, 0.0, 0.0)
 
-PATIENCE_S = SETTINGS.behaviors.avoid_static_obstacle.echo_age_max_s
+TIMEOUT_S = SETTINGS.behaviors.avoid_static_obstacle.echo_age_max_s
 
 
 class Perceiving(Perception):

@@ -9,7 +9,7 @@ from drivers.messages import Flags, Pose, Twist
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import STANDSTILL, Command, Order
-from tests.runtime.script import PATIENCE_S, PERIOD_S, Script
+from tests.runtime.script import TIMEOUT_S, PERIOD_S, Script
 
 
 def test_from_greeting_to_driving() -> None:
@@ -98,7 +98,7 @@ def test_a_failed_re_arm_latches_again() -> None:
     """The ring is silent: the cycle that would have driven finds the next reason, with the latch open."""
     script = Script().driving()
     script.cycle(request=Request.HALT)
-    for _ in range(round(PATIENCE_S / PERIOD_S) + 2):
+    for _ in range(round(TIMEOUT_S / PERIOD_S) + 2):
         script.cycle(firing=False)
     script.cycle(request=Request.ARM, firing=False)
     commands = [script.cycle(firing=False).command for _ in range(10)]
@@ -127,7 +127,7 @@ def test_a_silent_ring_is_a_reason_to_stop() -> None:
         record = script.cycle(firing=False)
     assert "ring has not reported" in str(record.mode.reason)
     assert record.command is Order.HALT
-    assert PATIENCE_S < script.robot_s - begin_s < PATIENCE_S + 2 * PERIOD_S
+    assert TIMEOUT_S < script.robot_s - begin_s < TIMEOUT_S + 2 * PERIOD_S
 
 
 def test_a_poisoned_pose_is_a_stop_and_no_exception() -> None:

@@ -44,7 +44,7 @@ PLANT = 40
 """The cycle in which something is killed: the robot drives by then."""
 LAST = 90
 WITHIN = 2
-PATIENCE_S = 20.0
+TIMEOUT_S = 20.0
 
 Plant = Callable[[RobotProcess, VirtualLoop], None]
 
@@ -207,7 +207,7 @@ def test_the_cycle_itself_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def gone(worker: Callable[[], str | None]) -> None:
     """Wait until a thread has ended."""
-    end_s = time.monotonic() + PATIENCE_S
+    end_s = time.monotonic() + TIMEOUT_S
     while worker() is None:
         assert time.monotonic() < end_s
         time.sleep(0.001)

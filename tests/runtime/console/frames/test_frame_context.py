@@ -23,7 +23,7 @@ from runtime.simulation.emulator_process import start_emulator
 from runtime.support.logs import open_log
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.run_clock import ScaledClock
-from tests.hil.machine import PATIENCE_S, stalls_excused
+from tests.hil.machine import TIMEOUT_S, stalls_excused
 from tests.recorded import hall, record
 from tests.runtime.console.playback.test_replay_client import PROGRAM, Page
 
@@ -53,7 +53,7 @@ async def test_a_player_and_a_report_beside_a_robot_that_drives(tmp_path: Path) 
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
             process = RobotProcess(on_port(settings, port), log, Observers(on_cycle), clock)
             running = asyncio.create_task(process.run(arm=True, seconds=None))
-            async with asyncio.timeout(PATIENCE_S):
+            async with asyncio.timeout(TIMEOUT_S):
                 while not (records and records[-1].mode.mode is Mode.DRIVE):
                     await asyncio.sleep(0.05)
             await players.open(page, "hall.mcap")

@@ -18,7 +18,7 @@ from runtime.console.frames.frame_encoder import EncodedFrame
 from runtime.console.playback.replay_client import WORKERS_MAX, ReplayClient, ReplayError, make_report
 from runtime.recording.storage import find_recording, list_recordings
 from runtime.support.child_process import ECHOLOCATE, NICENESS, kill_child, start_child
-from tests.hil.machine import PATIENCE_S
+from tests.hil.machine import TIMEOUT_S
 from tests.recorded import hall, record
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
@@ -59,7 +59,7 @@ class Page:
 
 
 async def until(done: Callable[[], bool]) -> None:
-    async with asyncio.timeout(PATIENCE_S):
+    async with asyncio.timeout(TIMEOUT_S):
         while not done():
             await asyncio.sleep(0.005)
 
