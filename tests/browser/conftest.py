@@ -1,7 +1,7 @@
 """A browser for the tests of the page: Debian's chromium, without a screen and drawing in software.
 
 Everything runs in one loop a session, because a browser belongs to the loop that started it. A browser that is
-missing fails the tests: a page that nobody opened works for nobody.
+missing fails the tests: a page that was never opened is untested.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, async_playwright
 
-from tests.browser.fake import FakeServer, serving
-from tests.browser.hall import Hall
-from tests.browser.opened import Opener
+from tests.browser.fake_server import FakeServer, serving
+from tests.browser.open_page import Opener
+from tests.browser.synthetic_run import Hall
 
 ARGUMENTS = ("--disable-gpu", "--disable-dev-shm-usage", "--force-color-profile=srgb")
 
@@ -44,7 +44,7 @@ async def server(hall: Hall) -> AsyncIterator[FakeServer]:
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def opener(browser: Browser, shots: Callable[[str], Path]) -> AsyncIterator[Opener]:
-    """Open pages, and see at the end that none of them complained."""
+    """Open pages, and check at the end that none reported an error."""
     async with Opener(browser, shots) as pages:
         yield pages
     pages.check()

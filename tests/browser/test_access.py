@@ -1,4 +1,4 @@
-"""For everybody: keys, contrast, names, words and not colours alone, screens of any size, nothing from outside."""
+"""Accessibility: keys, contrast, names, text besides colour, any screen size, no external resources."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any, Literal
 import pytest
 from playwright.async_api import expect
 
-from tests.browser.fake import PAGE, FakeServer
-from tests.browser.opened import DESK, PHONE, PROJECTOR, Opened, Opener
+from tests.browser.fake_server import PAGE, FakeServer
+from tests.browser.open_page import DESK, PHONE, PROJECTOR, Opened, Opener
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
@@ -43,7 +43,7 @@ async def test_all_text_has_contrast(server: FakeServer, opener: Opener, scheme:
 
 @pytest.mark.parametrize("mode", ["READY", "SAFE_STOP", "FAULT", "CONNECTING"])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-async def test_modes_have_contrast_words_and_a_shape(
+async def test_each_mode_has_contrast_text_and_a_shape(
     server: FakeServer, opener: Opener, mode: str, scheme: Literal["light", "dark"]
 ) -> None:
     server.mode, server.reason = mode, "bumper contact: free the robot, then re-arm"
@@ -59,7 +59,7 @@ async def test_modes_have_contrast_words_and_a_shape(
     assert len(shapes) == 5, "two modes look alike but for their colour"
 
 
-async def test_everything_that_can_be_used_has_a_name(server: FakeServer, opener: Opener) -> None:
+async def test_every_control_has_an_accessible_name(server: FakeServer, opener: Opener) -> None:
     opened = await scene(server, opener, DESK)
     for panel in PANELS:
         await opened.tab(panel)
@@ -88,7 +88,7 @@ async def test_it_fits_every_screen(server: FakeServer, opener: Opener, name: st
     assert box["height"] >= 190
 
 
-async def test_what_one_touches_is_large_enough(server: FakeServer, opener: Opener) -> None:
+async def test_touch_targets_are_large_enough(server: FakeServer, opener: Opener) -> None:
     opened = await scene(server, opener, PHONE, touch=True)
     for panel in (*PANELS, "Cycle"):
         await opened.tab(panel)
@@ -108,7 +108,7 @@ async def test_panels_are_reached_with_keys_alone(server: FakeServer, opener: Op
     await expect(page.locator("#panel-log")).to_be_visible()
 
 
-async def test_the_focus_goes_round_and_is_always_seen(server: FakeServer, opener: Opener) -> None:
+async def test_focus_cycles_and_is_always_visible(server: FakeServer, opener: Opener) -> None:
     opened = await scene(server, opener, DESK)
     page = opened.page
     await opened.tab("Drive")
@@ -118,7 +118,9 @@ async def test_the_focus_goes_round_and_is_always_seen(server: FakeServer, opene
         where = await opened.probe("focus")
         met.append(where[0])
         assert where[1], f"{where[0]} has the focus and does not show it"
-    assert {"halt", "map-front", "tool-pan", "fit", "tab-drive", "disarm", "pad", "teleop-limit", "goal-x"} <= set(met)
+    assert {"halt", "map-front", "tool-pan", "fit", "tab-drive", "disarm", "pad", "teleop-limit", "goal-x"} <= set(
+        met
+    )
 
 
 async def test_tools_are_radio_buttons(server: FakeServer, opener: Opener) -> None:
@@ -142,12 +144,12 @@ async def test_keys_are_listed(server: FakeServer, opener: Opener) -> None:
     await expect(opened.page.locator("#dialog")).to_be_hidden()
 
 
-async def test_the_map_has_words(server: FakeServer, opener: Opener) -> None:
+async def test_the_map_has_a_text_description(server: FakeServer, opener: Opener) -> None:
     opened = await scene(server, opener, DESK)
     await opened.says("#map-text", "6 objects: drum at 7.0, 4.0 ft")
 
 
-async def test_nothing_moves_for_those_who_want_it_calm(server: FakeServer, opener: Opener) -> None:
+async def test_reduced_motion_is_respected(server: FakeServer, opener: Opener) -> None:
     opened = await scene(server, opener, DESK, calm=True)
     moving = (
         "() => [...document.querySelectorAll('*')]"
@@ -156,7 +158,7 @@ async def test_nothing_moves_for_those_who_want_it_calm(server: FakeServer, open
     assert await opened.page.evaluate(moving) == 0
 
 
-async def test_dark_and_light_are_followed_at_once(server: FakeServer, opener: Opener) -> None:
+async def test_a_change_of_colour_scheme_applies_at_once(server: FakeServer, opener: Opener) -> None:
     opened = await scene(server, opener, DESK)
     corner = "() => document.getElementById('map-back').toDataURL()"
     light = await opened.page.evaluate(corner)

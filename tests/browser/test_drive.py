@@ -1,4 +1,4 @@
-"""Driving from the page: HALT above all, arming, the dead-man by pad, keys and gamepad, goals, who has control."""
+"""Driving from the page: HALT, arming, the deadman of pad, keys and gamepad, goals, control."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import itertools
 import pytest
 from playwright.async_api import expect
 
-from tests.browser.fake import FakeServer
-from tests.browser.opened import PHONE, Opened, Opener, until
+from tests.browser.fake_server import FakeServer
+from tests.browser.open_page import PHONE, Opened, Opener, until
 
 pytestmark = [pytest.mark.realtime, pytest.mark.asyncio(loop_scope="session")]
 
@@ -27,13 +27,13 @@ navigator.getGamepads = () => (pad.connected ? [pad] : []);
 
 
 async def still_sends(server: FakeServer) -> None:
-    """Wait until commands keep coming."""
+    """Wait until commands arrive repeatedly."""
     count = len(server.of("teleoperate"))
     await server.wait("teleoperate", count + 5)
 
 
 async def has_let_go(server: FakeServer) -> None:
-    """Wait for the zero, and see that nothing comes after it."""
+    """Wait for the zero command, and check that none follows it."""
     await until(lambda: _last_is_zero(server), "zero at the end")
     count = len(server.of("teleoperate"))
     await asyncio.sleep(0.3)  # six times as long as from one command to the next
@@ -59,7 +59,7 @@ async def test_halt_is_on_screen_whatever_is_open(server: FakeServer, opener: Op
         server.mode, server.reason = "DRIVE", None
 
 
-async def test_halt_latches_and_says_why(server: FakeServer, opener: Opener) -> None:
+async def test_halt_latches_and_shows_the_reason(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await opened.page.get_by_role("button", name="HALT").click()
     assert await server.wait("halt") == {}
@@ -91,7 +91,7 @@ async def test_the_space_bar_halts_wherever_the_focus_is(server: FakeServer, ope
     assert len(server.of("halt")) == 1
 
 
-async def test_the_space_bar_is_a_blank_where_one_writes(server: FakeServer, opener: Opener) -> None:
+async def test_the_space_bar_types_a_space_in_text_fields(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await opened.tab("Time")
     await opened.page.locator("#bookmark-text").press_sequentially("a b")
@@ -99,7 +99,7 @@ async def test_the_space_bar_is_a_blank_where_one_writes(server: FakeServer, ope
     assert not server.of("halt")
 
 
-async def test_a_halt_without_a_connection_is_told_and_sent_as_soon_as_there_is_one(
+async def test_a_halt_without_a_connection_is_reported_and_sent_on_reconnecting(
     server: FakeServer, opener: Opener
 ) -> None:
     opened = await opener.open(server.url)
@@ -132,7 +132,7 @@ async def test_arm_and_disarm(server: FakeServer, opener: Opener) -> None:
     assert len(server.of("arm")) == 2, "locked capitals arm nothing"
 
 
-async def test_who_watches_can_halt_but_not_drive(server: FakeServer, opener: Opener) -> None:
+async def test_an_observer_can_halt_but_not_drive(server: FakeServer, opener: Opener) -> None:
     server.controller = 99
     opened = await opener.open(server.url)
     await opened.tab("Drive")
@@ -152,7 +152,7 @@ async def test_who_watches_can_halt_but_not_drive(server: FakeServer, opener: Op
     await server.wait("halt")
 
 
-async def test_control_is_asked_for_and_handed_over(server: FakeServer, opener: Opener) -> None:
+async def test_control_is_requested_and_handed_over(server: FakeServer, opener: Opener) -> None:
     first = await opener.open(server.url)
     second = await opener.open(server.url)
     server.refusals["take_control"] = ("client 1 has the control and has been asked for it", None)
@@ -175,7 +175,7 @@ async def test_control_is_asked_for_and_handed_over(server: FakeServer, opener: 
 
 
 async def press_pad(opened: Opened, x: float, y: float) -> None:
-    """Press the pad in the middle and drag to a place, in shares of its radius."""
+    """Press the pad in the middle and drag to a point, in fractions of its radius."""
     await opened.tab("Drive")
     await opened.page.locator("#pad").scroll_into_view_if_needed()
     box = await opened.page.locator("#pad").bounding_box()
@@ -212,7 +212,7 @@ async def test_commands_come_often_enough(server: FakeServer, opener: Opener) ->
     assert gaps[len(gaps) // 2] <= 0.1, f"half of them came later than after {gaps[len(gaps) // 2]:.3f} s"
 
 
-async def test_keys_drive_only_where_that_is_switched_on(server: FakeServer, opener: Opener) -> None:
+async def test_keys_drive_only_if_enabled(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     page = opened.page
     await page.locator("#map-front").focus()
@@ -281,7 +281,7 @@ LOSSES: dict[str, str] = {
 
 
 @pytest.mark.parametrize("loss", LOSSES)
-async def test_whatever_is_lost_lets_go(server: FakeServer, opener: Opener, loss: str) -> None:
+async def test_any_loss_stops_teleoperation(server: FakeServer, opener: Opener, loss: str) -> None:
     opened = await opener.open(server.url)
     await press_pad(opened, 0.0, 1.0)
     await still_sends(server)
@@ -291,7 +291,7 @@ async def test_whatever_is_lost_lets_go(server: FakeServer, opener: Opener, loss
     await has_let_go(server)
 
 
-async def test_a_page_that_is_left_sends_zero(server: FakeServer, opener: Opener) -> None:
+async def test_leaving_the_page_sends_zero(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await press_pad(opened, 0.0, 1.0)
     await still_sends(server)
@@ -299,7 +299,7 @@ async def test_a_page_that_is_left_sends_zero(server: FakeServer, opener: Opener
     await has_let_go(server)
 
 
-async def test_halt_and_a_lost_mode_let_go(server: FakeServer, opener: Opener) -> None:
+async def test_halt_and_leaving_drive_stop_teleoperation(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await press_pad(opened, 0.0, 1.0)
     await still_sends(server)
@@ -317,7 +317,7 @@ async def test_halt_and_a_lost_mode_let_go(server: FakeServer, opener: Opener) -
     await opened.says("#teleop-state", "stopped: the mode is SAFE STOP")
 
 
-async def test_losing_control_lets_go(server: FakeServer, opener: Opener) -> None:
+async def test_losing_control_stops_teleoperation(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await press_pad(opened, 0.0, 1.0)
     await still_sends(server)
@@ -369,7 +369,7 @@ async def test_a_goal_with_the_keyboard_alone(server: FakeServer, opener: Opener
     assert (goal["x"], goal["y"]) == pytest.approx((x, y), abs=1e-6)
 
 
-async def test_gains_are_set_where_one_drives(server: FakeServer, opener: Opener) -> None:
+async def test_gains_can_be_set_in_the_drive_panel(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await opened.tab("Drive")
     gain = opened.page.locator("#drive-gains").get_by_label("move ahead gain")

@@ -1,4 +1,4 @@
-"""The page on the robot's own process, with the emulated base behind it: done on the one, it is seen on the other."""
+"""The page on a real process with an emulated base: an action on the page has its effect on the base."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 from playwright.async_api import expect
 
 from drivers.messages import Flags
-from tests.browser.opened import Opened, Opener
+from tests.browser.open_page import Opened, Opener
 from tests.hil.machine import TIMEOUT_S, stalls_excused
 from tests.hil.running import Running, running, start_url
 from tests.hil.truth import Row, Truth
@@ -26,7 +26,7 @@ pytestmark = [
 CYCLE_S = 0.05
 SLACK_S = 0.01
 ATTEMPTS = 8
-"""A machine that holds up a key's way through the browser and not its control does not do so eight times in a row."""
+"""A machine that delays a key event but not its control does not do so eight times in a row."""
 HALTS = 3
 TURN_S = 0.002
 
@@ -37,7 +37,7 @@ STAMP = """addEventListener('keydown', (event) => {
 
 @dataclass
 class Run:
-    """A run under way, its page's address, and what its base really does."""
+    """A running process, the address of its page, and the true state of its base."""
 
     command: Running
     url: str
@@ -45,7 +45,7 @@ class Run:
     recording: Path
 
     async def sees(self, done: Callable[[Row], bool], what: str) -> Row:
-        """Wait until the base does something."""
+        """Wait until the true state of the base fulfils a condition."""
         return await asyncio.to_thread(self.truth.wait, done, what)
 
 
@@ -78,9 +78,7 @@ async def test_the_page_shows_six_recognised_drums(tmp_path: Path, opener: Opene
         assert time.monotonic() - began_s < TIMEOUT_S
         await opened.says("#mode-name", "DRIVE")
         truth = await opened.world("run.session.truth.drums")
-        known = await opened.world(
-            "run.state.objects.filter((o) => o.model === 'semicircle').map((o) => [o.x, o.y])"
-        )
+        known = await opened.world("run.state.objects.filter((o) => o.model === 'semicircle').map((o) => [o.x, o.y])")
         for x, y, _ in truth:
             assert min(abs(x - kx) + abs(y - ky) for kx, ky in known) < 0.1
         assert await opened.world("run.segments.size") > 20
@@ -96,12 +94,12 @@ async def test_a_wrong_token_shows_nothing(tmp_path: Path, opener: Opener) -> No
         opened = await opener.open(wrong, live=False)
         await opened.says("#banner-connection", "token is missing or wrong")
         assert not await opened.world("run.fresh")
-        opened.complaints.clear()  # the browser's own words on the refusal
+        opened.errors.clear()  # the browser's own words on the refusal
 
 
 @dataclass
 class Oversleep:
-    """By how much a sleep was too long at worst: what the machine took from whoever ran meanwhile."""
+    """The longest delay of a sleep: a control for time that the machine took from all processes."""
 
     worst_s: float = 0.0
 
@@ -113,7 +111,7 @@ class Oversleep:
 
 
 async def halted_after(robot: Run, opened: Opened) -> tuple[float, float]:
-    """Press the space bar; return how long after that the base latched, and what the machine took meanwhile, s."""
+    """Press the space bar; return the delay until the base latched, and the control's delay, s."""
     wall_s = time.time() - time.monotonic()
     oversleep = Oversleep()
     control = asyncio.create_task(oversleep.work())
@@ -182,7 +180,7 @@ async def test_a_lost_page_stops_the_base(
 
 
 @stalls_excused
-async def test_what_a_person_does_is_replayed_to_the_bit(tmp_path: Path, opener: Opener) -> None:
+async def test_operator_actions_are_replayed_bit_identically(tmp_path: Path, opener: Opener) -> None:
     async with run(tmp_path, opener) as robot:
         opened = await opener.open(robot.url)
         page = opened.page
@@ -237,7 +235,7 @@ async def test_what_a_person_does_is_replayed_to_the_bit(tmp_path: Path, opener:
         assert await asyncio.to_thread(robot.command.end) == 0
         await opened.says("#banner-connection", "No connection")
         await page.close()
-        opened.complaints.clear()  # of a server that is gone
+        opened.errors.clear()  # of a server that is gone
     with running(tmp_path, "replay", "replay", str(robot.recording), "--verify") as replay:
         code = await asyncio.to_thread(replay.end)
         assert code == 0, replay.out + replay.err

@@ -1,4 +1,4 @@
-"""Drawing keeps up: 500 segments and 40 objects, everything switched on, drawn in software, no card to help.
+"""Drawing speed: 500 segments and 40 objects, all layers on, software rendering.
 
 A browser draws as often as the machine lets it, and here others share it. So the page draws as fast as it can, every
 frame anew, and in turns with it a page that draws a hundred lines: what the machine takes away it takes from both.
@@ -11,9 +11,9 @@ from statistics import median
 
 import pytest
 
-from tests.browser.fake import FakeServer
-from tests.browser.hall import Hall
-from tests.browser.opened import DESK, Opener
+from tests.browser.fake_server import FakeServer
+from tests.browser.open_page import DESK, Opener
+from tests.browser.synthetic_run import Hall
 
 pytestmark = [pytest.mark.realtime, pytest.mark.asyncio(loop_scope="session")]
 
@@ -21,7 +21,7 @@ FRAMES_PER_S = 30.0
 ROUNDS = 5
 ENOUGH = 25
 CONTROL_FRAMES_PER_S = 45.0
-"""A machine that cannot show even the control this often is too busy to say anything of frames a second."""
+"""Below this frame rate of the control the machine is too busy for the measurement to mean anything."""
 
 
 @pytest.mark.parametrize("hall", [Hall(segments=500, objects=40, moving=False)], ids=["full"])
@@ -46,7 +46,7 @@ async def test_thirty_frames_a_second(server: FakeServer, opener: Opener, measur
 
 
 @pytest.mark.parametrize("hall", [Hall(segments=500, objects=40, moving=False)], ids=["full"])
-async def test_it_draws_only_what_changed(server: FakeServer, opener: Opener) -> None:
+async def test_only_changes_are_drawn(server: FakeServer, opener: Opener) -> None:
     server.paused = True
     opened = await opener.open(server.url)
     await opened.steady()

@@ -1,4 +1,4 @@
-"""Time from the page: hold it, let it go a cycle at a time, faster, record it, look at it again."""
+"""The time panel: pause, single step, speed, recording, playback."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import pytest
 from PIL import Image
 from playwright.async_api import expect
 
-from tests.browser.fake import TOKEN, FakeServer
-from tests.browser.hall import greeting
-from tests.browser.opened import Opener
+from tests.browser.fake_server import TOKEN, FakeServer
+from tests.browser.open_page import Opener
+from tests.browser.synthetic_run import greeting
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
@@ -32,7 +32,7 @@ async def test_pause_single_step_and_speed(server: FakeServer, opener: Opener) -
     await opened.says("#time-text", "× 4")
 
 
-async def test_a_robot_on_a_port_has_no_time_to_hold(server: FakeServer, opener: Opener) -> None:
+async def test_a_robot_on_a_port_cannot_be_paused(server: FakeServer, opener: Opener) -> None:
     server.session = greeting(emulated=False, truth=None)
     opened = await opener.open(server.url)
     await opened.tab("Time")
@@ -96,7 +96,7 @@ async def test_a_recording_is_opened_scrubbed_played_and_left(server: FakeServer
     await opened.says("#robot-name", "denning")
 
 
-async def test_nothing_is_driven_by_hand_while_one_looks_at_a_recording(server: FakeServer, opener: Opener) -> None:
+async def test_teleoperation_is_refused_while_a_recording_is_shown(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     server.playback = {"s": 1.0, "is_playing": False, "speed": 1.0}
     await opened.says("#banner-playback", "not the live run")
@@ -132,7 +132,7 @@ async def test_a_screenshot_is_a_picture_of_the_map(server: FakeServer, opener: 
     assert len(colours) > 200, "the picture is empty"
 
 
-async def test_the_report_is_asked_for_with_the_token(server: FakeServer, opener: Opener) -> None:
+async def test_the_report_is_requested_with_the_token(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await opened.tab("Time")
     async with opened.page.context.expect_page() as shown:

@@ -1,4 +1,4 @@
-"""Data under the operator's hands: what a person does on the page, and what arrives at the process."""
+"""Editing the map: actions of the operator on the page, and the messages that arrive at the process."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Locator, expect
 
-from tests.browser.fake import FakeServer
-from tests.browser.hall import DRUMS, RADIUS
-from tests.browser.opened import PHONE, Opened, Opener
+from tests.browser.fake_server import FakeServer
+from tests.browser.open_page import PHONE, Opened, Opener
+from tests.browser.synthetic_run import DRUMS, RADIUS
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
@@ -25,14 +25,14 @@ async def still(server: FakeServer, opener: Opener, size: tuple[int, int] | None
 
 
 async def middle(opened: Opened, number: int) -> tuple[float, float]:
-    """Where the middle of a segment is on the screen."""
+    """Return the screen position of the middle of a segment."""
     s = await opened.world(f"run.segments.get({number})")
     x, y = (s["x1"] + s["x2"]) / 2, (s["y1"] + s["y2"]) / 2
     return await opened.screen(x, y)
 
 
 async def lasso(opened: Opened, x: float, y: float, r: float) -> None:
-    """Draw a ring round a place of the plane."""
+    """Draw a lasso round a point of the map."""
     page = opened.page
     spots = [await opened.screen(x + r * math.cos(a), y + r * math.sin(a)) for a in [0.4 * i for i in range(16)]]
     await page.mouse.move(*spots[0])
@@ -59,7 +59,7 @@ async def test_a_click_selects_a_segment_and_delete_removes_it(server: FakeServe
     await expect(page.locator("#selection-bar")).to_be_hidden()
 
 
-async def test_a_lasso_selects_what_lies_in_it_to_pin_and_unpin(server: FakeServer, opener: Opener) -> None:
+async def test_a_lasso_selects_segments_to_pin_and_unpin(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     page = opened.page
     await page.keyboard.press("2")
@@ -81,7 +81,7 @@ async def test_a_lasso_selects_what_lies_in_it_to_pin_and_unpin(server: FakeServ
     await page.keyboard.press("Escape")
 
 
-async def test_shift_adds_and_takes_away(server: FakeServer, opener: Opener) -> None:
+async def test_shift_adds_and_removes(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     await opened.page.keyboard.press("2")
     await lasso(opened, *DRUMS[0], 1.35 * RADIUS)
@@ -109,7 +109,7 @@ async def test_segments_are_selected_with_the_keyboard_alone(server: FakeServer,
     assert await opened.world("selection.segments.size + (selection.object === null ? 0 : 1)") > 0
 
 
-async def test_a_model_is_put_where_it_is_pressed_and_turned_by_dragging(server: FakeServer, opener: Opener) -> None:
+async def test_a_model_is_placed_by_pressing_and_rotated_by_dragging(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     page = opened.page
     await page.get_by_role("radio", name="Place a model").click()
@@ -124,7 +124,7 @@ async def test_a_model_is_put_where_it_is_pressed_and_turned_by_dragging(server:
     assert (placed["x"], placed["y"], placed["theta"]) == pytest.approx((3.0, 0.0, math.pi / 2), abs=0.02)
 
 
-async def test_an_object_is_dragged_and_turned(server: FakeServer, opener: Opener) -> None:
+async def test_an_object_is_dragged_and_rotated(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     page = opened.page
     await page.keyboard.press("3")
@@ -147,7 +147,7 @@ async def test_an_object_is_dragged_and_turned(server: FakeServer, opener: Opene
     assert (turned["x"], turned["y"], turned["theta"]) == pytest.approx((cx, cy, math.pi / 2), abs=0.03)
 
 
-async def test_an_object_is_nudged_and_turned_by_keys(server: FakeServer, opener: Opener) -> None:
+async def test_an_object_is_nudged_and_rotated_by_keys(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     page = opened.page
     await page.locator("#objects").focus()
@@ -174,7 +174,7 @@ async def test_reject_and_confirm(server: FakeServer, opener: Opener) -> None:
     assert await server.wait("reject_object") == {"object": 3}
 
 
-async def test_what_is_refused_says_why(server: FakeServer, opener: Opener) -> None:
+async def test_a_rejected_request_shows_the_reason(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     server.refusals["reject_object"] = ("object 3 left the map before", None)
     await opened.page.locator("#objects li").nth(2).click()
@@ -182,7 +182,7 @@ async def test_what_is_refused_says_why(server: FakeServer, opener: Opener) -> N
     await opened.says("#toasts", "object 3 left the map before")
 
 
-async def test_the_map_is_cleared_only_after_a_second_word(server: FakeServer, opener: Opener) -> None:
+async def test_the_map_is_cleared_only_after_confirmation(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     await opened.page.get_by_role("button", name="Clear the map…").click()
     await opened.page.get_by_role("button", name="Keep it").click()
@@ -192,7 +192,7 @@ async def test_the_map_is_cleared_only_after_a_second_word(server: FakeServer, o
     assert await server.wait("clear_map") == {}
 
 
-async def test_a_model_file_is_loaded_and_what_is_wrong_stands_beside_it(
+async def test_a_model_file_is_loaded_and_its_error_shown_beside_it(
     server: FakeServer, opener: Opener, tmp_path: Path
 ) -> None:
     opened = await still(server, opener)
@@ -216,7 +216,7 @@ def field(opened: Opened, path: str) -> Locator:
     return opened.page.locator(f'#tune-fields [data-path="{path}"]')
 
 
-async def test_a_parameter_is_set_and_its_error_stands_beside_it(server: FakeServer, opener: Opener) -> None:
+async def test_a_parameter_is_set_and_its_error_shown_beside_it(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     page = opened.page
     await opened.tab("Tune")
@@ -243,7 +243,7 @@ async def test_a_parameter_is_set_and_its_error_stands_beside_it(server: FakeSer
     await expect(gain).to_have_value("2.5")
 
 
-async def test_choices_are_chosen_and_undo_brings_back(server: FakeServer, opener: Opener) -> None:
+async def test_a_choice_is_set_and_undone(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     page = opened.page
     await opened.tab("Tune")
@@ -259,7 +259,7 @@ async def test_choices_are_chosen_and_undo_brings_back(server: FakeServer, opene
     await expect(gain).to_have_value("1")
 
 
-async def test_parameters_are_found_by_words(server: FakeServer, opener: Opener) -> None:
+async def test_parameters_are_filtered_by_text(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     await opened.tab("Tune")
     await opened.page.locator("#tune-filter").fill("founds a new")

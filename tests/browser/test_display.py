@@ -1,25 +1,25 @@
-"""What there is to see: map and layers, pan, zoom, follow, tape; ring, charts, list, log; that data are old."""
+"""The display: map and layers, pan, zoom, follow, tape; ring, charts, object list, log; stale data."""
 
 from __future__ import annotations
 
 import pytest
 from playwright.async_api import expect
 
-from tests.browser.fake import FakeServer
-from tests.browser.hall import DRUMS, Hall, greeting
-from tests.browser.opened import PHONE, Opened, Opener, until
+from tests.browser.fake_server import FakeServer
+from tests.browser.open_page import PHONE, Opened, Opener, until
+from tests.browser.synthetic_run import DRUMS, Hall, greeting
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
 async def picture(opened: Opened) -> str:
-    """A number for what is drawn on the map now, after whatever waits to be drawn."""
+    """Return a checksum of the map's pixels, after all pending drawing."""
     await opened.drawn()
     return str(await opened.probe("inked"))
 
 
 async def still(server: FakeServer, opener: Opener, cycle: int = 170) -> Opened:
-    """A page of a robot that stands, so that nothing on the map changes by itself."""
+    """Open a page of a robot that stands still, so that the map does not change by itself."""
     server.paused, server.cycle = True, cycle
     opened = await opener.open(server.url)
     await opened.steady()
@@ -54,7 +54,7 @@ async def test_every_layer_draws_something_and_can_be_switched(server: FakeServe
     await opened.shot("layers")
 
 
-async def test_truth_is_drawn_only_where_it_is_told(server: FakeServer, opener: Opener) -> None:
+async def test_true_outlines_are_drawn_only_if_reported(server: FakeServer, opener: Opener) -> None:
     server.session = greeting(truth=None)
     opened = await still(server, opener)
     await opened.tab("Layers")
@@ -64,7 +64,7 @@ async def test_truth_is_drawn_only_where_it_is_told(server: FakeServer, opener: 
     assert await picture(opened) == whole
 
 
-async def test_beams_are_those_that_fire_now(server: FakeServer, opener: Opener) -> None:
+async def test_only_the_beams_firing_now_are_drawn(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     server.silent = True
     for layer in ("arcs", "segments", "clusters", "models", "grid", "truth", "vectors", "labels"):
@@ -117,7 +117,7 @@ async def test_pan_zoom_and_fit_by_mouse_and_keys(server: FakeServer, opener: Op
         assert box["y"] < sy < box["y"] + box["height"]
 
 
-async def test_follow_keeps_the_robot_in_the_middle_until_somebody_pans(server: FakeServer, opener: Opener) -> None:
+async def test_follow_keeps_the_robot_centred_until_the_map_is_panned(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await opened.steady()
     follow = opened.page.get_by_role("button", name="Follow the robot")
@@ -185,7 +185,7 @@ async def test_tape_measures_from_drum_to_drum(server: FakeServer, opener: Opene
     await opened.says("#announce", "Tape: 3.0")
 
 
-async def test_a_list_of_objects_in_words(server: FakeServer, opener: Opener) -> None:
+async def test_objects_are_listed_as_text(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     rows = opened.page.locator("#objects li")
     await expect(rows).to_have_count(6)
@@ -247,7 +247,7 @@ async def test_the_log_can_be_searched_and_is_never_markup(server: FakeServer, o
     await expect(lines).to_have_count(1)
 
 
-async def test_old_data_are_told_to_be_old(server: FakeServer, opener: Opener) -> None:
+async def test_old_data_are_reported_as_old(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     server.silent = True
     await opened.says("#banner-stale", "what you see is old")
@@ -256,7 +256,7 @@ async def test_old_data_are_told_to_be_old(server: FakeServer, opener: Opener) -
     await expect(opened.page.locator("#banner-stale")).to_have_count(0)
 
 
-async def test_it_connects_again_by_itself_and_takes_the_whole_map(server: FakeServer, opener: Opener) -> None:
+async def test_it_reconnects_and_receives_the_whole_map(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await opened.steady()
     await server.drop()
@@ -266,11 +266,11 @@ async def test_it_connects_again_by_itself_and_takes_the_whole_map(server: FakeS
     await opened.until(f"run.segments.size >= {server.hall.known(server.cycle) - 5}", "the whole map")
 
 
-async def test_a_wrong_token_is_told(server: FakeServer, opener: Opener) -> None:
+async def test_a_wrong_token_is_reported(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url.replace("right", "wrong"), live=False)
     await opened.says("#banner-connection", "token is missing or wrong")
     await opened.shot("wrong-token")
-    opened.complaints.clear()  # the browser's own words on the refusal
+    opened.errors.clear()  # the browser's own words on the refusal
 
 
 async def test_the_token_does_not_stay_in_the_address(server: FakeServer, opener: Opener) -> None:
@@ -282,21 +282,21 @@ async def test_the_token_does_not_stay_in_the_address(server: FakeServer, opener
 
 
 @pytest.mark.parametrize("hall", [Hall(segments=60, objects=12)], ids=["walls"])
-async def test_what_has_no_model_is_shown_too(server: FakeServer, opener: Opener) -> None:
+async def test_objects_without_a_model_are_shown(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     await expect(opened.page.locator("#objects li")).to_have_count(12)
     await opened.says("#objects", "wall")
     await opened.shot("walls")
 
 
-async def test_segments_that_left_are_gone(server: FakeServer, opener: Opener) -> None:
+async def test_removed_segments_disappear(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     size = await opened.world("run.segments.size")
     server.deleted |= {1, 2, 3}
     await until(lambda: opened.world(f"run.segments.size === {size - 3}"), "three segments fewer")
 
 
-async def test_a_whole_map_after_a_gap_takes_the_place_of_the_old_one(server: FakeServer, opener: Opener) -> None:
+async def test_a_whole_map_after_a_gap_replaces_the_old_one(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     assert await opened.world("run.segments.has(5) && run.segments.has(6)")
     server.deleted |= {5, 6}

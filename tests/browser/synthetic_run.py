@@ -1,4 +1,4 @@
-"""A run as the page gets to see it, made of formulas: the paper's hall, and a robot that drives through it.
+"""A synthetic run as the page sees it: the paper's hall, and a robot that drives through it.
 
 The tests of the page need frames that they can foretell, of any size, and no robot.
 """
@@ -22,7 +22,7 @@ PHASES: Final = ("gather", "perceive", "decide", "command", "refine", "observers
 
 def parameter(path: str, kind: str, value: object, low: float | None = None, high: float | None = None,
               choices: list[str] | None = None, help_: str = "") -> dict[str, Any]:  # fmt: skip
-    """Return a parameter as the greeting lists it."""
+    """Return a parameter as the session message lists it."""
     return {"path": path, "label": path.split(".")[-1].replace("_", " "), "value": value, "low": low, "high": high,
             "kind": kind, "choices": choices, "help": help_}  # fmt: skip
 
@@ -45,7 +45,7 @@ PARAMETERS: Final = (
 
 
 def greeting(role: str = "control", **changes: Any) -> dict[str, Any]:
-    """Return the first message of a server."""
+    """Return the session message, the first one that a server sends."""
     angles = [math.radians(15.0 * i) for i in range(24)]
     turn = np.linspace(0.0, 2.0 * math.pi, 16, endpoint=False)
     drum = [[round(RADIUS * math.cos(a), 6), round(RADIUS * math.sin(a), 6)] for a in turn]
@@ -66,7 +66,7 @@ def greeting(role: str = "control", **changes: Any) -> dict[str, Any]:
 
 @dataclass
 class Hall:
-    """The run: what it shows in cycle n.
+    """The state of the run in cycle n.
 
     Parameters
     ----------
@@ -97,20 +97,20 @@ class Hall:
             self._shape.append([cx - dx, cy - dy, cx + dx, cy + dy, angle])
 
     def pose(self, cycle: int) -> list[float]:
-        """Return where the robot is."""
+        """Return the pose of the robot."""
         s = min(0.3 * cycle * PERIOD_S, 4.2) if self.moving else 0.0
         return [s, 0.06 * math.sin(1.4 * s), 0.08 * math.cos(1.4 * s)]
 
     def known(self, cycle: int) -> int:
-        """Return how many segments have been made."""
+        """Return the number of segments made so far."""
         return min(self.segments, 30 + cycle) if self.moving else self.segments
 
     def segment(self, number: int, t: float) -> list[float]:
-        """Return a segment in the form of the wire; the first ones are the oldest."""
+        """Return a segment in wire form; the first ones are the oldest."""
         return [number, *self._shape[number - 1], max(0.0, t)]
 
     def ranges(self, pose: list[float]) -> list[float]:
-        """Return the range of every sensor; −1 where nothing is heard."""
+        """Return the range of every sensor; −1 without an echo."""
         out = []
         for i in range(24):
             a = math.radians(15.0 * i)
@@ -126,7 +126,7 @@ class Hall:
         return out
 
     def seen(self, cycle: int) -> list[dict[str, Any]]:
-        """Return the objects known."""
+        """Return the recognised objects."""
         out = []
         for i, (x, y) in enumerate(self.places):
             spread = 0.004 + 0.0006 * i
@@ -139,7 +139,7 @@ class Hall:
         return out
 
     def frame(self, cycle: int) -> dict[str, Any]:
-        """Return what is the same for every client: all but its role and the segments that are new to it."""
+        """Return the part of a frame that all clients share: all but the role and the new segments."""
         rng = np.random.default_rng([self.seed, cycle])
         pose = self.pose(cycle)
         busy = 2500.0 + 1800.0 * math.sin(cycle / 9.0) ** 2

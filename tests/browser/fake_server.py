@@ -1,4 +1,4 @@
-"""A server that speaks the console's protocol and keeps what a page sent: the page's other end in its tests."""
+"""A fake server for tests of the page: it speaks the console's protocol and keeps the messages received."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from aiohttp import WSMsgType, web
 
-from tests.browser.hall import Hall, greeting
+from tests.browser.synthetic_run import Hall, greeting
 
 PAGE: Final = Path(__file__).parents[2] / "runtime" / "console" / "page"
 POLICY: Final = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
@@ -27,7 +27,7 @@ HALTED: Final = "halted by the operator; re-arm to go on"
 
 @dataclass
 class Client:
-    """A page that is connected."""
+    """A connected page."""
 
     socket: web.WebSocketResponse
     number: int
@@ -38,7 +38,7 @@ class Client:
 
 @dataclass
 class FakeServer:
-    """A robot's process as far as a page can tell."""
+    """The robot's process as the page sees it."""
 
     hall: Hall
     mode: str = "DRIVE"
@@ -60,7 +60,7 @@ class FakeServer:
     changed: list[tuple[str, Any]] = field(default_factory=list)
     flags: list[str] = field(default_factory=list)
     silent: bool = False
-    """Send nothing, as a process that hangs."""
+    """Send nothing, like a process that hangs."""
     port: int = 0
     _news: asyncio.Event = field(default_factory=asyncio.Event)
     _counted: int = 0
@@ -81,11 +81,11 @@ class FakeServer:
         return {key: value for key, value in self.of(kind)[count - 1].items() if key not in {"id", "type"}}
 
     def of(self, kind: str) -> list[dict[str, Any]]:
-        """Return the messages of a kind that came so far."""
+        """Return the messages of a kind received so far."""
         return [m for m in self.received if m["type"] == kind]
 
     def times_of(self, kind: str) -> list[float]:
-        """Return when they came, by the loop's clock."""
+        """Return the times at which they were received, by the loop's clock."""
         return [t for m, t in zip(self.received, self.arrived_s, strict=True) if m["type"] == kind]
 
     async def tell(self, message: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""Pages opened in a browser, with what a person does on them: find places on the map, wait for words."""
+"""Pages opened in a browser, and the actions of an operator on them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any, Literal, Self
 
 from playwright.async_api import Browser, BrowserContext, Page, expect
 
-from tests.browser.fake import PATIENCE_S
+from tests.browser.fake_server import PATIENCE_S
 
 DESK, PHONE, PROJECTOR = (1440, 900), (360, 740), (1920, 1080)
 PROBES = Path(__file__).parent / "probes"
@@ -21,14 +21,14 @@ MODULE = "import('/page/main.js')"
 
 @dataclass
 class Opened:
-    """A page, what it complained of, and where its pictures go."""
+    """A page, the errors it reported, and where its screenshots go."""
 
     page: Page
     shots: Callable[[str], Path]
-    complaints: list[str] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
 
     async def screen(self, x: float, y: float) -> tuple[float, float]:
-        """Return where a place of the odometry's frame (m) is on the screen, px."""
+        """Return the screen position (px) of a point of the odometry frame (m)."""
         at: list[float] = await self.page.evaluate(
             f"""async ([x, y]) => {{
                 const {{ view }} = await {MODULE};
@@ -41,28 +41,28 @@ class Opened:
         return at[0], at[1]
 
     async def world(self, expression: str) -> Any:
-        """Return the value of an expression of what the page's main module exports."""
+        """Return the value of an expression over the exports of the page's main module."""
         return await self.page.evaluate(
-            f"async () => {{ const {{ connection, teleoperation, selection, tools, units, view, run }} = await {MODULE};"
-            f" return {expression}; }}"
+            f"async () => {{ const {{ connection, teleoperation, selection, tools, units, view, run }} ="
+            f" await {MODULE}; return {expression}; }}"
         )
 
     async def until(self, expression: str, what: str) -> None:
-        """Wait until such an expression is true."""
+        """Wait until such an expression becomes true."""
         await until(lambda: self.world(f"Boolean({expression})"), what)
 
     async def probe(self, name: str, *arguments: Any) -> Any:
-        """Return what one of the functions in `probes/` finds on the page."""
+        """Return the result of one of the functions in `probes/`."""
         return await self.page.evaluate((PROBES / f"{name}.js").read_text("utf-8"), *arguments)
 
     async def drawn(self) -> None:
-        """Wait until whatever waited to be drawn is drawn."""
+        """Wait until all pending drawing is done."""
         await self.page.evaluate(
             "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done())))"
         )
 
     async def steady(self) -> None:
-        """Stop the map from being fitted by itself, so that places stay where they are."""
+        """Turn off automatic fitting of the map, so that screen positions stay valid."""
         await self.until("run.fresh && run.state.objects.length > 0", "objects on the map")
         await self.page.evaluate(f"async () => {{ const {{ view }} = await {MODULE}; view.touched = true; }}")
 
@@ -71,16 +71,16 @@ class Opened:
         await self.page.get_by_role("tab", name=name, exact=True).click()
 
     async def shot(self, name: str) -> None:
-        """Keep a picture of what is on screen."""
+        """Save a screenshot."""
         await self.page.screenshot(path=self.shots(name))
 
     async def says(self, selector: str, words: str) -> None:
-        """Wait until an element says something."""
+        """Wait until an element contains a text."""
         await expect(self.page.locator(selector)).to_contain_text(words, timeout=1000 * PATIENCE_S)
 
 
 class Opener:
-    """Opens pages, and closes them."""
+    """Opens pages and closes them at the end."""
 
     def __init__(self, browser: Browser, shots: Callable[[str], Path]) -> None:
         self._browser = browser
@@ -117,8 +117,8 @@ class Opener:
             await context.add_init_script(script)
         page = await context.new_page()
         opened = Opened(page, self._shots)
-        page.on("pageerror", lambda error: opened.complaints.append(str(error)))
-        page.on("console", lambda said: opened.complaints.extend([said.text] * (said.type == "error")))
+        page.on("pageerror", lambda error: opened.errors.append(str(error)))
+        page.on("console", lambda said: opened.errors.extend([said.text] * (said.type == "error")))
         self._opened.append(opened)
         await page.goto(url)
         if live:
@@ -126,13 +126,13 @@ class Opener:
         return opened
 
     def check(self) -> None:
-        """Fail where a page complained of anything."""
-        complaints = [text for opened in self._opened for text in opened.complaints]
-        assert not complaints, complaints
+        """Fail if a page reported an error."""
+        errors = [text for opened in self._opened for text in opened.errors]
+        assert not errors, errors
 
 
 async def until(done: Callable[[], Awaitable[object]], what: str) -> None:
-    """Wait until something is so."""
+    """Wait until a condition holds."""
     end_s = time.monotonic() + PATIENCE_S
     while not await done():
         assert time.monotonic() < end_s, f"it never came: {what}"
