@@ -20,7 +20,7 @@ from typing import Final, TypeAlias
 import numpy as np
 from rich.table import Table
 
-from runtime.timing.realtime import ask_slice
+from runtime.timing.realtime import request_slice
 from runtime.timing.wake import Waker
 
 PERIOD_S: Final = 0.05
@@ -79,12 +79,12 @@ def by_waker() -> Iterator[Sleep]:
 @contextlib.contextmanager
 def by_waker_with_slice() -> Iterator[Sleep]:
     """Sleep as the cycle does, with a short scheduler time slice requested, as a run does."""
-    ask_slice(SLICE_S)
+    request_slice(SLICE_S)
     try:
         with by_waker() as sleep:
             yield sleep
     finally:
-        ask_slice(0.0)
+        request_slice(0.0)
 
 
 def spinning(

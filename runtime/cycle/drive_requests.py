@@ -70,7 +70,10 @@ def validate(drive_request: DriveRequest) -> str | None:
                 )
         case Teleoperate(v, w, valid_s):
             if not (math.isfinite(v) and math.isfinite(w) and valid_s >= 0.0):
-                return f"invalid velocity ({v:g}, {w:g}) for {valid_s:g} s: expected finite m/s and rad/s, duration ≥ 0 s"
+                return (
+                    f"invalid velocity ({v:g}, {w:g}) for {valid_s:g} s: "
+                    "expected finite m/s and rad/s, duration ≥ 0 s"
+                )
     return None
 
 

@@ -1,4 +1,4 @@
-"""What one cycle takes in: everything that arrived from the robot, the operator and the process since the last one."""
+"""What one cycle takes in: all that arrived from the robot, the operator and the process since the last one."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from perception.edits import Edit
 from runtime.cycle.drive_requests import DriveRequest
 
 GAP_SHARE: Final = 0.9
-"""Largest time between two commands as a share of the base's deadman: beyond it the base has stopped or is about to."""
+"""Largest time between two commands as a share of the base's deadman, which stops a base that waits longer."""
 
 GAP_MAX_S: Final = GAP_SHARE * 0.5
-"""Largest time between two commands, s, for the protocol's usual deadman of 0.5 s, until the robot reports its own."""
+"""That time, s, for the protocol's usual deadman of 0.5 s, until the robot reports its own."""
 
 
 class Request(Enum):

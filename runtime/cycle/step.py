@@ -144,8 +144,8 @@ def step(
     state.cycle += 1
     counts = state.perception.counts
     return CycleRecord(
-        state.cycle, inputs, state.mode, command, new_segments, counts.segments, counts.hypotheses, quanta, iterations,
-        refinement, refused,
+        state.cycle, inputs, state.mode, command, new_segments, counts.segments, counts.hypotheses,
+        quanta, iterations, refinement, refused,
     )  # fmt: skip
 
 

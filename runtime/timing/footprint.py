@@ -1,7 +1,6 @@
-"""What the process costs its machine: start-up, memory, processor time, and kernels compiled too late.
+"""What the process uses of its machine: start-up time, memory, CPU time, and kernels compiled too late.
 
-A run opens these books when the robot is ready and closes them at its end; what they say goes into the summary, so
-that a drive that compiled, grew or hurried says so by itself.
+Measured from the first cycle to the end of the run; the result goes into the run's summary.
 """
 
 from __future__ import annotations
@@ -16,21 +15,21 @@ from runtime.timing.memory_policy import MemoryPolicy
 
 _MEGA: Final = 1e6
 _START_FIELD: Final = 19
-"""Place of `starttime` in /proc/self/stat after the name, which is the only field that may hold a blank."""
+"""Index of `starttime` in /proc/self/stat after the name, which is the only field that may contain a blank."""
 
 
 class FootprintRow(TypedDict):
-    """What a run cost its machine; None where this system does not tell."""
+    """What a run used of its machine; None where this system does not report it."""
 
     start_s: float | None
     """From the start of the process until the robot was ready for the first cycle."""
     cpu_share: float
-    """Processor time of all threads while driving, as a share of one core."""
+    """CPU time of all threads while driving, as a share of one core."""
     rss_mb: float | None
     """Memory at the end, 10⁶ bytes."""
     rss_peak_mb: float | None
     growth_mb: float | None
-    """Of the process's own memory since the first cycle."""
+    """Growth of the process's own memory since the first cycle, 10⁶ bytes."""
     compilations: int
     """Kernels compiled or loaded since the first cycle."""
     collections: list[int]
@@ -38,7 +37,7 @@ class FootprintRow(TypedDict):
 
 
 class Footprint:
-    """Books on this process, opened when the first cycle is about to begin.
+    """Measures this process from now, when the first cycle is about to begin, to `close`.
 
     Parameters
     ----------
@@ -55,7 +54,7 @@ class Footprint:
         self._cpu_s = time.process_time()
 
     def close(self) -> FootprintRow:
-        """Return what the run cost up to now."""
+        """Return what the run has used up to now."""
         driven_s = time.monotonic() - self._begin_host_s
         cpu_s = time.process_time() - self._cpu_s
         now_mb, before_mb = own_mb(), self._own_mb
@@ -71,7 +70,7 @@ class Footprint:
 
 
 def age_s() -> float | None:
-    """Return how long ago this process was started, to a hundredth of a second; None where nobody tells."""
+    """Return how long ago this process was started, to 0.01 s; None where the system does not report it."""
     try:
         fields = Path("/proc/self/stat").read_text("ascii", errors="replace").rpartition(")")[2].split()
         return time.clock_gettime(time.CLOCK_BOOTTIME) - int(fields[_START_FIELD]) / os.sysconf("SC_CLK_TCK")
@@ -80,17 +79,17 @@ def age_s() -> float | None:
 
 
 def rss_mb() -> float | None:
-    """Return the memory this process has in RAM, 10⁶ bytes; None where nobody tells."""
+    """Return the memory this process has in RAM, 10⁶ bytes; None where the system does not report it."""
     return _status_mb("VmRSS:")
 
 
 def peak_mb() -> float | None:
-    """Return the most it ever had."""
+    """Return the largest memory that this process had in RAM, 10⁶ bytes."""
     return _status_mb("VmHWM:")
 
 
 def own_mb() -> float | None:
-    """Return the memory it has filled itself, swapped out or not: pages of files come and go as the system likes."""
+    """Return the memory that this process allocated, swapped out or not, 10⁶ bytes; pages of files do not count."""
     filled, swapped = _status_mb("RssAnon:"), _status_mb("VmSwap:")
     return rss_mb() if filled is None else filled + (swapped or 0.0)
 

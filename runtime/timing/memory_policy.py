@@ -1,8 +1,8 @@
-"""The memory policy: while the robot drives, garbage is collected in slack only, and only the young.
+"""The memory policy: while the robot drives, only the young generation is collected, and only between two cycles.
 
-A full collection walks every object there is, which takes longer than a cycle may. So everything alive when the drive
-begins is set aside (`gc.freeze`), automatic collection is off, and the few young objects are looked through when a
-cycle has just ended and the next one is far enough away.
+A full collection visits every object, which takes longer than a cycle may. So all objects alive when the drive begins
+are excluded (`gc.freeze`), automatic collection is off, and the few young objects are collected when a cycle has just
+ended and the next one is far enough away.
 """
 
 from __future__ import annotations
@@ -13,30 +13,30 @@ from collections.abc import Callable, Iterator
 from typing import Final, Literal
 
 EVERY_CYCLES: Final = 20
-"""Young garbage is collected once in so many cycles: there is little, reference counts free the rest at once."""
+"""Cycles from one collection to the next: garbage is rare, as reference counts free most objects at once."""
 SLACK_MIN_S: Final = 0.01
-"""It takes well below a millisecond; nobody shall ever wait for it."""
+"""Least time until the next cycle for a collection, which takes well below a millisecond, s."""
 GENERATIONS: Final = 3
 _YOUNG: Final = 1
 
 
 def collect_young() -> None:
-    """Collect what was made since the last time."""
+    """Collect the objects made since the last collection."""
     gc.collect(_YOUNG)
 
 
 class MemoryPolicy:
-    """Decides when garbage is collected, and keeps the books on it.
+    """Decides when garbage is collected, and counts collections.
 
     Parameters
     ----------
     collect : callable
-        Collects the young.
+        Collects the young generation.
 
     Attributes
     ----------
     collections : list of int
-        Collections while driving, of each generation; whoever asked for them.
+        Collections while driving, of each generation, also those that others requested.
     """
 
     def __init__(self, collect: Callable[[], object] = collect_young) -> None:
@@ -46,7 +46,7 @@ class MemoryPolicy:
 
     @contextlib.contextmanager
     def driving(self) -> Iterator[None]:
-        """Set aside what is alive now, and collect nothing but in slack until the end."""
+        """Exclude what is alive now, and collect only in `cycle_done` inside this context."""
         gc.collect()
         gc.freeze()
         was_enabled = gc.isenabled()
@@ -61,7 +61,7 @@ class MemoryPolicy:
             gc.unfreeze()
 
     def cycle_done(self, slack_s: float) -> None:
-        """Collect young garbage if it is time for it and `slack_s` until the next cycle is enough."""
+        """Collect the young generation where it is due and the next cycle is `SLACK_MIN_S` away or more."""
         self._cycles += 1
         if self._cycles >= EVERY_CYCLES and slack_s >= SLACK_MIN_S:
             self._cycles = 0

@@ -1,7 +1,7 @@
-"""Asking the operating system for precedence: what it grants is used, what it refuses is told in one line each.
+"""Scheduling precedence from the operating system: what it grants is used, what it refuses is reported.
 
-Nothing is asked for by default. It is for whoever owns the machine to switch on, because it is at the cost of other
-programs: section `[realtime]`.
+Nothing is requested by default: the owner of the machine switches it on in the section `[realtime]`, because it is at
+the cost of other programs.
 """
 
 from __future__ import annotations
@@ -25,29 +25,25 @@ _CURRENT, _FUTURE, _ONFAULT = 1, 2, 4
 
 
 def apply_realtime(config: RealtimeConfig) -> list[str]:
-    """Ask for everything the settings name, for the calling thread and its memory.
+    """Request everything that the settings name, for the calling thread and its memory; return the refusals.
 
-    Returns
-    -------
-    list of str
-        A line for each thing refused: what, why, and what to do about it.
+    Each refusal is one line: what was refused, why, and what to do about it.
     """
     wanted: list[tuple[bool, Callable[[], str | None]]] = [
-        (config.slice_s is not None, lambda: ask_slice(config.slice_s or 0.0)),
+        (config.slice_s is not None, lambda: request_slice(config.slice_s or 0.0)),
         (config.core is not None, lambda: _pin(config.core or 0)),
         (config.lock_memory, _lock),
         (config.priority is not None, lambda: _priority(config.priority or 0)),
     ]
-    answers = [request() for asked, request in wanted if asked]
+    answers = [request() for is_set, request in wanted if is_set]
     return [refusal for refusal in answers if refusal is not None]
 
 
-def ask_slice(slice_s: float) -> str | None:
-    """Ask for short turns: a thread that wants little at a time is let in before those that want much.
+def request_slice(slice_s: float) -> str | None:
+    """Request a short time slice: the scheduler prefers threads that run briefly; return why it is refused.
 
-    A slice of 0 gives the system's own back. Returns what is refused, as `apply_realtime` does.
-
-    Since Linux 6.12 (EEVDF) a thread's virtual deadline follows from the slice it asks for; before, nothing happens.
+    A slice of 0 restores the system's default. Since Linux 6.12 (EEVDF) a thread's virtual deadline follows from its
+    slice; older kernels ignore it.
     """
     number = _SCHED_SETATTR.get(platform.machine()) if platform.system() == "Linux" else None
     if number is None or os.sched_getscheduler(0) != os.SCHED_OTHER:
@@ -86,7 +82,7 @@ def _lock() -> str | None:
 
 def _priority(priority: int) -> str | None:
     try:
-        # Processes started later shall not inherit it.
+        # Child processes must not inherit it.
         os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
     except OSError as error:
         return (

@@ -194,7 +194,7 @@ class ScaledClock(RunClock):
         self._notify()
 
     def _extend(self, due_s: float) -> None:
-        """Let scaled time go on past the next cycle's deadline, and at the same pace from here where it had to wait."""
+        """Let scaled time go on past the next cycle's deadline, from here on where it had to wait."""
         scale = self.time_scale
         beyond_s, least_s = (LEASE_S, LEASE_MIN_S) if self._cycles_left is None else (0.0, 0.0)
         if scale.is_real_time or due_s + beyond_s <= scale.until_s + least_s:

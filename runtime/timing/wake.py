@@ -1,8 +1,8 @@
-"""Waking on time: sleep until a deadline to the microsecond, or until somebody has news.
+"""Sleep until a deadline to the microsecond, or until woken.
 
-asyncio hands its timeouts to epoll in whole milliseconds, rounded up, and the kernel may add its timer slack on top:
-a cycle that sleeps that way begins 0.7 ms late at the median. A timerfd is a timer that the loop waits for as for any
-other file: it counts nanoseconds and gets no slack. `bench/waking.py` measures it against what else there is.
+asyncio passes its timeouts to epoll in whole milliseconds, rounded up, and the kernel may add its timer slack: a
+cycle that sleeps that way begins 0.7 ms late at the median. A timerfd is a timer that the loop waits for as for any other
+file: it counts nanoseconds and gets no slack. `bench/waking.py` compares it with the alternatives.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from typing import Final, Protocol
 from runtime.timing.run_clock import run_clock
 
 _COUNT_BYTES: Final = 8
-"""What is read from a timerfd: how often it fired."""
-_TURNS: Final = 2
-"""Turns of the loop until what had arrived is taken in: the first finds it, the second goes on after it."""
+"""Size of what is read from a timerfd: the number of times that it fired."""
+_LOOP_TURNS: Final = 2
+"""Turns of the loop until pending input is processed: the first finds it, the second follows its callbacks."""
 
 
 class _TimeSpec(ctypes.Structure):
@@ -31,129 +31,129 @@ class _TimerSpec(ctypes.Structure):
     _fields_ = (("interval", _TimeSpec), ("value", _TimeSpec))
 
 
-class Alarm(Protocol):
-    """Calls back once, after a while; setting it again forgets the earlier moment."""
+class Timer(Protocol):
+    """Calls back once after a delay; setting it again cancels the earlier call."""
 
-    def set(self, left_s: float) -> None:
-        """Be due in `left_s`."""
+    def set(self, delay_s: float) -> None:
+        """Call back after `delay_s`."""
 
     def close(self) -> None:
-        """Never call again."""
+        """Release the timer; it never calls again."""
 
 
 class TimerFd:
-    """An alarm in the kernel: exact, and Linux only.
+    """A timer of the kernel: exact, and Linux only.
 
     Parameters
     ----------
-    ring : callable
-        Called in the running loop when the alarm is due.
+    callback : callable
+        Called in the running loop when the timer fires.
 
     Raises
     ------
     OSError
-        This system has no such timers.
+        This system has no such timer.
     """
 
-    def __init__(self, ring: Callable[[], None]) -> None:
+    def __init__(self, callback: Callable[[], None]) -> None:
         libc = ctypes.CDLL(None, use_errno=True)
         try:
             create, self._settime = libc.timerfd_create, libc.timerfd_settime
         except AttributeError as error:
             raise OSError("this system has no timerfd") from error
-        self._ring = ring
+        self._callback = callback
         self._loop = asyncio.get_running_loop()
         self._spec = _TimerSpec()
         self._fd: int = create(time.CLOCK_MONOTONIC, os.O_NONBLOCK | os.O_CLOEXEC)
         if self._fd < 0:
-            raise OSError(ctypes.get_errno(), "no timer could be made")
-        self._loop.add_reader(self._fd, self._due)
+            raise OSError(ctypes.get_errno(), "cannot create a timer")
+        self._loop.add_reader(self._fd, self._on_readable)
 
-    def set(self, left_s: float) -> None:
-        """Be due in `left_s`; at once where that is negative."""
+    def set(self, delay_s: float) -> None:
+        """Call back after `delay_s`; at once where that is negative."""
         value = self._spec.value
-        # Zero would switch it off.
-        value.seconds, value.nanoseconds = divmod(max(1, math.ceil(left_s * 1e9)), 1_000_000_000)
+        # Zero would switch the timer off.
+        value.seconds, value.nanoseconds = divmod(max(1, math.ceil(delay_s * 1e9)), 1_000_000_000)
         self._settime(self._fd, 0, ctypes.byref(self._spec), None)
 
     def close(self) -> None:
-        """Give the timer back."""
+        """Release the timer."""
         self._loop.remove_reader(self._fd)
         os.close(self._fd)
 
-    def _due(self) -> None:
+    def _on_readable(self) -> None:
         try:
             os.read(self._fd, _COUNT_BYTES)
-        except BlockingIOError:  # it was set anew in the same turn of the loop
+        except BlockingIOError:  # it was set again in the same turn of the loop
             return
-        self._ring()
+        self._callback()
 
 
 class LoopTimer:
-    """An alarm by the loop's own timers, to the millisecond: for systems without a timerfd."""
+    """A timer of the loop, to the millisecond: for systems without a timerfd."""
 
-    def __init__(self, ring: Callable[[], None]) -> None:
-        self._ring = ring
+    def __init__(self, callback: Callable[[], None]) -> None:
+        self._callback = callback
         self._loop = asyncio.get_running_loop()
         self._handle: asyncio.TimerHandle | None = None
 
-    def set(self, left_s: float) -> None:
-        """Be due in `left_s`."""
+    def set(self, delay_s: float) -> None:
+        """Call back after `delay_s`."""
         self.close()
-        self._handle = self._loop.call_later(left_s, self._ring)
+        self._handle = self._loop.call_later(delay_s, self._callback)
 
     def close(self) -> None:
-        """Give the timer back."""
+        """Release the timer."""
         if self._handle is not None:
             self._handle.cancel()
 
 
 class Waker:
-    """Sleeps in the running loop until a moment or until it is woken.
+    """Sleeps in the running loop until a deadline or until it is woken.
 
-    One task sleeps; whoever has news for it calls `wake` from a callback of the same loop. News that comes while
-    nobody sleeps is kept for the next sleep, which it ends at once.
+    One task sleeps; callbacks of the same loop call `wake`. A `wake` that comes outside a sleep ends the next one at
+    once.
 
     Parameters
     ----------
     clock : callable
-        The clock that deadlines are given in, s; the run's may stand still before one.
-    alarm : callable, optional
-        Makes the alarm, in the loop of the first sleep; a timerfd where there is one.
+        The clock of the deadlines, s; the run's may stand still before one.
+    make_timer : callable, optional
+        Makes the timer for a callback, in the loop of the first sleep; by default a timerfd where there is one.
     """
 
     def __init__(
         self,
         clock: Callable[[], float] = time.monotonic,
-        alarm: Callable[[Callable[[], None]], Alarm] | None = None,
+        make_timer: Callable[[Callable[[], None]], Timer] | None = None,
     ) -> None:
         self._clock = run_clock(clock)
-        self._make_alarm = best_alarm if alarm is None else alarm
-        self._alarm: Alarm | None = None
+        self._make_timer = best_timer if make_timer is None else make_timer
+        self._timer: Timer | None = None
         self._sleep: asyncio.Future[None] | None = None
         self._woken = False
 
     def wake(self) -> None:
-        """End the sleep, or the next one where nobody sleeps."""
+        """End the sleep, or the next one outside a sleep."""
         self._woken = True
         self._end()
 
     async def until(self, deadline_s: float) -> bool:
         """Sleep until `deadline_s` of the clock, and return whether `wake` ended the sleep before.
 
-        The loop has taken in what had arrived before this returns, also where the deadline has passed long ago: a
-        cycle after an overrun begins with what waited meanwhile.
+        The loop processes its pending input before this returns, also where the deadline passed long ago: a cycle
+        after an overrun takes in what arrived meanwhile.
         """
-        left_s = self._clock.expect(deadline_s)
-        if self._woken or left_s <= 0.0:
-            for _ in range(_TURNS):
+        delay_s = self._clock.expect(deadline_s)
+        if self._woken or delay_s <= 0.0:
+            for _ in range(_LOOP_TURNS):
                 await asyncio.sleep(0.0)
         else:
-            if self._alarm is None:
-                self._alarm = self._make_alarm(self._end)
+            if self._timer is None:
+                self._timer = self._make_timer(self._end)
             self._sleep = asyncio.get_running_loop().create_future()
-            if left_s < math.inf:
-                self._alarm.set(left_s)
+            if delay_s < math.inf:
+                self._timer.set(delay_s)
             try:
                 await self._sleep
             finally:
@@ -162,19 +162,19 @@ class Waker:
         return woken
 
     def close(self) -> None:
-        """Give the timer back; nobody may sleep any more."""
-        if self._alarm is not None:
-            self._alarm.close()
-            self._alarm = None
+        """Release the timer; there must be no further sleep."""
+        if self._timer is not None:
+            self._timer.close()
+            self._timer = None
 
     def _end(self) -> None:
         if self._sleep is not None and not self._sleep.done():
             self._sleep.set_result(None)
 
 
-def best_alarm(ring: Callable[[], None]) -> Alarm:
-    """Return the most exact alarm that this system has."""
+def best_timer(callback: Callable[[], None]) -> Timer:
+    """Return the most exact timer that this system has."""
     try:
-        return TimerFd(ring)
+        return TimerFd(callback)
     except OSError:
-        return LoopTimer(ring)
+        return LoopTimer(callback)

@@ -85,7 +85,7 @@ def held(monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] 
         return made
 
     monkeypatch.setattr("runtime.cycle.process.Link", link)
-    monkeypatch.setattr("runtime.timing.wake.best_alarm", LoopTimer)
+    monkeypatch.setattr("runtime.timing.wake.best_timer", LoopTimer)
     monkeypatch.setattr("runtime.cycle.process.apply_realtime", lambda _realtime: ())
     asyncio.set_event_loop(None)
     try:

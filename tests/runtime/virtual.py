@@ -148,7 +148,7 @@ def in_virtual_time(
         return links[-1]
 
     monkeypatch.setattr("runtime.cycle.process.Link", link)
-    monkeypatch.setattr("runtime.timing.wake.best_alarm", LoopTimer)
+    monkeypatch.setattr("runtime.timing.wake.best_timer", LoopTimer)
     monkeypatch.setattr("runtime.cycle.process.apply_realtime", lambda _realtime: ())
     try:
         yield loop, settings, robot, links

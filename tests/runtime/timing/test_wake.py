@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from runtime.timing.wake import Alarm, LoopTimer, TimerFd, Waker, best_alarm
+from runtime.timing.wake import Timer, LoopTimer, TimerFd, Waker, best_timer
 
-MakeAlarm = Callable[[Callable[[], None]], Alarm]
+MakeTimer = Callable[[Callable[[], None]], Timer]
 FAR_S = 60.0
 
 
@@ -24,7 +24,7 @@ def open_files() -> int:
 
 @pytest.fixture(params=[TimerFd, LoopTimer])
 async def waker(request: pytest.FixtureRequest) -> AsyncIterator[Waker]:
-    made = Waker(alarm=request.param)
+    made = Waker(make_timer=request.param)
     yield made
     made.close()
 
@@ -51,7 +51,7 @@ async def test_news_while_nobody_sleeps_ends_the_next_sleep_and_only_that(waker:
     assert not await waker.until(time.monotonic() + 0.002)
 
 
-async def test_an_alarm_of_a_sleep_that_was_ended_early_does_not_end_the_next_one(waker: Waker) -> None:
+async def test_the_timer_of_a_sleep_that_was_ended_early_does_not_end_the_next_one(waker: Waker) -> None:
     loop = asyncio.get_running_loop()
     loop.call_later(0.001, waker.wake)
     await waker.until(time.monotonic() + 0.02)
@@ -129,7 +129,7 @@ async def test_the_timer_is_given_back() -> None:
 
 async def test_a_system_without_timerfd_gets_the_loops_timer(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("runtime.timing.wake.ctypes.CDLL", lambda *_a, **_k: object())
-    assert isinstance(best_alarm(lambda: None), LoopTimer)
+    assert isinstance(best_timer(lambda: None), LoopTimer)
 
 
 async def test_deadlines_are_those_of_the_clock_it_was_given() -> None:
