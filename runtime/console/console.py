@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
-from config.reload import differences
+from config.reload import Difference
 from config.settings import Settings
 from drivers.driver import RobotDriver
 from runtime.console.clients.client import Client
@@ -28,8 +28,8 @@ from runtime.console.http.server import Server, ServerContext
 from runtime.console.http.static_files import StaticFile, page_files
 from runtime.console.protocols import NOT_AVAILABLE, RecordingControl, ReplayControl, Run
 from runtime.console.timed_coroutine import timed_coroutine
+from runtime.cycle.live_settings import PrepareSettings
 from runtime.cycle.process import CONSOLE_RECEIVE
-from runtime.cycle.reloader import Ready
 from runtime.cycle.step import CycleRecord, State
 from runtime.support.length_format import Units
 from runtime.timing.cycle_stats import CycleStats
@@ -46,13 +46,9 @@ class Console:
     ----------
     run : Run
         The robot's process.
-    settings : Settings
-        With which the run was started.
     log : structlog logger
         Gets who connects, what is refused, and what is changed.
-    take_over : callable
-        Gets settings that were changed from the page.
-    ready : Ready
+    prepare : PrepareSettings
         Awaited before a further model is recognised.
     emulated : bool
         Whether the robot is emulated in the settings' world.
@@ -80,10 +76,8 @@ class Console:
     def __init__(
         self,
         run: Run,
-        settings: Settings,
         log: FilteringBoundLogger,
-        take_over: Callable[[Settings], None],
-        ready: Ready,
+        prepare: PrepareSettings,
         *,
         emulated: bool,
         units: Units = "m",
@@ -93,6 +87,7 @@ class Console:
         limits: Limits | None = None,
         clock: Callable[[], float] = host_time.monotonic,
     ) -> None:
+        settings = run.live_settings.current
         self._run = run
         self._log = log
         self._clock = clock
@@ -101,10 +96,10 @@ class Console:
         self._config = settings.console
         self._limits = Limits(clients=settings.console.clients_max) if limits is None else limits
         self._console_log = ConsoleLog(log, clock)
-        self._take_over = take_over
         self._shown = settings
         self.hub = ClientHub(self._limits, clock, lambda: self.dispatcher.end_teleoperation())
-        self.tuning = Tuning(settings, self._on_tuned, ready, emulated=emulated)
+        self.tuning = Tuning(run.live_settings, prepare, self._on_tuned, emulated=emulated)
+        run.live_settings.subscribe(self._show_settings)
         self._commands = CommandContext(run, self.hub, self.tuning, clock, time, recording, replay)
         self.dispatcher = CommandDispatcher(self._commands, self._console_log, self._start_task)
         self._publisher = FramePublisher(run, self.hub, self._commands, settings, log, clock, self._on_stalled)
@@ -138,11 +133,6 @@ class Console:
             self._publisher.take(record, state, stats, driver)
         except Exception as error:  # noqa: BLE001 - the health probe reports it; the cycle itself has not failed
             self._publisher.fail(error)
-
-    def adopt(self, settings: Settings) -> None:
-        """Show settings that were changed elsewhere, as from a file that was read again."""
-        self.tuning.adopt(settings)
-        self._show_settings(settings)
 
     def probe(self) -> str | None:
         """Return how the console ended, None while it works. See `runtime.support.health`."""
@@ -223,15 +213,12 @@ class Console:
         """Return the session information; the first frame follows the next cycle."""
         self._publisher.expedite()
         info = session_info(
-            self.tuning.current, name=self._run.name, emulated=self._emulated, units=self._units
+            self._run.live_settings.current, name=self._run.name, emulated=self._emulated, units=self._units
         )  # fmt: skip
         return {**info, "recording": self._commands.recording is not None}
 
-    def _on_tuned(self, settings: Settings) -> None:
-        changed = [str(difference) for difference in differences(self._shown, settings)]
-        self._log.info("configuration changed from the console", changed=changed)
-        self._take_over(settings)
-        self._show_settings(settings)
+    def _on_tuned(self, changed: tuple[Difference, ...]) -> None:
+        self._log.info("configuration changed from the console", changed=[str(difference) for difference in changed])
 
     def _show_settings(self, settings: Settings) -> None:
         before, self._shown = self._shown, settings

@@ -12,6 +12,7 @@ from runtime.console.clients.client import Frame
 from runtime.console.frames.frame_encoder import RecordingStatus
 from runtime.cycle.drive_requests import DriveRequest
 from runtime.cycle.inputs import Request
+from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.step import State
 from runtime.support.health import Health
 from runtime.timing.timing_monitor import TimingMonitor
@@ -39,6 +40,7 @@ class Run(Robot, Protocol):
     """The robot's process, as far as the console shows it."""
 
     health: Health
+    live_settings: LiveSettings
 
     @property
     def state(self) -> State:

@@ -23,6 +23,7 @@ from runtime.cycle.alerts import Alerts
 from runtime.cycle.connection import Connection
 from runtime.cycle.drive_requests import DriveRequest
 from runtime.cycle.inputs import Inputs, Request, command_gap_max_s, gather_inputs
+from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import Command, CycleRecord, State, apply_command, apply_settings, step
 from runtime.cycle.summary import RunSummary, run_summary
@@ -92,6 +93,8 @@ class RobotProcess:
     ----------
     health : Health
         Watches the parts of the run; parts added to the run are registered here.
+    live_settings : LiveSettings
+        The settings in force; a change applies from the next cycle on.
     """
 
     def __init__(
@@ -102,7 +105,9 @@ class RobotProcess:
         clock: Callable[[], float] = time.monotonic,
         notifier: SdNotifier | None = None,
     ) -> None:
+        self.live_settings = LiveSettings(settings)
         self._settings = settings
+        """Those of the cycle in progress."""
         self._log = log
         self._observers = observers
         self._clock = run_clock(clock)
@@ -127,7 +132,6 @@ class RobotProcess:
         self._drive_request: DriveRequest | None = None
         self._arm_when_ready = False
         self._stop = asyncio.Event()
-        self._next_settings: Settings | None = None
 
     def request(self, request: Request) -> None:
         """Pass a request to the next cycle; a stop is not overridden by an ARM in the same cycle.
@@ -168,10 +172,6 @@ class RobotProcess:
     def name(self) -> str | None:
         """The robot's name as it reports it, None until it has."""
         return None if self._driver.identity is None else self._driver.identity.name
-
-    def reconfigure(self, settings: Settings) -> None:
-        """Continue with other settings from the next cycle on; only such as `config.reload` lets through."""
-        self._next_settings = settings
 
     def stop(self) -> None:
         """End the run in good order: halt the base, then close the line."""
@@ -235,7 +235,7 @@ class RobotProcess:
     def _cycle(self, now: ClockSample) -> None:
         """Run one cycle in the order of DESIGN.md: gather, step (which sends the command and refines), record."""
         mark = self.timing_monitor.mark
-        self._apply_next_settings()
+        self._apply_live_settings()
         inputs = self._gather(now)
         mark(Phase.GATHER)
         before = self._state.mode
@@ -247,10 +247,10 @@ class RobotProcess:
             self._notifier.alive(inputs.run_s)
         mark(Phase.OBSERVERS)
 
-    def _apply_next_settings(self) -> None:
-        if self._next_settings is None:
+    def _apply_live_settings(self) -> None:
+        if self.live_settings.current is self._settings:
             return
-        self._settings, self._next_settings = self._next_settings, None
+        self._settings = self.live_settings.current
         self._driver.set_firing(self._settings.ring)
         apply_settings(self._state, self._settings)
         if self._observers.on_settings is not None:

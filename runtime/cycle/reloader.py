@@ -1,109 +1,104 @@
-"""Reading the configuration again while the robot runs: off the loop, one attempt at a time, told in the log.
+"""Reading the configuration files again while the robot runs: off the loop, one attempt at a time, logged.
 
-A file on a slow disk must delay no cycle, so it is read in a thread; what comes of it is taken over by the process at
-the start of a cycle (`RobotProcess.reconfigure`).
+A file on a slow disk must delay no cycle, so the files are read in a thread; the process takes the new settings at
+the beginning of a cycle.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
-from typing import TYPE_CHECKING, TypeAlias
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
-from config.reload import ReloadResult, reload
+from config.reload import ReloadResult
 from config.settings import Settings
+from runtime.cycle.live_settings import LiveSettings, PrepareSettings
 
 if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
-Ready: TypeAlias = Callable[[Settings, Settings], Awaitable[str | None]]
-"""Has this process readied to go from settings in force to other ones; says why it cannot. See `runtime.support.kernel_loader`."""
-
 
 class Reloader:
-    """Keeps the settings in force, and changes them as a whole or not at all.
+    """Puts the settings of the files in force, as a whole or not at all.
 
     Parameters
     ----------
-    current : Settings
-        What the process was started with.
+    live_settings : LiveSettings
+        The settings in force.
     propose : callable
-        Loads the settings as they stand now; raises ConfigError. Called in a thread.
-    take_over : callable
-        Gets settings that are good, differ from the last ones, and need no restart. Called in the loop.
+        Loads the settings from the files as they are now; raises ConfigError. Called in a thread.
     log : structlog logger
-        Told of every attempt.
-    ready : Ready
-        Awaited before anything is taken over.
+        Gets the result of every attempt.
+    prepare : PrepareSettings
+        Awaited before new settings are put in force.
     """
 
     def __init__(
         self,
-        current: Settings,
+        live_settings: LiveSettings,
         propose: Callable[[], Settings],
-        take_over: Callable[[Settings], None],
         log: FilteringBoundLogger,
-        ready: Ready,
+        prepare: PrepareSettings,
     ) -> None:
-        self.current = current
+        self._live_settings = live_settings
         self._propose = propose
-        self._take_over = take_over
         self._log = log
-        self._ready = ready
-        self.on_taken: Callable[[Settings], None] = lambda _settings: None
-        """Told of settings that were taken over from the files."""
-        self._under_way: asyncio.Task[None] | None = None
-        self._again = False
+        self._prepare = prepare
+        self._task: asyncio.Task[None] | None = None
+        self._is_requested = False
 
-    def ask(self) -> None:
-        """Begin an attempt; asked for while one is under way, another follows, so that the last word counts."""
-        if self._under_way is not None and not self._under_way.done():
-            self._again = True
+    def request(self) -> None:
+        """Begin an attempt; during one, request another after it, so that the newest files are read."""
+        if self._task is not None and not self._task.done():
+            self._is_requested = True
             return
-        self._under_way = asyncio.get_running_loop().create_task(self._attempts(), name="reload")
-
-    def supersede(self, settings: Settings) -> None:
-        """Take over settings that came by another way; the next attempt is compared with them."""
-        self._take_over(settings)
-        self.current = settings
+        self._task = asyncio.get_running_loop().create_task(self._attempts(), name="reload")
 
     async def settled(self) -> None:
-        """Wait until no attempt is under way."""
-        if self._under_way is not None:
-            await asyncio.gather(self._under_way, return_exceptions=True)
+        """Wait until no attempt is in progress."""
+        if self._task is not None:
+            await asyncio.gather(self._task, return_exceptions=True)
 
     def probe(self) -> str | None:
-        """Say how an attempt ended that should have gone on; None where none has. See `runtime.support.health`."""
-        task = self._under_way
-        return "it was ended from outside" if task is not None and task.cancelled() else None
+        """Return how an attempt ended that should have gone on, None otherwise; see `runtime.support.health`."""
+        return "it was ended from outside" if self._task is not None and self._task.cancelled() else None
 
     def cancel(self) -> None:
-        """Drop what is under way."""
-        if self._under_way is not None:
-            self._under_way.cancel()
+        """Drop the attempt in progress."""
+        if self._task is not None:
+            self._task.cancel()
 
     async def _attempts(self) -> None:
         while True:
-            self._again = False
+            self._is_requested = False
             try:
-                outcome = await asyncio.to_thread(reload, self.current, self._propose)
-                validate = await self._ready(self.current, outcome.settings)
-                self._conclude(outcome if validate is None else ReloadResult(self.current, problems=(validate,)))
+                self._conclude(await self._check())
             except Exception as error:  # noqa: BLE001 - a reload that fails must not end a run that goes well
                 self._log.error(
                     "the configuration is kept: reading it failed", error=f"{type(error).__name__}: {error}"
                 )
-            if not self._again:
+            if not self._is_requested:
                 return
 
-    def _conclude(self, outcome: ReloadResult) -> None:
-        if outcome.problems:
-            for line in outcome.problems:
+    async def _check(self) -> ReloadResult:
+        """Return the result for the files as they are now, with this process prepared for the change."""
+        live = self._live_settings
+        before = live.current
+        result = await asyncio.to_thread(live.check, self._propose)
+        problem = await self._prepare(before, result.settings)
+        if problem is not None:
+            return ReloadResult(before, problems=(problem,))
+        if live.current is not before and not result.problems:
+            # Changed from the console meanwhile; the files win, if they may follow on that as well.
+            return live.check(lambda: result.settings)
+        return result
+
+    def _conclude(self, result: ReloadResult) -> None:
+        if result.problems:
+            for line in result.problems:
                 self._log.warning("the configuration is kept", problem=line)
-        elif not outcome.changed:
+        elif not result.changed:
             self._log.info("the configuration is as before")
         else:
-            self._take_over(outcome.settings)
-            self.current = outcome.settings
-            self.on_taken(outcome.settings)
-            self._log.info("the configuration is taken over", changed=[str(d) for d in outcome.changed])
+            changed = self._live_settings.apply(result.settings, can_undo=False)
+            self._log.info("the configuration is taken over", changed=[str(d) for d in changed])

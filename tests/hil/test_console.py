@@ -245,7 +245,7 @@ async def test_halt_from_a_page_in_time(tmp_path: Path, measured: Callable[[str]
             process = operator.process = RobotProcess(
                 on_port(settings, port), log, Observers(on_cycle, on_bytes=on_bytes)
             )
-            console = Console(process, settings, log, process.reconfigure, KernelLoader(log), emulated=True)
+            console = Console(process, log, KernelLoader(log), emulated=True)
             async with console.open():
                 operator.url = console.url
                 deaf = await asyncio.to_thread(RawPage, console.url)

@@ -222,18 +222,17 @@ async def watch(
         process = RobotProcess(
             settings, log, observers, clock, notifier=stack.enter_context(SdNotifier.from_environment())
         )
-        readying = KernelLoader(log)
-        reloader = Reloader(settings, propose, process.reconfigure, log, readying)
+        kernel_loader = KernelLoader(log)
+        reloader = Reloader(process.live_settings, propose, log, kernel_loader)
         if settings.console.enabled:
             from runtime.cli.commands.serve_console import paged
 
             served = paged(
-                process, settings, log, reloader.supersede, readying, keeping, control, emulated=emulated, units=units
+                process, settings, log, kernel_loader, keeping, control, emulated=emulated, units=units
             )
             page = await stack.enter_async_context(served)
             lines.listeners.append(page.hub.on_log)
             stack.callback(lines.listeners.remove, page.hub.on_log)
-            reloader.on_taken = page.adopt
             watchers.append(page.on_cycle)
             if view is not None:
                 for line in page.hints():
@@ -247,7 +246,7 @@ async def watch(
         for name, probe in {"recorder": keeping.probe, "log": lines.probe, "reload": reloader.probe}.items():
             process.health.watch(name, probe)
         summary = await process.run(arm=arm, seconds=seconds)
-        summary["process"]["compilations"] -= readying.loaded  # on purpose, and in no cycle's time
+        summary["process"]["compilations"] -= kernel_loader.loaded  # on purpose, and in no cycle's time
         return summary
 
 
@@ -265,7 +264,7 @@ def signals(process: RobotProcess, reloader: Reloader) -> Iterator[None]:
         signal.SIGTERM: process.stop,
         signal.SIGUSR1: lambda: process.request(Request.ARM),
         signal.SIGUSR2: lambda: process.request(Request.HALT),
-        signal.SIGHUP: reloader.ask,
+        signal.SIGHUP: reloader.request,
     }
     for number, call in calls.items():
         loop.add_signal_handler(number, call)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Final
 
@@ -10,7 +10,7 @@ from config.settings import Settings
 from runtime.console.console import Console
 from runtime.console.frames.frame_encoder import RecordingStatus
 from runtime.console.playback.replay_client import ReplayClient
-from runtime.cycle.reloader import Ready
+from runtime.cycle.live_settings import PrepareSettings
 from runtime.recording.storage import recordings_folder
 from runtime.support.length_format import Units
 
@@ -57,8 +57,7 @@ async def paged(
     process: Run,
     settings: Settings,
     log: FilteringBoundLogger,
-    take_over: Callable[[Settings], None],
-    ready: Ready,
+    prepare: PrepareSettings,
     keeping: RunRecording,
     control: TimeControl,
     *,
@@ -69,8 +68,10 @@ async def paged(
 
     Parameters
     ----------
-    process, settings, log, take_over, ready, emulated, units
+    process, log, prepare, emulated, units
         As of `Console`.
+    settings : Settings
+        With which the run is started.
     keeping : RunRecording
         The run's.
     control : TimeControl
@@ -78,7 +79,7 @@ async def paged(
 
     Raises
     ------
-    Complaint
+    UserError
         There is nowhere to listen.
     """
     recording = Recordings(keeping)
@@ -88,7 +89,7 @@ async def paged(
 
     players = ReplayClient(recordings_folder(settings.recording), PLAYED, current, units)
     console = Console(
-        process, settings, log, take_over, ready, emulated=emulated, units=units,
+        process, log, prepare, emulated=emulated, units=units,
         time=control, recording=recording, replay=players,
     )  # fmt: skip
     try:

@@ -16,48 +16,49 @@ from config.layers import Location
 from config.load import MODELS_MAX, ConfigError, parse_model, with_value
 from config.model import ModelConfig
 from config.problems import shown
-from config.reload import Difference, ReloadResult, differences, reload
+from config.reload import Difference, ReloadResult, differences
 from config.settings import Settings
 from drivers.registry import make_driver
 from runtime.console.commands.command_error import CommandError
-from runtime.cycle.reloader import Ready
+from runtime.cycle.live_settings import LiveSettings, PrepareSettings
 
-UNDO_MAX: Final = 100
-"""Changes that can be undone."""
 SOURCE: Final = "page"
 """What error messages of the configuration call the source of a value."""
 PRESET: Final = ("ring", "firing", "preset")
 
 
 class Tuning:
-    """The settings in force and those before them.
+    """Changes of the live settings by an operator.
 
     Parameters
     ----------
-    current : Settings
-        With which the run was started.
-    take_over : callable
-        Gets settings that are valid and that a running process can follow.
-    ready : Ready
+    live_settings : LiveSettings
+        The settings in force.
+    prepare : PrepareSettings
         Awaited before a further model is recognised.
+    on_change : callable
+        Gets what an operator has changed or undone.
     emulated : bool
         Whether the port is an emulator's, which a saved file leaves out.
     """
 
     def __init__(
-        self, current: Settings, take_over: Callable[[Settings], None], ready: Ready, *, emulated: bool
+        self,
+        live_settings: LiveSettings,
+        prepare: PrepareSettings,
+        on_change: Callable[[tuple[Difference, ...]], None],
+        *,
+        emulated: bool,
     ) -> None:
-        self.current = current
-        self._first = current
-        self._take_over = take_over
-        self._ready = ready
+        self._live_settings = live_settings
+        self._prepare = prepare
+        self._on_change = on_change
         self._emulated = emulated
-        self._before: list[Settings] = []
 
-    def adopt(self, settings: Settings) -> None:
-        """Continue from settings that were changed elsewhere; earlier changes can no longer be undone."""
-        self.current = settings
-        self._before.clear()
+    @property
+    def current(self) -> Settings:
+        """The settings in force."""
+        return self._live_settings.current
 
     def set(self, path: str, value: bool | float | str | None) -> tuple[Difference, ...]:
         """Change one value; return what changed.
@@ -101,13 +102,10 @@ class Tuning:
                 raise CommandError(f"{MODELS_MAX} models are recognised already, which is the limit", "toml")
             return with_value(self.current, SOURCE, ("models",), [m.model_dump(mode="json") for m in models])
 
-        problem = await self._ready(self.current, self._validated("toml", proposed).settings)
+        problem = await self._prepare(self.current, self._validated("toml", proposed).settings)
         if problem is not None:
             raise CommandError(problem, "toml")
-        before = self._before
         self._apply("toml", proposed)
-        # A model cannot be removed while the robot runs, so undo restores other changes and keeps the models.
-        self._before = [settings.model_copy(update={"models": self.current.models}) for settings in before]
         return model
 
     def undo(self) -> tuple[Difference, ...]:
@@ -118,12 +116,10 @@ class Tuning:
         CommandError
             There is no change to undo.
         """
-        if not self._before:
+        changed = self._live_settings.undo()
+        if not changed:
             raise CommandError("there is no change to undo")
-        before = self._before.pop()
-        changed = tuple(differences(self.current, before))
-        self.current = before
-        self._take_over(before)
+        self._on_change(changed)
         return changed
 
     def saved(self) -> str:
@@ -131,7 +127,7 @@ class Tuning:
         table: dict[str, Any] = without_none(self.current.model_dump(mode="json"))
         if self._emulated:
             table["link"].pop("port", None)
-        changes = [f"#   {change}\n" for change in differences(self._first, self.current)]
+        changes = [f"#   {change}\n" for change in differences(self._live_settings.initial, self.current)]
         head = "# Saved from the operator console.\n" + ("# Changed there:\n" if changes else "") + "".join(changes)
         return f"{head}\n{tomli_w.dumps(table)}"
 
@@ -141,11 +137,10 @@ class Tuning:
     def _apply(self, path: str, propose: Callable[[], Settings], given: str = "") -> tuple[Difference, ...]:
         """Put a change into force; return what changed."""
         result = self._validated(path, propose, given)
-        if result.changed:
-            self._before = [*self._before[-UNDO_MAX + 1 :], self.current]
-            self.current = result.settings
-            self._take_over(result.settings)
-        return result.changed
+        changed = self._live_settings.apply(result.settings, can_undo=True)
+        if changed:
+            self._on_change(changed)
+        return changed
 
     def _validated(self, path: str, propose: Callable[[], Settings], given: str = "") -> ReloadResult:
         """Return what a change would result in; nothing is put into force.
@@ -164,7 +159,7 @@ class Tuning:
                 raise ConfigError(str(error)) from error
             return settings
 
-        result = reload(self.current, proposed)
+        result = self._live_settings.check(proposed)
         if result.problems:
             raise CommandError("; ".join(_next_to_field(path, given, line) for line in result.problems), path)
         return result

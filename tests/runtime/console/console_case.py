@@ -26,6 +26,7 @@ from runtime.console.http.client_limits import Limits
 from runtime.console.protocols import RecordingControl, ReplayControl
 from runtime.cycle.drive_requests import DriveRequest
 from runtime.cycle.inputs import Request
+from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.modes import Mode, ModeState
 from runtime.cycle.process import CALLBACKS
 from runtime.cycle.step import CycleRecord, Inputs, Refused, State
@@ -59,6 +60,8 @@ class FakeRun:
 
     def __post_init__(self) -> None:
         self.health = Health(self.log)
+        self.live_settings = LiveSettings(self.settings)
+        self.live_settings.subscribe(self.asked.append)
         self.stats = CycleStats(0.005)
         self.timing_monitor = TimingMonitor(self.stats, ClockSampler().read, callbacks=CALLBACKS)
         self.state = State(Perception(self.settings.ring, self.settings.models, self.settings.perception))
@@ -78,8 +81,6 @@ class FakeRun:
     def evidence(self, number: int) -> Evidence | None:
         return Evidence(number, "semicircle", supporting=3.5, opposing=-1.0) if number == 1 else None
 
-    def reconfigure(self, settings: Settings) -> None:
-        self.asked.append(settings)
 
 
 class Page:
@@ -220,7 +221,7 @@ async def open_console(
     settings = load_settings("hallway", ["perception.method=paper", FREE_PORT, *sets])
     run = FakeRun(settings, log)
     console = Console(
-        run, settings, log, run.reconfigure, KernelLoader(log), emulated=emulated, time=time,
+        run, log, KernelLoader(log), emulated=emulated, time=time,
         recording=recording, replay=replay, limits=limits, clock=lambda: clock[0],
     )  # fmt: skip
     before = asyncio.all_tasks()

@@ -159,7 +159,9 @@ inputs_of_a_cycle = st.builds(
 )
 
 
-@given(st.lists(inputs_of_a_cycle, min_size=5, max_size=40), st.sampled_from([CONNECTING, READY, DRIVE, STOPPED, FAULT]))
+@given(
+    st.lists(inputs_of_a_cycle, min_size=5, max_size=40), st.sampled_from([CONNECTING, READY, DRIVE, STOPPED, FAULT])
+)
 def test_motion_never_resumes_by_itself(steps: list[ModeInputs], begin: ModeState) -> None:
     state, run_s, armed = begin, NOW, False
     for step in steps:

@@ -13,6 +13,7 @@ from structlog.testing import LogCapture
 from config.load import ConfigError, load_settings
 from config.settings import PerceptionConfig, Settings
 from perception.pipeline import Perception
+from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.reloader import Reloader
 
 BEFORE = load_settings("hallway")
@@ -30,14 +31,16 @@ class Scripted:
         self.threads: set[int] = set()
         self.taken: list[Settings] = []
         self.log = LogCapture()
-        self.readied: list[tuple[Settings, Settings]] = []
-        self.validate: str | None = None
+        self.prepared: list[tuple[Settings, Settings]] = []
+        self.problem: str | None = None
         logger: Any = structlog.wrap_logger(structlog.PrintLogger(), processors=[self.log])
-        self.reloader = Reloader(BEFORE, self._propose, self.taken.append, logger, self._ready)
+        self.live_settings = LiveSettings(BEFORE)
+        self.live_settings.subscribe(self.taken.append)
+        self.reloader = Reloader(self.live_settings, self._propose, logger, self._prepare)
 
-    async def _ready(self, running: Settings, proposed: Settings) -> str | None:
-        self.readied.append((running, proposed))
-        return self.validate
+    async def _prepare(self, running: Settings, proposed: Settings) -> str | None:
+        self.prepared.append((running, proposed))
+        return self.problem
 
     def _propose(self) -> Settings:
         self.threads.add(threading.get_ident())
@@ -49,7 +52,7 @@ class Scripted:
         return answer
 
     async def attempt(self) -> str:
-        self.reloader.ask()
+        self.reloader.request()
         await self.reloader.settled()
         return str(self.log.entries[-1]["event"])
 
@@ -72,21 +75,35 @@ async def test_the_last_good_one_is_kept_until_a_better_one_comes() -> None:
 
 async def test_what_the_process_cannot_be_readied_for_is_not_taken_over() -> None:
     script = Scripted(SLOWER, SLOWER)
-    script.validate = "models: no kernels"
+    script.problem = "models: no kernels"
     assert await script.attempt() == "the configuration is kept"
     assert (script.log.entries[-1]["problem"], script.taken) == ("models: no kernels", [])
-    script.validate = None
+    script.problem = None
     assert await script.attempt() == "the configuration is taken over"
-    assert script.readied == [(BEFORE, SLOWER)] * 2
+    assert script.prepared == [(BEFORE, SLOWER)] * 2
+
+
+async def test_a_change_from_the_console_during_an_attempt_is_replaced_by_the_files() -> None:
+    script = Scripted(SLOWER)
+    faster = load_settings("hallway", ["behaviors.arbiter.base_velocity_m_s=0.4"])
+    script.go_on.clear()
+    script.reloader.request()
+    assert await asyncio.to_thread(script.begun.wait, 30.0)
+    script.live_settings.apply(faster, can_undo=True)
+    script.go_on.set()
+    await script.reloader.settled()
+    assert script.taken == [faster, SLOWER]
+    assert script.log.entries[-1]["changed"] == ["behaviors.arbiter.base_velocity_m_s: 0.4 → 0.2"]
+    assert script.live_settings.undo() == ()
 
 
 async def test_asked_again_while_it_reads_it_reads_once_more() -> None:
     script = Scripted(BEFORE, SLOWER)
     script.go_on.clear()
-    script.reloader.ask()
+    script.reloader.request()
     assert await asyncio.to_thread(script.begun.wait, 30.0)
     for _ in range(4):
-        script.reloader.ask()
+        script.reloader.request()
     script.go_on.set()
     await script.reloader.settled()
     assert script.answers == [], "five requests are two attempts: one under way, one after it"
@@ -96,7 +113,7 @@ async def test_asked_again_while_it_reads_it_reads_once_more() -> None:
 async def test_a_run_that_ends_drops_what_is_under_way() -> None:
     script = Scripted(SLOWER)
     script.go_on.clear()
-    script.reloader.ask()
+    script.reloader.request()
     assert await asyncio.to_thread(script.begun.wait, 30.0)
     script.reloader.cancel()
     script.go_on.set()

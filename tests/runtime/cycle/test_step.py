@@ -9,7 +9,7 @@ from drivers.messages import Flags, Pose, Twist
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import STANDSTILL, Command, Order
-from tests.runtime.script import TIMEOUT_S, PERIOD_S, Script
+from tests.runtime.script import PERIOD_S, TIMEOUT_S, Script
 
 
 def test_from_greeting_to_driving() -> None:

@@ -305,14 +305,14 @@ def test_the_reload_that_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
     def prepare(process: RobotProcess) -> None:
         from tests.recorded import hall
 
-        reloaders.append(Reloader(hall(), lambda: hall(), process.reconfigure, log, KernelLoader(log)))
+        reloaders.append(Reloader(process.live_settings, hall, log, KernelLoader(log)))
         process.health.watch("reload", reloaders[0].probe)
 
     def plant(_process: RobotProcess, loop: VirtualLoop) -> None:
         async def forever() -> None:
             await asyncio.sleep(1e6)
 
-        reloaders[0]._under_way = loop.create_task(forever(), name="reload")
+        reloaders[0]._task = loop.create_task(forever(), name="reload")
         loop.call_soon(cancel("reload"), _process, loop)
 
     reloaders: list[Reloader] = []

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from runtime.timing.wake import Timer, LoopTimer, TimerFd, Waker, best_timer
+from runtime.timing.wake import LoopTimer, Timer, TimerFd, Waker, best_timer
 
 MakeTimer = Callable[[Callable[[], None]], Timer]
 FAR_S = 60.0

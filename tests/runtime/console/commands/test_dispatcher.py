@@ -162,7 +162,7 @@ async def test_settings_from_elsewhere_are_shown_and_end_what_can_be_taken_back(
     async with open_console() as case:
         page = await case.page()
         await page.ask(type="set_parameter", path=GAIN, value=3.5)
-        case.console.adopt(case.run.settings)
+        case.run.live_settings.apply(case.run.settings, can_undo=False)
         while (await page.next("parameters"))["parameters"] != page.received[0]["parameters"]:
             pass
         assert not (await page.ask(type="undo_parameter"))["ok"]

@@ -209,7 +209,7 @@ def test_a_whole_process_does_not_move(monkeypatch: pytest.MonkeyPatch, *, armed
         start = robot.truth.pose
         process = RobotProcess(settings, log, Observers(on_cycle), loop.time)
         console = Console(
-            process, settings, log, process.reconfigure, KernelLoader(log), emulated=True,
+            process, log, KernelLoader(log), emulated=True,
             limits=BOUNDLESS, clock=loop.time,
         )  # fmt: skip
         controller, watcher = (console.hub.join(NoWire(), name, {}, has_token=True) for name in ("first", "second"))

@@ -1,0 +1,94 @@
+"""The settings in force while the robot runs: one store, changed as a whole or not at all.
+
+A changed file (SIGHUP), the console's parameters and undo all go through it; the process takes the newest settings at
+the beginning of each cycle, and subscribers learn of every change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from typing import Final, TypeAlias
+
+from config.reload import Difference, ReloadResult, differences, reload
+from config.settings import Settings
+
+UNDO_MAX: Final = 100
+"""Most changes that can be undone."""
+
+PrepareSettings: TypeAlias = Callable[[Settings, Settings], Awaitable[str | None]]
+"""Prepares this process for a change from the first settings to the second (`runtime.support.kernel_loader`);
+returns why that is impossible, None where the change can be applied."""
+
+
+class LiveSettings:
+    """The settings in force, those before them, and who is notified of a change.
+
+    Parameters
+    ----------
+    settings : Settings
+        What the run starts with.
+
+    Attributes
+    ----------
+    initial : Settings
+        What the run was started with.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self.initial = settings
+        self._current = settings
+        self._history: list[Settings] = []
+        self._subscribers: list[Callable[[Settings], None]] = []
+
+    @property
+    def current(self) -> Settings:
+        """The settings in force."""
+        return self._current
+
+    def subscribe(self, call: Callable[[Settings], None]) -> None:
+        """Have `call` called with the new settings after every change."""
+        self._subscribers.append(call)
+
+    def check(self, propose: Callable[[], Settings]) -> ReloadResult:
+        """Return what would come of a change: its differences, or the problems for which it is refused.
+
+        `propose` returns the new settings as a whole and raises ConfigError where they are invalid. Changes nothing,
+        so that it may run in a thread.
+        """
+        return reload(self._current, propose)
+
+    def apply(self, settings: Settings, *, can_undo: bool) -> tuple[Difference, ...]:
+        """Put settings in force that `check` has let through; return what changed.
+
+        Parameters
+        ----------
+        settings : Settings
+            The new ones.
+        can_undo : bool
+            Keep the settings before them for `undo`. A change that cannot be undone also ends the history.
+        """
+        changed = tuple(differences(self._current, settings))
+        if not changed:
+            return ()
+        history = [*self._history, self._current] if can_undo else []
+        if settings.models != self._current.models:
+            # A model cannot be removed while the robot runs: undo takes back the other changes only.
+            history = [before.model_copy(update={"models": settings.models}) for before in history]
+            history = history[:-1] if history and history[-1] == settings else history
+        self._history = history[-UNDO_MAX:]
+        self._put_in_force(settings)
+        return changed
+
+    def undo(self) -> tuple[Difference, ...]:
+        """Take the last change back and return what changed; empty where there is nothing to undo."""
+        if not self._history:
+            return ()
+        before = self._history.pop()
+        changed = tuple(differences(self._current, before))
+        self._put_in_force(before)
+        return changed
+
+    def _put_in_force(self, settings: Settings) -> None:
+        self._current = settings
+        for call in self._subscribers:
+            call(settings)
