@@ -17,8 +17,9 @@ from runtime.recording.channels import CHANNELS, CYCLE, RawMessage, schema_of
 from runtime.recording.mcap_file import CHUNK_BYTES, INDEX, PROFILE
 from runtime.recording.reader import open_recording
 from runtime.recording.recorder import Recorder
-from runtime.recording.replayer import ReplayResult, verify_recording
+from runtime.recording.schema import FORMAT
 from runtime.recording.storage import RecordingTarget, SingleFile
+from runtime.recording.verification import ReplayResult, verify_recording
 from runtime.recording.writer import RecorderStatus
 from runtime.simulation.closed_loop import OperatorInput, simulate
 
@@ -98,7 +99,9 @@ def entries_of(path: Path) -> list[RawMessage]:
         return list(recording.messages())
 
 
-def rewrite(entries: Iterator[RawMessage] | list[RawMessage], path: Path, profile: str = f"{PROFILE}/1") -> None:
+def rewrite(
+    entries: Iterator[RawMessage] | list[RawMessage], path: Path, profile: str = f"{PROFILE}/{FORMAT}"
+) -> None:
     """Write messages as a recording, a chunk every ten cycles."""
     with path.open("wb") as file:
         writer = Writer(file, CHUNK_BYTES, CompressionType.ZSTD, INDEX, enable_data_crcs=True)
@@ -120,5 +123,5 @@ def verify_file(path: Path, **span: float) -> ReplayResult:
     """Replay a recording that is whole, or a span of it."""
     with open_recording(path) as recording:
         result = verify_recording(recording, **span)  # type: ignore[arg-type]
-        assert recording.damage == []
+        assert recording.corrupt_regions == []
     return result

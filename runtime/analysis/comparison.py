@@ -1,7 +1,6 @@
-"""The same echoes with other settings: what would have been seen, and where the robot would have stopped.
+"""The same echoes with other settings: what would have been recognised, and where the robot would have stopped.
 
-The robot's way is as it was recorded; only what the program makes of the echoes, and what it would have commanded,
-is new.
+The robot's path is the recorded one. Only what the program perceives in the echoes and what it would command is new.
 """
 
 from __future__ import annotations
@@ -13,98 +12,104 @@ from dataclasses import dataclass, field
 from config.settings import Settings
 from config.world import WorldConfig
 from drivers.messages import Pose
-from perception.pipeline import DetectedObject
 from runtime.cycle.modes import Mode
-from runtime.cycle.step import Command, CycleRecord, State, apply_settings, step
+from runtime.cycle.step import Command, CycleRecord, State, step
 from runtime.cycle.summary import ObjectRow, object_row
-from runtime.recording.channels import CYCLE, SETTINGS, RawMessage, decode
-from runtime.recording.reader import Recording, RecordingError, parse_settings
-from runtime.recording.replayer import fresh_state, replay_cycle
-from runtime.recording.schema import Cycle, SettingsChange
+from runtime.recording.reader import Recording, RecordingError
+from runtime.recording.replayer import Replayer, fresh_state
 from runtime.simulation.evaluation import match_drums
 from runtime.timing.refinement_budget import within_quanta_per_cycle
 
 
 @dataclass(slots=True)
 class RunOutcome:
-    """One telling of a run."""
+    """What came of a run."""
 
     objects: list[ObjectRow] = field(default_factory=list)
     errors_m: list[float | None] | None = None
-    """Of each drum, None where it was not seen; no list where the world is not known."""
+    """Error of each drum, None if it was not found; no list if the world is not known."""
     false: int = 0
+    """Objects that match no drum."""
     stops: list[tuple[float, str]] = field(default_factory=list)
-    """When, in seconds after the first cycle, and why."""
+    """Time in s after the first cycle, and the reason."""
 
 
 @dataclass(slots=True)
 class Comparison:
-    """A run as it was, and as it would have been."""
+    """A run with the recorded settings and with others."""
 
-    was: RunOutcome = field(default_factory=RunOutcome)
-    would_be: RunOutcome = field(default_factory=RunOutcome)
+    recorded: RunOutcome = field(default_factory=RunOutcome)
+    other: RunOutcome = field(default_factory=RunOutcome)
     cycles: int = 0
-    other_commands: int = 0
-    first_other_s: float | None = None
+    changed_commands: int = 0
+    first_change_s: float | None = None
+    """Time of the first command that differs, s after the first cycle."""
 
 
 def compare_runs(
-    recording: Recording, settings: Settings, on_message: Callable[[RawMessage], None] | None = None
+    recording: Recording, settings: Settings, on_message: Callable[[], None] = lambda: None
 ) -> Comparison:
-    """Run the step over a recording with its own settings and with others, side by side.
+    """Replay a recording with its own settings and with others, cycle by cycle, and return both outcomes.
+
+    Parameters
+    ----------
+    recording : Recording
+        The run.
+    settings : Settings
+        The other settings.
+    on_message : callable
+        Called after each message, for a progress bar.
 
     Raises
     ------
     RecordingError
-        The other settings are of another ring.
+        The other settings are for another ring.
     """
-    mine, others = recording.settings, len(settings.ring.mounts)
-    if others != len(mine.ring.mounts):
+    own, others = len(recording.settings.ring.mounts), len(settings.ring.mounts)
+    if others != own:
         raise RecordingError(
-            f"{recording.path}: was made with a ring of {len(mine.ring.mounts)} sensors, and these settings are of "
-            f"one of {others}: name settings of the same robot"
+            f"{recording.path}: was made with a ring of {own} sensors, and these settings are for one of {others}: "
+            f"name settings of the same robot"
         )
-    told, was, would_be = Comparison(), fresh_state(mine), fresh_state(settings)
-    begun_s = None
-    for entry in recording.messages():
-        if on_message is not None:
-            on_message(entry)
-        if entry.topic == SETTINGS:
-            mine = parse_settings(decode(SettingsChange, entry.data).settings)
-            apply_settings(was, mine)
-        if entry.topic != CYCLE:
+    comparison, replayer, other = Comparison(), Replayer(recording), fresh_state(settings)
+    first_run_s = None
+    for found in replayer:
+        on_message()
+        if found.recorded is None:
             continue
-        record = decode(Cycle, entry.data).record
-        begun_s = record.inputs.run_s if begun_s is None else begun_s
-        at_s = record.inputs.run_s - begun_s
-        first = replay_cycle(was, record, mine)
-        second = step(would_be, record.inputs, settings, _ignore, within_quanta_per_cycle)
-        told.cycles += 1
-        _note_stop(told.was, first, at_s)
-        _note_stop(told.would_be, second, at_s)
-        if first.command != second.command:
-            told.other_commands += 1
-            told.first_other_s = at_s if told.first_other_s is None else told.first_other_s
-    _sum_up(told.was, was, recording.world)
-    _sum_up(told.would_be, would_be, recording.world)
-    return told
+        inputs = found.recorded.inputs
+        first_run_s = inputs.run_s if first_run_s is None else first_run_s
+        at_s = inputs.run_s - first_run_s
+        changed = step(other, inputs, settings, _ignore, within_quanta_per_cycle)
+        comparison.cycles += 1
+        _note_stop(comparison.other, changed, at_s)
+        if found.replayed is None:
+            continue
+        _note_stop(comparison.recorded, found.replayed, at_s)
+        if found.replayed.command != changed.command:
+            comparison.changed_commands += 1
+            comparison.first_change_s = at_s if comparison.first_change_s is None else comparison.first_change_s
+    if replayer.state is not None:
+        _sum_up(comparison.recorded, replayer.state, recording.world)
+    _sum_up(comparison.other, other, recording.world)
+    return comparison
 
 
 def _ignore(command: Command) -> None:
-    """Carry nothing out."""
+    """Send nothing."""
 
 
-def _note_stop(story: RunOutcome, record: CycleRecord, at_s: float) -> None:
+def _note_stop(outcome: RunOutcome, record: CycleRecord, at_s: float) -> None:
     if record.mode.mode is Mode.SAFE_STOP and record.mode.entered_run_s == record.inputs.run_s:
-        story.stops.append((at_s, record.mode.reason or ""))
+        outcome.stops.append((at_s, record.mode.reason or ""))
 
 
-def _sum_up(story: RunOutcome, state: State, world: WorldConfig | None) -> None:
-    seen: tuple[DetectedObject, ...] = state.perception.objects()
-    story.objects = [object_row(one) for one in seen]
+def _sum_up(outcome: RunOutcome, state: State, world: WorldConfig | None) -> None:
+    objects = state.perception.objects()
+    outcome.objects = [object_row(seen) for seen in objects]
     if world is None or not world.drum:
         return
     start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
-    places = [start.compose(Pose(one.x, one.y, one.theta)) for one in seen]
-    rows, story.false = match_drums(world, [(p.x, p.y) for p in places])
-    story.errors_m = [row["error"] for row in rows]
+    places = [start.compose(Pose(seen.x, seen.y, seen.theta)) for seen in objects]
+    rows, outcome.false = match_drums(world, [(p.x, p.y) for p in places])
+    outcome.errors_m = [row["error"] for row in rows]

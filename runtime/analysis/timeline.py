@@ -1,8 +1,9 @@
-"""What is known of a run that is over, whether a recording told it or a ring log."""
+"""A finished run over time, read from a recording or from a ring log."""
 
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ T, SENSOR, X, Y, BEARING, RANGE, ROBOT_T = range(7)
 
 @dataclass(frozen=True, slots=True)
 class Cluster:
-    """A cluster of outline segments: its centre and the rectangle around it, m."""
+    """A cluster of outline segments: its centre and its bounding rectangle, m."""
 
     x: float
     y: float
@@ -29,19 +30,20 @@ class Cluster:
     right: float
     top: float
     segments: int
+    """Number of segments in it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunSnapshot:
-    """What was known at one time."""
+    """What was known at one moment."""
 
     t_s: float
     pose: Pose
     ring_yaw: float
     echoes: int
-    """Rows of `Timeline.echoes` that had come by then."""
+    """Number of rows of `Timeline.echoes` up to this moment."""
     segments: Floats
-    """(n, 4): outline segments of the paper's front end: ends x, y, x, y, m."""
+    """(n, 4): ends x, y, x, y (m) of the outline segments that the paper's front end finds."""
     clusters: tuple[Cluster, ...]
     objects: tuple[DetectedObject, ...]
 
@@ -70,7 +72,7 @@ def _no_rows() -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class BookmarkEntry:
-    """A bookmark: when, what it says, and where the robot was."""
+    """A bookmark and the pose of the robot at that moment."""
 
     t_s: float
     text: str
@@ -79,43 +81,48 @@ class BookmarkEntry:
 
 @dataclass(slots=True, eq=False)
 class Timeline:
-    """A run, in the odometry's frame; times are seconds after its first cycle or firing."""
+    """A run in the frame of the odometry. Times `t_s` are s of the run's clock after the first cycle or firing."""
 
     path: Path
     settings: Settings
     world: WorldConfig | None
-    """What stood there, where that is known."""
-    start_unix_ns: int = 0
-    """Unix time of its first cycle; 0 where nobody knows."""
+    """The true world, if it is known."""
     seconds: float = 0.0
+    """Duration, s."""
     cycles: int = 0
+    """Number of cycles, or of firings in a ring log."""
+    cycle_unix: list[tuple[float, int]] = field(default_factory=list)
+    """Time (s) and Unix time (ns) of each cycle; empty for a ring log. They differ by more after a pause."""
     echoes: Floats = field(default_factory=_no_rows)
-    """(n, 7): t (s), sensor, where the sensor was x, y (m), where it looked (rad), range (m, inf heard nothing), and
-    the firing's own time by the robot's clock (s)."""
+    """(n, 7): t (s), sensor, position of the sensor x, y (m), its bearing (rad), range (m, inf without an echo), and
+    the time of the firing by the robot's clock (s)."""
     odometry: list[tuple[float, Odometry]] = field(default_factory=list)
-    """Thinned to ten a second."""
+    """At most ten a second."""
     snapshots: list[RunSnapshot] = field(default_factory=list)
-    """Evenly over the run; the last is its end."""
+    """Evenly over the run; the last one is its end."""
     segments: Floats = field(default_factory=_no_rows)
     """(n, 7): the run's own map: first and last seen (s), ends x, y, x, y (m), normal (rad)."""
     modes: list[ModeEntry] = field(default_factory=list)
     log: list[LogEntry] = field(default_factory=list)
     bookmarks: list[BookmarkEntry] = field(default_factory=list)
-    gaps_s: list[float] = field(default_factory=list)
-    """From cycle to cycle."""
-    stops: dict[str, int] = field(default_factory=dict)
+    cycle_gaps_s: list[float] = field(default_factory=list)
+    """Time from each cycle to the next."""
+    refinement_stops: dict[str, int] = field(default_factory=dict)
     """How often refinement ended for which cause."""
     counts: LinkCounts | None = None
+    """Frames in the recorded bytes of the serial line."""
     summary: dict[str, Any] | None = None
-    """What the run said of itself at its end; none where it was cut off."""
+    """The run's own summary; None if it was cut off."""
     versions: dict[str, str] = field(default_factory=dict)
+    """Versions of the software that recorded the run."""
     started: str | None = None
+    """Date and time, UTC."""
     notes: list[str] = field(default_factory=list)
     """What is missing or damaged, a line each."""
 
     @property
     def start(self) -> Pose:
-        """Where the odometry began: in the world's coordinates where the world is known, else in its own."""
+        """Where the odometry began, in world coordinates; the origin if the world is not known."""
         if self.world is None:
             return Pose(0.0, 0.0, 0.0)
         start = self.world.start
@@ -123,14 +130,21 @@ class Timeline:
 
     @property
     def last(self) -> RunSnapshot | None:
-        """The end of the run."""
+        """The snapshot at the end of the run; None without any."""
         return self.snapshots[-1] if self.snapshots else None
 
     @property
     def objects(self) -> tuple[DetectedObject, ...]:
-        """What was recognised at the end."""
+        """The objects recognised at the end."""
         return self.snapshots[-1].objects if self.snapshots else ()
 
+    @property
+    def start_unix_ns(self) -> int:
+        """Unix time of the first cycle, ns; 0 for a ring log."""
+        return self.cycle_unix[0][1] if self.cycle_unix else 0
+
     def unix_ns(self, t_s: float) -> int:
-        """Return a time of the run as Unix time, from 0 on where that is not known."""
-        return self.start_unix_ns + round(1e9 * t_s)
+        """Return the Unix time (ns) of a time of the run; for a ring log, which has none, ns from 0 on."""
+        last = max(0, bisect_right(self.cycle_unix, t_s, key=lambda cycle: cycle[0]) - 1)
+        from_s, from_ns = self.cycle_unix[last] if self.cycle_unix else (0.0, 0)
+        return from_ns + round(1e9 * (t_s - from_s))

@@ -1,9 +1,8 @@
-"""Traces from recordings, by a replay, and from ring logs, by perception over them."""
+"""Timelines from recordings, by a replay, and from ring logs, by running perception over them."""
 
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,175 +11,174 @@ from typing import Final
 from config.errors import WRONG_CALL, UserError
 from config.load import load_settings, load_world
 from config.settings import Settings
-from drivers.messages import Firing
 from drivers.registry import make_driver
-from perception.pipeline import Perception
 from runtime.analysis.timeline import BookmarkEntry, LogEntry, ModeEntry, Timeline
 from runtime.analysis.timeline_builder import TimelineBuilder
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import BOOKMARK, LOG, SERIAL, SUMMARY, RawMessage, decode
 from runtime.recording.reader import Recording, RecordingError, is_recording, open_recording
-from runtime.recording.replayer import verify_recording
+from runtime.recording.replayer import Replayer, ReplayStep
 from runtime.recording.ring_log import read_ring_log
-from runtime.recording.ring_log_replay import replay_firings
+from runtime.recording.ring_log_replay import FiringReplayer
 from runtime.recording.schema import Bookmark, LogLine, RunEnd, SerialBytes
+from runtime.recording.verification import Verifier
 
-Told = Callable[[], None]
-SAID_MAX: Final = 1000
+Progress = Callable[[], None]
+LOG_LINES_MAX: Final = 1000
+"""Log lines kept."""
 
 
 @dataclass(frozen=True, slots=True)
 class TimelineSource:
-    """Which file, and what a ring log does not say of itself."""
+    """A file, and what a ring log does not contain."""
 
     file: str
     sets: Sequence[str] = ()
+    """Overridden settings."""
     robot: str | None = None
     models: Sequence[str] = ()
     world: str | None = None
-    """What stood there, instead of what a recording knows; coordinates as if the log began at the world's start."""
+    """The true world, instead of the one in a recording; the start of a log is then at the world's start."""
 
 
 def load_timeline(
-    source: TimelineSource, ready: Callable[[Settings], None], on_step: Told = lambda: None
+    source: TimelineSource, prepare: Callable[[Settings], None], on_step: Progress = lambda: None
 ) -> Timeline:
     """Return the timeline of a recording or a ring log.
 
     Parameters
     ----------
     source : TimelineSource
-        The file, and what goes with it.
-    ready : callable
-        Gets the settings before perception begins: compiles kernels.
+        The file, and the settings for a ring log.
+    prepare : callable
+        Called with the settings before perception starts: compiles kernels.
     on_step : callable
-        Called now and then, for a progress bar.
+        Called after each message or firing, for a progress bar.
 
     Raises
     ------
     UserError
-        The file is none that can be read, or holds nothing to show.
+        The file cannot be read, or holds nothing to show.
     """
     path = Path(source.file)
     if not is_recording(path):
-        return _of_ring_log(path, source, ready, on_step)
+        return _of_ring_log(path, source, prepare, on_step)
     if source.sets or source.robot is not None or source.models:
         raise UserError(
-            f"{path}: is a recording and knows its settings; --set, --robot and --model are for ring logs",
+            f"{path}: is a recording and contains its settings; --set, --robot and --model are for ring logs",
             WRONG_CALL,
         )
     with open_recording(path) as recording:
-        ready(recording.settings)
+        prepare(recording.settings)
         return _of_recording(recording, source, on_step)
 
 
-def _of_recording(recording: Recording, source: TimelineSource, on_step: Told) -> Timeline:
+def _of_recording(recording: Recording, source: TimelineSource, on_step: Progress) -> Timeline:
     world = recording.world if source.world is None else load_world(source.world)
-    about = recording.info
-    timeline = Timeline(recording.path, recording.settings, world, versions=about.versions, started=about.started)
-    listener = _Listener(recording, timeline, on_step)
-    result = verify_recording(recording, on_cycle=listener.on_cycle, on_message=listener.on_message)
+    info = recording.info
+    timeline = Timeline(recording.path, recording.settings, world, versions=info.versions, started=info.started)
+    collector, verifier, replayer = _Collector(timeline), Verifier(), Replayer(recording)
+    for found in replayer:
+        verifier.check(found, replayer)
+        collector.add(found, replayer.state)
+        on_step()
+    result = verifier.result
     if result.cycles == 0:
         raise RecordingError(f"{recording.path}: holds no cycle, or none that can be replayed: nothing to show")
-    listener.finish()
-    timeline.cycles, timeline.stops = result.cycles, dict(result.refinement_stops)
+    collector.finish()
+    timeline.cycles, timeline.refinement_stops = result.cycles, dict(result.refinement_stops)
     timeline.notes += [f"cycles {first} to {last} are missing" for first, last in result.missing]
-    timeline.notes += [f"at byte {damage.at}: {damage.what}" for damage in recording.damage]
+    timeline.notes += [str(region) for region in recording.corrupt_regions]
     if result.first_difference is not None:
         timeline.notes.append(f"the replay differs from the run, first in {result.first_difference}")
     return timeline
 
 
-class _Listener:
-    """Sits in on the replay of a recording."""
+class _Collector:
+    """Fills a timeline from the steps of a replay."""
 
-    def __init__(self, recording: Recording, timeline: Timeline, on_step: Told) -> None:
-        self._recording = recording
+    def __init__(self, timeline: Timeline) -> None:
         self._timeline = timeline
-        self._on_step = on_step
-        self._gathering = TimelineBuilder(timeline)
-        self._driver = make_driver(recording.settings)
+        self._builder = TimelineBuilder(timeline)
+        self._driver = make_driver(timeline.settings)
         self._driver.line_opened(0.0)
         self._has_bytes = False
-        self._begun_s: float | None = None
-        self._before_s = math.nan
-        self._perception: Perception | None = None
-        self._said: list[tuple[float, LogLine]] = []
+        self._first_run_s: float | None = None
+        self._last_run_s = 0.0
+        self._state: State | None = None
+        self._log: list[LogLine] = []
 
-    def on_message(self, entry: RawMessage) -> None:
-        """Take a message."""
-        self._on_step()
-        if entry.topic == SERIAL["in"]:
-            self._has_bytes = True
-            for t_s, data in decode(SerialBytes, entry.data).pieces():
-                self._driver.receive(data, t_s)
-            self._driver.take_received()
-        elif entry.topic == LOG and len(self._said) < SAID_MAX:
-            self._said.append((self._recording.host_s(entry.log_ns), decode(LogLine, entry.data)))
-        elif entry.topic == BOOKMARK:
-            host_s = self._recording.host_s(entry.log_ns)
-            t_s = 0.0 if self._begun_s is None else max(0.0, host_s - self._begun_s)
-            self._timeline.bookmarks.append(
-                BookmarkEntry(t_s, decode(Bookmark, entry.data).text, self._gathering.pose)
-            )
-        elif entry.topic == SUMMARY:
-            self._timeline.summary = decode(RunEnd, entry.data).summary
+    def add(self, found: ReplayStep, state: State | None) -> None:
+        """Add one step of the replay, and the state it left."""
+        message = found.message
+        if found.replayed is not None and state is not None:
+            self._add_cycle(found.replayed, message.log_ns, state)
+        elif message.topic == SERIAL["in"]:
+            self._add_bytes(message)
+        elif message.topic == LOG and len(self._log) < LOG_LINES_MAX:
+            self._log.append(decode(LogLine, message.data))
+        elif message.topic == BOOKMARK:
+            mark = decode(Bookmark, message.data)
+            t_s = 0.0 if self._first_run_s is None else max(0.0, mark.run_s - self._first_run_s)
+            self._timeline.bookmarks.append(BookmarkEntry(t_s, mark.text, self._builder.pose))
+        elif message.topic == SUMMARY:
+            self._timeline.summary = decode(RunEnd, message.data).summary
 
-    def on_cycle(self, record: CycleRecord, state: State) -> None:
-        """Take a cycle, replayed."""
-        run_s = record.inputs.run_s
-        if self._begun_s is None:
-            self._begun_s = run_s
-            self._timeline.start_unix_ns = self._recording.info.unix_minus_host_ns + round(1e9 * run_s)
+    def _add_bytes(self, message: RawMessage) -> None:
+        self._has_bytes = True
+        for run_s, data in decode(SerialBytes, message.data).pieces():
+            self._driver.receive(data, run_s)
+        self._driver.take_received()
+
+    def _add_cycle(self, record: CycleRecord, log_ns: int, state: State) -> None:
+        timeline, builder, run_s = self._timeline, self._builder, record.inputs.run_s
+        if self._first_run_s is None:
+            self._first_run_s = run_s
         else:
-            self._timeline.gaps_s.append(run_s - self._before_s)
-        t_s, self._before_s = run_s - self._begun_s, run_s
+            timeline.cycle_gaps_s.append(run_s - self._last_run_s)
+        t_s, self._last_run_s = run_s - self._first_run_s, run_s
+        timeline.cycle_unix.append((t_s, log_ns))
         if record.inputs.received.rebooted:
-            self._gathering.begin_anew(t_s)
+            builder.restart(t_s)
         for firing in record.inputs.received.firings:
-            self._gathering.hear(t_s, firing)
+            builder.add_firing(t_s, firing)
         if state.odometry is not None:
-            self._gathering.move(t_s, state.odometry)
-        modes, mode = self._timeline.modes, record.mode
+            builder.add_odometry(t_s, state.odometry)
+        modes, mode = timeline.modes, record.mode
         if not modes or (modes[-1].mode, modes[-1].reason) != (mode.mode.value, mode.reason):
             modes.append(ModeEntry(t_s, mode.mode.value, mode.reason))
-        self._perception = state.perception
-        self._gathering.pass_by(t_s, state.perception)
+        self._state = state
+        builder.end_cycle(t_s, state.perception)
 
     def finish(self) -> None:
-        """Close the timeline."""
-        self._gathering.end(self._perception)
-        begun_s = self._begun_s or 0.0
-        for host_s, line in self._said:
-            more = ", ".join(f"{name} {value}" for name, value in line.fields.items() if name != "settings")
-            self._timeline.log.append(
-                LogEntry(host_s - begun_s, line.level, f"{line.event}: {more}" if more else line.event)
-            )
+        """Complete the timeline."""
+        self._builder.finish(None if self._state is None else self._state.perception)
+        first_run_s = self._first_run_s or 0.0
+        for line in self._log:
+            fields = ", ".join(f"{name} {value}" for name, value in line.fields.items() if name != "settings")
+            text = f"{line.event}: {fields}" if fields else line.event
+            self._timeline.log.append(LogEntry(line.run_s - first_run_s, line.level, text))
         if self._has_bytes:
             self._timeline.counts = self._driver.counts
 
 
-def _of_ring_log(path: Path, source: TimelineSource, ready: Callable[[Settings], None], on_step: Told) -> Timeline:
+def _of_ring_log(
+    path: Path, source: TimelineSource, prepare: Callable[[Settings], None], on_step: Progress
+) -> Timeline:
     settings = load_settings(None, source.sets, robot=source.robot, models=source.models)
     firings = read_ring_log(path, sensors=len(settings.ring.mounts))
-    first = next(firings)  # complains about a wrong file before anybody waits for kernels
-    ready(settings)
+    first = next(firings)  # reports an invalid file before kernels are compiled
+    prepare(settings)
     timeline = Timeline(path, settings, None if source.world is None else load_world(source.world))
-    gathering = TimelineBuilder(timeline)
-    begun_s: list[float] = []
-    kept: list[Perception] = []
-
-    def on_firing(firing: Firing, perception: Perception) -> None:
-        on_step()
-        if not begun_s:
-            begun_s.append(firing.robot_s)
-            kept.append(perception)
-        elif timeline.cycles:
-            timeline.gaps_s.append(firing.robot_s - begun_s[0] - timeline.seconds)
-        t_s = firing.robot_s - begun_s[0]
-        gathering.hear(t_s, firing)
-        gathering.pass_by(t_s, perception)
+    builder = TimelineBuilder(timeline)
+    replayer = FiringReplayer(settings, itertools.chain((first,), firings))
+    for firing in replayer:
+        t_s = firing.robot_s - first.robot_s
+        if timeline.cycles:
+            timeline.cycle_gaps_s.append(t_s - timeline.seconds)
+        builder.add_firing(t_s, firing)
+        builder.end_cycle(t_s, replayer.perception)
         timeline.cycles += 1
-
-    replay_firings(settings, itertools.chain((first,), firings), on_firing)
-    gathering.end(kept[0] if kept else None)
+        on_step()
+    builder.finish(replayer.perception)
     return timeline

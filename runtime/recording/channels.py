@@ -1,4 +1,4 @@
-"""The channels of a recording: what the messages of each topic are, their schemas, and to bytes and back."""
+"""The channels of a recording: the payload type of each topic, its JSON schema, and encoding and decoding."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from runtime.recording.schema import (
     LogLine,
     MapChange,
     ModeChange,
-    ObjectsSeen,
+    ObjectList,
     Payload,
     PayloadSchema,
     RunEnd,
@@ -42,7 +42,7 @@ CHANNELS: Final[Mapping[str, type[Payload]]] = MappingProxyType(
         CYCLE: Cycle,
         MODE: ModeChange,
         SEGMENTS: MapChange,
-        OBJECTS: ObjectsSeen,
+        OBJECTS: ObjectList,
         SERIAL["in"]: SerialBytes,
         SERIAL["out"]: SerialBytes,
         LOG: LogLine,
@@ -52,36 +52,36 @@ CHANNELS: Final[Mapping[str, type[Payload]]] = MappingProxyType(
         BOOKMARK: Bookmark,
     }
 )
-"""In the order in which they are numbered in a file, from 1; new ones go to the end."""
+"""Payload type by topic. The order gives the channel numbers in a file, from 1; append new topics at the end."""
 
-F = TypeVar("F", bound=Payload)
+P = TypeVar("P", bound=Payload)
 
 
 class RawMessage(NamedTuple):
-    """A message as it lies in a recording."""
+    """An undecoded message of a recording."""
 
     topic: str
     log_ns: int
-    """Unix time, ns."""
+    """Unix time at which it happened, ns."""
     data: bytes
 
 
-def encode(form: Payload) -> bytes:
-    """Return a message's JSON; its values are trusted, for they come from the program itself."""
-    return form.__pydantic_serializer__.to_json(form)
+def encode(payload: Payload) -> bytes:
+    """Return a payload as JSON, without validation: its values come from the program itself."""
+    return payload.__pydantic_serializer__.to_json(payload)
 
 
-def decode(kind: type[F], data: bytes) -> F:
-    """Return the message in `data`.
+def decode(kind: type[P], data: bytes) -> P:
+    """Return the payload of type `kind` in `data`.
 
     Raises
     ------
     pydantic.ValidationError
-        It is no such message.
+        `data` is no JSON of this type.
     """
     return kind.model_validate_json(data)
 
 
-def schema_of(form: type[Payload]) -> bytes:
-    """Return the JSON schema of what `encode` writes."""
-    return orjson.dumps(form.model_json_schema(mode="serialization", schema_generator=PayloadSchema))
+def schema_of(kind: type[Payload]) -> bytes:
+    """Return the JSON schema of what `encode` writes for a payload type."""
+    return orjson.dumps(kind.model_json_schema(mode="serialization", schema_generator=PayloadSchema))

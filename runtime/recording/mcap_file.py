@@ -1,4 +1,4 @@
-"""One file of a recording while it is written: small chunks, each complete in itself once it is flushed."""
+"""An MCAP file while it is being written: small chunks, each readable by itself once it is flushed."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from runtime.recording.schema import FORMAT
 
 PROFILE: Final = "echolocate"
 CHUNK_BYTES: Final = 256 * 1024
-"""A chunk ends at this size, or when it is flushed: whatever is damaged costs no more than this."""
+"""Largest chunk, bytes: no damage to a file costs more than this around it."""
 
 INDEX: Final = IndexType.CHUNK | IndexType.ATTACHMENT | IndexType.METADATA
-"""No index of single messages: in chunks as small as these it would be a third of the file."""
+"""No index of single messages: with chunks this small it would take a third of the file."""
 
 
 class McapFile:
-    """An MCAP file under way.
+    """An open MCAP file. Every method raises OSError if the disk refuses.
 
     Parameters
     ----------
     path : Path
         Replaced if it exists.
     info : bytes
-        The first message, in a chunk of its own with schemas and channels.
+        The first message, written in a chunk of its own with schemas and channels.
     log_ns : int
-        Its log time.
+        Its log time, Unix time in ns.
 
     Raises
     ------
     OSError
-        As every method does, where the disk will not have it.
+        The file cannot be created or written.
     """
 
     def __init__(self, path: Path, info: bytes, log_ns: int) -> None:
@@ -56,19 +56,30 @@ class McapFile:
 
     def _begin(self, info: bytes, log_ns: int) -> None:
         self._writer.start(profile=f"{PROFILE}/{FORMAT}", library=f"echolocate {VERSION}")
-        for topic, form in CHANNELS.items():
-            self.channel(topic, form.__name__, schema_of(form))
+        for topic, kind in CHANNELS.items():
+            self._register(topic, kind.__name__, schema_of(kind))
         self.add(RUN_INFO, info, log_ns)
         self.flush()
 
-    def channel(self, topic: str, name: str, schema: bytes) -> None:
-        """Register a channel of JSON messages."""
+    def _register(self, topic: str, name: str, schema: bytes) -> None:
         if name not in self._schemas:
             self._schemas[name] = self._writer.register_schema(name, "jsonschema", schema)
         self._channels[topic] = self._writer.register_channel(topic, "json", self._schemas[name])
 
     def add(self, topic: str, data: bytes, log_ns: int, sequence: int = 0) -> None:
-        """Add a message to the chunk under way."""
+        """Add a message to the current chunk.
+
+        Parameters
+        ----------
+        topic : str
+            One of `CHANNELS`.
+        data : bytes
+            The message's JSON.
+        log_ns : int
+            Unix time, ns.
+        sequence : int
+            MCAP's sequence number; the cycle number where there is one.
+        """
         self._writer.add_message(self._channels[topic], log_ns, data, log_ns, sequence)
 
     @property
@@ -77,11 +88,11 @@ class McapFile:
         return self._file.tell()
 
     def flush(self) -> None:
-        """End the chunk under way and hand it to the system: from here on it survives the death of this process."""
+        """Finish the current chunk and hand it to the system: then it survives the death of this process."""
         self._writer.flush()
 
     def sync(self) -> None:
-        """Wait until the disk has it: from here on it survives a power cut."""
+        """Wait until the disk has everything that was flushed: then it survives a power cut."""
         os.fsync(self._file.fileno())
 
     def finish(self) -> None:
@@ -94,6 +105,6 @@ class McapFile:
             self.abandon()
 
     def abandon(self) -> None:
-        """Close the file as it is; every chunk that was flushed can be read."""
+        """Close the file as it is; every flushed chunk stays readable."""
         with contextlib.suppress(OSError):
             self._file.close()

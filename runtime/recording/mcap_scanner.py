@@ -1,7 +1,7 @@
-"""Reading a recording in whatever state it is: cut off anywhere, or with bytes that are not what was written.
+"""Reading a recording in any state: cut off anywhere, or with damaged bytes.
 
-A chunk is complete in itself and carries a checksum. What is whole is read; what is not is passed over, told, and the
-next chunk is found by its own form. Nothing here raises because of what a file holds.
+A chunk is complete in itself and has a checksum. Whole chunks are read; anything else is skipped and reported, and
+the next chunk is found by the byte pattern at its start. No content of a file raises an exception here.
 """
 
 from __future__ import annotations
@@ -24,138 +24,156 @@ from mcap.writer import MCAP0_MAGIC
 from runtime.recording.channels import CHANNELS, RawMessage
 
 BEGIN: Final = 8
-"""The first byte after the magic ones."""
-HEAD: Final = 9
-"""Bytes of a record before its content: what it is, how long it is."""
+"""Offset of the first record, after the magic bytes."""
+RECORD_HEADER: Final = 9
+"""Bytes of a record before its content: opcode (1) and length (8)."""
 ZSTD: Final = b"\x04\x00\x00\x00zstd"
-ZSTD_AT: Final = HEAD + 8 + 8 + 8 + 4
-"""Where in a chunk the name of its compression stands."""
+ZSTD_AT: Final = RECORD_HEADER + 8 + 8 + 8 + 4
+"""Offset of the compression's name in a chunk record."""
 CONTENT_MAX: Final = 1 << 30
-"""No chunk of ours is a thousandth as large; a damaged length may claim anything."""
+"""Largest plausible chunk, bytes. Ours have 256 KiB; a damaged length field can have any value."""
 HEADER_MAX: Final = 4096
-KNOWN: Final = frozenset(int(code) for code in Opcode)
+OPCODES: Final = frozenset(int(code) for code in Opcode)
 UNREADABLE: Final = (McapError, zstandard.ZstdError, ValueError, struct.error, OverflowError, MemoryError)
-"""What reading damaged bytes may end in."""
-END_BYTES: Final = HEAD + 20 + len(MCAP0_MAGIC)
-"""Footer and magic at the end of a file that was finished."""
+"""Exceptions that reading damaged bytes may raise."""
+END_BYTES: Final = RECORD_HEADER + 20 + len(MCAP0_MAGIC)
+"""Size of footer and magic at the end of a finished file."""
 
 
 @dataclass(frozen=True, slots=True)
 class CorruptRegion:
-    """Something that is not as it was written: at which byte, and what it costs."""
+    """A place in a file that is not as it was written."""
 
-    at: int
-    what: str
+    offset: int
+    """Byte in the file."""
+    description: str
+
+    def __str__(self) -> str:
+        return f"at byte {self.offset}: {self.description}"
 
 
 class McapScanner:
-    """Everything that can be read of a file's bytes.
+    """Reader of everything readable in a file's bytes.
 
     Parameters
     ----------
-    data : bytes-like
-        The whole file; may be mapped.
+    data : memoryview
+        The whole file; may be memory-mapped.
+
+    Attributes
+    ----------
+    corrupt_regions : list of CorruptRegion
+        What is damaged; complete once `chunks` is exhausted.
+    finished : bool
+        Whether the file was closed properly; known once `chunks` is exhausted.
+    profile, library : str
+        From the file's header; empty if that is unreadable.
+    is_mcap : bool
+        Whether the file starts with MCAP's magic bytes.
+    chunk_offset : int
+        Where the messages last yielded by `chunks` start in the file.
+    schemas : dict
+        The schemas in the file, by topic.
     """
 
     def __init__(self, data: memoryview) -> None:
         self._data = data
-        self.damage: list[CorruptRegion] = []
-        """Known once `chunks` has come to its end."""
+        self.corrupt_regions: list[CorruptRegion] = []
         self.finished = False
-        """Whether the file was closed in good order; known then, too."""
         self.profile = ""
         self.library = ""
         self.is_mcap = bytes(data[:8]) == MCAP0_MAGIC
-        self.chunk_at = BEGIN
-        """Where in the file the messages last yielded are found again."""
+        self.chunk_offset = BEGIN
+        # This program's own channel numbers apply until the file defines others.
         self._topics = dict(enumerate(CHANNELS, start=1))
-        """By number; those of this program until the file says otherwise."""
         self._schemas: dict[int, Schema] = {}
         self.schemas: dict[str, Schema] = {}
-        """By topic, as the file has them."""
         self._read_header()
 
     def _read_header(self) -> None:
         try:
             code, length = struct.unpack_from("<BQ", self._data, 8)
             if code == Opcode.HEADER:
-                header = Header.read(_stream(self._data[8 + HEAD : 8 + HEAD + length]))
+                header = Header.read(_stream(self._data[8 + RECORD_HEADER : 8 + RECORD_HEADER + length]))
                 self.profile, self.library = header.profile, header.library
         except UNREADABLE:
             self.profile = ""
 
     def chunks(self, since: int = BEGIN) -> Iterator[list[RawMessage]]:
-        """Yield the messages of every chunk that is whole, in the order of the file.
+        """Yield the messages of every whole chunk, in file order.
 
         Parameters
         ----------
         since : int
-            Begin at this byte: one that `chunk_at` named earlier.
+            Start at this byte: a value that `chunk_offset` had before.
         """
         if not self.is_mcap:
-            self.damage.append(CorruptRegion(0, "the first bytes are not those of an MCAP file"))
+            self._note(0, "the first bytes are not those of an MCAP file")
         at, size = since, len(self._data)
         while at < size:
-            self.chunk_at = at
-            head = self._head(at)
+            self.chunk_offset = at
+            head = self._record_at(at)
             if head is not None and head[0] == Opcode.DATA_END:
                 self._check_end(at, head[1])
                 return
             if head is None or self._looks_like_chunk(at):
-                entries = None if head is None or head[0] != Opcode.CHUNK else self._chunk(at, head[1])
-                if entries is None:
-                    entries, at = self._find(at)
+                messages = None if head is None or head[0] != Opcode.CHUNK else self._chunk(at, head[1])
+                if messages is None:
+                    messages, at = self._find_chunk(at)
                 else:
-                    at += HEAD + head[1] if head is not None else 0
-                if entries is not None:
-                    yield entries
+                    at += RECORD_HEADER + head[1] if head is not None else 0
+                if messages is not None:
+                    yield messages
             else:
-                at += HEAD + head[1]
+                at += RECORD_HEADER + head[1]
+
+    def _note(self, offset: int, description: str) -> None:
+        self.corrupt_regions.append(CorruptRegion(offset, description))
 
     def _looks_like_chunk(self, at: int) -> bool:
-        """Say whether a chunk begins here, whatever its first byte says."""
+        """Return whether a chunk starts here, even if its opcode is damaged."""
         return self._data[at] == Opcode.CHUNK or bytes(self._data[at + ZSTD_AT : at + ZSTD_AT + len(ZSTD)]) == ZSTD
 
-    def _head(self, at: int) -> tuple[int, int] | None:
-        """Return what the record at a byte says it is, None where it cannot be one."""
-        if at + HEAD > len(self._data):
+    def _record_at(self, at: int) -> tuple[int, int] | None:
+        """Return opcode and length of the record at a byte; None if there cannot be one."""
+        if at + RECORD_HEADER > len(self._data):
             return None
         code, length = struct.unpack_from("<BQ", self._data, at)
-        if code not in KNOWN or code in {Opcode.FOOTER, Opcode.MESSAGE} or at + HEAD + length > len(self._data):
+        if code not in OPCODES or code in {Opcode.FOOTER, Opcode.MESSAGE}:
             return None
-        return code, length
+        return None if at + RECORD_HEADER + length > len(self._data) else (code, length)
 
-    def _find(self, at: int) -> tuple[list[RawMessage] | None, int]:
-        """Return the next whole chunk from `at` on, and where to go on after it: the end where there is none."""
-        data, look = bytes(self._data[at:]), 0
-        while (found := data.find(ZSTD, look)) >= 0:
-            look = found + 1
+    def _find_chunk(self, at: int) -> tuple[list[RawMessage] | None, int]:
+        """Return the next whole chunk from `at` on and the byte after it; the end of the file if there is none."""
+        data, start_search = bytes(self._data[at:]), 0
+        while (found := data.find(ZSTD, start_search)) >= 0:
+            start_search = found + 1
             start = found - ZSTD_AT
             if start < 0 or found + 16 > len(data):
                 continue
             (length,) = struct.unpack_from("<Q", data, found + len(ZSTD))
-            whole = ZSTD_AT - HEAD + len(ZSTD) + 8 + length
-            if start + HEAD + whole <= len(data) and (entries := self._chunk(at + start, whole)) is not None:
-                lost = f"{start} bytes cannot be read" if start else "a chunk's kind or length is wrong; it is whole"
-                self.damage.append(CorruptRegion(at, lost))
-                return entries, at + start + HEAD + whole
-        if not self._torn(at):
-            self.damage.append(CorruptRegion(at, f"nothing can be read from here to the end, {len(data)} bytes"))
+            whole = ZSTD_AT - RECORD_HEADER + len(ZSTD) + 8 + length
+            if start + RECORD_HEADER + whole <= len(data) and (chunk := self._chunk(at + start, whole)) is not None:
+                wrong_head = "a chunk's kind or length is wrong; its messages are whole"
+                self._note(at, f"{start} bytes cannot be read" if start else wrong_head)
+                return chunk, at + start + RECORD_HEADER + whole
+        if not self._is_cut_off(at):
+            self._note(at, f"nothing can be read from here to the end, {len(data)} bytes")
         return None, len(self._data)
 
-    def _torn(self, at: int) -> bool:
-        """Say whether the file just ends here, in the middle of a record: that is a cut and no damage."""
-        if at + HEAD > len(self._data):
+    def _is_cut_off(self, at: int) -> bool:
+        """Return whether the file just ends in the middle of this record, which is no damage."""
+        if at + RECORD_HEADER > len(self._data):
             return True
         code, length = struct.unpack_from("<BQ", self._data, at)
         longest = {Opcode.CHUNK: CONTENT_MAX, Opcode.HEADER: HEADER_MAX, Opcode.DATA_END: 4}.get(code, 0)
-        return bool(length <= longest) and at + HEAD + length > len(self._data)
+        return bool(length <= longest) and at + RECORD_HEADER + length > len(self._data)
 
     def _chunk(self, at: int, length: int) -> list[RawMessage] | None:
-        """Return the messages of the chunk at a byte, None where it is damaged."""
+        """Return the messages of the chunk at a byte; None if it is damaged."""
         try:
-            chunk = Chunk.read(_stream(self._data[at + HEAD : at + HEAD + length]))
-            if len(chunk.data) + len(ZSTD) + 8 + ZSTD_AT - HEAD != length:
+            chunk = Chunk.read(_stream(self._data[at + RECORD_HEADER : at + RECORD_HEADER + length]))
+            if len(chunk.data) + len(ZSTD) + 8 + ZSTD_AT - RECORD_HEADER != length:
                 return None
             if chunk.compression != "zstd" or not 0 < chunk.uncompressed_size < CONTENT_MAX:
                 return None
@@ -166,7 +184,7 @@ class McapScanner:
             return None
         if not chunk.uncompressed_crc:
             return None
-        entries = []
+        messages = []
         for record in records:
             if isinstance(record, Schema):
                 self._schemas[record.id] = record
@@ -175,33 +193,33 @@ class McapScanner:
                 if record.schema_id in self._schemas:
                     self.schemas[record.topic] = self._schemas[record.schema_id]
             elif isinstance(record, Message) and record.channel_id in self._topics:
-                entries.append(RawMessage(self._topics[record.channel_id], record.log_time, record.data))
-        times = [entry.log_ns for entry in entries]
+                messages.append(RawMessage(self._topics[record.channel_id], record.log_time, record.data))
+        times = [message.log_ns for message in messages]
         if times and (min(times), max(times)) != (chunk.message_start_time, chunk.message_end_time):
-            self.damage.append(CorruptRegion(at, "a chunk's own times are wrong; its messages are whole"))
-        return entries
+            self._note(at, "a chunk's own times are wrong; its messages are whole")
+        return messages
 
     def _check_end(self, at: int, length: int) -> None:
-        """Check what follows the messages: checksums of all before it and of the index."""
+        """Check what follows the messages: the checksums of everything before it and of the index."""
         self.finished = True
         try:
-            end = DataEnd.read(_stream(self._data[at + HEAD : at + HEAD + length]))
-            summary = at + HEAD + length
+            end = DataEnd.read(_stream(self._data[at + RECORD_HEADER : at + RECORD_HEADER + length]))
+            summary = at + RECORD_HEADER + length
             footer_at = len(self._data) - END_BYTES
-            footer = Footer.read(_stream(self._data[footer_at + HEAD :]))
+            footer = Footer.read(_stream(self._data[footer_at + RECORD_HEADER :]))
             head = struct.unpack_from("<BQ", self._data, footer_at)
-            index = zlib.crc32(self._data[summary : footer_at + HEAD + 16])
-            whole = bytes(self._data[-8:]) == MCAP0_MAGIC and head == (Opcode.FOOTER, 20)
+            index = zlib.crc32(self._data[summary : footer_at + RECORD_HEADER + 16])
+            is_whole = bytes(self._data[-8:]) == MCAP0_MAGIC and head == (Opcode.FOOTER, 20)
         except UNREADABLE:
             self.finished = False
             return
-        if not whole:
-            self.damage.append(CorruptRegion(at, "the end of the file is damaged or missing; its messages are whole"))
+        if not is_whole:
+            self._note(at, "the end of the file is damaged or missing; its messages are whole")
             self.finished = False
         elif index != footer.summary_crc:
-            self.damage.append(CorruptRegion(summary, "the index is damaged; the messages are whole"))
-        if end.data_section_crc != zlib.crc32(self._data[:at]) and not self.damage:
-            self.damage.append(CorruptRegion(0, "a byte between the chunks is damaged; their messages are whole"))
+            self._note(summary, "the index is damaged; the messages are whole")
+        if end.data_section_crc != zlib.crc32(self._data[:at]) and not self.corrupt_regions:
+            self._note(0, "a byte between the chunks is damaged; their messages are whole")
 
 
 def _stream(data: memoryview) -> ReadDataStream:

@@ -1,4 +1,4 @@
-"""A recording as something to read: what the run was, and its messages one by one, whatever has befallen the file."""
+"""An open recording: what the run was, and its messages one by one, even if the file is damaged or cut off."""
 
 from __future__ import annotations
 
@@ -16,17 +16,19 @@ from pydantic import ValidationError
 from config.errors import WRONG_CALL, UserError
 from config.settings import Settings
 from config.world import WorldConfig
-from runtime.recording.channels import RUN_INFO, RawMessage, decode
+from runtime.cycle.step import CycleRecord
+from runtime.recording.channels import CYCLE, RUN_INFO, RawMessage, decode
 from runtime.recording.mcap_file import PROFILE
 from runtime.recording.mcap_scanner import CorruptRegion, McapScanner
-from runtime.recording.schema import FORMAT, RunInfo
+from runtime.recording.schema import FORMAT, Cycle, RunInfo
 
 MAGIC: Final = b"\x89MCAP"
-NS_PER_S: Final = 1_000_000_000
+CYCLE_HEAD: Final = re.compile(rb'\{"record":\{"cycle":(\d{1,15}),"inputs":\{"run_s":([0-9.eE+-]{1,25}),')
+"""The start of a cycle's message: its number and its time."""
 
 
 class RecordingError(UserError):
-    """The file is not a recording or cannot be read; the text is one line for the user."""
+    """A recording cannot be read."""
 
     exit_code = WRONG_CALL
 
@@ -42,66 +44,73 @@ class Recording:
     info : RunInfo
         What the run was.
     settings : Settings
-        Its settings.
+        The run's settings at the start of the file.
     """
 
     path: Path
     info: RunInfo
     settings: Settings
     _data: memoryview
-    _salvage: McapScanner = field(init=False)
+    _scanner: McapScanner = field(init=False)
 
     def __post_init__(self) -> None:
-        self._salvage = McapScanner(self._data)
+        self._scanner = McapScanner(self._data)
 
     def messages(self) -> Iterator[RawMessage]:
-        """Yield every message that can be read, in the order of the file; may be called again."""
-        self._salvage = McapScanner(self._data)
-        for chunk in self._salvage.chunks():
+        """Yield every readable message in file order; may be called again."""
+        for _, chunk in self.chunks():
             yield from chunk
 
     def chunks(self, since: int | None = None) -> Iterator[tuple[int, list[RawMessage]]]:
-        """Yield the messages chunk by chunk, each with the byte at which to begin to read it again.
+        """Yield each chunk's offset in the file and its messages.
 
         Parameters
         ----------
         since : int, optional
-            Such a byte; all of the file has been read once before.
+            Start at this chunk offset. The whole file must have been read once before.
         """
+        scanner = self._scanner
         if since is None:
-            self._salvage = McapScanner(self._data)
-            for chunk in self._salvage.chunks():
-                yield self._salvage.chunk_at, chunk
+            scanner.corrupt_regions, scanner.finished = [], False
+            for chunk in scanner.chunks():
+                yield scanner.chunk_offset, chunk
             return
-        salvage = self._salvage
-        known = len(salvage.damage)
-        for chunk in salvage.chunks(since):
-            at = salvage.chunk_at
-            del salvage.damage[known:]
-            yield at, chunk
+        regions = list(scanner.corrupt_regions)
+        for chunk in scanner.chunks(since):
+            yield scanner.chunk_offset, chunk
+        scanner.corrupt_regions = regions  # a second pass over a part finds some of them again
+
+    def cycle_records(self) -> Iterator[CycleRecord]:
+        """Yield the record of every readable cycle in file order."""
+        return (decode(Cycle, message.data).record for message in self.messages() if message.topic == CYCLE)
 
     @property
-    def damage(self) -> list[CorruptRegion]:
-        """What was found wrong by the last `entries`, once it has come to its end."""
-        return self._salvage.damage
+    def corrupt_regions(self) -> list[CorruptRegion]:
+        """Damage found by the last full pass over the messages; complete once that is exhausted."""
+        return self._scanner.corrupt_regions
 
     @property
     def finished(self) -> bool:
-        """Whether the file was closed in good order; known then, too."""
-        return self._salvage.finished
+        """Whether the file was closed properly; known after a full pass over the messages."""
+        return self._scanner.finished
 
     @property
     def world(self) -> WorldConfig | None:
-        """What stood there, where that is known: a real robot's settings may name a world, but it is not in it."""
+        """The true world of an emulated run. None for a real robot: its settings may name a world it is not in."""
         return self.settings.world if self.info.emulated else None
 
-    def host_s(self, log_ns: int) -> float:
-        """Return a log time by the host's clock of the run."""
-        return 1e-9 * (log_ns - self.info.unix_minus_host_ns)
+
+def cycle_head(message: RawMessage) -> tuple[int, float]:
+    """Return number and time (run's clock, s) of a cycle's message without decoding all of it, which takes long."""
+    found = CYCLE_HEAD.match(message.data)
+    if found is not None:
+        return int(found[1]), float(found[2])
+    record = decode(Cycle, message.data).record
+    return record.cycle, record.inputs.run_s
 
 
 def is_recording(path: Path) -> bool:
-    """Say whether a file begins like an MCAP file, or is named like one."""
+    """Return whether a file starts like an MCAP file or is named like one."""
     try:
         with path.open("rb") as file:
             return file.read(len(MAGIC)) == MAGIC or path.suffix == ".mcap"
@@ -109,30 +118,30 @@ def is_recording(path: Path) -> bool:
         return path.suffix == ".mcap"
 
 
-def parse_settings(told: dict[str, Any]) -> Settings:
-    """Return settings from the form in which a recording holds them.
+def parse_settings(data: dict[str, Any]) -> Settings:
+    """Return settings from their form in a recording.
 
     Raises
     ------
     pydantic.ValidationError
-        They are not those of this version.
+        They are not valid in this version.
     """
-    return Settings.model_validate_json(orjson.dumps(told))
+    return Settings.model_validate_json(orjson.dumps(data))
 
 
 @contextlib.contextmanager
-def mapped(path: Path) -> Iterator[memoryview]:
-    """Give a file's bytes.
+def map_file(path: Path) -> Iterator[memoryview]:
+    """Memory-map a file and yield its bytes.
 
     Raises
     ------
     RecordingError
-        There is no such file, it cannot be read, or it is empty.
+        The file does not exist, cannot be read, or is empty.
     """
     try:
         with path.open("rb") as file:
-            empty = path.stat().st_size == 0
-            data = None if empty else mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+            is_empty = path.stat().st_size == 0
+            data = None if is_empty else mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}; check the path") from error
     if data is None:
@@ -141,87 +150,95 @@ def mapped(path: Path) -> Iterator[memoryview]:
     try:
         yield view
     finally:
-        with contextlib.suppress(BufferError):  # who was stopped by an error may still hold a piece of it
+        with contextlib.suppress(BufferError):  # after an exception its traceback may still refer to a slice
             view.release()
             data.close()
 
 
-def refuse_strangers(path: Path, salvage: McapScanner) -> None:
-    """Refuse what another program made.
+def check_origin(path: Path, scanner: McapScanner) -> None:
+    """Refuse a file that another program wrote.
 
     Raises
     ------
     RecordingError
-        Its header names neither our profile nor our library; one damaged byte does not make it another program's.
+        Neither profile nor library in its header is ours; one damaged byte therefore does not refuse our own files.
     """
-    named = salvage.profile or salvage.library
-    if named and not salvage.profile.startswith(PROFILE) and not salvage.library.startswith(PROFILE):
-        raise RecordingError(f"{path}: is an MCAP file of another program ({named!r}), not a recording of a run")
+    name = scanner.profile or scanner.library
+    if name and not scanner.profile.startswith(PROFILE) and not scanner.library.startswith(PROFILE):
+        raise RecordingError(f"{path}: is an MCAP file of another program ({name!r}), not a recording of a run")
 
 
-def refuse_newer(path: Path, salvage: McapScanner, told: RunInfo | None = None) -> None:
-    """Refuse what this program is too old for; what stands under a checksum goes before what does not.
+def check_format(path: Path, scanner: McapScanner, info: RunInfo | None = None) -> None:
+    """Refuse a recording of another format version.
+
+    Parameters
+    ----------
+    path : Path
+        The file, for the message.
+    scanner : McapScanner
+        Of the file.
+    info : RunInfo, optional
+        The file's first message. Its version counts more than the header's, which no checksum protects.
 
     Raises
     ------
     RecordingError
-        It was written by a newer program.
+        The version is known and is not ours.
     """
-    form = re.fullmatch(rf"{PROFILE}/(\d+)", salvage.profile)
-    of_header = int(form[1]) if form is not None else 0
-    of_file = of_header if told is None else told.format
-    if of_file > FORMAT:
+    header = re.fullmatch(rf"{PROFILE}/(\d+)", scanner.profile)
+    version = info.format if info is not None else FORMAT if header is None else int(header[1])
+    if version != FORMAT:
         raise RecordingError(
-            f"{path}: was written by a newer program ({salvage.library}, format {of_file}; this one reads up to "
-            f"{FORMAT}): update echolocate"
+            f"{path}: has recording format {version} (written by {scanner.library}), and this echolocate reads "
+            f"format {FORMAT} only: use {'a newer' if version > FORMAT else 'the older'} echolocate"
         )
 
 
 @contextlib.contextmanager
 def open_recording(path: Path) -> Iterator[Recording]:
-    """Open a recording, whole or not.
+    """Open a recording, damaged or not.
 
     Raises
     ------
     RecordingError
-        It is none, is of a newer program, or holds nothing that can be read; also where what is done with it finds a
-        message that is none of this version's.
+        The file is no recording, has another format version, or nothing in it can be read. Also raised if the body
+        of the `with` statement decodes a message that is invalid in this version.
     """
-    with mapped(path) as data:
-        salvage = McapScanner(data)
-        refuse_strangers(path, salvage)
-        info = next((e for chunk in salvage.chunks() for e in chunk if e.topic == RUN_INFO), None)
-        if info is None:
-            refuse_newer(path, salvage)
-            raise RecordingError(f"{path}: {_why_nothing(salvage)}")
+    with map_file(path) as data:
+        scanner = McapScanner(data)
+        check_origin(path, scanner)
+        first = next((m for chunk in scanner.chunks() for m in chunk if m.topic == RUN_INFO), None)
+        if first is None:
+            check_format(path, scanner)
+            raise RecordingError(f"{path}: {_why_unreadable(scanner)}")
         try:
-            told = decode(RunInfo, info.data)
-            refuse_newer(path, salvage, told)
-            settings = parse_settings(told.settings)
+            info = decode(RunInfo, first.data)
+            check_format(path, scanner, info)
+            settings = parse_settings(info.settings)
         except ValidationError as error:
             raise RecordingError(
-                f"{path}: its settings are not those of this version ({_first_of(error)}); replay it with the "
-                f"version that made it, or name settings by --with"
+                f"{path}: its settings are not valid in this version ({_first_error(error)}); replay it with the "
+                f"version that wrote it, or give other settings by --with"
             ) from error
-        recording = Recording(path, told, settings, data)
+        recording = Recording(path, info, settings, data)
         try:
             yield recording
         except ValidationError as error:
             raise RecordingError(
-                f"{path}: a message in it has a form that this version does not know ({_first_of(error)}): replay it "
-                f"with the version that made it"
+                f"{path}: a message in it is not valid in this version ({_first_error(error)}): replay it with the "
+                f"version that wrote it"
             ) from error
-        del recording, salvage
+        del recording, scanner
 
 
-def _first_of(error: ValidationError) -> str:
+def _first_error(error: ValidationError) -> str:
     first = error.errors(include_url=False)[0]
     return f"{'.'.join(map(str, first['loc']))}: {' '.join(first['msg'].split())}"
 
 
-def _why_nothing(salvage: McapScanner) -> str:
-    if not salvage.is_mcap:
+def _why_unreadable(scanner: McapScanner) -> str:
+    if not scanner.is_mcap:
         return (
             "is no recording (MCAP), and nothing in it can be read as one; `echolocate run --record FILE` makes one"
         )
-    return "holds no message that can be read: it was cut off before the first, or is damaged"
+    return "holds no readable message: it was cut off before the first one, or is damaged"

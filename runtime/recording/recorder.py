@@ -1,8 +1,8 @@
-"""The loop's side of a recording: what happened is handed over as it is, and the loop goes on.
+"""The control loop's side of a recording: everything that happens is queued as it is, and the loop goes on.
 
-Handing over is an append to a queue. Only now and then is more asked of the loop: once a second a copy of the map,
-half a second later the objects, and once in a while, as a keyframe, a copy of everything that is remembered; all of
-it after the command has been sent.
+Queueing is an append. Only from time to time the loop does more: once a second a copy of the map, half a second later
+the objects, and rarely, as a keyframe, a copy of the whole state. All of it happens after the command has
+been sent.
 """
 
 from __future__ import annotations
@@ -24,17 +24,26 @@ from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, LOG, OBJECTS, SEGMENTS, SERIAL, SETTINGS, SUMMARY
 from runtime.recording.schema import FORMAT, Bookmark, LogLine, RunEnd, RunInfo, carried_state
 from runtime.recording.storage import RecordingTarget
-from runtime.recording.writer import QUEUE_MAX, Item, MapSnapshot, RecorderStatus, RecordingWriter, Reloaded, Switch
+from runtime.recording.writer import (
+    QUEUE_MAX,
+    MapSnapshot,
+    QueuedItem,
+    RecorderStatus,
+    RecordingSwitch,
+    RecordingWriter,
+    SettingsReload,
+)
 from runtime.support.kernel_cache import kernels_key
+from runtime.timing.run_clock import RunClock, run_clock
 
-MOMENT_S: Final = 1.0
-"""So often the map and the objects are recorded, as changes."""
+SNAPSHOT_S: Final = 1.0
+"""Interval at which changes of the map, and the objects, are recorded."""
 BOOKMARK_MAX: Final = 500
-"""Characters."""
+"""Characters in a bookmark."""
 
 
 def software_versions() -> dict[str, str]:
-    """Return what the last bit of a result may depend on besides its inputs."""
+    """Return what the last bit of a result may depend on besides its inputs: versions, kernels and processor."""
     return {
         "echolocate": VERSION,
         "python": platform.python_version(),
@@ -46,57 +55,70 @@ def software_versions() -> dict[str, str]:
     }
 
 
-def run_info(settings: Settings, clock: Callable[[], float], *, emulated: bool) -> RunInfo:
-    """Return what stands at the beginning of a recording that begins now."""
+def run_info(settings: Settings, host_clock: Callable[[], float], *, emulated: bool) -> RunInfo:
+    """Return the first message of a recording that starts now.
+
+    Parameters
+    ----------
+    settings : Settings
+        The run's.
+    host_clock : callable
+        The host's monotonic clock, s. Its difference to Unix time is fixed here, for all log times.
+    emulated : bool
+        Whether the settings' world is the true one.
+    """
     return RunInfo(
         format=FORMAT,
         settings=settings.model_dump(mode="json"),
         versions=software_versions(),
         started=datetime.now(UTC).isoformat(timespec="seconds"),
-        unix_minus_host_ns=time.time_ns() - round(1e9 * clock()),
+        unix_minus_host_ns=time.time_ns() - round(1e9 * host_clock()),
         part=1,
         emulated=emulated,
     )
 
 
 class Recorder:
-    """Takes everything that a run does and has it written; a context in which the writing goes on.
+    """Records everything that a run does. As a context manager it starts and stops the writing.
+
+    Log times are Unix times: the host's clock at that moment plus the difference at the start, whatever the run's
+    clock does. Messages hold the run's time.
 
     Parameters
     ----------
     settings : Settings
-        Of the run.
-    place : RecordingTarget
-        Where the recording goes.
-    clock : callable
-        The host's clock of the run: monotonic, s.
+        The run's.
+    target : RecordingTarget
+        Where the recording is written.
+    clock : RunClock or callable
+        The run's clock, which knows the host's; any other monotonic clock (s) stands for both.
     queue_max : int
         Items that may wait; what does not fit is dropped and counted.
     emulated : bool
-        Whether the settings' world is what the robot meets.
+        Whether the settings' world is the true one.
     on : bool
-        Whether to record from the beginning; `set_enabled` may do so later.
+        Whether to record from the start; `set_enabled` changes it.
     """
 
     def __init__(
         self,
         settings: Settings,
-        place: RecordingTarget,
-        clock: Callable[[], float] = time.monotonic,
+        target: RecordingTarget,
+        clock: RunClock | Callable[[], float] = time.monotonic,
         queue_max: int = QUEUE_MAX,
         *,
         emulated: bool = False,
         on: bool = True,
     ) -> None:
-        self._clock = clock
-        self._queue_max = queue_max
-        self._moment_cycles = max(1, round(MOMENT_S * settings.cycle.rate_hz))
+        self._clock = run_clock(clock)
+        self._snapshot_cycles = max(1, round(SNAPSHOT_S * settings.cycle.rate_hz))
         self._keyframe_s = settings.recording.keyframe_period_s
-        self._writer = RecordingWriter(place, run_info(settings, clock, emulated=emulated), on=on)
+        info = run_info(settings, self._clock.host, emulated=emulated)
+        self._writer = RecordingWriter(target, info, self._clock.host, queue_max, on=on)
         self._on = on
-        self._begins = False
-        self._last_keyframe_s: float | None = None
-        self._gap = False
+        self._is_starting = False
+        self._last_keyframe_run_s: float | None = None
+        self._has_gap = False
         self._cycle = 0
 
     def __enter__(self) -> Recorder:
@@ -110,89 +132,116 @@ class Recorder:
 
     @property
     def status(self) -> RecorderStatus:
-        """How the recording stands."""
+        """The state of the recording."""
         return self._writer.status
 
     def probe(self) -> str | None:
-        """Say how its thread ended; None while it runs. See `runtime.support.health`."""
-        return self._writer.probe()
+        """Return how its thread ended; None while it runs. See `runtime.support.health`."""
+        return self._writer.thread.probe()
 
     @property
     def is_enabled(self) -> bool:
-        """Whether a recording is wanted."""
+        """Whether recording is switched on."""
         return self._on
 
     def set_enabled(self, *, on: bool) -> None:
-        """Begin another file with the next cycle, or end the one under way; nothing where it is so already."""
+        """Begin another file with the next cycle, or end the current one. Does nothing if it is so already."""
         if on == self._on:
             return
-        self._on = self._begins = on
-        self._writer.queue.append(Item(CYCLE, self._clock(), Switch(on)))
+        self._on = self._is_starting = on
+        self._put_now(CYCLE, RecordingSwitch(on))
 
     def bookmark(self, text: str) -> str | None:
-        """Put a mark into the recording; returns why not."""
+        """Write a bookmark at this moment; return why it is refused, None if it is written."""
         if not self._writer.status.is_writing or not self._on:
             return "nothing is being recorded: switch the recording on first"
         words = " ".join(text.split())
         if not words or len(words) > BOOKMARK_MAX:
             return f"a bookmark has from 1 to {BOOKMARK_MAX} characters, not {len(words)}"
-        self._hand(BOOKMARK, self._clock(), Bookmark.model_construct(cycle=self._cycle, text=words))
+        run_s, host_s = self._clock.both()
+        mark = Bookmark.model_construct(run_s=run_s, cycle=self._cycle, text=words)
+        self._put(QueuedItem(BOOKMARK, host_s, run_s, mark))
         return None
 
     def on_cycle(self, record: CycleRecord, state: State) -> None:
-        """Take a cycle, just over."""
-        run_s = record.inputs.run_s
+        """Record a cycle that has just ended, and the map, the objects or a keyframe if one is due.
+
+        Parameters
+        ----------
+        record : CycleRecord
+            The cycle.
+        state : State
+            As the cycle left it.
+        """
+        run_s, host_s = record.inputs.run_s, record.inputs.host_s
+        host_s = run_s if host_s is None else host_s  # virtual time has no other clock
         self._cycle = record.cycle
         if not self._on:
             return
-        if self._begins:
-            # What follows is replayed from the state that this one left.
-            self._begins, self._gap = False, True
+        if self._is_starting:
+            # The replay starts from the state that this cycle has left.
+            self._is_starting, self._has_gap = False, True
         else:
-            self._hand(CYCLE, run_s, record)
-        if self._last_keyframe_s is None:
-            self._last_keyframe_s = run_s
-        room = len(self._writer.queue) < self._queue_max
-        due = self._gap or self._writer.wants_keyframe or run_s - self._last_keyframe_s >= self._keyframe_s
-        if due and room:
-            self._gap = self._writer.wants_keyframe = False
-            self._last_keyframe_s = run_s
-            seen = state.perception
-            whole = MapSnapshot(
-                record.cycle, seen.segment_geometry(), seen.objects(), carried_state(state), seen.snapshot()
+            self._put(QueuedItem(CYCLE, host_s, run_s, record))
+        if self._last_keyframe_run_s is None:
+            self._last_keyframe_run_s = run_s
+        is_due = self._has_gap or self._writer.wants_keyframe or run_s - self._last_keyframe_run_s >= self._keyframe_s
+        perception, cycle = state.perception, record.cycle
+        if is_due and not self._writer.thread.is_full:
+            self._has_gap = self._writer.wants_keyframe = False
+            self._last_keyframe_run_s = run_s
+            snapshot = MapSnapshot(
+                cycle,
+                perception.segment_geometry(),
+                perception.objects(),
+                carried_state(state),
+                perception.snapshot(),
             )
-            self._hand(KEYFRAME, run_s, whole)
-        elif record.cycle % self._moment_cycles == 0:
-            self._hand(SEGMENTS, run_s, MapSnapshot(record.cycle, segments=state.perception.segment_geometry()))
-        elif record.cycle % self._moment_cycles == self._moment_cycles // 2:
-            self._hand(OBJECTS, run_s, MapSnapshot(record.cycle, objects=state.perception.objects()))
+            self._put(QueuedItem(KEYFRAME, host_s, run_s, snapshot))
+        elif cycle % self._snapshot_cycles == 0:
+            segments = MapSnapshot(cycle, segments=perception.segment_geometry())
+            self._put(QueuedItem(SEGMENTS, host_s, run_s, segments))
+        elif cycle % self._snapshot_cycles == self._snapshot_cycles // 2:
+            objects = MapSnapshot(cycle, objects=perception.objects())
+            self._put(QueuedItem(OBJECTS, host_s, run_s, objects))
 
-    def on_bytes(self, way: str, host_s: float, data: bytes) -> None:
-        """Take bytes that came or went over the line."""
-        self._hand(SERIAL[way], host_s, data)
+    def on_bytes(self, direction: str, host_s: float, data: bytes) -> None:
+        """Record bytes that have just come or gone over the serial line.
+
+        Parameters
+        ----------
+        direction : {"in", "out"}
+            As the program sees it.
+        host_s : float
+            The present moment by the host's clock.
+        data : bytes
+            What went over the line.
+        """
+        self._put(QueuedItem(SERIAL[direction], host_s, self._clock.at(host_s), data))
 
     def on_settings(self, settings: Settings) -> None:
-        """Take settings that are in force from the next cycle on; never dropped, for what follows hangs on them."""
-        self._writer.queue.append(Item(SETTINGS, self._clock(), Reloaded(self._cycle + 1, settings)))
+        """Record settings in force from the next cycle on; never dropped, as every later cycle needs them."""
+        self._put_now(SETTINGS, SettingsReload(self._cycle + 1, settings))
 
     def on_summary(self, summary: Mapping[str, Any]) -> None:
-        """Take what the run says of itself at its end."""
-        self._writer.queue.append(Item(SUMMARY, self._clock(), RunEnd.model_construct(summary=dict(summary))))
+        """Record the run's summary at its end."""
+        self._put_now(SUMMARY, RunEnd.model_construct(run_s=self._clock(), summary=dict(summary)))
 
     def on_log(self, event: Mapping[str, Any]) -> None:
-        """Take a line of the log."""
+        """Record a line of the log."""
         fields = {name: value for name, value in event.items() if name not in {"level", "event", "timestamp"}}
+        run_s, host_s = self._clock.both()
         line = LogLine.model_construct(
-            level=str(event.get("level", "info")), event=str(event.get("event", "")),
+            run_s=run_s, level=str(event.get("level", "info")), event=str(event.get("event", "")),
             fields={name: str(value) for name, value in fields.items()},
         )  # fmt: skip
-        self._hand(LOG, self._clock(), line)
+        self._put(QueuedItem(LOG, host_s, run_s, line))
 
-    def _hand(self, topic: str, host_s: float, what: object) -> None:
-        if not self._on or self._begins:
-            return
-        if len(self._writer.queue) < self._queue_max:
-            self._writer.queue.append(Item(topic, host_s, what))
-        else:
-            self._writer.drop()
-            self._gap = self._gap or topic == CYCLE
+    def _put(self, item: QueuedItem) -> None:
+        if self._on and not self._is_starting and not self._writer.thread.put(item):
+            self._has_gap = self._has_gap or item.topic == CYCLE
+
+    def _put_now(self, topic: str, content: object) -> None:
+        """Queue an item of this moment even if the queue is full."""
+        run_s, host_s = self._clock.both()
+        self._writer.thread.put(QueuedItem(topic, host_s, run_s, content), always=True)

@@ -1,4 +1,4 @@
-"""A damaged or unfinished recording written anew: every whole chunk, with an index, as if it had been closed."""
+"""Copying the whole chunks of a damaged or unfinished recording into a file that is closed properly."""
 
 from __future__ import annotations
 
@@ -12,86 +12,90 @@ from mcap.writer import CompressionType, Writer
 from runtime.recording.channels import CHANNELS, CYCLE, RawMessage, schema_of
 from runtime.recording.mcap_file import CHUNK_BYTES, INDEX, PROFILE
 from runtime.recording.mcap_scanner import CorruptRegion, McapScanner
-from runtime.recording.reader import RecordingError, mapped, refuse_newer, refuse_strangers
+from runtime.recording.reader import RecordingError, check_format, check_origin, map_file
+from runtime.recording.schema import FORMAT
 
-BESIDE: Final = ".part"
-"""Added to the name of a file under way, which takes its name only once it is whole."""
+PARTIAL: Final = ".part"
+"""Suffix of the file until it is complete."""
 
 
 @dataclass(frozen=True, slots=True)
 class Recovered:
-    """What was restored."""
+    """What was recovered."""
 
     path: Path
     chunks: int
     messages: int
     cycles: int
     first_ns: int
+    """Log time of the first message, Unix time in ns."""
     last_ns: int
-    damage: tuple[CorruptRegion, ...]
+    corrupt_regions: tuple[CorruptRegion, ...]
     finished: bool
-    """Whether the original had been closed in good order."""
+    """Whether the original had been closed properly."""
 
 
 def recover(source: Path, target: Path) -> Recovered:
-    """Write every whole chunk of `source` to `target`.
+    """Copy every whole chunk of `source` to `target` and return what was recovered.
 
     Raises
     ------
     RecordingError
         The source is no recording, or nothing in it can be read.
     OSError
-        The target cannot be written; then there is none.
+        The target cannot be written; it does not exist then.
     """
-    beside = target.with_name(target.name + BESIDE)
-    with mapped(source) as data:
-        salvage = McapScanner(data)
-        refuse_strangers(source, salvage)
+    partial = target.with_name(target.name + PARTIAL)
+    with map_file(source) as data:
+        scanner = McapScanner(data)
+        check_origin(source, scanner)
         try:
-            recovered = _copy(salvage, source, beside, target)
-            beside.replace(target)
+            recovered = _copy(scanner, source, partial, target)
+            partial.replace(target)
         finally:
-            beside.unlink(missing_ok=True)
-            del salvage
+            partial.unlink(missing_ok=True)
+            del scanner
     return recovered
 
 
-def _copy(salvage: McapScanner, source: Path, beside: Path, target: Path) -> Recovered:
+def _copy(scanner: McapScanner, source: Path, partial: Path, target: Path) -> Recovered:
     chunks = messages = cycles = 0
     first_ns = last_ns = 0
-    with beside.open("wb") as file:
+    with partial.open("wb") as file:
         writer = Writer(file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD, index_types=INDEX,
                         enable_data_crcs=True)  # fmt: skip
-        writer.start(profile=salvage.profile or f"{PROFILE}/1", library=salvage.library or PROFILE)
-        numbers: dict[str, int] = {}
-        for entries in salvage.chunks():
-            for entry in entries:
-                if entry.topic not in numbers:
-                    numbers[entry.topic] = _channel(writer, salvage, entry)
-                writer.add_message(numbers[entry.topic], entry.log_ns, entry.data, entry.log_ns)
-                first_ns = entry.log_ns if not messages else min(first_ns, entry.log_ns)
-                last_ns = max(last_ns, entry.log_ns)
+        writer.start(profile=scanner.profile or f"{PROFILE}/{FORMAT}", library=scanner.library or PROFILE)
+        channels: dict[str, int] = {}
+        for chunk in scanner.chunks():
+            for message in chunk:
+                if message.topic not in channels:
+                    channels[message.topic] = _register(writer, scanner, message)
+                writer.add_message(channels[message.topic], message.log_ns, message.data, message.log_ns)
+                first_ns = message.log_ns if not messages else min(first_ns, message.log_ns)
+                last_ns = max(last_ns, message.log_ns)
                 messages += 1
-                cycles += entry.topic == CYCLE
+                cycles += message.topic == CYCLE
             chunks += 1
             writer.flush()
         if not messages:
-            refuse_newer(source, salvage)
-            raise RecordingError(f"{source}: holds no chunk that is whole: nothing can be restored")
+            check_format(source, scanner)
+            raise RecordingError(f"{source}: holds no whole chunk: nothing can be recovered")
         writer.finish()
         file.flush()
         os.fsync(file.fileno())
-    return Recovered(target, chunks, messages, cycles, first_ns, last_ns, tuple(salvage.damage), salvage.finished)
+    return Recovered(
+        target, chunks, messages, cycles, first_ns, last_ns, tuple(scanner.corrupt_regions), scanner.finished
+    )  # fmt: skip
 
 
-def _channel(writer: Writer, salvage: McapScanner, entry: RawMessage) -> int:
-    """Register a channel with the schema that the file has for it, or else this program's."""
-    schema = salvage.schemas.get(entry.topic)
+def _register(writer: Writer, scanner: McapScanner, message: RawMessage) -> int:
+    """Register a channel, with the file's own schema if it has one, and return its number."""
+    schema = scanner.schemas.get(message.topic)
     if schema is not None:
         number = writer.register_schema(schema.name, schema.encoding, schema.data)
-    elif entry.topic in CHANNELS:
-        form = CHANNELS[entry.topic]
-        number = writer.register_schema(form.__name__, "jsonschema", schema_of(form))
+    elif message.topic in CHANNELS:
+        kind = CHANNELS[message.topic]
+        number = writer.register_schema(kind.__name__, "jsonschema", schema_of(kind))
     else:
         number = 0
-    return writer.register_channel(entry.topic, "json", number)
+    return writer.register_channel(message.topic, "json", number)

@@ -1,7 +1,7 @@
-"""The ring log: a recording of firings that any robot's owner can write with a script and read in a spreadsheet.
+"""The ring log: firings as CSV, which any robot's owner can write with a script and open in a spreadsheet.
 
-Such files come from strangers, so reading trusts nothing and every complaint is one line that says where (file, row
-as a text editor counts it, column), what stood there, what is allowed, and what to do.
+Anybody may have written such a file, so reading checks everything. Each error is one line: the place (file, row as a
+text editor counts it, column), what was found there, what is allowed, and what to do.
 """
 
 from __future__ import annotations
@@ -23,34 +23,34 @@ REQUIRED: Final = ("t", "x", "y", "theta")
 RING_YAW: Final = "ring_yaw"
 
 LINE_MAX_BYTES: Final = 65_536
-"""Ten times the row of the largest ring; a longer line is no ring log and must not fill the memory."""
+"""Longest line: ten times the row of the largest ring. Limits the memory that a file without line ends takes."""
 
 _FORM: Final = "the header is t,x,y,theta[,ring_yaw],r00,r01,… separated by commas"
 _FINITE: Final = "a finite number"
-_RANGE: Final = "metres ≥ 0, 'inf' for fired and heard nothing, or nothing for did not fire"
+_RANGE: Final = "metres ≥ 0, 'inf' (fired, no echo) or an empty cell (did not fire)"
 _SPELT_INF: Final = re.compile(r"\s*\+?inf(inity)?\s*", re.IGNORECASE)
 
 
 class RingLogError(UserError):
-    """The ring log cannot be read or written; the text is one line for the user."""
+    """A ring log cannot be read or written."""
 
     exit_code = WRONG_CALL
 
 
 def read_ring_log(path: Path, sensors: int | None = None) -> Iterator[Firing]:
-    """Yield the firings of a ring log, one a row, reading no further than asked.
+    """Yield the firings of a ring log, one for each row, reading only as far as the caller iterates.
 
     Parameters
     ----------
-    path
+    path : Path
         CSV in UTF-8, with or without a byte order mark, LF or CRLF; blank lines are skipped.
-    sensors
-        How many sensors the robot's ring has, where the log must fit one.
+    sensors : int, optional
+        Number of sensors that the log must have.
 
     Raises
     ------
     RingLogError
-        Before the first firing where the file or its header is at fault, else at the row that is.
+        The file cannot be read or is invalid; before the first firing if its header is, else at the invalid row.
     """
     try:
         with path.open("rb") as file:
@@ -60,55 +60,61 @@ def read_ring_log(path: Path, sensors: int | None = None) -> Iterator[Firing]:
 
 
 def write_ring_log(path: Path, firings: Iterable[Firing]) -> None:
-    """Write firings as a ring log that `read_ring_log` gives back to the bit.
+    """Write firings as a ring log from which `read_ring_log` returns exactly the same values.
 
     Parameters
     ----------
-    path
+    path : Path
         Replaced if it exists.
-    firings
+    firings : iterable of Firing
         At least one, all of one ring, in order of time.
 
     Raises
     ------
     RingLogError
-        Where a firing cannot stand in a ring log, or the file cannot be written. Rows before it are in the file.
+        A firing cannot be represented, or the file cannot be written. The rows before it are in the file.
     """
     try:
         with path.open("w", encoding="utf-8", newline="\n") as file:
-            _write_rows(file, path, firings)
+            rows = RingLogRows(file, path)
+            for firing in firings:
+                rows.write(firing)
+            rows.check_not_empty()
     except OSError as error:
-        raise RingLogError(
-            f"{path}: cannot be written: {error.strerror or error}; check the folder and the space left"
-        ) from error
+        raise cannot_write(path, error) from error
+
+
+def cannot_write(path: Path, error: OSError) -> RingLogError:
+    """Return the message for a ring log that the disk refuses."""
+    return RingLogError(f"{path}: cannot be written: {error.strerror or error}; check the folder and the space left")
 
 
 def _lines(file: BinaryIO, path: Path) -> Iterator[str]:
-    """Yield the file's lines as text; decoded one by one, so that a complaint can name the row."""
+    """Yield the file's lines as text; decoded one by one, so that an error can name the row."""
     for row, raw in enumerate(iter(lambda: file.readline(LINE_MAX_BYTES), b""), start=1):
         if len(raw) == LINE_MAX_BYTES:
-            raise _fault(path, row, f"is longer than {LINE_MAX_BYTES} bytes", "check that this is a ring log (CSV)")
+            raise _error(path, row, f"is longer than {LINE_MAX_BYTES} bytes", "check that this is a ring log (CSV)")
         if b"\0" in raw:
-            raise _fault(path, row, "holds NUL bytes, as binary files and UTF-16 do", "save it as CSV in UTF-8")
+            raise _error(path, row, "holds NUL bytes, as binary files and UTF-16 do", "save it as CSV in UTF-8")
         try:
             yield raw.decode("utf-8-sig" if row == 1 else "utf-8")
         except UnicodeDecodeError as error:
             bad = f"0x{raw[error.start]:02x} at byte {error.start + 1}"
-            raise _fault(path, row, f"is not UTF-8 ({bad})", "save it as CSV in UTF-8") from error
+            raise _error(path, row, f"is not UTF-8 ({bad})", "save it as CSV in UTF-8") from error
 
 
 def _rows(file: BinaryIO, path: Path) -> Iterator[tuple[int, list[str]]]:
     """Yield the cells of each row that is not blank, with its number.
 
-    Each line is read by itself. A quoted cell may span lines in CSV but not here: one quote too few would otherwise
-    make a single row of the whole rest of the file, in memory.
+    Each line is parsed by itself. A quoted cell may span lines in CSV but not here: a missing quote would otherwise
+    read the whole rest of the file into memory as a single row.
     """
     for row, line in enumerate(_lines(file, path), start=1):
         try:
             cells = next(csv.reader((line,), strict=True))
         except csv.Error as error:
             hint = "save it with plain cells and LF or CRLF line ends"
-            raise _fault(path, row, f"is not CSV ({error})", hint) from error
+            raise _error(path, row, f"is not CSV ({error})", hint) from error
         if cells:
             yield row, cells
 
@@ -128,16 +134,16 @@ def _firings(rows: Iterator[tuple[int, list[str]]], path: Path, sensors: int | N
     last_t, empty = -math.inf, True
     for row, cells in rows:
         if len(cells) != len(names):
-            raise _fault(path, row, f"has {len(cells)} cells where the header has {len(names)}", _cells_hint(cells))
+            raise _error(path, row, f"has {len(cells)} cells where the header has {len(names)}", _cells_hint(cells))
         try:
             stamp = [_finite(cell) for cell in cells[:first_range]]
             ranges = np.array([_range(cell) for cell in cells[first_range:]], dtype=np.float64)
         except ValueError as error:
-            raise _cell_fault(path, row, names, cells, first_range) from error
+            raise _cell_error(path, row, names, cells, first_range) from error
         t, x, y, theta = stamp[:4]
         if t < last_t:
-            hint = "t never decreases; sort the rows by t, or split the file where the clock began again"
-            raise _fault(path, row, f"column 't' is {t!r}, earlier than {last_t!r} before it", hint)
+            hint = "t never decreases; sort the rows by t, or split the file where the clock restarted"
+            raise _error(path, row, f"column 't' is {t!r}, earlier than {last_t!r} before it", hint)
         yield Firing(t, Pose(x, y, theta), stamp[-1], ranges)
         last_t, empty = t, False
     if empty:
@@ -148,29 +154,29 @@ def _check_header(names: Sequence[str], path: Path, row: int) -> int:
     """Return how many columns come before the ranges."""
     for name, times in Counter(names).items():
         if times > 1:
-            raise _fault(path, row, f"names the column {_shown(name)} {times} times", f"each name once; {_FORM}")
+            raise _error(path, row, f"names the column {_shown(name)} {times} times", f"each name once; {_FORM}")
     for name in REQUIRED:
         if name not in names:
-            raise _fault(path, row, f"lacks the column {name!r}", _FORM)
+            raise _error(path, row, f"lacks the column {name!r}", _FORM)
     lead = [*REQUIRED, RING_YAW] if RING_YAW in names else [*REQUIRED]
     if len(names) == len(lead):
-        raise _fault(path, row, "has no sensor column", _FORM)
+        raise _error(path, row, "has no sensor column", _FORM)
     wanted = lead + [f"r{i:02d}" for i in range(len(names) - len(lead))]
     for i, (name, want) in enumerate(zip(names, wanted, strict=True)):
         if name != want:
-            raise _fault(path, row, f"has {_shown(name)} as column {i + 1} where {want!r} belongs", _FORM)
+            raise _error(path, row, f"has {_shown(name)} as column {i + 1} where {want!r} belongs", _FORM)
     return len(lead)
 
 
-def _plain(cell: str) -> float:
-    """Return the number in a cell; `float` alone would also take 1_000 and digits of other scripts."""
+def _number(cell: str) -> float:
+    """Return the number in a cell; `float` alone would also accept 1_000 and digits of other scripts."""
     if "_" in cell or not cell.isascii():
         raise ValueError(cell)
     return float(cell)
 
 
 def _finite(cell: str) -> float:
-    value = _plain(cell)
+    value = _number(cell)
     if not math.isfinite(value):
         raise ValueError(cell)
     return value
@@ -179,14 +185,14 @@ def _finite(cell: str) -> float:
 def _range(cell: str) -> float:
     if not cell:
         return math.nan
-    value = _plain(cell)
-    # 1e999 overflows to inf, yet nobody meant "heard nothing" by it. NaN compares false and is refused, too.
+    value = _number(cell)
+    # 1e999 overflows to inf but does not mean "no echo". NaN compares false and is refused as well.
     if not value >= 0.0 or (value == math.inf and _SPELT_INF.fullmatch(cell) is None):
         raise ValueError(cell)
     return value
 
 
-def _refuses(parse: Callable[[str], float], cell: str) -> bool:
+def _is_refused(parse: Callable[[str], float], cell: str) -> bool:
     try:
         parse(cell)
     except ValueError:
@@ -194,12 +200,12 @@ def _refuses(parse: Callable[[str], float], cell: str) -> bool:
     return False
 
 
-def _cell_fault(path: Path, row: int, names: Sequence[str], cells: Sequence[str], first_range: int) -> RingLogError:
-    """Return the complaint about the first bad cell of a row known to have one."""
-    column = next(i for i, cell in enumerate(cells) if _refuses(_finite if i < first_range else _range, cell))
+def _cell_error(path: Path, row: int, names: Sequence[str], cells: Sequence[str], first_range: int) -> RingLogError:
+    """Return the error for the first invalid cell of a row that has one."""
+    column = next(i for i, cell in enumerate(cells) if _is_refused(_finite if i < first_range else _range, cell))
     allowed = _FINITE if column < first_range else _RANGE
     found = f"is {_shown(cells[column])}" if cells[column] else "is empty"
-    return _fault(path, row, f"column {names[column]!r} {found}", f"allowed is {allowed}; correct or delete the row")
+    return _error(path, row, f"column {names[column]!r} {found}", f"allowed is {allowed}; correct or delete the row")
 
 
 def _cells_hint(cells: Sequence[str]) -> str:
@@ -209,31 +215,74 @@ def _cells_hint(cells: Sequence[str]) -> str:
 
 
 def _shown(text: str) -> str:
-    """Return a cell as one short printable piece of a complaint."""
+    """Return a cell as a short printable part of a message."""
     shown = ascii(text[:60])
     return shown if len(shown) <= 60 else f"{shown[:60]}…"
 
 
-def _fault(path: Path, row: int, what: str, hint: str) -> RingLogError:
+def _error(path: Path, row: int, what: str, hint: str) -> RingLogError:
     return RingLogError(f"{path}: row {row} {what}; {hint}")
 
 
-def _write_rows(file: TextIO, path: Path, firings: Iterable[Firing]) -> None:
-    count, last_t = 0, -math.inf
-    for row, firing in enumerate(firings, start=2):
+class RingLogRows:
+    """Writer of a ring log's rows into an open text file.
+
+    Parameters
+    ----------
+    file : TextIO
+        Opened for UTF-8 and LF.
+    path : Path
+        Its name, for messages.
+
+    Attributes
+    ----------
+    count : int
+        Firings written so far.
+    """
+
+    def __init__(self, file: TextIO, path: Path) -> None:
+        self._file = file
+        self._path = path
+        self.count = 0
+        self._sensors = 0
+        self._last_t = -math.inf
+
+    def write(self, firing: Firing) -> None:
+        """Write a row, and before the first one the header.
+
+        Raises
+        ------
+        RingLogError
+            The firing cannot be represented: another number of sensors, a time before the last one, a bad number.
+        OSError
+            The disk refuses.
+        """
+        path, row = self._path, self.count + 2
         ranges = firing.ranges_m.tolist()
-        if row == 2:
-            count = len(ranges)
-            file.write(",".join([*REQUIRED, RING_YAW, *(f"r{i:02d}" for i in range(count))]) + "\n")
+        if self.count == 0:
+            self._sensors = len(ranges)
+            self._file.write(",".join([*REQUIRED, RING_YAW, *(f"r{i:02d}" for i in range(self._sensors))]) + "\n")
         stamp = [firing.robot_s, firing.pose.x, firing.pose.y, firing.pose.theta, firing.ring_yaw]
-        if len(ranges) != count or count == 0:
-            raise _fault(path, row, f"would have {len(ranges)} sensors", f"the first firing has {count}, at least 1")
-        if not all(map(math.isfinite, stamp)) or firing.robot_s < last_t:
-            raise _fault(path, row, f"would have t, pose and ring yaw {stamp}", f"all are finite and t ≥ {last_t}")
+        if len(ranges) != self._sensors or not ranges:
+            expected = f"the first firing has {self._sensors}, at least 1"
+            raise _error(path, row, f"would have {len(ranges)} sensors", expected)
+        if not all(map(math.isfinite, stamp)) or firing.robot_s < self._last_t:
+            expected = f"all are finite and t ≥ {self._last_t}"
+            raise _error(path, row, f"would have t, pose and ring yaw {stamp}", expected)
         if any(r < 0.0 for r in ranges):
-            raise _fault(path, row, f"would have the range {min(ranges)}", f"allowed is {_RANGE}")
+            raise _error(path, row, f"would have the range {min(ranges)}", f"allowed is {_RANGE}")
         cells = [repr(float(value)) for value in stamp] + ["" if math.isnan(r) else repr(r) for r in ranges]
-        file.write(",".join(cells) + "\n")
-        last_t = firing.robot_s
-    if count == 0:
-        raise RingLogError(f"{path}: there is no firing to write; a ring log holds at least one")
+        self._file.write(",".join(cells) + "\n")
+        self._last_t = firing.robot_s
+        self.count += 1
+
+    def check_not_empty(self) -> None:
+        """Refuse a ring log without a firing.
+
+        Raises
+        ------
+        RingLogError
+            No row was written.
+        """
+        if self.count == 0:
+            raise RingLogError(f"{self._path}: there is no firing to write; a ring log holds at least one")

@@ -1,9 +1,9 @@
-"""Perception over a ring log, firing by firing, as if the robot were driving there now."""
+"""Perception over a ring log, firing by firing, as if the robot were driving now."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Iterator
 
 from config.settings import Settings
 from drivers.messages import Firing
@@ -13,36 +13,62 @@ from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.refinement_budget import within_quanta_per_cycle
 
 
-def replay_firings(
-    settings: Settings, firings: Iterable[Firing], on_firing: Callable[[Firing, Perception], None] | None = None
-) -> ReplaySummary:
-    """Run perception over `firings` and return what it saw.
+class FiringReplayer:
+    """An iterator over firings that runs perception on each of them before it yields it.
 
     Parameters
     ----------
     settings : Settings
         Ring, models and constants.
     firings : iterable of Firing
-        In the order of their times.
-    on_firing : callable, optional
-        Called after each.
+        In order of time.
+
+    Attributes
+    ----------
+    perception : Perception
+        With everything perceived so far.
     """
-    perception = Perception(settings.ring, settings.models, settings.perception)
-    cycle_stats = CycleStats(late_after_s=float("inf"))
-    for firing in firings:
-        began = time.perf_counter()
-        perception.observe(firing)
-        quanta = 0
-        while perception.can_refine and within_quanta_per_cycle(quanta):
-            perception.refine()
-            quanta += 1
-        cycle_stats.add_cycle(time.perf_counter() - began)
-        if on_firing is not None:
-            on_firing(firing, perception)
-    return {
-        "objects": [object_row(seen) for seen in perception.objects()],
-        "segments": perception.counts.segments_total,
-        "clusters": perception.counts.hypotheses,
-        "cycles": cycle_stats.cycles,
-        "cycle_us": cycle_stats.cycle_us(),
-    }
+
+    def __init__(self, settings: Settings, firings: Iterable[Firing]) -> None:
+        self.perception = Perception(settings.ring, settings.models, settings.perception)
+        self._firings = firings
+        self._cycle_stats = CycleStats(late_after_s=float("inf"))
+
+    def __iter__(self) -> Iterator[Firing]:
+        perception = self.perception
+        for firing in self._firings:
+            started_s = time.perf_counter()
+            perception.observe(firing)
+            quanta = 0
+            while perception.can_refine and within_quanta_per_cycle(quanta):
+                perception.refine()
+                quanta += 1
+            self._cycle_stats.add_cycle(time.perf_counter() - started_s)
+            yield firing
+
+    def summary(self) -> ReplaySummary:
+        """Return what was perceived so far, and what it took."""
+        counts = self.perception.counts
+        return {
+            "objects": [object_row(seen) for seen in self.perception.objects()],
+            "segments": counts.segments_total,
+            "clusters": counts.hypotheses,
+            "cycles": self._cycle_stats.cycles,
+            "cycle_us": self._cycle_stats.cycle_us(),
+        }
+
+
+def replay_firings(settings: Settings, firings: Iterable[Firing]) -> ReplaySummary:
+    """Run perception over firings and return what it perceived.
+
+    Parameters
+    ----------
+    settings : Settings
+        Ring, models and constants.
+    firings : iterable of Firing
+        In order of time.
+    """
+    replayer = FiringReplayer(settings, firings)
+    for _ in replayer:
+        pass
+    return replayer.summary()

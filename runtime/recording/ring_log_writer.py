@@ -1,91 +1,104 @@
-"""A ring log while the robot drives: firings are handed over, a thread writes them, and no cycle waits for the disk.
+"""A ring log of a running robot: firings are queued and a thread writes them, so that no cycle waits for the disk.
 
-What a slow disk cannot take in time is dropped and counted, so that it costs neither a cycle nor memory without end;
-a file that fails is left as far as it came.
+What a slow disk does not take in time is dropped and counted. A file that fails is closed as it is.
 """
 
 from __future__ import annotations
 
 import contextlib
-import queue
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Final, TextIO
 
 from drivers.messages import Firing
-from runtime.recording.ring_log import RingLogError, write_ring_log
+from runtime.recording.ring_log import RingLogError, RingLogRows, cannot_write
 from runtime.recording.writer import CLOSE_MAX_S, RecorderStatus
-from runtime.support.health import Worker
+from runtime.support.background_writer import BackgroundWriter
 
-WAITING_MAX: Final = 4096
-"""Firings that may wait to be written: three minutes of a disk that does nothing."""
+QUEUE_MAX: Final = 4096
+"""Firings that may wait: three minutes of a disk that stands still."""
 
 
 class RingLogWriter:
-    """Takes firings and has them written; a context in which the writing goes on.
+    """Writer of a ring log. As a context manager it starts and stops the writing.
 
     Parameters
     ----------
     path : Path
         Replaced if it exists.
-
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._waiting: queue.SimpleQueue[Firing | None] = queue.SimpleQueue()
-        self._taken = self._refused = self._unwritten = self._bytes = 0
-        self._trouble: str | None = None
-        self._worker = Worker("ring log", self._work)
+        self._file: TextIO | None = None
+        self._rows: RingLogRows | None = None
+        self._bytes = 0
+        self._error: str | None = None
+        self._thread = BackgroundWriter[Firing](
+            "ring log", self._write, begin=self._begin, finish=self._finish, capacity=QUEUE_MAX,
+            close_max_s=CLOSE_MAX_S,
+        )  # fmt: skip
 
     def __enter__(self) -> RingLogWriter:
-        self._worker.start()
+        self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._waiting.put(None)
-        self._worker.join(CLOSE_MAX_S)
-        if self._worker.is_alive():
-            self._unwritten += self._waiting.qsize()
-            self._tell(f"{self._path}: the disk did not take the end within {CLOSE_MAX_S:.0f} s")
-        elif self._worker.failure is not None:
-            self._tell(f"{self._path}: its writer failed: {self._worker.failure}")
+        self._thread.close()
+        if self._thread.is_stuck:
+            self._note(f"{self._path}: the disk did not take the end within {CLOSE_MAX_S:.0f} s")
+        elif self._thread.failure is not None:
+            self._note(f"{self._path}: its writer failed: {self._thread.failure}")
         with contextlib.suppress(OSError):
             self._bytes = self._path.stat().st_size
 
     @property
     def status(self) -> RecorderStatus:
-        """How the ring log stands; its messages are firings, its size is told at the end."""
-        dropped = self._refused + self._unwritten
-        return RecorderStatus(str(self._path), 1, self._bytes, self._taken, dropped, self._trouble)
+        """The state of the ring log; `messages` counts firings, and `bytes` is known at the end."""
+        written = 0 if self._rows is None else self._rows.count
+        return RecorderStatus(str(self._path), 1, self._bytes, written, self._thread.lost, self._error)
 
     def put(self, firing: Firing) -> None:
-        """Hand over a firing."""
-        if self._waiting.qsize() < WAITING_MAX:
-            self._waiting.put(firing)
-        else:
-            self._refused += 1
-            self._tell(f"{self._path}: the disk takes firings more slowly than they come")
+        """Queue a firing."""
+        if not self._thread.put(firing):
+            self._note(f"{self._path}: firings come faster than the disk takes them")
 
     def probe(self) -> str | None:
-        """Say how its thread ended; None while it runs. See `runtime.support.health`."""
-        return self._worker.probe()
+        """Return how its thread ended; None while it runs. See `runtime.support.health`."""
+        return self._thread.probe()
 
-    def _work(self) -> None:
-        firings = self._firings()
+    def _begin(self) -> None:
         try:
-            write_ring_log(self._path, firings)
-        except RingLogError as error:
-            self._tell(str(error))
-            # The disk's trouble is not the drive's: what comes from now on is taken, and is missing.
-            for _ in firings:
-                self._unwritten += 1
+            self._file = self._path.open("w", encoding="utf-8", newline="\n")
+            self._rows = RingLogRows(self._file, self._path)
+        except OSError as error:
+            self._fail(str(cannot_write(self._path, error)))
 
-    def _firings(self) -> Iterator[Firing]:
-        while (firing := self._waiting.get()) is not None:
-            self._taken += 1
-            yield firing
+    def _write(self, firing: Firing) -> None:
+        if self._file is None or self._rows is None:
+            raise OSError(self._error)  # counted as lost
+        try:
+            self._rows.write(firing)
+        except (OSError, RingLogError) as error:
+            self._fail(str(error if isinstance(error, RingLogError) else cannot_write(self._path, error)))
+            raise OSError(self._error) from error
 
-    def _tell(self, trouble: str) -> None:
-        """Keep what was wrong first: the rest follows from it."""
-        self._trouble = self._trouble or trouble
+    def _finish(self) -> None:
+        if self._file is None or self._rows is None:
+            return
+        try:
+            self._file.close()
+            self._rows.check_not_empty()
+        except (OSError, RingLogError) as error:
+            self._fail(str(error if isinstance(error, RingLogError) else cannot_write(self._path, error)))
+
+    def _fail(self, error: str) -> None:
+        """Close the file as it is: every later firing is lost."""
+        self._note(error)
+        if self._file is not None:
+            with contextlib.suppress(OSError):
+                self._file.close()
+        self._file = None
+
+    def _note(self, error: str) -> None:
+        """Keep the first error: the others follow from it."""
+        self._error = self._error or error

@@ -1,12 +1,12 @@
-"""What a recording is made of, as pydantic models around the runtime's own dataclasses.
+"""The content of a recording, as pydantic models around the runtime's own dataclasses.
 
-Fields of the dataclasses are read off their types, so whatever is added to a cycle's record or to its inputs is
-recorded, described in the file's own schema and read back, with no change here.
+The fields of the dataclasses are read from their type hints: a field added to a cycle's record or its inputs is
+recorded, described in the file's own schema and read back without a change here.
 """
 
 from __future__ import annotations
 
-from dataclasses import MISSING, Field, fields
+from dataclasses import fields
 from itertools import accumulate
 from typing import Any, Final, TypeAlias, get_type_hints
 
@@ -20,84 +20,89 @@ from perception.snapshot import Snapshot
 from runtime.cycle.modes import ModeState
 from runtime.cycle.step import CycleRecord, State
 
-FORMAT: Final = 1
-"""Counted up when older programs can no longer read what is written."""
+FORMAT: Final = 2
+"""Version of the file format. Increase it with every change after which a recording cannot be read as before."""
 
 
 class Payload(BaseModel):
-    """A message of a recording; what a newer program has added to one is not read."""
+    """The content of one message."""
 
     model_config = ConfigDict(frozen=True, ser_json_inf_nan="strings", ser_json_bytes="base64",
                               val_json_bytes="base64", use_attribute_docstrings=True)  # fmt: skip
 
 
 class RunInfo(Payload):
-    """What a run was: everything that a replay needs besides the messages."""
+    """The first message of a file: everything that a replay needs besides the other messages."""
 
     format: int
     settings: dict[str, Any]
-    """The run's settings, object models among them, as `Settings` dumps them."""
+    """The settings in force, object models included, as `Settings` dumps them."""
     versions: dict[str, str]
-    """Versions of program and libraries, the kernels' key, the processor: what the last bits may depend on."""
+    """Versions of program and libraries, the kernels' key, the processor: the last bits may depend on them."""
     started: str
-    """Date and time, UTC."""
+    """Date and time of the start, UTC."""
     unix_minus_host_ns: int
-    """Log times are Unix times: the host's clock plus this."""
+    """A log time (Unix time) minus the host's monotonic clock at the same moment."""
     part: int
-    """A long run, or one whose disk was full for a while, is kept in several files, numbered from 1."""
+    """Number of this file: a long run, or one whose disk was full for a while, has several, numbered from 1."""
     emulated: bool = False
-    """The settings' world is what stood there; a real robot knows of none."""
+    """Whether the settings' world is the true one; a real robot's world is unknown."""
 
 
-class SettingsChange(Payload):
-    """Other settings, in force from a cycle on: an input of it as much as an echo is."""
+class TimedPayload(Payload):
+    """Content with a time of the run."""
+
+    run_s: float
+    """Time by the run's clock, s. It stands still while a run is paused; log times do not."""
+
+
+class SettingsChange(TimedPayload):
+    """New settings, in force from a cycle on. A replay needs them as much as the echoes."""
 
     cycle: int
     settings: dict[str, Any]
-    """Whole, as in `RunInfo`, which repeats them from then on."""
+    """All settings, as in `RunInfo`, which repeats them from then on."""
 
 
-class RunEnd(Payload):
-    """What a run that came to its own end says of itself: its stats, line counts and stop reasons."""
+class RunEnd(TimedPayload):
+    """The summary of a run that ended normally: cycle times, link counts and stop reasons."""
 
     summary: dict[str, Any]
 
 
 class Cycle(Payload):
-    """One cycle of the step."""
+    """One cycle. Its time is `record.inputs.run_s`."""
 
     record: CycleRecord
 
 
-class ModeChange(Payload):
-    """A mode that was entered, or a reason that changed."""
+class ModeChange(TimedPayload):
+    """A new mode, or a new reason for the mode."""
 
     cycle: int
     mode: ModeState
 
 
-class SerialBytes(Payload):
-    """Bytes of the line as they came or went for a while, in whatever pieces."""
+class SerialBytes(TimedPayload):
+    """Pieces of data that came or went over the serial line; `run_s` is the time of the first piece."""
 
-    host_s: float
-    """When the first piece came or went, by the host's clock."""
     after_us: list[int]
-    """How much later each piece came or went."""
+    """Delay of each piece after the first one, µs."""
     sizes: list[int]
-    """How many bytes each piece has."""
+    """Number of bytes in each piece."""
     data: str
-    """The pieces one after the other, in hexadecimal: what repeats itself still does, unlike in base64."""
+    """All pieces in hexadecimal, in which repetition stays visible to compression, unlike in base64."""
 
     def pieces(self) -> list[tuple[float, bytes]]:
-        """Return each piece and when it came or went by the host's clock, s."""
+        """Return the time (run's clock, s) and the bytes of each piece."""
         raw, ends = bytes.fromhex(self.data), list(accumulate(self.sizes))
         return [
-            (self.host_s + 1e-6 * after, raw[end - size : end])
+            (self.run_s + 1e-6 * after, raw[end - size : end])
             for after, size, end in zip(self.after_us, self.sizes, ends, strict=True)
         ]
 
 
-class LogLine(Payload):
+class LogLine(TimedPayload):
     """A line of the log."""
 
     level: str
@@ -105,119 +110,118 @@ class LogLine(Payload):
     fields: dict[str, Any]
 
 
-class Bookmark(Payload):
-    """A mark that an operator put here, to be found again; nothing in the run hangs on it."""
+class Bookmark(TimedPayload):
+    """An operator's note at a moment of the run. It has no effect on the run."""
 
     cycle: int
-    """The last one before it."""
+    """The last cycle before it."""
     text: str
 
 
-class MapChange(Payload):
-    """What has happened to the outline map since the message before."""
+class MapChange(TimedPayload):
+    """Changes of the outline map since the previous message of this type."""
 
     cycle: int
     whole: bool
-    """Nothing before this counts: `added` is the whole map."""
+    """Whether `added` is the whole map, and all messages before do not count."""
     first: int
-    """Number of the first of `added`; the others follow."""
+    """Number of the first segment in `added`; the others are numbered consecutively."""
     added: list[tuple[float, float, float, float, float]]
-    """Ends x, y, x, y (m) and normal (rad) of each new segment, to the millimetre."""
+    """Ends x, y, x, y (m) and normal (rad) of each new segment, rounded to the millimetre."""
     removed: list[int]
-    """Numbers."""
+    """Numbers of the segments that are gone."""
 
 
-class ObjectsSeen(Payload):
-    """What is recognised now, as in the run's summary."""
+class ObjectList(TimedPayload):
+    """The objects recognised at this moment, as in the run's summary."""
 
     cycle: int
     objects: list[dict[str, Any]]
 
 
-def _default(of: Field[Any]) -> Any:  # noqa: ANN401 - a field's default is whatever its type allows
-    """Return what stands for a field of the state in a recording that does not know it; … where there must be one."""
-    if of.default_factory is not MISSING:
-        return of.default_factory()
-    return ... if of.default is MISSING else of.default
-
-
 _HINTS: Final = get_type_hints(State)
+_CARRIED: Final = tuple(f.name for f in fields(State) if f.name != "perception")
 CarriedState: Any = create_model(  # type: ignore[call-overload]  # mypy sees no field definitions here
     "CarriedState",
     __base__=Payload,
-    __doc__="What a cycle leaves to the next one besides perception's memory.",
-    **{f.name: (_HINTS[f.name], _default(f)) for f in fields(State) if f.name != "perception"},
+    __doc__="What a cycle carries over to the next one, apart from perception's state.",
+    **{name: (_HINTS[name], ...) for name in _CARRIED},
 )
 
 
 class ArrayInfo(Payload):
-    """Where an array of the memory is: the arrays lie one after the other."""
+    """Name and layout of one array of perception's state; the arrays lie one after the other."""
 
     name: str
     dtype: str
     shape: list[int]
 
 
-class Keyframe(Payload):
-    """The whole state after a cycle: a replay can begin here."""
+class Keyframe(TimedPayload):
+    """The whole state after a cycle, from which a replay can start."""
 
     cycle: int
-    left: CarriedState  # of the fields of `State`
+    state: CarriedState  # of the fields of `State`
     arrays: list[ArrayInfo]
-    memory: bytes
+    data: bytes
     """The arrays' bytes, little-endian, compressed by zstd."""
 
 
 StateFields: TypeAlias = dict[str, Any]
+"""The fields of `State` without perception, by name."""
 
 
 def carried_state(state: State) -> StateFields:
-    """Return the state's fields but for perception; all are immutable."""
-    return {f.name: getattr(state, f.name) for f in fields(State) if f.name != "perception"}
+    """Return the fields of a state without perception; all of them are immutable."""
+    return {name: getattr(state, name) for name in _CARRIED}
 
 
-def keyframe(cycle: int, left: StateFields, snapshot: Snapshot) -> Keyframe:
-    """Return the message that holds a state."""
+def keyframe(cycle: int, run_s: float, state: StateFields, snapshot: Snapshot) -> Keyframe:
+    """Return the message that holds a whole state.
+
+    Parameters
+    ----------
+    cycle : int
+        Number of the cycle that left the state.
+    run_s : float
+        Time of that cycle by the run's clock, s.
+    state : dict
+        From `carried_state`.
+    snapshot : Snapshot
+        Perception's arrays by name.
+    """
     arrays = [ArrayInfo(name=name, dtype=a.dtype.str, shape=list(a.shape)) for name, a in snapshot.items()]
-    memory = zstandard.compress(b"".join(a.tobytes() for a in snapshot.values()))
+    data = zstandard.compress(b"".join(a.tobytes() for a in snapshot.values()))
     return Keyframe.model_construct(
+        run_s=run_s,
         cycle=cycle,
-        left=CarriedState.model_construct(**left),  # type: ignore[arg-type]
+        state=CarriedState.model_construct(**state),  # type: ignore[arg-type]
         arrays=arrays,
-        memory=memory,
+        data=data,
     )
 
 
 def perception_snapshot(frame: Keyframe) -> Snapshot:
-    """Return the memory that a keyframe holds."""
-    raw, taken, at = zstandard.decompress(frame.memory), {}, 0
+    """Return perception's arrays of a keyframe, by name."""
+    raw, arrays, at = zstandard.decompress(frame.data), {}, 0
     for array in frame.arrays:
         dtype = np.dtype(array.dtype)
         count = int(np.prod(array.shape, dtype=np.int64))
-        taken[array.name] = np.frombuffer(raw, dtype, count, at).reshape(array.shape)
+        arrays[array.name] = np.frombuffer(raw, dtype, count, at).reshape(array.shape)
         at += count * dtype.itemsize
-    return taken
+    return arrays
 
 
-def restore_state(state: State, frame: Keyframe) -> None:
-    """Make `state` what it was when the keyframe was taken.
-
-    Raises
-    ------
-    ValueError
-        The keyframe was taken with other settings.
-    """
-    state.perception.restore(perception_snapshot(frame))
-    for f in fields(State):
-        if f.name != "perception":
-            setattr(state, f.name, getattr(frame.left, f.name))
+def state_fields(frame: Keyframe) -> StateFields:
+    """Return the fields of a keyframe's state without perception, by name."""
+    return {name: getattr(frame.state, name) for name in _CARRIED}
 
 
 class PayloadSchema(GenerateJsonSchema):
-    """JSON schemas of what is really written: numbers JSON cannot name go as strings, flags as their sum."""
+    """JSON schemas of what is really written: non-finite numbers are strings, flags are integers."""
 
     def float_schema(self, schema: core_schema.FloatSchema) -> JsonSchemaValue:
-        """Return the schema of a number that may be none."""
+        """Return the schema of a number that may be infinite or NaN."""
         return {"anyOf": [super().float_schema(schema), {"enum": ["NaN", "Infinity", "-Infinity"]}]}
 
     def enum_schema(self, schema: core_schema.EnumSchema) -> JsonSchemaValue:

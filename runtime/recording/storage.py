@@ -1,66 +1,69 @@
-"""Where recordings go: the file that was asked for, or a folder in which the oldest make room for the newest."""
+"""Where recordings are stored: in a file named by the user, or in a folder from which the oldest are deleted."""
 
 from __future__ import annotations
 
 import contextlib
-import os
 import stat
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple, Protocol
 
+import platformdirs
+
 from config.settings import RecordingConfig
 
 SUFFIX: Final = ".mcap"
 MEGABYTE: Final = 1_000_000
+PART_SHARE: Final = 0.25
+"""Share of the folder's size limit that one file may take: the folder can then be kept within its limit."""
 
 
 class RecordingTarget(Protocol):
-    """Where the parts of one recording go."""
+    """Where the files of one recording are written."""
 
     def path(self, part: int) -> Path:
-        """Return where a part goes, numbered from 1, and make it possible that it goes there."""
+        """Return the path of a file, numbered from 1; its folder exists and has room afterwards."""
         ...
 
     def enforce_limits(self, current: Path) -> None:
-        """Keep what lies there within its bounds; called now and then while `current` grows."""
+        """Keep the storage within its limits; called regularly while the file `current` grows."""
         ...
 
     def is_part_full(self, part_bytes: int) -> bool:
-        """Say whether a part of that size should be followed by the next one."""
+        """Return whether a file of this size should be closed and the next one begun."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class SingleFile:
-    """A file by name, and beside it the next ones after trouble with the disk: `hall-2.mcap` and so on."""
+    """A file named by the user. After a disk error the recording goes on in `NAME-2.mcap` and so on next to it."""
 
     first: Path
 
     def path(self, part: int) -> Path:
-        """Return the part's file."""
+        """Return the path of a file, numbered from 1."""
         return self.first if part == 1 else self.first.with_stem(f"{self.first.stem}-{part}")
 
     def enforce_limits(self, current: Path) -> None:
-        """Leave everything: a file that was asked for is not for us to delete."""
+        """Delete nothing: files named by the user are the user's."""
 
-    def is_part_full(self, part_bytes: int) -> bool:  # noqa: ARG002 - what is asked for by name stays one file
-        """Say no."""
+    def is_part_full(self, part_bytes: int) -> bool:  # noqa: ARG002 - a file named by the user is not split
+        """Return False."""
         return False
 
 
 @dataclass(frozen=True, slots=True)
 class RotatingFolder:
-    """A folder of recordings with a cap on their number and on their size together.
+    """A folder of recordings with limits on their number and on their total size.
 
     Parameters
     ----------
     folder : Path
-        Made where it is missing.
+        Created if it is missing.
     run : str
-        Begins the names of this run's files; names sort by time.
+        Prefix of this run's file names; names sort by time.
     config : RecordingConfig
-        The bounds.
+        The limits.
     """
 
     folder: Path
@@ -68,66 +71,69 @@ class RotatingFolder:
     config: RecordingConfig
 
     def path(self, part: int) -> Path:
-        """Return the part's file, after room was made for it."""
+        """Return the path of a file, numbered from 1, after deleting old recordings to make room for it."""
         self.folder.mkdir(parents=True, exist_ok=True)
         path = self.folder / f"{self.run}-{part:03d}{SUFFIX}"
-        self._keep(self.config.keep - 1, path)
+        self._delete_oldest(self.config.keep - 1, path)
         return path
 
     def enforce_limits(self, current: Path) -> None:
-        """Delete the oldest recordings until the rest is within bounds; never the one under way."""
-        self._keep(self.config.keep, current)
+        """Delete the oldest recordings until the rest is within the limits; never the file `current`."""
+        self._delete_oldest(self.config.keep, current)
 
     def is_part_full(self, part_bytes: int) -> bool:
-        """Say whether the part has its share of the cap: a quarter, so that the cap can be kept to."""
-        return part_bytes > 0.25 * self.config.cap_mb * MEGABYTE
+        """Return whether a file of this size has reached its share of the limit."""
+        return part_bytes > PART_SHARE * self.config.cap_mb * MEGABYTE
 
-    def _keep(self, number: int, current: Path) -> None:
-        known = []
+    def _delete_oldest(self, number: int, current: Path) -> None:
+        files = []
         for path in self.folder.glob(f"*{SUFFIX}"):
-            with contextlib.suppress(OSError):  # another run's tidying was faster
-                known.append((path.stat().st_mtime_ns, path.stat().st_size, path))
-        known.sort()
-        total = sum(size for _, size, _ in known)
-        left = len(known)
-        for _, size, path in known:
-            if left <= number and total <= self.config.cap_mb * MEGABYTE:
+            with contextlib.suppress(OSError):  # another run has just deleted it
+                files.append((path.stat().st_mtime_ns, path.stat().st_size, path))
+        files.sort()
+        total = sum(size for _, size, _ in files)
+        count = len(files)
+        for _, size, path in files:
+            if count <= number and total <= self.config.cap_mb * MEGABYTE:
                 return
             if path != current:
                 with contextlib.suppress(OSError):
                     path.unlink()
-                left -= 1
+                count -= 1
                 total -= size
 
 
 class RecordingFile(NamedTuple):
-    """A recording in the folder."""
+    """A recording in a folder."""
 
     file: str
-    """Its name there."""
+    """Its name in the folder."""
     bytes: int
     modified_s: float
     """Unix time."""
 
 
 def list_recordings(folder: Path) -> list[RecordingFile]:
-    """Return the recordings in a folder, newest first; none where there is no such folder. Waits for the disk."""
+    """Return the recordings in a folder, newest first; none if there is no such folder. Waits for the disk."""
     found = []
     with contextlib.suppress(OSError):
         for path in folder.glob(f"*{SUFFIX}"):
-            with contextlib.suppress(OSError):  # it made room for another just now
-                known = path.stat()
-                if stat.S_ISREG(known.st_mode):
-                    found.append(RecordingFile(path.name, known.st_size, known.st_mtime))
-    return sorted(found, key=lambda one: (-one.modified_s, one.file))
+            with contextlib.suppress(OSError):  # just deleted to make room
+                info = path.stat()
+                if stat.S_ISREG(info.st_mode):
+                    found.append(RecordingFile(path.name, info.st_size, info.st_mtime))
+    return sorted(found, key=lambda file: (-file.modified_s, file.file))
 
 
 def find_recording(folder: Path, name: str) -> Path | None:
-    """Return the recording of that name in a folder; None where `list_recordings` has none, wherever else the name leads."""
-    return next((folder / one.file for one in list_recordings(folder) if one.file == name), None)
+    """Return the path of a recording by its name in a folder; None if `list_recordings` has no such name.
+
+    A name that leads out of the folder is therefore never found.
+    """
+    return next((folder / file.file for file in list_recordings(folder) if file.file == name), None)
 
 
 def recordings_folder(config: RecordingConfig) -> Path:
-    """Return the folder of the settings, else the user's own for what programs leave behind."""
-    state = os.environ.get("XDG_STATE_HOME") or "~/.local/state"
-    return Path(config.folder or f"{state}/echolocate/runs").expanduser()
+    """Return the folder of the settings, or else `echolocate/runs` in the user's state folder."""
+    default = platformdirs.user_state_path("echolocate") / "runs"
+    return Path(config.folder).expanduser() if config.folder else default

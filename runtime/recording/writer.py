@@ -1,18 +1,15 @@
-"""The recorder's thread: takes what the loop has handed over, encodes it, and sees to the disk.
+"""The writing side of a recording, on a thread: encodes what the control loop has handed over and writes it to disk.
 
-Whatever the disk does stays here. A full disk, a folder that cannot be written, an fsync that takes seconds: it is
-counted and told, a file that fails is left as far as it came, and another is tried after a while.
+Any trouble with the disk stays here. A full disk, a read-only folder, an fsync that takes seconds: it is counted and
+reported, the file is closed as it is, and a new one is tried after a while.
 """
 
 from __future__ import annotations
 
 import sys
-import threading
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -28,7 +25,7 @@ from runtime.recording.schema import (
     Cycle,
     MapChange,
     ModeChange,
-    ObjectsSeen,
+    ObjectList,
     Payload,
     RunInfo,
     SerialBytes,
@@ -37,310 +34,323 @@ from runtime.recording.schema import (
     keyframe,
 )
 from runtime.recording.storage import RecordingTarget
-from runtime.support.health import Worker
+from runtime.support.background_writer import BackgroundWriter
 
 QUEUE_MAX: Final = 8192
-"""Handed over and not yet taken, at most: a minute and a half of a disk that does nothing."""
+"""Items that may wait: about a minute and a half of a disk that stands still."""
 POLL_S: Final = 0.05
+"""Interval at which the thread looks for items."""
 FLUSH_S: Final = 0.6
-"""A chunk ends this long after the last one: with the poll, what a killed process loses."""
+"""Interval between chunks. With the poll this is what a killed process loses."""
 SYNC_S: Final = 1.0
 RETRY_S: Final = 10.0
-"""After trouble with the disk the next file is tried this much later."""
+"""Wait after a disk error before the next file is tried."""
 CLOSE_MAX_S: Final = 10.0
-"""So long the end of a run waits for the disk."""
-BATCH: Final = 256
-BREATH_S: Final = 0.002
-"""Between batches of a backlog the interpreter belongs to the loop."""
+"""Longest wait for the disk at the end of a run."""
 SWITCH_INTERVAL_S: Final = 0.0005
-"""While this thread encodes, the loop waits for the interpreter this long at most."""
-DIGITS: Final = 3
-"""Of a segment's coordinates: a millimetre is a thirtieth of what the ring resolves."""
+"""Longest wait of the control loop for the interpreter while this thread encodes."""
+SEGMENT_DIGITS: Final = 3
+"""Decimals of a segment's coordinates: a millimetre is a thirtieth of the ring's resolution."""
 OBJECT_DIGITS: Final = 6
 
 
-class Item(NamedTuple):
-    """Something handed over: nothing in it changes any more."""
+class QueuedItem(NamedTuple):
+    """Something to record. Nothing in it may change any more."""
 
     topic: str
     host_s: float
-    what: Any
+    """When it happened, by the host's clock."""
+    run_s: float
+    """When it happened, by the run's clock."""
+    content: Any
 
 
-class Reloaded(NamedTuple):
-    """Settings that are in force from a cycle on."""
+class SettingsReload(NamedTuple):
+    """Settings in force from a cycle on."""
 
     cycle: int
     settings: Settings
 
 
-class Switch(NamedTuple):
-    """From here on a recording is wanted, or none is."""
+class RecordingSwitch(NamedTuple):
+    """Recording is switched on or off from here on."""
 
     on: bool
 
 
 class MapSnapshot(NamedTuple):
-    """The map, or the objects, as a cycle left them; for a keyframe both and everything else."""
+    """The map or the objects as a cycle left them; for a keyframe both, and the whole state."""
 
     cycle: int
     segments: Floats | None = None
+    """(n, 5): ends x, y, x, y (m) and normal (rad)."""
     objects: tuple[Any, ...] | None = None
-    left: StateFields | None = None
-    memory: dict[str, Any] | None = None
+    state: StateFields | None = None
+    perception: dict[str, Any] | None = None
+    """Perception's arrays by name."""
 
 
 @dataclass(frozen=True, slots=True)
 class RecorderStatus:
-    """How the recording stands."""
+    """State of a recording, or of a ring log."""
 
     file: str | None = None
     files: int = 0
     bytes: int = 0
-    """In all files."""
+    """In all files together."""
     messages: int = 0
     dropped: int = 0
-    """Handed over while the queue was full or no file could be written, or not yet in a file when it failed."""
+    """Items not written: the queue was full, no file could be written, or a file failed before it was flushed."""
     last_error: str | None = None
-    """The last one with the disk."""
+    """The last trouble with the disk."""
     sync_max_s: float = 0.0
-    """The longest that the disk took to confirm."""
+    """The longest time the disk took to confirm."""
     is_writing: bool = False
-    """Whether the file is being written."""
+    """Whether a file is open."""
 
 
 class RecordingWriter:
-    """A thread that writes a recording.
+    """A recording and the thread that writes it.
 
     Parameters
     ----------
-    place : RecordingTarget
-        Where its files go.
+    target : RecordingTarget
+        Where its files are written.
     info : RunInfo
-        What stands at the beginning of each.
-    clock : callable
-        Monotonic, s: the thread's own pace.
+        The first message of each file.
+    host_clock : callable
+        The host's clock of the run, s, for the log time of `info`.
+    queue_max : int
+        Items that may wait.
     on : bool
-        Whether a recording is wanted from the beginning.
+        Whether to record from the start.
+
+    Attributes
+    ----------
+    wants_keyframe : bool
+        A keyframe is needed for the replay to go on: a file has begun, or something is missing.
     """
 
     def __init__(
-        self, place: RecordingTarget, info: RunInfo, clock: Callable[[], float] = time.monotonic, *, on: bool = True
+        self,
+        target: RecordingTarget,
+        info: RunInfo,
+        host_clock: Callable[[], float] = time.monotonic,
+        queue_max: int = QUEUE_MAX,
+        *,
+        on: bool = True,
     ) -> None:
-        self.queue: deque[Item] = deque()
         self.wants_keyframe = False
-        """A file has begun, or something is missing: without a keyframe no replay could go on."""
-        self.status = RecorderStatus()
-        self._place = place
+        self._status = RecorderStatus()
+        self._target = target
         self._info = info
-        self._clock = clock
-        self._part: McapFile | None = None
+        self._host_clock = host_clock
+        self._file: McapFile | None = None
         self._parts = 0
         self._on = on
-        self._retry_s = 0.0
-        self._before = 0
+        self._retry_s = self._flushed_s = self._synced_s = self._limited_s = 0.0
+        self._bytes_before = 0
         self._unflushed = 0
         self._mode: ModeState | None = None
         self._map: dict[bytes, int] = {}
-        self._numbered = 0
-        self._pieces: dict[str, list[tuple[float, bytes]]] = {}
-        self._ending = threading.Event()
-        self._thread = Worker("recorder", self._work)
+        self._map_count = 0
+        self._pieces: dict[str, list[tuple[QueuedItem, bytes]]] = {}
+        self.thread = BackgroundWriter[QueuedItem](
+            "recorder", self._write, begin=self._begin, tick=self._tick, finish=lambda: self._guarded(self._finish),
+            poll_s=POLL_S, capacity=queue_max, close_max_s=CLOSE_MAX_S,
+        )  # fmt: skip
         self._interval_s = sys.getswitchinterval()
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
         sys.setswitchinterval(SWITCH_INTERVAL_S)
-        self._thread.start()
+        self.thread.start()
 
     def stop(self) -> None:
-        """Write what is left and end, unless the disk takes too long."""
-        self._ending.set()
-        self._thread.join(CLOSE_MAX_S)
+        """Write what is queued and end the thread, unless the disk takes too long."""
+        self.thread.close()
         sys.setswitchinterval(self._interval_s)
-        if self._thread.is_alive():
-            why = f"the disk did not take the end of {self.status.file} within {CLOSE_MAX_S:.0f} s"
-            self.status = replace(self.status, last_error=why)
-        elif self._part is not None:
-            self._leave(f"{self.status.file}: its writer failed: {self._thread.failure}")
+        if self.thread.is_stuck:
+            error = f"the disk did not take the end of {self._status.file} within {CLOSE_MAX_S:.0f} s"
+            self._status = replace(self._status, last_error=error)
+        elif self._file is not None:
+            self._abandon(f"{self._status.file}: its writer failed: {self.thread.failure}")
 
-    def probe(self) -> str | None:
-        """Say how the thread ended; None while it runs. See `runtime.support.health`."""
-        return self._thread.probe()
+    @property
+    def status(self) -> RecorderStatus:
+        """The state of the recording."""
+        return replace(self._status, dropped=self._status.dropped + self.thread.lost)
 
-    def drop(self, count: int = 1) -> None:
-        """Count what is not written."""
-        self.status = replace(self.status, dropped=self.status.dropped + count)
+    def _drop(self, count: int) -> None:
+        self._status = replace(self._status, dropped=self._status.dropped + count)
 
-    def _work(self) -> None:
-        flushed_s = synced_s = tidied_s = self._clock()
+    def _begin(self) -> None:
+        self._flushed_s = self._synced_s = self._limited_s = time.monotonic()
         if self._on:
             self._guarded(self._open)
-        ending = False
-        while not (ending and not self.queue):
-            ending = self._ending.wait(POLL_S if len(self.queue) < BATCH else BREATH_S)
-            for _ in range(min(BATCH, len(self.queue))):
-                item = self.queue.popleft()
-                self._guarded(lambda item=item: self._enter(item))  # type: ignore[misc]
-            now_s = self._clock()
-            if now_s - flushed_s >= FLUSH_S:
-                self._guarded(self._flush)
-                flushed_s = now_s
-            if now_s - synced_s >= SYNC_S:
-                self._guarded(self._sync)
-                synced_s = self._clock()
-            if now_s - tidied_s >= RETRY_S and self._part is not None:
-                self._guarded(lambda: self._place.enforce_limits(self._current()))
-                tidied_s = now_s
-        self._guarded(self._finish)
 
-    def _guarded(self, work: Callable[[], None]) -> None:
-        """Do something with the disk; where it fails, leave the file and try the next one later."""
+    def _write(self, item: QueuedItem) -> None:
+        self._guarded(lambda: self._enter(item))
+
+    def _tick(self) -> None:
+        now_s = time.monotonic()
+        if now_s - self._flushed_s >= FLUSH_S:
+            self._guarded(self._flush)
+            self._flushed_s = now_s
+        if now_s - self._synced_s >= SYNC_S:
+            self._guarded(self._sync)
+            self._synced_s = time.monotonic()
+        if now_s - self._limited_s >= RETRY_S and self._file is not None:
+            path = self._file.path
+            self._guarded(lambda: self._target.enforce_limits(path))
+            self._limited_s = now_s
+
+    def _guarded(self, act: Callable[[], None]) -> None:
+        """Do something with the disk; if it fails, abandon the file and try a new one later."""
         try:
-            work()
+            act()
         except OSError as error:
-            where = self.status.file if self._part is not None else str(error.filename)
-            self._leave(f"{where}: {error.strerror or error}")
+            where = self._status.file if self._file is not None else str(error.filename)
+            self._abandon(f"{where}: {error.strerror or error}")
 
-    def _leave(self, why: str) -> None:
-        if self._part is not None:
-            self._part.abandon()
-        self._part = None
-        self.drop(self._unflushed)
+    def _abandon(self, error: str) -> None:
+        if self._file is not None:
+            self._file.abandon()
+        self._file = None
+        self._drop(self._unflushed)
         self._unflushed = 0
-        self._retry_s = self._clock() + RETRY_S
-        self.status = replace(self.status, last_error=why, is_writing=False)
-
-    def _current(self) -> Path:
-        return Path() if self._part is None else self._part.path
+        self._retry_s = time.monotonic() + RETRY_S
+        self._status = replace(self._status, last_error=error, is_writing=False)
 
     def _open(self) -> None:
         self._parts += 1
-        info = self._info.model_copy(update={"part": self._parts})
-        self._info = info
-        host_ns = time.time_ns()
-        self._part = McapFile(self._place.path(self._parts), encode(info), host_ns)
-        self._before = self.status.bytes
+        self._info = self._info.model_copy(update={"part": self._parts})
+        log_ns = self._log_ns(self._host_clock())
+        self._file = McapFile(self._target.path(self._parts), encode(self._info), log_ns)
+        self._bytes_before = self._status.bytes
         self._mode = None
-        path, files = str(self._part.path), self.status.files + 1
-        self.status = replace(self.status, file=path, files=files, is_writing=True)
+        path, files = str(self._file.path), self._status.files + 1
+        self._status = replace(self._status, file=path, files=files, is_writing=True)
 
     def _finish(self) -> None:
-        if self._part is not None:
+        if self._file is not None:
             self._enter_pieces()
-            part, self._part = self._part, None
+            file, self._file = self._file, None
             try:
-                part.finish()
-                size = self._before + part.path.stat().st_size
-                self.status = replace(self.status, bytes=size, is_writing=False)
+                file.finish()
+                size = self._bytes_before + file.path.stat().st_size
+                self._status = replace(self._status, bytes=size, is_writing=False)
                 self._unflushed = 0
             except OSError as error:
-                self._leave(f"{part.path}: {error.strerror or error}")
+                self._abandon(f"{file.path}: {error.strerror or error}")
 
     def _flush(self) -> None:
-        if self._part is not None:
+        if self._file is not None:
             self._enter_pieces()
-            self._part.flush()
+            self._file.flush()
             self._unflushed = 0
-            self.status = replace(self.status, bytes=self._before + self._part.bytes)
-            if self._place.is_part_full(self._part.bytes):
+            self._status = replace(self._status, bytes=self._bytes_before + self._file.bytes)
+            if self._target.is_part_full(self._file.bytes):
                 self.wants_keyframe = True
-        elif self._on and self._clock() >= self._retry_s:
+        elif self._on and time.monotonic() >= self._retry_s:
             self.wants_keyframe = True
 
     def _sync(self) -> None:
-        if self._part is not None:
-            began_s = self._clock()
-            self._part.sync()
-            took_s = self._clock() - began_s
-            if took_s > self.status.sync_max_s:
-                self.status = replace(self.status, sync_max_s=took_s)
+        if self._file is not None:
+            started_s = time.monotonic()
+            self._file.sync()
+            took_s = time.monotonic() - started_s
+            if took_s > self._status.sync_max_s:
+                self._status = replace(self._status, sync_max_s=took_s)
 
-    def _enter(self, item: Item) -> None:
-        """Write one item; with a keyframe the next file can begin."""
-        if isinstance(item.what, Switch):
-            self._on, self._retry_s = item.what.on, 0.0
+    def _enter(self, item: QueuedItem) -> None:
+        """Write one item; at a keyframe a new file can begin."""
+        if isinstance(item.content, RecordingSwitch):
+            self._on, self._retry_s = item.content.on, 0.0
             if not self._on:
                 self._finish()
             return
         if item.topic == KEYFRAME:
-            if self._part is not None and self._place.is_part_full(self._part.bytes):
+            if self._file is not None and self._target.is_part_full(self._file.bytes):
                 self._finish()
-            if self._part is None and self._clock() >= self._retry_s:
+            if self._file is None and time.monotonic() >= self._retry_s:
                 self._open()
         if item.topic == SETTINGS:
-            settings = item.what.settings.model_dump(mode="json")
+            settings = item.content.settings.model_dump(mode="json")
             self._info = self._info.model_copy(update={"settings": settings})
-        if self._part is None:
-            self.drop(int(self._on))
+        if self._file is None:
+            self._drop(int(self._on))
             return
         log_ns = self._log_ns(item.host_s)
-        match item.what:
+        match item.content:
             case CycleRecord():
-                self._enter_cycle(item.what, log_ns)
+                self._enter_cycle(item.content, log_ns)
             case MapSnapshot():
-                self._enter_moment(item.what, log_ns)
-            case Reloaded(cycle, _):
-                change = SettingsChange.model_construct(cycle=cycle, settings=self._info.settings)
+                self._enter_snapshot(item.content, item.run_s, log_ns)
+            case SettingsReload(cycle, _):
+                change = SettingsChange.model_construct(run_s=item.run_s, cycle=cycle, settings=self._info.settings)
                 self._add(SETTINGS, change, log_ns)
             case bytes():
-                self._pieces.setdefault(item.topic, []).append((item.host_s, item.what))
+                self._pieces.setdefault(item.topic, []).append((item, item.content))
             case _:
-                self._add(item.topic, item.what, log_ns)
+                self._add(item.topic, item.content, log_ns)
 
     def _enter_pieces(self) -> None:
-        """Write what went over the line since the last time."""
+        """Write what went over the serial line since the last time."""
         for topic, pieces in self._pieces.items():
-            first_s = pieces[0][0]
-            form = SerialBytes.model_construct(
-                host_s=first_s, after_us=[round(1e6 * (t_s - first_s)) for t_s, _ in pieces],
+            first = pieces[0][0]
+            payload = SerialBytes.model_construct(
+                run_s=first.run_s, after_us=[round(1e6 * (item.run_s - first.run_s)) for item, _ in pieces],
                 sizes=[len(data) for _, data in pieces], data=b"".join(data for _, data in pieces).hex(),
             )  # fmt: skip
-            self._add(topic, form, self._log_ns(first_s))
+            self._add(topic, payload, self._log_ns(first.host_s))
         self._pieces.clear()
 
     def _log_ns(self, host_s: float) -> int:
+        """Return the Unix time of a moment of the host's clock."""
         return self._info.unix_minus_host_ns + round(1e9 * host_s)
 
     def _enter_cycle(self, record: CycleRecord, log_ns: int) -> None:
         self._add(CYCLE, Cycle.model_construct(record=record), log_ns, record.cycle)
         if record.mode != self._mode:
             self._mode = record.mode
-            self._add(MODE, ModeChange.model_construct(cycle=record.cycle, mode=record.mode), log_ns)
+            change = ModeChange.model_construct(run_s=record.inputs.run_s, cycle=record.cycle, mode=record.mode)
+            self._add(MODE, change, log_ns)
 
-    def _enter_moment(self, moment: MapSnapshot, log_ns: int) -> None:
-        if moment.left is not None and moment.memory is not None:
+    def _enter_snapshot(self, snapshot: MapSnapshot, run_s: float, log_ns: int) -> None:
+        cycle = snapshot.cycle
+        if snapshot.state is not None and snapshot.perception is not None:
             self._add(RUN_INFO, self._info, log_ns)
-            self._add(KEYFRAME, keyframe(moment.cycle, moment.left, moment.memory), log_ns, moment.cycle)
-        if moment.segments is not None:
-            self._add(SEGMENTS, self._map_change(moment, moment.segments), log_ns)
-        if moment.objects is not None:
-            rows = [_rounded(dict(object_row(seen))) for seen in moment.objects]
-            self._add(OBJECTS, ObjectsSeen.model_construct(cycle=moment.cycle, objects=rows), log_ns)
+            self._add(KEYFRAME, keyframe(cycle, run_s, snapshot.state, snapshot.perception), log_ns, cycle)
+        if snapshot.segments is not None:
+            self._add(SEGMENTS, self._map_change(snapshot, snapshot.segments, run_s), log_ns)
+        if snapshot.objects is not None:
+            rows = [_rounded(dict(object_row(seen))) for seen in snapshot.objects]
+            self._add(OBJECTS, ObjectList.model_construct(run_s=run_s, cycle=cycle, objects=rows), log_ns)
 
-    def _map_change(self, moment: MapSnapshot, segments: Floats) -> MapChange:
-        """Return what has come and gone since the last moment; a keyframe tells the whole map."""
-        whole = moment.memory is not None
+    def _map_change(self, snapshot: MapSnapshot, segments: Floats, run_s: float) -> MapChange:
+        """Return the changes since the last snapshot of the map; with a keyframe, the whole map."""
+        whole = snapshot.perception is not None
         if whole:
             self._map = {}
-        rows = np.round(segments, DIGITS)
-        now = {row.tobytes(): row for row in rows}
-        removed = [self._map.pop(key) for key in [key for key in self._map if key not in now]]
-        fresh = [key for key in now if key not in self._map]
-        first, self._numbered = self._numbered, self._numbered + len(fresh)
-        self._map.update(zip(fresh, range(first, self._numbered), strict=True))
+        rows = np.round(segments, SEGMENT_DIGITS)
+        current = {row.tobytes(): row for row in rows}
+        removed = [self._map.pop(key) for key in [key for key in self._map if key not in current]]
+        added = [key for key in current if key not in self._map]
+        first, self._map_count = self._map_count, self._map_count + len(added)
+        self._map.update(zip(added, range(first, self._map_count), strict=True))
         return MapChange.model_construct(
-            cycle=moment.cycle, whole=whole, first=first, added=[tuple(now[key].tolist()) for key in fresh],
-            removed=removed,
+            run_s=run_s, cycle=snapshot.cycle, whole=whole, first=first,
+            added=[tuple(current[key].tolist()) for key in added], removed=removed,
         )  # fmt: skip
 
-    def _add(self, topic: str, form: Payload, log_ns: int, sequence: int = 0) -> None:
-        if self._part is not None:
+    def _add(self, topic: str, payload: Payload, log_ns: int, sequence: int = 0) -> None:
+        if self._file is not None:
             self._unflushed += 1
-            self._part.add(topic, encode(form), log_ns, sequence)
-            self.status = replace(self.status, messages=self.status.messages + 1)
+            self._file.add(topic, encode(payload), log_ns, sequence)
+            self._status = replace(self._status, messages=self._status.messages + 1)
 
 
 def _rounded(row: dict[str, Any]) -> dict[str, Any]:
-    """Return an object's row for the eye; replaying gives every digit."""
+    """Return an object's row rounded for reading; a replay gives every digit."""
     return {k: round(v, OBJECT_DIGITS) if isinstance(v, float) else v for k, v in row.items() if k != "covariance"}

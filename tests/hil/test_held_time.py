@@ -25,8 +25,8 @@ from runtime.cycle.step import CycleRecord, State
 from runtime.cycle.summary import RunSummary
 from runtime.recording.reader import open_recording
 from runtime.recording.recorder import Recorder
-from runtime.recording.replayer import verify_recording
 from runtime.recording.storage import SingleFile
+from runtime.recording.verification import verify_recording
 from runtime.simulation.emulator_process import start_emulator
 from runtime.support.logs import open_log
 from runtime.timing.cycle_stats import CycleStats

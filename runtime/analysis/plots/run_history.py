@@ -42,8 +42,8 @@ def course(timeline: Timeline, units: Units) -> Figure:
         if at:
             panels[1].legend(loc="upper right", ncols=2)
     rhythm = panels[-1]
-    gaps = 1e3 * np.array(timeline.gaps_s)
-    rhythm.plot(np.cumsum(timeline.gaps_s), gaps, marker=".", markersize=3, linestyle="", color=ECHO, alpha=0.6,
+    gaps = 1e3 * np.array(timeline.cycle_gaps_s)
+    rhythm.plot(np.cumsum(timeline.cycle_gaps_s), gaps, marker=".", markersize=3, linestyle="", color=ECHO, alpha=0.6,
                 gid="gaps", rasterized=len(gaps) > 2000)  # fmt: skip
     rhythm.set(xlabel="t (s)", ylabel="between cycles (ms)")
     rhythm.set_ylim(bottom=0.0)

@@ -195,16 +195,16 @@ def _timing(timeline: Timeline) -> list[str]:
         parts.append(table(heads, [[name, *("" if math.isnan(v) else f"{v:.2f}" for v in vs)] for name, vs in rows]))
     else:
         parts.append(note("The run's own books are not in the file: it was cut off, or this is a ring log."))
-    if timeline.gaps_s:
-        q = 1e3 * np.quantile(timeline.gaps_s, [0.0, 0.5, 0.99, 1.0])
+    if timeline.cycle_gaps_s:
+        q = 1e3 * np.quantile(timeline.cycle_gaps_s, [0.0, 0.5, 0.99, 1.0])
         what = "cycle to cycle" if timeline.modes else "firing to firing"
         parts.append(note(f"From {what}, ms: least {q[0]:.1f}, median {q[1]:.1f}, p99 {q[2]:.1f}, most {q[3]:.1f}."))
     if "late" in summary:
         by = ", ".join(f"{culprit} ({count})" for culprit, count in timing.get("faults", {}).items())
         whose = f"; by fault of {by}" if by else ""
         parts.append(note(f"{summary['late']} cycles late, {summary.get('missed', 0)} missed{whose}."))
-    if timeline.stops:
-        causes = ", ".join(f"{cause} {count}" for cause, count in sorted(timeline.stops.items()))
+    if timeline.refinement_stops:
+        causes = ", ".join(f"{cause} {count}" for cause, count in sorted(timeline.refinement_stops.items()))
         parts.append(note(f"Refinement ended by: {causes}."))
     return parts
 

@@ -28,10 +28,10 @@ def recover_recording(source: str, out: str | None) -> int:
             f"{target}: cannot be written: {error.strerror or error}; choose another place by --out", FAILED
         ) from error
     console = Console(soft_wrap=True, highlight=False)
-    for damage in got.damage[:SHOWN]:
-        console.print(f"at byte {damage.at}: {damage.what}")
-    if len(got.damage) > SHOWN:
-        console.print(f"and {len(got.damage) - SHOWN} more")
+    for region in got.corrupt_regions[:SHOWN]:
+        console.print(str(region))
+    if len(got.corrupt_regions) > SHOWN:
+        console.print(f"and {len(got.corrupt_regions) - SHOWN} more")
     state = (
         "was closed in good order" if got.finished else "had not been closed: the run was cut off, or the file was"
     )

@@ -5,16 +5,16 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import Progress
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings, override_settings
+from runtime.cli.commands.offline_io import progress
 from runtime.cli.tables import objects_table
 from runtime.cycle.summary import ReplaySummary, object_row, write_json
 from runtime.support.kernel_cache import prepare_kernels
@@ -23,13 +23,9 @@ from runtime.support.length_format import Units, format_length
 if TYPE_CHECKING:
     from config.settings import Settings
     from runtime.analysis.comparison import RunOutcome
-    from runtime.cycle.step import CycleRecord, State
-    from runtime.recording.channels import RawMessage
     from runtime.recording.reader import Recording
-    from runtime.recording.replayer import ReplayResult
-
-    OnEntry = Callable[[RawMessage], None]
-    OnCycle = Callable[[CycleRecord, State], None]
+    from runtime.recording.replayer import Replayer, ReplayStep
+    from runtime.recording.verification import OnStep, ReplayResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,20 +90,12 @@ def other_settings(
     return override_settings(recording.settings, str(recording.path), sets)
 
 
-@contextlib.contextmanager
-def progress(console: Console, *, shown: bool = True) -> Iterator[OnEntry]:
-    """Show how far the replay has come."""
-    with Progress(console=console, transient=True, disable=not (console.is_terminal and shown)) as bar:
-        task = bar.add_task("replaying", total=None)
-        yield lambda _entry: bar.update(task, advance=1)
-
-
 def rerun(
     recording: Recording, console: Console, *, span: Span, verify: bool, json_file: str | None, units: Units
 ) -> int:
     """Replay and tell what came out."""
     from runtime.recording.recorder import software_versions
-    from runtime.recording.replayer import verify_recording
+    from runtime.recording.verification import verify_recording
 
     prepare_kernels(recording.settings, console)
     now, then = software_versions(), recording.info.versions
@@ -116,12 +104,15 @@ def rerun(
         console.print(f"made by another program or machine: {', '.join(others)}; results may differ from there on")
     until_s = math.inf if span.until_s is None else span.until_s
     with contextlib.ExitStack() as stack:
-        on_cycle, on_message = None, stack.enter_context(progress(console, shown=span.speed is None))
         if span.speed is not None:
-            on_cycle, on_message = stack.enter_context(watching(recording, span, units))
-        result = verify_recording(
-            recording, since_s=span.since_s, until_s=until_s, on_cycle=on_cycle, on_message=on_message
-        )
+            on_step = stack.enter_context(watching(recording, span, units))
+        else:
+            advance = stack.enter_context(progress(console, "replaying"))
+
+            def on_step(_step: ReplayStep, _replayer: Replayer) -> None:
+                advance()
+
+        result = verify_recording(recording, since_s=span.since_s, until_s=until_s, on_step=on_step)
     if result.cycles == 0:
         if result.skipped or span != Span(0.0, None, span.speed):
             raise UserError(f"{recording.path}: holds no cycle that can be replayed in this part of it", FAILED)
@@ -134,8 +125,8 @@ def rerun(
         write_json(json_file, summary)
     out = Console(soft_wrap=True, highlight=False)
     out.print(objects_table(summary["objects"], units))
-    for damage in recording.damage:
-        console.print(f"at byte {damage.at}: {damage.what}")
+    for region in recording.corrupt_regions:
+        console.print(str(region))
     for first, last in result.missing:
         console.print(f"cycles {first} to {last} are not in the recording; taken up again at the next keyframe")
     causes = ", ".join(f"{cause} {count}" for cause, count in sorted(result.refinement_stops.items()))
@@ -169,13 +160,13 @@ def summarise(recording: Recording, result: ReplayResult) -> ReplaySummary:
             "missing": result.missing,
             "refinement": dict(result.refinement_stops),
             "times_real_time": round(result.times_real_time, 1),
-            "damage": [f"at byte {damage.at}: {damage.what}" for damage in recording.damage],
+            "damage": [str(region) for region in recording.corrupt_regions],
         },
     }
 
 
 @contextlib.contextmanager
-def watching(recording: Recording, span: Span, units: Units) -> Iterator[tuple[OnCycle, OnEntry]]:
+def watching(recording: Recording, span: Span, units: Units) -> Iterator[OnStep]:
     """Hold the replay to its pace, and show it where there is a terminal."""
     from drivers.registry import make_driver
     from runtime.cli.terminal.view import View
@@ -187,29 +178,29 @@ def watching(recording: Recording, span: Span, units: Units) -> Iterator[tuple[O
     view = View(settings, console, units) if console.is_terminal and not console.is_dumb_terminal else None
     driver, stats = make_driver(settings), CycleStats(late_after_s=math.inf)
     driver.line_opened(0.0)
-    begun: list[tuple[float, float]] = []
+    start: list[tuple[float, float]] = []
 
-    def on_message(entry: RawMessage) -> None:
-        if entry.topic == SERIAL["in"]:
-            for t_s, data in decode(SerialBytes, entry.data).pieces():
-                driver.receive(data, t_s)
+    def on_step(found: ReplayStep, replayer: Replayer) -> None:
+        if found.message.topic == SERIAL["in"]:
+            for run_s, data in decode(SerialBytes, found.message.data).pieces():
+                driver.receive(data, run_s)
             driver.take_received()
-
-    def on_cycle(record: CycleRecord, state: State) -> None:
-        recorded_s, host_s = record.inputs.run_s, time.monotonic()
-        if not begun:
-            begun.append((recorded_s, host_s))
-        due_s = begun[0][1] + (recorded_s - begun[0][0]) / (span.speed or math.inf)
+        if found.replayed is None or replayer.state is None:
+            return
+        run_s, host_s = found.replayed.inputs.run_s, time.monotonic()
+        if not start:
+            start.append((run_s, host_s))
+        due_s = start[0][1] + (run_s - start[0][0]) / (span.speed or math.inf)
         if due_s > host_s:
             time.sleep(due_s - host_s)
         stats.add_cycle(0.0, max(0.0, host_s - due_s))
         if view is not None:
-            view.on_cycle(record, state, stats, driver)
+            view.on_cycle(found.replayed, replayer.state, stats, driver)
 
     with contextlib.ExitStack() as stack:
         if view is not None:
             stack.enter_context(view.shown())
-        yield on_cycle, on_message
+        yield on_step
 
 
 def tell_other(recording: Recording, settings: Settings, console: Console, units: Units) -> int:
@@ -217,17 +208,17 @@ def tell_other(recording: Recording, settings: Settings, console: Console, units
     from runtime.analysis.comparison import compare_runs
 
     prepare_kernels(settings, console)
-    with progress(console) as on_message:
-        told = compare_runs(recording, settings, on_message)
+    with progress(console, "replaying") as advance:
+        told = compare_runs(recording, settings, advance)
     out = Console(soft_wrap=True, highlight=False)
-    for title, story in (("as it was", told.was), ("with the other settings", told.would_be)):
+    for title, story in (("as it was", told.recorded), ("with the other settings", told.other)):
         out.print(title)
         out.print(objects_table(story.objects, units))
         out.print(errors_line(story, units))
         for at_s, reason in story.stops:
             out.print(f"stopped after {at_s:.1f} s: {reason}")
-    first = "" if told.first_other_s is None else f", the first after {told.first_other_s:.2f} s"
-    out.print(f"{told.cycles} cycles; {told.other_commands} with another command{first}")
+    first = "" if told.first_change_s is None else f", the first after {told.first_change_s:.2f} s"
+    out.print(f"{told.cycles} cycles; {told.changed_commands} with another command{first}")
     return DONE
 
 

@@ -7,33 +7,19 @@ yielded one by one, so that the caller can do something else in between.
 
 from __future__ import annotations
 
-import re
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right
 from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
-from perception.snapshot import Snapshot
 from runtime.cycle.modes import ModeState
 from runtime.cycle.step import CycleRecord, State
-from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, MODE, RUN_INFO, SETTINGS, RawMessage, decode
-from runtime.recording.mcap_scanner import BEGIN
-from runtime.recording.reader import NS_PER_S, Recording, RecordingError
-from runtime.recording.replayer import Replayer
-from runtime.recording.schema import (
-    Bookmark,
-    Cycle,
-    Keyframe,
-    ModeChange,
-    RunInfo,
-    SettingsChange,
-    StateFields,
-    carried_state,
-)
-from runtime.recording.schema import perception_snapshot as memory_in
+from runtime.recording.channels import BOOKMARK, CYCLE, MODE, decode
+from runtime.recording.reader import Recording, RecordingError, cycle_head
+from runtime.recording.replayer import Checkpoint, KeyframeFinder, KeyframePosition, Replayer
+from runtime.recording.schema import Bookmark, ModeChange
 
-NUMBER: Final = re.compile(rb'\{"record":\{"cycle":(\d{1,15}),')
 LOOK_BACK: Final = 20
 """Cycles that a seek yields before its target, if there are so many: within them every sensor has fired."""
 KEEP_PERIOD: Final = 100
@@ -50,27 +36,13 @@ class ReplayedCycle(NamedTuple):
 
 
 @dataclass(slots=True)
-class _KnownState:
-    """A cycle whose state is kept: what it takes to continue from there."""
-
-    chunk_at: int
-    told: dict[str, Any]
-    left: StateFields
-    memory: Snapshot
-
-
-@dataclass(slots=True)
 class _Index:
-    """Where in the file each cycle and keyframe is."""
+    """What is where in the file."""
 
-    numbers: list[int] = field(default_factory=list)
-    """Of the cycles, in file order."""
     times_s: list[float] = field(default_factory=list)
-    """Of the cycles, after the first one."""
-    chunks_at: list[int] = field(default_factory=list)
-    """File offset of each cycle's chunk."""
-    keyframes: list[tuple[int, int, dict[str, Any]]] = field(default_factory=list)
-    """Of each keyframe: the cycles before it, the offset of its chunk, and the settings in force."""
+    """Time of each cycle by the run's clock, s after the first one, in file order."""
+    keyframes: dict[int, KeyframePosition] = field(default_factory=dict)
+    """The keyframes by the number of cycles before them in the file."""
 
 
 class ReplayCursor:
@@ -106,22 +78,19 @@ class ReplayCursor:
         self.bookmarks: list[tuple[float, str]] = []
         self.modes: list[tuple[float, ModeState]] = []
         self._index_file()
-        if not self._index.numbers:
+        if not self._index.times_s:
             raise RecordingError(f"{recording.path}: holds no cycle: the run ended before its first one")
-        self.cycles = len(self._index.numbers)
+        self.cycles = len(self._index.times_s)
         self.duration_s = self._index.times_s[-1]
-        self._kept: OrderedDict[int, _KnownState] = OrderedDict()
+        self._kept: OrderedDict[int, Checkpoint] = OrderedDict()
         self._kept_bytes = 0
-        self._replayed: list[ReplayedCycle] = []
-        self._replayer = Replayer(recording, self._take, begun=True)
-        self._entries: Iterator[tuple[int, RawMessage]] = iter(())
         self._next = self.jumps = 0
         self._begin_at(0)
 
     @property
     def settings(self) -> dict[str, Any]:
         """The settings in force at this position, as the recording has them."""
-        return self._replayer.told
+        return self._replayer.settings_data
 
     @property
     def position(self) -> int:
@@ -143,14 +112,12 @@ class ReplayCursor:
 
     def next_cycle(self) -> ReplayedCycle | None:
         """Replay and return the next cycle whose state is known; None at the end."""
-        self._replayed.clear()
-        for chunk_at, entry in self._entries:
-            self._replayer.take(entry)
-            if entry.topic == CYCLE:
+        for step in self._replayer:
+            if step.message.topic == CYCLE:
                 self._next += 1
-                if self._replayed:
-                    self._keep(chunk_at)
-                    return self._replayed[0]
+                if step.replayed is not None and self._replayer.state is not None:
+                    self._keep()
+                    return ReplayedCycle(step.replayed, self._replayer.state)
         return None
 
     def seek(self, position: int) -> Iterator[ReplayedCycle]:
@@ -164,101 +131,47 @@ class ReplayCursor:
 
     def _index_file(self) -> None:
         """Fill the index, the bookmarks and the modes."""
-        index, recording = self._index, self._recording
-        told, raw = recording.info.settings, b""
-        first_ns: int | None = None
-        for chunk_at, entries in recording.chunks():
-            for entry in entries:
-                if entry.topic == CYCLE:
-                    first_ns = entry.log_ns if first_ns is None else first_ns
-                    index.numbers.append(_number(entry))
-                    index.times_s.append((entry.log_ns - first_ns) / NS_PER_S)
-                    index.chunks_at.append(chunk_at)
-                elif entry.topic == KEYFRAME:
-                    index.keyframes.append((len(index.numbers), chunk_at, told))
-                elif entry.topic == SETTINGS:
-                    told = decode(SettingsChange, entry.data).settings
-                elif entry.topic == RUN_INFO and entry.data != raw:
-                    raw = entry.data
-                    told = decode(RunInfo, raw).settings
-                elif entry.topic == BOOKMARK:
-                    s = 0.0 if first_ns is None else max(0.0, (entry.log_ns - first_ns) / NS_PER_S)
-                    self.bookmarks.append((s, decode(Bookmark, entry.data).text))
-                elif entry.topic == MODE and first_ns is not None:
-                    at_s = (entry.log_ns - first_ns) / NS_PER_S
-                    self.modes.append((at_s, decode(ModeChange, entry.data).mode))
+        index, finder = self._index, KeyframeFinder(self._recording)
+        first_run_s: float | None = None
+        for chunk_offset, messages in self._recording.chunks():
+            for message in messages:
+                keyframe = finder.find(chunk_offset, message)
+                if keyframe is not None:
+                    index.keyframes[len(index.times_s)] = keyframe
+                elif message.topic == CYCLE:
+                    _, run_s = cycle_head(message)
+                    first_run_s = run_s if first_run_s is None else first_run_s
+                    index.times_s.append(run_s - first_run_s)
+                elif message.topic == BOOKMARK:
+                    mark = decode(Bookmark, message.data)
+                    s = 0.0 if first_run_s is None else max(0.0, mark.run_s - first_run_s)
+                    self.bookmarks.append((s, mark.text))
+                elif message.topic == MODE and first_run_s is not None:
+                    change = decode(ModeChange, message.data)
+                    self.modes.append((change.run_s - first_run_s, change.mode))
 
     def _nearest(self, position: int) -> int:
         """Return the last position with a known state that is far enough before `position`."""
         latest = position - LOOK_BACK
-        known = [at for at, _, _ in self._index.keyframes if at <= latest]
-        known += [at for at in self._kept if at <= latest]
-        return max(known, default=0)
+        return max((at for at in (*self._index.keyframes, *self._kept) if at <= latest), default=0)
 
     def _begin_at(self, position: int) -> None:
         """Go to a position with a known state, or to the beginning."""
-        place = self._kept.get(position)
-        frame = next((frame for frame in self._index.keyframes if frame[0] == position), None)
-        self._replayer = Replayer(self._recording, self._take, begun=False)
+        start = self._kept.get(position) or self._index.keyframes.get(position)
+        if isinstance(start, Checkpoint):
+            self._kept.move_to_end(position)
+        self._replayer = Replayer(self._recording, start)
         self._next = position
         self.jumps += 1
-        if place is not None:
-            self._kept.move_to_end(position)
-            self._replayer.go_on(place.told, place.left, place.memory)
-            self._entries = self._after(place.chunk_at, self._index.numbers[position - 1])
-        elif frame is not None:
-            _, chunk_at, told = frame
-            self._entries = self._from_keyframe(chunk_at, told)
-        else:
-            self._replayer = Replayer(self._recording, self._take, begun=True)
-            self._entries = self._since(BEGIN)
 
-    def _since(self, begin_at: int) -> Iterator[tuple[int, RawMessage]]:
-        for chunk_at, entries in self._recording.chunks(begin_at):
-            for entry in entries:
-                yield chunk_at, entry
-
-    def _after(self, chunk_at: int, number: int) -> Iterator[tuple[int, RawMessage]]:
-        """Yield the messages after a cycle."""
-        rest = self._since(chunk_at)
-        for _, entry in rest:
-            if entry.topic == CYCLE and _number(entry) == number:
-                break
-        yield from rest
-
-    def _from_keyframe(self, begin_at: int, told: dict[str, Any]) -> Iterator[tuple[int, RawMessage]]:
-        """Restore the keyframe's state and yield the messages after it."""
-        rest = self._since(begin_at)
-        skipped = self._next - bisect_left(self._index.chunks_at, begin_at)
-        for _, entry in rest:
-            skipped -= entry.topic == CYCLE
-            if entry.topic == KEYFRAME and skipped == 0:
-                frame = decode(Keyframe, entry.data)
-                left = {name: getattr(frame.left, name) for name in type(frame.left).model_fields}
-                self._replayer.go_on(told, left, memory_in(frame))
-                break
-        yield from rest
-
-    def _take(self, record: CycleRecord, state: State) -> None:
-        self._replayed.append(ReplayedCycle(record, state))
-
-    def _keep(self, chunk_at: int) -> None:
+    def _keep(self) -> None:
         """Keep the state of every so many cycles, for seeks backward."""
-        if self._next % KEEP_PERIOD or self._next in self._kept or self._replayer.state is None:
+        if self._next % KEEP_PERIOD or self._next in self._kept:
             return
-        state = self._replayer.state
-        place = _KnownState(chunk_at, self._replayer.told, carried_state(state), state.perception.snapshot())
-        self._kept[self._next] = place
-        self._kept_bytes += _size(place)
+        checkpoint = self._replayer.checkpoint()
+        if checkpoint is None:
+            return
+        self._kept[self._next] = checkpoint
+        self._kept_bytes += checkpoint.nbytes
         while self._kept_bytes > KEPT_BYTES and len(self._kept) > 1:
-            self._kept_bytes -= _size(self._kept.popitem(last=False)[1])
-
-
-def _size(place: _KnownState) -> int:
-    return sum(array.nbytes for array in place.memory.values())
-
-
-def _number(entry: RawMessage) -> int:
-    """Return a cycle's number from the beginning of its record, because parsing all of it takes long."""
-    found = NUMBER.match(entry.data)
-    return decode(Cycle, entry.data).record.cycle if found is None else int(found[1])
+            self._kept_bytes -= self._kept.popitem(last=False)[1].nbytes

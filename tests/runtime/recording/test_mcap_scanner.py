@@ -19,8 +19,8 @@ from runtime.recording.channels import CYCLE, RawMessage, decode
 from runtime.recording.mcap_scanner import McapScanner
 from runtime.recording.reader import open_recording
 from runtime.recording.recovery import recover
-from runtime.recording.replayer import verify_recording
 from runtime.recording.schema import Cycle
+from runtime.recording.verification import verify_recording
 from tests.recorded import entries_of, hall, record, rewrite
 
 
@@ -69,7 +69,7 @@ def test_the_account_of_chunks_is_right(small: bytes) -> None:
     assert all(small[begin] == Opcode.CHUNK for begin, _ in found)
     chunks, salvage = salvaged(small)
     assert [len(chunk) for chunk in chunks] == [10] * 2
-    assert (salvage.damage, salvage.finished) == ([], True)
+    assert (salvage.corrupt_regions, salvage.finished) == ([], True)
 
 
 def test_cut_off_anywhere_every_complete_chunk_is_read(small: bytes) -> None:
@@ -79,7 +79,7 @@ def test_cut_off_anywhere_every_complete_chunk_is_read(small: bytes) -> None:
         assert len(chunks) == sum(end <= cut for end in ends), cut
         assert not salvage.finished
         if cut >= 8:
-            told = [damage for damage in salvage.damage if "end of the file" not in damage.what]
+            told = [damage for damage in salvage.corrupt_regions if "end of the file" not in damage.description]
             assert told == [], (cut, told)
 
 
@@ -96,7 +96,7 @@ def test_one_flipped_bit_costs_a_chunk_at_most_and_is_told(small: bytes) -> None
         assert len(lost) <= 1, (at, len(lost))
         assert all(chunk in whole for chunk in chunks), (at, "what was not written is read")
         # Zstandard has bits that no reader looks at: what costs nothing need not be told.
-        assert salvage.damage or not lost, (at, "nothing is told")
+        assert salvage.corrupt_regions or not lost, (at, "nothing is told")
 
 
 @settings(max_examples=150, deadline=None)
@@ -108,7 +108,7 @@ def test_any_bytes_anywhere_raise_nothing(small_file: Path, junk: bytes, at: int
     whole, _ = salvaged(small)
     assert all(chunk in whole for chunk in chunks)
     if not chunks:
-        assert salvage.damage
+        assert salvage.corrupt_regions
 
 
 @pytest.mark.parametrize("data", [b"", b"\x89", b"\x89MCAP0\r\n", bytes(5000), bytes(range(256)) * 40])
@@ -126,7 +126,7 @@ def test_a_lost_chunk_is_got_over_at_the_next_keyframe(run: Path, tmp_path: Path
     path.write_bytes(data)
     with open_recording(path) as recording:
         result = verify_recording(recording)
-        assert [damage.at for damage in recording.damage] == [begin]
+        assert [region.offset for region in recording.corrupt_regions] == [begin]
     assert result.first_difference is None, str(result.first_difference)
     assert result.missing == [(61, 70)]
     assert 10 <= result.skipped <= 20
@@ -152,7 +152,7 @@ def test_recovered_it_is_whole_again(run: Path, tmp_path: Path, capsys: pytest.C
 def test_recovering_twice_changes_nothing(run: Path, tmp_path: Path) -> None:
     first = recover(run, tmp_path / "1.mcap")
     second = recover(tmp_path / "1.mcap", tmp_path / "2.mcap")
-    assert (first.finished, first.damage) == (True, ())
+    assert (first.finished, first.corrupt_regions) == (True, ())
     assert (first.messages, first.cycles, first.chunks) == (second.messages, 200, second.chunks)
     assert (tmp_path / "1.mcap").read_bytes() == (tmp_path / "2.mcap").read_bytes()
 
@@ -164,7 +164,7 @@ def test_without_its_first_chunk_a_recording_is_still_known(run: Path, tmp_path:
     data[end - 3] ^= 0xFF
     (tmp_path / "x.mcap").write_bytes(data)
     got = recover(tmp_path / "x.mcap", tmp_path / "y.mcap")
-    assert [damage.at for damage in got.damage] == [begin]
+    assert [region.offset for region in got.corrupt_regions] == [begin]
     cycles = [decode(Cycle, e.data).record.cycle for e in entries_of(tmp_path / "y.mcap") if e.topic == CYCLE]
     assert cycles == list(range(11, 201))
     with open_recording(tmp_path / "y.mcap") as recording:

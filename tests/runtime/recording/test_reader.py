@@ -41,10 +41,15 @@ def told(command: tuple[str, ...], file: Path, out: Path, capsys: pytest.Capture
 def newer(hall_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recording as a later version of this program would write it, with a topic that this one does not know."""
     path = tmp_path_factory.mktemp("newer") / "newer.mcap"
-    first, *rest = entries_of(hall_run)
-    about = decode(RunInfo, first.data).model_copy(update={"format": FORMAT + 1})
-    rewrite([RawMessage(RUN_INFO, first.log_ns, encode(about)), *rest], path, f"echolocate/{FORMAT + 1}")
+    rewrite_as(hall_run, path, FORMAT + 1)
     return path
+
+
+def rewrite_as(source: Path, path: Path, version: int) -> None:
+    """Write a recording again with another format version."""
+    first, *rest = entries_of(source)
+    info = decode(RunInfo, first.data).model_copy(update={"format": version})
+    rewrite([RawMessage(RUN_INFO, first.log_ns, encode(info)), *rest], path, f"echolocate/{version}")
 
 
 @pytest.mark.parametrize("command", COMMANDS.values(), ids=COMMANDS)
@@ -71,15 +76,20 @@ def test_wrong_files(command: tuple[str, ...], tmp_path: Path, capsys: pytest.Ca
 
 
 @pytest.mark.parametrize("command", READING.values(), ids=READING)
-def test_a_file_of_a_newer_version(
-    command: tuple[str, ...], newer: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    code, line = told(command, newer, tmp_path / "out", capsys)
+@pytest.mark.parametrize(
+    ("version", "word"), [(FORMAT + 1, "a newer echolocate"), (FORMAT - 1, "the older echolocate")]
+)
+def test_another_format_is_refused_with_both_versions(
+    command: tuple[str, ...], version: int, word: str, hall_run: Path, tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    path = tmp_path / "other.mcap"
+    rewrite_as(hall_run, path, version)
+    code, line = told(command, path, tmp_path / "out", capsys)
     assert code == WRONG_CALL
-    assert (
-        f"was written by a newer program (echolocate 9, format {FORMAT + 1}; this one reads up to {FORMAT})" in line
-    )
-    assert "update echolocate" in line
+    assert f"has recording format {version} (written by echolocate 9)" in line
+    assert f"reads format {FORMAT} only" in line
+    assert word in line
 
 
 @pytest.mark.parametrize("command", READING.values(), ids=READING)
@@ -91,7 +101,7 @@ def test_a_message_of_another_form(
     rewrite([e._replace(data=b'{"record": 7}') if e.topic == CYCLE else e for e in entries_of(hall_run)], odd)
     code, line = told(command, odd, tmp_path / "out", capsys)
     assert code == WRONG_CALL
-    assert "a form that this version does not know (record: " in line
+    assert "is not valid in this version (record: " in line
 
 
 def test_a_newer_file_is_restored_as_it_is_or_refused_as_newer(
@@ -104,10 +114,10 @@ def test_a_newer_file_is_restored_as_it_is_or_refused_as_newer(
     capsys.readouterr()
     assert entries_of_any(restored) == entries_of_any(newer)
     code, line = told(READING["replay"], restored, tmp_path / "out", capsys)
-    assert (code, "newer program" in line) == (WRONG_CALL, True)
+    assert (code, f"format {FORMAT + 1} " in line) == (WRONG_CALL, True)
     cut.write_bytes(newer.read_bytes()[:90])
     code, line = told(COMMANDS["recover"], cut, tmp_path / "none.mcap", capsys)
-    assert (code, "newer program" in line) == (WRONG_CALL, True)
+    assert (code, f"format {FORMAT + 1} " in line) == (WRONG_CALL, True)
 
 
 def entries_of_any(path: Path) -> list[RawMessage]:

@@ -112,7 +112,7 @@ def test_what_does_not_fit_is_dropped_counted_and_got_over(tmp_path: Path) -> No
         count += 1
         if count == 100:
             recorder.__enter__()
-        while count >= 100 and len(recorder._writer.queue) > 20:
+        while count >= 100 and len(recorder._writer.thread._queue) > 20:
             time.sleep(0.001)
         recorder.on_cycle(cycle, state)
 

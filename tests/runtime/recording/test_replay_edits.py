@@ -29,10 +29,10 @@ from runtime.cycle.drive_requests import Legs
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord, Edit, State
-from runtime.recording.channels import CYCLE, KEYFRAME, RawMessage, decode
+from runtime.recording.channels import CYCLE, RawMessage, decode
 from runtime.recording.reader import open_recording
-from runtime.recording.replayer import verify_recording
-from runtime.recording.schema import Cycle, Keyframe
+from runtime.recording.schema import Cycle
+from runtime.recording.verification import verify_recording
 from runtime.simulation.closed_loop import OperatorInput
 from tests.recorded import entries_of, hall, record, rewrite
 
@@ -155,50 +155,3 @@ def test_without_one_edit_the_replay_goes_another_way(edited: Path, tmp_path: Pa
         result = verify_recording(recording)
     assert result.first_difference is not None
     assert result.first_difference.cycle >= 150
-
-
-NEW = {
-    "inputs": ("drive_request", "edits"), "record": ("refused",), "left": ("drive_request", "requested_run_s", "vectors", "status"),
-}  # fmt: skip
-ARRAYS = (
-    ".memory.names", ".memory.tally", ".memory.stamps", ".memory.barred", "._pins.", ".outline.numbers",
-    ".outline.pinned", "candidates.numbers", "candidates._numbers_before", "_names.", ".placements.", "._rejections.",
-    "._by_hand",
-)  # fmt: skip
-
-
-def of_an_older_program(entry: RawMessage) -> RawMessage:
-    """Return a message without what this program has added to it."""
-    told = orjson.loads(entry.data)
-    if entry.topic == CYCLE:
-        for name in NEW["inputs"]:
-            del told["record"]["inputs"][name]
-        for name in NEW["record"]:
-            del told["record"][name]
-    elif entry.topic == KEYFRAME:
-        from runtime.recording.schema import keyframe, perception_snapshot
-
-        frame = decode(Keyframe, entry.data)
-        memory = perception_snapshot(frame)
-        older = {name: a for name, a in memory.items() if not any(part in f".{name}" for part in ARRAYS)}
-        assert len(older) < len(memory)
-        left = {name: getattr(frame.left, name) for name in type(frame.left).model_fields}
-        told = orjson.loads(keyframe(frame.cycle, left, older).model_dump_json())
-        for name in NEW["left"]:
-            del told["left"][name]
-    return entry._replace(data=orjson.dumps(told))
-
-
-@pytest.mark.compiled
-@pytest.mark.parametrize("method", ["bayes", "paper"])
-def test_recordings_of_older_programs_are_read(method: str, tmp_path: Path) -> None:
-    record(hall(f"perception.method={method}"), tmp_path / "new.mcap", 12.0)
-    rewrite([of_an_older_program(entry) for entry in entries_of(tmp_path / "new.mcap")], tmp_path / "old.mcap")
-    for since_s in (0.0, 7.0):
-        with open_recording(tmp_path / "old.mcap") as recording:
-            result = verify_recording(recording, since_s=since_s)
-        assert result.first_difference is None, str(result.first_difference)
-        assert result.keyframes >= 1
-        assert result.state is not None
-        assert result.state.perception.objects()
-        assert result.state.drive_request == Legs()

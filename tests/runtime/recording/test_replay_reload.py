@@ -11,8 +11,8 @@ from runtime.analysis.comparison import compare_runs
 from runtime.cli.app import run_command
 from runtime.recording.channels import CYCLE, KEYFRAME, RUN_INFO, SETTINGS, decode
 from runtime.recording.reader import open_recording, parse_settings
-from runtime.recording.replayer import verify_recording
 from runtime.recording.schema import RunInfo, SettingsChange
+from runtime.recording.verification import verify_recording
 from tests.recorded import entries_of, hall, record, rewrite
 
 AT = 150
@@ -71,8 +71,8 @@ def test_it_is_in_the_record_and_in_force_from_its_cycle_on(reloaded: Path, tmp_
 def test_a_retelling_knows_of_it(reloaded: Path) -> None:
     with open_recording(reloaded) as recording:
         told = compare_runs(recording, recording.settings)
-    assert told.first_other_s is not None
-    assert told.first_other_s >= (AT - 1) / 20.0 - 0.1
+    assert told.first_change_s is not None
+    assert told.first_change_s >= (AT - 1) / 20.0 - 0.1
 
 
 def test_a_run_without_a_cycle_is_told_plainly(

@@ -252,7 +252,9 @@ def test_round_trip_to_the_bit(tmp_path: Path, firings: list[Firing]) -> None:
     path = tmp_path / "log.csv"
     write_ring_log(path, iter(firings))
     nan = np.float64(math.nan)
-    canonical = [Firing(f.robot_s, f.pose, f.ring_yaw, np.where(np.isnan(f.ranges_m), nan, f.ranges_m)) for f in firings]
+    canonical = [
+        Firing(f.robot_s, f.pose, f.ring_yaw, np.where(np.isnan(f.ranges_m), nan, f.ranges_m)) for f in firings
+    ]
     same(read_ring_log(path, len(firings[0].ranges_m)), canonical)
 
 

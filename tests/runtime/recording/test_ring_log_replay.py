@@ -104,19 +104,19 @@ def test_a_memory_that_differs_is_named(run: Path, tmp_path: Path) -> None:
     frame = decode(Keyframe, entries[where].data)
     memory = perception_snapshot(frame)
     name = next(name for name in memory if name.endswith("hist"))
-    from runtime.recording.schema import CarriedState, keyframe
+    from runtime.recording.schema import keyframe, state_fields
 
     changed = memory[name].copy()
     changed.flat[0] = changed.flat[0] + 1e-9
-    left = {f: getattr(frame.left, f) for f in CarriedState.model_fields}
-    entries[where] = entries[where]._replace(data=encode(keyframe(frame.cycle, left, {**memory, name: changed})))
+    altered = keyframe(frame.cycle, frame.run_s, state_fields(frame), {**memory, name: changed})
+    entries[where] = entries[where]._replace(data=encode(altered))
     rewrite(entries, tmp_path / "x.mcap")
     result = verify_file(tmp_path / "x.mcap")
     assert result.differences == 1
     assert result.first_difference is not None
     assert (result.first_difference.cycle, result.first_difference.field.split("[")[0]) == (
         frame.cycle,
-        f"memory {name}",
+        f"perception {name}",
     )
 
 
@@ -175,7 +175,7 @@ def test_a_newer_file_and_a_strange_one(run: Path, tmp_path: Path, capsys: pytes
     about = decode(RunInfo, entries[0].data)
     newer = [entries[0]._replace(data=encode(about.model_copy(update={"format": FORMAT + 1}))), *entries[1:]]
     rewrite(newer, Path(path), f"echolocate/{FORMAT + 1}")
-    assert "newer program" in complaint(["replay", path], capsys, WRONG_CALL)
+    assert f"has recording format {FORMAT + 1} " in complaint(["replay", path], capsys, WRONG_CALL)
     odd = about.model_copy(update={"settings": {**about.settings, "warp": 9}})
     rewrite([entries[0]._replace(data=encode(odd)), *entries[1:]], Path(path))
     assert "warp" in complaint(["replay", path], capsys, WRONG_CALL)

@@ -34,16 +34,16 @@ def stuck(path: Path) -> int:
 def test_a_ring_log_on_a_disk_that_stands_still_fills_no_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ringlog_writer, "WAITING_MAX", 64)
+    monkeypatch.setattr(ringlog_writer, "QUEUE_MAX", 64)
     path, read = tmp_path / "log.csv", bytearray()
     out = stuck(path)
     count = 5000
     with RingLogWriter(path) as writer:
         for number in range(count):
             writer.put(firing(number))
-        assert writer._waiting.qsize() <= 64
+        assert len(writer._thread._queue) <= 64
         assert writer.status.dropped > 0
-        assert "more slowly than they come" in str(writer.status.last_error)
+        assert "faster than the disk takes them" in str(writer.status.last_error)
         assert writer.probe() is None, "a slow disk is no part's end"
         os.set_blocking(out, True)
         reader = threading.Thread(target=lambda: read.extend(b"".join(iter(lambda: os.read(out, 65536), b""))))

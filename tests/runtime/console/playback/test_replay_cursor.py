@@ -149,7 +149,7 @@ def test_bookmarks(run: Path, tmp_path: Path) -> None:
     entries, path = entries_of(run), tmp_path / "marked.mcap"
     cycles = [at for at, entry in enumerate(entries) if entry.topic == CYCLE]
     at = cycles[40]
-    mark = RawMessage(BOOKMARK, entries[at].log_ns, encode(Bookmark(cycle=41, text="here <it> was")))
+    mark = RawMessage(BOOKMARK, entries[at].log_ns, encode(Bookmark(run_s=2.05, cycle=41, text="here <it> was")))
     rewrite([*entries[: at + 1], mark, *entries[at + 1 :]], path)
     with open_recording(path) as recording:
         playback = ReplayCursor(recording)

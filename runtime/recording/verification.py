@@ -1,0 +1,207 @@
+"""Verification of a recording: every replayed cycle, and every state at a keyframe, must equal the recorded one."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+import orjson
+
+from runtime.cycle.step import CycleRecord, State
+from runtime.recording.channels import CYCLE, encode
+from runtime.recording.reader import Recording, cycle_head
+from runtime.recording.replayer import KeyframeFinder, KeyframePosition, Replayer, ReplayStep
+from runtime.recording.schema import CarriedState, Cycle, Keyframe, carried_state, perception_snapshot
+from runtime.timing.cycle_stats import CycleStats
+
+ABSENT: Final = "nothing"
+OnStep = Callable[[ReplayStep, Replayer], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """A place where replay and recording differ."""
+
+    cycle: int
+    field: str
+    recorded: object
+    replayed: object
+
+    def __str__(self) -> str:
+        return f"cycle {self.cycle}: {self.field} was {self.recorded} and is {self.replayed} now"
+
+
+@dataclass(slots=True)
+class ReplayResult:
+    """What a replay found."""
+
+    cycles: int = 0
+    """Replayed and compared."""
+    differences: int = 0
+    first_difference: Difference | None = None
+    first_cycle: int | None = None
+    """The first cycle that was replayed."""
+    keyframes: int = 0
+    """Compared with the replayed state."""
+    skipped: int = 0
+    """Cycles not replayed: something before them is missing, and no keyframe has followed yet."""
+    missing: list[tuple[int, int]] = field(default_factory=list)
+    """First and last cycle of each gap in the recording."""
+    refinement_stops: Counter[str] = field(default_factory=Counter)
+    """How often refinement ended for which cause."""
+    recorded_s: float = 0.0
+    """Time of the run that was replayed, by the run's clock."""
+    elapsed_s: float = 0.0
+    """What the replay took."""
+    state: State | None = None
+    """At the end of the replay."""
+    cycle_stats: CycleStats = field(default_factory=lambda: CycleStats(late_after_s=float("inf")))
+    """What the steps took."""
+
+    @property
+    def times_real_time(self) -> float:
+        """How much faster the replay was than the run."""
+        return self.recorded_s / self.elapsed_s if self.elapsed_s else 0.0
+
+
+def verify_recording(
+    recording: Recording, *, since_s: float = 0.0, until_s: float = float("inf"), on_step: OnStep | None = None
+) -> ReplayResult:
+    """Replay a recording, compare every cycle and keyframe with it, and return what was found.
+
+    Parameters
+    ----------
+    recording : Recording
+        May be damaged: after a gap the replay goes on at the next keyframe.
+    since_s, until_s : float
+        Which part to replay, in s of the run's clock after the first cycle; it starts at the last keyframe before.
+    on_step : callable, optional
+        Called with every step and the replayer.
+    """
+    start, first_run_s = _keyframe_before(recording, since_s)
+    replayer, verifier = Replayer(recording, start), Verifier()
+    started_s = time.perf_counter()
+    for found in replayer:
+        if found.recorded is not None and found.recorded.inputs.run_s - first_run_s > until_s:
+            break
+        verifier.check(found, replayer)
+        if on_step is not None:
+            on_step(found, replayer)
+    verifier.result.elapsed_s = time.perf_counter() - started_s
+    verifier.result.state = replayer.state
+    return verifier.result
+
+
+def _keyframe_before(recording: Recording, since_s: float) -> tuple[KeyframePosition | None, float]:
+    """Return the last keyframe up to `since_s` after the first cycle, if any, and the time of that cycle, s."""
+    first_run_s, start, finder = math.inf, None, KeyframeFinder(recording)
+    is_before = True
+    for offset, chunk in recording.chunks():
+        for message in chunk:
+            frame = finder.find(offset, message)
+            if message.topic == CYCLE:
+                _, run_s = cycle_head(message)
+                first_run_s = min(first_run_s, run_s)
+                is_before = run_s - first_run_s <= since_s
+                if not since_s:
+                    return None, first_run_s
+            elif frame is not None and is_before and first_run_s < math.inf:
+                start = frame
+    return start, first_run_s
+
+
+class Verifier:
+    """Compares the steps of a replay with the recording.
+
+    Attributes
+    ----------
+    result : ReplayResult
+        What was found so far.
+    """
+
+    def __init__(self) -> None:
+        self.result = ReplayResult()
+        self._last: CycleRecord | None = None
+
+    def check(self, found: ReplayStep, replayer: Replayer) -> None:
+        """Compare one step.
+
+        Parameters
+        ----------
+        found : ReplayStep
+            The next step.
+        replayer : Replayer
+            That gave it.
+        """
+        if found.recorded is not None:
+            self._check_cycle(found, found.recorded)
+        elif found.keyframe is not None and replayer.state is not None:
+            self.result.keyframes += 1
+            difference = _keyframe_difference(found.keyframe, replayer.state)
+            self._count(found.keyframe.cycle, difference)
+
+    def _check_cycle(self, found: ReplayStep, recorded: CycleRecord) -> None:
+        result, last, self._last = self.result, self._last, recorded
+        if last is not None and recorded.cycle != last.cycle + 1:
+            result.missing.append((last.cycle + 1, recorded.cycle - 1))
+        if found.replayed is None:
+            if last is None:
+                result.missing.append((1, recorded.cycle - 1))
+            result.skipped += 1
+            return
+        result.cycle_stats.add_cycle(found.elapsed_s)
+        result.cycles += 1
+        result.refinement_stops[recorded.refinement] += 1
+        if result.first_cycle is None:
+            result.first_cycle = recorded.cycle
+        if last is not None:
+            result.recorded_s += recorded.inputs.run_s - last.inputs.run_s
+        replayed = encode(Cycle.model_construct(record=found.replayed))
+        if replayed != found.message.data:
+            before, now = orjson.loads(found.message.data), orjson.loads(replayed)
+            self._count(recorded.cycle, find_difference(before["record"], now["record"]))
+
+    def _count(self, cycle: int, difference: tuple[str, object, object] | None) -> None:
+        if difference is None:
+            return
+        self.result.differences += 1
+        if self.result.first_difference is None:
+            self.result.first_difference = Difference(cycle, *difference)
+
+
+def _keyframe_difference(frame: Keyframe, state: State) -> tuple[str, object, object] | None:
+    """Return where a keyframe differs from a state, and both values; None if they are equal."""
+    arrays = state.perception.snapshot()
+    for name, array in perception_snapshot(frame).items():
+        if name not in arrays or array.tobytes() != arrays[name].tobytes():
+            other = arrays.get(name)
+            where = "" if other is None else str(np.argwhere(np.atleast_1d(other != array)).tolist()[:1])
+            return f"perception {name}{where}", "one value", "another"
+    replayed = encode(CarriedState.model_construct(**carried_state(state)))
+    return find_difference(orjson.loads(encode(frame.state)), orjson.loads(replayed), "state.")
+
+
+def find_difference(recorded: Any, replayed: Any, path: str = "") -> tuple[str, object, object] | None:  # noqa: ANN401
+    """Return the first place where two JSON trees differ in any bit, and both values; None if they are equal.
+
+    Parameters
+    ----------
+    recorded, replayed : JSON value
+        The trees.
+    path : str
+        Prefix of the returned place: dotted names from the root.
+    """
+    if isinstance(recorded, dict) and isinstance(replayed, dict):
+        names = [*recorded, *(name for name in replayed if name not in recorded)]
+        pairs = [(name, recorded.get(name, ABSENT), replayed.get(name, ABSENT)) for name in names]
+    elif isinstance(recorded, list) and isinstance(replayed, list) and len(recorded) == len(replayed):
+        pairs = [(str(i), a, b) for i, (a, b) in enumerate(zip(recorded, replayed, strict=True))]
+    else:
+        is_same = type(recorded) is type(replayed) and repr(recorded) == repr(replayed)
+        return None if is_same else (path.rstrip("."), recorded, replayed)
+    return next((found for name, a, b in pairs if (found := find_difference(a, b, f"{path}{name}."))), None)
