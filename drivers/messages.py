@@ -1,7 +1,7 @@
-"""What any robot says and hears, whatever its wire format.
+"""The messages of any robot, whatever its wire format.
 
-These types are the door between drivers/ and everything above it: a further robot is one more folder that
-produces them, and nothing else changes. Everything is SI and radians; counter-clockwise is positive, x forward.
+These types are all that the rest of the program sees of a robot: a further robot is one more folder that produces
+them. Units are SI and radians; counter-clockwise is positive, x points forward.
 """
 
 from __future__ import annotations
@@ -13,27 +13,47 @@ from typing import Annotated, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import GetPydanticSchema
+from pydantic_core import CoreSchema, core_schema
 
-from drivers.json_array import NumberList
 
-Floats: TypeAlias = Annotated[NDArray[np.float64], NumberList()]
+def _array_schema(_source: object, _handler: object) -> CoreSchema:
+    """Return how pydantic writes and reads an array of shape (n,): as a list of numbers, exact to the bit."""
+    numbers = core_schema.list_schema(core_schema.float_schema())
+    return core_schema.no_info_before_validator_function(
+        _as_list,
+        core_schema.no_info_after_validator_function(_as_array, numbers),
+        serialization=core_schema.plain_serializer_function_ser_schema(_as_list, return_schema=numbers),
+    )
+
+
+def _as_list(value: object) -> object:
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _as_array(values: list[float]) -> NDArray[np.float64]:
+    return np.array(values, dtype=np.float64)
+
+
+Floats: TypeAlias = Annotated[NDArray[np.float64], GetPydanticSchema(_array_schema)]
+"""An array of float64; pydantic records one of shape (n,) as a list."""
 
 
 def wrap_angle(angle_rad: float) -> float:
-    """Return `angle_rad` brought into [−π, π)."""
+    """Return the angle wrapped into [−π, π)."""
     return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
 
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """A place and direction in the plane: metres and radians, an element of SE(2)."""
+    """A position and direction in the plane, m and rad: an element of SE(2)."""
 
     x: float
     y: float
     theta: float
 
     def compose(self, other: Pose) -> Pose:
-        """Return `other`, given in this pose's frame, in the frame this pose is given in."""
+        """Return the pose `other`, which is given in this pose's frame, in the frame of this pose."""
         c, s = math.cos(self.theta), math.sin(self.theta)
         return Pose(self.x + c * other.x - s * other.y, self.y + s * other.x + c * other.y, self.theta + other.theta)
 
@@ -52,7 +72,7 @@ class Twist:
 
 
 class Flags(IntFlag):
-    """What the base reports of itself; a robot without one of these never sets it."""
+    """The base's status; a robot that lacks one of these never sets it."""
 
     NONE = 0
     LATCHED = 1
@@ -64,7 +84,7 @@ class Flags(IntFlag):
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What a robot says of itself when asked; a new `boot_id` means that it restarted."""
+    """A robot's description of itself; a new `boot_id` means that it has restarted."""
 
     name: str
     sensors: int
@@ -76,10 +96,23 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class Odometry:
-    """Where the base believes it is, at its own time `robot_s` (seconds since boot, unwrapped).
+    """The base's pose and velocity by its own odometry.
 
-    `pose.theta` is the direction in which the wheels drive; `ring_yaw` the direction of the ring's sensor 0. They
-    are one angle on a base whose body turns with its wheels and two on a synchro drive. Both are unwrapped.
+    Attributes
+    ----------
+    robot_s
+        The robot's own clock: seconds since boot, unwrapped.
+    pose
+        Position, and the direction in which the wheels drive; unwrapped.
+    ring_yaw
+        Direction of the ring's sensor 0, rad, unwrapped. It equals `pose.theta` on a base whose body turns with its
+        wheels, not on a synchro drive.
+    twist
+        The wheels' velocity.
+    flags
+        The base's status.
+    last_drive_seq
+        Number of the last drive command that the base obeyed.
     """
 
     robot_s: float
@@ -92,10 +125,17 @@ class Odometry:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Firing:
-    """One firing of a set of sensors, stamped with the pose at that moment.
+    """One firing of a set of sensors, and the pose of the base when they fired.
 
-    `ranges_m` has shape (sensors,), one entry for each sensor of the ring, fired or not: NaN did not fire (or
-    reported a fault), +inf fired and heard nothing inside the window, else metres. `robot_s` is the robot's own time.
+    Attributes
+    ----------
+    robot_s
+        The robot's own clock when the sensors fired, s.
+    pose, ring_yaw
+        As in `Odometry`, at that time.
+    ranges_m
+        Shape (sensors,), one entry for each sensor of the ring: the range in metres, +inf for a sensor that fired and
+        heard no echo inside its window, NaN for one that did not fire or reported a fault.
     """
 
     robot_s: float
@@ -106,7 +146,7 @@ class Firing:
 
 @dataclass(frozen=True, slots=True)
 class LinkCounts:
-    """What went over the line since it was first opened: good frames in, bad frames, frames known lost."""
+    """Frames received since the line was first opened: valid ones, corrupt ones, and ones known to be lost."""
 
     frames: int = 0
     bad: int = 0

@@ -1,27 +1,45 @@
-"""Where the first echo of each sensor comes from: geometry only, exact, compiled.
+"""Where the first echo of each sensor comes from: exact geometry, compiled; nothing is sampled.
 
-Two models of the beam. `cone`: the nearest surface point inside the beam's sector. `specular`: smooth surfaces are
-mirrors to a wavelength of 7 mm, so a surface answers only from the point whose normal looks back at the sensor, a
-concave corner sends everything back where it came from, a convex edge answers weakly, and what a nearer thing hides
-is not heard. Every distance is exact; nothing is sampled.
+There are two models of the beam. `cone`: the nearest surface point inside the beam's sector. `specular`: at a
+wavelength of 7 mm smooth surfaces are mirrors. A surface then answers only from the point whose normal looks back at
+the sensor, a concave corner reflects sound back to where it came from, a convex edge answers weakly, and a surface
+that a nearer one hides does not answer.
+
+Surfaces, sensors and echoes are structured arrays: one record each, with named fields.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.emulator._jit import kernel
-from drivers.messages import Floats
+
+CIRCLE: Final = np.dtype((np.record, [("x", "f8"), ("y", "f8"), ("radius", "f8")]))
+"""A round surface: its centre and radius, m."""
+SEGMENT: Final = np.dtype((np.record, [("x1", "f8"), ("y1", "f8"), ("x2", "f8"), ("y2", "f8")]))
+"""A straight surface: its two end points, m."""
+CORNER: Final = np.dtype((np.record, [("x", "f8"), ("y", "f8"), ("start", "f8"), ("opening", "f8")]))
+"""An open sector at a point where surfaces meet: the point, m, the direction in which the sector starts, and its
+opening counter-clockwise from there, rad."""
+MOUNT: Final = np.dtype((np.record, [("x", "f8"), ("y", "f8"), ("angle", "f8")]))
+"""A sensor's place and direction in the ring's frame, m and rad."""
+ECHO: Final = np.dtype((np.record, [("distance", "f8"), ("x", "f8"), ("y", "f8")]))
+"""Distance from a sensor to the reflecting point, m, and that point in the world; +inf and NaN if there is none."""
+
+Records: TypeAlias = NDArray[Any]
+"""A structured array of one of the types above, shape (n,)."""
 
 CONVEX_EDGE_REACH_M = 1.0
-"""A convex edge only scatters what diffracts round it, some 20 to 30 dB below a mirror's echo, and that spreads
-again on its way back; a rangefinder tuned for walls ten metres off hears it within about a metre."""
+"""Farthest distance at which a convex edge is detected. An edge scatters only what diffracts round it, some 20 to
+30 dB below a mirror's echo, and that spreads again on its way back; a rangefinder tuned for walls at ten metres
+detects it within about a metre."""
 SIGHT_SLACK_M = 3e-4
-"""A surface nearer than this to a reflecting point does not hide it: that is the surface itself, or one that joins
-it. It is above `scene.JOIN_M`, so that a corner is not hidden by the rounding of its own walls."""
+"""A surface nearer than this to a reflecting point does not hide it: it is the reflecting surface itself, or one that
+joins it. Above `scene.JOIN_M`, so that rounding in a corner's own walls does not hide the corner."""
 
 
 @kernel
@@ -29,49 +47,48 @@ def first_echoes(
     x: float,
     y: float,
     yaw: float,
-    mounts: Floats,
+    mounts: Records,
     fired: NDArray[np.bool_],
     half_angle: float,
     specular: bool,
     edge_reach: float,
     slack: float,
-    circles: Floats,
-    segments: Floats,
-    corners: Floats,
-    out: Floats,
+    circles: Records,
+    segments: Records,
+    corners: Records,
+    out: Records,
 ) -> None:
     """Find the first echo of every sensor that fires.
 
     Parameters
     ----------
     x, y, yaw
-        Place and direction of the ring, metres and radians.
+        Place and direction of the ring in the world, m and rad.
     mounts
-        Shape (sensors, 3): x, y and direction of each sensor in the ring's frame.
+        The sensors: `MOUNT`, shape (sensors,).
     fired
-        Shape (sensors,): who emits.
+        Which sensors emit, shape (sensors,).
     half_angle
-        Half the beam's opening, below π/2.
+        Half of the beam's opening, rad, below π/2.
     specular
-        The model: mirrors, or the nearest point in the beam.
+        True for mirrors, False for the nearest point in the beam.
     edge_reach, slack
-        `CONVEX_EDGE_REACH_M` and `SIGHT_SLACK_M`.
+        `CONVEX_EDGE_REACH_M` and `SIGHT_SLACK_M`, m.
     circles, segments, corners
-        The `Scene`.
+        The surfaces: `CIRCLE`, `SEGMENT` and `CORNER`, shape (n,) each; see `drivers.emulator.scene.Scene`.
     out
-        Shape (sensors, 3), overwritten: distance to the reflecting point and its x, y in the world; the distance is
-        +inf where nothing answers or the sensor did not fire.
+        The echoes: `ECHO`, shape (sensors,), overwritten; none for a sensor that did not fire.
     """
     c, s = math.cos(yaw), math.sin(yaw)
     for i in range(mounts.shape[0]):
-        out[i, 0] = math.inf
-        out[i, 1] = math.nan
-        out[i, 2] = math.nan
+        out[i].distance = math.inf
+        out[i].x = math.nan
+        out[i].y = math.nan
         if not fired[i]:
             continue
-        sx = x + c * mounts[i, 0] - s * mounts[i, 1]
-        sy = y + s * mounts[i, 0] + c * mounts[i, 1]
-        axis = yaw + mounts[i, 2]
+        sx = x + c * mounts[i].x - s * mounts[i].y
+        sy = y + s * mounts[i].x + c * mounts[i].y
+        axis = yaw + mounts[i].angle
         if specular:
             _first_mirror(sx, sy, axis, half_angle, edge_reach, slack, circles, segments, corners, out[i])
         else:
@@ -79,23 +96,23 @@ def first_echoes(
 
 
 @kernel
-def _keep_nearer(distance: float, px: float, py: float, best: Floats) -> None:
-    if distance < best[0]:
-        best[0] = distance
-        best[1] = px
-        best[2] = py
+def _keep_nearer(distance: float, px: float, py: float, best: np.record) -> None:
+    if distance < best.distance:
+        best.distance = distance
+        best.x = px
+        best.y = py
 
 
 @kernel
 def _nearest_in_cone(
-    sx: float, sy: float, axis: float, half_angle: float, circles: Floats, segments: Floats, best: Floats
+    sx: float, sy: float, axis: float, half_angle: float, circles: Records, segments: Records, best: np.record
 ) -> None:
     rx, ry = math.cos(axis - half_angle), math.sin(axis - half_angle)
     lx, ly = math.cos(axis + half_angle), math.sin(axis + half_angle)
     for k in range(circles.shape[0]):
-        cx, cy, radius = circles[k, 0] - sx, circles[k, 1] - sy, circles[k, 2]
+        cx, cy, radius = circles[k].x - sx, circles[k].y - sy, circles[k].radius
         centre = math.hypot(cx, cy)
-        if centre <= radius:  # inside the circle there is no range but the shortest
+        if centre <= radius:  # a sensor inside the circle always reports the shortest range
             _keep_nearer(0.0, sx, sy, best)
         elif rx * cy - ry * cx >= 0.0 and cx * ly - cy * lx >= 0.0:
             gap = centre - radius
@@ -108,8 +125,8 @@ def _nearest_in_cone(
                     reach = along - math.sqrt(radius * radius - off * off)
                     _keep_nearer(reach, sx + reach * ex, sy + reach * ey, best)
     for k in range(segments.shape[0]):
-        ax, ay = segments[k, 0] - sx, segments[k, 1] - sy
-        bx, by = segments[k, 2] - sx, segments[k, 3] - sy
+        ax, ay = segments[k].x1 - sx, segments[k].y1 - sy
+        bx, by = segments[k].x2 - sx, segments[k].y2 - sy
         # The part of the segment left of the right edge and right of the left one: both are linear along it.
         right_a, right_b = rx * ay - ry * ax, rx * by - ry * bx
         left_a, left_b = ax * ly - ay * lx, bx * ly - by * lx
@@ -140,53 +157,65 @@ def _first_mirror(
     half_angle: float,
     edge_reach: float,
     slack: float,
-    circles: Floats,
-    segments: Floats,
-    corners: Floats,
-    best: Floats,
+    circles: Records,
+    segments: Records,
+    corners: Records,
+    best: np.record,
 ) -> None:
     ux, uy = math.cos(axis), math.sin(axis)
     cos_half = math.cos(half_angle)
     for k in range(circles.shape[0]):
-        cx, cy, radius = circles[k, 0] - sx, circles[k, 1] - sy, circles[k, 2]
+        cx, cy, radius = circles[k].x - sx, circles[k].y - sy, circles[k].radius
         centre = math.hypot(cx, cy)
         if centre <= radius:
             _keep_nearer(0.0, sx, sy, best)
         elif cx * ux + cy * uy >= centre * cos_half:
             gap = centre - radius
             px, py = sx + cx / centre * gap, sy + cy / centre * gap
-            if gap < best[0] and not hidden(sx, sy, px, py, slack, circles, segments):
+            if gap < best.distance and not hidden(sx, sy, px, py, slack, circles, segments):
                 _keep_nearer(gap, px, py, best)
     for k in range(segments.shape[0]):
-        ax, ay = segments[k, 0] - sx, segments[k, 1] - sy
-        dx, dy = segments[k, 2] - segments[k, 0], segments[k, 3] - segments[k, 1]
+        ax, ay = segments[k].x1 - sx, segments[k].y1 - sy
+        dx, dy = segments[k].x2 - segments[k].x1, segments[k].y2 - segments[k].y1
         t = -(ax * dx + ay * dy) / (dx * dx + dy * dy)
         if 0.0 <= t <= 1.0:
             px, py = ax + t * dx, ay + t * dy
             foot = math.hypot(px, py)
             if (
-                foot < best[0]
+                foot < best.distance
                 and px * ux + py * uy >= foot * cos_half
                 and not hidden(sx, sy, sx + px, sy + py, slack, circles, segments)
             ):
                 _keep_nearer(foot, sx + px, sy + py, best)
     for k in range(corners.shape[0]):
-        px, py = corners[k, 0] - sx, corners[k, 1] - sy
+        px, py = corners[k].x - sx, corners[k].y - sy
         reach = math.hypot(px, py)
-        side = (math.atan2(-py, -px) - corners[k, 2]) % (2.0 * math.pi)
+        side = (math.atan2(-py, -px) - corners[k].start) % (2.0 * math.pi)
         if (
-            side < corners[k, 3]
-            and (corners[k, 3] < math.pi or reach <= edge_reach)
-            and reach < best[0]
+            side < corners[k].opening
+            and (corners[k].opening < math.pi or reach <= edge_reach)
+            and reach < best.distance
             and px * ux + py * uy >= reach * cos_half
-            and not hidden(sx, sy, corners[k, 0], corners[k, 1], slack, circles, segments)
+            and not hidden(sx, sy, corners[k].x, corners[k].y, slack, circles, segments)
         ):
-            _keep_nearer(reach, corners[k, 0], corners[k, 1], best)
+            _keep_nearer(reach, corners[k].x, corners[k].y, best)
 
 
 @kernel
-def hidden(sx: float, sy: float, px: float, py: float, slack: float, circles: Floats, segments: Floats) -> bool:
-    """Tell whether any surface crosses the line of sight from (sx, sy) to within `slack` of (px, py)."""
+def hidden(sx: float, sy: float, px: float, py: float, slack: float, circles: Records, segments: Records) -> bool:
+    """Return whether any surface crosses the line of sight from a sensor to a reflecting point.
+
+    Parameters
+    ----------
+    sx, sy
+        The sensor, m.
+    px, py
+        The reflecting point, m.
+    slack
+        Surfaces nearer than this to the reflecting point do not count, m.
+    circles, segments
+        The surfaces: `CIRCLE` and `SEGMENT`, shape (n,) each.
+    """
     dx, dy = px - sx, py - sy
     distance = math.hypot(dx, dy)
     reach = distance - slack
@@ -195,13 +224,13 @@ def hidden(sx: float, sy: float, px: float, py: float, slack: float, circles: Fl
     dx /= distance
     dy /= distance
     for k in range(circles.shape[0]):
-        cx, cy = circles[k, 0] - sx, circles[k, 1] - sy
+        cx, cy = circles[k].x - sx, circles[k].y - sy
         t = min(reach, max(0.0, cx * dx + cy * dy))
-        if math.hypot(cx - t * dx, cy - t * dy) < circles[k, 2]:
+        if math.hypot(cx - t * dx, cy - t * dy) < circles[k].radius:
             return True
     for k in range(segments.shape[0]):
-        ax, ay = segments[k, 0] - sx, segments[k, 1] - sy
-        vx, vy = segments[k, 2] - segments[k, 0], segments[k, 3] - segments[k, 1]
+        ax, ay = segments[k].x1 - sx, segments[k].y1 - sy
+        vx, vy = segments[k].x2 - segments[k].x1, segments[k].y2 - segments[k].y1
         side_a = dx * ay - dy * ax
         side_b = side_a + dx * vy - dy * vx
         if side_a * side_b > 0.0 or side_a == side_b:
@@ -213,14 +242,22 @@ def hidden(sx: float, sy: float, px: float, py: float, slack: float, circles: Fl
 
 
 @kernel
-def clearance(x: float, y: float, circles: Floats, segments: Floats) -> float:
-    """Return the distance from (x, y) to the nearest surface, metres; negative inside a circle, +inf in the open."""
+def clearance(x: float, y: float, circles: Records, segments: Records) -> float:
+    """Return the distance from a point to the nearest surface, m; negative inside a circle, +inf without surfaces.
+
+    Parameters
+    ----------
+    x, y
+        The point, m.
+    circles, segments
+        The surfaces: `CIRCLE` and `SEGMENT`, shape (n,) each.
+    """
     nearest = math.inf
     for k in range(circles.shape[0]):
-        nearest = min(nearest, math.hypot(circles[k, 0] - x, circles[k, 1] - y) - circles[k, 2])
+        nearest = min(nearest, math.hypot(circles[k].x - x, circles[k].y - y) - circles[k].radius)
     for k in range(segments.shape[0]):
-        ax, ay = segments[k, 0] - x, segments[k, 1] - y
-        dx, dy = segments[k, 2] - segments[k, 0], segments[k, 3] - segments[k, 1]
+        ax, ay = segments[k].x1 - x, segments[k].y1 - y
+        dx, dy = segments[k].x2 - segments[k].x1, segments[k].y2 - segments[k].y1
         t = min(1.0, max(0.0, -(ax * dx + ay * dy) / (dx * dx + dy * dy)))
         nearest = min(nearest, math.hypot(ax + t * dx, ay + t * dy))
     return nearest

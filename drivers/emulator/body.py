@@ -1,7 +1,7 @@
-"""The base: where it truly is, what it believes, and what its rim runs into.
+"""The base: its true pose, its odometry, and contacts of its rim with surfaces.
 
-Truth and odometry are two states. The truth moves on exact arcs and is stopped by surfaces; the odometry follows
-the wheels with its own errors and knows nothing of the world.
+The true pose and the odometry are two states. The true pose moves on exact arcs and is stopped by surfaces; the
+odometry follows the wheels with its own errors and does not depend on the world.
 """
 
 from __future__ import annotations
@@ -17,22 +17,41 @@ from drivers.emulator.scene import Scene
 from drivers.messages import Pose, Twist, wrap_angle
 
 BRAKE_S = 0.1
-"""A hard brake takes this long from full speed: what "stops at once" means for a base with mass."""
+"""Duration of a hard brake from full speed, s; what the protocol's "at once" means for a base with mass."""
 RAMP_S = 0.25
-"""A ramp to a stop takes this long from full speed, where the base's own acceleration is not quicker still."""
+"""Duration of a ramped stop from full speed, s, unless the base's own acceleration is higher."""
 _BISECTIONS = 40
+"""Halvings of a step in the search for the point of contact: 2⁻⁴⁰ of a step is below any surface's precision."""
+_CLEAR_MIN_M = 1e-6
+"""With this much room left no rounding can hide a contact, m."""
+_STRAIGHT_RAD = 1e-9
+"""Half turn below which sin(x)/x is 1 in float64."""
 
 
 def arc(pose: Pose, distance_m: float, turn_rad: float) -> Pose:
-    """Return `pose` after a circular arc: the exponential of SE(2), its chord written with sin(x)/x."""
+    """Return the pose at the end of a circular arc.
+
+    Parameters
+    ----------
+    pose
+        Where the arc starts.
+    distance_m
+        Its length; negative = backwards.
+    turn_rad
+        The change of heading along it.
+
+    Notes
+    -----
+    The exponential of SE(2), Sola et al., *A micro Lie theory*, eq. 155-158, the chord written with sin(x)/x.
+    """
     half = 0.5 * turn_rad
-    chord = distance_m * (math.sin(half) / half if abs(half) > 1e-9 else 1.0)
+    chord = distance_m * (math.sin(half) / half if abs(half) > _STRAIGHT_RAD else 1.0)
     direction = pose.theta + half
     return Pose(pose.x + chord * math.cos(direction), pose.y + chord * math.sin(direction), pose.theta + turn_rad)
 
 
 def _approach(speed: float, target: float, rate: float, dt_s: float) -> tuple[float, float]:
-    """Return the speed after dt_s towards `target` at constant acceleration `rate`, and the way covered."""
+    """Return the speed after `dt_s` of constant acceleration `rate` towards `target`, and the distance covered."""
     ramp_s = abs(target - speed) / rate
     if ramp_s <= dt_s:
         return target, 0.5 * (speed + target) * ramp_s + target * (dt_s - ramp_s)
@@ -46,26 +65,26 @@ class Body:
     Parameters
     ----------
     config
-        Size and limits; `synchro` keeps the ring's direction while the wheels turn.
+        Size and limits; on a synchro drive the ring keeps its direction while the wheels turn.
     scene
-        What stops the rim.
+        The surfaces that stop the rim.
     start
-        The true pose at time zero; odometry begins at zero there.
+        The true pose at time zero, where the odometry is zero.
     odometry
         How the odometry drifts.
     rng
-        The drift's source of randomness.
+        Source of the drift's random numbers.
 
     Attributes
     ----------
     pose, ring_yaw
-        The truth, in world coordinates; angles are unwrapped.
-    believed, believed_ring_yaw
+        The true pose, in world coordinates; angles are unwrapped.
+    odometry_pose, odometry_ring_yaw
         The odometry.
     twist
-        The wheels' speed now.
+        The wheels' velocity.
     contacts
-        How often the rim has run into something.
+        How often the rim has touched a surface.
     """
 
     def __init__(
@@ -73,39 +92,57 @@ class Body:
     ) -> None:
         self._config = config
         self._scene = scene
-        self._odometry = odometry
+        self._odometry_errors = odometry
         self._rng = rng
         self.pose = start
         self.ring_yaw = start.theta
-        self.believed = Pose(0.0, 0.0, 0.0)
-        self.believed_ring_yaw = 0.0
+        self.odometry_pose = Pose(0.0, 0.0, 0.0)
+        self.odometry_ring_yaw = 0.0
         self.twist = Twist(0.0, 0.0)
         self.contacts = 0
-        self._known: tuple[Pose, float] | None = None
-        """The last pose that was asked about and its clearance, m: one step ends where the next one begins."""
+        self._last_clearance: tuple[Pose, float] | None = None
+        """The pose whose clearance was computed last, and that clearance, m: the end of a step is the next one's start."""
+        self._clear_m = -math.inf
+        """A lower bound of the clearance at `pose`, m."""
 
     @property
     def clearance_m(self) -> float:
-        """Distance from the rim to the nearest surface; never below zero unless the robot starts there."""
+        """Distance from the rim to the nearest surface, m; below zero only if the robot starts there."""
         return self._clearance(self.pose)
 
     def reset_odometry(self) -> None:
-        """Begin the odometry at zero here; the ring's angle to the wheels is read off its gear and survives."""
-        self.believed = Pose(0.0, 0.0, 0.0)
-        self.believed_ring_yaw = wrap_angle(self.ring_yaw - self.pose.theta)
+        """Set the odometry to zero; the ring's angle to the wheels is measured at its gear and stays."""
+        self.odometry_pose = Pose(0.0, 0.0, 0.0)
+        self.odometry_ring_yaw = wrap_angle(self.ring_yaw - self.pose.theta)
 
     def jump_odometry(self, dx_m: float, dy_m: float, dheading_rad: float) -> None:
-        """Shift what the odometry believes, by a vector in its own frame and an angle."""
-        old = self.believed
-        self.believed = Pose(old.x + dx_m, old.y + dy_m, old.theta + dheading_rad)
-        self.believed_ring_yaw += dheading_rad
+        """Shift the odometry.
+
+        Parameters
+        ----------
+        dx_m, dy_m
+            By this vector in the odometry's frame.
+        dheading_rad
+            By this angle.
+        """
+        old = self.odometry_pose
+        self.odometry_pose = Pose(old.x + dx_m, old.y + dy_m, old.theta + dheading_rad)
+        self.odometry_ring_yaw += dheading_rad
 
     def step(self, dt_s: float, target: Twist, *, within_s: float | None = None) -> bool:
-        """Let `dt_s` pass, the wheels on their way to `target`; return whether the rim ran into something.
+        """Move the base for `dt_s` and return whether its rim touched a surface.
 
-        With `within_s` the wheels change their speed by their full speed in that time, even where the limits on
-        acceleration are lower. A contact stops the wheels dead, at the surface; from there the body can move away,
-        and any motion towards the surface is a new contact.
+        A contact stops the wheels at once, at the surface. From there the body can move away; any motion towards the
+        surface is a new contact.
+
+        Parameters
+        ----------
+        dt_s
+            Duration of the step.
+        target
+            The velocity the wheels accelerate towards.
+        within_s
+            Time in which the wheels change by their full speed, even if the limits on acceleration are lower.
         """
         limits = self._config
         rate, turn_rate = limits.acceleration_max_m_s2, limits.turn_acceleration_max_rad_s2
@@ -131,17 +168,21 @@ class Body:
         return False
 
     def _clearance(self, pose: Pose) -> float:
-        if self._known is not None and self._known[0] is pose:
-            return self._known[1]
+        if self._last_clearance is not None and self._last_clearance[0] is pose:
+            return self._last_clearance[1]
         here_m = clearance(pose.x, pose.y, self._scene.circles, self._scene.segments) - self._config.radius_m
-        self._known = (pose, here_m)
+        self._last_clearance = (pose, here_m)
         return here_m
 
     def _free_share(self, end: Pose, distance: float, turn: float) -> float:
-        """Return how much of the arc to `end` can be driven, 0 to 1, before the rim touches."""
+        """Return which share of the arc to `end`, 0 to 1, can be driven before the rim touches a surface."""
         if distance == 0.0:
             return 1.0
+        self._clear_m -= abs(distance)  # no surface can come nearer by more than the distance driven
+        if self._clear_m > _CLEAR_MIN_M:
+            return 1.0
         before, after = self._clearance(self.pose), self._clearance(end)
+        self._clear_m = after
         if after >= min(0.0, before):
             return 1.0
         free, blocked = 0.0, 1.0
@@ -154,17 +195,17 @@ class Body:
         return free
 
     def _move(self, distance: float, turn: float) -> float:
-        """Move along the arc as far as it is free; return how much of it that is."""
+        """Move along the arc as far as it is free, and return which share of it that is."""
         end = arc(self.pose, distance, turn)
         share = self._free_share(end, distance, turn)
         if share < 1.0:
             distance, turn = share * distance, share * turn
             end = arc(self.pose, distance, turn)
         self.pose = end
-        drift = self._odometry.heading_rad_per_sqrt_m
+        drift = self._odometry_errors.heading_rad_per_sqrt_m
         wander = drift * math.sqrt(abs(distance)) * self._rng.standard_normal() if drift > 0.0 else 0.0
-        self.believed = arc(self.believed, self._odometry.scale * distance, turn + wander)
+        self.odometry_pose = arc(self.odometry_pose, self._odometry_errors.scale * distance, turn + wander)
         if not self._config.synchro:
             self.ring_yaw += turn
-            self.believed_ring_yaw += turn + wander
+            self.odometry_ring_yaw += turn + wander
         return share

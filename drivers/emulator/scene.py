@@ -1,8 +1,8 @@
-"""A world file as plain arrays: circles, straight surfaces, and the corners where surfaces meet.
+"""A world file as arrays: circles, straight surfaces, and the corners where surfaces meet.
 
-A corner is described by the open sectors round it, because what a corner does to sound depends on the side it is
-seen from: a sector narrower than half a turn is a concave corner to whoever stands in it, a wider one a convex edge.
-A wall that ends on another wall, or crosses it, makes corners as well.
+A corner is described by the open sectors round it, because it reflects sound differently to each side: seen from
+inside a sector narrower than half a turn it is a concave corner, from a wider one a convex edge. A wall that ends on
+another wall, or crosses it, makes corners as well.
 """
 
 from __future__ import annotations
@@ -13,34 +13,35 @@ from dataclasses import dataclass
 import numpy as np
 
 from config.world import BoxConfig, PolygonConfig, WorldConfig
-from drivers.messages import Floats
+from drivers.emulator.acoustics import CIRCLE, CORNER, SEGMENT, Records
 
 JOIN_M = 1e-4
-"""Surfaces whose ends are nearer than this meet: a world file is typed with rounded numbers."""
+"""Surfaces whose end points are nearer than this meet: people type rounded numbers into world files."""
 _FLAT_RAD = 1e-3
-"""Two surfaces that go on in one direction make no corner."""
+"""Two surfaces whose directions differ by less than this make no corner."""
+_PARALLEL = 1e-12
+"""Sine of the angle below which two sides count as parallel: rounding makes any crossing of theirs meaningless."""
 
 _Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """What reflects and what the body can hit, in world coordinates; float64, C order.
+    """What reflects sound and stops the body, in world coordinates; types of records as in `acoustics`.
 
     Attributes
     ----------
     circles
-        Shape (circles, 3): centre x, y and radius, metres.
+        `CIRCLE`, shape (circles,).
     segments
-        Shape (segments, 4): x and y of both ends, metres.
+        `SEGMENT`, shape (segments,).
     corners
-        Shape (sectors, 4): x, y, the direction in which an open sector begins, and its opening counter-clockwise
-        from there; metres and radians.
+        `CORNER`, shape (sectors,).
     """
 
-    circles: Floats
-    segments: Floats
-    corners: Floats
+    circles: Records
+    segments: Records
+    corners: Records
 
 
 def compile_scene(world: WorldConfig) -> Scene:
@@ -50,14 +51,10 @@ def compile_scene(world: WorldConfig) -> Scene:
         sides += zip(outline, outline[1:] + outline[:1], strict=True)
     sides = [(a, b) for a, b in sides if math.dist(a, b) > JOIN_M]
     return Scene(
-        circles=_table([(drum.x_m, drum.y_m, drum.radius_m) for drum in world.drum], 3),
-        segments=_table([(*a, *b) for a, b in sides], 4),
-        corners=_table(_sectors(sides), 4),
+        circles=np.array([(drum.x_m, drum.y_m, drum.radius_m) for drum in world.drum], dtype=CIRCLE),
+        segments=np.array([(*a, *b) for a, b in sides], dtype=SEGMENT),
+        corners=np.array(_sectors(sides), dtype=CORNER),
     )
-
-
-def _table(rows: list[tuple[float, ...]], columns: int) -> Floats:
-    return np.array(rows, dtype=np.float64).reshape(len(rows), columns)
 
 
 def _box_outline(box: BoxConfig) -> list[_Point]:
@@ -101,7 +98,7 @@ def _crossing(first: tuple[_Point, _Point], second: tuple[_Point, _Point]) -> _P
     (cx, cy), (dx, dy) = second
     ux, uy, vx, vy = bx - ax, by - ay, dx - cx, dy - cy
     across = ux * vy - uy * vx
-    if abs(across) < 1e-12 * math.hypot(ux, uy) * math.hypot(vx, vy):
+    if abs(across) < _PARALLEL * math.hypot(ux, uy) * math.hypot(vx, vy):
         return None
     t = ((cx - ax) * vy - (cy - ay) * vx) / across
     s = ((cx - ax) * uy - (cy - ay) * ux) / across

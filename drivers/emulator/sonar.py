@@ -1,7 +1,7 @@
-"""The ring's electronics: what the sensors report of the echoes that the scene sends back.
+"""The ring's electronics: the ranges that the sensors report, given the echoes of a scene.
 
-Serves any ring, with the protocol or without it: ranges come out in metres, quantised by the ring's resolution.
-The draws of a firing are always the same in number and order, so that one seed gives one run.
+Serves any ring and any protocol: ranges are in metres, quantised by the ring's resolution. A firing always draws the
+same number of random numbers in the same order, so that the same seed gives the same run.
 """
 
 from __future__ import annotations
@@ -14,15 +14,23 @@ from numpy.typing import NDArray
 
 from config.robot import RingConfig
 from config.world import AcousticsConfig
-from drivers.emulator.acoustics import CONVEX_EDGE_REACH_M, SIGHT_SLACK_M, first_echoes, hidden
+from drivers.emulator.acoustics import (
+    CONVEX_EDGE_REACH_M,
+    ECHO,
+    MOUNT,
+    SIGHT_SLACK_M,
+    Records,
+    first_echoes,
+    hidden,
+)
 from drivers.emulator.scene import Scene
 from drivers.messages import Floats, Pose, wrap_angle
 
 LISTENING_LOBE = 2.0
-"""How far off its axis a sensor hears another's pulse, in beam half-angles. The beam's edge is where emission and
-reception together fall below what the electronics detect; for a foreign pulse only reception is off its axis, which
-costs half the decibels, so it is heard farther out: about √2 times for an ordinary echo, about twice for a strong
-one, and strong ones are those that matter here."""
+"""How far off its axis a sensor hears another sensor's pulse, in beam half-angles. At the beam's edge the losses of
+emission and reception together reach the detection limit. For a foreign pulse only reception is off axis, which costs
+half the decibels, so the limit lies farther out: about √2 times for an ordinary echo, about twice for a strong one.
+Strong echoes are those that cause crosstalk."""
 
 
 class Sonar:
@@ -31,13 +39,13 @@ class Sonar:
     Parameters
     ----------
     ring
-        Where the sensors sit, their beam, and how they quantise.
+        The sensors' places, beam and resolution.
     scene
-        What answers.
+        The surfaces that reflect.
     acoustics
-        The model of reflection and everything that spoils a range.
+        The model of reflection and the errors of a range.
     rng
-        The only source of randomness.
+        The only source of random numbers.
     """
 
     def __init__(self, ring: RingConfig, scene: Scene, acoustics: AcousticsConfig, rng: np.random.Generator) -> None:
@@ -45,42 +53,43 @@ class Sonar:
         self._scene = scene
         self._acoustics = acoustics
         self._rng = rng
-        self._mounts: Floats = np.array(ring.mounts, dtype=np.float64).reshape(-1, 3)
+        self._mount_poses = [Pose(*mount) for mount in ring.mounts]
+        self._mounts: Records = np.array(list(ring.mounts), dtype=MOUNT)
         self._half_angle = math.radians(ring.beam_half_angle_deg)
         self._is_clean = not (
             acoustics.noise_relative or acoustics.noise_m or acoustics.dropout or acoustics.outliers
         )
-        self._echoes: Floats = np.empty((len(self._mounts), 3))
+        self._echoes: Records = np.empty(len(self._mounts), dtype=ECHO)
 
     def fire(
         self, pose: Pose, ring_yaw: float, sensors: Iterable[int] | None = None, window_m: float | None = None
     ) -> Floats:
-        """Fire sensors together and listen.
+        """Return the ranges that sensors report when they fire together.
 
         Parameters
         ----------
         pose
-            The body's true pose; its place is the ring's centre.
+            The body's true pose, whose origin is the ring's centre.
         ring_yaw
-            The true direction of the ring, radians.
+            The true direction of the ring, rad.
         sensors
-            Numbers of those that fire; all where not given.
+            Numbers of the sensors that fire; all if not given.
         window_m
-            How far to listen; the ring's own window where not given.
+            How far the sensors listen, m; the ring's own window if not given.
 
         Returns
         -------
         Floats
-            Shape (sensors,), as in `drivers.messages.Firing.ranges_m`: metres, +inf nothing heard, NaN not fired.
+            Shape (sensors,), as in `drivers.messages.Firing.ranges_m`: m, +inf no echo, NaN not fired.
         """
         window = self._ring.window_m if window_m is None else window_m
         fired = np.zeros(len(self._mounts), dtype=np.bool_)
         fired[slice(None) if sensors is None else list(sensors)] = True
         echoes = self.true_echoes(pose, ring_yaw, fired)
-        distances = echoes[:, 0].copy()
+        distances = echoes["distance"].copy()
         if self._acoustics.crosstalk > 0.0:
             self._mix_in_crosstalk(pose, ring_yaw, fired, echoes, distances)
-        ranges = self._spoil(distances / self._acoustics.sound_speed_scale, window)
+        ranges = self._with_errors(distances / self._acoustics.sound_speed_scale, window)
         ranges[ranges > window] = math.inf
         if self._ring.resolution_m > 0.0:
             ranges = np.rint(ranges / self._ring.resolution_m) * self._ring.resolution_m
@@ -88,10 +97,22 @@ class Sonar:
         ranges[~fired] = math.nan
         return ranges
 
-    def true_echoes(self, pose: Pose, ring_yaw: float, fired: NDArray[np.bool_]) -> Floats:
-        """Return distance and reflecting point of each first echo, shape (sensors, 3), before any electronics.
+    def true_echoes(self, pose: Pose, ring_yaw: float, fired: NDArray[np.bool_]) -> Records:
+        """Return the first echo of each sensor, without errors of the electronics.
 
-        The array is the ring's own and is overwritten by the next call.
+        Parameters
+        ----------
+        pose
+            The body's true pose.
+        ring_yaw
+            The true direction of the ring, rad.
+        fired
+            Which sensors fire, shape (sensors,).
+
+        Returns
+        -------
+        Records
+            `acoustics.ECHO`, shape (sensors,); the next call overwrites it.
         """
         first_echoes(
             pose.x,
@@ -110,35 +131,35 @@ class Sonar:
         )
         return self._echoes
 
-    def _spoil(self, ranges: Floats, window: float) -> Floats:
-        """Apply noise, drop-outs and outliers; the same four draws a sensor whatever the settings."""
+    def _with_errors(self, ranges: Floats, window: float) -> Floats:
+        """Return ranges with noise, dropouts and outliers; draws four numbers a sensor whatever the settings."""
         count = len(ranges)
         noise = self._rng.standard_normal(count)
         dropout, outlier, anywhere = self._rng.random((3, count))
         if self._is_clean:
             return ranges
         heard = np.isfinite(ranges)
-        spoilt = np.full(count, math.inf)
+        reported = np.full(count, math.inf)
         sigma = np.hypot(self._acoustics.noise_relative * ranges[heard], self._acoustics.noise_m)
-        spoilt[heard] = ranges[heard] + sigma * noise[heard]
-        spoilt[dropout < self._acoustics.dropout] = math.inf
+        reported[heard] = ranges[heard] + sigma * noise[heard]
+        reported[dropout < self._acoustics.dropout] = math.inf
         wild = outlier < self._acoustics.outliers
         farthest = window if self._acoustics.outlier_max_m is None else min(window, self._acoustics.outlier_max_m)
         nearest = min(self._ring.range_min_m, farthest)
-        spoilt[wild] = nearest + anywhere[wild] * (farthest - nearest)
-        return spoilt
+        reported[wild] = nearest + anywhere[wild] * (farthest - nearest)
+        return reported
 
     def _mix_in_crosstalk(
-        self, pose: Pose, ring_yaw: float, fired: NDArray[np.bool_], echoes: Floats, distances: Floats
+        self, pose: Pose, ring_yaw: float, fired: NDArray[np.bool_], echoes: Records, distances: Floats
     ) -> None:
-        """Lower `distances` to half the way sensor j, its reflecting point, sensor i, where i hears that first."""
+        """Replace the distance of each sensor that first hears another one's pulse by half of that pulse's path."""
         count = len(self._mounts)
         chance = self._rng.random((count, count)) < self._acoustics.crosstalk
         lobe = LISTENING_LOBE * self._half_angle
         for i in np.flatnonzero(fired):
-            place = Pose(pose.x, pose.y, ring_yaw).compose(Pose(*self._mounts[i]))
-            for j in np.flatnonzero(fired & np.isfinite(echoes[:, 0]) & chance[i]):
-                out, px, py = echoes[j]
+            place = Pose(pose.x, pose.y, ring_yaw).compose(self._mount_poses[i])
+            for j in np.flatnonzero(fired & np.isfinite(echoes["distance"]) & chance[i]):
+                out, px, py = map(float, echoes[j])
                 back = math.hypot(px - place.x, py - place.y)
                 off_axis = abs(wrap_angle(math.atan2(py - place.y, px - place.x) - place.theta))
                 if (

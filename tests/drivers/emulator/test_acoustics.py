@@ -10,7 +10,15 @@ import pytest
 
 from config.robot import RingConfig, SensorConfig
 from config.world import AcousticsConfig, BoxConfig, DrumConfig, PolygonConfig, WallConfig, WorldConfig
-from drivers.emulator.acoustics import CONVEX_EDGE_REACH_M, SIGHT_SLACK_M, clearance, first_echoes
+from drivers.emulator.acoustics import (
+    CONVEX_EDGE_REACH_M,
+    ECHO,
+    MOUNT,
+    SIGHT_SLACK_M,
+    Records,
+    clearance,
+    first_echoes,
+)
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Floats, Pose
@@ -85,10 +93,10 @@ def random_world(rng: np.random.Generator) -> WorldConfig:
     )
 
 
-def echoes(world: WorldConfig, sensors: list[tuple[complex, float]], half_angle: float, *, specular: bool) -> Floats:
+def echoes(world: WorldConfig, sensors: list[tuple[complex, float]], half_angle: float, *, specular: bool) -> Records:
     scene = compile_scene(world)
-    mounts = np.array([(s.real, s.imag, axis) for s, axis in sensors])
-    out = np.empty((len(sensors), 3))
+    mounts = np.array([(s.real, s.imag, axis) for s, axis in sensors], dtype=MOUNT)
+    out = np.empty(len(sensors), dtype=ECHO)
     first_echoes(
         0.0,
         0.0,
@@ -127,8 +135,8 @@ def test_cone_is_exactly_the_nearest_point_in_the_beam() -> None:
     for world, shapes, sensors, half in random_cases(1, 300):
         out = echoes(world, sensors, half, specular=False)
         expected = [naive.cone(shapes, s, axis, half) for s, axis in sensors]
-        np.testing.assert_allclose(out[:, 0], expected, rtol=0, atol=1e-8)
-        heard += int(np.isfinite(out[:, 0]).sum())
+        np.testing.assert_allclose(out["distance"], expected, rtol=0, atol=1e-8)
+        heard += int(np.isfinite(out["distance"]).sum())
     assert heard > 1000
 
 
@@ -137,7 +145,7 @@ def test_cone_agrees_with_densely_sampled_surfaces() -> None:
     for world, shapes, sensors, half in random_cases(2, 60):
         out = echoes(world, sensors, half, specular=False)
         points = naive.surface_samples(shapes, spacing)
-        for (sensor, axis), found in zip(sensors, out[:, 0], strict=True):
+        for (sensor, axis), found in zip(sensors, out["distance"], strict=True):
             inside = np.abs(np.angle((points - sensor) * np.exp(-1j * axis))) <= half
             sampled = np.abs(points[inside] - sensor).min() if inside.any() else math.inf
             assert found <= sampled + 1e-9, "a sample in the beam is nearer than the nearest point"
@@ -151,8 +159,8 @@ def test_specular_is_exactly_the_first_visible_mirror() -> None:
     for world, shapes, sensors, half in random_cases(3, 300):
         out = echoes(world, sensors, half, specular=True)
         expected = [naive.specular(shapes, s, axis, half, CONVEX_EDGE_REACH_M, SIGHT_SLACK_M) for s, axis in sensors]
-        np.testing.assert_allclose(out[:, 0], expected, rtol=0, atol=1e-8)
-        heard += int(np.isfinite(out[:, 0]).sum())
+        np.testing.assert_allclose(out["distance"], expected, rtol=0, atol=1e-8)
+        heard += int(np.isfinite(out["distance"]).sum())
     assert heard > 500
 
 
@@ -230,7 +238,7 @@ def test_convex_edge_is_heard_from_near_only() -> None:
 
 def test_joint_of_two_walls_in_line_is_no_corner() -> None:
     scene = compile_scene(world_of("specular", wall=(wall(0, 0, 1, 0), wall(1, 0, 2, 0))))
-    assert sorted(scene.corners[:, 0]) == [0.0, 2.0]
+    assert sorted(scene.corners["x"]) == [0.0, 2.0]
 
 
 def test_nearer_thing_hides_farther_one() -> None:

@@ -99,7 +99,7 @@ def test_synchro_keeps_its_ring() -> None:
     turning, synchro = make(), make(synchro=True)
     for body in (turning, synchro):
         run(body, 2.0, Twist(0.2, 1.0))
-    assert synchro.ring_yaw == synchro.believed_ring_yaw == 0.0
+    assert synchro.ring_yaw == synchro.odometry_ring_yaw == 0.0
     assert turning.ring_yaw == pytest.approx(turning.pose.theta)
     assert turning.pose.theta > 1.0
     assert turning.pose == synchro.pose
@@ -167,19 +167,19 @@ def test_robot_that_starts_inside_a_surface_can_leave_it() -> None:
 def test_odometry_begins_at_zero_wherever_the_robot_stands() -> None:
     body = make(start=Pose(3.0, -2.0, 1.0))
     run(body, 2.0, Twist(0.5, 0.3))
-    expected = Pose(3.0, -2.0, 1.0).compose(body.believed)
+    expected = Pose(3.0, -2.0, 1.0).compose(body.odometry_pose)
     assert body.pose.x == pytest.approx(expected.x)
     assert body.pose.y == pytest.approx(expected.y)
     assert body.pose.theta == pytest.approx(expected.theta)
-    assert body.ring_yaw == pytest.approx(1.0 + body.believed_ring_yaw)
+    assert body.ring_yaw == pytest.approx(1.0 + body.odometry_ring_yaw)
 
 
 def test_odometry_scale_stretches_the_way_and_not_the_turn() -> None:
     body = make(odometry={"scale": 1.1})
     run(body, 4.0, Twist(0.5, 0.0))
-    assert body.believed.x == pytest.approx(1.1 * body.pose.x)
+    assert body.odometry_pose.x == pytest.approx(1.1 * body.pose.x)
     run(body, 2.0, Twist(0.0, 0.5))
-    assert body.believed.theta == pytest.approx(body.pose.theta)
+    assert body.odometry_pose.theta == pytest.approx(body.pose.theta)
 
 
 def test_heading_drifts_with_the_root_of_the_way_and_the_truth_does_not() -> None:
@@ -191,8 +191,8 @@ def test_heading_drifts_with_the_root_of_the_way_and_the_truth_does_not() -> Non
         for _ in range(round(4.0 / dt_s)):
             body.step(dt_s, Twist(1.0, 0.0))
         assert body.pose.theta == 0.0
-        assert body.believed_ring_yaw == body.believed.theta
-        return body.believed.theta
+        assert body.odometry_ring_yaw == body.odometry_pose.theta
+        return body.odometry_pose.theta
 
     for dt_s in (0.02, 0.1):  # the spread does not depend on how the way is cut
         spread = np.std([drift(dt_s, seed) for seed in range(300)])
@@ -204,8 +204,8 @@ def test_reset_and_jump_touch_the_odometry_only() -> None:
     run(body, 2.0, Twist(0.5, 0.5))
     truth, angle = body.pose, body.ring_yaw - body.pose.theta
     body.reset_odometry()
-    assert body.believed == Pose(0, 0, 0)
-    assert body.believed_ring_yaw == pytest.approx(angle), "the ring's angle to the wheels is a fact"
+    assert body.odometry_pose == Pose(0, 0, 0)
+    assert body.odometry_ring_yaw == pytest.approx(angle), "the ring's angle to the wheels is a fact"
     body.jump_odometry(1.0, -2.0, 0.5)
-    assert body.believed == Pose(1.0, -2.0, 0.5)
+    assert body.odometry_pose == Pose(1.0, -2.0, 0.5)
     assert body.pose == truth
