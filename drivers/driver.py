@@ -1,7 +1,8 @@
-"""What the runtime asks of any robot's driver: a sans-I/O object between the line's bytes and messages.
+"""The protocol that every robot's driver fulfils: a sans-I/O object between the bytes of a line and messages.
 
-The runtime moves bytes between a line and a driver, and tells it the time; the driver never waits, reads a clock
-or touches a port. So the same driver runs on a serial port, on the emulator's pty, and in virtual time in memory.
+The runtime moves bytes between a line and a driver, and tells the driver the time. A driver never waits, reads a
+clock or opens a port. So the same driver runs on a serial port, on the emulator's pty, and in virtual time in memory.
+`drivers.registry` says how a package adds a driver.
 """
 
 from __future__ import annotations
@@ -16,90 +17,132 @@ from drivers.messages import Firing, Identity, LinkCounts, Odometry, Pose, Twist
 
 
 class DriverError(UserError):
-    """The robot file asks for a driver, or of a driver, what is not available: what happened and what would work."""
+    """The robot file names a driver, or asks of it, what is not available: what happened and what would work."""
 
     exit_code = WRONG_CALL
 
 
 class LineState(Enum):
-    """How far the conversation with the robot has come."""
+    """The state of the connection with the robot."""
 
     CLOSED = "closed"
     """No line is open."""
     HANDSHAKE = "handshake"
-    """The line is open; the robot has not yet identified itself and taken the firing pattern."""
+    """The line is open; the robot has not yet identified itself and accepted the firing pattern."""
     READY = "ready"
-    """The robot answers, fires, and takes commands."""
+    """The robot answers, fires, and obeys commands."""
     DOWN = "down"
-    """The line is open and the robot does not answer; `RobotDriver.problem` says more."""
+    """The line is open and the robot does not answer as it should; `RobotDriver.problem` says why."""
 
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """Everything that arrived since it was last taken, in order."""
+    """What a driver received since it was last asked."""
 
     firings: tuple[Firing, ...]
+    """Oldest first; their times only grow, unless the robot restarted."""
     odometry: Odometry | None
-    """The newest one, None where none came."""
+    """The newest sample, None if there was none."""
     rebooted: bool
-    """The robot restarted: its clock and odometry began again at zero."""
+    """The robot restarted: its clock and odometry began again at zero. Nothing here is from before the restart."""
     notes: tuple[str, ...] = ()
-    """What an operator should know of it: what happened, likely cause, next action."""
+    """What an operator should know: what happened, likely cause, next action; one line each."""
 
 
 class RobotDriver(Protocol):
-    """A robot on the other end of a line. Times are the host's, in seconds, never decreasing."""
+    """The host's end of the line to one robot.
+
+    The runtime calls `line_opened` once the line is open and `line_closed` once it is lost. In between it calls
+    `receive` when bytes arrive, `tick` at least once a cycle, and `outgoing` after anything that may have given the
+    driver something to send. Lines come and go; the driver lives as long as the run.
+
+    All times are readings of the run's clock, `run_s`, in seconds. They never decrease, and stand still while an
+    emulated run is paused. No method blocks, and none raises because of what the robot sends.
+    """
 
     @property
     def state(self) -> LineState:
-        """How far the conversation has come."""
+        """The state of the connection. Only READY lets the robot be driven."""
 
     @property
     def problem(self) -> str | None:
-        """Why the state is DOWN or GREETING longer than it should be: what happened, likely cause, next action."""
+        """What is wrong, in one line: what happened, likely cause, next action. None if nothing is.
+
+        There must be one in state DOWN. In other states it is a warning and does not stop the robot.
+        """
 
     @property
     def identity(self) -> Identity | None:
-        """What the robot said of itself, None until it has."""
+        """The robot's description of itself; the last one known while it is connecting again, None before the first.
+
+        Its `deadman_s` tells the runtime how long two drive commands may be apart.
+        """
 
     @property
     def counts(self) -> LinkCounts:
-        """Frames over the line so far."""
+        """Frames received so far, over all lines."""
 
     @property
     def odometry_origin(self) -> Pose:
-        """The origin of the poses handed up, in the robot's own odometry: another one since that has leapt."""
+        """The origin of the poses in `Received`, given in the robot's own odometry.
+
+        It is the identity for a driver that passes the robot's odometry on as it is. A driver that takes out jumps of
+        the odometry moves the origin instead, so that its poses stay continuous.
+        """
 
     @property
     def firings_waiting(self) -> int:
-        """Firings that `take` has ready."""
+        """Number of firings that `take_received` would return."""
 
     def line_opened(self, run_s: float) -> None:
-        """Begin (again) on a line just opened: greet the robot and set its firing pattern."""
+        """Start the handshake on a line that has just been opened: identify the robot, set its firing pattern."""
 
     def line_closed(self) -> None:
-        """Forget what was under way: the line is gone."""
+        """Forget commands in progress: the line is lost. Keep a halt that was not acknowledged for the next line."""
 
     def receive(self, data: bytes, run_s: float) -> None:
-        """Take bytes from the line, any chunking."""
+        """Take bytes from the line, split anywhere; never raises, whatever they are."""
 
     def tick(self, run_s: float) -> None:
-        """Let time pass: commands unanswered are sent again, silence becomes DOWN."""
+        """Let time pass: send unanswered commands again, and go DOWN if the robot is silent for too long."""
 
     def drive(self, twist: Twist) -> None:
-        """Ask for a velocity; replaces one that is not yet on the line."""
+        """Request a velocity; it replaces one that has not been sent yet, and is dropped unless the state is READY.
+
+        Raises
+        ------
+        ValueError
+            The velocity is not finite.
+        """
 
     def halt(self) -> None:
-        """Stop at once and latch; goes before everything else, drops a DRIVE not yet on the line."""
+        """Stop the robot at once and latch it, so that it ignores drive commands until `release`.
+
+        A halt is sent before everything else, discards a drive command that has not been sent, and is repeated until
+        the robot acknowledges it.
+        """
 
     def release(self) -> None:
-        """Clear the latch, so that DRIVE is obeyed again."""
+        """Clear the latch, so that drive commands are obeyed again; without effect unless the state is READY."""
 
     def set_firing(self, ring: RingConfig) -> None:
-        """Fire the pattern of this ring from now on; nothing happens where it is the one under way."""
+        """Change the firing pattern to that of `ring`; does nothing if it is the current one.
+
+        Raises
+        ------
+        drivers.firing_pattern.FiringError
+            The robot or its protocol cannot carry out the pattern; the current one stays.
+        """
 
     def outgoing(self, *, writable: bool) -> bytes:
-        """Return what should go on the line now; only HALT while the line is not `writable`."""
+        """Return the bytes to send now, and consider them sent.
+
+        Parameters
+        ----------
+        writable
+            False while the line still holds earlier bytes: then only a halt may be returned, so that no drive command
+            is sent late.
+        """
 
     def take_received(self) -> Received:
-        """Return and forget what arrived since the last call."""
+        """Return what was received since the last call, and forget it."""

@@ -1,7 +1,7 @@
-"""Frames to bytes and back: stuffing, checksum and field layout, without a line, a clock or a wait.
+"""Frames to bytes and back: byte stuffing (COBS), checksum and field layout; without I/O.
 
-The decoder is total. Whatever bytes come, it raises nothing, holds no more than one frame's worth of them, and
-finds its feet again at the next zero; what it could not use is counted.
+The decoder is total: whatever bytes it gets, it raises nothing, keeps no more of them than one frame, resynchronises
+at the next zero byte, and counts what it could not use.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from drivers.denning.frames import (
 )
 
 FRAME_MAX = 128
-"""Longest frame before stuffing, checksum included."""
+"""Longest frame before stuffing, checksum included, bytes."""
 _STUFFED_MAX = FRAME_MAX + 1
 """COBS adds one byte to anything up to 254 long."""
 _OVERHEAD = 4
@@ -44,7 +44,7 @@ _OVERHEAD = 4
 _NAME_BYTES = 16
 _MASK_BYTES = 3
 _REJECTED_MAX = 64
-"""Refusals kept for one who may never ask for them."""
+"""Rejected frames kept if they are not taken."""
 
 _RANGES = MappingProxyType(
     {
@@ -58,14 +58,14 @@ _RANGES = MappingProxyType(
 
 
 class _Layout(NamedTuple):
-    """How one type of frame lies on the wire: its fixed fields, before whatever varies in length."""
+    """The byte layout of one type of frame: its fixed fields, which precede those of variable length."""
 
     type: int
     make: Callable[..., Frame]
     codes: str
     fields: tuple[str, ...]
     fixed: struct.Struct
-    """What packs the fixed fields."""
+    """Packs the fixed fields."""
 
 
 def _layout(kind: int, make: Callable[..., Frame], codes: str, fields: tuple[str, ...]) -> _Layout:
@@ -121,14 +121,14 @@ def crc(data: bytes) -> int:
 
 
 def encode(frame: Frame, seq: int | None = None) -> bytes:
-    """Return `frame` as it goes on the line, the closing zero included.
+    """Return the bytes of a frame, its closing zero included.
 
     Parameters
     ----------
     frame
-        What to say.
+        The frame.
     seq
-        Its sequence number; the frame's own where not given.
+        Its sequence number; the frame's own if not given.
 
     Raises
     ------
@@ -158,7 +158,7 @@ def _mask_bytes(frame: Frame, field: str, mask: int) -> bytes:
 
 
 def _encode_tail(frame: Frame) -> bytes:
-    """Return what follows the fixed fields, for the types that vary in length."""
+    """Return the bytes after the fixed fields, for types of variable length."""
     match frame:
         case Pattern():
             head = (
@@ -187,7 +187,7 @@ def _encode_tail(frame: Frame) -> bytes:
 
 
 def _decode_tail(layout: _Layout, tail: bytes) -> tuple[object, ...] | NakCode:
-    """Return the fields after the fixed ones, or why there are none."""
+    """Return the fields after the fixed ones, or the reason why they are invalid."""
     if layout.make is Pattern:
         if len(tail) < 4 or len(tail) != 4 + _MASK_BYTES * tail[0]:
             return NakCode.WRONG_LENGTH
@@ -214,22 +214,22 @@ def _decode_tail(layout: _Layout, tail: bytes) -> tuple[object, ...] | NakCode:
 
 
 class Decoder:
-    """Bytes of one direction to frames.
+    """Turns the bytes of one direction into frames.
 
     Parameters
     ----------
     direction
-        The side the frames come from.
+        The side that sends the frames.
     midway
-        The first bytes may be the end of a frame whose beginning went by before the line was opened: up to the first
-        0x00 such a piece is dropped without being counted.
+        The line may be in use already, so that the first bytes are the end of a frame: up to the first 0x00 they are
+        dropped without being counted.
 
     Attributes
     ----------
     frames, bad
-        Frames decoded, and frames dropped: unstuffable, overlong, short, wrong checksum, or nonsense inside.
+        Frames decoded, and frames dropped: invalid stuffing, length, checksum or content.
     lost
-        Frames that gaps in the sender's sequence numbers tell of; one that came but was unreadable is among them.
+        Frames missing by the sender's sequence numbers, among them those dropped for stuffing, length or checksum.
     """
 
     def __init__(self, direction: Literal["host", "robot"], *, midway: bool = False) -> None:
@@ -245,22 +245,22 @@ class Decoder:
 
     @property
     def rejected(self) -> list[tuple[int, NakCode]]:
-        """Frames with the right checksum that make no sense: sequence number and reason, the newest 64."""
+        """Frames with a valid checksum and invalid content: sequence number and reason, the newest 64."""
         return list(self._rejected)
 
     def take_rejected(self) -> list[tuple[int, NakCode]]:
-        """Return and forget `rejected`."""
+        """Return `rejected`, and forget it."""
         taken = self.rejected
         self._rejected.clear()
         return taken
 
     @property
     def pending(self) -> int:
-        """Bytes held of a frame not yet whole; never more than a frame's worth."""
+        """Number of bytes kept of an incomplete frame; never more than one frame."""
         return len(self._pending)
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Return the frames that `data` completes, in order; any chunking gives the same frames."""
+        """Return the frames that `data` completes, in order; how the bytes are split makes no difference."""
         found: list[Frame] = []
         start = 0
         while (end := data.find(b"\0", start)) >= 0:

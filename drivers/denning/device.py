@@ -197,7 +197,7 @@ class DenningDevice:
                     )
                 )
             case Pattern() if self._is_possible(frame):
-                self._rotation.take(frame, self._now_us)
+                self._rotation.set_pattern(frame, self._now_us)
                 self._send(frames.Ack(0, frame.seq))
             case Pattern():
                 self._send(frames.Nak(0, frame.seq, NakCode.VALUE_OUT_OF_RANGE))

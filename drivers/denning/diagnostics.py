@@ -1,4 +1,4 @@
-"""What can be wrong with the robot on the line, in words: what happened, likely cause, next action."""
+"""Messages for what can be wrong with the robot on the line: what happened, likely cause, next action."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from config.robot import RobotConfig
 from drivers.denning.frames import VERSION, Ident, NakCode
 
 _RADIUS_TOLERANCE_MM = 1.0
+"""The robot reports whole millimetres."""
 
 _NOISE_MIN = 3
-"""So many broken frames and no odometry are a line that is disturbed; one or two are how a line ends."""
+"""Fewest corrupt frames that count as noise; one or two are normal where a line starts or ends."""
 
 _MEANINGS = MappingProxyType(
     {
@@ -24,7 +25,7 @@ _MEANINGS = MappingProxyType(
 
 
 def wrong_robot(ident: Ident, config: RobotConfig) -> str | None:
-    """Return why the robot that answered is not the one the robot file describes; None where it is."""
+    """Return the message for a robot that is not the one the robot file describes; None if it is."""
     if ident.version != VERSION:
         return (
             f"the robot '{ident.name}' speaks version {ident.version} of the protocol and this program version "
@@ -46,73 +47,85 @@ def wrong_robot(ident: Ident, config: RobotConfig) -> str | None:
 
 
 def no_answer(command: str, tries: int, *, frames: int, bad: int, baud: int) -> str:
-    """Return what to make of `tries` unanswered commands, given the frames heard on the line so far."""
-    what = f"the robot left {tries} {command} unanswered"
+    """Return the message for a command that stayed unanswered.
+
+    Parameters
+    ----------
+    command
+        Its name in the protocol.
+    tries
+        How often it was sent.
+    frames, bad
+        Valid and corrupt frames received on the line so far.
+    baud
+        The line's speed.
+    """
+    what = f"no answer to {tries} {command} commands"
     if frames:
         return (
-            f"{what} although it can be heard; the line to it is broken or something else reads its port: "
-            f"check the cable, and that no other program uses the port"
+            f"{what} although the robot sends other frames; the line to it is broken or something else reads its "
+            f"port: check the cable, and that no other program uses the port"
         )
     if bad:
         return (
-            f"{what} and what comes from it makes no sense; likely the baud rate: check that the robot is set to "
+            f"{what} and all that is received is corrupt; likely the baud rate: check that the robot is set to "
             f"{baud} baud, or set link.baud"
         )
     return (
-        f"{what} and nothing comes from it; it is off, or on another port: check its power and cable, and link.port; "
-        f"it is taken up as soon as it answers"
+        f"{what} and nothing is received; the robot is off, or on another port: check its power and cable, and "
+        f"link.port; the connection is restored as soon as it answers"
     )
 
 
 def silence(silent_s: float, *, others: bool, bad: int) -> str:
-    """Return what to make of missing odometry.
+    """Return the message for missing odometry.
 
     Parameters
     ----------
     silent_s
         For how long it has been missing.
     others
-        Frames of other kinds still come.
+        Whether frames of other kinds are still received.
     bad
-        Broken frames that came meanwhile.
+        Corrupt frames received since the last odometry.
     """
-    if (drowned := noise(bad, "it")) is not None:
-        return f"no odometry for {silent_s:.2f} s, {drowned}; it is taken up as soon as it can be understood"
+    if (noisy := noise(bad, "it")) is not None:
+        return f"no odometry for {silent_s:.2f} s, {noisy}; the connection is restored as soon as frames are valid"
     if others:
         return (
-            f"no odometry for {silent_s:.2f} s although the robot sends other things; its base has stopped working: "
+            f"no odometry for {silent_s:.2f} s although the robot sends other frames; its base has stopped working: "
             f"restart the robot"
         )
     return (
-        f"nothing heard for {silent_s:.2f} s; the robot is off or restarting, or its cable is loose: check its power "
-        f"and cable; it is taken up as soon as it answers"
+        f"nothing received for {silent_s:.2f} s; the robot is off or restarting, or its cable is loose: check its "
+        f"power and cable; the connection is restored as soon as it answers"
     )
 
 
 def noise(bad: int, what: str) -> str | None:
-    """Return what to make of so many broken frames in place of something; None where that is nothing to speak of."""
+    """Return the message for corrupt frames received in place of `what`; None if they are too few to matter."""
     if bad < _NOISE_MIN:
         return None
     return (
-        f"{bad} broken frames came in place of {what}: noise on the line drowns what the robot says, check its cable "
-        f"and shield, and that nothing else sends on it"
+        f"{bad} corrupt frames came in place of {what}: noise on the line, check its cable and shield, and that "
+        f"nothing else sends on it"
     )
 
 
-def deafness(untaken_s: float) -> str:
-    """Return what to make of DRIVEs that the odometry does not name."""
+def not_receiving(unacknowledged_s: float) -> str:
+    """Return the message for a robot that sends but does not acknowledge DRIVEs."""
     return (
-        f"the robot can be heard and has not taken a DRIVE for {untaken_s:.2f} s; the line to it is broken or its "
-        f"receiver hangs: check the cable, then restart the robot"
+        f"the robot sends but has not acknowledged a DRIVE for {unacknowledged_s:.2f} s; the line to it is broken or "
+        f"its receiver hangs: check the cable, then restart the robot"
     )
 
 
 def refusal(command: str, code: int) -> str:
-    """Return what to make of a NAK."""
+    """Return the message for a command that the robot refused with a NAK."""
     meaning = _MEANINGS.get(NakCode(code), "") if code in list(NakCode) else "for a reason this program does not know"
     action = "check that the robot and this program speak the same version of the protocol"
     if code == NakCode.LATCHED:
-        action = "remove what holds it: free the bumper, or restart the motors after a fault"
+        action = "remove the cause: free the bumper, or restart the motors after a fault"
     elif code == NakCode.VALUE_OUT_OF_RANGE and command == "PATTERN":
         action = "make ring.firing.step_period_s longer or ring.firing.window_m shorter"
     elif code == NakCode.VALUE_OUT_OF_RANGE and command == "DRIVE":
@@ -121,10 +134,18 @@ def refusal(command: str, code: int) -> str:
 
 
 def odometry_jump(off_m: float, turned_rad: float, ring_rad: float) -> str:
-    """Return what to make of odometry that leapt by so much, the heading and the ring's direction by so much."""
+    """Return the message for a jump of the odometry.
+
+    Parameters
+    ----------
+    off_m
+        Distance between the odometry and where the wheels' speeds would have brought the base.
+    turned_rad, ring_rad
+        The same of the heading and of the ring's direction.
+    """
     return (
-        f"the odometry leapt by {off_m:.2f} m and {math.degrees(turned_rad):+.0f} degrees, the ring's direction by "
-        f"{math.degrees(ring_rad):+.0f}: farther than the wheels could have turned; a wheel slipped, or an "
-        f"encoder or its counter failed: the leap is taken out and the map goes on; if it comes again, check wheels "
-        f"and encoders"
+        f"the odometry jumped by {off_m:.2f} m and {math.degrees(turned_rad):+.0f} degrees, the ring's direction by "
+        f"{math.degrees(ring_rad):+.0f}: more than the wheels can have turned; a wheel slipped, or an "
+        f"encoder or its counter failed: the jump is removed and the map stays valid; if it happens again, check "
+        f"wheels and encoders"
     )

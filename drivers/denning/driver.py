@@ -1,7 +1,8 @@
-"""The conversation with a robot that speaks the ring-and-base protocol: greet, set the pattern, drive, and notice.
+"""The driver of a robot that speaks the ring-and-base protocol: handshake, commands, supervision.
 
-No line, no clock: bytes and times come in, bytes and messages go out. What a command waits for is in `commands`,
-where a firing took place in `stamping`, what problem is called in `diagnostics`.
+It has no I/O and no clock: bytes and times come in, bytes and messages go out. Retries of commands are in
+`pending_command`, the pose of a firing in `pose_stamping`, timeouts in `timeouts`, the words for what can go wrong in
+`diagnostics`.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from config.robot import RingConfig, RobotConfig
 from drivers.denning import diagnostics
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Ack, Drive, Echo, Frame, Halt, Hello, Ident, Nak, NakCode, Odom, Pattern, Release
-from drivers.denning.pending_command import Command
+from drivers.denning.pending_command import PendingCommand
 from drivers.denning.pose_stamping import PoseStamper
 from drivers.denning.robot_clock import Jump
 from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout
@@ -21,18 +22,19 @@ from drivers.denning.wire_units import identity_of, to_wire, wire_pattern
 from drivers.driver import LineState, Received
 from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
 
-_GREET_AGAIN_S = 0.5
-"""Pace of greeting a robot that does not answer or is the wrong one."""
-_UNTAKEN_SHARE = 0.75
-"""DRIVEs untaken for this share of the longest silence mean that nobody hears them; they come only once a cycle."""
-_STEPS_MISSED = 2
-"""A ring may be silent for this many firings more than the line may be for odometry."""
-_STEPS_SETTLING = 3
-"""So many steps after a new pattern was taken the last echo of the one before has come."""
+_HELLO_PERIOD_S = 0.5
+"""Time between HELLOs to a robot that does not answer or is the wrong one, s: seldom enough not to disturb it."""
+_UNACKNOWLEDGED_SHARE = 0.75
+"""If DRIVEs stay unacknowledged for this share of the longest silence, the robot is not receiving. Less than 1,
+because DRIVEs are sent only once a cycle."""
+_MISSED_STEPS_MAX = 2
+"""Firings that the ring may miss, beyond the longest silence, before the robot is asked who it is."""
+_SETTLING_STEPS = 3
+"""Steps after a new pattern was accepted until the last echo of the previous one has arrived."""
 _FIRINGS_MAX = 1024
-"""Firings kept for one who does not take them; the oldest leave."""
-_ORDER = ("HALT", "HELLO", "PATTERN", "RELEASE")
-"""What goes on the line first."""
+"""Firings kept if they are not taken; the oldest are dropped. At 20 firings a second this is almost a minute."""
+_SEND_ORDER = ("HALT", "HELLO", "PATTERN", "RELEASE")
+"""Commands in the order in which they are sent."""
 
 
 class DenningDriver:
@@ -41,12 +43,12 @@ class DenningDriver:
     Parameters
     ----------
     config
-        The robot file: the ring the robot must have, and the patience with its answers.
+        The robot file: the ring the robot must have, and the timeouts of its answers.
 
     Raises
     ------
     drivers.firing_pattern.FiringError
-        The firing pattern is one that the ring cannot carry out or the protocol cannot say.
+        The ring cannot carry out the firing pattern, or the protocol cannot express it.
     """
 
     def __init__(self, config: RobotConfig) -> None:
@@ -59,116 +61,120 @@ class DenningDriver:
         self._identity: Identity | None = None
         self._jump: Jump | None = None
         self._decoder = Decoder("robot", midway=True)
-        self._earlier = LinkCounts()
+        self._earlier_counts = LinkCounts()
         self._run_s = 0.0
         self._odometry_s = 0.0
-        self._frame_s = 0.0
-        self._bad_then = 0
+        self._last_frame_s = 0.0
+        self._bad_at_odometry = 0
         self._seq = 0
         self._flush_first = False
-        self._commands: dict[str, Command] = {}
+        self._commands: dict[str, PendingCommand] = {}
         self._drive: Twist | None = None
-        self._watch = CommandAckMonitor()
-        self._ring = EchoTimeout(config.link.silence_max_s + _STEPS_MISSED * 1e-3 * self._pattern.step_period_ms)
-        self._pattern_s = 0.0
+        self._drive_acks = CommandAckMonitor()
+        self._echo_timeout = EchoTimeout(
+            config.link.silence_max_s + _MISSED_STEPS_MAX * 1e-3 * self._pattern.step_period_ms
+        )
+        self._pattern_acked_s = 0.0
         self._settling_s = 0.0
-        self._ask_who = False
+        self._must_identify = False
         self._firings: deque[Firing] = deque(maxlen=_FIRINGS_MAX)
         self._odometry: Odometry | None = None
         self._rebooted = False
 
     @property
     def state(self) -> LineState:
-        """How far the conversation has come."""
+        """The state of the connection."""
         return self._state
 
     @property
     def problem(self) -> str | None:
-        """What is wrong, in one line; None where nothing is."""
+        """What is wrong, in one line; None if nothing is."""
         if self._problem is None and self._state is LineState.READY:
-            return diagnostics.noise(self._ring.drowned(self._run_s, self._decoder.bad), "its echoes")
+            return diagnostics.noise(self._echo_timeout.corrupt_frames(self._run_s, self._decoder.bad), "its echoes")
         return self._problem
 
     @property
     def identity(self) -> Identity | None:
-        """What the robot said of itself; the last known where it is being greeted again."""
+        """The robot's description of itself; the last one known during a new handshake."""
         return self._identity
 
     @property
     def counts(self) -> LinkCounts:
-        """Frames over all lines so far."""
-        before, now = self._earlier, self._decoder
-        return LinkCounts(before.frames + now.frames, before.bad + now.bad, before.lost + now.lost)
+        """Frames received so far, over all lines."""
+        earlier, now = self._earlier_counts, self._decoder
+        return LinkCounts(earlier.frames + now.frames, earlier.bad + now.bad, earlier.lost + now.lost)
 
     @property
     def firings_waiting(self) -> int:
-        """Firings that `take_received` has ready."""
+        """Number of firings that `take_received` would return."""
         return len(self._firings)
 
     @property
     def late_echoes(self) -> int:
-        """Firings dropped: no odometry tells where they took place, or they came twice, or after a newer one."""
+        """Number of firings dropped: without odometry around them, duplicated, or older than one before."""
         return self._stamper.late_echoes
 
     @property
     def out_of_window(self) -> int:
-        """Ranges dropped that lie beyond the window their firing listened for."""
+        """Number of ranges dropped because they lie beyond the window of their firing."""
         return self._stamper.out_of_window
 
     @property
     def odometry_origin(self) -> Pose:
-        """The origin of the poses handed up, in the robot's own odometry: another one since that has leapt."""
+        """The origin of the poses passed on, in the robot's own odometry; it moves when that jumps."""
         return self._stamper.origin
 
     def line_opened(self, run_s: float) -> None:
-        """Begin (again) on a line just opened: greet the robot and set its firing pattern."""
+        """Start the handshake on a line that has just been opened: HELLO, then PATTERN."""
         self.line_closed()
-        self._run_s = self._frame_s = run_s
+        self._run_s = self._last_frame_s = run_s
         self._flush_first = True
-        self._watch = CommandAckMonitor()
-        self._greet()
+        self._drive_acks = CommandAckMonitor()
+        self._start_handshake()
 
     def line_closed(self) -> None:
-        """Forget what was under way; only a HALT not yet answered is kept for the next line."""
-        self._earlier = self.counts
+        """Forget commands in progress; only a HALT that was not acknowledged is kept for the next line."""
+        self._earlier_counts = self.counts
         self._decoder = Decoder("robot", midway=True)
-        self._bad_then = 0
+        self._bad_at_odometry = 0
         self._state = LineState.CLOSED
         self._abandon()
 
     def receive(self, data: bytes, run_s: float) -> None:
-        """Take bytes from the line, any chunking."""
+        """Take bytes from the line, split anywhere."""
         self._run_s = run_s
         if self._state is LineState.CLOSED:
             return
         for frame in self._decoder.feed(data):
-            self._frame_s = run_s
+            self._last_frame_s = run_s
             self._take_frame(frame)
         self._firings.extend(self._stamper.firings())
 
     def tick(self, run_s: float) -> None:
-        """Let time pass: commands unanswered are sent again, silence becomes DOWN."""
+        """Let time pass: send unanswered commands again; go DOWN if the robot is silent for too long."""
         self._run_s = run_s
         if self._state is LineState.CLOSED:
             return
         commands = self._commands
-        given_up = [name for name in _ORDER if name in commands and commands[name].tick(run_s)] if commands else ()
+        given_up = (
+            [name for name in _SEND_ORDER if name in commands and commands[name].tick(run_s)] if commands else ()
+        )
         if given_up:
             name = given_up[0]
-            heard, tries = self._decoder, self._commands[name].tries
+            decoder, tries = self._decoder, self._commands[name].tries
             problem = diagnostics.no_answer(
-                name, tries, frames=heard.frames, bad=heard.bad, baud=self._config.link.baud
+                name, tries, frames=decoder.frames, bad=decoder.bad, baud=self._config.link.baud
             )
             self._go_down(problem)
         if self._state is LineState.READY:
-            self._listen()
-            if "PATTERN" not in self._commands and run_s - self._pattern_s > self._settling_s:
+            self._check_timeouts()
+            if "PATTERN" not in self._commands and run_s - self._pattern_acked_s > self._settling_s:
                 self._stamper.set_window(self._pattern.window)
 
     def drive(self, twist: Twist) -> None:
-        """Ask for a velocity; replaces one that is not yet on the line, and is held to the limits of the body.
+        """Request a velocity, clamped to the body's limits; it replaces one that has not been sent yet.
 
-        It goes on the line only while the robot is READY and no HALT waits for its answer.
+        It is sent only in state READY and while no HALT is unacknowledged.
 
         Raises
         ------
@@ -180,47 +186,47 @@ class DenningDriver:
         self._drive = twist
 
     def halt(self) -> None:
-        """Stop at once and latch: before everything else, and again and again until the robot has answered."""
+        """Stop the robot at once and latch it: sent before everything else, and repeated until acknowledged."""
         self._drive = None
         self._commands.pop("RELEASE", None)
         if "HALT" not in self._commands:
-            self._ask("HALT")
+            self._queue("HALT")
 
     def release(self) -> None:
-        """Clear the latch; without effect while the robot is not READY, so that none is released later unseen."""
+        """Clear the latch; without effect unless READY, so that the robot is never released later and unnoticed."""
         if self._state is LineState.READY:
             self._commands.pop("HALT", None)
-            self._ask("RELEASE")
+            self._queue("RELEASE")
 
     def set_firing(self, ring: RingConfig) -> None:
-        """Fire the pattern of this ring from now on; nothing happens where it is the one under way.
+        """Change the firing pattern to that of `ring`; does nothing if it is the current one.
 
-        Until the robot has taken it, the echoes of the one before still count: an echo names its own sensors.
+        Until the robot accepts the new pattern, echoes of the previous one are used: an echo names its own sensors.
 
         Raises
         ------
         drivers.firing_pattern.FiringError
-            The ring cannot carry it out, or the protocol cannot say it; the pattern stays as it was.
+            The ring cannot carry out the pattern, or the protocol cannot express it; the current one stays.
         """
         pattern = wire_pattern(ring)
         if pattern == self._pattern:
             return
-        # Until the new one is under way, whose echoes come next cannot be told.
+        # Until the new pattern is in use, echoes may belong to either of the two.
         self._stamper.set_window(max(self._pattern.window, pattern.window))
-        self._settling_s = _STEPS_SETTLING * 1e-3 * max(self._pattern.step_period_ms, pattern.step_period_ms)
+        self._settling_s = _SETTLING_STEPS * 1e-3 * max(self._pattern.step_period_ms, pattern.step_period_ms)
         self._pattern = pattern
         if self._state is LineState.READY or "PATTERN" in self._commands:
-            self._ask("PATTERN")
+            self._queue("PATTERN")
 
     def outgoing(self, *, writable: bool) -> bytes:
-        """Return what should go on the line now; only HALT while the line is not `writable`."""
+        """Return the bytes to send now; only HALT while the line is not `writable`."""
         if self._state is LineState.CLOSED:
             self._drive = None
             return b""
-        if self._drive is None and not self._commands and not self._ask_who:
+        if self._drive is None and not self._commands and not self._must_identify:
             return b""
         out = bytearray()
-        for name in _ORDER if writable else _ORDER[:1]:
+        for name in _SEND_ORDER if writable else _SEND_ORDER[:1]:
             command = self._commands.get(name)
             if command is not None and command.due:
                 out += encode(command.frame(self._next_seq(), self._run_s))
@@ -228,84 +234,84 @@ class DenningDriver:
             self._drive = None
         if writable and self._drive is not None:
             seq, body = self._next_seq(), self._config.body
-            self._watch.sent(seq, self._run_s)
+            self._drive_acks.sent(seq, self._run_s)
             v, w = to_wire(self._drive.v, body.speed_max_m_s), to_wire(self._drive.w, body.turn_max_rad_s)
             out += encode(Drive(seq, v, w))
             self._drive = None
-        if writable and self._ask_who:
-            # Not a command under way: nobody need wait for the answer, and no answer is no news.
-            self._ask_who = False
+        if writable and self._must_identify:
+            # Not a pending command: no answer is fine, because other timeouts notice a robot that is gone.
+            self._must_identify = False
             out += encode(Hello(self._next_seq()))
         if out and self._flush_first:
-            # Ends whatever half a frame an earlier user of the line left in the robot's decoder.
+            # Ends the incomplete frame that an earlier user of the line may have left in the robot's decoder.
             self._flush_first = False
             return b"\0" + bytes(out)
         return bytes(out)
 
     def take_received(self) -> Received:
-        """Return and forget what arrived since the last call."""
-        heard = Received(tuple(self._firings), self._odometry, self._rebooted, self._stamper.notes())
+        """Return what was received since the last call, and forget it."""
+        received = Received(tuple(self._firings), self._odometry, self._rebooted, self._stamper.notes())
         self._firings.clear()
         self._odometry = None
         self._rebooted = False
-        return heard
+        return received
 
-    def _listen(self) -> None:
-        """Notice a robot that has fallen silent, one that no longer hears, and a ring that does not fire."""
+    def _check_timeouts(self) -> None:
+        """Notice a robot that is silent, one that does not receive, and a ring that does not fire."""
         silence_max_s = self._config.link.silence_max_s
         silent_s = self._run_s - self._odometry_s
-        untaken_s = self._watch.untaken_s(self._odometry_s)  # what came after it, it cannot tell of
+        unacknowledged_s = self._drive_acks.unacknowledged_s(self._odometry_s)
         if silent_s > silence_max_s:
-            # An echo may well come right after the last odometry of all.
-            others = self._frame_s - self._odometry_s > 0.5 * silence_max_s
-            bad = self._decoder.bad - self._bad_then
+            # A single echo may well follow the last odometry before the robot falls silent.
+            others = self._last_frame_s - self._odometry_s > 0.5 * silence_max_s
+            bad = self._decoder.bad - self._bad_at_odometry
             self._go_down(diagnostics.silence(silent_s, others=others, bad=bad))
-        elif untaken_s > _UNTAKEN_SHARE * silence_max_s:
-            self._go_down(diagnostics.deafness(untaken_s))
-        elif self._ring.should_ask(self._run_s):
-            self._ask_who = True
+        elif unacknowledged_s > _UNACKNOWLEDGED_SHARE * silence_max_s:
+            self._go_down(diagnostics.not_receiving(unacknowledged_s))
+        elif self._echo_timeout.expired(self._run_s):
+            self._must_identify = True
 
     def _next_seq(self) -> int:
         seq = self._seq
         self._seq = (seq + 1) % 256
         return seq
 
-    def _ask(self, name: str) -> None:
-        """Put a command under way; with the usual patience, or without end where nobody answers anyway."""
+    def _queue(self, name: str) -> None:
+        """Queue a command; with the usual number of tries, or without limit if the robot does not answer anyway."""
         link = self._config.link
-        patient = self._state in (LineState.DOWN, LineState.CLOSED)
-        tries = None if patient else link.tries
+        without_limit = self._state in (LineState.DOWN, LineState.CLOSED)
+        tries = None if without_limit else link.tries
         match name:
             case "HALT":
-                command = Command(Halt, link.reply_timeout_s, tries)
+                command = PendingCommand(Halt, link.reply_timeout_s, tries)
             case "RELEASE":
-                command = Command(Release, link.reply_timeout_s, tries)
+                command = PendingCommand(Release, link.reply_timeout_s, tries)
             case "HELLO":
-                command = Command(Hello, _GREET_AGAIN_S if patient else link.reply_timeout_s, tries)
+                command = PendingCommand(Hello, _HELLO_PERIOD_S if without_limit else link.reply_timeout_s, tries)
             case _:
-                command = Command(lambda seq: Pattern(seq, *self._pattern), link.reply_timeout_s, tries)
+                command = PendingCommand(lambda seq: Pattern(seq, *self._pattern), link.reply_timeout_s, tries)
         self._commands[name] = command
 
-    def _greet(self) -> None:
+    def _start_handshake(self) -> None:
         self._state = LineState.HANDSHAKE
-        self._ask("HELLO")
+        self._queue("HELLO")
 
     def _abandon(self) -> None:
-        """Drop everything under way but HALT; from now on that is tried without end."""
+        """Drop all commands but HALT, which is repeated without limit from now on."""
         halt = self._commands.pop("HALT", None)
         self._commands.clear()
         self._drive = None
-        self._ask_who = False
-        self._watch.settle()
+        self._must_identify = False
+        self._drive_acks.forget()
         self._stamper.drop_held()
         if halt is not None:
-            self._ask("HALT")
+            self._queue("HALT")
 
     def _go_down(self, problem: str) -> None:
         self._state = LineState.DOWN
         self._problem = problem
         self._abandon()
-        self._ask("HELLO")
+        self._queue("HELLO")
         hello = self._commands["HELLO"]
         hello.due, hello.sent_s = False, self._run_s
 
@@ -320,10 +326,10 @@ class DenningDriver:
             case Odom():
                 self._take_odometry(frame)
             case Echo() if self._state is LineState.READY:
-                self._ring.heard(self._run_s, self._decoder.bad)
+                self._echo_timeout.restart(self._run_s, self._decoder.bad)
                 self._stamper.echo(frame)
             case _:
-                pass  # an echo of a pattern that is not ours yet
+                pass  # an echo of a pattern that this driver has not set
 
     def _take_ident(self, ident: Ident) -> None:
         wrong = diagnostics.wrong_robot(ident, self._config)
@@ -334,20 +340,20 @@ class DenningDriver:
         restarted = known is not None and (known.boot_id != ident.boot_id or self._jump is Jump.BACK)
         if known is None or known.odometry_period_s != self._identity.odometry_period_s:
             self._stamper.set_period(self._identity.odometry_period_s)
-        greeted = self._commands.pop("HELLO", None) is not None
+        answers_hello = self._commands.pop("HELLO", None) is not None
         if restarted:
             self._abandon()
             self._stamper.restart()
             self._firings.clear()
             self._odometry = None
             self._rebooted = True
-            self._watch = CommandAckMonitor()
+            self._drive_acks = CommandAckMonitor()
         elif self._jump is not None:
             self._stamper.break_off()
         self._jump = None
-        if greeted or restarted:
+        if answers_hello or restarted:
             self._state = LineState.HANDSHAKE
-            self._ask("PATTERN")
+            self._queue("PATTERN")
 
     def _take_ack(self, ack: Ack) -> None:
         name = self._answered(ack.of)
@@ -356,11 +362,13 @@ class DenningDriver:
         del self._commands[name]
         if name == "PATTERN":
             self._state = LineState.READY
-            self._odometry_s, self._bad_then = self._run_s, self._decoder.bad
-            self._ring.heard(self._run_s, self._decoder.bad)
-            self._pattern_s = self._run_s
+            self._odometry_s, self._bad_at_odometry = self._run_s, self._decoder.bad
+            self._echo_timeout.restart(self._run_s, self._decoder.bad)
+            self._pattern_acked_s = self._run_s
             if "HALT" in self._commands:
-                self._ask("HALT")  # a robot that answers all else must answer this, within the usual patience
+                self._queue(
+                    "HALT"
+                )  # a robot that answers other commands must answer this one within the usual number of tries
         if self._state is LineState.READY:
             self._problem = None
 
@@ -373,28 +381,30 @@ class DenningDriver:
                 self._problem = problem
             else:
                 self._go_down(problem)
-        elif nak.of in self._watch:
-            self._watch.settle()
+        elif nak.of in self._drive_acks:
+            self._drive_acks.forget()
             if nak.code != NakCode.LATCHED:
                 self._problem = diagnostics.refusal("DRIVE", nak.code)
 
     def _answered(self, seq: int) -> str | None:
-        """Return the name of the command under way one of whose tries was `seq`."""
-        return next((name for name in _ORDER if name in self._commands and seq in self._commands[name].seqs), None)
+        """Return the name of the pending command one of whose tries had this sequence number."""
+        return next(
+            (name for name in _SEND_ORDER if name in self._commands and seq in self._commands[name].seqs), None
+        )
 
     def _take_odometry(self, odom: Odom) -> None:
         if "HELLO" in self._commands:
-            return  # until it has said who it is, its clock and its odometry may be another life's
+            return  # until it has identified itself, its clock and odometry may be those of before a restart
         sample = self._stamper.odometry(odom, self._run_s)
         if isinstance(sample, Jump):
-            # Perhaps it restarted, and its clock, its odometry and its pattern are gone: ask who is there.
+            # Perhaps it restarted, and its clock, its odometry and its pattern are gone: identify it again.
             self._jump = sample
             self._abandon()
-            self._greet()
+            self._start_handshake()
             return
-        self._odometry_s, self._bad_then = self._run_s, self._decoder.bad
+        self._odometry_s, self._bad_at_odometry = self._run_s, self._decoder.bad
         self._odometry = sample
-        self._watch.named(odom.last_drive_seq)
+        self._drive_acks.acknowledged(odom.last_drive_seq)
         if sample.flags & Flags.LATCHED:
-            self._watch.settle()  # while latched it takes none, and says so
+            self._drive_acks.forget()  # while latched the robot obeys none, and says so
         self._firings.extend(self._stamper.firings())

@@ -1,6 +1,6 @@
-"""The frames of the ring-and-base protocol as typed values, in the units the wire speaks.
+"""The frames of the ring-and-base protocol as typed values, in the protocol's units.
 
-Millimetres, tenths of a foot and microseconds stop here: only this folder and the emulator's device side know them.
+Only this folder uses millimetres, tenths of a foot and microseconds.
 """
 
 from __future__ import annotations
@@ -10,17 +10,17 @@ from enum import IntEnum
 from typing import TypeAlias
 
 VERSION = 1
-"""The version of the protocol that is spoken here."""
+"""The protocol version implemented here."""
 SENSORS_MAX = 24
-"""Sensors that a mask has bits for."""
+"""Bits in a mask of sensors."""
 MASKS_MAX = 24
-"""Steps that a pattern can hold."""
+"""Most steps of a pattern."""
 WINDOW_MIN, WINDOW_MAX = 5, 255
-"""Tenths of a foot a firing can listen for."""
+"""Shortest and longest window, tenths of a foot."""
 TENTHS_MIN, TENTHS_MAX = 5, 254
-"""Echo bytes that are ranges, in tenths of a foot."""
+"""Smallest and largest echo byte that is a range, tenths of a foot."""
 NO_ECHO = 255
-"""The echo byte of a sensor that heard nothing inside the window."""
+"""The echo byte of a sensor that heard no echo inside the window."""
 FAULT = 0
 """The echo byte of a sensor that reports a fault."""
 TENTH_FT_M = 0.03048
@@ -28,7 +28,7 @@ TENTH_FT_M = 0.03048
 
 
 class NakCode(IntEnum):
-    """Why the robot refuses a command."""
+    """The reason why the robot refuses a command."""
 
     UNKNOWN_TYPE = 1
     WRONG_LENGTH = 2
@@ -38,7 +38,7 @@ class NakCode(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Hello:
-    """Ask the robot who it is; changes nothing."""
+    """Request the robot's IDENT; changes nothing."""
 
     seq: int
     version: int = VERSION
@@ -46,7 +46,7 @@ class Hello:
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """Fire these masks in turn, one each step; no masks stop the firing."""
+    """Fire the sensors of each mask in turn, one mask a step; without masks, stop firing."""
 
     seq: int
     step_period_ms: int
@@ -56,7 +56,7 @@ class Pattern:
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """Drive at this velocity; re-arms the deadman."""
+    """Drive at this velocity, and restart the deadman timer."""
 
     seq: int
     v_mm_s: int
@@ -79,7 +79,7 @@ class Release:
 
 @dataclass(frozen=True, slots=True)
 class Ident:
-    """The robot's answer to Hello."""
+    """The robot's description of itself; the answer to HELLO."""
 
     seq: int
     version: int
@@ -93,7 +93,7 @@ class Ident:
 
 @dataclass(frozen=True, slots=True)
 class Ack:
-    """The command with sequence number `of` is done."""
+    """The command with sequence number `of` was carried out."""
 
     seq: int
     of: int
@@ -101,7 +101,7 @@ class Ack:
 
 @dataclass(frozen=True, slots=True)
 class Nak:
-    """The command with sequence number `of` is refused; `code` is a `NakCode`, or one this version does not know."""
+    """The command with sequence number `of` was refused; `code` is a `NakCode`, or one unknown to this version."""
 
     seq: int
     of: int
@@ -110,7 +110,7 @@ class Nak:
 
 @dataclass(frozen=True, slots=True)
 class Odom:
-    """Where the base believes it is, and how it is."""
+    """The base's pose and velocity by its own odometry, and its status."""
 
     seq: int
     t_us: int
@@ -126,7 +126,7 @@ class Odom:
 
 @dataclass(frozen=True, slots=True)
 class Echo:
-    """What one firing heard: an echo byte for each bit of the mask, lowest sensor first."""
+    """The result of one firing: an echo byte for each bit of the mask, lowest sensor first."""
 
     seq: int
     t_us: int

@@ -1,4 +1,4 @@
-"""The firing pattern as it rotates: which sensors fire next, and when a new pattern takes the old one's place."""
+"""The emulated ring's schedule: which sensors fire next, and when a new pattern replaces the current one."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from drivers.denning.frames import TENTH_FT_M, Pattern
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One firing: its moment, its number in the pattern, who fires, and how far they listen."""
+    """One firing: its time, its number in the pattern, which sensors fire, and how far they listen."""
 
     at_us: int
     number: int
     mask: int
     window_m: float
     closes_us: int
-    """When the window has closed."""
+    """When the window closes."""
 
 
 class Rotation:
-    """Steps one pattern after another; a new one begins at a step's boundary, with its first step."""
+    """Steps through a firing pattern; a new pattern starts with its first step, at the end of a step."""
 
     def __init__(self) -> None:
         self._pattern: Pattern | None = None
@@ -32,18 +32,18 @@ class Rotation:
 
     @property
     def next_us(self) -> int | None:
-        """When the next step begins, microseconds; None where nothing fires."""
+        """When the next step starts, µs; None if nothing fires."""
         return None if self._pattern is None else self._at_us
 
-    def take(self, pattern: Pattern, now_us: int) -> None:
-        """Go on with `pattern` from the next boundary, which is now where nothing fires; no masks end the firing."""
+    def set_pattern(self, pattern: Pattern, now_us: int) -> None:
+        """Use `pattern` from the end of the current step, or from now if nothing fires; without masks, stop."""
         if self._pattern is not None:
             self._next_pattern = pattern
         elif pattern.masks:
             self._pattern, self._number, self._at_us = pattern, 0, now_us
 
     def step(self, now_us: int) -> Step | None:
-        """Return the step that has begun by now and go on to the next, None where none has."""
+        """Return the step that has started by now, and advance to the next; None if none has started."""
         if self._pattern is None or self._at_us > now_us:
             return None
         if self._next_pattern is not None:
@@ -59,5 +59,5 @@ class Rotation:
 
 
 def window_us(pattern: Pattern) -> int:
-    """Return how long sound takes to the window's end and back, microseconds."""
+    """Return how long sound takes to the window's end and back, µs."""
     return math.ceil(2e6 * pattern.window * TENTH_FT_M / SOUND_SPEED_M_S)

@@ -1,4 +1,4 @@
-"""A command that wants an answer: when it goes on the line, when again, and when it is given up."""
+"""A command that must be answered: when to send it, when to send it again, and when to give up."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from dataclasses import dataclass, field
 from drivers.denning.frames import HostFrame
 
 _SEQS_KEPT = 8
-"""Tries whose late answers still count; far fewer than the 256 after which numbers come again."""
+"""Tries whose late answers still count; far fewer than the 256 after which sequence numbers repeat."""
 
 
 @dataclass(slots=True)
-class Command:
-    """One command under way.
+class PendingCommand:
+    """One command that has not been answered.
 
-    Each try has a sequence number of its own, because the robot counts gaps in them as losses; an answer to any
-    try will do, because all commands are idempotent.
+    Each try has its own sequence number, because the robot counts gaps in them as losses. An answer to any try
+    counts, because all commands are idempotent.
 
     Attributes
     ----------
@@ -26,9 +26,9 @@ class Command:
     every_s
         Time from one try to the next.
     tries_max
-        Tries before it is given up; None = never.
+        Tries before giving up; None = never.
     due
-        True where it should go on the line as soon as it can.
+        True if it should be sent as soon as possible.
     """
 
     build: Callable[[int], HostFrame]
@@ -39,17 +39,17 @@ class Command:
     sent_s: float = 0.0
     seqs: deque[int] = field(default_factory=lambda: deque(maxlen=_SEQS_KEPT))
 
-    def frame(self, seq: int, now_s: float) -> HostFrame:
-        """Return the next try's frame, and wait for its answer from now on."""
+    def frame(self, seq: int, run_s: float) -> HostFrame:
+        """Return the frame of the next try, and start waiting for its answer."""
         self.due = False
         self.tries += 1
-        self.sent_s = now_s
+        self.sent_s = run_s
         self.seqs.append(seq)
         return self.build(seq)
 
-    def tick(self, now_s: float) -> bool:
-        """Let time pass; return True where the last try has gone unanswered."""
-        if self.due or now_s - self.sent_s < self.every_s:
+    def tick(self, run_s: float) -> bool:
+        """Let time pass; return True if the last try stayed unanswered."""
+        if self.due or run_s - self.sent_s < self.every_s:
             return False
         if self.tries_max is not None and self.tries >= self.tries_max:
             return True

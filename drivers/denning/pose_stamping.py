@@ -1,11 +1,11 @@
-"""Odometry and echoes to stamped firings: each firing gets the pose of its own moment, not of its arrival.
+"""Odometry and echoes to firings: each firing gets the pose at which it was fired, not that of its arrival.
 
-An echo arrives when its window has closed, most often after the odometry that follows its firing, now and then
-before; then it is held until that odometry is there.
+An echo arrives when its window has closed. Usually the odometry after its firing has arrived by then; if not, the
+echo waits for it.
 
-Odometry that leaps farther than the wheels could have turned tells of a counter that was set or slipped, not of a
-body that moved. The leap is taken out, here where every sample passes, so that poses go on without a break and
-whatever is remembered in their frame stays where it is: see `frame`.
+Odometry that jumps by more than the wheels can have turned means that a counter was set or a wheel slipped, not that
+the body moved. The jump is removed here, where every sample passes, so that poses stay continuous and the map stays
+valid: see `PoseStamper.origin`.
 """
 
 from __future__ import annotations
@@ -24,50 +24,56 @@ from drivers.messages import Firing, Odometry, Pose, wrap_angle
 from drivers.odometry_history import OdometryHistory
 
 _HISTORY_S = 2.5
+"""Odometry kept, s: several times the longest window and its way over a busy line."""
 _HISTORY_MIN, _HISTORY_MAX = 64, 4096
+"""Fewest and most samples kept, whatever period the robot reports."""
 _HELD_MAX = 64
+"""Echoes that may wait for their odometry; the oldest are dropped."""
 _GAP_PERIODS = 4.5
-"""Three odometry samples lost in a row can be bridged; with more missing, an arc between two samples is a guess."""
+"""Longest gap between two samples to interpolate over, in odometry periods: three lost samples. With more missing,
+the arc between two samples is a guess."""
 _GAP_MIN_S = 0.01
+"""The same limit, at least, s."""
 _FUTURE_MAX_US = 1_000_000
-_POSE_JUMP_M = 0.5
-_POSE_JUMP_M_S = 20.0
-"""A base that moved farther than this allows did not move: its odometry was reset, perhaps all of it was."""
-_LEAP_M, _LEAP_RAD = 0.1, 0.1
-"""What odometry may differ from what its own velocities say, besides what a stop within one sample explains."""
-_STEADY = 10
-"""Only after so many samples that did not leap is one that does a leap; else it is how this base moves."""
-_HERE = Pose(0.0, 0.0, 0.0)
+"""How far after the newest odometry an echo may have been fired to wait for more, µs; beyond, its time is corrupt."""
+_RESET_M, _RESET_M_S = 0.5, 20.0
+"""A pose that moved farther than this, m plus m/s, was reset: the robot may have restarted."""
+_JUMP_M, _JUMP_RAD = 0.1, 0.1
+"""Allowed difference of odometry from what its own velocities predict, m and rad, besides a stop within one sample."""
+_STEADY_SAMPLES = 10
+"""A deviation counts as a jump only after this many samples without one; otherwise it is how this base moves."""
+_IDENTITY = Pose(0.0, 0.0, 0.0)
 _NOTES_MAX = 16
+"""Notes kept if they are not taken."""
 
 
 class PoseStamper:
-    """The odometry's history and the echoes that wait for it.
+    """Gives each firing its pose, from the history of the odometry.
 
     Parameters
     ----------
     sensors
-        Of the ring.
+        Number of sensors in the ring.
     body
-        Its limits say what is a motion and what a leap.
+        The base's limits, which tell a motion from a jump.
 
     Attributes
     ----------
     late_echoes
-        Firings dropped: no odometry tells where they took place, or they came twice, or after a newer one.
+        Firings dropped: without odometry around them, duplicated, or older than one before.
     out_of_window
-        Ranges dropped that lie beyond the window their firing listened for.
+        Ranges dropped because they lie beyond the window of their firing.
     jumps
-        Leaps of the odometry that were taken out.
-    frame
-        The origin of the poses given out, in the robot's own odometry; the identity while that has not leapt.
+        Jumps of the odometry that were removed.
+    origin
+        The origin of the poses passed on, in the robot's own odometry; the identity until that jumps.
     """
 
     def __init__(self, sensors: int, body: BodyConfig) -> None:
         self.late_echoes = 0
         self.out_of_window = 0
         self.jumps = 0
-        self.origin = _HERE
+        self.origin = _IDENTITY
         self._sensors = sensors
         self._body = body
         self._clock = RobotClock()
@@ -82,65 +88,65 @@ class PoseStamper:
         self._notes: deque[str] = deque(maxlen=_NOTES_MAX)
 
     def set_window(self, tenths_ft: int) -> None:
-        """Hold echoes from now on to a window."""
+        """Set the window, in tenths of a foot, beyond which ranges are dropped."""
         self._window = tenths_ft
 
     def notes(self) -> tuple[str, ...]:
-        """Return and forget what an operator should know of the odometry."""
+        """Return what an operator should know about the odometry, and forget it."""
         notes = tuple(self._notes)
         self._notes.clear()
         return notes
 
     def set_period(self, period_s: float) -> None:
-        """Make room for the history of a robot whose odometry comes every `period_s`."""
+        """Size the history for a robot that sends odometry every `period_s`."""
         capacity = math.ceil(_HISTORY_S / max(period_s, 1e-3)) + 1
         self._history = OdometryHistory(min(max(capacity, _HISTORY_MIN), _HISTORY_MAX))
         self._gap_max_s = max(_GAP_PERIODS * period_s, _GAP_MIN_S)
 
     def restart(self) -> None:
-        """Forget everything: the robot's clock and odometry began again at zero."""
+        """Forget everything: the robot's clock and odometry restarted at zero."""
         self._clock.restart()
         self._last_firing_us = None
         self._last, self._steady = None, 0
-        self.origin, self._ring_offset = _HERE, 0.0
+        self.origin, self._ring_offset = _IDENTITY, 0.0
         self.break_off()
 
     def break_off(self) -> None:
-        """Forget poses and held echoes, but not the clock: what follows does not join on to what was before."""
+        """Forget poses and waiting echoes, but not the clock: later odometry does not continue the earlier one."""
         self._history.clear()
         self._clock.trust_next()
         self.drop_held()
 
     def drop_held(self) -> None:
-        """Give up the echoes that wait."""
+        """Drop the echoes that wait for odometry."""
         self.late_echoes += len(self._held)
         self._held.clear()
 
     def odometry(self, odom: Odom, run_s: float) -> Odometry | Jump:
-        """Take an odometry frame; a jump is reported, and the frame not used."""
+        """Return the sample of an odometry frame received at `run_s`; or a `Jump`, and then the frame is not used."""
         t_us = self._clock.read(odom.t_us, run_s)
         if isinstance(t_us, Jump):
             return t_us
-        told = odometry_of(odom, t_us)
-        sample = self._in_our_frame(told)
+        reported = odometry_of(odom, t_us)
+        sample = self._from_origin(reported)
         newest = self._history.newest
         if newest is not None:
             moved_m = math.hypot(sample.pose.x - newest.pose.x, sample.pose.y - newest.pose.y)
-            if moved_m > _POSE_JUMP_M + _POSE_JUMP_M_S * (sample.robot_s - newest.robot_s):
+            if moved_m > _RESET_M + _RESET_M_S * (sample.robot_s - newest.robot_s):
                 return Jump.AHEAD
-        sample = self._without_leap(told, sample)
+        sample = self._without_jump(reported, sample)
         self._history.add(sample)
         self._last = sample
         return sample
 
-    def _in_our_frame(self, told: Odometry) -> Odometry:
-        if self.origin == _HERE and self._ring_offset == 0.0:
-            return told
-        pose = self.origin.inverse().compose(told.pose)
-        return replace(told, pose=pose, ring_yaw=told.ring_yaw + self._ring_offset)
+    def _from_origin(self, reported: Odometry) -> Odometry:
+        if self.origin == _IDENTITY and self._ring_offset == 0.0:
+            return reported
+        pose = self.origin.inverse().compose(reported.pose)
+        return replace(reported, pose=pose, ring_yaw=reported.ring_yaw + self._ring_offset)
 
-    def _without_leap(self, told: Odometry, sample: Odometry) -> Odometry:
-        """Return `sample`, or where the wheels' own speeds would have brought the base if it is nowhere near that."""
+    def _without_jump(self, reported: Odometry, sample: Odometry) -> Odometry:
+        """Return `sample`, or the prediction from the wheels' speeds if they differ by a jump; then move `origin`."""
         last = self._last
         if last is None:
             return sample
@@ -152,24 +158,24 @@ class PoseStamper:
         turned = sample.pose.theta - expected.theta
         off_rad = max(abs(turned), abs(sample.ring_yaw - ring_yaw))
         limits = self._body
-        if off_m <= _LEAP_M + limits.speed_max_m_s * dt_s and off_rad <= _LEAP_RAD + limits.turn_max_rad_s * dt_s:
+        if off_m <= _JUMP_M + limits.speed_max_m_s * dt_s and off_rad <= _JUMP_RAD + limits.turn_max_rad_s * dt_s:
             self._steady += 1
             return sample
         steady, self._steady = self._steady, 0
-        if steady < _STEADY:
+        if steady < _STEADY_SAMPLES:
             return sample
         self.jumps += 1
         self._notes.append(
             diagnostics.odometry_jump(off_m, wrap_angle(turned), wrap_angle(sample.ring_yaw - ring_yaw))
         )
-        self.origin = told.pose.compose(expected.inverse())
-        self._ring_offset = ring_yaw - told.ring_yaw
-        return replace(told, pose=expected, ring_yaw=ring_yaw)
+        self.origin = reported.pose.compose(expected.inverse())
+        self._ring_offset = ring_yaw - reported.ring_yaw
+        return replace(reported, pose=expected, ring_yaw=ring_yaw)
 
     def echo(self, echo: Echo) -> None:
-        """Take an echo frame; `firings` has it as soon as its pose is known.
+        """Take an echo frame; `firings` returns it as soon as its pose is known.
 
-        A range beyond the window is the echo of an earlier firing or of nothing: as good as a fault.
+        A range beyond the window belongs to an earlier firing or is noise, and is treated like a sensor's fault.
         """
         beyond = sum(self._window < tenths < NO_ECHO for tenths in echo.tenths_ft)
         if beyond:
@@ -182,11 +188,11 @@ class PoseStamper:
         self._held.append(echo)
 
     def firings(self) -> list[Firing]:
-        """Return and forget the held echoes whose pose is known now, in the order of their firing."""
+        """Return the waiting echoes whose pose is known now, in the order of their firing, and forget them."""
         ready: list[Firing] = []
         newest = self._history.newest
         while self._held and newest is not None:
-            t_us = self._clock.past(self._held[0].t_us)
+            t_us = self._clock.near_last(self._held[0].t_us)
             if t_us is None:
                 break
             ahead_us = t_us - round(newest.robot_s * 1e6)
@@ -194,7 +200,7 @@ class PoseStamper:
                 break
             echo = self._held.popleft()
             place = self._history.at(t_us * 1e-6, self._gap_max_s)
-            # Times only grow for those above: a firing from before the last one is no news, one of its time its copy.
+            # Times passed on only grow: this drops firings older than the last one, and copies of it.
             if place is None or (self._last_firing_us is not None and t_us <= self._last_firing_us):
                 self.late_echoes += 1
                 continue

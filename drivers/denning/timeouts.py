@@ -1,6 +1,6 @@
-"""What the robot does not say by itself: that it no longer hears, and that it restarted without a trace.
+"""Supervision of faults that a robot does not report: that it no longer receives, and that it restarted unnoticed.
 
-A robot that talks on may have stopped listening; then its odometry goes on naming an old DRIVE. One that restarted
+A robot that still sends may have stopped receiving; then its odometry keeps naming an old DRIVE. One that restarted
 just as its clock wrapped seems to carry on; but it has lost its firing pattern, so its ring is silent.
 """
 
@@ -9,66 +9,72 @@ from __future__ import annotations
 from collections import deque
 
 _KEPT = 128
-"""DRIVEs remembered: half of the sequence numbers, so that none is mistaken for the one before it."""
+"""DRIVEs remembered: half of the 256 sequence numbers, so that no number stands for two of them."""
 
 
 class CommandAckMonitor:
-    """Follows which DRIVE the odometry names, and says for how long none of the newer ones has been taken.
+    """Measures for how long DRIVEs have been sent and not been acknowledged by the odometry.
 
-    A robot that names the same DRIVE all its life tells nothing by it and is not held to it: only one that has been
-    seen to follow is.
+    Odometry names the last DRIVE that was obeyed. A robot that always names the same one does not support this and is
+    not supervised; supervision starts when the named DRIVE has changed once.
     """
 
     def __init__(self) -> None:
         self._sent: deque[tuple[int, float]] = deque(maxlen=_KEPT)
-        self._named: int | None = None
-        self._follows = False
+        self._last_seq: int | None = None
+        self._is_supported = False
 
     def __contains__(self, seq: int) -> bool:
         return any(seq == sent for sent, _ in self._sent)
 
-    def sent(self, seq: int, now_s: float) -> None:
-        """Remember that a DRIVE with this number has gone on the line."""
-        self._sent.append((seq, now_s))
+    def sent(self, seq: int, run_s: float) -> None:
+        """Note that a DRIVE with this sequence number has been sent."""
+        self._sent.append((seq, run_s))
 
-    def named(self, seq: int) -> None:
-        """Take from the odometry which DRIVE was taken last: it and those before it need no more waiting for."""
+    def acknowledged(self, seq: int) -> None:
+        """Note that the odometry names this DRIVE: it and all before it are acknowledged."""
         if seq not in self:
             return
-        self._follows = self._follows or self._named not in (None, seq)
-        self._named = seq
+        self._is_supported = self._is_supported or self._last_seq not in (None, seq)
+        self._last_seq = seq
         while self._sent.popleft()[0] != seq:
             pass
 
-    def settle(self) -> None:
-        """Wait no more for what has been sent: it was refused, or given up."""
+    def forget(self) -> None:
+        """Expect no acknowledgement of what has been sent: it was refused, or given up."""
         self._sent.clear()
 
-    def untaken_s(self, heard_s: float) -> float:
-        """Return for how long DRIVEs have gone and none was taken, as odometry that came at `heard_s` tells it."""
-        return max(0.0, heard_s - self._sent[0][1]) if self._follows and self._sent else 0.0
+    def unacknowledged_s(self, odometry_s: float) -> float:
+        """Return the age, at the time of the last odometry, of the oldest DRIVE that it does not acknowledge, s."""
+        return max(0.0, odometry_s - self._sent[0][1]) if self._is_supported and self._sent else 0.0
 
 
 class EchoTimeout:
-    """Says when a ring that should fire has been silent for so long that the robot should be asked who it is."""
+    """Expires when a ring that should fire has been silent for so long that the robot may have restarted.
 
-    def __init__(self, patience_s: float) -> None:
-        self._patience_s = patience_s
-        self._since_s = self._heard_s = 0.0
+    Parameters
+    ----------
+    timeout_s
+        The longest silence.
+    """
+
+    def __init__(self, timeout_s: float) -> None:
+        self._timeout_s = timeout_s
+        self._since_s = self._echo_s = 0.0
         self._bad = 0
 
-    def heard(self, now_s: float, bad: int) -> None:
-        """Begin to wait anew: an echo frame has come, or a pattern was set; so many broken frames came until now."""
-        self._since_s = self._heard_s = now_s
+    def restart(self, run_s: float, bad: int) -> None:
+        """Start anew: an echo has come, or a pattern was set; `bad` corrupt frames have come so far."""
+        self._since_s = self._echo_s = run_s
         self._bad = bad
 
-    def should_ask(self, now_s: float) -> bool:
-        """Return True once after each stretch of silence."""
-        if now_s - self._since_s <= self._patience_s:
+    def expired(self, run_s: float) -> bool:
+        """Return True once after each `timeout_s` of silence."""
+        if run_s - self._since_s <= self._timeout_s:
             return False
-        self._since_s = now_s
+        self._since_s = run_s
         return True
 
-    def drowned(self, now_s: float, bad: int) -> int:
-        """Return how many broken frames came in place of echoes; 0 while that is too soon to say."""
-        return bad - self._bad if now_s - self._heard_s > self._patience_s else 0
+    def corrupt_frames(self, run_s: float, bad: int) -> int:
+        """Return how many corrupt frames came since the last echo, of `bad` so far; 0 before the timeout."""
+        return bad - self._bad if run_s - self._echo_s > self._timeout_s else 0

@@ -1,4 +1,4 @@
-"""The wire's units to ours and back: tenths of a foot, millimetres and microseconds end here."""
+"""Conversion between the protocol's units and SI: tenths of a foot, millimetres, microseconds."""
 
 from __future__ import annotations
 
@@ -24,6 +24,8 @@ from drivers.denning.frames import (
 from drivers.firing_pattern import FiringError, firing_pattern, sensors
 from drivers.messages import Flags, Floats, Identity, Odometry, Pose, Twist
 
+_ROUNDING = 1e-6
+"""Slack before rounding up or down, in units of the protocol, for decimal fractions that float64 cannot hold."""
 _STEP_MAX_MS = 0xFFFF
 _I16_MAX = 0x7FFF
 
@@ -37,49 +39,49 @@ class WirePattern(NamedTuple):
 
 
 def wire_pattern(ring: RingConfig) -> WirePattern:
-    """Return the ring's firing pattern as the protocol says it.
+    """Return the ring's firing pattern in the protocol's units.
 
-    The step is rounded up to whole milliseconds and the window down to whole tenths of a foot, so that a pattern
-    whose steps are long enough stays one.
+    The step is rounded up to whole milliseconds and the window down to whole tenths of a foot, so that a step stays
+    long enough for its window.
 
     Raises
     ------
     FiringError
-        The ring cannot carry the pattern out, or the protocol cannot say it.
+        The ring cannot carry out the pattern, or the protocol cannot express it.
     """
     pattern = firing_pattern(ring)
     if len(ring.mounts) > SENSORS_MAX:
         raise FiringError(
-            f"ring: {len(ring.mounts)} sensors, and this robot's protocol knows {SENSORS_MAX} at most; "
-            f"name the sensors of the ring that is there"
+            f"ring: {len(ring.mounts)} sensors, and this robot's protocol supports at most {SENSORS_MAX}; "
+            f"describe the ring that the robot has"
         )
     if len(pattern.masks) > MASKS_MAX:
         raise FiringError(
             f"ring.firing: {len(pattern.masks)} firings before the pattern repeats, and this robot holds "
             f"{MASKS_MAX}; use fewer sets or rotations"
         )
-    window = math.floor(pattern.window_m / TENTH_FT_M + 1e-6)
+    window = math.floor(pattern.window_m / TENTH_FT_M + _ROUNDING)
     if not WINDOW_MIN <= window <= WINDOW_MAX:
         raise FiringError(
             f"ring.firing: a window of {pattern.window_m:g} m, and this robot listens for "
             f"{WINDOW_MIN * TENTH_FT_M:.4f} to {WINDOW_MAX * TENTH_FT_M:.4f} m; "
             f"set window_m (or ring.range_max_m) accordingly"
         )
-    step_ms = math.ceil(pattern.step_period_s * 1e3 - 1e-6)
+    step_ms = math.ceil(pattern.step_period_s * 1e3 - _ROUNDING)
     if step_ms > _STEP_MAX_MS:  # pragma: no cover - the schema's own limit is below
         raise FiringError(f"ring.firing: step_period_s {pattern.step_period_s:g}, and this robot's longest is 65.535")
     return WirePattern(step_ms, window, pattern.masks)
 
 
 def to_wire(value: float, limit: float) -> int:
-    """Return metres or radians a second as signed 16-bit thousandths, never beyond ±`limit`, not even by rounding."""
-    most = min(_I16_MAX, math.floor(limit * 1e3 + 1e-6))
-    held = max(-limit, min(limit, value))  # before it is scaled: a large number times a thousand is none
-    return max(-most, min(most, round(held * 1e3)))
+    """Return a velocity, m/s or rad/s, as signed 16-bit thousandths, within ±`limit` even after rounding."""
+    most = min(_I16_MAX, math.floor(limit * 1e3 + _ROUNDING))
+    clamped = max(-limit, min(limit, value))  # before scaling: a huge number times a thousand is infinite
+    return max(-most, min(most, round(clamped * 1e3)))
 
 
 def identity_of(ident: Ident) -> Identity:
-    """Return what the robot says of itself in SI."""
+    """Return the robot's description of itself in SI."""
     return Identity(
         name=ident.name,
         sensors=ident.sensors,
@@ -91,7 +93,7 @@ def identity_of(ident: Ident) -> Identity:
 
 
 def odometry_of(odom: Odom, t_us: int) -> Odometry:
-    """Return an odometry sample in SI; `t_us` is its unwrapped time."""
+    """Return an odometry sample in SI, given its unwrapped time in µs."""
     return Odometry(
         robot_s=t_us * 1e-6,
         pose=Pose(odom.x_0p1mm * 1e-4, odom.y_0p1mm * 1e-4, odom.heading_1em4rad * 1e-4),
@@ -103,7 +105,7 @@ def odometry_of(odom: Odom, t_us: int) -> Odometry:
 
 
 def ranges_of(echo: Echo, count: int) -> Floats:
-    """Return the ranges of a firing, shape (count,), metres: NaN not fired or at fault, +inf nothing heard.
+    """Return the ranges of a firing, shape (count,), m: NaN not fired or faulty, +inf no echo.
 
     Bits of the mask beyond the ring's sensors are ignored.
     """
@@ -115,7 +117,7 @@ def ranges_of(echo: Echo, count: int) -> Floats:
 
 
 def echo_byte(range_m: float | None) -> int:
-    """Return how an ECHO says the range of a sensor that fired, metres: +inf nothing heard, None a fault."""
+    """Return the echo byte of a sensor that fired: its range in m, +inf for no echo, None for a fault."""
     if range_m is None:
         return FAULT
     if not math.isfinite(range_m):

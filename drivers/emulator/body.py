@@ -101,7 +101,7 @@ class Body:
         self.twist = Twist(0.0, 0.0)
         self.contacts = 0
         self._last_clearance: tuple[Pose, float] | None = None
-        """The pose whose clearance was computed last, and that clearance, m: the end of a step is the next one's start."""
+        """The pose whose clearance was computed last, and the clearance, m; a step ends where the next one starts."""
         self._clear_m = -math.inf
         """A lower bound of the clearance at `pose`, m."""
 

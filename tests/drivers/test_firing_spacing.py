@@ -46,7 +46,7 @@ def test_a_million_firings_through_reconnects(measured: Callable[[str], None]) -
         # A line is lost and found again after a few steps, or while the first one is still under way.
         if rng.random() < 0.7:
             current = known[int(rng.integers(0, len(known)))]
-        rotation.take(current, now_us)
+        rotation.set_pattern(current, now_us)
         reconnects += 1
         until_us = now_us + int(rng.exponential(30.0) * 50_000)
         while rotation.next_us is not None and rotation.next_us <= until_us:
@@ -90,7 +90,7 @@ def test_a_pattern_that_is_set_again_and_again_does_not_hurry_the_ring() -> None
     rotation, times = Rotation(), []
     for now_us in range(0, 2_000_000, 1000):
         if now_us % 7000 == 0:
-            rotation.take(replace(pattern, seq=now_us // 7000 % 256), now_us)
+            rotation.set_pattern(replace(pattern, seq=now_us // 7000 % 256), now_us)
         step = rotation.step(now_us)
         if step is not None:
             times.append(step.at_us)

@@ -161,7 +161,7 @@ async def test_an_emulator_that_is_stopped_and_one_that_is_killed(
         await until(lambda: len(records) >= cycles + 5)
 
     summary, _, _, _ = await run(tmp_path, act)
-    assert "nothing heard for" in summary["stop_reasons"][0]
+    assert "nothing received for" in summary["stop_reasons"][0]
 
 
 def children() -> list[int]:

@@ -99,7 +99,7 @@ def test_a_port_that_answers_garbage(tmp_path: Path) -> None:
 @stalls_excused
 def test_a_port_that_says_nothing(tmp_path: Path) -> None:
     with Stranger() as stranger, run_on(tmp_path, stranger.path, CONNECT_MAX_S) as run:
-        check(run, FAILED, "HELLO", "nothing comes from it")
+        check(run, FAILED, "HELLO", "nothing is received")
         assert len(stranger.heard) > 0, "it was asked"
 
 
@@ -179,7 +179,7 @@ def test_a_robot_that_is_deaf(tmp_path: Path) -> None:
         emulated(tmp_path, "--faults", str(tmp_path / "faults.toml")) as robot,
         run_on(tmp_path, robot.port, CONNECT_MAX_S) as run,
     ):
-        check(run, FAILED, "HELLO", "although it can be heard")
+        check(run, FAILED, "HELLO", "although the robot sends other frames")
 
 
 @stalls_excused

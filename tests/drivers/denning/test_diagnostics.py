@@ -58,7 +58,7 @@ def test_silence_is_down_and_motion_does_not_resume_by_itself(bench: Bench) -> N
     bench.robot.release()
     bench.pass_time(0.02)
     assert bench.state() is LineState.DOWN
-    assert "nothing heard for 0.41 s" in (bench.robot.problem or "")
+    assert "nothing received for 0.41 s" in (bench.robot.problem or "")
     assert bench.heard() == []
     bench.run(1.0, t_us=t_us + 600_000)
     assert bench.state() is LineState.READY
@@ -88,7 +88,7 @@ def test_a_robot_that_talks_on_but_takes_no_drive_is_down(bench: Bench) -> None:
     assert bench.state() is LineState.READY
     drive_on(bench, 0.1, t_us + 300_000, deaf=True)
     assert bench.state() is LineState.DOWN
-    assert "can be heard and has not taken a DRIVE for 0.35 s" in (bench.robot.problem or "")
+    assert "sends but has not acknowledged a DRIVE for 0.35 s" in (bench.robot.problem or "")
     assert "check the cable" in (bench.robot.problem or "")
 
 
@@ -158,7 +158,7 @@ def test_an_echo_just_after_the_last_odometry_does_not_make_it_a_robot_that_talk
     bench.say(Echo(0, t_us, 0, 1, (10,)))
     bench.pass_time(0.4)
     assert bench.state() is LineState.DOWN
-    assert "nothing heard" in (bench.robot.problem or "")
+    assert "nothing received" in (bench.robot.problem or "")
 
 
 def test_a_restart_between_two_lines_is_noticed(bench: Bench) -> None:

@@ -81,7 +81,7 @@ def test_an_unanswered_command_is_sent_three_times_with_numbers_of_their_own() -
     assert sent == [Hello(0), Hello(1), Hello(2)]
     assert bench.device_lost == 0
     assert bench.state() is LineState.DOWN
-    assert "left 3 HELLO unanswered and nothing comes from it" in (bench.robot.problem or "")
+    assert "no answer to 3 HELLO commands and nothing is received" in (bench.robot.problem or "")
 
 
 def test_a_lost_ack_is_made_good_by_the_next_and_a_late_one_counts() -> None:
@@ -186,7 +186,7 @@ def test_noise_instead_of_an_answer_points_at_the_baud_rate() -> None:
 
 
 @pytest.mark.parametrize(
-    ("broken", "told"), [(1, "nothing heard for 0.41 s"), (9, "9 broken frames came in place of it: noise")]
+    ("broken", "told"), [(1, "nothing received for 0.41 s"), (9, "9 corrupt frames came in place of it: noise")]
 )
 def test_noise_in_place_of_odometry_is_named_and_one_broken_frame_is_not(
     bench: Bench, broken: int, told: str
@@ -203,7 +203,7 @@ def test_noise_in_place_of_echoes_is_named_once_they_are_overdue(bench: Bench) -
         bench.robot.receive(b"\x9f\x33\0" * (k % 2), bench.now)
         bench.pass_time(0.02)
         assert bench.robot.problem is None or k > 20
-    assert "broken frames came in place of its echoes: noise" in (bench.robot.problem or "")
+    assert "corrupt frames came in place of its echoes: noise" in (bench.robot.problem or "")
     bench.say(Echo(0, 29 * PERIOD_US, 0, 1, (10,)))
     assert bench.robot.problem is None
 

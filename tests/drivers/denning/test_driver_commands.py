@@ -122,7 +122,7 @@ def test_a_robot_that_answers_all_but_halt_is_down() -> None:
         bench.heard()
         bench.pass_time(0.02)
     assert bench.state() is LineState.DOWN
-    assert "left 3 HALT unanswered although it can be heard" in (bench.robot.problem or "")
+    assert "no answer to 3 HALT commands although the robot sends" in (bench.robot.problem or "")
 
 
 def test_release_clears_a_pending_halt_and_waits_for_nobody(bench: Bench) -> None:
@@ -160,6 +160,6 @@ def test_a_refused_release_is_told_and_not_repeated(bench: Bench) -> None:
     (release,) = bench.heard()
     bench.say(Nak(0, release.seq, NakCode.LATCHED))
     assert bench.state() is LineState.READY
-    assert "refuses RELEASE (NAK 4): it is latched; remove what holds it" in (bench.robot.problem or "")
+    assert "refuses RELEASE (NAK 4): it is latched; remove the cause" in (bench.robot.problem or "")
     bench.pass_time(0.2)
     assert bench.heard() == []

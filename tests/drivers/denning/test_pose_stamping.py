@@ -174,7 +174,7 @@ def test_a_leap_of_the_odometry_is_taken_out_and_told(bench: Bench, x: int, head
     assert heard.odometry.pose == Pose(0.0, 0.0, 0.0)
     assert heard.odometry.ring_yaw == 0.0
     (note,) = heard.notes
-    assert "leapt" in note
+    assert "jumped" in note
     assert "check wheels" in note
     frame = bench.robot.odometry_origin
     assert (frame.x, frame.y, frame.theta) == pytest.approx((x * 1e-4, 0.0, heading * 1e-4))

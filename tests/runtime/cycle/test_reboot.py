@@ -122,7 +122,7 @@ def test_at_any_phase_it_stands_until_it_is_re_armed(measured: Callable[[str], N
         assert identity.boot_id == run.robot.boot_id, "the new boot_id was read"
         worst_stop_s = max(worst_stop_s, stopped_s)
         assert run.state.mode.reason is not None
-        assert "re-arm" in run.state.mode.reason or "taken up" in run.state.mode.reason
+        assert "re-arm" in run.state.mode.reason or "restored" in run.state.mode.reason
 
         # The map is empty at that moment, and clock and odometry begin again.
         assert not run.state.perception.objects()

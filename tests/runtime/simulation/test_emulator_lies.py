@@ -100,7 +100,7 @@ def test_a_leap_is_told_and_the_robot_drives_on(measured: Callable[[str], None])
     run.until(FROM_S + 1.0)
     assert run.state.mode.mode is Mode.DRIVE
     (note,) = run.notes
-    assert note.startswith("the odometry leapt by 0.30 m and ")
+    assert note.startswith("the odometry jumped by 0.30 m and ")
     # What is reported is in the robot's own odometry, as that is now: a foot off where it was.
     frame = run.driver.odometry_origin
     assert (frame.x / FT, frame.y / FT) == pytest.approx((1.0, 0.0), abs=0.02)
@@ -131,7 +131,7 @@ def test_noise_stops_it_only_where_it_lasts_and_is_named(rate: float, measured: 
         stopped = run.state.mode
         assert stopped.mode is Mode.SAFE_STOP
         reason = str(stopped.reason)
-        assert "broken frames came in place of its echoes: noise on the line" in reason
+        assert "corrupt frames came in place of its echoes: noise on the line" in reason
         assert reason.endswith(", then re-arm")
         assert 0.9 < stopped.entered_run_s - (FROM_S + 0.017 * seed) < 1.2
         firings = len(run.firings)

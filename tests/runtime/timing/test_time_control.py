@@ -284,7 +284,7 @@ def test_an_emulator_that_hangs_is_told_and_the_run_stops_for_its_silence(monkey
             it.links[0].is_hung = False
 
         summary, _ = run(it, act)
-    assert "nothing heard for" in summary["stop_reasons"][0]
+    assert "nothing received for" in summary["stop_reasons"][0]
 
 
 @pytest.mark.parametrize("when", ["running", "paused", "pausing"])
