@@ -39,7 +39,7 @@ _FUTURE_MAX_US = 1_000_000
 _RESET_M, _RESET_M_S = 0.5, 20.0
 """A pose that moved farther than this, m plus m/s, was reset: the robot may have restarted."""
 _JUMP_M, _JUMP_RAD = 0.1, 0.1
-"""Allowed difference of odometry from what its own velocities predict, m and rad, besides a stop within one sample."""
+"""Allowed difference of odometry from its own velocities, m and rad, besides a stop within one sample."""
 _STEADY_SAMPLES = 10
 """A deviation counts as a jump only after this many samples without one; otherwise it is how this base moves."""
 _IDENTITY = Pose(0.0, 0.0, 0.0)

@@ -109,7 +109,7 @@ def test_a_step_exactly_as_long_as_its_window_will_do() -> None:
 @pytest.mark.parametrize(
     ("firing", "count", "range_max_m", "text"),
     [
-        (FiringConfig(preset="single"), 25, 7.7, "25 sensors, and this robot's protocol knows 24"),
+        (FiringConfig(preset="single"), 25, 7.7, "25 sensors, and this robot's protocol supports at most 24"),
         (FiringConfig(sets=((0,), (1,)), rotations=13), 24, 7.7, "26 firings .* holds 24"),
         (FiringConfig(preset="octets", step_period_s=0.1), 24, 8.0, "listens for 0.1524 to 7.7724"),
         (FiringConfig(preset="octets", window_m=0.15), 24, 7.7, "listens for 0.1524 to 7.7724"),
