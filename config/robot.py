@@ -1,7 +1,4 @@
-"""The robot file: the ring and its firing pattern, the body, the serial line.
-
-Everything that differs from one robot to the next, and nothing that does not.
-"""
+"""The robot file: the ring and its firing pattern, the body, the serial line: what differs between robots."""
 
 from __future__ import annotations
 
@@ -13,19 +10,19 @@ from pydantic import BeforeValidator, Field, model_validator
 from config.strict import Strict, TomlList
 
 SOUND_SPEED_M_S = 343.0
-"""Speed of sound in dry air at 20 °C; what the ring's own electronics assume."""
+"""Speed of sound in dry air at 20 °C, m/s; the ring's electronics assume it."""
 
 SENSORS_MAX = 255
-"""Sensors in a ring, and sets in a firing pattern; a file that lists a million must not fill the memory."""
+"""Largest number of sensors in a ring, and of sets in a firing pattern; bounds the memory for a faulty file."""
 
 SensorSet: TypeAlias = Annotated[TomlList[Annotated[int, Field(ge=0, lt=SENSORS_MAX)]], Field(max_length=SENSORS_MAX)]
-"""Numbers of sensors that fire together."""
+"""Indices of sensors that fire together."""
 
 Preset = Literal["single", "opposite_pairs", "thirds", "quadrants", "octets", "alternating"]
 
 
 class Mount(NamedTuple):
-    """Where one sensor sits and looks, in the ring's frame: metres and radians."""
+    """Place (m) and direction (rad) of one sensor in the ring's frame."""
 
     x_m: float
     y_m: float
@@ -33,41 +30,44 @@ class Mount(NamedTuple):
 
 
 class SensorConfig(Strict):
-    """One sensor of a ring that is not a regular one."""
+    """One sensor of an irregular ring."""
 
     x_m: float = Field(ge=-10.0, le=10.0)
+    """Place in the ring's frame, forward, m."""
     y_m: float = Field(ge=-10.0, le=10.0)
+    """Place in the ring's frame, to the left, m."""
     angle_deg: float = Field(ge=-360.0, le=360.0)
+    """Direction of its axis, degrees counter-clockwise from forward."""
 
 
 class FiringConfig(Strict):
-    """Which sensors fire together, and how often: a preset, or sets of one's own."""
+    """The firing pattern: which sensors fire together, and how often. Give a preset or your own sets."""
 
     preset: Preset | None = None
-    """A regular pattern by name: how many sensors, equally spaced, fire at a time; `alternating` fires octets and
-    thirds in turn, so that no two sensors fire together in both and crosstalk shows."""
+    """A regular pattern by name, i.e. how many equally spaced sensors fire at a time; `alternating` fires octets and
+    thirds in turn; no two sensors fire together in both, so that crosstalk can be detected."""
     sets: Annotated[TomlList[SensorSet], Field(max_length=SENSORS_MAX)] | None = None
-    """Sets of sensor numbers, fired in turn; instead of a preset."""
+    """Sets of sensor indices, fired in turn, instead of a preset."""
     rotations: int = Field(default=1, ge=1, le=255)
-    """Fire `sets` this many times round, one sensor further round the ring each time."""
+    """Repeat `sets` this many times, each time shifted by one sensor around the ring."""
     step_period_s: float = Field(default=0.05, ge=0.001, le=60.0)
-    """Time from one firing to the next."""
+    """Time from one firing to the next, s."""
     window_m: float | None = Field(default=None, gt=0.0, le=100.0)
-    """How far each firing listens; `ring.range_max_m` where it is not given."""
+    """Range up to which each firing listens, m; by default `ring.range_max_m`."""
 
     @model_validator(mode="after")
     def _one_pattern(self) -> FiringConfig:
         if (self.preset is None) == (self.sets is None):
             raise ValueError("give either preset or sets, one of the two")
         if self.sets is not None and not self.sets:
-            raise ValueError("sets is empty: a ring that never fires sees nothing")
+            raise ValueError("sets is empty: give at least one set of sensors")
         if self.sets is not None and any(len(s) == 0 or len(set(s)) != len(s) for s in self.sets):
-            raise ValueError("each set needs at least one sensor, and none twice")
+            raise ValueError("each set needs at least one sensor, and each sensor once only")
         return self
 
 
 def _preset_as_table(value: object) -> object:
-    """Let ``firing = "octets"`` stand for ``firing = {preset = "octets"}``."""
+    """Return ``{preset = "octets"}`` for ``firing = "octets"``."""
     return {"preset": value} if isinstance(value, str) else value
 
 
@@ -75,14 +75,21 @@ class RingConfig(Strict):
     """The ring of sensors: regular (count and radius_m) or listed one by one (sensors)."""
 
     count: int | None = Field(default=None, ge=2, le=SENSORS_MAX)
+    """Number of sensors of a regular ring; sensor 0 looks forward, the others follow counter-clockwise."""
     radius_m: float | None = Field(default=None, ge=0.0, le=10.0)
+    """Radius of a regular ring, m."""
     sensors: Annotated[TomlList[SensorConfig], Field(max_length=SENSORS_MAX)] | None = None
+    """The sensors one by one, instead of `count` and `radius_m`."""
     beam_half_angle_deg: float = Field(gt=0.0, lt=90.0)
+    """Half the width of a sensor's beam, degrees."""
     resolution_m: float = Field(ge=0.0, lt=1.0)
-    """Step of the reported range; 0 = not quantised."""
+    """Quantisation step of the reported range, m; 0 = not quantised."""
     range_min_m: float = Field(ge=0.0, lt=100.0)
+    """Least range that a sensor reports, m."""
     range_max_m: float = Field(gt=0.0, le=100.0)
+    """Greatest range that a sensor reports, m."""
     firing: Annotated[FiringConfig, BeforeValidator(_preset_as_table)] = FiringConfig(preset="octets")
+    """The firing pattern: a preset's name, or a table."""
 
     @model_validator(mode="after")
     def _whole_ring(self) -> RingConfig:
@@ -98,7 +105,7 @@ class RingConfig(Strict):
 
     @property
     def mounts(self) -> tuple[Mount, ...]:
-        """Every sensor's place and direction, in the order of their numbers."""
+        """Place (m) and direction (rad) of each sensor, by index."""
         if self.sensors is not None:
             return tuple(Mount(s.x_m, s.y_m, math.radians(s.angle_deg)) for s in self.sensors)
         count, radius = self.count or 0, self.radius_m or 0.0
@@ -107,36 +114,44 @@ class RingConfig(Strict):
 
     @property
     def window_m(self) -> float:
-        """How far a firing listens, metres."""
+        """Range up to which a firing listens, m."""
         return self.range_max_m if self.firing.window_m is None else self.firing.window_m
 
 
 class BodyConfig(Strict):
-    """The base: its size, its limits, and whether its ring turns with its wheels."""
+    """The base: its size, its limits, and whether the ring turns with the wheels."""
 
     radius_m: float = Field(gt=0.0, le=10.0)
+    """Radius of the body, m."""
     speed_max_m_s: float = Field(gt=0.0, le=10.0)
+    """Largest speed, m/s."""
     turn_max_rad_s: float = Field(gt=0.0, le=20.0)
+    """Largest turning rate, rad/s."""
     acceleration_max_m_s2: float = Field(default=0.5, gt=0.0, le=50.0)
+    """Largest acceleration and deceleration, m/s²."""
     turn_acceleration_max_rad_s2: float = Field(default=2.0, gt=0.0, le=100.0)
+    """Largest angular acceleration, rad/s²."""
     synchro: bool = False
-    """True where the wheels turn and the body with its ring does not."""
+    """Synchro drive: the wheels turn, the body with its ring does not."""
 
 
 class LinkConfig(Strict):
-    """The serial line and the patience the runtime has with it."""
+    """The serial line to the robot and its timeouts."""
 
     port: str | None = None
+    """Serial port of the robot, as /dev/ttyUSB0; without it a run starts the emulator."""
     baud: int = Field(default=115200, ge=300, le=4_000_000)
+    """Speed of the line, bits per second."""
     reply_timeout_s: float = Field(default=0.1, ge=0.001, le=10.0)
-    """A command unanswered for this long is sent again."""
+    """Time after which an unanswered command is sent again, s."""
     tries: int = Field(default=3, ge=1, le=100)
-    """After this many unanswered tries the link is down."""
+    """Unanswered tries after which the link is down."""
     silence_max_s: float = Field(default=0.4, ge=0.05, le=60.0)
-    """With no odometry for this long the link is down; it comes also when still. Noticed by the next cycle."""
+    """Time without odometry after which the link is down, s; a robot at rest sends it too."""
     reopen_first_s: float = Field(default=0.05, gt=0.0, le=60.0)
+    """Wait before the first attempt to reopen the port, s; it doubles with each attempt."""
     reopen_max_s: float = Field(default=0.5, gt=0.0, le=600.0)
-    """First and longest wait between attempts to open the port; it doubles in between."""
+    """Longest wait between such attempts, s."""
 
 
 class DriverConfig(Strict):

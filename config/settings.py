@@ -1,7 +1,7 @@
-"""Everything the main process can be told: the robot, what it should recognise, how it sees, moves and logs.
+"""All settings of a run: the robot, the models, perception, behaviours, the cycle, logs, recordings and the console.
 
-The sections are named as in the files, so that a dotted path names a value everywhere: in a file, after
-``--set``, and in an error.
+The sections have the same names as in the files, so that a dotted path names a setting everywhere: in a file, after
+``--set``, and in an error message. The text below each setting is its help in the console and in docs/.
 """
 
 from __future__ import annotations
@@ -20,21 +20,22 @@ class CycleConfig(Strict):
     """The perception-action cycle."""
 
     rate_hz: float = Field(default=20.0, ge=1.0, le=200.0)
+    """Cycles per second, Hz."""
     perception_budget_s: float = Field(default=0.005, ge=0.0, le=1.0)
-    """Time perception may take in a cycle; refinement stops there and resumes in the next."""
+    """Time for perception in each cycle, s. Refinement stops then and continues in the next cycle."""
     overruns_max: int = Field(default=10, ge=1, le=10_000)
-    """After so many cycles in a row that left no time for the next one the robot stops and says whose fault it is."""
+    """Consecutive cycles that may overrun their period. One more stops the robot; the reason names the slow part."""
 
 
 class SegmentsConfig(Strict):
-    """Which pairs of readings of one sensor make an outline segment (paper §3.2)."""
+    """Pairs of readings of one sensor that form an outline segment (paper §3.2)."""
 
     baseline_min_m: float = Field(default=0.25, gt=0.0, le=10.0)
-    """Two readings nearer than this are not paired: their quantisation would dominate the direction."""
+    """Shortest distance between paired readings, m. Below it quantisation dominates the segment's direction."""
     baseline_max_m: float = Field(default=0.5, gt=0.0, le=10.0)
-    """Two readings farther apart than this hardly see the same surface."""
+    """Longest distance between paired readings, m. Beyond it they rarely see the same surface."""
     gap_max_s: float = Field(default=3.0, gt=0.0, le=60.0)
-    """Two readings further apart in time than this are not consecutive."""
+    """Longest time between paired readings, s."""
 
     @model_validator(mode="after")
     def _ordered(self) -> SegmentsConfig:
@@ -46,77 +47,81 @@ class SegmentsConfig(Strict):
 
 
 class MapConfig(Strict):
-    """The outline map, the paper's raw map."""
+    """The outline map: the paper's raw map of segments (§3.3)."""
 
     capacity: int = Field(default=4096, ge=16, le=4_000_000)
-    """Segments held at most; the oldest leaves for a new one."""
+    """Largest number of segments; a new one then replaces the oldest."""
     age_max_s: float = Field(default=120.0, gt=0.0, le=1e6)
-    """Segments leave the map at this age."""
+    """Age at which segments leave the map, s."""
     contradiction_margin_m: float = Field(default=0.2, ge=0.0, le=10.0)
-    """A segment leaves when a sensor that faces it hears an echo from this much behind it."""
+    """A segment leaves the map when a sensor that faces it hears an echo from at least this far behind it, m."""
 
 
 class ClustersConfig(Strict):
     """Minimum-distance clustering (paper Table 1)."""
 
     threshold_m: float = Field(default=0.4572, gt=0.0, le=100.0)
-    """T: a segment farther than this from every cluster's centre founds a new cluster."""
+    """T: a segment farther than this from every cluster's centre starts a new cluster, m."""
     segments_min: int = Field(default=8, ge=1, le=10_000)
-    """Clusters of fewer segments get no model."""
+    """Least number of segments in a cluster that a model is fitted to."""
     clusters_max: int = Field(default=128, ge=1, le=4096)
+    """Largest number of clusters."""
 
 
 class RelaxationConfig(Strict):
     """Relaxation of the model onto a cluster's segments (paper §3.4)."""
 
     gamma: float = Field(default=2.0, gt=0.0, le=100.0)
-    """γ: sphere_i = γ times the length of model segment i."""
+    """γ: radius of a model side's sphere of influence over its length."""
     negligible_m: float = Field(default=3e-4, gt=0.0, le=1.0)
+    """Relaxation ends when an iteration moves the model by less than this, m, and …"""
     negligible_rad: float = Field(default=1e-3, gt=0.0, le=1.0)
-    """The process stops when the total increment is below both."""
+    """… turns it by less than this, rad."""
     iterations_max: int = Field(default=500, ge=1, le=1_000_000)
-    """A model that has not settled by then is left as it is until new evidence comes."""
+    """Most iterations for one model; after them it stays where it is until its segments change."""
     iterations_per_quantum: int = Field(default=20, ge=1, le=100_000)
+    """Iterations in one quantum of refinement."""
 
 
 class RecognitionConfig(Strict):
-    """When a relaxed model counts as an object seen."""
+    """Conditions under which a relaxed model is reported as an object."""
 
     tolerance_m: float = Field(default=0.1, gt=0.0, le=10.0)
+    """Largest distance of a supporting segment from a side of the model, m."""
     tolerance_deg: float = Field(default=30.0, gt=0.0, le=90.0)
-    """A segment supports the model where it lies this near to a side and this parallel to it."""
+    """Largest angle between a supporting segment and that side, degrees."""
     support_min: float = Field(default=0.5, ge=0.0, le=1.0)
-    """Share of the cluster's segments that support the model, at least."""
+    """Least share of the cluster's segments that support the model, 0 to 1."""
     separation_m: float = Field(default=0.3, ge=0.0, le=100.0)
-    """Two candidates that rest nearer to one another than this are one object."""
+    """Candidates nearer to one another than this are one object, m."""
     coverage_min: float = Field(default=0.35, ge=0.0, le=1.0)
-    """Share of the model's outline whose sides have support, at least."""
+    """Least share of the model's outline that has support, 0 to 1."""
 
 
 class BayesConfig(Strict):
-    """The Bayesian method: raw ranges held against every explanation there is."""
+    """The Bayesian method: raw ranges are compared under all alternative explanations."""
 
     report_probability: float = Field(default=0.95, gt=0.0, lt=1.0)
-    """A model is reported from this probability on."""
+    """Least probability at which a model is reported."""
     report_probability_near: float = Field(default=0.8, gt=0.0, lt=1.0)
-    """The same for what was heard from within 6 ft; farther away are explanations that nobody thought of."""
+    """The same for objects heard from within 6 ft (1.83 m). Farther away unmodelled explanations are more likely."""
     tracks_max: int = Field(default=48, ge=1, le=1000)
-    """Round things held in mind at a time, models or not."""
+    """Largest number of tracks of round objects, models or not."""
     attempts_per_firing: int = Field(default=3, ge=0, le=64)
-    """Unexplained outline segments looked at for new objects, a firing."""
+    """Unexplained outline segments examined for new objects after each firing."""
     fresh_share: float = Field(default=0.08, gt=0.0, le=1.0)
-    """An object is refined once this share of its readings is new."""
+    """An object is refined again once this share of its readings is new, 0 to 1."""
     quanta_per_firing: int = Field(default=2, ge=1, le=1000)
-    """Refinements a firing, at most; what is left waits for the next one."""
+    """Most refinements of round objects after each firing; the others follow after the next one."""
     polygon_quanta_per_firing: int = Field(default=12, ge=1, le=1000)
-    """The same for polygons, so that drums in view do not starve the boxes beside them."""
+    """Most refinements of polygons after each firing, counted separately so that drums do not delay boxes."""
 
 
 class PerceptionConfig(Strict):
-    """Perception: the method and its constants; the sections below `bayes` are the paper's steps."""
+    """Perception: the method and its settings; the sections after `bayes` are the paper's steps."""
 
     method: Literal["paper", "bayes"] = "bayes"
-    """How objects are recognised: as the paper does it, or exactly."""
+    """How objects are recognised: `paper` as Santamaría & Arkin do, `bayes` by comparing raw ranges."""
     bayes: BayesConfig = BayesConfig()
 
     segments: SegmentsConfig = SegmentsConfig()
@@ -130,24 +135,28 @@ class MoveAheadConfig(Strict):
     """The move-ahead schema (Arkin 1989): a unit vector along a heading, in the odometry's frame."""
 
     move_ahead_gain: float = Field(default=1.0, ge=0.0, le=100.0)
+    """Length of the schema's vector; 1 asks for the base velocity."""
     move_ahead_direction_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
+    """Heading in the odometry's frame, degrees counter-clockwise from x."""
     distance_m: float | None = Field(default=None, gt=0.0, le=1e6)
-    """How far to go from where the drive began; without end where it is not given."""
+    """Distance to drive from the start, m; unlimited if not given."""
     at_end: Literal["stop", "turn_back"] = "stop"
+    """After that distance: stop, or drive back and forth."""
 
 
 class AvoidStaticObstacleConfig(Strict):
-    """The avoid-static-obstacle schema (Arkin 1989), distances from the robot's rim to the echo."""
+    """The avoid-static-obstacle schema (Arkin 1989); distances are from the robot's rim to the echo."""
 
     avoid_obstacle_gain: float = Field(default=1.0, ge=0.0, le=100.0)
+    """G: factor on the repulsion; 0 turns the schema off."""
     avoid_obstacle_sphere_m: float = Field(default=0.6, gt=0.0, le=100.0)
-    """S: obstacles farther away than this do not matter."""
+    """S: obstacles farther away than this are ignored, m."""
     avoid_obstacle_safety_margin_m: float = Field(default=0.2, ge=0.0, le=100.0)
-    """R: nearer than this the repulsion is unbounded; above the least range the ring can report, or it never is."""
+    """R: nearer than this the repulsion is unbounded, m. Must exceed the ring's least range to have an effect."""
     summing: Literal["sum", "largest"] = "largest"
-    """Add all echoes' vectors, or keep only the largest magnitude along the sum's direction."""
+    """`sum` adds the vectors of all echoes; `largest` limits the sum to the largest single push in its direction."""
     echo_age_max_s: float = Field(default=1.0, gt=0.0, le=60.0)
-    """An echo older than this is no longer an obstacle."""
+    """Age up to which an echo counts as an obstacle, s."""
 
     @model_validator(mode="after")
     def _ordered(self) -> AvoidStaticObstacleConfig:
@@ -157,13 +166,14 @@ class AvoidStaticObstacleConfig(Strict):
 
 
 class MoveToGoalConfig(Strict):
-    """The move-to-goal schema (Arkin 1989): a vector towards a place that the operator names."""
+    """The move-to-goal schema (Arkin 1989): a vector towards a goal that the operator sets."""
 
     move_to_goal_gain: float = Field(default=1.0, ge=0.0, le=100.0)
+    """Length of the schema's vector outside the controlled zone; 1 asks for the base velocity."""
     success_radius_m: float = Field(default=0.1, gt=0.0, le=100.0)
-    """Nearer than this the goal is reached, and the robot stands."""
+    """Distance at which the goal is reached and the robot stops, m."""
     controlled_zone_m: float = Field(default=0.6, gt=0.0, le=100.0)
-    """Nearer than this it goes the slower the nearer it is."""
+    """Distance within which the robot slows down in proportion, m."""
 
     @model_validator(mode="after")
     def _ordered(self) -> MoveToGoalConfig:
@@ -173,32 +183,32 @@ class MoveToGoalConfig(Strict):
 
 
 class TeleoperationConfig(Strict):
-    """Driving by hand: velocities from an operator's keys, pointer or gamepad, each good for a moment."""
+    """Teleoperation: velocities from the operator's keys, pointer or gamepad, each valid for a short time."""
 
     message_age_max_s: float = Field(default=0.25, ge=0.02, le=2.0)
-    """With no further word from the operator for this long the robot stands, by the host's clock."""
+    """Time without a message from the operator after which the robot stops, s of the host's clock."""
     avoid: bool = True
-    """Whether avoid-static-obstacle slows and steers; the arbiter's clearance holds in any case."""
+    """Let avoid-static-obstacle slow and steer the robot. The arbiter's clearance applies in any case."""
 
 
 class ArbiterConfig(Strict):
-    """How the sum of the schemas becomes a velocity."""
+    """The arbiter: how the sum of the schemas' vectors becomes a velocity."""
 
     base_velocity_m_s: float = Field(default=0.3, gt=0.0, le=10.0)
-    """Speed for a sum of magnitude one, straight ahead."""
+    """Speed straight ahead for a sum of length 1, m/s."""
     cautious_velocity_m_s: float = Field(default=0.1, ge=0.0, le=10.0)
-    """Speed kept while the robot must turn."""
+    """Speed while the robot is 45° off course, m/s; it falls to 0 at 90°."""
     turn_gain_per_s: float = Field(default=2.0, gt=0.0, le=100.0)
-    """Turning rate for each radian between the drive heading and the sum's direction."""
+    """Turning rate for each radian between the drive heading and the sum's direction, rad/s."""
     clearance_m: float = Field(default=0.16, ge=0.0, le=10.0)
-    """The speed is held to what the base can stop from with this much left between its rim and an echo ahead.
+    """Distance between rim and echo at which the base can still stop, m; it limits the speed.
 
-    Just above the least range the ring can report: such an echo may be from anything nearer.
+    Choose it just above the ring's least range: an echo at that range may come from anything nearer.
     """
 
 
 class BehaviorsConfig(Strict):
-    """The motor schemas and their arbiter; which of them are asked depends on what the operator wants driven."""
+    """The motor schemas and their arbiter; the operator's drive request selects the schemas."""
 
     move_ahead: MoveAheadConfig = MoveAheadConfig()
     avoid_static_obstacle: AvoidStaticObstacleConfig = AvoidStaticObstacleConfig()
@@ -208,64 +218,67 @@ class BehaviorsConfig(Strict):
 
 
 class RealtimeConfig(Strict):
-    """What the operating system is asked for, so that cycles begin on time; what it refuses is told, not fatal."""
+    """Requests to the operating system for punctual cycles; a refused one is logged, and the run continues."""
 
     slice_s: float | None = Field(default=None, ge=0.0001, le=0.1)
-    """Turns of the processor this short let a waking cycle in before programs that want it all (from Linux 6.12).
+    """Length of the process's time slice, s (from Linux 6.12). A short one lets a cycle start before busy programs.
 
-    One shorter than a cycle's work lets them in again in the middle of it.
+    One shorter than a cycle's work lets those interrupt it.
     """
     priority: int | None = Field(default=None, ge=1, le=99)
-    """Run under SCHED_FIFO at this priority: before everything that is not real-time."""
+    """Run under SCHED_FIFO at this priority, before all processes that are not real-time."""
     core: int | None = Field(default=None, ge=0, le=4095)
-    """Stay on this core."""
+    """Run on this processor core only."""
     lock_memory: bool = False
-    """Never let memory be swapped out."""
+    """Lock the process's memory against swapping."""
 
 
 class LogConfig(Strict):
-    """Where the log goes and how much of it."""
+    """The log: its file and its level."""
 
     file: str | None = None
-    """JSON lines; where it is not given, echolocate/echolocate.jsonl in the user's state folder."""
+    """Path of the log, in JSON lines; by default echolocate/echolocate.jsonl in the user's state folder."""
     level: Literal["debug", "info", "warning", "error"] = "info"
+    """Least severity that is logged."""
 
 
 class RecordingConfig(Strict):
-    """The recording that every run leaves behind, in a folder where the oldest make room for the newest."""
+    """The recording of every run, in a folder from which the oldest recordings are deleted."""
 
     enabled: bool = True
-    """Keep one where ``--record`` names no file."""
+    """Record even if ``--record`` names no file."""
     folder: str | None = None
-    """Where it is not given, echolocate/runs in the user's state folder."""
+    """Folder of the recordings; by default echolocate/runs in the user's state folder."""
     cap_mb: float = Field(default=1000.0, ge=1.0, le=1e7)
-    """All recordings in the folder together, megabytes; an hour takes about 30."""
+    """Largest size of all recordings in the folder, MB; an hour takes about 30 MB."""
     keep: int = Field(default=100, ge=1, le=100_000)
-    """Files in the folder, at most."""
+    """Largest number of recordings in the folder."""
     keyframe_period_s: float = Field(default=40.0, ge=0.1, le=3600.0)
-    """So often the whole state is recorded: a replay can begin there."""
+    """Time between records of the whole state, from which a replay can start, s."""
 
 
 class ConsoleConfig(Strict):
-    """The operator console: a page that the robot's own process serves, for watching and for driving."""
+    """The operator console: a web page served by the robot's process, for monitoring and driving."""
 
     enabled: bool = True
+    """Serve the console."""
     host: str = Field(default="127.0.0.1", min_length=1)
-    """Where it listens. Anything but this machine itself lets others reach it: they still need the token."""
+    """Address to listen on. Any other than this machine's own lets other machines connect; they need the token."""
     port: int = Field(default=8765, ge=0, le=65_535)
-    """The next free one where it is taken; 0 = any free one."""
+    """TCP port; if it is in use, the next free one. 0 = any free one."""
     watch_without_token: bool = False
-    """Let who has no token watch; to halt, change or drive takes the token of the start URL in any case."""
+    """Allow monitoring without the token. Halting, changing and driving always require the token of the start URL."""
     clients_max: int = Field(default=16, ge=1, le=256)
-    """Pages that may be open at a time."""
+    """Largest number of pages open at a time."""
 
 
 class Settings(RobotConfig):
-    """All settings of one run: the robot's sections at the top, then what it recognises and does."""
+    """All settings of one run: the robot's sections first, then models, world, perception and behaviours."""
 
     models: TomlList[ModelConfig] = Field(min_length=1)
+    """The objects to recognise."""
     world: WorldConfig | None = None
-    """What the emulator shows where no port is given."""
+    """The world of the emulator, which runs if no port is given."""
     cycle: CycleConfig = CycleConfig()
     perception: PerceptionConfig = PerceptionConfig()
     behaviors: BehaviorsConfig = BehaviorsConfig()
@@ -279,5 +292,5 @@ class Settings(RobotConfig):
         names = [m.name for m in self.models]
         twice = next((n for n in names if names.count(n) > 1), None)
         if twice is not None:
-            raise ValueError(f"two models are named {twice}: a report could not tell them apart")
+            raise ValueError(f"two models are named {twice}: give each model a name of its own")
         return self

@@ -1,4 +1,4 @@
-"""The world file: what stands in an emulated hall, how sound behaves there, and how odometry drifts."""
+"""The world file: objects and walls of an emulated hall, its acoustics, and the drift of odometry."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from pydantic import Field
 from config.strict import Coordinate, Point, Strict, TomlList
 
 ITEMS_MAX: Final = 1000
-"""Things of a kind in a world, and corners of a thing."""
+"""Largest number of objects of one kind in a world, and of corners of a polygon."""
 
 Turn: TypeAlias = Annotated[float, Field(ge=-360.0, le=360.0)]
 """An angle, degrees."""
 
 
 class DrumConfig(Strict):
-    """A closed cylinder."""
+    """A closed cylinder: its centre and radius, m."""
 
     x_m: Coordinate
     y_m: Coordinate
@@ -24,7 +24,7 @@ class DrumConfig(Strict):
 
 
 class WallConfig(Strict):
-    """A straight wall between two points, seen from both sides."""
+    """A straight wall between two points (m), visible from both sides."""
 
     x1_m: Coordinate
     y1_m: Coordinate
@@ -33,7 +33,7 @@ class WallConfig(Strict):
 
 
 class BoxConfig(Strict):
-    """A rectangle by its centre, its sides, and its rotation."""
+    """A rectangle: its centre (m), its sides (m) and its rotation (degrees)."""
 
     x_m: Coordinate
     y_m: Coordinate
@@ -43,13 +43,13 @@ class BoxConfig(Strict):
 
 
 class PolygonConfig(Strict):
-    """A closed polygon by its corners, in order."""
+    """A closed polygon: its corners in order, m."""
 
     vertices_m: TomlList[Point] = Field(min_length=3, max_length=ITEMS_MAX)
 
 
 class StartConfig(Strict):
-    """Where the robot stands when the world begins, in world coordinates."""
+    """Pose of the robot at the start, in world coordinates (m, degrees)."""
 
     x_m: Coordinate = 0.0
     y_m: Coordinate = 0.0
@@ -57,33 +57,33 @@ class StartConfig(Strict):
 
 
 class AcousticsConfig(Strict):
-    """How a range comes about."""
+    """The model of ranges and their errors."""
 
     model: Literal["cone", "specular"] = "cone"
-    """`cone`: nearest surface point in the beam; `specular`: echo only where the surface normal lies in the beam."""
+    """`cone`: the nearest surface point in the beam; `specular`: an echo only if its normal is in the beam."""
     noise_relative: float = Field(default=0.0, ge=0.0, le=1.0)
-    """Standard deviation of the range noise as a share of the range."""
+    """Standard deviation of the range noise that grows with range, as a share of the range."""
     noise_m: float = Field(default=0.0, ge=0.0, le=10.0)
-    """Standard deviation of the range noise that does not depend on range."""
+    """Standard deviation of the range noise that does not depend on range, m."""
     dropout: float = Field(default=0.0, ge=0.0, le=1.0)
-    """Probability that a reading that should have echoed hears nothing."""
+    """Probability that a sensor misses its echo."""
     outliers: float = Field(default=0.0, ge=0.0, le=1.0)
-    """Probability that a reading is a uniformly random range inside the window."""
+    """Probability that a reading is a uniformly random range within the window."""
     outlier_max_m: float | None = Field(default=None, gt=0.0, le=100.0)
-    """Such a range is at most this; the window's end where it is not given or beyond."""
+    """Largest random range, m; by default, and at most, the end of the window."""
     crosstalk: float = Field(default=0.0, ge=0.0, le=1.0)
-    """Probability that a sensor hears a neighbour's echo of the same firing where that comes first."""
+    """Probability that a sensor hears a neighbour's echo of the same firing if that arrives first."""
     sound_speed_scale: float = Field(default=1.0, ge=0.8, le=1.2)
-    """True speed of sound over the one the ring assumes; ranges come out divided by it."""
+    """True speed of sound over the one that the ring assumes; ranges are divided by it."""
 
 
 class OdometryConfig(Strict):
-    """How the odometry drifts from the truth."""
+    """The drift of odometry."""
 
     scale: float = Field(default=1.0, ge=0.5, le=1.5)
-    """Reported over true distance."""
+    """Reported distance over true distance."""
     heading_rad_per_sqrt_m: float = Field(default=0.0, ge=0.0, le=1.0)
-    """Standard deviation of the heading's random walk, a square root of a metre travelled."""
+    """Standard deviation of the heading's random walk, rad per √m travelled."""
 
 
 class WorldConfig(Strict):

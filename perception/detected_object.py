@@ -1,4 +1,4 @@
-"""What perception reports: an object, what it is, and how well that and its place are known."""
+"""The results of perception: detected objects with their uncertainty, and counts of what a method holds."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 @dataclass(frozen=True, slots=True)
 class DetectedObject:
-    """An object recognised and located, in the odometry's frame."""
+    """An object that was recognised and located, in the odometry's frame."""
 
     model: str
-    """Its label: a model's name; from the Bayesian method also wall, inside corner, edge, post, barrel or unknown."""
+    """Label: a model's name; from the Bayesian method also wall, inside corner, edge, post, barrel or unknown."""
     x: float
     """m"""
     y: float
@@ -19,21 +19,21 @@ class DetectedObject:
     theta: float
     """rad"""
     sigma: float
-    """Standard error of the position, m: along its worst axis, or as the paper's method's residuals have it."""
+    """Standard error of the position along its worst axis, m; from the paper's method, that of the residuals."""
     support: int
     """The number of outline segments (paper) or raw readings (bayes) that support it."""
     score: float
-    """From 0 to 1: the probability that it is what it is called, or the paper's method's goodness of fit."""
+    """From 0 to 1: the label's probability (bayes) or the goodness of fit (paper)."""
     probability: float | None = None
-    """That it is what it is called; the paper's method does not know."""
+    """Probability of the label; None from the paper's method."""
     covariance: tuple[float, float, float] | None = None
-    """xx, xy, yy of the position, m²; the paper's method does not know."""
+    """xx, xy, yy of the position, m²; None from the paper's method."""
     number: int | None = None
-    """By which it is known as long as it is there; none is used twice. Walls have none."""
+    """The object's number for as long as it exists; numbers are never reused. None for walls."""
     confirmed: bool = False
-    """A person said that it is there."""
+    """A user confirmed it."""
     placed: bool = False
-    """A person put it there, and the readings do not bear that out by themselves yet."""
+    """A user placed it, and the readings alone do not support it yet."""
 
 
 class MapCounts(NamedTuple):

@@ -1,7 +1,7 @@
-"""What a person may do to what was perceived, and what a person is told of why something is believed.
+"""Edits of the map by the operator, and the evidence for an object that the operator sees.
 
-An edit is an input of a cycle as an echo is: plain numbers and names, recorded with the rest, so that a replay does
-the same to the same things. `kind` tells one from the other in a recording.
+An edit is an input of a cycle, like an echo: plain numbers and names, recorded with the other inputs so that a replay
+repeats it. `kind` names the edit in a recording and on the wire.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from perception.kernel import Floats, Ints
 
 @dataclass(frozen=True, slots=True)
 class DeleteSegments:
-    """Take outline segments out of the map."""
+    """Delete outline segments from the map."""
 
     numbers: tuple[int, ...]
     kind: Literal["delete_segments"] = "delete_segments"
@@ -22,7 +22,7 @@ class DeleteSegments:
 
 @dataclass(frozen=True, slots=True)
 class PinSegments:
-    """Keep outline segments whatever comes: they do not age, and nothing contradicts them; or let them go again."""
+    """Pin outline segments, or unpin them. Pinned segments neither age nor leave by contradiction."""
 
     numbers: tuple[int, ...]
     pinned: bool
@@ -31,7 +31,7 @@ class PinSegments:
 
 @dataclass(frozen=True, slots=True)
 class PlaceModel:
-    """Say that a model stands about here (m, rad, the odometry's frame): refinement goes on from there."""
+    """Place a model (m, rad, odometry's frame) as a new object; refinement starts from there."""
 
     model: str
     x: float
@@ -42,7 +42,7 @@ class PlaceModel:
 
 @dataclass(frozen=True, slots=True)
 class MoveObject:
-    """Say that an object stands rather here: refinement goes on from there."""
+    """Move an object (m, rad, odometry's frame); refinement starts from there."""
 
     object: int
     x: float
@@ -53,7 +53,7 @@ class MoveObject:
 
 @dataclass(frozen=True, slots=True)
 class RejectObject:
-    """Say that there is no such object: it goes, and what was heard so far does not bring it back."""
+    """Remove an object; readings taken so far do not bring it back."""
 
     object: int
     kind: Literal["reject_object"] = "reject_object"
@@ -61,7 +61,7 @@ class RejectObject:
 
 @dataclass(frozen=True, slots=True)
 class ConfirmObject:
-    """Say that there is such an object: it is reported however little the readings say for it."""
+    """Confirm an object; it is reported whatever the readings say."""
 
     object: int
     kind: Literal["confirm_object"] = "confirm_object"
@@ -69,7 +69,7 @@ class ConfirmObject:
 
 @dataclass(frozen=True, slots=True)
 class ClearMap:
-    """Forget segments and objects; what the robot has to keep clear of stays."""
+    """Remove all segments and objects; fresh echoes, which the robot avoids, stay."""
 
     kind: Literal["clear_map"] = "clear_map"
 
@@ -77,37 +77,39 @@ class ClearMap:
 Edit: TypeAlias = DeleteSegments | PinSegments | PlaceModel | MoveObject | RejectObject | ConfirmObject | ClearMap
 
 NUMBER_MAX: Final = 2**53
-"""Numbers stay below this: a page keeps them as floats."""
+"""Numbers of objects and segments are below this: a browser stores them as floats."""
 COORDINATE_MAX_M: Final = 10_000.0
-"""Nothing stands farther off than this along an axis; a number beyond it is a slip."""
+"""Largest coordinate accepted, m; a larger one is a mistake."""
+NAMED_MAX: Final = 5
+"""Segments that a message lists by number; further ones are counted."""
 
 
 class Segments(NamedTuple):
-    """The outline segments in the map, a row each, copies."""
+    """The outline segments in the map, one row each; copies."""
 
     numbers: Ints
-    """(n,) by which a segment is known as long as it is there; none is used twice."""
+    """(n,) each segment's number for as long as it exists; numbers are never reused."""
     geometry: Floats
     """(n, 5) end points x1, y1, x2, y2 (m) and direction of the normal (rad)."""
     times: Floats
-    """(n,) when each was completed, s of the robot's clock; NaN where a recording's beginning does not tell."""
+    """(n,) when each was completed, s of the robot's clock; NaN if unknown."""
     pinned: Ints
-    """(n,) 1 where it was pinned."""
+    """(n,) 1 for a pinned segment."""
 
 
 @dataclass(frozen=True, slots=True)
 class Arc:
-    """A raw reading, and what it says of an object."""
+    """A raw reading and its evidence for or against an object."""
 
     x: float
     y: float
     """Place of the sensor, m."""
     direction: float
-    """Of its axis, rad."""
+    """Direction of its axis, rad."""
     range_m: float | None
-    """None: nothing was heard."""
+    """None if it heard no echo."""
     nats: float
-    """For the object where positive, against it where negative: log likelihood over that of something else's echo."""
+    """Log likelihood ratio of the object against an echo of something else; negative: evidence against it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,31 +126,34 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Why an object is believed, and how far."""
+    """The evidence for and against an object."""
 
     object: int
     model: str
-    """What it is compared as: a model's name, or what a rival of the models is called."""
+    """The label it was compared as: a model's name, or that of an alternative."""
     arcs: tuple[Arc, ...] = ()
-    """The Bayesian method's readings."""
+    """The readings, from the Bayesian method."""
     lines: tuple[Line, ...] = ()
-    """The paper's method's segments."""
+    """The segments, from the paper's method."""
     supporting: float = 0.0
     opposing: float = 0.0
-    """Sums of what speaks for it and, negative, against it: nats, or segments by the paper's method."""
+    """Sums of the evidence for it and, negative, against it: nats (bayes) or segments (paper)."""
     rivals: tuple[tuple[str, float], ...] = ()
-    """By how much other explanations of the readings led when they were last asked, nat; negative: were behind."""
+    """Label and lead of each alternative explanation when it was last compared, nat; negative: less likely."""
 
 
 def invalid_pose(x: float, y: float, theta: float) -> str | None:
-    """Return why a pose given by hand is none, None where it is good."""
+    """Return why a pose entered by the operator (m, rad) is invalid, None if it is valid."""
     if abs(x) <= COORDINATE_MAX_M and abs(y) <= COORDINATE_MAX_M and abs(theta) <= COORDINATE_MAX_M:
         return None
-    return f"({x:g} m, {y:g} m, {theta:g} rad) is no place: give metres and radians in the odometry's frame"
+    return (
+        f"invalid pose ({x:g} m, {y:g} m, {theta:g} rad): expected metres and radians in the odometry's frame, "
+        f"each finite and within ±{COORDINATE_MAX_M:g}"
+    )
 
 
 def invalid_number(edit: Edit) -> str | None:
-    """Return why the numbers that an edit names are none that anything has, None where they may be."""
+    """Return why a number in an edit cannot belong to any segment or object, None if all can."""
     match edit:
         case DeleteSegments(numbers) | PinSegments(numbers):
             named: tuple[int, ...] = tuple(numbers)
@@ -157,16 +162,16 @@ def invalid_number(edit: Edit) -> str | None:
         case PlaceModel() | ClearMap():
             return None
     wrong = next((n for n in named if not 0 < n < NUMBER_MAX), None)
-    return None if wrong is None else f"nothing has the number {wrong}"
+    return None if wrong is None else f"invalid number {wrong}: expected an integer above 0 and below 2^53"
 
 
 def no_such_object(number: int) -> str:
-    """Return why an edit of an object fails that is not there."""
-    return f"there is no object {number} any more: look at the list again"
+    """Return the error for an edit of an object that does not exist."""
+    return f"no object {number}: it may have left the map since; look at the list again"
 
 
 def no_such_segments(numbers: set[int]) -> str:
-    """Return why an edit of segments fails of which some are not there."""
-    named = ", ".join(map(str, sorted(numbers)[:5]))
-    more = f" and {len(numbers) - 5} more" if len(numbers) > 5 else ""
-    return f"not in the map any more: segment {named}{more}; the others are done"
+    """Return the error for an edit of several segments of which these do not exist."""
+    named = ", ".join(map(str, sorted(numbers)[:NAMED_MAX]))
+    more = f" and {len(numbers) - NAMED_MAX} more" if len(numbers) > NAMED_MAX else ""
+    return f"no longer in the map: segment {named}{more}; the other segments were edited"

@@ -1,7 +1,7 @@
-"""The last echo of each sensor as a point in the odometry's frame: what the schemas are to keep clear of.
+"""The last echo of each sensor as a point in the odometry's frame: the obstacles that the schemas avoid.
 
-A sensor that fires again replaces its own echo and no other's; one that hears nothing clears it. So a reading at
-maximum range leaves no obstacle behind, and neighbours do not erase each other's.
+A sensor that fires again replaces only its own echo; if it hears nothing, its echo is removed. So a reading at
+maximum range leaves no obstacle behind, and neighbours do not erase each other's echoes.
 """
 
 from __future__ import annotations
@@ -16,11 +16,27 @@ from perception.kernel import Floats, kernel
 
 
 @kernel
-def take_in(
+def record_echoes(
     ranges: Floats, mounts: Floats, x: float, y: float, yaw: float, t: float, points: Floats, times: Floats,
     heard: NDArray[np.bool_],
 ) -> None:  # fmt: skip
-    """Enter a firing into `points` (n, 2), `times` (n,) and `heard` (n,); `ranges` as in a `Firing`, m and rad."""
+    """Enter the readings of a firing.
+
+    Parameters
+    ----------
+    ranges : (n,) float
+        As in a `Firing`, m.
+    mounts : (n, 3) float
+        x, y (m), direction (rad) of each sensor in the ring's frame.
+    x, y, yaw, t : float
+        Place (m) and direction (rad) of the ring, time of the firing (s).
+    points : (n, 2) float
+        Place of each sensor's last echo, m. Updated.
+    times : (n,) float
+        When each sensor last fired, s. Updated.
+    heard : (n,) bool
+        Whether it heard an echo then. Updated.
+    """
     c = math.cos(yaw)
     s = math.sin(yaw)
     for i in range(ranges.shape[0]):
@@ -50,18 +66,18 @@ class FreshEchoes:
         self._heard = np.zeros(len(mounts), dtype=np.bool_)
 
     def update(self, firing: Firing) -> None:
-        """Take in one firing."""
+        """Enter the echoes of a firing."""
         pose = firing.pose
-        take_in(
+        record_echoes(
             firing.ranges_m, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), float(firing.robot_s),
             self._points, self._times, self._heard,
         )  # fmt: skip
 
-    def points(self, t: float, age_max_s: float) -> Floats:
-        """Return the echoes not older than `age_max_s` at time `t`: shape (k, 2), m, a copy."""
-        fresh: Floats = self._points[self._heard & (t - self._times <= age_max_s)]
+    def points(self, robot_s: float, age_max_s: float) -> Floats:
+        """Return a copy of the echoes no older than `age_max_s` at the robot's time `robot_s`: shape (k, 2), m."""
+        fresh: Floats = self._points[self._heard & (robot_s - self._times <= age_max_s)]
         return fresh
 
     def clear(self) -> None:
-        """Forget all echoes."""
+        """Remove all echoes."""
         self._heard[:] = False

@@ -1,23 +1,34 @@
-"""An object model as the kernels want it: the sides of a polygon, ready to be moved and turned (paper §3.4)."""
+"""An object model in the form that kernels take: the sides of its outline (paper §3.4)."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from config.model import ModelConfig
 from perception.kernel import Floats
 
+STRAIGHT_M: Final = 1e-9
+"""An open outline that bulges by less is a straight line, m; covers rounding only."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectModel:
     """The outline of an object in its own frame.
 
-    `sides` has shape (m, 4): middle x, y (m), direction (rad) and length (m) of each side. `centroid` is the middle
-    of the outline, weighted by length. `facing` is the direction in which an open outline bulges, None for a closed
-    one, which looks alike from everywhere as far as a first guess goes.
+    Attributes
+    ----------
+    name : str
+        The model's name.
+    sides : (m, 4) float
+        Middle x, y (m), direction (rad) and length (m) of each side.
+    centroid : (float, float)
+        Mean of the outline, weighted by length, m.
+    facing : float or None
+        The direction in which an open outline bulges, rad. None for a closed outline: it gives no first guess.
     """
 
     name: str
@@ -27,7 +38,7 @@ class ObjectModel:
 
     @classmethod
     def from_config(cls, config: ModelConfig) -> ObjectModel:
-        """Build the model of a model file."""
+        """Return the model that a model file describes."""
         vertices = np.array(config.vertices_m, dtype=np.float64)
         begin = vertices if config.closed else vertices[:-1]
         end = np.roll(vertices, -1, axis=0) if config.closed else vertices[1:]
@@ -39,7 +50,7 @@ class ObjectModel:
         bulge = centroid - 0.5 * (vertices[0] + vertices[-1])
         facing = None
         if not config.closed:
-            straight = math.hypot(*bulge) < 1e-9
+            straight = math.hypot(*bulge) < STRAIGHT_M
             across = math.atan2(along[0, 1], along[0, 0]) + 0.5 * math.pi
             facing = across if straight else math.atan2(bulge[1], bulge[0])
         return cls(config.name, np.ascontiguousarray(sides), (float(centroid[0]), float(centroid[1])), facing)

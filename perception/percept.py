@@ -1,7 +1,4 @@
-"""What the behaviours get to know: the door between perception/ and behaviors/.
-
-Behaviours import nothing of ours but this module and config, so everything they need from below comes through here.
-"""
+"""What behaviours see of perception. Behaviours import nothing of this program but this module and `config`."""
 
 from __future__ import annotations
 
@@ -14,10 +11,16 @@ __all__ = ["Floats", "Percept", "Pose", "Twist", "wrap_angle"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Percept:
-    """The world as one cycle sees it, in the odometry's frame: metres and radians.
+    """The surroundings in one cycle, in the odometry's frame (m, rad).
 
-    `pose.theta` is the drive heading. `obstacles` has shape (n, 2): the points at which fresh echoes came back, all
-    finite. `objects` are the objects recognised so far, for schemas that go to one.
+    Attributes
+    ----------
+    pose : Pose
+        Pose of the robot; `pose.theta` is the drive heading.
+    obstacles : (n, 2) float
+        Points at which fresh echoes came back, all finite, m.
+    objects : tuple of DetectedObject
+        The objects recognised so far, for schemas that approach one.
     """
 
     pose: Pose

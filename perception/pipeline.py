@@ -1,7 +1,7 @@
-"""Perception as an anytime stage: the part that always runs, and refinement in quanta of bounded work.
+"""Perception as an anytime stage: a part that always runs, and refinement in quanta of bounded work.
 
-`observe` takes in one firing. `refine` does one quantum; the caller decides how many it can afford, and what is
-unfinished goes on next time from where it stood. Objects are recognised by a method: the paper's or the Bayesian one.
+`observe` takes one firing. `refine` does one quantum; the caller decides how many it can afford, and the rest
+continues in the next cycle from where it stopped. A method recognises the objects: the paper's or the Bayesian one.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ __all__ = ["DetectedObject", "Method", "Perception", "make_method"]
 
 
 class Method(Protocol):
-    """A way to recognise objects."""
+    """A method of recognising objects."""
 
     @property
     def can_refine(self) -> bool:
@@ -42,15 +42,15 @@ class Method(Protocol):
 
     @property
     def counts(self) -> MapCounts:
-        """How many segments and hypotheses there are."""
+        """The numbers of segments and hypotheses."""
         ...
 
     def observe(self, firing: Firing) -> int:
-        """Take in one firing and return how many outline segments it completed."""
+        """Enter one firing and return how many outline segments it completed."""
         ...
 
     def refine(self) -> int:
-        """Do one quantum of refinement and return its iterations, zero where nothing is left to improve."""
+        """Do one quantum of refinement and return its iterations, zero if nothing is left to improve."""
         ...
 
     def objects(self) -> tuple[DetectedObject, ...]:
@@ -58,44 +58,54 @@ class Method(Protocol):
         ...
 
     def labelled_objects(self) -> tuple[DetectedObject, ...]:
-        """Return everything that has a name, models or not."""
+        """Return the models recognised now and everything else that has a label."""
         ...
 
     def segment_geometry(self) -> Floats:
-        """Return the outline segments in the map: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""
+        """Return a copy of the outline segments: end points x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""
         ...
 
     def segments(self) -> Segments:
-        """Return the outline segments in the map with all that is known of them."""
+        """Return the outline segments with their numbers, times and pins."""
         ...
 
     def edit(self, edit: Edit) -> str | None:
-        """Do what a person says; return None, or why it cannot be done."""
+        """Apply an operator's edit; return None, or why it cannot be applied."""
         ...
 
     def evidence(self, number: int) -> Evidence | None:
-        """Return why an object is believed, None where there is none of this number; changes nothing."""
+        """Return the evidence for an object, None if no object has this number; changes nothing."""
         ...
 
     def reset(self) -> None:
-        """Begin anew, as after the odometry did."""
+        """Start again with an empty map, as after a reset of the odometry."""
         ...
 
     def apply_settings(self, config: PerceptionConfig) -> None:
-        """Go on with other constants, of those that a running process follows (`config.reload.LIVE_SETTINGS`)."""
+        """Use other settings, of those that a running process may change (`config.reload.LIVE_SETTINGS`)."""
         ...
 
     def set_models(self, models: Sequence[ModelConfig]) -> None:
-        """Look for further models as well, which come after those from before."""
+        """Recognise further models, which follow the present ones in `models`."""
         ...
 
     def drop_caches(self) -> None:
-        """Drop what was worked out before the memory was put back from a snapshot."""
+        """Discard cached results, after the memory was restored from a snapshot."""
         ...
 
 
 def make_method(ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> Method:
-    """Return the method that the configuration names."""
+    """Return the method that the settings name.
+
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
+    models : sequence of ModelConfig
+        The objects to recognise.
+    config : PerceptionConfig
+        The method and its settings.
+    """
     if config.method == "paper":
         return PaperPerception(ring, models, config)
     return BayesPerception(ring, models, config.bayes)
@@ -109,9 +119,9 @@ class Perception:
     ring : RingConfig
         The sensors.
     models : sequence of ModelConfig
-        What is looked for.
+        The objects to recognise.
     config : PerceptionConfig
-        The method and its constants.
+        The method and its settings.
     """
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> None:
@@ -133,25 +143,25 @@ class Perception:
 
     @property
     def counts(self) -> MapCounts:
-        """How many segments and hypotheses there are."""
+        """The numbers of segments and hypotheses."""
         return self.method.counts
 
     def observe(self, firing: Firing) -> int:
-        """Take in one firing and return how many outline segments it completed.
+        """Enter one firing and return how many outline segments it completed.
 
         Raises
         ------
         ValueError
-            The firing is not this ring's; compiled code would read beyond its arrays.
+            The firing is of another ring; compiled code would read beyond its arrays.
         """
         if len(firing.ranges_m) != self._sensors:
-            raise ValueError(f"a firing of {len(firing.ranges_m)} ranges came to a ring of {self._sensors} sensors")
-        believed, possible = self.sensor_monitor.filter(firing)
+            raise ValueError(f"a firing of {len(firing.ranges_m)} ranges, but the ring has {self._sensors} sensors")
+        trusted, possible = self.sensor_monitor.filter(firing)
         self._echoes.update(possible)
-        return self.method.observe(believed)
+        return self.method.observe(trusted)
 
     def refine(self) -> int:
-        """Do one quantum of refinement and return its iterations, zero where nothing is left to improve."""
+        """Do one quantum of refinement and return its iterations, zero if nothing is left to improve."""
         return self.method.refine()
 
     def objects(self) -> tuple[DetectedObject, ...]:
@@ -159,21 +169,21 @@ class Perception:
         return self.method.objects()
 
     def labelled_objects(self) -> tuple[DetectedObject, ...]:
-        """Return everything that has a name, models or not: also walls, corners, posts and what is unknown."""
+        """Return the models recognised now and everything else that has a label: walls, corners, posts, unknowns."""
         return self.method.labelled_objects()
 
     def segment_geometry(self) -> Floats:
-        """Return the outline segments in the map: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""
+        """Return a copy of the outline segments: end points x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""
         return self.method.segment_geometry()
 
     def segments(self) -> Segments:
-        """Return the outline segments in the map with their numbers, times, and which are pinned; copies."""
+        """Return copies of the outline segments with their numbers, times and pins."""
         return self.method.segments()
 
     def edit(self, edit: Edit) -> str | None:
-        """Do what a person says; return None, or why it cannot be done, in words for that person.
+        """Apply an operator's edit; return None, or why it cannot be applied, as text for the operator.
 
-        What the robot has to keep clear of is none of a person's affair: the fresh echoes stay whatever is edited.
+        No edit changes the obstacles that the robot avoids: the fresh echoes stay.
         """
         refused = invalid_number(edit)
         if refused is None and isinstance(edit, PlaceModel | MoveObject):
@@ -181,48 +191,48 @@ class Perception:
         return self.method.edit(edit) if refused is None else refused
 
     def evidence(self, number: int) -> Evidence | None:
-        """Return why an object is believed, None where there is none of this number; changes nothing."""
+        """Return the evidence for an object, None if no object has this number; changes nothing."""
         return self.method.evidence(number)
 
-    def obstacles(self, t_s: float, age_max_s: float) -> Floats:
-        """Return each sensor's last echo not older than that at the robot's time `t_s`: points of shape (k, 2), m."""
-        return self._echoes.points(t_s, age_max_s)
+    def obstacles(self, robot_s: float, age_max_s: float) -> Floats:
+        """Return each sensor's last echo if no older than `age_max_s` at the robot's time: shape (k, 2), m."""
+        return self._echoes.points(robot_s, age_max_s)
 
     def reset(self) -> None:
-        """Begin anew, as after the odometry did."""
+        """Start again with an empty map, as after a reset of the odometry."""
         self.method.reset()
         self.sensor_monitor.reset()
         self._echoes.clear()
 
     def apply_settings(self, config: PerceptionConfig) -> None:
-        """Go on with other constants, of those that a running process follows (`config.reload.LIVE_SETTINGS`)."""
+        """Use other settings, of those that a running process may change (`config.reload.LIVE_SETTINGS`)."""
         self.method.apply_settings(config)
 
     def set_models(self, models: Sequence[ModelConfig]) -> None:
-        """Look for these models from now on: those from before, and perhaps further ones after them."""
+        """Recognise these models: the present ones, and possibly further ones after them."""
         if tuple(models) != self._models:
             self._models = tuple(models)
             self.method.set_models(models)
 
     def set_firing_pattern(self, ring: RingConfig) -> None:
-        """Expect another firing pattern of the same sensors from now on."""
+        """Expect another firing pattern of the same sensors."""
         self.sensor_monitor.set_firing_pattern(ring)
 
     def sensor_reports(self) -> tuple[SensorReport, ...]:
-        """Return which sensors are not believed, and why."""
+        """Return a report on each faulty sensor."""
         return self.sensor_monitor.reports()
 
     def snapshot(self) -> Snapshot:
-        """Return copies of everything remembered, from which `restore` goes on to the bit."""
+        """Return copies of the whole state, from which `restore` continues with identical results."""
         return snapshot_of(self)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go on from a snapshot that perception of the same settings gave.
+        """Continue from a snapshot that perception with the same settings made.
 
         Raises
         ------
         ValueError
-            The snapshot is of other settings.
+            The snapshot was made with other settings.
         """
         put_back(self, snapshot)
         self.method.drop_caches()

@@ -1,8 +1,8 @@
-"""Relaxation: the paper's fourth step (§3.4). Segments attract the sides of the model until it rests.
+"""Relaxation: the paper's fourth step (§3.4). Segments attract the sides of the model until it is at rest.
 
-Every outline segment of a cluster pulls every side of the model across and turns it, the nearer and the more
-parallel the stronger. The model moves by the weighted sum, again and again, until the increment is negligible. It
-starts from where it rested last time, so a few new segments cost a few steps.
+Every outline segment of a cluster attracts every side of the model: it shifts and turns it, more strongly if it is
+nearer and more parallel. The model moves by the weighted sum repeatedly until the increment is negligible. It starts
+from where it came to rest last time, so a few new segments cost a few iterations.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from perception.kernel import Floats, Ints, kernel
 def increment(
     sides: Floats, segments: Floats, members: Ints, gamma: float, x: float, y: float, theta: float
 ) -> tuple[float, float, float]:
-    """Return the total increment of a model's pose: F and τ of the paper, §3.4.
+    """Return the total increment of a model's pose: F and τ of the paper (Santamaría & Arkin 1995, §3.4).
 
     For side i and segment j, with ΔN the perpendicular vector from the side's centre of mass to the line of the
     segment, Δα the angle from side to segment between undirected lines in (−π/2, π/2], sphere = γ · length of i:
@@ -38,11 +38,11 @@ def increment(
     sides : (m, 4) float
         Middle x, y (m), direction (rad), length (m) of each side in the model's frame.
     segments : (capacity, 5) float
-        Outline segments: ends x, y, x, y (m), normal (rad).
+        Outline segments: end points x1, y1, x2, y2 (m), direction of the normal (rad).
     members : (k,) int
-        Slots of the segments that attract.
+        Rows of the segments that attract.
     gamma : float
-        γ.
+        γ: radius of a side's sphere of influence over its length.
     x, y, theta : float
         Pose of the model: m, rad.
 
@@ -108,23 +108,23 @@ def relax(
     iterations: int,
     pose: Floats,
 ) -> tuple[int, bool]:
-    """Move a model by its total increments until they are negligible or `iterations` are used up.
+    """Move a model by its total increments until they are negligible; return the iterations and whether it rests.
 
     Parameters
     ----------
     sides, segments, members, gamma
         As for `increment`.
     negligible_m, negligible_rad : float
-        The model rests once an increment is below both.
+        The model is at rest once an increment is below both.
     iterations : int
-        How many increments at most: the bound on the work.
+        Largest number of increments: the bound on the work.
     pose : (3,) float
         x, y (m), theta (rad). Updated.
 
     Returns
     -------
     (int, bool)
-        Increments applied, and whether the model rests.
+        Increments applied, and whether the model is at rest.
     """
     for n in range(iterations):
         dx, dy, turn = increment(sides, segments, members, gamma, pose[0], pose[1], pose[2])

@@ -1,21 +1,21 @@
-"""Which sensors to believe: stuck ones, failing ones and those that hear a neighbour are found out and masked.
+"""Detection of faulty sensors: stuck, failing, silent and cross-talking ones are found and masked.
 
-A reading proves nothing by itself; what it does while the robot moves and while others fire beside it does.
+A single reading proves nothing; how readings change while the robot moves and while other sensors fire does.
 
-- *Stuck.* A sensor that reads the same while its base has moved towards or away from whatever answers it, whichever
-  way in its beam that lies, lies; so does one past which its neighbours saw things come and go. At rest, along a wall
-  and behind a slipping wheel the same reading is honest: then the beam is crossed sideways, the neighbours saw
-  nothing change, or the whole ring stands still.
-- *Silent.* A sensor that hears nothing while both neighbours hear echoes, over a long way: its silence, which would
-  say that nothing is there, is not believed, and its first echo is.
-- *Failing.* A sensor that should fire and reports no range, however often the ring fires.
-- *Crosstalk.* EERUF's idea (Borenstein & Koren 1995): a true echo does not ask who else fired. A reading that is
-  shorter than the one before it in another set of sensors is not believed until one in another set says the same:
-  that costs a true echo one firing. One that is short in a set again and again, and long before and after in others,
-  masks the sensor in that set. So crosstalk is exposed where the firing pattern gives a sensor different partners in
-  turn, as the preset `alternating` does; where it does not, nothing is compared and nothing lost.
+- *Stuck.* The sensor repeats one reading although its base has moved towards or away from any surface in its beam
+  that could give that reading, or although its neighbours saw objects pass. The same reading is legitimate at rest,
+  along a wall and with slipping wheels: then the base moves across the beam, the neighbours' readings do not change,
+  or those of the whole ring do not.
+- *Silent.* The sensor hears nothing over a long distance while both neighbours hear echoes. Its silence, which would
+  mean free space, is not trusted; its first echo is.
+- *Failing.* The sensor should fire and reports no range, however often the ring fires.
+- *Crosstalk.* EERUF's idea (Borenstein & Koren 1995): a true echo does not depend on which other sensors fired. A
+  reading that is shorter than the one before it in another set of sensors is not trusted until a reading in another
+  set agrees, which delays a true echo by one firing. If a sensor repeatedly reads short in one set only, it is masked
+  in that set. So crosstalk shows if the firing pattern gives a sensor different partners in turn, as the preset
+  `alternating` does; with other patterns nothing is compared and nothing is lost.
 
-Masked sensors are listened to all the same, and come back when they behave.
+Masked sensors are still tested and return to use when they behave.
 """
 
 from __future__ import annotations
@@ -29,45 +29,62 @@ from numpy.typing import NDArray
 from config.robot import RingConfig
 from drivers.messages import Firing
 from perception.kernel import Floats, Ints
+from perception.records import records, zeros
 from perception.sensor_mounts import mounts_array
-from perception.sensor_report import SensorReport, report
+from perception.sensor_report import SensorReport, describe_fault
 from perception.sensor_tests import (
-    AT,
-    CHANGED,
-    COLUMNS,
-    COUNT,
-    EVER,
-    LESS_BELIEVED,
+    FAULTS_CHANGED,
     LESS_POSSIBLE,
-    MISSED,
-    RING,
-    SETS,
-    watch,
+    LESS_TRUSTED,
+    SETS_MAX,
+    RingMemory,
+    SensorMemory,
+    check_firing,
 )
 
 NEIGHBOUR_MAX_RAD: Final = math.radians(31.0)
-"""A sensor that looks farther aside than this sees other things."""
+"""Largest angle between neighbours' axes, two places of a ring of 24 and some slack; beyond it sensors see different
+surfaces."""
 NEAR_SHARE: Final = 0.45
-"""Of the ring's reach: along a straight wall a beam hears up to 2.2 times as far as its neighbour 15° nearer to the
-wall, so beyond this an echo says nothing of what the next beam should hear."""
+"""Near limit as a share of the ring's reach. Along a straight wall a beam measures up to 2.2 times as far as its
+neighbour 15° nearer to the wall, so an echo beyond this does not tell what the neighbour should hear."""
+SAME_AXIS_RAD: Final = 1e-6
+"""Sensors whose axes differ by less look the same way and are not neighbours."""
+TOLERANCE_MIN_M: Final = 0.005
+"""Least tolerance for equal readings, for rings that do not quantise."""
+TOLERANCE_STEPS: Final = 1.1
+"""Tolerance for equal readings in steps of the ring's quantisation: one step and some rounding."""
 
 
-def neighbours(axes: Floats) -> Ints:
-    """Return the sensors that look next to each one on either side, shape (n, 2); −1 where it has not two."""
-    sides: Ints = np.full((len(axes), 2), -1, np.int64)
+def neighbours_of(axes: Floats) -> Ints:
+    """Return the sensors that look next to each one on the left and on the right.
+
+    Parameters
+    ----------
+    axes : (n,) float
+        Direction of each sensor in the ring, rad.
+
+    Returns
+    -------
+    (n, 2) int
+        Indices of the neighbours, −1 twice for a sensor that has not two.
+    """
+    neighbours: Ints = np.full((len(axes), 2), -1, np.int64)
     for i, axis in enumerate(axes):
         aside = np.remainder(axes - axis, 2.0 * math.pi)
-        left = [k for k in np.argsort(aside) if 1e-6 < aside[k] <= NEIGHBOUR_MAX_RAD]
+        left = [k for k in np.argsort(aside) if SAME_AXIS_RAD < aside[k] <= NEIGHBOUR_MAX_RAD]
         right = [
-            k for k in np.argsort(-aside) if 2.0 * math.pi - NEIGHBOUR_MAX_RAD <= aside[k] < 2.0 * math.pi - 1e-6
+            k
+            for k in np.argsort(-aside)
+            if 2.0 * math.pi - NEIGHBOUR_MAX_RAD <= aside[k] < 2.0 * math.pi - SAME_AXIS_RAD
         ]
         if left and right:
-            sides[i] = left[0], right[0]
-    return sides
+            neighbours[i] = left[0], right[0]
+    return neighbours
 
 
 def fires(ring: RingConfig) -> NDArray[np.bool_]:
-    """Return who fires at all in the ring's pattern, shape (n,)."""
+    """Return for each sensor whether it fires at all in the ring's pattern, shape (n,)."""
     count, firing = len(ring.mounts), ring.firing
     if firing.sets is None:
         return np.ones(count, np.bool_)
@@ -79,7 +96,7 @@ def fires(ring: RingConfig) -> NDArray[np.bool_]:
 
 
 class SensorMonitor:
-    """Takes in firings and gives them back without what is not to be believed.
+    """Removes untrustworthy readings from firings.
 
     Parameters
     ----------
@@ -88,73 +105,72 @@ class SensorMonitor:
 
     Attributes
     ----------
-    changes
-        How often a verdict on a sensor has changed.
+    changes : int
+        How often a sensor's faults have changed.
     """
 
-    SCRATCH: Final = ("_believed", "_possible")
-    """No memory."""
+    SCRATCH: Final = ("_trusted", "_possible", "_sensor_records", "_ring_records")
+    """Not part of a snapshot: overwritten before each use, or a view of arrays that are."""
 
     def __init__(self, ring: RingConfig) -> None:
         mounts = mounts_array(ring.mounts)
         count = len(mounts)
         self.changes = 0
         self._axes = np.ascontiguousarray(mounts[:, 2])
-        self._sides = neighbours(self._axes)
+        self._neighbours = neighbours_of(self._axes)
         self._expected = fires(ring)
         self._half_angle = math.radians(ring.beam_half_angle_deg)
-        self._tolerance = max(1.1 * ring.resolution_m, 0.005)
+        self._tolerance = max(TOLERANCE_STEPS * ring.resolution_m, TOLERANCE_MIN_M)
         self._near = NEAR_SHARE * ring.range_max_m
-        self._memory = np.zeros((count, COLUMNS))
-        self._ring = np.zeros(RING)
-        self._sets = np.zeros((SETS, count), np.uint8)
-        self._shorts = np.zeros((count, SETS))
-        self._crossed = np.zeros((count, SETS), np.uint8)
-        self._faults = np.zeros(count, np.int64)
-        self._believed = np.zeros(count)
+        self._sensors = zeros(SensorMemory, count)
+        self._sensor_records = records(SensorMemory, self._sensors)
+        self._ring = zeros(RingMemory, 1)
+        self._ring_records = records(RingMemory, self._ring)
+        self._sets = np.zeros((SETS_MAX, count), np.uint8)
+        self._trusted = np.zeros(count)
         self._possible = np.zeros(count)
 
     def filter(self, firing: Firing) -> tuple[Firing, Firing]:
-        """Take in a firing; return what is to be believed of it, and that with what is in doubt.
+        """Test a firing; return it with trusted readings only, and with trusted and doubtful readings.
 
-        What is in doubt makes no map, and is kept clear of all the same. Ranges that are neither are NaN there, as if
-        the sensor had not fired.
+        Doubtful readings are not mapped, but the robot keeps clear of them. Other readings are NaN, as if the sensor
+        had not fired.
         """
-        pose, ranges = firing.pose, firing.ranges_m
-        believed, possible = self._believed, self._possible
-        news = watch(
-            ranges, float(pose.x), float(pose.y), float(firing.ring_yaw), self._axes, self._sides, self._expected,
-            self._half_angle, self._tolerance, self._near, self._memory, self._ring, self._sets, self._shorts,
-            self._crossed, self._faults, believed, possible,
+        pose, trusted, possible = firing.pose, self._trusted, self._possible
+        changed = check_firing(
+            firing.ranges_m, float(pose.x), float(pose.y), float(firing.ring_yaw), self._axes, self._neighbours,
+            self._expected, self._half_angle, self._tolerance, self._near, self._sensor_records, self._ring_records,
+            self._sets, trusted, possible,
         )  # fmt: skip
-        self.changes += news & CHANGED
+        self.changes += changed & FAULTS_CHANGED
         return (
-            _only(firing, believed) if news & LESS_BELIEVED else firing,
-            _only(firing, possible) if news & LESS_POSSIBLE else firing,
+            _with_ranges(firing, trusted) if changed & LESS_TRUSTED else firing,
+            _with_ranges(firing, possible) if changed & LESS_POSSIBLE else firing,
         )
 
     def set_firing_pattern(self, ring: RingConfig) -> None:
-        """Expect another firing pattern of the same sensors from now on."""
+        """Expect another firing pattern of the same sensors."""
         self._expected[:] = fires(ring)
-        self._memory[:, MISSED] = 0.0
+        self._sensors["missed"] = 0
 
     def reset(self) -> None:
-        """Begin anew, as after the odometry did; what is wrong with a sensor stays wrong."""
-        self._memory[:, [COUNT, EVER, MISSED]] = 0.0
+        """Start again after the odometry was reset; known faults stay."""
+        for name in ("readings", "run_length", "missed"):
+            self._sensors[name] = 0
 
     def reports(self) -> tuple[SensorReport, ...]:
-        """Return what is wrong, by sensor."""
+        """Return a report on each faulty sensor, in the order of the sensors."""
         return tuple(
-            report(i, int(bits), float(self._memory[i, AT]), self._partners(i))
-            for i, bits in enumerate(self._faults)
-            if bits
+            describe_fault(i, int(sensor["faults"]), float(sensor["stuck_m"]), self._crosstalk_partners(i))
+            for i, sensor in enumerate(self._sensors)
+            if sensor["faults"]
         )
 
-    def _partners(self, i: int) -> list[int]:
-        """Return who fires in the sets in which sensor `i` is masked."""
-        fired = self._sets[self._crossed[i] == 1].any(axis=0)
+    def _crosstalk_partners(self, i: int) -> list[int]:
+        """Return the sensors that fire in the sets in which sensor `i` is masked."""
+        fired = self._sets[self._sensors["is_crossed"][i] == 1].any(axis=0)
         return [int(k) for k in np.flatnonzero(fired) if k != i]
 
 
-def _only(firing: Firing, ranges: Floats) -> Firing:
+def _with_ranges(firing: Firing, ranges: Floats) -> Firing:
     return Firing(firing.robot_s, firing.pose, firing.ring_yaw, ranges.copy())

@@ -1,4 +1,4 @@
-"""What is wrong with a sensor, in words: what happened, likely cause, next action."""
+"""Sensor faults as text for the user: what happened, the likely cause, the next action."""
 
 from __future__ import annotations
 
@@ -12,48 +12,48 @@ STUCK: Final = 1
 SILENT: Final = 2
 FAILING: Final = 4
 CROSSTALK: Final = 8
-"""Bits of what is wrong; a sensor may have several, and the gravest is told."""
+"""Bits of a sensor's fault word. A sensor may have several faults; the most severe one is reported."""
 
 
 @dataclass(frozen=True, slots=True)
 class SensorReport:
-    """What is wrong with a sensor."""
+    """A sensor's most severe fault."""
 
     sensor: int
     fault: SensorFault
     reason: str
-    """What happened, likely cause, next action."""
+    """What happened, the likely cause, the next action."""
 
 
-def report(sensor: int, bits: int, stuck_m: float, partners: Sequence[int]) -> SensorReport:
-    """Return the report on a sensor.
+def describe_fault(sensor: int, faults: int, stuck_m: float, partners: Sequence[int]) -> SensorReport:
+    """Return the report on a sensor with at least one fault.
 
     Parameters
     ----------
     sensor : int
-        Its number.
-    bits : int
-        What is wrong, not zero.
+        Index of the sensor in the ring.
+    faults : int
+        The sensor's fault bits, not zero.
     stuck_m : float
-        What it answers, if it is stuck, m.
+        The range it repeats if it is stuck, m.
     partners : sequence of int
-        Whom it fires with where it hears one of them.
+        The sensors that fire in the sets in which it is masked for crosstalk.
     """
-    if bits & FAILING:
+    if faults & FAILING:
         return SensorReport(
             sensor,
             "failing",
             f"sensor {sensor} never answers when it should fire, or reports a fault each time: masked; check its "
             f"cable and its board",
         )
-    if bits & STUCK:
+    if faults & STUCK:
         return SensorReport(
             sensor,
             "stuck",
             f"sensor {sensor} always answers {stuck_m:.2f} m although the base has moved on: masked; look for "
             f"something that hangs in front of it, then replace it",
         )
-    if bits & SILENT:
+    if faults & SILENT:
         return SensorReport(
             sensor,
             "silent",

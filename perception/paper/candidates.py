@@ -1,7 +1,7 @@
-"""Candidate matches: a model placed at each cluster, kept from cycle to cycle so that each starts warm (paper §3.4).
+"""Candidates: a model placed at each cluster, kept from cycle to cycle so that relaxation starts warm (paper §3.4).
 
-Clusters are made anew whenever the map changes, and a cluster may get another number when an older one disappears.
-A candidate therefore follows its cluster by place, and keeps the pose at which it last rested.
+Clusters are computed again whenever the map changes, and a cluster's index may change. A candidate therefore follows
+its cluster by position and keeps the pose it has reached.
 """
 
 from __future__ import annotations
@@ -15,33 +15,39 @@ from config.settings import RelaxationConfig
 from perception.kernel import Floats, Ints, owning_kernel
 from perception.object_model import ObjectModel
 from perception.paper.clusters import Clusters
-from perception.paper.manual_placement import Names
+from perception.paper.manual_placement import NumberSource
 from perception.paper.outline_map import OutlineMap
 from perception.relaxation import relax
 
+CANDIDATE: Final = np.dtype(
+    [("pose", np.float64, 3), ("iterations_left", np.int64), ("has_rested", np.int64), ("number", np.int64)]
+)
+"""A candidate: x, y (m), theta (rad); the iterations that it may still take, 0 at rest; 1 once it has come to rest
+since it was placed; the number it is known by, 0 if its cluster has too few segments."""
+
 
 @owning_kernel
-def follow_clusters(old: Floats, new: Floats, reach: float, heir: Ints) -> None:
-    """Say which old cluster each new one continues: the nearest, each at most once, the nearest pairs first.
+def follow_clusters(old: Floats, new: Floats, reach: float, predecessor: Ints) -> None:
+    """Find the old cluster that each new one continues: the nearest, each at most once, nearest pairs first.
 
     Parameters
     ----------
     old, new : (c, 2), (d, 2) float
         Centres, m.
     reach : float
-        No farther than this, m.
-    heir : (d,) int
-        Out: number of the old cluster, −1 where there is none.
+        Largest distance, m.
+    predecessor : (d,) int
+        Out: index of the old cluster, −1 for none.
     """
     for j in range(new.shape[0]):
-        heir[j] = -1
+        predecessor[j] = -1
     taken = np.zeros(old.shape[0], dtype=np.int64)
     for _ in range(min(old.shape[0], new.shape[0])):
         best = reach
         best_old = -1
         best_new = -1
         for j in range(new.shape[0]):
-            if heir[j] >= 0:
+            if predecessor[j] >= 0:
                 continue
             for i in range(old.shape[0]):
                 if taken[i] != 0:
@@ -53,29 +59,31 @@ def follow_clusters(old: Floats, new: Floats, reach: float, heir: Ints) -> None:
                     best_new = j
         if best_new < 0:
             return
-        heir[best_new] = best_old
+        predecessor[best_new] = best_old
         taken[best_old] = 1
 
 
 class Candidates:
-    """One candidate for each cluster and model: where the model rests, or how far it has come.
+    """One candidate for each cluster and model.
 
     Parameters
     ----------
     models : tuple of ObjectModel
-        What is looked for.
+        The objects to recognise.
     config : RelaxationConfig
         The paper's constants and the bound on the work.
     clusters_max, segments_min : int
-        Room for clusters; a cluster of fewer segments gets no candidate.
+        Largest number of clusters; a cluster of fewer segments gets no candidate.
     reach_m : float
         How far a cluster's centre may move at once and still be the same cluster.
-    names : Names
-        Where candidates get their numbers from.
-    """
+    numbers : NumberSource
+        Gives candidates their numbers.
 
-    LATER: Final = ("numbers", "_numbers_before", "_names")
-    """What recordings of older programs do not hold."""
+    Attributes
+    ----------
+    rows : (clusters_max, models) CANDIDATE
+        The candidates by cluster and model.
+    """
 
     def __init__(
         self,
@@ -84,71 +92,50 @@ class Candidates:
         clusters_max: int,
         segments_min: int,
         reach_m: float,
-        names: Names,
+        numbers: NumberSource,
     ) -> None:
         self._models = models
-        self._names = names
+        self._numbers = numbers
         self._config = config
         self._segments_min = segments_min
         self._reach_m = reach_m
-        shape = (clusters_max, len(models))
-        self.poses = np.zeros((*shape, 3))
-        """(clusters, models, 3): x, y (m), theta (rad) of each candidate."""
-        self._poses_before = np.zeros_like(self.poses)
-        self._left = np.zeros(shape, dtype=np.int64)
-        self._left_before = np.zeros_like(self._left)
-        self.rested = np.zeros(shape, dtype=np.int64)
-        """(clusters, models): 1 once the candidate has rested since it was placed."""
-        self._rested_before = np.zeros_like(self.rested)
-        self.numbers = np.zeros(shape, dtype=np.int64)
-        """(clusters, models): by which each candidate is known; 0 where the cluster has too few segments for any."""
-        self._numbers_before = np.zeros_like(self.numbers)
-        self._known = np.zeros((clusters_max, 3))
-        self._heir = np.zeros(clusters_max, dtype=np.int64)
+        self.rows = np.zeros((clusters_max, len(models)), CANDIDATE)
+        self._centres = np.zeros((clusters_max, 2))
+        """Centres of the clusters that the candidates follow, m."""
+        self._sizes = np.zeros(clusters_max, dtype=np.int64)
+        self._predecessor = np.zeros(clusters_max, dtype=np.int64)
         self._count = 0
         self._turn = 0
 
     @property
-    def awake(self) -> int:
-        """How many candidates have not come to rest."""
-        return int(np.count_nonzero(self._left[: self._count]))
-
-    @property
-    def pending(self) -> bool:
-        """Whether a candidate has not come to rest."""
-        return self.awake > 0
+    def pending(self) -> int:
+        """The number of candidates that are not at rest."""
+        return int(np.count_nonzero(self.rows["iterations_left"][: self._count]))
 
     def follow(self, clusters: Clusters, outline: OutlineMap) -> None:
-        """Carry candidates over to the clusters as they are now; wake those whose cluster changed; place new ones."""
-        before = self._count
+        """Move candidates to the present clusters; restart those whose cluster changed; place new ones."""
         follow_clusters(
-            self._known[:before, :2], clusters.centres[: clusters.count], self._reach_m, self._heir[: clusters.count]
-        )
-        self._poses_before[:] = self.poses
-        self._left_before[:] = self._left
-        self._rested_before[:] = self.rested
-        self._numbers_before[:] = self.numbers
-        known = self._known[:before].copy()
-        for j in range(clusters.count):
-            now = (clusters.centres[j, 0], clusters.centres[j, 1], float(clusters.sizes[j]))
-            i = int(self._heir[j])
-            if clusters.sizes[j] < self._segments_min:
-                self._left[j] = 0
-                self.rested[j] = 0
-                self.numbers[j] = 0
-            elif i >= 0 and self._numbers_before[i, 0] > 0:
-                self.poses[j] = self._poses_before[i]
-                self.rested[j] = self._rested_before[i]
-                self.numbers[j] = self._numbers_before[i]
-                unchanged = tuple(known[i]) == now
-                self._left[j] = self._left_before[i] if unchanged else self._config.iterations_max
+            self._centres[: self._count], clusters.centres[: clusters.count], self._reach_m,
+            self._predecessor[: clusters.count],
+        )  # fmt: skip
+        before = self.rows.copy()
+        centres, sizes = self._centres.copy(), self._sizes.copy()
+        self._count = clusters.count
+        self._centres[: self._count] = clusters.centres[: self._count]
+        self._sizes[: self._count] = clusters.sizes[: self._count]
+        for j in range(self._count):
+            i = int(self._predecessor[j])
+            if self._sizes[j] < self._segments_min:
+                self.rows[["iterations_left", "has_rested", "number"]][j] = 0
+            elif i >= 0 and before["number"][i, 0] > 0:
+                self.rows[j] = before[i]
+                if self._sizes[j] != sizes[i] or not np.array_equal(self._centres[j], centres[i]):
+                    self.rows["iterations_left"][j] = self._config.iterations_max
             else:
                 self._place(j, clusters, outline)
-            self._known[j] = now
-        self._count = clusters.count
 
     def refine(self, clusters: Clusters, outline: OutlineMap) -> int:
-        """Relax one candidate that has not come to rest, by one quantum; return the increments applied.
+        """Relax one candidate that is not at rest by one quantum; return the iterations done.
 
         Candidates take turns, so that none waits for another to finish.
         """
@@ -156,66 +143,70 @@ class Candidates:
         many = self._count * len(self._models)
         for k in range(many):
             j, m = divmod((self._turn + k) % many, len(self._models))
-            if self._left[j, m] > 0:
+            left = int(self.rows["iterations_left"][j, m])
+            if left > 0:
                 self._turn = (self._turn + k + 1) % many
-                allowed = min(config.iterations_per_quantum, int(self._left[j, m]))
                 done, rests = relax(
-                    self._models[m].sides, outline.segments, clusters.members(j), config.gamma,
-                    config.negligible_m, config.negligible_rad, allowed, self.poses[j, m],
+                    self._models[m].sides, outline.segments, clusters.members(j), config.gamma, config.negligible_m,
+                    config.negligible_rad, min(config.iterations_per_quantum, left), self.rows["pose"][j, m],
                 )  # fmt: skip
-                self._left[j, m] = 0 if rests else self._left[j, m] - done
-                if self._left[j, m] == 0:
-                    self.rested[j, m] = 1
+                left = 0 if rests else left - done
+                self.rows["iterations_left"][j, m] = left
+                if left == 0:
+                    self.rows["has_rested"][j, m] = 1
                 return done
         return 0
 
-    def adopt(self, config: RelaxationConfig, segments_min: int, reach_m: float) -> None:
-        """Go on with other constants; what rested relaxes again where those of relaxation are others."""
+    def apply_settings(self, config: RelaxationConfig, segments_min: int, reach_m: float) -> None:
+        """Use other settings; if those of relaxation changed, all candidates relax again.
+
+        Parameters
+        ----------
+        config, segments_min, reach_m
+            As for the class.
+        """
         self._segments_min, self._reach_m = segments_min, reach_m
         if config != self._config:
             self._config = config
-            self._left[: self._count][self.numbers[: self._count] > 0] = config.iterations_max
+            used = self.rows[: self._count]
+            used["iterations_left"][used["number"] > 0] = config.iterations_max
 
     def extend(self, models: tuple[ObjectModel, ...], clusters: Clusters, outline: OutlineMap) -> None:
-        """Try further models, which come after those from before, at the clusters as they are."""
+        """Try further models, which follow the present ones in `models`, at the present clusters.
+
+        Parameters
+        ----------
+        models : tuple of ObjectModel
+            The present models and the further ones.
+        clusters : Clusters
+            The present clusters.
+        outline : OutlineMap
+            Their segments.
+        """
         before, self._models = len(self._models), models
-        more = len(models) - before
-        for name in ("poses", "_poses_before", "_left", "_left_before", "rested", "_rested_before", "numbers",
-                     "_numbers_before"):  # fmt: skip
-            array = getattr(self, name)
-            added = np.zeros((array.shape[0], more, *array.shape[2:]), array.dtype)
-            setattr(self, name, np.ascontiguousarray(np.concatenate([array, added], axis=1)))
+        added = np.zeros((len(self.rows), len(models) - before), CANDIDATE)
+        self.rows = np.ascontiguousarray(np.concatenate([self.rows, added], axis=1))
         for j in range(self._count):
-            if self.numbers[j, 0] > 0:
+            if self.rows["number"][j, 0] > 0:
                 self._place(j, clusters, outline, before)
 
     def find(self, number: int) -> tuple[int, int] | None:
-        """Return cluster and model of the candidate of this number, None where there is none."""
-        found = np.argwhere(self.numbers[: self._count] == number)
+        """Return cluster and model of the candidate of this number, None if there is none."""
+        found = np.argwhere(self.rows["number"][: self._count] == number)
         return (int(found[0, 0]), int(found[0, 1])) if len(found) else None
 
-    def rename(self, j: int, m: int) -> None:
-        """Give a candidate another number: its own has gone to something else."""
-        self.numbers[j, m] = self._names.next()
+    def renumber(self, j: int, m: int) -> None:
+        """Give a candidate a new number: another object has taken over its own."""
+        self.rows["number"][j, m] = self._numbers.next()
 
     def clear(self) -> None:
-        """Forget every candidate."""
+        """Remove every candidate."""
         self._count = 0
-        self._left[:] = 0
-        self.numbers[:] = 0
-
-    def restored(self) -> None:
-        """Give numbers to the candidates of a recording that has none."""
-        if self._names.last == 0:
-            for j in range(self._count):
-                if self._known[j, 2] >= self._segments_min:
-                    self.numbers[j] = [self._names.next() for _ in self._models]
+        self.rows["iterations_left"] = 0
+        self.rows["number"] = 0
 
     def _place(self, j: int, clusters: Clusters, outline: OutlineMap, first: int = 0) -> None:
-        """Put each model at a cluster: its outline's middle on the cluster's centre, bulging towards the sensors.
-
-        Models before `first` stay where they are.
-        """
+        """Put each model from `first` on at a cluster: its centroid at the centre, its bulge towards the sensors."""
         normals = outline.segments[clusters.members(j), 4]
         towards_sensors = math.atan2(-np.sin(normals).sum(), -np.cos(normals).sum())
         along_sides = 0.5 * math.atan2(np.sin(2.0 * normals).sum(), np.cos(2.0 * normals).sum())
@@ -223,11 +214,5 @@ class Candidates:
             theta = along_sides if model.facing is None else towards_sensors - model.facing
             c, s = math.cos(theta), math.sin(theta)
             cx, cy = model.centroid
-            self.poses[j, m] = (
-                clusters.centres[j, 0] - c * cx + s * cy,
-                clusters.centres[j, 1] - s * cx - c * cy,
-                theta,
-            )
-            self.numbers[j, m] = self._names.next()
-        self._left[j, first:] = self._config.iterations_max
-        self.rested[j, first:] = 0
+            pose = (clusters.centres[j, 0] - c * cx + s * cy, clusters.centres[j, 1] - s * cx - c * cy, theta)
+            self.rows[j, m] = (pose, self._config.iterations_max, 0, self._numbers.next())

@@ -1,6 +1,6 @@
 """Clusters of outline segments: the paper's third step (§3.3, Table 1), minimum-distance clustering.
 
-A cluster says that something is there; its centre is where a model starts.
+A cluster shows where an object may be; relaxation starts a model at its centre.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from perception.paper.outline_map import OutlineMap
 @kernel
 def cluster_segments(
     segments: Floats,
-    alive: Ints,
+    status: Ints,
     start: int,
     count: int,
     threshold: float,
@@ -25,20 +25,20 @@ def cluster_segments(
     centres: Floats,
     sizes: Ints,
 ) -> int:
-    """Assign each living segment, oldest first, to the nearest cluster or found a new one (paper Table 1).
+    """Assign each segment, oldest first, to the nearest cluster or to a new one (Table 1); return their number.
 
     Parameters
     ----------
     segments : (capacity, 5) float
-        Ends x, y, x, y (m), normal (rad).
-    alive : (capacity,) int
-        1 where a slot counts.
+        End points x1, y1, x2, y2 (m), direction of the normal (rad).
+    status : (capacity,) int
+        0 for an empty slot.
     start, count : int
         Oldest slot and number of slots in use, circular.
     threshold : float
-        T: a segment whose centre is farther than this from every cluster's centre founds a new one, m.
+        T: a segment whose centre is farther than this from every cluster's centre starts a new one, m.
     labels : (capacity,) int
-        Out: the cluster of each slot, −1 where it has none.
+        Out: the cluster of each slot, −1 for none.
     centres : (c, 2) float
         Out: mean of each cluster's segment centres, m.
     sizes : (c,) int
@@ -47,14 +47,14 @@ def cluster_segments(
     Returns
     -------
     int
-        Number of clusters. Where there is no room for a further one, a far segment stays without.
+        Number of clusters. If there is no room for another one, a distant segment belongs to none.
     """
     capacity = segments.shape[0]
     clusters = 0
     for k in range(count):
         slot = (start + k) % capacity
         labels[slot] = -1
-        if alive[slot] == 0:
+        if status[slot] == 0:
             continue
         x = 0.5 * (segments[slot, 0] + segments[slot, 2])
         y = 0.5 * (segments[slot, 1] + segments[slot, 3])
@@ -90,13 +90,13 @@ def group_by_cluster(
     Parameters
     ----------
     labels : (capacity,) int
-        The cluster of each slot, −1 where it has none.
+        The cluster of each slot, −1 for none.
     start, count : int
         Oldest slot and number of slots in use, circular.
     sizes : (c,) int
         Segments in each cluster.
     clusters : int
-        How many clusters there are.
+        Number of clusters.
     offsets : (c + 1,) int
         Out: cluster j's members are ``members[offsets[j]:offsets[j + 1]]``.
     members : (capacity,) int
@@ -117,14 +117,23 @@ def group_by_cluster(
 
 
 class Clusters:
-    """The clusters of an outline map, made anew after each change of the map.
+    """The clusters of an outline map, computed again after each change of the map.
 
     Parameters
     ----------
     config : ClustersConfig
-        The threshold T and how many clusters there may be.
+        The threshold T and the largest number of clusters.
     capacity : int
         Capacity of the map.
+
+    Attributes
+    ----------
+    centres : (clusters_max, 2) float
+        m; the first `count` are valid.
+    sizes : (clusters_max,) int
+        Segments in each cluster.
+    count : int
+        Number of clusters.
     """
 
     def __init__(self, config: ClustersConfig, capacity: int) -> None:
@@ -133,19 +142,18 @@ class Clusters:
         self._members = np.zeros(capacity, dtype=np.int64)
         self._offsets = np.zeros(config.clusters_max + 1, dtype=np.int64)
         self.centres = np.zeros((config.clusters_max, 2))
-        """(clusters_max, 2): m; the first `count` are valid."""
         self.sizes = np.zeros(config.clusters_max, dtype=np.int64)
         self.count = 0
 
-    def adopt(self, config: ClustersConfig) -> bool:
-        """Go on with another T; the number of clusters stays. Return whether clusters are others under it."""
+    def apply_settings(self, config: ClustersConfig) -> bool:
+        """Use another threshold T; return whether it changed. The largest number of clusters stays."""
         before, self._config = self._config, config
         return before.threshold_m != config.threshold_m
 
     def update(self, outline: OutlineMap) -> None:
-        """Cluster the living segments of `outline`."""
+        """Cluster the segments of `outline`."""
         self.count = cluster_segments(
-            outline.segments, outline.alive, outline.start, outline.count, self._config.threshold_m,
+            outline.segments, outline.status, outline.start, outline.count, self._config.threshold_m,
             self._labels, self.centres, self.sizes,
         )  # fmt: skip
         group_by_cluster(

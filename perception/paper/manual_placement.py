@@ -1,9 +1,8 @@
-"""What an operator says stands somewhere, or does not, by the paper's method.
+"""Objects that an operator places, moves, confirms or rejects, by the paper's method.
 
-The paper's candidates come from clusters and go with them. What was placed, moved or confirmed by hand is a candidate
-of its own, a *placement*: it starts where it was put, the segments around it relax it as they do any other (§3.4),
-and it stays until it is rejected. A rejection is kept by place: what rests there is judged by the segments that came
-after it alone.
+The paper's candidates come and go with clusters. What an operator placed, moved or confirmed is a candidate of its
+own, a *placement*: it starts where it was put, the segments around it relax it like any other (§3.4), and it stays
+until it is rejected. A rejection is kept by place: only segments that arrive after it can bring a candidate there.
 """
 
 from __future__ import annotations
@@ -20,145 +19,196 @@ from perception.object_model import ObjectModel
 from perception.paper.outline_map import OutlineMap
 from perception.relaxation import relax
 
-ROOM: Final = 32
+PLACEMENTS_MAX: Final = 32
 """Placements, and rejections, at a time."""
-NUMBER, MODEL, LEFT, CONFIRMED, HEARD = range(5)
-"""Columns of a placement: its object's number, its model, iterations it may still take, whether it was confirmed, and
-the sum of its segments' numbers: another sum is other segments."""
+
+PLACEMENT: Final = np.dtype(
+    [
+        ("pose", np.float64, 3),
+        ("number", np.int64),
+        ("model", np.int64),
+        ("iterations_left", np.int64),
+        ("is_confirmed", np.int64),
+        ("members_sum", np.int64),
+    ]
+)
+"""A placement: x, y (m), theta (rad); its object's number; index of its model; the iterations that it may still take,
+0 at rest; 1 if the operator confirmed it; the sum of its segments' numbers, which changes with its segments."""
+
+REJECTION: Final = np.dtype(
+    [("x", np.float64), ("y", np.float64), ("reach", np.float64), ("model", np.int64), ("newest_segment", np.int64)]
+)
+"""A rejection: place and reach (m); index of the model; number of the newest segment at that time."""
 
 
 @dataclass(slots=False)
-class Names:
-    """Gives objects their numbers; none twice."""
+class NumberSource:
+    """Gives objects their numbers; none is given twice."""
 
     last: int = 0
 
     def next(self) -> int:
-        """Return a number that nothing has had yet."""
+        """Return a number that was never given before."""
         self.last += 1
         return self.last
 
 
 class Placements:
-    """Models that a person put somewhere.
+    """Models that an operator placed.
 
     Parameters
     ----------
     models : tuple of ObjectModel
-        What can be placed.
+        The models that can be placed.
     config : RelaxationConfig
         The paper's constants and the bound on the work.
     reach_m : float
-        Segments as far as half of this outside the model's outline pull at it.
+        Segments up to half of this outside the model's outline attract it.
+
+    Attributes
+    ----------
+    rows : (PLACEMENTS_MAX,) PLACEMENT
+        The placements; the first `count` are valid.
     """
 
     def __init__(self, models: tuple[ObjectModel, ...], config: RelaxationConfig, reach_m: float) -> None:
-        self.poses = np.zeros((ROOM, 3))
-        """(ROOM, 3): x, y (m), theta (rad); the first `count` are valid."""
-        self.rows = np.zeros((ROOM, 5), np.int64)
-        """(ROOM, 5): see the columns above."""
+        self.rows = np.zeros(PLACEMENTS_MAX, PLACEMENT)
         self.count = 0
         self._turn = 0
-        self.adopt(models, config, reach_m)
+        self.apply_settings(models, config, reach_m)
 
-    def adopt(self, models: tuple[ObjectModel, ...], config: RelaxationConfig, reach_m: float) -> None:
-        """Go on with these; of the models the first are those from before."""
+    def apply_settings(self, models: tuple[ObjectModel, ...], config: RelaxationConfig, reach_m: float) -> None:
+        """Use other settings; the present models come first in `models`.
+
+        Parameters
+        ----------
+        models, config, reach_m
+            As for the class.
+        """
         self._models = models
         self._config = config
         self._reaches = tuple(float(np.hypot(*m.sides[:, :2].T).max()) + 0.5 * reach_m for m in models)
 
     @property
     def pending(self) -> bool:
-        """Whether a placement has not come to rest."""
-        return self.count > 0 and bool(self.rows[: self.count, LEFT].any())
+        """Whether a placement is not at rest."""
+        return self.count > 0 and bool(self.rows["iterations_left"][: self.count].any())
 
     def put(self, number: int, model: int, pose: tuple[float, float, float], *, confirmed: bool) -> None:
-        """Place a model, or put the one of this number elsewhere; the caller has seen that there is room."""
+        """Place a model, or move the placement of this number; the caller has checked that there is room.
+
+        Parameters
+        ----------
+        number : int
+            The object's number.
+        model : int
+            Index of the model.
+        pose : (float, float, float)
+            m, rad.
+        confirmed : bool
+            Whether the operator confirmed the object.
+        """
         k = self.find(number)
-        if k < 0:
+        if k is None:
             k = self.count
             self.count += 1
-        self.poses[k] = pose
-        self.rows[k] = (number, model, self._config.iterations_max, confirmed, 0)
+        self.rows[k] = (pose, number, model, self._config.iterations_max, confirmed, 0)
 
-    def find(self, number: int) -> int:
-        """Return the placement of an object, −1 where it is none."""
-        found = np.flatnonzero(self.rows[: self.count, NUMBER] == number)
-        return int(found[0]) if len(found) else -1
+    def find(self, number: int) -> int | None:
+        """Return the row of an object's placement, None if it has none."""
+        found = np.flatnonzero(self.rows["number"][: self.count] == number)
+        return int(found[0]) if len(found) else None
 
-    def take_away(self, k: int) -> None:
+    def remove(self, k: int) -> None:
         """Remove a placement."""
-        for rows in (self.poses, self.rows):
-            rows[k : self.count - 1] = rows[k + 1 : self.count].copy()
-            rows[self.count - 1] = 0
+        self.rows[k : self.count - 1] = self.rows[k + 1 : self.count].copy()
         self.count -= 1
+        self.rows[self.count] = 0
 
     def clear(self) -> None:
-        """Remove all."""
-        self.poses[:] = 0.0
+        """Remove all placements."""
         self.rows[:] = 0
         self.count = 0
 
     def members(self, k: int, outline: OutlineMap) -> Ints:
         """Return the slots of the segments around placement `k`."""
+        x, y, _ = self.rows["pose"][k]
         middles = 0.5 * (outline.segments[:, :2] + outline.segments[:, 2:4])
-        off = np.hypot(middles[:, 0] - self.poses[k, 0], middles[:, 1] - self.poses[k, 1])
-        return np.flatnonzero((outline.alive > 0) & (off <= self._reaches[self.rows[k, MODEL]]))
+        off = np.hypot(middles[:, 0] - x, middles[:, 1] - y)
+        return np.flatnonzero((outline.status > 0) & (off <= self._reaches[self.rows["model"][k]]))
 
-    def wake(self, outline: OutlineMap) -> None:
-        """Let those relax again whose segments are others than they were."""
+    def restart_changed(self, outline: OutlineMap) -> None:
+        """Relax those placements again whose segments have changed."""
         for k in range(self.count):
-            heard = int(outline.numbers[self.members(k, outline)].sum())
-            if heard != self.rows[k, HEARD]:
-                self.rows[k, HEARD], self.rows[k, LEFT] = heard, self._config.iterations_max
+            members_sum = int(outline.numbers[self.members(k, outline)].sum())
+            if members_sum != self.rows["members_sum"][k]:
+                self.rows["members_sum"][k] = members_sum
+                self.rows["iterations_left"][k] = self._config.iterations_max
 
-    def wake_all(self) -> None:
-        """Let all relax again, as under other constants."""
-        self.rows[: self.count, LEFT] = self._config.iterations_max
+    def restart_all(self) -> None:
+        """Relax all placements again, as after a change of settings."""
+        self.rows["iterations_left"][: self.count] = self._config.iterations_max
 
     def refine(self, outline: OutlineMap) -> int:
-        """Relax one placement that has not come to rest, by one quantum; return the increments applied."""
-        config = self._config
+        """Relax one placement that is not at rest by one quantum; return the iterations done."""
+        config, left = self._config, self.rows["iterations_left"]
         order = (self._turn + np.arange(self.count)) % max(1, self.count)
-        k = int(next(k for k in order if self.rows[k, LEFT] > 0))
+        k = int(next(k for k in order if left[k] > 0))
         self._turn = k + 1
-        allowed = min(config.iterations_per_quantum, int(self.rows[k, LEFT]))
+        allowed = min(config.iterations_per_quantum, int(left[k]))
         done, rests = relax(
-            self._models[self.rows[k, MODEL]].sides, outline.segments, self.members(k, outline), config.gamma,
-            config.negligible_m, config.negligible_rad, allowed, self.poses[k],
+            self._models[self.rows["model"][k]].sides, outline.segments, self.members(k, outline), config.gamma,
+            config.negligible_m, config.negligible_rad, allowed, self.rows["pose"][k],
         )  # fmt: skip
-        self.rows[k, LEFT] = 0 if rests else self.rows[k, LEFT] - done
+        left[k] = 0 if rests else left[k] - done
         return done
 
 
 class Rejections:
-    """Places where a person said that a model does not stand."""
+    """Places where an operator rejected a model.
+
+    Attributes
+    ----------
+    rows : (PLACEMENTS_MAX,) REJECTION
+        The last rejections, a ring buffer.
+    total : int
+        Rejections so far.
+    """
 
     def __init__(self) -> None:
-        self.rows = np.zeros((ROOM, 5))
-        """(ROOM, 5): x, y, how far around (m), model, and the number of the newest segment at that time."""
+        self.rows = np.zeros(PLACEMENTS_MAX, REJECTION)
         self.total = 0
 
-    def add(self, x: float, y: float, reach_m: float, model: int, newest: int) -> None:
-        """Remember one; the oldest makes room."""
-        self.rows[self.total % ROOM] = (x, y, reach_m, model, newest)
+    def add(self, x: float, y: float, reach_m: float, model: int, newest_segment: int) -> None:
+        """Add a rejection; the oldest is overwritten.
+
+        Parameters
+        ----------
+        x, y, reach_m : float
+            The place, and how far around it the rejection applies, m.
+        model : int
+            Index of the model.
+        newest_segment : int
+            Number of the newest segment in the map.
+        """
+        self.rows[self.total % PLACEMENTS_MAX] = (x, y, reach_m, model, newest_segment)
         self.total += 1
 
-    def since(self, x: float, y: float, model: int) -> int:
-        """Return the number after which segments speak for a model at (x, y); 0 where all do."""
+    def newest_excluded(self, x: float, y: float, model: int) -> int:
+        """Return the newest segment that does not count for a model at (x, y), m; 0 if all segments count."""
         newest = 0
-        for row in self.rows[: min(self.total, ROOM)]:
-            if row[3] == model and math.hypot(row[0] - x, row[1] - y) < row[2]:
-                newest = max(newest, int(row[4]))
+        for row in self.rows[: min(self.total, PLACEMENTS_MAX)]:
+            if row["model"] == model and math.hypot(row["x"] - x, row["y"] - y) < row["reach"]:
+                newest = max(newest, int(row["newest_segment"]))
         return newest
 
     def clear(self) -> None:
-        """Forget all."""
-        self.rows[:] = 0.0
+        """Remove all rejections."""
+        self.rows[:] = 0
         self.total = 0
 
 
-def facing_from(pose: Floats) -> tuple[float, float, float]:
-    """Return a pose with its heading brought into [−π, π)."""
+def wrapped_pose(pose: Floats) -> tuple[float, float, float]:
+    """Return a pose (m, rad) with its heading wrapped into [−π, π)."""
     x, y, theta = (float(v) for v in pose)
     return x, y, (theta + math.pi) % (2.0 * math.pi) - math.pi

@@ -1,7 +1,7 @@
 """The paper's method: outline segments, clusters of them, and a model relaxed onto each cluster.
 
-`observe` takes in one firing: segments, ageing, contradictions, clusters (paper §3.1 to §3.3). `refine` relaxes one
-candidate by one quantum (§3.4). `edit` does what a person says.
+`observe` enters one firing: segments, ageing, contradictions, clusters (paper §3.1 to §3.3). `refine` relaxes one
+candidate by one quantum (§3.4). `edit` applies an operator's edit.
 """
 
 from __future__ import annotations
@@ -36,16 +36,7 @@ from perception.kernel import Floats, Ints
 from perception.object_model import ObjectModel
 from perception.paper.candidates import Candidates
 from perception.paper.clusters import Clusters
-from perception.paper.manual_placement import (
-    CONFIRMED,
-    MODEL,
-    NUMBER,
-    ROOM,
-    Names,
-    Placements,
-    Rejections,
-    facing_from,
-)
+from perception.paper.manual_placement import PLACEMENTS_MAX, NumberSource, Placements, Rejections, wrapped_pose
 from perception.paper.outline_map import OutlineMap
 from perception.paper.recognition import goodness_of_fit
 from perception.paper.segments import SegmentExtractor
@@ -60,15 +51,13 @@ class PaperPerception:
     ring : RingConfig
         The sensors.
     models : sequence of ModelConfig
-        What is looked for.
+        The objects to recognise.
     config : PerceptionConfig
-        The constants of each step.
+        The settings of each step.
     """
 
     SCRATCH: Final = ("_scratch",)
-    """Only for reporting, and no memory."""
-    LATER: Final = ("_names", "placements", "_rejections", "_by_hand")
-    """What recordings of older programs do not hold."""
+    """Not part of a snapshot: overwritten before each use."""
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> None:
         mounts = mounts_array(ring.mounts)
@@ -78,19 +67,19 @@ class PaperPerception:
         self._extractor = SegmentExtractor(ring, config.segments)
         self.outline = OutlineMap(config.map, mounts, math.radians(ring.beam_half_angle_deg))
         self.clusters = Clusters(config.clusters, config.map.capacity)
-        self._names = Names()
+        self._numbers = NumberSource()
         self.candidates = Candidates(
             self._models, config.relaxation, config.clusters.clusters_max,
-            config.clusters.segments_min, config.clusters.threshold_m, self._names,
+            config.clusters.segments_min, config.clusters.threshold_m, self._numbers,
         )  # fmt: skip
         self.placements = Placements(self._models, config.relaxation, config.clusters.threshold_m)
         self._rejections = Rejections()
-        self._by_hand = False
+        self._placement_was_last = False
 
     @property
     def can_refine(self) -> bool:
         """Whether `refine` has anything to improve now."""
-        return self.placements.pending or self.candidates.pending
+        return self.placements.pending or self.candidates.pending > 0
 
     @property
     def converged(self) -> bool:
@@ -98,57 +87,58 @@ class PaperPerception:
         return not self.can_refine
 
     def observe(self, firing: Firing) -> int:
-        """Take in one firing and return how many outline segments it completed."""
+        """Enter one firing and return how many outline segments it completed."""
         segments = self._extractor.extract(firing)
-        erased = self.outline.contradict(firing)
+        removed = self.outline.remove_contradicted(firing)
         aged = self.outline.age(firing.robot_s)
         self.outline.add(segments, firing.robot_s)
-        if erased > 0 or len(segments) > 0 or aged:
-            self._follow()
+        if removed > 0 or len(segments) > 0 or aged:
+            self._follow_map()
         return len(segments)
 
     def refine(self) -> int:
-        """Do one quantum of refinement and return its iterations, zero where nothing is left to improve."""
-        self._by_hand = self.placements.pending and not (self._by_hand and self.candidates.pending)
-        if self._by_hand:
+        """Do one quantum of refinement and return its iterations, zero if nothing is left to improve."""
+        placements_turn = not (self._placement_was_last and self.candidates.pending)
+        self._placement_was_last = self.placements.pending and placements_turn
+        if self._placement_was_last:
             return self.placements.refine(self.outline)
         return self.candidates.refine(self.clusters, self.outline)
 
     @property
     def counts(self) -> MapCounts:
-        """How many segments and clusters there are."""
-        return MapCounts(self.outline.living, self.outline.total, self.clusters.count)
+        """The numbers of segments and clusters."""
+        return MapCounts(self.outline.size, self.outline.total, self.clusters.count)
 
     def segment_geometry(self) -> Floats:
-        """Return the outline segments in the map: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""
+        """Return a copy of the outline segments: end points x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""
         return self.outline.listed().geometry
 
     def segments(self) -> Segments:
-        """Return the outline segments in the map with all that is known of them."""
+        """Return the outline segments with their numbers, times and pins."""
         return self.outline.listed()
 
     def objects(self) -> tuple[DetectedObject, ...]:
-        """Return what is recognised now, best first.
+        """Return the objects recognised now, best first.
 
-        Candidates that rest on one another explain one object, and the best of them stays: a cluster that Table 1
-        split gives two candidates of one model, and a cluster gives a candidate for each model. What a person placed
-        or confirmed stays in any case.
+        Of candidates that rest near one another only the best is reported: Table 1 may split an object into two
+        clusters, and a cluster has a candidate for each model. Objects that an operator placed or confirmed are
+        always reported.
         """
-        many = range(len(self._models))
-        judged = [s for j in range(self.clusters.count) for m in many if (s := self._judge(j, m)) is not None]
-        seen = [self._judge_placement(k) for k in range(self.placements.count)]
-        for candidate in sorted(judged, key=lambda s: s.score, reverse=True):
+        models = range(len(self._models))
+        fitting = [o for j in range(self.clusters.count) for m in models if (o := self._candidate(j, m)) is not None]
+        detected = [self._placement(k) for k in range(self.placements.count)]
+        for candidate in sorted(fitting, key=lambda o: o.score, reverse=True):
             apart = self._config.recognition.separation_m
-            if all(math.hypot(candidate.x - s.x, candidate.y - s.y) >= apart for s in seen):
-                seen.append(candidate)
-        return tuple(sorted(seen, key=lambda s: s.score, reverse=True))
+            if all(math.hypot(candidate.x - o.x, candidate.y - o.y) >= apart for o in detected):
+                detected.append(candidate)
+        return tuple(sorted(detected, key=lambda o: o.score, reverse=True))
 
     def labelled_objects(self) -> tuple[DetectedObject, ...]:
-        """Return everything that has a name: here the objects."""
+        """Return the objects: this method has no other labels."""
         return self.objects()
 
     def reset(self) -> None:
-        """Begin anew, as after the odometry did."""
+        """Start again with an empty map, as after a reset of the odometry."""
         self._extractor.reset()
         self.outline.clear()
         self.clusters.update(self.outline)
@@ -157,67 +147,65 @@ class PaperPerception:
         self._rejections.clear()
 
     def apply_settings(self, config: PerceptionConfig) -> None:
-        """Go on with other constants; what sizes an array stays."""
+        """Use other settings; those that size an array stay."""
         relaxation, segments_min = self._config.relaxation, self._config.clusters.segments_min
         self._config = config
         self._extractor.apply_settings(config.segments)
-        self.outline.adopt(config.map)
-        others = self.clusters.adopt(config.clusters) or segments_min != config.clusters.segments_min
-        self.candidates.adopt(config.relaxation, config.clusters.segments_min, config.clusters.threshold_m)
-        self.placements.adopt(self._models, config.relaxation, config.clusters.threshold_m)
+        self.outline.apply_settings(config.map)
+        regroup = self.clusters.apply_settings(config.clusters) or segments_min != config.clusters.segments_min
+        self.candidates.apply_settings(config.relaxation, config.clusters.segments_min, config.clusters.threshold_m)
+        self.placements.apply_settings(self._models, config.relaxation, config.clusters.threshold_m)
         if config.relaxation != relaxation:
-            self.placements.wake_all()
-        if others:
-            self._follow()
+            self.placements.restart_all()
+        if regroup:
+            self._follow_map()
 
     def set_models(self, models: Sequence[ModelConfig]) -> None:
-        """Look for further models as well, which come after those from before."""
+        """Recognise further models, which follow the present ones in `models`."""
         self._models = tuple(ObjectModel.from_config(m) for m in models)
         self._scratch = np.zeros(max(len(m.sides) for m in self._models), dtype=np.int64)
         self.candidates.extend(self._models, self.clusters, self.outline)
-        self.placements.adopt(self._models, self._config.relaxation, self._config.clusters.threshold_m)
+        self.placements.apply_settings(self._models, self._config.relaxation, self._config.clusters.threshold_m)
 
     def drop_caches(self) -> None:
-        """Make good what the snapshot of an older program does not hold."""
-        self.outline.restored()
-        self.candidates.restored()
+        """Do nothing: this method caches no results."""
 
     def edit(self, edit: Edit) -> str | None:
-        """Do what a person says; return None, or why it cannot be done."""
+        """Apply an operator's edit; return None, or why it cannot be applied."""
         match edit:
             case DeleteSegments(numbers):
                 missing = self.outline.delete(numbers)
             case PinSegments(numbers, pinned):
-                refused = self.outline.pin(numbers, pinned=pinned)
-                if refused is None:
-                    return "no more segments can be pinned: they would fill half the map"
-                missing = refused
+                not_pinned = self.outline.pin(numbers, pinned=pinned)
+                if not_pinned is None:
+                    return "too many pinned segments: they would fill half of the map; unpin some first"
+                missing = not_pinned
             case PlaceModel(model, x, y, theta):
                 m = next((m for m, known in enumerate(self._models) if known.name == model), None)
                 if m is None:
                     return f"no model is called {model}: load it first"
-                return self._put(self._names.last + 1, m, (x, y, theta), confirmed=False)
+                return self._put(self._numbers.last + 1, m, (x, y, theta), confirmed=False)
             case MoveObject(number, x, y, theta):
-                return self._say(number, (x, y, theta), confirmed=None)
+                return self._make_placement(number, (x, y, theta), confirmed=None)
             case ConfirmObject(number):
-                return self._say(number, None, confirmed=True)
+                return self._make_placement(number, None, confirmed=True)
             case RejectObject(number):
                 return self._reject(number)
             case ClearMap():
                 self.reset()
                 return None
-        self._follow()
+        self._follow_map()
         return no_such_segments(missing) if missing else None
 
     def evidence(self, number: int) -> Evidence | None:
-        """Return the segments around an object, and which of them lie on it."""
+        """Return the segments around an object and which of them lie on it, None if no object has this number."""
         k = self.placements.find(number)
         found = self.candidates.find(number)
-        if k >= 0:
-            m, pose = int(self.placements.rows[k, MODEL]), self.placements.poses[k]
-            slots = self.placements.members(k, self.outline)
+        if k is not None:
+            row = self.placements.rows[k]
+            m, pose, slots = int(row["model"]), row["pose"], self.placements.members(k, self.outline)
         elif found is not None:
-            m, pose, slots = found[1], self.candidates.poses[found], self.clusters.members(found[0])
+            m, pose, slots = found[1], self.candidates.rows["pose"][found], self.clusters.members(found[0])
         else:
             return None
         lines = []
@@ -229,54 +217,58 @@ class PaperPerception:
         name = self._models[m].name
         return Evidence(number, name, lines=tuple(lines), supporting=support, opposing=support - len(lines))
 
-    def _follow(self) -> None:
-        """Cluster the map as it is now, and let candidates and placements follow."""
+    def _follow_map(self) -> None:
+        """Cluster the present map; let candidates and placements follow."""
         self.clusters.update(self.outline)
         self.candidates.follow(self.clusters, self.outline)
-        self.placements.wake(self.outline)
+        self.placements.restart_changed(self.outline)
 
     def _put(self, number: int, m: int, pose: tuple[float, float, float], *, confirmed: bool) -> str | None:
-        """Have a placement stand at a pose; return why not."""
-        if self.placements.find(number) < 0 and self.placements.count == ROOM:
-            return f"{ROOM} objects stand by hand already: reject one first"
-        self._names.last = max(self._names.last, number)
+        """Put a placement at a pose; return None, or why there is no room for it."""
+        if self.placements.find(number) is None and self.placements.count == PLACEMENTS_MAX:
+            return f"{PLACEMENTS_MAX} objects are placed already, and there is no room for more: reject one first"
+        self._numbers.last = max(self._numbers.last, number)
         self.placements.put(number, m, pose, confirmed=confirmed)
         return None
 
-    def _say(self, number: int, pose: tuple[float, float, float] | None, *, confirmed: bool | None) -> str | None:
-        """Make an object a placement, at a pose or where it rests; return why not."""
+    def _make_placement(
+        self, number: int, pose: tuple[float, float, float] | None, *, confirmed: bool | None
+    ) -> str | None:
+        """Turn an object into a placement, at a pose or where it is; return None, or why that is impossible."""
         k = self.placements.find(number)
-        if k >= 0:
-            was = bool(self.placements.rows[k, CONFIRMED])
-            at = facing_from(self.placements.poses[k]) if pose is None else pose
+        if k is not None:
+            row = self.placements.rows[k]
+            was_confirmed = bool(row["is_confirmed"])
+            at = wrapped_pose(row["pose"]) if pose is None else pose
             return self._put(
-                number, int(self.placements.rows[k, MODEL]), at, confirmed=was if confirmed is None else confirmed
+                number, int(row["model"]), at, confirmed=was_confirmed if confirmed is None else confirmed
             )
         found = self.candidates.find(number)
         if found is None:
             return no_such_object(number)
-        at = facing_from(self.candidates.poses[found]) if pose is None else pose
+        at = wrapped_pose(self.candidates.rows["pose"][found]) if pose is None else pose
         refused = self._put(number, found[1], at, confirmed=bool(confirmed))
         if refused is None:
-            self.candidates.rename(*found)
+            self.candidates.renumber(*found)
         return refused
 
     def _reject(self, number: int) -> str | None:
         k = self.placements.find(number)
         found = self.candidates.find(number)
-        if k >= 0:
-            m, (x, y, _) = int(self.placements.rows[k, MODEL]), facing_from(self.placements.poses[k])
-            self.placements.take_away(k)
+        if k is not None:
+            row = self.placements.rows[k]
+            m, (x, y, _) = int(row["model"]), wrapped_pose(row["pose"])
+            self.placements.remove(k)
         elif found is not None:
-            m, (x, y, _) = found[1], facing_from(self.candidates.poses[found])
-            self.candidates.rename(*found)
+            m, (x, y, _) = found[1], wrapped_pose(self.candidates.rows["pose"][found])
+            self.candidates.renumber(*found)
         else:
             return no_such_object(number)
         self._rejections.add(x, y, self._config.recognition.separation_m, m, self.outline.total)
         return None
 
     def _fit(self, m: int, slots: Ints, pose: Floats) -> tuple[int, float, float]:
-        """Return how many of the segments lie on a model, how far off they are, and how much of it they cover."""
+        """Return support, residual (m) and coverage of a model at a pose; see `goodness_of_fit`."""
         limits = self._config.recognition
         x, y, theta = (float(v) for v in pose)
         return goodness_of_fit(
@@ -284,33 +276,34 @@ class PaperPerception:
             limits.tolerance_m, math.radians(limits.tolerance_deg), self._scratch,
         )  # fmt: skip
 
-    def _judge(self, cluster: int, m: int) -> DetectedObject | None:
-        """Return the candidate as an object if it fits well enough."""
-        if not self.candidates.rested[cluster, m]:
+    def _candidate(self, cluster: int, m: int) -> DetectedObject | None:
+        """Return a candidate as an object, None if it does not fit well enough."""
+        row = self.candidates.rows[cluster, m]
+        if not row["has_rested"]:
             return None
         limits, slots = self._config.recognition, self.clusters.members(cluster)
-        x, y, theta = facing_from(self.candidates.poses[cluster, m])
-        newest = self._rejections.since(x, y, m)
-        if newest > 0:
-            slots = slots[self.outline.numbers[slots] > newest]
+        x, y, theta = wrapped_pose(row["pose"])
+        excluded = self._rejections.newest_excluded(x, y, m)
+        if excluded > 0:
+            slots = slots[self.outline.numbers[slots] > excluded]
             if len(slots) < self._config.clusters.segments_min:
                 return None
-        support, residual, coverage = self._fit(m, slots, self.candidates.poses[cluster, m])
+        support, residual, coverage = self._fit(m, slots, row["pose"])
         share = support / len(slots)
         if share < limits.support_min or coverage < limits.coverage_min:
             return None
         return DetectedObject(
             self._models[m].name, x, y, theta, residual / math.sqrt(support), support, share * coverage,
-            number=int(self.candidates.numbers[cluster, m]),
+            number=int(row["number"]),
         )  # fmt: skip
 
-    def _judge_placement(self, k: int) -> DetectedObject:
+    def _placement(self, k: int) -> DetectedObject:
         """Return a placement as an object, however well it fits."""
         row, slots = self.placements.rows[k], self.placements.members(k, self.outline)
-        x, y, theta = facing_from(self.placements.poses[k])
-        support, residual, coverage = self._fit(int(row[MODEL]), slots, self.placements.poses[k])
+        x, y, theta = wrapped_pose(row["pose"])
+        support, residual, coverage = self._fit(int(row["model"]), slots, row["pose"])
         sigma = residual / math.sqrt(support) if support else self._config.clusters.threshold_m
         return DetectedObject(
-            self._models[row[MODEL]].name, x, y, theta, sigma, support, support / max(1, len(slots)) * coverage,
-            number=int(row[NUMBER]), confirmed=bool(row[CONFIRMED]), placed=not row[CONFIRMED],
+            self._models[row["model"]].name, x, y, theta, sigma, support, support / max(1, len(slots)) * coverage,
+            number=int(row["number"]), confirmed=bool(row["is_confirmed"]), placed=not row["is_confirmed"],
         )  # fmt: skip

@@ -1,7 +1,7 @@
-"""How well a relaxed model explains a cluster, and with that whether an object is seen at all (paper §3.4).
+"""Recognition: how well a relaxed model explains a cluster, and so whether an object is detected (paper §3.4).
 
-The paper asks for a goodness of fit and leaves it open. Two numbers carry it here: how near the segments lie to the
-model's outline, and how much of the outline has segments on it.
+The paper requires a goodness of fit and does not define it. Here it consists of two numbers: how near the segments
+lie to the model's outline, and how much of the outline has segments on it.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ def goodness_of_fit(
     tolerance_rad: float,
     hit: Ints,
 ) -> tuple[int, float, float]:
-    """Compare a cluster's segments with the outline of the model at a pose.
+    """Return how many of a cluster's segments support a model at a pose, how near they lie, and the coverage.
 
-    A segment supports the model where its middle lies within `tolerance_m` of the nearest side and its direction
+    A segment supports the model if its middle lies within `tolerance_m` of the nearest side and its direction
     within `tolerance_rad` of that side's.
 
     Parameters
@@ -33,14 +33,14 @@ def goodness_of_fit(
     sides, segments, members, x, y, theta
         As for `perception.relaxation.increment`.
     tolerance_m, tolerance_rad : float
-        Metres, radians.
+        Largest distance (m) and angle (rad) of a supporting segment from its side.
     hit : (m,) int
-        Scratch, one a side.
+        Out: supporting segments of each side.
 
     Returns
     -------
     (int, float, float)
-        Supporting segments, their root mean square distance from the outline (m, inf where there are none), and the
+        Supporting segments, their root mean square distance from the outline (m, inf if there are none), and the
         share of the outline's length whose sides have support.
     """
     c = math.cos(theta)

@@ -1,33 +1,56 @@
-"""Outline segments: the paper's second step (§3.2), after McKerrow.
+"""Outline segments: the paper's second step (§3.2), after McKerrow (1993).
 
-One range says only that a surface touches an arc. Two ranges of one sensor from two places say more: the common
-tangent of both arcs is the best estimate of the surface that answered both.
+One range only tells that a surface touches an arc. Two ranges of one sensor from two places tell more: the common
+tangent of both arcs is the best estimate of the surface that returned both echoes.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Annotated, Final
 
 import numpy as np
 
 from config.robot import RingConfig
 from config.settings import SegmentsConfig
 from drivers.messages import Firing
-from perception.kernel import Floats, Ints, kernel
+from perception.kernel import Floats, kernel
+from perception.records import Record, Records, records, zeros
 from perception.sensor_mounts import mounts_array
 
-REMEMBERED = 16
-"""Readings kept of each sensor; they lie a fraction of a baseline apart, so this spans several baselines."""
+READINGS_KEPT: Final = 16
+"""Readings kept of each sensor. They are a fraction of a baseline apart, so that they span several baselines."""
+SPACING: Final = 0.25
+"""A reading is kept once its sensor has moved by this share of the shortest baseline since the last one kept."""
 
-SPACING = 0.25
-"""A reading is kept once its sensor has moved this share of the shortest baseline since the last one kept."""
+
+class KeptReading(Record):
+    """A range and where it was measured."""
+
+    x: float
+    """Place of the sensor, m."""
+    y: float
+    axis: float
+    """Direction of its axis, rad."""
+    range_m: float
+    robot_s: float
+
+
+class SensorReadings(Record):
+    """The last readings of a sensor, a ring buffer."""
+
+    newest: int
+    """Index of the newest reading."""
+    count: int
+    """Readings kept."""
+    kept: Annotated[Records[KeptReading], READINGS_KEPT]
 
 
 @kernel
 def tangent(
     x1: float, y1: float, axis1: float, r1: float, x2: float, y2: float, axis2: float, r2: float, half_angle: float
 ) -> tuple[bool, float]:
-    """Return the direction of the normal of the line that touches both ranges' arcs.
+    """Return the normal of the common tangent of two readings' arcs.
 
     A line n·x = c touches both circles where n·P1 + r1 = n·P2 + r2 = c, so that cos(α − φ) = (r1 − r2)/L for the
     direction α of n, with L and φ the length and direction of P2 − P1 (McKerrow 1993; paper §3.2, Figure 2).
@@ -35,17 +58,17 @@ def tangent(
     Parameters
     ----------
     x1, y1, axis1, r1 : float
-        First reading: the sensor's place (m), the direction of its axis (rad), its range (m).
+        First reading: place of the sensor (m), direction of its axis (rad), range (m).
     x2, y2, axis2, r2 : float
         Second reading.
     half_angle : float
-        Half the beam's opening, rad: the arcs end there.
+        Half the beam's width, rad: the arcs end there.
 
     Returns
     -------
     (bool, float)
         Whether a tangent touches both arcs inside both beams, and the direction of its normal, from the sensors
-        to the surface (rad). Where both roots do, the one nearer to the axes.
+        to the surface (rad). If both roots do, the one nearer to the axes.
     """
     baseline = math.hypot(x2 - x1, y2 - y1)
     if baseline == 0.0 or abs(r1 - r2) > baseline:
@@ -74,9 +97,7 @@ def pair_readings(
     pose_y: float,
     yaw: float,
     t: float,
-    kept: Floats,
-    newest: Ints,
-    filled: Ints,
+    sensors: Records[SensorReadings],
     half_angle: float,
     baseline_min: float,
     baseline_max: float,
@@ -84,24 +105,28 @@ def pair_readings(
     spacing: float,
     out: Floats,
 ) -> int:
-    """Pair each new reading of a firing with the last one far enough back, and remember it.
+    """Pair each echo of a firing with the last kept one far enough back; return the number of segments.
 
     Parameters
     ----------
     ranges : (n,) float
-        Metres; NaN did not fire, inf heard nothing. Neither is an echo and neither is paired.
+        As in a `Firing`, m: NaN did not fire, inf heard nothing. Neither is paired.
     mounts : (n, 3) float
         x, y (m) and direction (rad) of each sensor in the ring's frame.
     pose_x, pose_y, yaw, t : float
         Place of the ring (m), direction of its sensor 0 (rad), time of the firing (s).
-    kept : (n, k, 5) float
-        Circular memory of each sensor's readings: x, y, axis, range, time. Updated.
-    newest, filled : (n,) int
-        Index of each sensor's newest kept reading and how many are kept. Updated.
-    half_angle, baseline_min, baseline_max, gap_max, spacing : float
-        Radians, metres, metres, seconds, metres.
+    sensors : (n,) records
+        Each sensor's last readings. Updated.
+    half_angle : float
+        Half the beam's width, rad.
+    baseline_min, baseline_max : float
+        Least and greatest distance between the two readings of a pair, m.
+    gap_max : float
+        Longest time between them, s.
+    spacing : float
+        Least distance between kept readings, m.
     out : (n, 5) float
-        Room for the segments: both ends x, y, x, y (m) and the direction of the normal (rad).
+        Out: the segments' end points x1, y1, x2, y2 (m) and direction of the normal (rad).
 
     Returns
     -------
@@ -109,7 +134,6 @@ def pair_readings(
         How many segments were written to `out`.
     """
     count = 0
-    memory = kept.shape[1]
     c = math.cos(yaw)
     s = math.sin(yaw)
     for i in range(ranges.shape[0]):
@@ -119,78 +143,77 @@ def pair_readings(
         x = pose_x + c * mounts[i, 0] - s * mounts[i, 1]
         y = pose_y + s * mounts[i, 0] + c * mounts[i, 1]
         axis = yaw + mounts[i, 2]
-        if filled[i] > 0:
-            last = kept[i, newest[i]]
-            if t - last[4] <= gap_max and math.hypot(x - last[0], y - last[1]) < spacing:
+        sensor = sensors[i]
+        if sensor.count > 0:
+            last = sensor.kept[sensor.newest]
+            if t - last.robot_s <= gap_max and math.hypot(x - last.x, y - last.y) < spacing:
                 continue
-        for back in range(filled[i]):
-            old = kept[i, (newest[i] - back) % memory]
-            if t - old[4] > gap_max:
+        for back in range(sensor.count):
+            old = sensor.kept[(sensor.newest - back) % READINGS_KEPT]
+            if t - old.robot_s > gap_max:
                 break
-            baseline = math.hypot(x - old[0], y - old[1])
+            baseline = math.hypot(x - old.x, y - old.y)
             if baseline < baseline_min:
                 continue
             if baseline <= baseline_max:
-                found, normal = tangent(old[0], old[1], old[2], old[3], x, y, axis, r, half_angle)
+                found, normal = tangent(old.x, old.y, old.axis, old.range_m, x, y, axis, r, half_angle)
                 if found:
                     nx = math.cos(normal)
                     ny = math.sin(normal)
-                    out[count, 0] = old[0] + old[3] * nx
-                    out[count, 1] = old[1] + old[3] * ny
+                    out[count, 0] = old.x + old.range_m * nx
+                    out[count, 1] = old.y + old.range_m * ny
                     out[count, 2] = x + r * nx
                     out[count, 3] = y + r * ny
                     out[count, 4] = normal
                     count += 1
             break
-        newest[i] = (newest[i] + 1) % memory
-        filled[i] = min(filled[i] + 1, memory)
-        kept[i, newest[i], 0] = x
-        kept[i, newest[i], 1] = y
-        kept[i, newest[i], 2] = axis
-        kept[i, newest[i], 3] = r
-        kept[i, newest[i], 4] = t
+        sensor.newest = (sensor.newest + 1) % READINGS_KEPT
+        sensor.count = min(sensor.count + 1, READINGS_KEPT)
+        new = sensor.kept[sensor.newest]
+        new.x, new.y, new.axis, new.range_m, new.robot_s = x, y, axis, r, t
     return count
 
 
 class SegmentExtractor:
-    """Firings in, outline segments out; remembers each sensor's last readings.
+    """Turns firings into outline segments; keeps each sensor's last readings.
 
     Parameters
     ----------
     ring : RingConfig
-        Where the sensors sit and how wide their beams are.
+        Mounts and beam width of the sensors.
     config : SegmentsConfig
-        Which pairs are made.
+        Which readings are paired.
     """
 
+    SCRATCH: Final = ("_out", "_sensor_records")
+    """Not part of a snapshot: overwritten before each use, or a view of arrays that are."""
+
     def __init__(self, ring: RingConfig, config: SegmentsConfig) -> None:
-        sensors = len(ring.mounts)
+        count = len(ring.mounts)
         self._mounts = mounts_array(ring.mounts)
         self._half_angle = math.radians(ring.beam_half_angle_deg)
         self._config = config
-        self._kept = np.zeros((sensors, REMEMBERED, 5))
-        self._newest = np.zeros(sensors, dtype=np.int64)
-        self._filled = np.zeros(sensors, dtype=np.int64)
-        self._out = np.zeros((sensors, 5))
+        self._sensors = zeros(SensorReadings, count)
+        self._sensor_records = records(SensorReadings, self._sensors)
+        self._out = np.zeros((count, 5))
 
     def extract(self, firing: Firing) -> Floats:
         """Return the segments that `firing` completes: a view of shape (m, 5), valid until the next call.
 
-        A row is both ends x, y, x, y (m) and the direction of the normal, away from the sensor (rad).
+        A row holds the end points x1, y1, x2, y2 (m) and the direction of the normal, away from the sensor (rad).
         """
         config = self._config
         count = pair_readings(
             firing.ranges_m, self._mounts, firing.pose.x, firing.pose.y, firing.ring_yaw, firing.robot_s,
-            self._kept, self._newest, self._filled, self._half_angle,
-            config.baseline_min_m, config.baseline_max_m, config.gap_max_s, SPACING * config.baseline_min_m,
-            self._out,
+            self._sensor_records, self._half_angle, config.baseline_min_m, config.baseline_max_m, config.gap_max_s,
+            SPACING * config.baseline_min_m, self._out,
         )  # fmt: skip
         return self._out[:count]
 
     def apply_settings(self, config: SegmentsConfig) -> None:
-        """Make pairs of other readings from now on."""
+        """Pair readings by other settings from now on."""
         self._config = config
 
     def reset(self) -> None:
-        """Forget all readings, as after the odometry began anew."""
-        self._filled[:] = 0
+        """Discard all readings, as after a reset of the odometry."""
+        self._sensors["count"] = 0

@@ -6,6 +6,7 @@ recorded, described in the file's own schema and read back without a change here
 
 from __future__ import annotations
 
+import ast
 from dataclasses import fields
 from itertools import accumulate
 from typing import Any, Final, TypeAlias, get_type_hints
@@ -190,7 +191,7 @@ def keyframe(cycle: int, run_s: float, state: StateFields, snapshot: Snapshot) -
     snapshot : Snapshot
         Perception's arrays by name.
     """
-    arrays = [ArrayInfo(name=name, dtype=a.dtype.str, shape=list(a.shape)) for name, a in snapshot.items()]
+    arrays = [ArrayInfo(name=name, dtype=_dtype_text(a.dtype), shape=list(a.shape)) for name, a in snapshot.items()]
     data = zstandard.compress(b"".join(a.tobytes() for a in snapshot.values()))
     return Keyframe.model_construct(
         run_s=run_s,
@@ -201,11 +202,20 @@ def keyframe(cycle: int, run_s: float, state: StateFields, snapshot: Snapshot) -
     )
 
 
+def _dtype_text(dtype: np.dtype[Any]) -> str:
+    """Return a dtype as text; that of records lists their fields."""
+    return dtype.str if dtype.names is None else str(dtype.descr)
+
+
+def _parse_dtype(text: str) -> np.dtype[Any]:
+    return np.dtype(ast.literal_eval(text) if text.startswith("[") else text)
+
+
 def perception_snapshot(frame: Keyframe) -> Snapshot:
     """Return perception's arrays of a keyframe, by name."""
     raw, arrays, at = zstandard.decompress(frame.data), {}, 0
     for array in frame.arrays:
-        dtype = np.dtype(array.dtype)
+        dtype = _parse_dtype(array.dtype)
         count = int(np.prod(array.shape, dtype=np.int64))
         arrays[array.name] = np.frombuffer(raw, dtype, count, at).reshape(array.shape)
         at += count * dtype.itemsize

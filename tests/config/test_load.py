@@ -146,7 +146,7 @@ def test_one_model_may_stand_without_its_list(tmp_path: Path) -> None:
 
 
 def test_two_models_of_one_name() -> None:
-    assert problem(models=["box", "box"]).endswith("two models are named box: a report could not tell them apart")
+    assert problem(models=["box", "box"]).endswith("two models are named box: give each model a name of its own")
 
 
 def test_a_firing_table_with_its_own_pattern_replaces_the_robots(tmp_path: Path) -> None:

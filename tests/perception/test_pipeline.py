@@ -73,8 +73,8 @@ def test_warm_starts_take_a_few_iterations() -> None:
     warm = []
     for firing in drive(load_world("hallway")):
         perception.observe(firing)
-        awake = perception.candidates.awake
-        rested = int(perception.candidates.rested[: perception.clusters.count].sum())
+        awake = perception.candidates.pending
+        rested = int(perception.candidates.rows["has_rested"][: perception.clusters.count].sum())
         iterations = settle(perception)
         if rested >= 4 and awake:
             warm.append(iterations / awake)
@@ -95,7 +95,7 @@ def test_quanta_change_when_not_what() -> None:
         for firing in firings:
             perception.observe(firing)
             settle(perception)
-        poses.append(perception.candidates.poses[: perception.clusters.count].copy())
+        poses.append(perception.candidates.rows["pose"][: perception.clusters.count].copy())
     np.testing.assert_array_equal(poses[0], poses[1])
 
 
@@ -104,10 +104,10 @@ def test_refinement_takes_turns() -> None:
     perception = perceive(settings(relaxation=RelaxationConfig(iterations_per_quantum=1)))
     for firing in drive(load_world("hallway"), (-6.0, 8.0)):
         perception.observe(firing)
-    before = perception.candidates.poses[: perception.clusters.count].copy()
+    before = perception.candidates.rows["pose"][: perception.clusters.count].copy()
     for _ in range(perception.clusters.count):
         perception.refine()
-    moved = np.any(perception.candidates.poses[: perception.clusters.count] != before, axis=(1, 2))
+    moved = np.any(perception.candidates.rows["pose"][: perception.clusters.count] != before, axis=(1, 2))
     large = perception.clusters.sizes[: perception.clusters.count] >= settings().perception.clusters.segments_min
     np.testing.assert_array_equal(moved, large)
 
@@ -122,10 +122,10 @@ def test_old_segments_leave_and_their_objects_with_them() -> None:
     assert perception.objects()
     silent = np.full(24, np.nan)
     perception.observe(Firing(last.robot_s + 29.0, last.pose, 0.0, silent))
-    left = perception.outline.living
+    left = perception.outline.size
     assert 0 < left < perception.outline.total
     perception.observe(Firing(last.robot_s + 31.0, last.pose, 0.0, silent))
-    assert perception.outline.living == 0
+    assert perception.outline.size == 0
     assert perception.objects() == ()
 
 
@@ -143,8 +143,8 @@ def test_a_drum_that_was_taken_away_is_contradicted() -> None:
         perception.observe(firing)
         settle(perception)
     assert all(o.y / FT > 6.0 for o in perception.objects())
-    alive = perception.outline.segments[perception.outline.alive == 1]
-    near = np.hypot(alive[:, 0] - 4.0 * FT, alive[:, 1] - 3.5 * FT) < 1.5 * FT
+    left = perception.outline.segments[perception.outline.status > 0]
+    near = np.hypot(left[:, 0] - 4.0 * FT, left[:, 1] - 3.5 * FT) < 1.5 * FT
     assert near.sum() <= 2  # a segment seen from the side only is faced by no sensor that hears the wall
 
 

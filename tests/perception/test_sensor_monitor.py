@@ -19,7 +19,7 @@ from drivers.messages import Firing, Pose
 from perception.pipeline import Perception
 from perception.sensor_monitor import SensorMonitor
 from perception.sensor_report import SensorFault
-from perception.sensor_tests import FAILURES, RETURNS
+from perception.sensor_tests import MISSED_FIRINGS_MAX, RECOVERY_READINGS
 from runtime.simulation.random_halls import random_hall
 
 pytestmark = [pytest.mark.compiled]
@@ -138,7 +138,7 @@ def test_a_stuck_sensor_is_masked_and_said_to_be(measured: Callable[[str], None]
 def test_a_failing_sensor_is_reported_and_one_that_is_not_to_fire_is_not(measured: Callable[[str], None]) -> None:
     world, path = random_hall(0, NOISY)
     for sensor in range(24):
-        got = found(RING, firings(RING, world, path[: FAILURES + 1], {sensor: FAULTY}))
+        got = found(RING, firings(RING, world, path[: MISSED_FIRINGS_MAX + 1], {sensor: FAULTY}))
         assert set(got) == {(sensor, "failing")}
     sparse = ring(sets=(tuple(range(0, 24, 2)), tuple(range(0, 24, 3))))
     assert found(sparse, firings(sparse, world, path)) == {}
@@ -150,7 +150,7 @@ def test_a_failing_sensor_is_reported_and_one_that_is_not_to_fire_is_not(measure
     for firing in firings(RING, world, path[:6]):
         watch.filter(firing)
     assert watch.reports() == ()
-    measured(f"24 sensors that always fail: 24 reported after {FAILURES} firings")
+    measured(f"24 sensors that always fail: 24 reported after {MISSED_FIRINGS_MAX} firings")
 
 
 @promise
@@ -173,7 +173,9 @@ def test_a_sensor_that_never_hears_keeps_its_silence_to_itself_until_it_hears(
         if watch.reports() and not np.isnan(firing.ranges_m[0]):
             assert np.isnan(believed.ranges_m[0])
             break
-    echo = Firing(firing.robot_s + 0.15, firing.pose, firing.ring_yaw, np.where(np.isnan(firing.ranges_m), np.nan, 2.0))
+    echo = Firing(
+        firing.robot_s + 0.15, firing.pose, firing.ring_yaw, np.where(np.isnan(firing.ranges_m), np.nan, 2.0)
+    )
     believed, _ = watch.filter(echo)
     assert believed.ranges_m[0] == 2.0
     assert watch.reports() == ()
@@ -191,7 +193,7 @@ def test_a_stuck_sensor_comes_back_when_it_behaves() -> None:
         believed, _ = watch.filter(firing)
         masked += bool(np.isnan(believed.ranges_m[7]) and not np.isnan(firing.ranges_m[7]))
     assert watch.reports() == ()
-    assert masked <= 3 * RETURNS
+    assert masked <= 3 * RECOVERY_READINGS
 
 
 def crosstalk(config: RingConfig, halls: range) -> tuple[int, int, int, int]:

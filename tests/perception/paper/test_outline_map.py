@@ -1,4 +1,4 @@
-"""The outline map under a person's hands, against an oracle that keeps segments in a list."""
+"""The outline map under ageing, contradiction and edits, against oracles: a list of segments, and tests/naive.py."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import pytest
 
 from config.settings import MapConfig
 from drivers.messages import Firing, Pose
 from perception.edits import PinSegments
-from perception.paper.outline_map import OutlineMap
+from perception.paper.outline_map import OutlineMap, erase_contradicted
 from perception.paper.paper_method import PaperPerception
+from tests import naive
 from tests.perception.halls import settings
+from tests.perception.random_outlines import as_segments, random_segments
 
 CAPACITY = 16
 MOUNTS = np.array([[0.0, 0.0, 0.0]])
@@ -21,6 +22,8 @@ MOUNTS = np.array([[0.0, 0.0, 0.0]])
 
 @dataclass
 class Segment:
+    """The oracle's segment."""
+
     number: int
     t: float
     x: float
@@ -32,15 +35,16 @@ def outline_map(age_max_s: float = 10.0) -> OutlineMap:
 
 
 def row(x: float) -> np.ndarray:
-    """A segment that a sensor in the origin looks at squarely, x ahead."""
+    """Return a segment at distance x that a sensor in the origin faces squarely."""
     return np.array([[x, -0.5, x, 0.5, 0.0]])
 
 
-def told(outline: OutlineMap) -> list[tuple[int, float, float, int]]:
-    listed = outline.listed()
+def listed(outline: OutlineMap) -> list[tuple[int, float, float, int]]:
+    """Return number, time, x and pin of each segment, in order of numbers."""
+    present = outline.listed()
     return sorted(
         (int(n), float(t), float(e[0]), int(p))
-        for n, e, t, p in zip(listed.numbers, listed.geometry, listed.times, listed.pinned, strict=True)
+        for n, e, t, p in zip(present.numbers, present.geometry, present.times, present.pinned, strict=True)
     )
 
 
@@ -76,48 +80,48 @@ def test_any_order_of_adding_ageing_deleting_and_pinning_equals_its_oracle() -> 
                     assert refused == some - set(known)
                     for s in kept:
                         s.pinned = pinned if s.number in some else s.pinned
-            # Room that deleted ones left is used only once it has come to the tail: the map may forget earlier.
+            # A deleted segment's slot is reused only when it reaches the tail, so the map may drop others earlier.
             want = sorted((s.number, s.t, s.x, int(s.pinned)) for s in kept)
-            have = told(outline)
+            have = listed(outline)
             assert [w for w in want if w in have] == have
-            assert [w for w in want if w[3]] == [h for h in have if h[3]], "what is pinned is there"
+            assert [w for w in want if w[3]] == [h for h in have if h[3]], "pinned segments are present"
             assert outline.pinned == sum(w[3] for w in want)
             kept = [s for s in kept if (s.number, s.t, s.x, int(s.pinned)) in have]
 
 
-def test_what_is_pinned_does_not_age_and_is_not_pushed_out_and_what_is_let_go_does() -> None:
+def test_pinned_segments_neither_age_nor_make_room_and_unpinned_ones_do() -> None:
     outline = outline_map()
     for k in range(4):
         outline.add(row(1.0 + k), 0.1 * k)
     assert outline.pin([2, 3], pinned=True) == set()
     assert outline.age(100.0)
-    assert [number for number, *_ in told(outline)] == [2, 3]
-    assert not outline.age(200.0), "nothing but pinned ones: none is passed round"
+    assert [number for number, *_ in listed(outline)] == [2, 3]
+    assert not outline.age(200.0), "with pinned segments only, no slot changes"
     for k in range(3 * CAPACITY):
         outline.add(row(20.0), 200.0 + 0.01 * k)
-    listed = told(outline)
-    assert len(listed) == CAPACITY
-    assert [number for number, *_ in listed][:2] == [2, 3]
-    assert listed[0] == (2, 0.1, 2.0, 1), "it stays what it was"
+    rows = listed(outline)
+    assert len(rows) == CAPACITY
+    assert [number for number, *_ in rows][:2] == [2, 3]
+    assert rows[0] == (2, 0.1, 2.0, 1), "a pinned segment keeps its values"
     assert outline.pin([3], pinned=False) == set()
     outline.age(201.0)
-    assert [number for number, *_ in told(outline)][:1] == [2]
-    assert 3 not in [number for number, *_ in told(outline)], "let go, it is as old as it is"
+    assert [number for number, *_ in listed(outline)][:1] == [2]
+    assert 3 not in [number for number, *_ in listed(outline)], "an unpinned segment leaves by its age"
     outline.clear()
-    assert (told(outline), outline.pinned) == ([], 0)
+    assert (listed(outline), outline.pinned) == ([], 0)
 
 
-def test_what_is_pinned_is_not_contradicted() -> None:
+def test_pinned_segments_are_not_contradicted() -> None:
     outline = outline_map()
     outline.add(row(1.0), 0.0)
     outline.add(row(2.0), 0.0)
     outline.pin([1], pinned=True)
     firing = Firing(1.0, Pose(0.0, 0.0, 0.0), 0.0, np.array([5.0]))
-    assert outline.contradict(firing) == 1
-    assert [number for number, *_ in told(outline)] == [1]
+    assert outline.remove_contradicted(firing) == 1
+    assert [number for number, *_ in listed(outline)] == [1]
     outline.pin([1], pinned=False)
-    assert outline.contradict(firing) == 1
-    assert told(outline) == []
+    assert outline.remove_contradicted(firing) == 1
+    assert listed(outline) == []
 
 
 def test_half_the_map_may_be_pinned() -> None:
@@ -127,32 +131,46 @@ def test_half_the_map_may_be_pinned() -> None:
     assert outline.pin(range(1, CAPACITY // 2 + 2), pinned=True) is None
     assert outline.pinned == 0
     assert outline.pin(range(1, CAPACITY // 2 + 1), pinned=True) == set()
-    assert outline.pin(range(1, CAPACITY // 2 + 1), pinned=True) == set(), "again is no more"
+    assert outline.pin(range(1, CAPACITY // 2 + 1), pinned=True) == set(), "pinning again adds nothing"
     assert outline.pin([CAPACITY], pinned=True) is None
     assert outline.delete([1]) == set()
     assert outline.pin([CAPACITY], pinned=True) == set()
 
 
-@pytest.mark.parametrize("lost", [0, 5])
-def test_a_recording_without_numbers_gets_them(lost: int) -> None:
-    outline = outline_map()
-    for k in range(CAPACITY + lost):
-        outline.add(row(1.0), 0.1 * k)
-    before = outline.numbers.copy()
-    outline.restored()
-    np.testing.assert_array_equal(outline.numbers, before)
-    outline.numbers[:] = 0
-    outline.restored()
-    np.testing.assert_array_equal(outline.numbers, before)
-    assert math.isfinite(outline.times.max())
+def test_contradiction_equals_its_oracle() -> None:
+    rng = np.random.default_rng(8)
+    erased = 0
+    for _ in range(2_000):
+        capacity, start, count = 30, int(rng.integers(30)), int(rng.integers(31))
+        rows = random_segments(rng, capacity, 2.0)
+        rows[rng.integers(capacity), 2:4] = rows[0, 0:2]
+        status = (rng.uniform(size=capacity) < 0.8).astype(np.int64)
+        mounts = np.column_stack([rng.uniform(-0.4, 0.4, (8, 2)), rng.uniform(-math.pi, math.pi, 8)])
+        x, y, yaw = (float(v) for v in rng.uniform(-2, 2, 3))
+        ranges = rng.uniform(0.2, 4.0, 8)
+        ranges[0], ranges[1] = math.nan, math.inf
+        turn = complex(math.cos(yaw), math.sin(yaw))
+        readings = [
+            naive.Reading((p := complex(x, y) + complex(m[0], m[1]) * turn).real, p.imag, yaw + m[2], r, 0.0)
+            for m, r in zip(mounts, ranges, strict=True)
+        ]
+        used = {(start + k) % capacity for k in range(count)}
+        expected = status.copy()
+        for i, segment in enumerate(as_segments(rows)):
+            if i in used and any(naive.contradicted(segment, r, 0.4, 0.2) for r in readings):
+                expected[i] = 0
+        n = erase_contradicted(rows, status, start, count, ranges, mounts, x, y, yaw, 0.4, 0.2)
+        np.testing.assert_array_equal(status, expected)
+        erased += n
+    assert erased > 500
 
 
-def test_the_papers_method_says_that_no_more_can_be_pinned() -> None:
+def test_the_papers_method_refuses_to_pin_more_than_half_of_the_map() -> None:
     chosen = settings(map=MapConfig(capacity=CAPACITY))
     perception = PaperPerception(chosen.ring, chosen.models, chosen.perception)
     for k in range(CAPACITY):
         perception.outline.add(row(1.0), 0.1 * k)
     refused = perception.edit(PinSegments(tuple(range(1, CAPACITY)), pinned=True))
     assert refused is not None
-    assert "half the map" in refused
+    assert "half of the map" in refused
     assert perception.segments().pinned.sum() == 0

@@ -63,8 +63,8 @@ def paper(state: State) -> PaperPerception:
 def left_behind(state: State) -> object:
     perception = paper(state)
     arrays = [
-        perception.outline.segments, perception.outline.times, perception.outline.alive,
-        perception.candidates.poses, perception.candidates.rested, perception.clusters.centres,
+        perception.outline.segments, perception.outline.times, perception.outline.status,
+        perception.candidates.rows["pose"], perception.candidates.rows["has_rested"], perception.clusters.centres,
     ]  # fmt: skip
     return bits([*arrays, perception.objects(), state.mode, state.leg, state.odometry, state.last_firing_robot_s])
 
@@ -162,7 +162,7 @@ def test_refinement_of_one_cycle_resumes_where_the_last_one_stood(drive: Drive) 
         assert total > 20
         assert (cycles == 1) == (quanta == 10_000)
         perception = paper(state)
-        rested.append((total, bits(perception.candidates.poses), bits(perception.objects())))
+        rested.append((total, bits(perception.candidates.rows["pose"]), bits(perception.objects())))
     assert rested[0] == rested[1] == rested[2]
     assert len(rested[0][2]) > 0  # type: ignore[arg-type]
 
