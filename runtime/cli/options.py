@@ -1,4 +1,4 @@
-"""Options that several commands have, and how they are read."""
+"""Options that several commands share, and how they are parsed."""
 
 from __future__ import annotations
 
@@ -12,29 +12,41 @@ Sets = Annotated[
     Parameter(
         name="--set",
         negative="",
+        show_default=False,
         allow_leading_hyphen=False,
-        help="Override one setting, as in ring.firing=quadrants.",
+        help="Override a setting, e.g. ring.firing=quadrants; may be repeated.",
     ),
 ]
-JsonFile = Annotated[str | None, Parameter(name="--json", help="Write the summary to this file.")]
-UnitsOption = Annotated[Literal["m", "ft"], Parameter(help="Units of what is printed.")]
-Flag = Parameter(negative="")
+JsonFile = Annotated[str | None, Parameter(name="--json", help="Write a summary to this file (JSON).")]
+UnitsOption = Annotated[Literal["m", "ft"], Parameter(help="Units of the printed tables.")]
+Flag = Parameter(negative="", show_default=False)
 Several = Parameter(negative="", consume_multiple=True)
-"""`--option a b c`, as well as the option again and again."""
+"""Allows `--option a b c` besides repeating the option."""
 ConfigFile = Annotated[str | None, Parameter(help="Run file, or the name of a shipped one.")]
 RobotFile = Annotated[str | None, Parameter(help="Robot file, or the name of a shipped one.")]
+WorldFile = Annotated[str | None, Parameter(help="World file, or the name of a shipped one.")]
 ModelFiles = Annotated[
     tuple[str, ...],
-    Parameter(negative="", help="Object model to look for: a file or a name; may be repeated."),
+    Parameter(
+        negative="",
+        show_default=False,
+        help="Object model to look for: file, or the name of a shipped one; may be repeated.",
+    ),
 ]
 
 
-def whole(_type: type, tokens: Sequence[Token]) -> int:
-    """Return a whole number, none below zero; left alone, cyclopts takes 1.5 for 1."""
+def parse_whole_number(_type: type, tokens: Sequence[Token]) -> int:
+    """Return a whole number ≥ 0; without this converter, cyclopts takes 1.5 for 1.
+
+    Raises
+    ------
+    ValueError
+        The text is not a whole number.
+    """
     text = tokens[0].value
     if not (text.isascii() and text.isdigit()):
         raise ValueError(f"{text!r} must be a whole number, 0 or above.")
     return int(text)
 
 
-Seed = Annotated[int, Parameter(converter=whole)]
+Count = Annotated[int, Parameter(converter=parse_whole_number)]

@@ -62,8 +62,8 @@ def spread_line(spread: Spread, units: Units) -> str:
     return (
         f"{spread['seeds']} seeds: mean error {format_length(spread['mean'], units, 4)} ± "
         f"{format_length(spread['deviation'], units, 4)} {units} from seed to seed; worst single error "
-        f"{format_length(spread['worst'], units, 4)} {units} (seed {spread['worst_seed']}); {spread['missed']} drums not "
-        f"found, at most {spread['missed_most']} by one seed; {spread['false']} false"
+        f"{format_length(spread['worst'], units, 4)} {units} (seed {spread['worst_seed']}); {spread['missed']} drums "
+        f"not found, at most {spread['missed_most']} by one seed; {spread['false']} false"
     )
 
 

@@ -58,7 +58,7 @@ class RecordingRow(TypedDict):
     files: int
     bytes: int
     dropped: int
-    trouble: str | None
+    last_error: str | None
     sync_max_s: float
 
 
@@ -66,7 +66,7 @@ class LogRow(TypedDict):
     """Lines of the log that are missing in its file, and why."""
 
     lost: int
-    trouble: str | None
+    last_error: str | None
 
 
 class RunSummary(TypedDict):

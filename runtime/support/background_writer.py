@@ -53,7 +53,7 @@ class BackgroundWriter(Generic[Item]):
 
     Attributes
     ----------
-    trouble : str or None
+    last_error : str or None
         Why items were lost, the last time.
     is_stuck : bool
         Whether the thread was still writing when the writer was closed.
@@ -87,7 +87,7 @@ class BackgroundWriter(Generic[Item]):
         # Each is counted by one thread only.
         self._refused = self._unwritten = self._left = 0
         self._gap_written = 0
-        self.trouble: str | None = None
+        self.last_error: str | None = None
         self.is_stuck = False
 
     @property
@@ -117,7 +117,7 @@ class BackgroundWriter(Generic[Item]):
         """
         if self.is_full and not always:
             self._refused += 1
-            self.trouble = "items come faster than they can be written"
+            self.last_error = "items come faster than they can be written"
             return False
         self._queue.append(item)
         if self._poll_s is None:
@@ -141,9 +141,9 @@ class BackgroundWriter(Generic[Item]):
         if self._worker.is_alive():
             # The thread still holds the item it writes, and the file: nothing may be closed under it.
             self.is_stuck = True
-            self.trouble = f"the last items were not written within {self._close_max_s:.0f} s"
+            self.last_error = f"the last items were not written within {self._close_max_s:.0f} s"
         elif self.failure is not None:
-            self.trouble = f"its thread failed: {self.failure}"
+            self.last_error = f"its thread failed: {self.failure}"
 
     def __enter__(self) -> BackgroundWriter[Item]:
         self.start()
@@ -181,4 +181,4 @@ class BackgroundWriter(Generic[Item]):
             self._write(item)
         except (OSError, ValueError) as error:
             self._unwritten += 1
-            self.trouble = getattr(error, "strerror", None) or str(error)
+            self.last_error = getattr(error, "strerror", None) or str(error)

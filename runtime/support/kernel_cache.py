@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, Final
 
 from platformdirs import user_cache_path
 
+from runtime.support.progress import progress
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -139,7 +141,7 @@ def prepare_kernels(settings: Settings, console: Console, parts: Iterable[str] |
     if not uncompiled:
         warm_up(settings, (part for part in parts if part != EMULATOR))
         return
-    with console.status("compiling kernels; this happens once"):
+    with progress(console, "compiling kernels; this happens once"):
         compile_parts(settings, folder, uncompiled)
         warm_up(settings, (part for part in parts if part not in {*uncompiled, EMULATOR}))
 

@@ -50,9 +50,9 @@ class LogStatus:
         return 0 if self.file is None else self.file.lost
 
     @property
-    def trouble(self) -> str | None:
+    def last_error(self) -> str | None:
         """Why lines are missing in the file, the last time; None if none are."""
-        return None if self.file is None else self.file.trouble
+        return None if self.file is None else self.file.last_error
 
     def probe(self) -> str | None:
         """Return how one of the writers' threads ended; None while they run. See `runtime.support.health`."""
@@ -72,7 +72,7 @@ class _LineOutput:
 
     def __call__(self, logger: object, name: str, event: MutableMapping[str, Any]) -> Mapping[str, Any]:
         settings = event.pop("settings", None)
-        self._report_trouble(logger, event)
+        self._report_error(logger, event)
         if self._status.file is not None:
             if settings is not None:
                 self._status.file.put(_json({"event": "settings", "settings": settings}))
@@ -80,12 +80,12 @@ class _LineOutput:
         self._show(logger, name, event)
         raise structlog.DropEvent
 
-    def _report_trouble(self, logger: object, event: Mapping[str, Any]) -> None:
-        """Warn once of each trouble with the file on the terminal and to the listeners."""
-        trouble = self._status.trouble
-        if trouble != self._reported:
-            self._reported = trouble
-            warning = {"event": "log lines are missing in the file", "reason": trouble, "lost": self._status.lost}
+    def _report_error(self, logger: object, event: Mapping[str, Any]) -> None:
+        """Warn once of each error of the file, on the terminal and to the listeners."""
+        error = self._status.last_error
+        if error != self._reported:
+            self._reported = error
+            warning = {"event": "log lines are missing in the file", "reason": error, "lost": self._status.lost}
             self._show(logger, "warning", {**warning, "level": "warning", "timestamp": event.get("timestamp")})
 
     def _show(self, logger: object, name: str, event: Mapping[str, Any]) -> None:

@@ -32,7 +32,7 @@ class SdNotifier:
     ----------
     lost
         Messages that the manager did not take.
-    trouble
+    last_error
         Why, the last time.
     """
 
@@ -43,7 +43,7 @@ class SdNotifier:
         self._is_ready = False
         self._status: str | None = None
         self.lost = 0
-        self.trouble: str | None = None
+        self.last_error: str | None = None
         self._socket: socket.socket | None = None
         if self._address:
             self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
@@ -92,7 +92,7 @@ class SdNotifier:
         except OSError as error:
             # A manager that is busy or restarts; it asks for nothing but the next sign of life.
             self.lost += 1
-            self.trouble = error.strerror or str(error)
+            self.last_error = error.strerror or str(error)
 
     def __enter__(self) -> SdNotifier:
         return self

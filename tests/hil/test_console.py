@@ -19,7 +19,7 @@ from config.settings import LogConfig
 from drivers.denning.codec import Decoder
 from drivers.denning.frames import Halt
 from drivers.driver import RobotDriver
-from runtime.cli.commands.run import on_port
+from runtime.cli.commands.run import with_port
 from runtime.console.console import Console
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
@@ -243,7 +243,7 @@ async def test_halt_from_a_page_in_time(tmp_path: Path, measured: Callable[[str]
     async with start_emulator([]) as (port, _control):
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
             process = operator.process = RobotProcess(
-                on_port(settings, port), log, Observers(on_cycle, on_bytes=on_bytes)
+                with_port(settings, port), log, Observers(on_cycle, on_bytes=on_bytes)
             )
             console = Console(process, log, KernelLoader(log), emulated=True)
             async with console.open():

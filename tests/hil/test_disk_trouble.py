@@ -73,7 +73,7 @@ def test_a_full_disk_under_the_log_and_the_recording(tmp_path: Path, measured: C
         written, figures = compare(run, summary, tmp_path, FAILED)
     assert written["recording"]["dropped"] > 0
     assert written["log"]["lost"] >= 4
-    assert "No space left" in written["log"]["trouble"]
+    assert "No space left" in written["log"]["last_error"]
     assert "log lines are missing in the file" in run.err, "where lines still arrive"
     assert f"{written['log']['lost']} lines of the log are missing: No space left" in " ".join(run.out.split())
     (error,) = run.error_lines
@@ -90,8 +90,8 @@ def test_a_disk_that_fills_up_on_the_way(tmp_path: Path, measured: Callable[[str
     with run_with(tmp_path, "run", "", *where, limit="ulimit -f 32") as (run, summary):
         written, figures = compare(run, summary, tmp_path)
     assert written["recording"]["dropped"] > 0
-    assert written["recording"]["trouble"] is not None
-    assert "the recording has trouble" in (tmp_path / "run.jsonl").read_text("utf-8")
+    assert written["recording"]["last_error"] is not None
+    assert "the recording is incomplete" in (tmp_path / "run.jsonl").read_text("utf-8")
     measured(f"full after 16 KiB: {figures}; {written['recording']['dropped']} messages lost and reported")
 
 
@@ -102,7 +102,7 @@ def test_a_folder_where_nothing_can_be_written(tmp_path: Path, measured: Callabl
     with run_with(tmp_path, "run", "", *where) as (run, summary):
         written, figures = compare(run, summary, tmp_path)
     assert written["recording"]["dropped"] > 0
-    assert str(tmp_path / "file") in written["recording"]["trouble"]
+    assert str(tmp_path / "file") in written["recording"]["last_error"]
     measured(f"no folder to write in: {figures}; {written['recording']['dropped']} messages lost and reported")
 
 
@@ -132,7 +132,7 @@ def test_a_log_and_a_terminal_that_take_nothing(tmp_path: Path, measured: Callab
         with run_with(tmp_path, "run", "", "--no-record", log=fifo, stderr=into) as (run, summary):
             written, figures = compare(run, summary, tmp_path)
             assert written["log"]["lost"] >= 3
-            assert "the last items were not written" in written["log"]["trouble"]
+            assert "the last items were not written" in written["log"]["last_error"]
     finally:
         for fd in (held, out, into):
             os.close(fd)

@@ -9,7 +9,7 @@ import pytest
 from config.load import load_settings
 from config.settings import LogConfig
 from drivers.driver import RobotDriver
-from runtime.cli.commands.run import on_port
+from runtime.cli.commands.run import with_port
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
 from runtime.simulation.emulator_process import start_emulator
@@ -30,7 +30,7 @@ async def test_a_cycle_that_fails_halts_the_base_and_ends_in_fault(tmp_path: Pat
     trace = tmp_path / "trace.csv"
     async with start_emulator(["--trace", str(trace)]) as (port, _):
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
-            process = RobotProcess(on_port(load_settings("hallway"), port), log, Observers(on_cycle=fail))
+            process = RobotProcess(with_port(load_settings("hallway"), port), log, Observers(on_cycle=fail))
             summary = await process.run(arm=True, seconds=TIMEOUT_S)
     assert summary["mode"] == "FAULT"
     assert summary["cycles"] == 39

@@ -19,7 +19,7 @@ from drivers.denning.codec import Decoder
 from drivers.denning.frames import Halt
 from drivers.driver import RobotDriver
 from drivers.messages import Flags
-from runtime.cli.commands.run import on_port
+from runtime.cli.commands.run import with_port
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess
@@ -119,7 +119,7 @@ async def halts(folder: Path, monkeypatch: pytest.MonkeyPatch, trials: int) -> O
         async with start_emulator(["--trace", str(trace)]) as (port, _):
             with open_log(LogConfig(file=str(folder / "log.jsonl")), terminal=False) as log:
                 process = operator.process = RobotProcess(
-                    on_port(settings, port), log, Observers(on_cycle, on_bytes=on_bytes)
+                    with_port(settings, port), log, Observers(on_cycle, on_bytes=on_bytes)
                 )
                 asking = threading.Thread(target=operator.work)
                 asking.start()

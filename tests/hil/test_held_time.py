@@ -17,7 +17,7 @@ from config.load import load_settings
 from config.settings import LogConfig
 from drivers.driver import RobotDriver
 from drivers.messages import Flags
-from runtime.cli.commands.run import on_port
+from runtime.cli.commands.run import with_port
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess
@@ -65,7 +65,7 @@ async def run(folder: Path, act: Act) -> tuple[RunSummary, list[CycleRecord], Pa
                 records.append(record)
                 recorder.on_cycle(record, state)
 
-            process = RobotProcess(on_port(SETTINGS, port), log, Observers(on_cycle), clock)
+            process = RobotProcess(with_port(SETTINGS, port), log, Observers(on_cycle), clock)
             running = asyncio.create_task(process.run(arm=True, seconds=None))
             try:
                 await until(lambda: len(records) >= 20 and records[-1].mode.mode is Mode.DRIVE)

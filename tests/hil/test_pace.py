@@ -18,7 +18,7 @@ import pytest
 from config.load import load_settings
 from config.settings import LogConfig
 from drivers.driver import RobotDriver
-from runtime.cli.commands.run import on_port
+from runtime.cli.commands.run import with_port
 from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
@@ -124,7 +124,7 @@ async def test_an_echo_waits_for_no_timer(tmp_path: Path) -> None:
         line = stack.enter_context(control_line(control_s))
         await stack.enter_async_context(program(CONTROL, line))
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
-            process = RobotProcess(on_port(SETTINGS, port), log, Observers(on_cycle=note))
+            process = RobotProcess(with_port(SETTINGS, port), log, Observers(on_cycle=note))
             summary = await process.run(arm=True, seconds=TIMEOUT_S)
     written = {int(t_us): float(at_s) for t_us, at_s in map(str.split, log_path.read_text().splitlines())}
     # The emulator is ended in the middle of whatever it does: the last echoes may not be in its log.
@@ -158,7 +158,7 @@ async def test_overruns_in_a_row_end_in_a_safe_stop_that_names_the_callback(tmp_
     settings = load_settings("hallway", ["cycle.overruns_max=5"])
     async with start_emulator([]) as (port, _):
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
-            process = RobotProcess(on_port(settings, port), log, Observers(on_cycle=plant))
+            process = RobotProcess(with_port(settings, port), log, Observers(on_cycle=plant))
             summary = await process.run(arm=True, seconds=TIMEOUT_S)
     assert summary["mode"] == "SAFE_STOP"
     (reason,) = summary["stop_reasons"]

@@ -60,7 +60,7 @@ def check(folder: Path, seconds: float, replays: int, *more: str) -> str:
     """Record a run and replay it whole and from some of its keyframes; return the figures."""
     summary = record(folder, seconds, *more)
     kept = summary["recording"]
-    assert (kept["dropped"], kept["trouble"], kept["files"]) == (0, None, 1)
+    assert (kept["dropped"], kept["last_error"], kept["files"]) == (0, None, 1)
     path = folder / "hall.mcap"
     assert kept["bytes"] == path.stat().st_size
     result = verify(path)
@@ -192,7 +192,7 @@ def test_a_folder_that_cannot_be_written_stops_nothing(tmp_path: Path) -> None:
         assert run.end() == 0
     assert run.error_lines == []
     events = [json.loads(line) for line in (tmp_path / "run.jsonl").read_text("utf-8").splitlines()]
-    (warning,) = [event for event in events if event["event"] == "the recording has trouble"]
+    (warning,) = [event for event in events if event["event"] == "the recording is incomplete"]
     assert str(tmp_path / "file") in warning["reason"]
 
 

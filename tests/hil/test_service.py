@@ -19,7 +19,7 @@ from pathlib import Path
 import pytest
 
 from config.errors import WRONG_CALL
-from runtime.cli.commands.service import quoted
+from runtime.cli.commands.service import quote_for_systemd
 from runtime.support.sd_notify import STATUS_MAX, SdNotifier
 from tests.hil.planted import SHORT_S, planted
 from tests.hil.running import ROOT, emulated, wait_for
@@ -121,7 +121,7 @@ def test_missing_or_blocked_manager_does_not_block_the_run(tmp_path: Path) -> No
     with SdNotifier.from_environment(environment) as notifier:
         notifier.alive(0.0)
         assert notifier.lost == 2, "READY and WATCHDOG"
-        assert notifier.trouble is not None
+        assert notifier.last_error is not None
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as ears:
             ears.bind(path)
             for k in range(10_000):
@@ -204,4 +204,4 @@ def test_a_service_without_a_port_is_a_wrong_call() -> None:
      ("a\\b", '"a\\\\b"'), ("", '""')],
 )  # fmt: skip
 def test_words_of_a_command_line(word: str, unit: str) -> None:
-    assert quoted(word) == unit
+    assert quote_for_systemd(word) == unit

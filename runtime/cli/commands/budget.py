@@ -1,4 +1,4 @@
-"""`echolocate experiment budget`: what less time for perception costs, in a hall of forty drums."""
+"""`echolocate experiment budget`: what smaller time budgets for perception cost, in a hall of forty drums."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import track
 
 from config.errors import DONE, WRONG_CALL, UserError
 from config.load import load_settings
 from runtime.support.kernel_cache import prepare_kernels
+from runtime.support.progress import progress
 
 if TYPE_CHECKING:
     from runtime.support.length_format import Units
@@ -29,9 +29,18 @@ def run_budgets(
     json_file: str | None,
     units: Units,
 ) -> int:
-    """Carry out the command; see `runtime.cli.app.experiment`."""
-    if seeds < 1:
-        raise UserError(f"--seeds {seeds}: must be at least 1", WRONG_CALL)
+    """Drive through the hall under each budget, print a table and return the exit code.
+
+    Parameters
+    ----------
+    sets, budgets_ms, quanta, models, seeds, json_file, units
+        As of `runtime.cli.experiment_commands.experiment`.
+
+    Raises
+    ------
+    UserError
+        A budget is not a number ≥ 0.
+    """
     if not all(0.0 <= budget < math.inf for budget in (*budgets_ms, *quanta)):
         raise UserError("--budget-ms, --quanta: must be 0 or above", WRONG_CALL)
     settings = load_settings("irregular", sets, models=models)
@@ -43,15 +52,19 @@ def run_budgets(
     from runtime.timing.refinement_budget import CpuTimeBudget, QuantumBudget
 
     settings = long_hall_settings(settings)
-    makers: list[tuple[float, Callable[[], RefinementBudget]]] = (
+    budgets: list[tuple[float, Callable[[], RefinementBudget]]] = (
         [(most, partial(QuantumBudget, most)) for most in quanta]
         or [(most, partial(CpuTimeBudget, 1e-3 * most)) for most in budgets_ms]
     )  # fmt: skip
-    # The first drive pays for what is allocated and loaded at first need.
+    # The first drive pays for what is allocated and loaded on first use.
     drive(settings, 0, lambda: QuantumBudget(1), (0,))
-    runs = track(makers, "driving", console=console, transient=True, disable=not console.is_terminal)
-    rows = [drive(settings, budget, maker, range(seeds)) for budget, maker in runs]
+    rows = []
+    with progress(console, "driving", len(budgets)) as step:
+        for budget, make_budget in budgets:
+            rows.append(drive(settings, budget, make_budget, range(seeds)))
+            step()
+    unit = "quanta" if quanta else "ms"
     if json_file is not None:
-        write_json(json_file, {"unit": "quanta" if quanta else "ms", "budgets": rows})
-    Console().print(budget_table(rows, "quanta" if quanta else "ms", units))
+        write_json(json_file, {"unit": unit, "budgets": rows})
+    Console().print(budget_table(rows, unit, units))
     return DONE

@@ -1,4 +1,4 @@
-"""`echolocate emulate`: the robot's side alone, on a pseudo-terminal."""
+"""`echolocate emulate`: a robot on a pseudo-terminal."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from config.errors import DONE, WRONG_CALL, UserError
 from config.load import load_settings
 
 PIPES: Final = (0, 1)
-"""Standard input and output: what a program that started this one holds the other ends of."""
+"""Standard input and output, for the program that started this one."""
 CLOCK_WRAP_S: Final = 2**32 * 1e-6
-"""The robot counts microseconds in 32 bits."""
+"""The robot's counter has 32 bits of microseconds."""
 
 
 def emulate_robot(
@@ -31,13 +31,26 @@ def emulate_robot(
     end_with_parent: bool,
     control: bool,
 ) -> int:
-    """Carry out the command; see `runtime.cli.app.emulate`."""
+    """Emulate a robot until interrupted and return the exit code.
+
+    Parameters
+    ----------
+    config, sets, world, robot, link, faults, seed, trace, latency, clock_s, control
+        As of `runtime.cli.robot_commands.emulate`.
+    end_with_parent : bool
+        Whether it ends when the process that started it ends.
+
+    Raises
+    ------
+    UserError
+        There is no world, an option is wrong, or a file cannot be written.
+    """
     settings = load_settings(config, sets, world=world, robot=robot)
     from drivers.emulator.faults import load_faults
     from drivers.emulator.pty_transport import serve
 
     if settings.world is None:
-        raise UserError("no world is given: name one with --world", WRONG_CALL)
+        raise UserError("no world: name one with --world", WRONG_CALL)
     if not 0.0 <= clock_s < CLOCK_WRAP_S:
         raise UserError(f"--clock {clock_s:g}: must be from 0 to below {CLOCK_WRAP_S} s, where it wraps", WRONG_CALL)
     script = () if faults is None else load_faults(faults)

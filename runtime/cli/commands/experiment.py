@@ -7,26 +7,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from rich.console import Console
-from rich.progress import track
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings
 from config.settings import Settings
-from runtime.cli.commands.firing_check import refuse_impossible_firing
-from runtime.cli.commands.offline_io import folder, read
+from drivers.registry import make_driver
+from runtime.cli.commands.offline_io import make_output_folder, plain_console, read_timeline
 from runtime.cli.tables import boxes_table, outcome_line, scene_line, spread_line, table_2
 from runtime.simulation.scene_names import SceneName
 from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.length_format import Units
+from runtime.support.progress import progress
 
 if TYPE_CHECKING:
     from runtime.simulation.evaluation import SeedOutcome
 
 QUEUE_MAX: Final = 1_000_000
-"""Virtual time waits for no disk: everything may wait in memory."""
-SEEDS_SHOWN = 2
-ROWS_SHOWN = 24
-"""Tables of more runs or rows than this say nothing to a person."""
+"""Items that may wait to be recorded: virtual time runs faster than any disk writes."""
+SEEDS_SHOWN: Final = 2
+"""With more seeds, only the summary is printed."""
+ROWS_SHOWN: Final = 24
+"""Longer tables are not printed."""
 
 
 def run_experiment(
@@ -40,47 +41,66 @@ def run_experiment(
     json_file: str | None,
     units: Units,
 ) -> int:
-    """Carry out the command; see `runtime.cli.app.experiment`."""
-    _refuse_no_seeds(seeds)
-    settings = one_way(load_settings(name, sets, world=world, models=models))
-    if settings.world is None or not settings.world.drum:
-        raise UserError("the world holds no drum: the experiment sets drums seen against drums there", WRONG_CALL)
-    refuse_impossible_firing(settings)
-    console = Console(stderr=True)
-    prepare_kernels(settings, console)
-    from runtime.cycle.summary import write_json
-    from runtime.simulation.evaluation import run_seed, summarise
+    """Drive through the experiment's hall once per seed, print the outcome and return the exit code.
 
-    place = None if out is None else folder(out)
-    told = Console(soft_wrap=True, highlight=False)
-    runs = track(range(seeds), "driving", console=console, transient=True, disable=not console.is_terminal)
-    outcomes = []
-    for seed in runs:
-        if seed == 0 and place is not None:
-            outcomes.append(recorded(settings, seed, place / f"{name}.mcap"))
-        else:
-            outcomes.append(run_seed(settings, settings.world, seed))
-    outcome = summarise(outcomes)
-    if json_file is not None:
-        write_json(json_file, outcome)
-    if seeds <= SEEDS_SHOWN:
-        told.print(table_2(outcome, units))
-    told.print(outcome_line(outcome, units))
-    if "spread" in outcome:
-        told.print(spread_line(outcome["spread"], units))
-    if place is not None:
-        for path in shown(place, name, console, units):
-            told.print(str(path))
-    return DONE
-
-
-def recorded(settings: Settings, seed: int, path: Path) -> SeedOutcome:
-    """Run the experiment once and record it.
+    Parameters
+    ----------
+    name, sets, world, models, seeds, out, json_file, units
+        As of `runtime.cli.experiment_commands.experiment`.
 
     Raises
     ------
     UserError
-        As `run_seed`, or the file cannot be written.
+        The settings do not describe an experiment, or a file cannot be written.
+    """
+    settings = stop_at_leg_end(load_settings(name, sets, world=world, models=models))
+    if settings.world is None or not settings.world.drum:
+        raise UserError("the world has no drum: the experiment compares what is recognised with drums", WRONG_CALL)
+    make_driver(settings)  # refuses what the robot cannot carry out
+    console, output = Console(stderr=True), plain_console()
+    prepare_kernels(settings, console)
+    from runtime.cycle.summary import write_json
+    from runtime.simulation.evaluation import run_seed, summarise
+
+    folder = None if out is None else make_output_folder(out)
+    outcomes = []
+    with progress(console, "driving", seeds) as step:
+        for seed in range(seeds):
+            if seed == 0 and folder is not None:
+                outcomes.append(record_seed(settings, seed, folder / f"{name}.mcap"))
+            else:
+                outcomes.append(run_seed(settings, settings.world, seed))
+            step()
+    outcome = summarise(outcomes)
+    if json_file is not None:
+        write_json(json_file, outcome)
+    if seeds <= SEEDS_SHOWN:
+        output.print(table_2(outcome, units))
+    output.print(outcome_line(outcome, units))
+    if "spread" in outcome:
+        output.print(spread_line(outcome["spread"], units))
+    if folder is not None:
+        for path in draw_recorded_run(folder, name, console, units):
+            output.print(str(path))
+    return DONE
+
+
+def record_seed(settings: Settings, seed: int, path: Path) -> SeedOutcome:
+    """Run the experiment with one seed, record it, and return its outcome.
+
+    Parameters
+    ----------
+    settings : Settings
+        Of the run, with a world.
+    seed : int
+        Of everything random.
+    path : Path
+        The recording.
+
+    Raises
+    ------
+    UserError
+        The run failed, or the recording could not be written completely.
     """
     from drivers.messages import Pose
     from runtime.cycle.step import CycleRecord, State
@@ -88,11 +108,12 @@ def recorded(settings: Settings, seed: int, path: Path) -> SeedOutcome:
     from runtime.recording.storage import SingleFile
     from runtime.simulation.evaluation import run_seed
 
-    now = [0.0]
-    with Recorder(settings, SingleFile(path), clock=lambda: now[0], queue_max=QUEUE_MAX, emulated=True) as recorder:
+    run_s = 0.0
+    with Recorder(settings, SingleFile(path), clock=lambda: run_s, queue_max=QUEUE_MAX, emulated=True) as recorder:
 
         def on_state(record: CycleRecord, state: State, _start: Pose) -> None:
-            now[0] = record.inputs.run_s
+            nonlocal run_s
+            run_s = record.inputs.run_s
             recorder.on_cycle(record, state)
 
         if settings.world is None:
@@ -101,20 +122,32 @@ def recorded(settings: Settings, seed: int, path: Path) -> SeedOutcome:
         recorder.on_summary(outcome.end)
     if recorder.status.last_error is not None or recorder.status.dropped:
         why = recorder.status.last_error or "the disk was too slow"
-        raise UserError(f"--out: the recording is not whole: {why}; make room or choose another place", FAILED)
+        raise UserError(f"--out: the recording is incomplete: {why}; make room or choose another place", FAILED)
     return outcome
 
 
-def shown(place: Path, name: str, console: Console, units: Units) -> list[Path]:
-    """Draw the recorded run and write its page; return all files."""
+def draw_recorded_run(folder: Path, name: str, console: Console, units: Units) -> list[Path]:
+    """Write figures and page of a recorded run into its folder and return all files.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds the recording.
+    name : str
+        Of the recording, without suffix.
+    console : Console
+        Where progress is shown.
+    units : {"m", "ft"}
+        Units of figures and page.
+    """
     from runtime.analysis.timeline_sources import TimelineSource
     from runtime.cli.commands.figures import draw_all
-    from runtime.cli.commands.report import report
+    from runtime.cli.commands.report import write_page
 
-    timeline = read(TimelineSource(str(place / f"{name}.mcap")), console)
-    page = place / f"{name}.html"
-    report(timeline, page, console, units=units)
-    return [timeline.path, page, *draw_all(timeline, place, console, moving=True, units=units)]
+    timeline = read_timeline(TimelineSource(str(folder / f"{name}.mcap")), console)
+    page = folder / f"{name}.html"
+    write_page(timeline, page, console, units=units)
+    return [timeline.path, page, *draw_all(timeline, folder, console, moving=True, units=units)]
 
 
 def run_scenes(
@@ -126,37 +159,45 @@ def run_scenes(
     json_file: str | None,
     units: Units,
 ) -> int:
-    """Carry out the command with ``--scene``; see `runtime.cli.app.experiment`."""
-    _refuse_no_seeds(seeds)
+    """Give perception the readings of a scene once per seed, print the outcome and return the exit code.
+
+    Parameters
+    ----------
+    scene, sets, models, seeds, json_file, units
+        As of `runtime.cli.experiment_commands.experiment`.
+    """
     settings = load_settings("hallway", sets, models=models)
     console = Console(stderr=True)
     prepare_kernels(settings, console)
     from runtime.cycle.summary import write_json
     from runtime.simulation.open_loop import run_scene, summarise_scene
 
-    runs = track(range(seeds), "driving", console=console, transient=True, disable=not console.is_terminal)
-    outcome = summarise_scene(
-        scene, [hall for seed in runs for hall in run_scene(settings, scene, seed)], settings.models
-    )
+    halls = []
+    with progress(console, "driving", seeds) as step:
+        for seed in range(seeds):
+            halls += run_scene(settings, scene, seed)
+            step()
+    outcome = summarise_scene(scene, halls, settings.models)
     if json_file is not None:
         write_json(json_file, outcome)
-    out = Console()
+    output = Console()
     if len(outcome["drums"]) + len(outcome["boxes"]) <= ROWS_SHOWN:
         if outcome["drums"]:
-            out.print(table_2(outcome, units))
+            output.print(table_2(outcome, units))
         if outcome["boxes"]:
-            out.print(boxes_table(outcome, units))
-    out.print(scene_line(outcome, units), soft_wrap=True)
+            output.print(boxes_table(outcome, units))
+    output.print(scene_line(outcome, units), soft_wrap=True)
     return DONE
 
 
-def _refuse_no_seeds(seeds: int) -> None:
-    if seeds < 1:
-        raise UserError(f"--seeds {seeds}: must be at least 1", WRONG_CALL)
+def stop_at_leg_end(settings: Settings) -> Settings:
+    """Return the settings with the drive ending at the end of its leg, as in the paper's experiment.
 
-
-def one_way(settings: Settings) -> Settings:
-    """Return the settings with the drive ending at the end of its leg, as the paper's does."""
+    Raises
+    ------
+    UserError
+        The leg has no end.
+    """
     ahead = settings.behaviors.move_ahead
     if ahead.distance_m is None:
         raise UserError("behaviors.move_ahead.distance_m is not set: the experiment needs an end", WRONG_CALL)

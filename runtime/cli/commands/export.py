@@ -1,4 +1,4 @@
-"""`echolocate export`: a run in the form of another program."""
+"""`echolocate export`: convert a run to the format of another program."""
 
 from __future__ import annotations
 
@@ -6,59 +6,75 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
-from rich.console import Console
-
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
-from runtime.cli.commands.offline_io import folder, need, progress, read, writing
+from runtime.cli.commands.offline_io import (
+    make_output_folder,
+    plain_console,
+    read_timeline,
+    refuse_overwriting,
+    require_package,
+    writing,
+)
+from runtime.support.progress import progress
 
 if TYPE_CHECKING:
     from runtime.analysis.timeline import Timeline
     from runtime.analysis.timeline_sources import TimelineSource
 
-Form: TypeAlias = Literal["csv", "parquet", "foxglove", "rosbag2", "ringlog"]
+ExportFormat: TypeAlias = Literal["csv", "parquet", "foxglove", "rosbag2", "ringlog"]
 
-NEEDED: Final = MappingProxyType(
+OPTIONAL_PACKAGES: Final = MappingProxyType(
     {"parquet": ("pyarrow", "pyarrow"), "foxglove": ("foxglove", "foxglove-sdk"), "rosbag2": ("rosbags", "rosbags")}
 )
-"""Module and package of each form that core does without."""
+"""Module and package that a format needs; they are installed by the extra only."""
 EXTRA: Final = "export"
 
 
-def export_run(source: TimelineSource, form: Form, out: str) -> int:
-    """Carry out the command; see `runtime.cli.app.export`."""
-    if form in NEEDED:
-        need(*NEEDED[form], EXTRA)
+def export_run(source: TimelineSource, to: ExportFormat, out: str) -> int:
+    """Export a run and return the exit code.
+
+    Parameters
+    ----------
+    source, to, out
+        As of `runtime.cli.recording_commands.export`.
+
+    Raises
+    ------
+    UserError
+        A package is missing, the input cannot be read or the output cannot be written.
+    """
+    if to in OPTIONAL_PACKAGES:
+        require_package(*OPTIONAL_PACKAGES[to], EXTRA)
     target = Path(out)
-    if target.absolute() == Path(source.file).absolute():
-        raise UserError(f"--out {out}: is the file itself; choose another name", WRONG_CALL)
-    console, told = Console(stderr=True, soft_wrap=True, highlight=False), Console(soft_wrap=True, highlight=False)
-    if form == "ringlog":
-        told.print(f"{target}: {ring_log(source, target)} firings")
+    refuse_overwriting(source.file, target)
+    console, output = plain_console(stderr=True), plain_console()
+    if to == "ringlog":
+        output.print(f"{target}: {export_ring_log(source, target)} firings")
         return DONE
-    if form in {"csv", "parquet"}:
-        target = folder(out)
-    elif form == "rosbag2" and target.exists():
-        raise UserError(f"--out {out}: is there already; a bag is a new folder", FAILED)
-    timeline = read(source, console)
+    if to in {"csv", "parquet"}:
+        target = make_output_folder(out)
+    elif to == "rosbag2" and target.exists():
+        raise UserError(f"--out {out}: exists; a bag needs a new folder", FAILED)
+    timeline = read_timeline(source, console)
     with progress(console, "writing"), writing("--out", target):
-        for path in write(timeline, form, target):
-            told.print(str(path))
+        for path in write_timeline(timeline, to, target):
+            output.print(str(path))
     for note in timeline.notes:
         console.print(note)
     return DONE
 
 
-def write(timeline: Timeline, form: Form, target: Path) -> list[Path]:
-    """Write a run in the form source for; each form's package is imported only here."""
-    if form == "csv":
+def write_timeline(timeline: Timeline, to: ExportFormat, target: Path) -> list[Path]:
+    """Write a run in a format and return the files; the package of a format is imported only here."""
+    if to == "csv":
         from runtime.analysis.export.csv_tables import write_csv
 
         return write_csv(timeline, target)
-    if form == "parquet":
+    if to == "parquet":
         from runtime.analysis.export.csv_tables import write_parquet
 
         return write_parquet(timeline, target)
-    if form == "foxglove":
+    if to == "foxglove":
         from runtime.analysis.export.foxglove import write_foxglove
 
         return write_foxglove(timeline, target)
@@ -67,13 +83,13 @@ def write(timeline: Timeline, form: Form, target: Path) -> list[Path]:
     return write_bag(timeline, target)
 
 
-def ring_log(source: TimelineSource, target: Path) -> int:
-    """Write the firings of a recording as a ring log and return how many.
+def export_ring_log(source: TimelineSource, target: Path) -> int:
+    """Write the firings of a recording as a ring log and return their number.
 
     Raises
     ------
     UserError
-        It is no recording, holds no firing, or the log cannot be written.
+        The input is not a recording or holds no firing, or the ring log cannot be written.
     """
     from runtime.analysis.export.ring_log_export import write_log
     from runtime.recording.reader import RecordingError, is_recording, open_recording
@@ -84,7 +100,7 @@ def ring_log(source: TimelineSource, target: Path) -> int:
         with open_recording(path) as recording:
             return write_log(recording, target)
     except RecordingError as error:
-        said = "" if is_recording(path) else "; a ring log is one already"
-        raise UserError(f"{error}{said}", WRONG_CALL) from error
+        hint = "" if is_recording(path) else "; a ring log needs no conversion"
+        raise UserError(f"{error}{hint}", WRONG_CALL) from error
     except RingLogError as error:
         raise UserError(f"--out {error}", FAILED) from error

@@ -1,4 +1,4 @@
-"""`echolocate figures`: a run as the paper draws it."""
+"""`echolocate figures`: draw a run as the paper does."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from config.errors import DONE
-from runtime.cli.commands.offline_io import folder, progress, read, writing
+from runtime.cli.commands.offline_io import make_output_folder, plain_console, read_timeline, writing
 from runtime.support.length_format import Units
+from runtime.support.progress import progress
 
 if TYPE_CHECKING:
     from runtime.analysis.timeline import Timeline
@@ -17,35 +18,55 @@ if TYPE_CHECKING:
 
 
 def draw_figures(source: TimelineSource, out: str, *, moving: bool, units: Units) -> int:
-    """Carry out the command; see `runtime.cli.app.figures`."""
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
-    place = folder(out)
-    timeline = read(source, console)
-    told = Console(soft_wrap=True, highlight=False)
-    for path in draw_all(timeline, place, console, moving=moving, units=units):
-        told.print(str(path))
+    """Draw all figures of a run and return the exit code.
+
+    Parameters
+    ----------
+    source, out, units
+        As of `runtime.cli.recording_commands.figures`.
+    moving : bool
+        Whether the animation is drawn.
+    """
+    console, output = plain_console(stderr=True), plain_console()
+    folder = make_output_folder(out)
+    timeline = read_timeline(source, console)
+    for path in draw_all(timeline, folder, console, moving=moving, units=units):
+        output.print(str(path))
     for note in timeline.notes:
         console.print(note)
     return DONE
 
 
-def draw_all(timeline: Timeline, place: Path, console: Console, *, moving: bool, units: Units) -> list[Path]:
-    """Write every picture of a run into a folder and return the files.
+def draw_all(timeline: Timeline, folder: Path, console: Console, *, moving: bool, units: Units) -> list[Path]:
+    """Write every figure of a run into a folder and return the files.
+
+    Parameters
+    ----------
+    timeline : Timeline
+        The run.
+    folder : Path
+        An existing folder.
+    console : Console
+        Where the progress bar is shown.
+    moving : bool
+        Whether the animation is drawn.
+    units : {"m", "ft"}
+        Units of the axes.
 
     Raises
     ------
-    Complaint
-        One cannot be written.
+    UserError
+        A file cannot be written.
     """
     from runtime.analysis.plots.animation import save_moving
     from runtime.analysis.plots.figure_files import save, styled
     from runtime.analysis.plots.paper_figures import pictures
 
-    with progress(console, "drawing") as step, writing("--out", place), styled():
+    with progress(console, "drawing") as step, writing("--out", folder), styled():
         paths = []
         for name, figure in pictures(timeline, units).items():
-            paths += save(figure, place, name)
+            paths += save(figure, folder, name)
             step()
         if moving:
-            paths += save_moving(timeline, units, place, "overview", step)
+            paths += save_moving(timeline, units, folder, "overview", step)
     return paths

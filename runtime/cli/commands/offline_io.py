@@ -1,38 +1,35 @@
-"""What the commands share that show a run which is over: reading it with a progress bar, and where to write."""
+"""What the commands on finished runs share: reading a file with a progress bar, and checking where to write."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import Progress
 
 from config.errors import FAILED, WRONG_CALL, UserError
 from runtime.support.kernel_cache import prepare_kernels
+from runtime.support.progress import progress
 
 if TYPE_CHECKING:
     from runtime.analysis.timeline import Timeline
     from runtime.analysis.timeline_sources import TimelineSource
 
 
-@contextlib.contextmanager
-def progress(console: Console, what: str) -> Iterator[Callable[[], None]]:
-    """Show that something goes on; gives what to call for each step."""
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(what, total=None)
-        yield lambda: bar.update(task, advance=1)
+def plain_console(*, stderr: bool = False) -> Console:
+    """Return a console that neither wraps lines nor colours numbers: paths can be copied, output can be parsed."""
+    return Console(stderr=stderr, soft_wrap=True, highlight=False)
 
 
-def read(source: TimelineSource, console: Console) -> Timeline:
-    """Return the timeline of a file.
+def read_timeline(source: TimelineSource, console: Console) -> Timeline:
+    """Return the timeline of a recording or ring log, with a progress bar.
 
     Raises
     ------
     UserError
-        It cannot be read, or holds nothing to show.
+        The file cannot be read, or it holds nothing to show.
     """
     from runtime.analysis.timeline_sources import load_timeline
 
@@ -45,7 +42,7 @@ def read(source: TimelineSource, console: Console) -> Timeline:
 
 @contextlib.contextmanager
 def writing(option: str, path: str | Path) -> Iterator[None]:
-    """Turn what the disk refuses into a complaint that names the option.
+    """Raise OSErrors of the block as a UserError that names the option.
 
     Raises
     ------
@@ -61,29 +58,50 @@ def writing(option: str, path: str | Path) -> Iterator[None]:
         ) from error
 
 
-def folder(path: str) -> Path:
-    """Return the folder of `--out`, made where it is missing.
+def make_output_folder(path: str) -> Path:
+    """Return the folder of `--out`, created if it does not exist.
 
     Raises
     ------
     UserError
-        It is a file, or cannot be made.
+        The path is a file, or the folder cannot be created.
     """
-    made = Path(path)
-    if made.exists() and not made.is_dir():
+    folder = Path(path)
+    if folder.exists() and not folder.is_dir():
         raise UserError(f"--out {path}: is a file; name a folder", WRONG_CALL)
     with writing("--out", path):
-        made.mkdir(parents=True, exist_ok=True)
-    return made
+        folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
-def need(module: str, package: str, extra: str) -> None:
-    """Complain where a package of an extra is missing.
+def refuse_overwriting(source: str, target: Path) -> None:
+    """Raise an error if the output would overwrite the input.
 
     Raises
     ------
     UserError
-        It is; the line names what to install.
+        Both are the same file.
+    """
+    if target.absolute() == Path(source).absolute():
+        raise UserError(f"--out {target}: is the input itself; choose another name", WRONG_CALL)
+
+
+def require_package(module: str, package: str, extra: str) -> None:
+    """Raise an error if an optional package is not installed.
+
+    Parameters
+    ----------
+    module : str
+        Module to import.
+    package : str
+        Package that contains it.
+    extra : str
+        Extra of this program that installs it.
+
+    Raises
+    ------
+    UserError
+        The package is missing; the message says how to install it.
     """
     from importlib.util import find_spec
 

@@ -1,4 +1,4 @@
-"""`echolocate recover`: what can be read of a damaged recording, as a whole one."""
+"""`echolocate recover`: restore what can be read of a damaged recording."""
 
 from __future__ import annotations
 
@@ -9,34 +9,38 @@ from rich.console import Console
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 
-SHOWN: Final = 10
-"""Damages told one by one."""
+SHOWN_MAX: Final = 10
+"""Damaged places that are listed."""
 
 
 def recover_recording(source: str, out: str | None) -> int:
-    """Carry out the command; see `runtime.cli.app.recover`."""
+    """Write what can be read of a recording into a new one and return the exit code.
+
+    Raises
+    ------
+    UserError
+        The input is not a recording, or the output cannot be written.
+    """
     from runtime.recording.recovery import recover
 
     path = Path(source)
     target = path.with_name(f"{path.stem}-recovered.mcap") if out is None else Path(out)
     if target.absolute() == path.absolute():
-        raise UserError(f"--out {out}: is the damaged file itself; choose another name", WRONG_CALL)
+        raise UserError(f"--out {out}: is the input itself; choose another name", WRONG_CALL)
     try:
-        got = recover(path, target)
+        recovered = recover(path, target)
     except OSError as error:
         raise UserError(
-            f"{target}: cannot be written: {error.strerror or error}; choose another place by --out", FAILED
+            f"{target}: cannot be written: {error.strerror or error}; choose another place with --out", FAILED
         ) from error
     console = Console(soft_wrap=True, highlight=False)
-    for region in got.corrupt_regions[:SHOWN]:
+    for region in recovered.corrupt_regions[:SHOWN_MAX]:
         console.print(str(region))
-    if len(got.corrupt_regions) > SHOWN:
-        console.print(f"and {len(got.corrupt_regions) - SHOWN} more")
-    state = (
-        "was closed in good order" if got.finished else "had not been closed: the run was cut off, or the file was"
-    )
+    if len(recovered.corrupt_regions) > SHOWN_MAX:
+        console.print(f"and {len(recovered.corrupt_regions) - SHOWN_MAX} more")
+    state = "was complete" if recovered.finished else "was not closed: the run or the file was cut off"
     console.print(
-        f"{target}: {got.cycles} cycles, {got.messages} messages in {got.chunks} chunks, "
-        f"{1e-9 * (got.last_ns - got.first_ns):.1f} s; the original {state}"
+        f"{target}: {recovered.cycles} cycles, {recovered.messages} messages in {recovered.chunks} chunks, "
+        f"{1e-9 * (recovered.last_ns - recovered.first_ns):.1f} s; the original {state}"
     )
     return DONE

@@ -1,4 +1,4 @@
-"""`echolocate replay` of a recording: run again and compared, at a pace to watch, or with other settings."""
+"""`echolocate replay` of a recording: verify it, show it at a chosen speed, or compare it with other settings."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from rich.console import Console
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings, override_settings
-from runtime.cli.commands.offline_io import progress
+from runtime.cli.commands.offline_io import plain_console
 from runtime.cli.tables import objects_table
 from runtime.cycle.summary import ReplaySummary, object_row, write_json
 from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.length_format import Units, format_length
+from runtime.support.progress import progress
 
 if TYPE_CHECKING:
     from config.settings import Settings
@@ -30,19 +31,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Which part of a recording, in seconds after its first cycle, and how fast."""
+    """The part of a recording that is replayed, in seconds after its first cycle, and how fast it is shown."""
 
     since_s: float
     until_s: float | None
     speed: float | None
 
-    def refuse(self) -> None:
-        """Complain where it is no span.
+    def validate(self) -> None:
+        """Check the options.
 
         Raises
         ------
         UserError
-            A number makes no sense.
+            A number is negative or infinite, or the end is not after the start.
         """
         for option, value in (("--from", self.since_s), ("--to", self.until_s), ("--speed", self.speed)):
             if value is not None and not (value >= 0.0 and math.isfinite(value)):
@@ -65,35 +66,71 @@ def replay_recording(
     json_file: str | None,
     units: Units,
 ) -> int:
-    """Carry out the command; see `runtime.cli.app.replay`."""
+    """Replay a recording, print the outcome and return the exit code.
+
+    Parameters
+    ----------
+    log, sets, verify, other, robot, models, json_file, units
+        As of `runtime.cli.recording_commands.replay`.
+    span : Span
+        The part to replay.
+
+    Raises
+    ------
+    UserError
+        Options contradict each other, the recording cannot be read, or with `verify` it is not reproduced.
+    """
     from runtime.recording.reader import open_recording
 
-    span.refuse()
-    otherwise = other is not None or bool(sets) or bool(models) or robot is not None
-    if verify and otherwise:
+    span.validate()
+    has_other_settings = other is not None or bool(sets) or bool(models) or robot is not None
+    if verify and has_other_settings:
         raise UserError("--verify compares with the recorded settings: leave out --with, --set, --model, --robot",
                         WRONG_CALL)  # fmt: skip
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    console = plain_console(stderr=True)
     with open_recording(Path(log)) as recording:
-        if otherwise:
+        if has_other_settings:
             settings = other_settings(recording, other, sets, robot=robot, models=models)
-            return tell_other(recording, settings, console, units)
-        return rerun(recording, console, span=span, verify=verify, json_file=json_file, units=units)
+            return compare_with_settings(recording, settings, console, units)
+        return replay_again(recording, console, span=span, verify=verify, json_file=json_file, units=units)
 
 
 def other_settings(
     recording: Recording, other: str | None, sets: Sequence[str], *, robot: str | None, models: Sequence[str]
 ) -> Settings:
-    """Return the settings to replay with: of a run file, or the recorded ones with some overridden."""
+    """Return the settings to compare with: those of a run file, or the recorded ones with overrides.
+
+    Parameters
+    ----------
+    recording : Recording
+        The recording.
+    other, sets, robot, models
+        As of `runtime.cli.recording_commands.replay`.
+    """
     if other is not None or models or robot is not None:
         return load_settings(other, sets, robot=robot, models=models)
     return override_settings(recording.settings, str(recording.path), sets)
 
 
-def rerun(
+def replay_again(
     recording: Recording, console: Console, *, span: Span, verify: bool, json_file: str | None, units: Units
 ) -> int:
-    """Replay and tell what came out."""
+    """Replay with the recorded settings, print what differs and return the exit code.
+
+    Parameters
+    ----------
+    recording : Recording
+        The recording.
+    console : Console
+        Where progress and notes are shown.
+    span, verify, json_file, units
+        As of `replay_recording`.
+
+    Raises
+    ------
+    UserError
+        There is no cycle to replay, or with `verify` the replay differs.
+    """
     from runtime.recording.recorder import software_versions
     from runtime.recording.verification import verify_recording
 
@@ -101,11 +138,11 @@ def rerun(
     now, then = software_versions(), recording.info.versions
     others = [f"{name} {then.get(name)} → {now[name]}" for name in now if then.get(name) != now[name]]
     if others:
-        console.print(f"made by another program or machine: {', '.join(others)}; results may differ from there on")
+        console.print(f"recorded by another version or machine: {', '.join(others)}; results may differ")
     until_s = math.inf if span.until_s is None else span.until_s
     with contextlib.ExitStack() as stack:
         if span.speed is not None:
-            on_step = stack.enter_context(watching(recording, span, units))
+            on_step = stack.enter_context(live_view(recording, span.speed, units))
         else:
             advance = stack.enter_context(progress(console, "replaying"))
 
@@ -115,7 +152,7 @@ def rerun(
         result = verify_recording(recording, since_s=span.since_s, until_s=until_s, on_step=on_step)
     if result.cycles == 0:
         if result.skipped or span != Span(0.0, None, span.speed):
-            raise UserError(f"{recording.path}: holds no cycle that can be replayed in this part of it", FAILED)
+            raise UserError(f"{recording.path}: this part of it holds no cycle that can be replayed", FAILED)
         console.print(f"{recording.path}: holds no cycle yet: the run ended before its first one; nothing differs")
         if json_file is not None:
             write_json(json_file, summarise(recording, result))
@@ -123,14 +160,14 @@ def rerun(
     summary = summarise(recording, result)
     if json_file is not None:
         write_json(json_file, summary)
-    out = Console(soft_wrap=True, highlight=False)
-    out.print(objects_table(summary["objects"], units))
+    output = plain_console()
+    output.print(objects_table(summary["objects"], units))
     for region in recording.corrupt_regions:
         console.print(str(region))
     for first, last in result.missing:
-        console.print(f"cycles {first} to {last} are not in the recording; taken up again at the next keyframe")
+        console.print(f"cycles {first} to {last} are missing in the recording; replay continues at the next keyframe")
     causes = ", ".join(f"{cause} {count}" for cause, count in sorted(result.refinement_stops.items()))
-    out.print(
+    output.print(
         f"{result.cycles} cycles from cycle {result.first_cycle} on, {result.differences} differences, "
         f"{result.keyframes} keyframes compared; refinement ended by: {causes}; "
         f"{result.times_real_time:.0f} times real time"
@@ -166,8 +203,18 @@ def summarise(recording: Recording, result: ReplayResult) -> ReplaySummary:
 
 
 @contextlib.contextmanager
-def watching(recording: Recording, span: Span, units: Units) -> Iterator[OnStep]:
-    """Hold the replay to its pace, and show it where there is a terminal."""
+def live_view(recording: Recording, speed: float, units: Units) -> Iterator[OnStep]:
+    """Pace a replay, and show it on a terminal; yield what to call for each step of it.
+
+    Parameters
+    ----------
+    recording : Recording
+        The recording.
+    speed : float
+        How many times as fast as the run it is shown.
+    units : {"m", "ft"}
+        Units of the table of objects.
+    """
     from drivers.registry import make_driver
     from runtime.cli.terminal.view import View
     from runtime.recording.channels import SERIAL, decode
@@ -178,9 +225,10 @@ def watching(recording: Recording, span: Span, units: Units) -> Iterator[OnStep]
     view = View(settings, console, units) if console.is_terminal and not console.is_dumb_terminal else None
     driver, stats = make_driver(settings), CycleStats(late_after_s=math.inf)
     driver.line_opened(0.0)
-    start: list[tuple[float, float]] = []
+    start_s: tuple[float, float] | None = None  # of the first cycle, by the run's clock and the host's
 
     def on_step(found: ReplayStep, replayer: Replayer) -> None:
+        nonlocal start_s
         if found.message.topic == SERIAL["in"]:
             for run_s, data in decode(SerialBytes, found.message.data).pieces():
                 driver.receive(data, run_s)
@@ -188,9 +236,9 @@ def watching(recording: Recording, span: Span, units: Units) -> Iterator[OnStep]
         if found.replayed is None or replayer.state is None:
             return
         run_s, host_s = found.replayed.inputs.run_s, time.monotonic()
-        if not start:
-            start.append((run_s, host_s))
-        due_s = start[0][1] + (run_s - start[0][0]) / (span.speed or math.inf)
+        if start_s is None:
+            start_s = (run_s, host_s)
+        due_s = start_s[1] + (run_s - start_s[0]) / speed
         if due_s > host_s:
             time.sleep(due_s - host_s)
         stats.add_cycle(0.0, max(0.0, host_s - due_s))
@@ -203,33 +251,45 @@ def watching(recording: Recording, span: Span, units: Units) -> Iterator[OnStep]
         yield on_step
 
 
-def tell_other(recording: Recording, settings: Settings, console: Console, units: Units) -> int:
-    """Replay with the recorded settings and with others, and say what is different."""
+def compare_with_settings(recording: Recording, settings: Settings, console: Console, units: Units) -> int:
+    """Replay with the recorded settings and with others, print what differs and return the exit code.
+
+    Parameters
+    ----------
+    recording : Recording
+        The recording.
+    settings : Settings
+        The other settings.
+    console : Console
+        Where progress is shown.
+    units : {"m", "ft"}
+        Units of the tables.
+    """
     from runtime.analysis.comparison import compare_runs
 
     prepare_kernels(settings, console)
     with progress(console, "replaying") as advance:
-        told = compare_runs(recording, settings, advance)
-    out = Console(soft_wrap=True, highlight=False)
-    for title, story in (("as it was", told.recorded), ("with the other settings", told.other)):
-        out.print(title)
-        out.print(objects_table(story.objects, units))
-        out.print(errors_line(story, units))
-        for at_s, reason in story.stops:
-            out.print(f"stopped after {at_s:.1f} s: {reason}")
-    first = "" if told.first_change_s is None else f", the first after {told.first_change_s:.2f} s"
-    out.print(f"{told.cycles} cycles; {told.changed_commands} with another command{first}")
+        comparison = compare_runs(recording, settings, advance)
+    output = plain_console()
+    for title, run in (("as it was", comparison.recorded), ("with the other settings", comparison.other)):
+        output.print(title)
+        output.print(objects_table(run.objects, units))
+        output.print(errors_line(run, units))
+        for at_s, reason in run.stops:
+            output.print(f"stopped after {at_s:.1f} s: {reason}")
+    first = "" if comparison.first_change_s is None else f", the first after {comparison.first_change_s:.2f} s"
+    output.print(f"{comparison.cycles} cycles; {comparison.changed_commands} with another command{first}")
     return DONE
 
 
-def errors_line(story: RunOutcome, units: Units) -> str:
-    """Return how far the objects are from the drums that were there, where that is known."""
-    if story.errors_m is None:
-        return f"{len(story.objects)} objects"
-    found = [error for error in story.errors_m if error is not None]
+def errors_line(run: RunOutcome, units: Units) -> str:
+    """Return how far the objects are from the true drums in one line; only their number where these are unknown."""
+    if run.errors_m is None:
+        return f"{len(run.objects)} objects"
+    found = [error for error in run.errors_m if error is not None]
     mean = format_length(sum(found) / len(found), units, 4) if found else "none"
     worst = format_length(max(found), units, 4) if found else "none"
     return (
-        f"{len(found)} of {len(story.errors_m)} drums, {story.false} false; "
+        f"{len(found)} of {len(run.errors_m)} drums, {run.false} false; "
         f"mean error {mean} {units}, worst {worst} {units}"
     )

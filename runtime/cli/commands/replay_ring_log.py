@@ -1,13 +1,12 @@
-"""`echolocate replay`: perception over a recording."""
+"""`echolocate replay` of a ring log: perception over its firings."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import Progress
 
 from config.errors import DONE
 from config.load import load_settings
@@ -15,6 +14,7 @@ from runtime.cli.tables import objects_table
 from runtime.cycle.summary import write_json
 from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.length_format import Units
+from runtime.support.progress import progress
 
 if TYPE_CHECKING:
     from drivers.messages import Firing
@@ -29,31 +29,36 @@ def replay_log(
     json_file: str | None,
     units: Units,
 ) -> int:
-    """Carry out the command; see `runtime.cli.app.replay`."""
+    """Run perception over a ring log, print the objects and return the exit code.
+
+    Parameters
+    ----------
+    log, sets, robot, models, json_file, units
+        As of `runtime.cli.recording_commands.replay`.
+    """
     settings = load_settings(None, sets, robot=robot, models=models)
     console = Console(stderr=True)
     prepare_kernels(settings, console)
     from runtime.recording.ring_log import read_ring_log
     from runtime.recording.ring_log_replay import replay_firings
 
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+    with progress(console, "replaying") as step:
         firings = read_ring_log(Path(log), sensors=len(settings.ring.mounts))
-        summary = replay_firings(settings, watched(firings, progress))
+        summary = replay_firings(settings, _each(firings, step))
     if json_file is not None:
         write_json(json_file, summary)
-    out = Console()
-    out.print(objects_table(summary["objects"], units))
-    took = summary["cycle_us"]
-    out.print(
+    output = Console()
+    output.print(objects_table(summary["objects"], units))
+    cycle_us = summary["cycle_us"]
+    output.print(
         f"{summary['cycles']} firings, {summary['segments']} outline segments, {summary['clusters']} clusters; "
-        f"a firing takes {took['p50'] / 1e3:.2f} ms, p99 {took['p99'] / 1e3:.2f} ms"
+        f"a firing takes {cycle_us['p50'] / 1e3:.2f} ms, p99 {cycle_us['p99'] / 1e3:.2f} ms"
     )
     return DONE
 
 
-def watched(firings: Iterable[Firing], progress: Progress) -> Iterator[Firing]:
-    """Yield `firings` while the progress shows how far along the recording they are."""
-    task = progress.add_task("replaying", total=None)
+def _each(firings: Iterable[Firing], step: Callable[[], None]) -> Iterator[Firing]:
+    """Yield the firings and call `step` for each."""
     for firing in firings:
-        progress.update(task, advance=1)
+        step()
         yield firing

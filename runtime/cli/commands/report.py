@@ -1,4 +1,4 @@
-"""`echolocate report`: a run on one page."""
+"""`echolocate report`: one HTML page about a run."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from config.errors import DONE, WRONG_CALL, UserError
-from runtime.cli.commands.offline_io import progress, read, writing
+from config.errors import DONE
+from runtime.cli.commands.offline_io import plain_console, read_timeline, refuse_overwriting, writing
 from runtime.support.length_format import Units
+from runtime.support.progress import progress
 
 if TYPE_CHECKING:
     from runtime.analysis.timeline import Timeline
@@ -17,24 +18,40 @@ if TYPE_CHECKING:
 
 
 def write_report(source: TimelineSource, out: str | None, *, units: Units) -> int:
-    """Carry out the command; see `runtime.cli.app.report`."""
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    """Write the page of a run and return the exit code.
+
+    Parameters
+    ----------
+    source, out, units
+        As of `runtime.cli.recording_commands.report`.
+    """
+    console = plain_console(stderr=True)
     target = Path(source.file).with_suffix(".html") if out is None else Path(out)
-    if target.absolute() == Path(source.file).absolute():
-        raise UserError(f"--out {target}: is the file itself; choose another name", WRONG_CALL)
-    timeline = read(source, console)
-    report(timeline, target, console, units=units)
-    Console(soft_wrap=True, highlight=False).print(str(target))
+    refuse_overwriting(source.file, target)
+    timeline = read_timeline(source, console)
+    write_page(timeline, target, console, units=units)
+    plain_console().print(str(target))
     return DONE
 
 
-def report(timeline: Timeline, target: Path, console: Console, *, units: Units) -> None:
+def write_page(timeline: Timeline, target: Path, console: Console, *, units: Units) -> None:
     """Write the page of a run.
+
+    Parameters
+    ----------
+    timeline : Timeline
+        The run.
+    target : Path
+        The file.
+    console : Console
+        Where the progress bar is shown.
+    units : {"m", "ft"}
+        Units of lengths on the page.
 
     Raises
     ------
     UserError
-        It cannot be written.
+        The file cannot be written.
     """
     from runtime.analysis.report.report_page import page
 

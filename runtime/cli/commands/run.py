@@ -1,4 +1,4 @@
-"""`echolocate run`: the robot's main process, on a serial port or on an emulator of its own."""
+"""`echolocate run`: the robot's main process, on a serial port or on an emulated robot."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from rich.console import Console
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import ConfigError, load_settings
 from config.settings import Settings
+from drivers.registry import make_driver
 from runtime import VERSION
-from runtime.cli.commands.firing_check import refuse_impossible_firing
-from runtime.cli.commands.run_recording import RunRecording, kept
+from runtime.cli.commands.run_recording import RunRecording, open_run_recording
 from runtime.cli.tables import objects_table, timing_line, timing_table
 from runtime.support.config_lint import lint_settings
 from runtime.support.file_lock import file_lock
@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Emulation:
-    """What the emulator is asked for where no port is given."""
+class EmulatorOptions:
+    """Options of the emulator that a run without a port starts."""
 
     world: str | None
     seed: int
@@ -50,7 +50,7 @@ class Emulation:
     faults: str | None
 
     def arguments(self, config: str | None, sets: Sequence[str]) -> list[str]:
-        """Return the arguments of ``echolocate emulate`` that ask for it."""
+        """Return the command line of ``echolocate emulate`` with these options."""
         named = {
             "--config": config,
             "--world": self.world,
@@ -74,77 +74,104 @@ def run_robot(
     no_record: bool,
     no_console: bool,
     json_file: str | None,
-    emulation: Emulation,
+    emulator: EmulatorOptions,
     units: Units,
 ) -> int:
-    """Carry out the command; see `runtime.cli.app.run`."""
-    settings = load_settings(config, sets, world=emulation.world)
-    refuse_impossible_firing(settings)
+    """Run the robot until the run is ended, print its summary and return the exit code.
+
+    Parameters
+    ----------
+    config, sets, port, arm, seconds, headless, record, no_record, no_console, json_file, units
+        As of `runtime.cli.robot_commands.run`.
+    emulator : EmulatorOptions
+        Used without a port.
+
+    Raises
+    ------
+    UserError
+        An option is wrong, a file cannot be written, the run ended in FAULT, or the recording is incomplete.
+    """
+    settings = load_settings(config, sets, world=emulator.world)
+    make_driver(settings)  # refuses what the robot cannot carry out
     if no_console:
         settings = without_console(settings)
     if seconds is not None and not seconds > 0.0:
         raise UserError(f"--seconds {seconds}: must be above 0", WRONG_CALL)
-    given, port = port, port if port is not None else settings.link.port
+    port_option, port = port, port if port is not None else settings.link.port
     if port is not None:
-        settings = on_port(settings, port)
+        settings = with_port(settings, port)
     refuse_unwritable({"--record": record, "--json": json_file})
     console = Console(stderr=True)
     prepare_kernels(settings, console)
     live = not headless and console.is_terminal and not console.is_dumb_terminal
-    lines = LogStatus()
+    log_status = LogStatus()
     with contextlib.ExitStack() as stack:
         if record is not None:
             stack.enter_context(file_lock(Path(record), f"--record {record}"))
         clock = ScaledClock() if port is None else RunClock()
-        keeping = stack.enter_context(kept(settings, record, no_record=no_record, emulated=port is None, clock=clock))
-        log = stack.enter_context(open_log(settings.log, terminal=not live, listener=keeping.on_log, status=lines))
+        recording = stack.enter_context(
+            open_run_recording(settings, record, no_record=no_record, emulated=port is None, clock=clock)
+        )
+        log = stack.enter_context(
+            open_log(settings.log, terminal=not live, listener=recording.on_log, status=log_status)
+        )
         log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
         for text in lint_settings(settings):
             log.warning(text)
 
-        async def whole() -> RunSummary:
+        async def run() -> RunSummary:
             from runtime.simulation.emulator_process import start_emulator
             from runtime.timing.time_control import NoTimeControl
 
             async with contextlib.AsyncExitStack() as running:
-                chosen = settings
+                run_settings = settings
                 control: TimeControl = NoTimeControl()
                 if isinstance(clock, ScaledClock):
-                    words = emulation.arguments(config, sets)
-                    emulated, control = await running.enter_async_context(start_emulator(words, clock))
-                    chosen = on_port(settings, emulated)
-                return await watch(
-                    chosen, log, console, clock=clock, control=control, live=live, units=units, keeping=keeping,
-                    lines=lines, arm=arm or port is None, seconds=seconds, emulated=port is None,
-                    propose=lambda: proposed(
-                        config, sets, emulation.world, given, None if port else chosen.link.port,
+                    arguments = emulator.arguments(config, sets)
+                    emulator_port, control = await running.enter_async_context(start_emulator(arguments, clock))
+                    run_settings = with_port(settings, emulator_port)
+                return await run_process(
+                    run_settings, log, console, clock=clock, control=control, live=live, units=units,
+                    recording=recording, log_status=log_status, arm=arm or port is None, seconds=seconds,
+                    emulated=port is None,
+                    reload=lambda: reload_settings(
+                        config, sets, emulator.world, port_option, None if port else run_settings.link.port,
                         no_console=no_console,
                     ),
                 )  # fmt: skip
 
-        summary = asyncio.run(whole())
-        keeping.on_summary(summary)
-    if keeping.standing is not None:
-        summary["recording"] = keeping.standing
-    summary["log"] = {"lost": lines.lost, "trouble": lines.trouble}
+        summary = asyncio.run(run())
+        recording.on_summary(summary)
+    if recording.summary_row is not None:
+        summary["recording"] = recording.summary_row
+    summary["log"] = {"lost": log_status.lost, "last_error": log_status.last_error}
     if json_file is not None:
         from runtime.cycle.summary import write_json
 
         write_json(json_file, summary)
-    out = Console()
-    out.print(objects_table(summary["objects"], units))
-    out.print(timing_table(summary))
-    out.print(timing_line(summary))
-    if lines.lost:
-        out.print(f"{lines.lost} lines of the log are missing: {lines.trouble}; make room or choose another log.file")
+    output = Console()
+    output.print(objects_table(summary["objects"], units))
+    output.print(timing_table(summary))
+    output.print(timing_line(summary))
+    if log_status.lost:
+        output.print(
+            f"{log_status.lost} lines of the log are missing: {log_status.last_error}; make room or choose another "
+            "log.file"
+        )
     if summary["mode"] == "FAULT":
         raise UserError(summary["stop_reasons"][-1], FAILED)
-    keeping.complain()
+    recording.raise_if_incomplete()
     return DONE
 
 
 def refuse_unwritable(files: dict[str, str | None]) -> None:
-    """Complain before the robot moves about a file that could not be written when it is done."""
+    """Check, before the robot moves, that the files of these options can be written.
+
+    Raises
+    ------
+    UserError
+        One cannot.
+    """
     for option, path in files.items():
         try:
             if path is not None:
@@ -156,38 +183,50 @@ def refuse_unwritable(files: dict[str, str | None]) -> None:
 
 
 def without_console(settings: Settings) -> Settings:
-    """Return the settings with the console left out."""
+    """Return the settings with the operator console switched off."""
     return settings.model_copy(update={"console": settings.console.model_copy(update={"enabled": False})})
 
 
-def on_port(settings: Settings, port: str) -> Settings:
+def with_port(settings: Settings, port: str) -> Settings:
     """Return the settings with the serial port replaced."""
     return settings.model_copy(update={"link": settings.link.model_copy(update={"port": port})})
 
 
-def proposed(
-    config: str | None, sets: Sequence[str], world: str | None, given: str | None, emulated: str | None,
-    *, no_console: bool = False,
-) -> Settings:  # fmt: skip
-    """Return the settings as the files hold them now, for a run on a port that was given, or is the emulator's.
+def reload_settings(
+    config: str | None,
+    sets: Sequence[str],
+    world: str | None,
+    port: str | None,
+    emulator_port: str | None,
+    *,
+    no_console: bool = False,
+) -> Settings:
+    """Return the settings as the files are now, for a run on the same port as before.
+
+    Parameters
+    ----------
+    config, sets, world, port, no_console
+        As of `runtime.cli.robot_commands.run`.
+    emulator_port : str, optional
+        Port of the emulator, which is used if the settings name none.
 
     Raises
     ------
     ConfigError
-        What is wrong with them, a firing pattern that the ring cannot carry out included.
+        The settings are wrong, or no robot can carry them out.
     """
     settings = load_settings(config, sets, world=world)
     try:
-        refuse_impossible_firing(settings)
-    except UserError as complaint:
-        raise ConfigError(str(complaint)) from complaint
+        make_driver(settings)
+    except UserError as error:
+        raise ConfigError(str(error)) from error
     if no_console:
         settings = without_console(settings)
-    port = given or settings.link.port or emulated
-    return settings if port is None else on_port(settings, port)
+    port = port or settings.link.port or emulator_port
+    return settings if port is None else with_port(settings, port)
 
 
-async def watch(
+async def run_process(
     settings: Settings,
     log: FilteringBoundLogger,
     console: Console,
@@ -196,14 +235,38 @@ async def watch(
     control: TimeControl,
     live: bool,
     units: Units,
-    keeping: RunRecording,
-    lines: LogStatus,
+    recording: RunRecording,
+    log_status: LogStatus,
     arm: bool,
     seconds: float | None,
     emulated: bool,
-    propose: Callable[[], Settings],
+    reload: Callable[[], Settings],
 ) -> RunSummary:
-    """Run the process under the eyes of view and console; it heeds signals and keys, and its parts are watched."""
+    """Run the robot's process with live view, console, signals and keys; return the summary of the run.
+
+    Parameters
+    ----------
+    settings, log, clock
+        As of `runtime.cycle.process.RobotProcess`.
+    console : rich.console.Console
+        The terminal.
+    control : TimeControl
+        Of the run.
+    live : bool
+        Whether the live view is shown.
+    units : {"m", "ft"}
+        Units of view and console.
+    recording : RunRecording
+        Of the run.
+    log_status : LogStatus
+        Of the run's log.
+    arm, seconds
+        As of `runtime.cycle.process.RobotProcess.run`.
+    emulated : bool
+        Whether the robot is emulated.
+    reload : callable
+        Reads the settings again.
+    """
     from runtime.cli.terminal.time_keys import TimeKeys
     from runtime.cli.terminal.view import View, keys
     from runtime.cycle.process import RobotProcess
@@ -212,28 +275,27 @@ async def watch(
 
     async with contextlib.AsyncExitStack() as stack:
         view = View(settings, console, units) if live else None
-        watchers: list[OnCycle] = [] if view is None else [view.on_cycle]
+        listeners: list[OnCycle] = [] if view is None else [view.on_cycle]
 
         def on_cycle(record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
-            for watcher in watchers:
-                watcher(record, state, stats, driver)
+            for listener in listeners:
+                listener(record, state, stats, driver)
 
-        observers = keeping.observers(on_cycle, log)
+        observers = recording.observers(on_cycle, log)
         process = RobotProcess(
             settings, log, observers, clock, notifier=stack.enter_context(SdNotifier.from_environment())
         )
         kernel_loader = KernelLoader(log)
-        reloader = Reloader(process.live_settings, propose, log, kernel_loader)
+        reloader = Reloader(process.live_settings, reload, log, kernel_loader)
         if settings.console.enabled:
-            from runtime.cli.commands.serve_console import paged
+            from runtime.cli.commands.serve_console import serve_console
 
-            served = paged(
-                process, settings, log, kernel_loader, keeping, control, emulated=emulated, units=units
+            page = await stack.enter_async_context(
+                serve_console(process, settings, log, kernel_loader, recording, control, emulated=emulated, units=units)
             )
-            page = await stack.enter_async_context(served)
-            lines.listeners.append(page.hub.on_log)
-            stack.callback(lines.listeners.remove, page.hub.on_log)
-            watchers.append(page.on_cycle)
+            log_status.listeners.append(page.hub.on_log)
+            stack.callback(log_status.listeners.remove, page.hub.on_log)
+            listeners.append(page.on_cycle)
             if view is not None:
                 for line in page.hints():
                     console.print(line, markup=False, highlight=False, soft_wrap=True)
@@ -243,34 +305,34 @@ async def watch(
             stack.enter_context(view.shown())
             stack.enter_context(keys(process.request, process.stop, TimeKeys(control, log).press))
             process.health.watch("view", view.probe)
-        for name, probe in {"recorder": keeping.probe, "log": lines.probe, "reload": reloader.probe}.items():
+        for name, probe in {"recorder": recording.probe, "log": log_status.probe, "reload": reloader.probe}.items():
             process.health.watch(name, probe)
         summary = await process.run(arm=arm, seconds=seconds)
-        summary["process"]["compilations"] -= kernel_loader.loaded  # on purpose, and in no cycle's time
+        summary["process"]["compilations"] -= kernel_loader.loaded  # they delayed no cycle
         return summary
 
 
 @contextlib.contextmanager
 def signals(process: RobotProcess, reloader: Reloader) -> Iterator[None]:
-    """Heed signals: INT and TERM end the run in good order, USR1 arms and USR2 halts a robot without a keyboard.
+    """Handle signals during a run: INT and TERM end it, USR1 arms the robot, USR2 halts it, HUP reloads the settings.
 
-    HUP has the configuration read again; what is wrong with it is told in the log and the last good one kept.
+    If the reloaded configuration is wrong, the errors go to the log and the settings in force remain.
     """
     from runtime.cycle.inputs import Request
 
     loop = asyncio.get_running_loop()
-    calls: dict[signal.Signals, Callable[[], None]] = {
+    handlers: dict[signal.Signals, Callable[[], None]] = {
         signal.SIGINT: process.stop,
         signal.SIGTERM: process.stop,
         signal.SIGUSR1: lambda: process.request(Request.ARM),
         signal.SIGUSR2: lambda: process.request(Request.HALT),
         signal.SIGHUP: reloader.request,
     }
-    for number, call in calls.items():
-        loop.add_signal_handler(number, call)
+    for number, handler in handlers.items():
+        loop.add_signal_handler(number, handler)
     try:
         yield
     finally:
-        for number in calls:
+        for number in handlers:
             loop.remove_signal_handler(number)
         reloader.cancel()

@@ -1,6 +1,6 @@
-"""What a run leaves behind: a recording where nothing else is said, and a ring log where that is asked for.
+"""What a run records: by default a recording in the folder of recordings, on request a ring log.
 
-There is a recorder in every run, be it one that is switched off: an operator may want to record from now on.
+Every run has a recorder, even if it is switched off: the operator may switch it on during the run.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ import contextlib
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -21,57 +20,59 @@ if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
     from drivers.driver import RobotDriver
+    from runtime.console.frames.frame_encoder import RecordingStatus
     from runtime.cycle.process import Observers
     from runtime.cycle.step import CycleRecord, State
     from runtime.cycle.summary import RecordingRow
     from runtime.recording.recorder import Recorder
     from runtime.recording.ring_log_writer import RingLogWriter
-    from runtime.recording.writer import RecorderStatus
     from runtime.timing.cycle_stats import CycleStats
 
     OnCycle = Callable[[CycleRecord, State, CycleStats, RobotDriver], None]
 
 RING_LOG: Final = ".csv"
-"""A file to record into that ends so becomes a ring log."""
+"""Suffix of a file that is written as a ring log."""
 
 
 class RunRecording:
-    """The recorder of a run, and what is told about it.
+    """The recorder and the ring log of a run: what they observe, and how they are.
 
     Parameters
     ----------
     recorder : Recorder
-        On or off.
+        Switched on or off.
     ring_log : RingLogWriter, optional
-        None where there is no ring log.
-    asked_for : bool
-        Whether the user named the file: then trouble with it is the command's failure.
+        None without a ring log.
+    is_requested : bool
+        Whether the user named the file: then an incomplete file is an error of the command.
     """
 
-    def __init__(self, recorder: Recorder, ring_log: RingLogWriter | None = None, *, asked_for: bool = False) -> None:
+    def __init__(
+        self, recorder: Recorder, ring_log: RingLogWriter | None = None, *, is_requested: bool = False
+    ) -> None:
         self._recorder = recorder
         self._ring_log = ring_log
-        self._asked_for = asked_for
-        self._told: dict[Recorder | RingLogWriter, str | None] = {}
+        self._is_requested = is_requested
+        self._reported: dict[Recorder | RingLogWriter, str | None] = {}
 
     def on_log(self, event: Mapping[str, Any]) -> None:
-        """Take a line of the log."""
+        """Record a line of the log."""
         self._recorder.on_log(event)
 
     def observers(self, view: OnCycle | None, log: FilteringBoundLogger) -> Observers:
-        """Return who watches the run: the recorder and the view."""
+        """Return the observers of the run: recorder, ring log and view; errors of the disk go to the log."""
         from runtime.cycle.process import Observers
 
         recorder, ring_log = self._recorder, self._ring_log
-        parts = (recorder,) if ring_log is None else (ring_log, recorder)
+        writers = (recorder,) if ring_log is None else (ring_log, recorder)
 
         def on_cycle(record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
             recorder.on_cycle(record, state)
-            for part in parts:
-                standing = part.status
-                if standing.last_error != self._told.get(part):
-                    self._told[part] = standing.last_error
-                    log.warning("the recording has trouble", reason=standing.last_error, dropped=standing.dropped)
+            for writer in writers:
+                status = writer.status
+                if status.last_error != self._reported.get(writer):
+                    self._reported[writer] = status.last_error
+                    log.warning("the recording is incomplete", reason=status.last_error, dropped=status.dropped)
             if view is not None:
                 view(record, state, stats, driver)
 
@@ -79,70 +80,74 @@ class RunRecording:
         return Observers(on_cycle, on_firing, recorder.on_bytes, recorder.on_settings)
 
     def on_summary(self, summary: Mapping[str, Any]) -> None:
-        """Take what the run says of itself at its end."""
+        """Record the summary of the run."""
         self._recorder.on_summary(summary)
 
     @property
-    def now(self) -> RecorderStatus | None:
-        """The recording under way; None where there is none."""
-        standing = self._recorder.status
-        return standing if standing.is_writing and self._recorder.is_enabled else None
+    def now(self) -> RecordingStatus | None:
+        """The recording being written; None if there is none."""
+        from runtime.console.frames.frame_encoder import RecordingStatus
+
+        status = self._recorder.status
+        if not status.is_writing or not self._recorder.is_enabled:
+            return None
+        return RecordingStatus(status.file, status.bytes, status.dropped)
 
     async def record(self, *, on: bool) -> str | None:
-        """Begin another recording with the next cycle, or end the one under way; returns why not."""
+        """Start a recording with the next cycle, or end the current one; return None, or why that is impossible."""
         self._recorder.set_enabled(on=on)
         return None
 
     async def bookmark(self, text: str) -> str | None:
-        """Put a mark into the recording; returns why not."""
+        """Add a bookmark to the recording; return None, or why that is impossible."""
         return self._recorder.bookmark(text)
 
     def probe(self) -> str | None:
-        """Say how the recorder or the ring log's writer ended; None while they run. See `runtime.support.health`."""
+        """Return how the thread of recorder or ring log ended; None while they run. See `runtime.support.health`."""
         return self._recorder.probe() or (None if self._ring_log is None else self._ring_log.probe())
 
     @property
-    def _asked(self) -> Recorder | RingLogWriter:
-        """What the run is to leave behind first of all."""
+    def _main_writer(self) -> Recorder | RingLogWriter:
+        """The ring log if there is one, otherwise the recorder."""
         return self._recorder if self._ring_log is None else self._ring_log
 
     @property
-    def standing(self) -> RecordingRow | None:
-        """How ring log or recording stands, for the summary; None where there was none."""
-        standing = asdict(self._asked.status)
-        if not standing["files"] and standing["last_error"] is None:
+    def summary_row(self) -> RecordingRow | None:
+        """The state of the ring log or the recording, for the summary of the run; None if there was none."""
+        status = self._main_writer.status
+        if not status.files and status.last_error is None:
             return None
         return {
-            "file": standing["file"],
-            "files": standing["files"],
-            "bytes": standing["bytes"],
-            "dropped": standing["dropped"],
-            "trouble": standing["last_error"],
-            "sync_max_s": round(standing["sync_max_s"], 4),
+            "file": status.file,
+            "files": status.files,
+            "bytes": status.bytes,
+            "dropped": status.dropped,
+            "last_error": status.last_error,
+            "sync_max_s": round(status.sync_max_s, 4),
         }
 
-    def complain(self) -> None:
-        """Complain where the file that was asked for is not whole.
+    def raise_if_incomplete(self) -> None:
+        """Raise an error if the file that the user named is incomplete.
 
         Raises
         ------
         UserError
             The disk refused, or something was dropped.
         """
-        now = self._asked.status
-        if self._asked_for and (now.last_error is not None or now.dropped):
-            what, salvage = "recording", " (`echolocate recover` reads what is there)"
+        status = self._main_writer.status
+        if self._is_requested and (status.last_error is not None or status.dropped):
+            what, hint = "recording", " (`echolocate recover` restores what is there)"
             if self._ring_log is not None:
-                what, salvage = "ring log", ""
+                what, hint = "ring log", ""
             raise UserError(
-                f"--record: the {what} is not whole: {now.last_error or 'the disk was too slow'}; {now.dropped} "
-                f"messages are missing; make room or choose another disk{salvage}",
+                f"--record: the {what} is incomplete: {status.last_error or 'the disk was too slow'}; "
+                f"{status.dropped} messages are missing; make room or choose another disk{hint}",
                 FAILED,
             )
 
 
 @contextlib.contextmanager
-def kept(
+def open_run_recording(
     settings: Settings,
     record: str | None,
     *,
@@ -150,34 +155,34 @@ def kept(
     emulated: bool,
     clock: Callable[[], float] = time.monotonic,
 ) -> Iterator[RunRecording]:
-    """Keep what is to be kept while the run lasts.
+    """Yield the recording of a run, and complete its files at the end.
 
     Parameters
     ----------
     settings : Settings
-        The run's, with the section `recording`.
+        Of the run.
     record : str, optional
-        A file by name: a recording, or a ring log where it ends in ``.csv``.
+        File to record into: a ring log if its name ends in ``.csv``, otherwise a recording.
     no_record : bool
-        Keep no recording in the folder either, unless it is switched on.
+        Whether the recording in the folder of recordings is switched off at the start.
     emulated : bool
-        Whether the settings' world is what the robot meets.
+        Whether the robot drives in the world of the settings.
     clock : callable
-        The run's, s.
+        The run's clock, s.
     """
     from runtime.recording.recorder import Recorder
     from runtime.recording.ring_log_writer import RingLogWriter
     from runtime.recording.storage import RecordingTarget, RotatingFolder, SingleFile, recordings_folder
 
     run = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{os.getpid()}"
-    place: RecordingTarget = RotatingFolder(recordings_folder(settings.recording), run, settings.recording)
+    target: RecordingTarget = RotatingFolder(recordings_folder(settings.recording), run, settings.recording)
     with contextlib.ExitStack() as stack:
         ring_log: RingLogWriter | None = None
         if record is not None and Path(record).suffix.lower() == RING_LOG:
             on, ring_log = False, stack.enter_context(RingLogWriter(Path(record)))
         elif record is not None:
-            on, place = True, SingleFile(Path(record))
+            on, target = True, SingleFile(Path(record))
         else:
             on = settings.recording.enabled and not no_record
-        recorder = stack.enter_context(Recorder(settings, place, clock, emulated=emulated, on=on))
-        yield RunRecording(recorder, ring_log, asked_for=record is not None)
+        recorder = stack.enter_context(Recorder(settings, target, clock, emulated=emulated, on=on))
+        yield RunRecording(recorder, ring_log, is_requested=record is not None)

@@ -15,7 +15,7 @@ from config.load import load_settings
 from drivers.emulator.robot_device import GroundTruth
 from drivers.messages import Pose
 from runtime.cli.app import run_command
-from runtime.cli.commands.run_recording import RunRecording, kept
+from runtime.cli.commands.run_recording import RunRecording, open_run_recording
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, RUN_INFO, decode
 from runtime.recording.reader import open_recording
@@ -160,8 +160,8 @@ async def in_folder_of(
     """Keep what a short run does, as the command does."""
     settings = load_settings("hallway", ["perception.method=paper", f"recording.folder={json.dumps(str(folder))}"])
     assert settings.world is not None
-    with kept(settings, record, no_record=no_record, emulated=True) as keeping:
-        observers = keeping.observers(None, structlog.get_logger())
+    with open_run_recording(settings, record, no_record=no_record, emulated=True) as recording:
+        observers = recording.observers(None, structlog.get_logger())
 
         def on_cycle(record: CycleRecord, _truth: GroundTruth) -> None:
             pass
@@ -173,12 +173,12 @@ async def in_folder_of(
                 if observers.on_firing is not None:
                     observers.on_firing(firing)
             if record.cycle == 20:
-                act(keeping)
+                act(recording)
             if record.cycle == 21:
-                until(lambda: keeping.now is not None, "a file")
+                until(lambda: recording.now is not None, "a file")
 
         simulate(settings, settings.world, 0, 2.0, on_cycle, on_state=on_state)
-    return keeping
+    return recording
 
 
 @pytest.mark.parametrize("record", [None, "firings.csv"])
@@ -186,17 +186,17 @@ async def test_a_run_that_records_nothing_may_be_told_to(tmp_path: Path, record:
     log = None if record is None else str(tmp_path / record)
     folder = tmp_path / "runs"
 
-    def on(keeping: RunRecording) -> None:
-        assert keeping.now is None
-        assert (keeping.standing is None) == (log is None), "a ring log is there from the first"
-        keeping._recorder.set_enabled(on=True)
+    def on(recording: RunRecording) -> None:
+        assert recording.now is None
+        assert (recording.summary_row is None) == (log is None), "a ring log is there from the first"
+        recording._recorder.set_enabled(on=True)
 
-    keeping = await in_folder_of(folder, on, no_record=True, record=log)
-    assert keeping.standing is not None
+    recording = await in_folder_of(folder, on, no_record=True, record=log)
+    assert recording.summary_row is not None
     (path,) = folder.glob("*.mcap")
-    assert keeping.standing["file"] == (str(path) if log is None else log)
+    assert recording.summary_row["file"] == (str(path) if log is None else log)
     assert cycles_of(path)[0] == 22
-    keeping.complain()
+    recording.raise_if_incomplete()
 
 
 async def test_the_console_s_words() -> None:
@@ -212,7 +212,7 @@ async def test_the_console_s_words() -> None:
             return "no"
 
     recorder = Recording()
-    keeping = RunRecording(recorder, None, asked_for=False)  # type: ignore[arg-type]
-    assert await keeping.record(on=True) is None
-    assert await keeping.bookmark("here") == "no"
+    recording = RunRecording(recorder, None, is_requested=False)  # type: ignore[arg-type]
+    assert await recording.record(on=True) is None
+    assert await recording.bookmark("here") == "no"
     assert recorder.asked == [True, "here"]

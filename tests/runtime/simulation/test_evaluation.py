@@ -18,7 +18,7 @@ from config.load import load_settings
 from config.settings import Settings
 from config.world import WorldConfig
 from runtime.cli.app import run_command
-from runtime.cli.commands.experiment import one_way
+from runtime.cli.commands.experiment import stop_at_leg_end
 from runtime.recording.reader import open_recording
 from runtime.simulation.evaluation import run_seed, summarise
 
@@ -41,7 +41,7 @@ def found(outcome: dict[str, Any]) -> int:
 
 
 def settings_of(name: str) -> tuple[Settings, WorldConfig]:
-    settings = one_way(load_settings(name))
+    settings = stop_at_leg_end(load_settings(name))
     assert settings.world is not None
     return settings, settings.world
 

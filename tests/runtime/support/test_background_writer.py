@@ -25,7 +25,7 @@ def test_a_writer_that_blocks_fills_no_memory_and_reports_the_gap() -> None:
         accepted = [writer.put(b"%d\n" % number) for number in range(1, CAPACITY + 100)]
         assert (accepted.count(True), accepted.count(False)) == (CAPACITY - 1, 100)
         assert writer.is_full
-        assert (writer.lost, writer.trouble) == (100, "items come faster than they can be written")
+        assert (writer.lost, writer.last_error) == (100, "items come faster than they can be written")
         assert writer.put(b"last\n", always=True), "some items are queued even if the queue is full"
         release.set()
     assert written[:3] == [b"0\n", b"100 missing\n", b"1\n"]
@@ -48,7 +48,7 @@ def test_an_item_that_cannot_be_written_is_counted_and_the_next_is_tried(error: 
             writer.put(number)
     assert written == list(range(0, 2 * BATCH, 2))
     assert writer.lost == BATCH
-    assert writer.trouble in {"No space left on device", "write to closed file"}
+    assert writer.last_error in {"No space left on device", "write to closed file"}
 
 
 def test_closing_gives_up_on_a_writer_that_blocks() -> None:
@@ -59,7 +59,7 @@ def test_closing_gives_up_on_a_writer_that_blocks() -> None:
             writer.put(number)
     assert writer.is_stuck
     assert writer.lost == 3
-    assert writer.trouble == "the last items were not written within 0 s"
+    assert writer.last_error == "the last items were not written within 0 s"
     assert not finished.is_set(), "the file stays open as long as a write is under way"
     release.set()
     assert finished.wait(5.0)
@@ -78,7 +78,7 @@ def test_a_thread_that_fails_is_reported_and_what_is_queued_counts_as_lost() -> 
         writer.put(2)
         assert str(writer.probe()).startswith("ZeroDivisionError: planted")
     assert writer.lost == 2
-    assert str(writer.trouble).startswith("its thread failed: ZeroDivisionError: planted")
+    assert str(writer.last_error).startswith("its thread failed: ZeroDivisionError: planted")
     assert finished == []
 
 

@@ -169,7 +169,7 @@ def test_rosbag2(hall_run: Path, timeline: Timeline, tmp_path: Path, capsys: pyt
     assert len(newest["/tf_static"].transforms) == 25
     capsys.readouterr()
     assert run_command(["export", str(hall_run), "--to", "rosbag2", "--out", str(bag)]) == FAILED
-    assert "is there already" in capsys.readouterr().err
+    assert "exists; a bag needs a new folder" in capsys.readouterr().err
 
 
 def test_a_ring_log_out_and_in(hall_run: Path, hall_log: Path, timeline: Timeline, tmp_path: Path) -> None:
@@ -220,13 +220,13 @@ def test_an_uneven_ring_for_foxglove(tmp_path: Path) -> None:
     assert scans[0].end_angle == pytest.approx(math.radians(10.0))
 
 
-@pytest.mark.parametrize("form", sorted(export.NEEDED))
+@pytest.mark.parametrize("form", sorted(export.OPTIONAL_PACKAGES))
 def test_a_missing_extra_is_one_line(
     form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     import importlib.util
 
-    module, package = export.NEEDED[form]
+    module, package = export.OPTIONAL_PACKAGES[form]
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name, *a: None if name == module else find(name, *a))
     assert run_command(["export", str(tmp_path / "any.mcap"), "--to", form, "--out", str(tmp_path / "out")]) == FAILED

@@ -12,7 +12,7 @@ import pytest
 from config.errors import FAILED, UserError
 from config.load import load_settings
 from drivers.messages import Firing, Pose
-from runtime.cli.commands.run_recording import kept
+from runtime.cli.commands.run_recording import open_run_recording
 from runtime.recording import ring_log_writer as ringlog_writer
 from runtime.recording.ring_log import read_ring_log
 from runtime.recording.ring_log_writer import RingLogWriter
@@ -57,27 +57,29 @@ def test_a_ring_log_on_a_disk_that_stands_still_fills_no_memory(
 def test_a_full_disk_under_a_ring_log_is_told_and_counted(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.symlink_to("/dev/full")
-    with kept(SETTINGS, str(path), no_record=False, emulated=True) as keeping:
-        put = keeping.observers(None, None).on_firing  # type: ignore[arg-type]
+    with open_run_recording(SETTINGS, str(path), no_record=False, emulated=True) as recording:
+        put = recording.observers(None, None).on_firing  # type: ignore[arg-type]
         assert put is not None
         for number in range(2000):
             put(firing(number))
-        until(lambda: keeping.standing is not None and keeping.standing["dropped"] > 0, "trouble")
-        assert keeping.probe() is None, "the drive goes on"
-    with pytest.raises(UserError, match=r"--record: the ring log is not whole: .*log\.csv.* No space left") as caught:
-        keeping.complain()
+        until(lambda: recording.summary_row is not None and recording.summary_row["dropped"] > 0, "trouble")
+        assert recording.probe() is None, "the drive goes on"
+    with pytest.raises(
+        UserError, match=r"--record: the ring log is incomplete: .*log\.csv.* No space left"
+    ) as caught:
+        recording.raise_if_incomplete()
     assert caught.value.exit_code == FAILED
 
 
 def test_a_ring_log_that_is_whole_is_no_complaint(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
-    with kept(SETTINGS, str(path), no_record=False, emulated=True) as keeping:
-        put = keeping.observers(None, None).on_firing  # type: ignore[arg-type]
+    with open_run_recording(SETTINGS, str(path), no_record=False, emulated=True) as recording:
+        put = recording.observers(None, None).on_firing  # type: ignore[arg-type]
         assert put is not None
         for number in range(100):
             put(firing(number))
-    keeping.complain()
+    recording.raise_if_incomplete()
     assert len(list(read_ring_log(path))) == 100
-    assert keeping.standing == {
-        "file": str(path), "files": 1, "bytes": path.stat().st_size, "dropped": 0, "trouble": None, "sync_max_s": 0.0,
+    assert recording.summary_row == {
+        "file": str(path), "files": 1, "bytes": path.stat().st_size, "dropped": 0, "last_error": None, "sync_max_s": 0.0,
     }  # fmt: skip

@@ -14,7 +14,7 @@ import pytest
 from config.load import load_settings
 from config.settings import LogConfig
 from drivers.driver import RobotDriver
-from runtime.cli.commands.run import on_port
+from runtime.cli.commands.run import with_port
 from runtime.console.playback.replay_client import ReplayClient
 from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess
@@ -51,7 +51,7 @@ async def test_a_player_and_a_report_beside_a_robot_that_drives(tmp_path: Path) 
     players = ReplayClient(tmp_path, PROGRAM, lambda: str(recorded))
     async with start_emulator([], clock) as (port, _):
         with open_log(LogConfig(file=str(tmp_path / "log.jsonl")), terminal=False) as log:
-            process = RobotProcess(on_port(settings, port), log, Observers(on_cycle), clock)
+            process = RobotProcess(with_port(settings, port), log, Observers(on_cycle), clock)
             running = asyncio.create_task(process.run(arm=True, seconds=None))
             async with asyncio.timeout(TIMEOUT_S):
                 while not (records and records[-1].mode.mode is Mode.DRIVE):

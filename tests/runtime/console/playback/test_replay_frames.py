@@ -9,7 +9,7 @@ import orjson
 import pytest
 
 from perception.edits import DeleteSegments
-from runtime.cli.commands.serve_console import PLAYED
+from runtime.cli.commands.serve_console import REPLAY_PROGRAM
 from runtime.console.playback.replay_client import ReplayClient
 from runtime.console.playback.replay_cursor import ReplayCursor
 from runtime.console.playback.replay_frames import make_replay_frames
@@ -66,7 +66,7 @@ def test_the_changes_of_all_frames_come_to_the_map_of_the_last(folder: Path) -> 
 @pytest.mark.realtime
 @pytest.mark.usefixtures("warm_kernels")
 async def test_a_page_is_shown_a_recording(folder: Path) -> None:
-    page, players = Page(), ReplayClient(folder, PLAYED, lambda: None)
+    page, players = Page(), ReplayClient(folder, REPLAY_PROGRAM, lambda: None)
     try:
         about = (await players.open(page, "hall.mcap"))["about"]
         assert (len(about["ring"]["mounts"]), about["emulated"], "units" in about) == (24, True, False)

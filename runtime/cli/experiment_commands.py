@@ -1,0 +1,69 @@
+"""The command that repeats the paper's experiments in simulation: `experiment`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from config.errors import WRONG_CALL, UserError
+from runtime.cli.options import Count, JsonFile, ModelFiles, Sets, Several, UnitsOption, WorldFile
+from runtime.simulation.scene_names import SceneName
+
+
+def experiment(
+    name: Literal["hallway", "irregular", "budget"],
+    /,
+    *,
+    method: Literal["paper", "bayes"] = "bayes",
+    scene: SceneName | None = None,
+    world: WorldFile = None,
+    model: ModelFiles = (),
+    budget_ms: Annotated[tuple[float, ...], Several] = (0.2, 0.5, 1.0, 2.0, 5.0),
+    quanta: Annotated[tuple[float, ...], Several] = (),
+    seeds: Count = 1,
+    out: str | None = None,
+    json: JsonFile = None,
+    units: UnitsOption = "ft",
+    sets: Sets = (),
+) -> int:
+    """Repeat an experiment of the paper in virtual time, and print its Table 2.
+
+    Parameters
+    ----------
+    name
+        The simulated hallway, the irregular hallway of the real run, or the effect of smaller time budgets for
+        perception in a hall of 40 drums.
+    method
+        How objects are recognised.
+    scene
+        Instead of driving, give perception the readings of this scene at exact poses.
+    budget_ms
+        For `budget`: processor time of perception per cycle, ms.
+    quanta
+        For `budget`: refinement quanta per cycle instead of a time, which makes the table repeatable; 0.1 is one in
+        ten cycles.
+    seeds
+        Repeat with this many seeds, starting at 0.
+    out
+        Folder for recording, figures and report of the run with seed 0.
+    """
+    from runtime.cli.commands.experiment import run_experiment, run_scenes
+
+    sets = (*sets, f"perception.method={method}")
+    if seeds < 1:
+        raise UserError(f"--seeds {seeds}: must be at least 1", WRONG_CALL)
+    if scene is not None and out is not None:
+        raise UserError("--scene gives perception readings without a run: there is nothing to record in --out",
+                        WRONG_CALL)  # fmt: skip
+    if name == "budget":
+        from runtime.cli.commands.budget import run_budgets
+
+        if scene is not None or world is not None:
+            raise UserError("experiment budget has a hall of its own: leave out --scene and --world", WRONG_CALL)
+        return run_budgets(
+            sets, budgets_ms=budget_ms, quanta=quanta, models=model, seeds=seeds, json_file=json, units=units
+        )
+    if scene is not None:
+        if name != "hallway" or world is not None:
+            raise UserError("--scene is a hallway of its own: call `experiment hallway`, without --world", WRONG_CALL)
+        return run_scenes(scene, sets, models=model, seeds=seeds, json_file=json, units=units)
+    return run_experiment(name, sets, world=world, models=model, seeds=seeds, out=out, json_file=json, units=units)

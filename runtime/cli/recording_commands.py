@@ -1,0 +1,182 @@
+"""The commands that read the recording of a finished run: `replay`, `recover`, `figures`, `report`, `export`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Final, Literal
+
+from cyclopts import Parameter
+
+from config.errors import WRONG_CALL, UserError
+from runtime.cli.options import Flag, JsonFile, ModelFiles, RobotFile, Sets, UnitsOption
+
+if TYPE_CHECKING:
+    from runtime.analysis.timeline_sources import TimelineSource
+
+File = Annotated[str, Parameter(help="Recording (MCAP) or ring log (CSV).")]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class SourceOptions:
+    """What a file may not contain itself: its world, and for ring logs the robot and the models."""
+
+    world: Annotated[
+        str | None, Parameter(help="World file, or the name of a shipped one, if FILE does not contain its world.")
+    ] = None
+    robot: Annotated[str | None, Parameter(help="Ring logs: robot file, or the name of a shipped one.")] = None
+    models: Annotated[
+        tuple[str, ...],
+        Parameter(
+            name="--model",
+            negative="",
+            show_default=False,
+            help="Ring logs: object model, file or name of a shipped one; may be repeated.",
+        ),
+    ] = ()
+
+    def timeline_source(self, file: str, sets: tuple[str, ...]) -> TimelineSource:
+        """Return the file together with these options, as the analysis takes them."""
+        from runtime.analysis.timeline_sources import TimelineSource
+
+        return TimelineSource(file, sets, self.robot, self.models, self.world)
+
+
+NO_OPTIONS: Final = SourceOptions()
+
+
+def replay(
+    log: str,
+    /,
+    *,
+    verify: Annotated[bool, Flag] = False,
+    other: Annotated[str | None, Parameter(name="--with")] = None,
+    since: Annotated[float, Parameter(name="--from", show_default=False)] = 0.0,
+    until: Annotated[float | None, Parameter(name="--to")] = None,
+    speed: float | None = None,
+    robot: RobotFile = None,
+    model: ModelFiles = (),
+    json: JsonFile = None,
+    units: UnitsOption = "m",
+    sets: Sets = (),
+) -> int:
+    """Replay a recording cycle by cycle, or run perception over a ring log.
+
+    Parameters
+    ----------
+    log
+        Recording (MCAP), or ring log (CSV with the header t,x,y,theta[,ring_yaw],r00,r01,…).
+    verify
+        Fail unless every cycle is reproduced bit by bit.
+    other
+        Compare with the run under the settings of this run file. So does --set.
+    since
+        Start this many seconds after the first recorded cycle.
+    until
+        End this many seconds after the first recorded cycle.
+    speed
+        Show the run this many times as fast as it was; by default it is replayed as fast as possible.
+    """
+    from pathlib import Path
+
+    from runtime.recording.reader import is_recording
+
+    if is_recording(Path(log)):
+        from runtime.cli.commands.replay_recording import Span, replay_recording
+
+        return replay_recording(
+            log, sets, span=Span(since, until, speed), verify=verify, other=other, robot=robot, models=model,
+            json_file=json, units=units,
+        )  # fmt: skip
+    if verify or other is not None or since or until is not None or speed is not None:
+        raise UserError(
+            f"{log}: is a ring log; --verify, --with, --from, --to and --speed apply to recordings (MCAP) only",
+            WRONG_CALL,
+        )
+    from runtime.cli.commands.replay_ring_log import replay_log
+
+    return replay_log(log, sets, robot=robot, models=model, json_file=json, units=units)
+
+
+def recover(recording: str, /, *, out: str | None = None) -> int:
+    """Restore what can be read of a damaged or incomplete recording.
+
+    Parameters
+    ----------
+    recording
+        Damaged file; it is not changed.
+    out
+        File to write; by default NAME-recovered.mcap in the same folder.
+    """
+    from runtime.cli.commands.recover import recover_recording
+
+    return recover_recording(recording, out)
+
+
+def figures(
+    file: File,
+    /,
+    *,
+    out: str,
+    still: Annotated[bool, Flag] = False,
+    options: SourceOptions = NO_OPTIONS,
+    units: UnitsOption = "m",
+    sets: Sets = (),
+) -> int:
+    """Draw a run as the paper does: raw data, segments, clusters, matched models, and an animation of it all.
+
+    Parameters
+    ----------
+    out
+        Folder for the figures: SVG, PDF and PNG; the animation as GIF, and as MP4 if ffmpeg is installed.
+    still
+        Leave out the animation.
+    """
+    from runtime.cli.commands.figures import draw_figures
+
+    return draw_figures(options.timeline_source(file, sets), out, moving=not still, units=units)
+
+
+def report(
+    file: File,
+    /,
+    *,
+    out: str | None = None,
+    options: SourceOptions = NO_OPTIONS,
+    units: UnitsOption = "m",
+    sets: Sets = (),
+) -> int:
+    """Write one HTML page about a run: Table 2 with errors, figures, timing, link, stop reasons, settings.
+
+    Parameters
+    ----------
+    out
+        Page to write; by default NAME.html in the folder of FILE.
+    """
+    from runtime.cli.commands.report import write_report
+
+    return write_report(options.timeline_source(file, sets), out, units=units)
+
+
+def export(
+    file: File,
+    /,
+    *,
+    to: Literal["csv", "parquet", "foxglove", "rosbag2", "ringlog"],
+    out: str,
+    options: SourceOptions = NO_OPTIONS,
+    sets: Sets = (),
+) -> int:
+    """Convert a run to the format of another program; some formats need `pip install 'echolocate[export]'`.
+
+    Parameters
+    ----------
+    to
+        Tables (csv, or parquet*), an MCAP for Foxglove (foxglove*), a ROS 2 bag (rosbag2*), or the firings of a
+        recording as a ring log (ringlog). Formats with * need the extra `export`.
+    out
+        Folder for tables, new folder for a bag, otherwise the file to write.
+    """
+    from runtime.cli.commands.export import export_run
+
+    return export_run(options.timeline_source(file, sets), to, out)

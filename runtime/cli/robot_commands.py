@@ -1,0 +1,142 @@
+"""The commands that run or describe a robot: `run`, `emulate`, `check`, `service`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from runtime.cli.options import ConfigFile, Count, Flag, JsonFile, RobotFile, Sets, UnitsOption, WorldFile
+
+
+def run(
+    config: ConfigFile = None,
+    /,
+    *,
+    port: str | None = None,
+    arm: Annotated[bool, Flag] = False,
+    seconds: float | None = None,
+    headless: Annotated[bool, Flag] = False,
+    record: str | None = None,
+    no_record: Annotated[bool, Flag] = False,
+    no_console: Annotated[bool, Flag] = False,
+    json: JsonFile = None,
+    world: str | None = None,
+    seed: Count = 0,
+    trace: str | None = None,
+    faults: str | None = None,
+    units: UnitsOption = "m",
+    sets: Sets = (),
+) -> int:
+    """Run the robot's main process; without a port, on an emulated robot.
+
+    Signals: SIGUSR1 arms the robot, SIGUSR2 halts it, SIGHUP reloads the run file, SIGINT and SIGTERM end the run.
+
+    Parameters
+    ----------
+    port
+        Serial port of the robot, which then waits in READY until it is armed.
+    arm
+        Arm the robot once, at the start. The emulated robot is armed without this option.
+    seconds
+        End the run after this time.
+    headless
+        Print log lines instead of the live view.
+    record
+        Record into this file instead of the folder of recordings; a name that ends in .csv gives a ring log.
+    no_record
+        Record nothing.
+    no_console
+        Do not serve the operator console.
+    world
+        Emulated robot: world file, or the name of a shipped one.
+    seed
+        Emulated robot: seed of everything random.
+    trace
+        Emulated robot: write its true poses to this file (CSV).
+    faults
+        Emulated robot: fault script.
+    """
+    from runtime.cli.commands.run import EmulatorOptions, run_robot
+
+    emulator = EmulatorOptions(world=world, seed=seed, trace=trace, faults=faults)
+    return run_robot(
+        config, sets, port=port, arm=arm, seconds=seconds, headless=headless, record=record,
+        no_record=no_record, no_console=no_console, json_file=json, emulator=emulator, units=units,
+    )  # fmt: skip
+
+
+def emulate(
+    *,
+    world: WorldFile = None,
+    link: str | None = None,
+    faults: str | None = None,
+    seed: Count = 0,
+    robot: RobotFile = None,
+    trace: str | None = None,
+    latency: str | None = None,
+    clock: float = 0.0,
+    control: Annotated[bool, Flag] = False,
+    config: ConfigFile = None,
+    sets: Sets = (),
+    end_with_parent: Annotated[bool, Parameter(negative="", show=False)] = False,
+) -> int:
+    """Emulate a robot on a pseudo-terminal until interrupted.
+
+    Parameters
+    ----------
+    link
+        Create a symbolic link to the pseudo-terminal at this path.
+    faults
+        Fault script.
+    seed
+        Seed of everything random.
+    trace
+        Write the true poses to this file (CSV), 100 rows a second.
+    latency
+        Write to this file (CSV) when each echo was sent and when each drive command arrived.
+    clock
+        Initial value of the robot's own clock, s; it wraps at 4294.967296.
+    control
+        Take time control from standard input, one line per request: pace NUMBER HOST_S RUN_S FACTOR UNTIL_S. From the
+        host's monotonic time HOST_S on, the robot's time starts at RUN_S and runs FACTOR times as fast until UNTIL_S.
+        The time reached is reported on standard output: at NUMBER RUN_S.
+    config
+        Run file that names robot and world.
+    """
+    from runtime.cli.commands.emulate import emulate_robot
+
+    return emulate_robot(
+        config, sets, world=world, robot=robot, link=link, faults=faults, seed=seed, trace=trace,
+        latency=latency, clock_s=clock, end_with_parent=end_with_parent, control=control,
+    )  # fmt: skip
+
+
+def check(config: str, /, *, sets: Sets = ()) -> int:
+    """Check a configuration file; report each error with its place and the likely fix.
+
+    Parameters
+    ----------
+    config
+        Run, robot, world or model file, or the name of a shipped run.
+    """
+    from runtime.cli.commands.check import check_config
+
+    return check_config(config, sets)
+
+
+def service(
+    config: ConfigFile = None, /, *, port: str | None = None, user: str | None = None, sets: Sets = ()
+) -> int:
+    """Print a systemd unit that runs the robot's main process from boot on; it never arms the robot.
+
+    Parameters
+    ----------
+    port
+        Serial port of the robot, unless the run file names one.
+    user
+        User that runs it; by default one that systemd creates.
+    """
+    from runtime.cli.commands.service import print_service
+
+    return print_service(config, sets, port=port, user=user)
