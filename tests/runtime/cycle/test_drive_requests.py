@@ -19,21 +19,21 @@ from runtime.cycle.drive_requests import Legs
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import STANDSTILL, CycleRecord, DriveRequest, Order
-from tests.runtime.script import PERIOD_S, Script
+from tests.runtime.scripted_step import PERIOD_S, ScriptedRobot
 
 FORWARD = Teleoperate(0.2, 0.1)
 
 
-class Told(Script):
+class RequestedRobot(ScriptedRobot):
     """A robot on paper that is told what to drive."""
 
-    def tell(self, drive_request: DriveRequest | None, **found: object) -> CycleRecord:
+    def request_drive(self, drive_request: DriveRequest | None, **found: object) -> CycleRecord:
         self.drive_request = drive_request
         return self.cycle(**found)  # type: ignore[arg-type]
 
-    def going(self, pose: Pose) -> CycleRecord:
+    def move_to(self, pose: Pose) -> CycleRecord:
         self.pose = pose
-        return self.tell(None)
+        return self.request_drive(None)
 
 
 def near(v: float, w: float) -> Any:
@@ -41,108 +41,108 @@ def near(v: float, w: float) -> Any:
     return Twist(pytest.approx(v), pytest.approx(w))  # type: ignore[arg-type]
 
 
-def told(*sets: str) -> Told:
-    return Told(load_settings("hallway", ["perception.method=paper", *sets])) if sets else Told()
+def robot(*sets: str) -> RequestedRobot:
+    return RequestedRobot(load_settings("hallway", ["perception.method=paper", *sets])) if sets else RequestedRobot()
 
 
-def driving(*sets: str) -> Told:
-    script = told(*sets)
+def driving(*sets: str) -> RequestedRobot:
+    script = robot(*sets)
     script.driving()
     return script
 
 
-def standing(script: Told) -> str:
+def hold_reason(script: RequestedRobot) -> str:
     """Return why it stands, nothing where it does not."""
     return script.state.hold_reason or ""
 
 
-def arm(script: Told) -> CycleRecord:
-    record = script.tell(None, request=Request.ARM)
+def arm(script: RequestedRobot) -> CycleRecord:
+    record = script.request_drive(None, request=Request.ARM)
     assert record.command is Order.RELEASE
     while script.state.mode.mode is not Mode.DRIVE:
-        record = script.tell(None)
+        record = script.request_drive(None)
         assert record.mode.mode is Mode.DRIVE or record.command in {STANDSTILL, None}
     return record
 
 
-def test_without_a_wish_it_is_the_legs_as_ever() -> None:
+def test_without_a_drive_request_the_legs_are_driven() -> None:
     script = driving()
-    record = script.tell(None)
+    record = script.request_drive(None)
     assert script.state.drive_request == Legs()
     assert record.command == near(0.3, 0.0)
     assert script.state.vectors == (
         Response("move_ahead", 1.0, 0.0), Response("avoid_static_obstacle", 0.0, 0.0), Response("sum", 1.0, 0.0),
     )  # fmt: skip
-    assert standing(script) == ""
+    assert hold_reason(script) == ""
 
 
-def test_a_goal_is_gone_to_reached_and_stood_at() -> None:
+def test_a_goal_is_approached_and_the_robot_stands_there() -> None:
     script = driving("behaviors.move_to_goal.success_radius_m=0.2")
-    assert script.tell(Goal(0.0, 5.0)).command == near(0.0, script.settings.body.turn_max_rad_s)
+    assert script.request_drive(Goal(0.0, 5.0)).command == near(0.0, script.settings.body.turn_max_rad_s)
     to_goal = script.state.vectors[0]
     assert to_goal.schema == "move_to_goal"
     assert (to_goal.x, to_goal.y) == pytest.approx((0.0, 1.0))
-    assert script.going(Pose(0.0, 1.0, math.pi / 2)).command == near(0.3, 0.0)
+    assert script.move_to(Pose(0.0, 1.0, math.pi / 2)).command == near(0.3, 0.0)
     speeds = []
     for y in (4.3, 4.5, 4.7):
-        command = script.going(Pose(0.0, y, math.pi / 2)).command
+        command = script.move_to(Pose(0.0, y, math.pi / 2)).command
         assert isinstance(command, Twist)
         speeds.append(command.v)
     assert all(later < earlier for earlier, later in pairwise(speeds)), "it comes in slowly"
-    assert standing(script) == ""
-    record = script.going(Pose(0.0, 4.9, math.pi / 2))
+    assert hold_reason(script) == ""
+    record = script.move_to(Pose(0.0, 4.9, math.pi / 2))
     assert (record.mode.mode, record.command) == (Mode.DRIVE, STANDSTILL)
-    assert standing(script) == "the goal (0.00 m, 5.00 m) is reached"
-    assert script.going(Pose(0.0, 3.0, 0.0)).command == STANDSTILL, "pushed away it does not set out again"
-    command = script.tell(Goal(0.0, 5.0)).command
+    assert hold_reason(script) == "the goal (0.00 m, 5.00 m) is reached"
+    assert script.move_to(Pose(0.0, 3.0, 0.0)).command == STANDSTILL, "pushed away it does not set out again"
+    command = script.request_drive(Goal(0.0, 5.0)).command
     assert command != STANDSTILL, "told again it does"
-    assert standing(script) == ""
+    assert hold_reason(script) == ""
 
 
-def test_the_hand_drives_while_it_speaks_and_stops_within_a_quarter_second() -> None:
+def test_teleoperation_drives_while_velocities_arrive_and_stops_within_a_quarter_second() -> None:
     script = driving()
     begin_s = script.run_s + PERIOD_S
     for _ in range(10):
-        record = script.tell(FORWARD)
+        record = script.request_drive(FORWARD)
         assert record.command == near(0.2, 0.1)
-        assert standing(script) == ""
+        assert hold_reason(script) == ""
     last_s = script.run_s
     assert last_s - begin_s > 0.4, "longer than one word holds"
-    while (record := script.tell(None)).command != STANDSTILL:
+    while (record := script.request_drive(None)).command != STANDSTILL:
         assert record.command == near(0.2, 0.1)
     assert 0.19 < script.run_s - last_s < 0.251
     assert record.mode.mode is Mode.DRIVE
-    assert "no velocity arrives from an operator" in standing(script)
+    assert "no velocity arrives from an operator" in hold_reason(script)
     assert script.state.drive_request == TELEOPERATION_ENDED
     for _ in range(50):
-        assert script.tell(None).command == STANDSTILL
-    assert script.tell(FORWARD).command != STANDSTILL
+        assert script.request_drive(None).command == STANDSTILL
+    assert script.request_drive(FORWARD).command != STANDSTILL
 
 
-def test_the_hand_is_limited_by_echoes_and_by_what_a_word_says_of_itself() -> None:
+def test_teleoperation_is_limited_by_echoes_and_by_the_validity_of_a_velocity() -> None:
     """3 m of free space; the schema of the settings may be switched off, the clearance may not."""
     for avoid in ("true", "false"):
         script = driving(f"behaviors.teleoperation.avoid={avoid}", "behaviors.arbiter.clearance_m=3.0")
-        assert script.tell(FORWARD).command == near(0.0, 0.1)
+        assert script.request_drive(FORWARD).command == near(0.0, 0.1)
         assert [r.schema for r in script.state.vectors] == [
             "teleoperation", *(["avoid_static_obstacle"] if avoid == "true" else []), "sum",
         ]  # fmt: skip
     script = driving()
-    script.tell(replace(FORWARD, valid_s=0.12))
-    assert script.tell(None).command != STANDSTILL
-    assert script.tell(None).command == STANDSTILL
+    script.request_drive(replace(FORWARD, valid_s=0.12))
+    assert script.request_drive(None).command != STANDSTILL
+    assert script.request_drive(None).command == STANDSTILL
 
 
 @pytest.mark.parametrize("drive_request", [Legs(), Goal(3.0, 0.0), FORWARD], ids=["legs", "goal", "hand"])
-def test_no_wish_moves_a_robot_that_is_not_driving(drive_request: DriveRequest) -> None:
-    script = told()
+def test_no_drive_request_moves_a_robot_that_is_not_in_drive(drive_request: DriveRequest) -> None:
+    script = robot()
     for line in (LineState.CLOSED, LineState.HANDSHAKE):
-        assert script.tell(drive_request, line=line, firing=False, odometry=False).command is None
+        assert script.request_drive(drive_request, line=line, firing=False, odometry=False).command is None
     for _ in range(20):
-        assert script.tell(drive_request).command == STANDSTILL
-    script.tell(drive_request, request=Request.HALT)
+        assert script.request_drive(drive_request).command == STANDSTILL
+    script.request_drive(drive_request, request=Request.HALT)
     for _ in range(20):
-        record = script.tell(drive_request)
+        record = script.request_drive(drive_request)
         assert (record.mode.mode, record.command) == (Mode.SAFE_STOP, None)
     assert script.state.vectors == ()
 
@@ -159,83 +159,83 @@ STOPS: list[dict[str, object]] = [
 @pytest.mark.parametrize("found", STOPS, ids=["halt", "disarm", "line", "bumper", "reboot"])
 @pytest.mark.parametrize("drive_request", [Goal(30.0, 0.0), FORWARD], ids=["goal", "hand"])
 @pytest.mark.parametrize("at_once", [True, False], ids=["said as it stops", "said before"])
-def test_after_a_stop_goal_and_hand_do_not_resume(
+def test_after_a_stop_goal_and_teleoperation_do_not_resume(
     found: dict[str, object], drive_request: DriveRequest, at_once: bool
 ) -> None:
     script = driving()
-    assert script.tell(drive_request).command != STANDSTILL
-    script.tell(drive_request if at_once else None, **found)
+    assert script.request_drive(drive_request).command != STANDSTILL
+    script.request_drive(drive_request if at_once else None, **found)
     assert script.state.mode.mode is not Mode.DRIVE
     assert script.state.drive_request == TELEOPERATION_ENDED
     assert arm(script).command == STANDSTILL
     for _ in range(20):
-        record = script.tell(None)
+        record = script.request_drive(None)
         assert (record.mode.mode, record.command) == (Mode.DRIVE, STANDSTILL)
-    assert "no velocity arrives from an operator" in standing(script)
-    assert script.tell(Legs()).command == near(0.3, 0.0)
+    assert "no velocity arrives from an operator" in hold_reason(script)
+    assert script.request_drive(Legs()).command == near(0.3, 0.0)
 
 
-def test_the_legs_go_on_after_a_re_arm_as_they_always_did() -> None:
+def test_the_legs_resume_after_a_re_arm() -> None:
     script = driving()
-    script.tell(None, request=Request.HALT)
+    script.request_drive(None, request=Request.HALT)
     assert script.state.drive_request == Legs()
     assert arm(script).command == near(0.3, 0.0)
 
 
-def test_a_stop_that_the_cycle_finds_itself_takes_the_goal_as_well() -> None:
+def test_a_stop_by_the_arbiter_drops_the_goal() -> None:
     script = driving()
-    script.tell(Goal(30.0, 0.0))
+    script.request_drive(Goal(30.0, 0.0))
     while script.state.mode.mode is Mode.DRIVE:
-        record = script.tell(None, firing=False)
+        record = script.request_drive(None, firing=False)
     assert "ring has not reported" in str(record.mode.reason)
     assert script.state.drive_request == TELEOPERATION_ENDED
     assert script.state.vectors == ()
 
 
-def test_a_goal_named_before_arming_is_gone_to_after_it() -> None:
-    script = told()
-    script.tell(Goal(9.0, 0.0))
+def test_a_goal_set_before_arming_is_driven_after_it() -> None:
+    script = robot()
+    script.request_drive(Goal(9.0, 0.0))
     assert arm(script).command == near(0.3, 0.0)
     assert script.state.vectors[0].schema == "move_to_goal"
 
 
-def test_disarmed_it_stands_in_ready_and_can_be_armed_again() -> None:
+def test_a_disarmed_robot_stands_in_ready_and_can_be_armed_again() -> None:
     script = driving()
-    record = script.tell(None, request=Request.DISARM)
+    record = script.request_drive(None, request=Request.DISARM)
     assert (record.mode.mode, record.command) == (Mode.READY, STANDSTILL)
     assert "disarmed by the operator" in str(record.mode.reason)
     for _ in range(20):
-        record = script.tell(None)
+        record = script.request_drive(None)
         assert (record.mode.mode, record.command) == (Mode.READY, STANDSTILL)
     assert arm(script).mode.reason is None
 
 
-def test_disarming_while_it_is_being_armed_ends_that_and_shuts_an_open_latch() -> None:
-    script = told()
-    script.tell(None)
-    assert script.tell(None, request=Request.ARM).command is Order.RELEASE
-    assert script.tell(None, request=Request.DISARM).command == STANDSTILL
+def test_disarming_during_arming_ends_it_and_sets_the_latch_again() -> None:
+    script = robot()
+    script.request_drive(None)
+    assert script.request_drive(None, request=Request.ARM).command is Order.RELEASE
+    assert script.request_drive(None, request=Request.DISARM).command == STANDSTILL
     for _ in range(40):
-        assert script.tell(None).command == STANDSTILL
-    script.tell(None, request=Request.HALT)
-    assert script.tell(None, request=Request.ARM).command is Order.RELEASE
-    record = script.tell(None, request=Request.DISARM)
+        assert script.request_drive(None).command == STANDSTILL
+    script.request_drive(None, request=Request.HALT)
+    assert script.request_drive(None, request=Request.ARM).command is Order.RELEASE
+    record = script.request_drive(None, request=Request.DISARM)
     assert (record.mode.mode, record.command) == (Mode.SAFE_STOP, Order.HALT)
     for _ in range(40):
-        assert script.tell(None).command is None
+        assert script.request_drive(None).command is None
 
 
-def test_legs_that_are_done_begin_anew_when_they_are_asked_for() -> None:
+def test_legs_that_are_done_begin_again_on_request() -> None:
     script = driving("behaviors.move_ahead.distance_m=1.0", "behaviors.move_ahead.at_end=stop")
-    assert script.going(Pose(1.1, 0.0, 0.0)).command == STANDSTILL
-    assert standing(script) == "the leg is done"
-    assert script.tell(None).command == STANDSTILL
-    assert script.tell(Legs()).command == near(0.3, 0.0)
-    script.going(Pose(1.5, 0.0, 0.0))
-    script.tell(Goal(9.0, 0.0))
-    script.tell(Legs())
-    assert script.going(Pose(2.0, 0.0, 0.0)).command != STANDSTILL, "one under way goes on"
-    assert script.going(Pose(2.2, 0.0, 0.0)).command == STANDSTILL
+    assert script.move_to(Pose(1.1, 0.0, 0.0)).command == STANDSTILL
+    assert hold_reason(script) == "the leg is done"
+    assert script.request_drive(None).command == STANDSTILL
+    assert script.request_drive(Legs()).command == near(0.3, 0.0)
+    script.move_to(Pose(1.5, 0.0, 0.0))
+    script.request_drive(Goal(9.0, 0.0))
+    script.request_drive(Legs())
+    assert script.move_to(Pose(2.0, 0.0, 0.0)).command != STANDSTILL, "one under way goes on"
+    assert script.move_to(Pose(2.2, 0.0, 0.0)).command == STANDSTILL
 
 
 @pytest.mark.parametrize(
@@ -245,19 +245,19 @@ def test_legs_that_are_done_begin_anew_when_they_are_asked_for() -> None:
         Teleoperate(0.0, -math.inf), Teleoperate(0.1, 0.0, math.nan), Teleoperate(0.1, 0.0, -1.0),
     ],
 )  # fmt: skip
-def test_a_wish_that_is_none_changes_nothing(drive_request: DriveRequest) -> None:
+def test_an_invalid_drive_request_changes_nothing(drive_request: DriveRequest) -> None:
     script = driving()
-    assert script.tell(Goal(9.0, 0.0)).command == near(0.3, 0.0)
-    record = script.tell(drive_request)
+    assert script.request_drive(Goal(9.0, 0.0)).command == near(0.3, 0.0)
+    record = script.request_drive(drive_request)
     assert record.command == near(0.3, 0.0)
     assert script.state.drive_request == Goal(9.0, 0.0)
     assert record.inputs.drive_request is drive_request
 
 
 @pytest.mark.parametrize("drive_request", [Legs(), Goal(9.0, 0.0), FORWARD], ids=["legs", "goal", "hand"])
-def test_vectors_that_allow_no_decision_are_not_shown(drive_request: DriveRequest) -> None:
+def test_vectors_of_a_stop_are_not_shown(drive_request: DriveRequest) -> None:
     script = driving()
     script.pose = Pose(math.nan, 0.0, 0.0)
-    record = script.tell(drive_request, firing=False)
+    record = script.request_drive(drive_request, firing=False)
     assert (record.mode.mode, record.command) == (Mode.SAFE_STOP, Order.HALT)
     assert script.state.vectors == ()

@@ -18,7 +18,7 @@ from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
 from runtime.timing.cycle_stats import CycleStats
-from tests.runtime.virtual import in_virtual_time
+from tests.runtime.virtual_time import in_virtual_time
 
 pytestmark = [pytest.mark.compiled, pytest.mark.promise("P2")]
 
@@ -45,7 +45,7 @@ class Sent:
         return next((at_s for at_s, frame in self.frames if isinstance(frame, kind) and at_s >= since_s), None)
 
 
-def test_a_thousand_halts_at_any_moment(monkeypatch: pytest.MonkeyPatch, measured: Callable[[str], None]) -> None:
+def test_a_thousand_halts_at_random_moments(monkeypatch: pytest.MonkeyPatch, measured: Callable[[str], None]) -> None:
     rng, sent, waits_s = random.Random(2), Sent(), list[float]()
 
     with in_virtual_time(monkeypatch, "perception.method=paper") as (loop, settings, robot, links):
@@ -101,7 +101,7 @@ def test_a_thousand_halts_at_any_moment(monkeypatch: pytest.MonkeyPatch, measure
     measured(f"{TRIALS} requests at random moments of virtual time: HALT on the line ≤ {worst_ms:.1f} ms later")
 
 
-def test_a_velocity_that_was_held_up_on_its_way_out_is_followed_by_a_halt(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_velocity_delayed_before_the_line_is_followed_by_a_halt(monkeypatch: pytest.MonkeyPatch) -> None:
     """SIGSTOP can come between the last look at the clock and the line: then the base had stopped by itself."""
     with in_virtual_time(monkeypatch) as (loop, settings, _robot, _links):
         sent, held = Sent(), list[float]()

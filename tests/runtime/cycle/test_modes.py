@@ -119,7 +119,7 @@ def test_transition(before: ModeState, seen: ModeInputs, mode: Mode, reason: str
         assert after.entered_run_s == NOW
 
 
-def test_a_part_that_has_failed_ends_every_mode_but_a_fault_and_an_arm_changes_nothing() -> None:
+def test_a_failed_part_ends_every_mode_but_fault_and_arming_does_not_help() -> None:
     seen = replace(QUIET, fault="the part `link` has ended")
     for before in (CONNECTING, READY, DRIVE, STOPPED, arming(READY, WAITED), arming(STOPPED, WAITED)):
         after = advance_by(before, seen)
@@ -136,7 +136,7 @@ def test_a_part_that_has_failed_ends_every_mode_but_a_fault_and_an_arm_changes_n
     assert advance_by(DRIVE, replace(seen, line=LineState.CLOSED)).reason == seen.fault, "the cause, not what it does"
 
 
-def test_the_table_shows_every_mode_from_every_other_that_leads_there() -> None:
+def test_the_table_covers_every_possible_transition() -> None:
     shown = {(before.mode, mode) for before, _, mode, _, _ in TRANSITIONS}
     everywhere = {
         Mode.CONNECTING: {Mode.CONNECTING, Mode.READY, Mode.SAFE_STOP},
@@ -209,21 +209,21 @@ def test_cycles_that_overrun_too_often_stop_a_drive_and_end_an_arming() -> None:
     ],
     ids=["waited just long enough", "the latch has its whole second", "a gap as long as may be", "grace to its end"],
 )
-def test_to_the_very_end_of_a_patience(before: ModeState, seen: ModeInputs, mode: Mode) -> None:
+def test_exactly_at_the_end_of_a_time_limit(before: ModeState, seen: ModeInputs, mode: Mode) -> None:
     assert advance_by(before, seen).mode is mode
 
 
-def test_patience_in_seconds() -> None:
+def test_time_limits_in_seconds() -> None:
     """The protocol sends odometry every 20 ms and its deadman is half a second; an operator waits for one."""
     assert (ARMING_MIN_S, ARMING_MAX_S, DEADMAN_GRACE_S, GAP_MAX_S) == (0.1, 1.0, 0.5, 0.45)
 
 
-def test_modes_and_requests_are_called_what_logs_and_summaries_call_them() -> None:
+def test_modes_and_requests_have_the_names_of_logs_and_summaries() -> None:
     assert [mode.value for mode in Mode] == ["CONNECTING", "READY", "DRIVE", "SAFE_STOP", "FAULT"]
     assert [request.value for request in Request] == ["arm", "halt", "disarm"]
 
 
-def test_a_mode_entered_again_is_entered() -> None:
+def test_entering_the_same_mode_again_counts_as_entered() -> None:
     assert (CONNECTING.mode, CONNECTING.entered_run_s) == (Mode.CONNECTING, 0.0)
     assert not DRIVE.entered_since(DRIVE)
     assert not replace(DRIVE, arming_run_s=1.0, reason="another").entered_since(DRIVE)

@@ -109,7 +109,7 @@ PHASES = [2.0 + 0.0137 * k for k in range(24)]
 DOWN = (0.0, 0.05, 0.3, 1.3)
 
 
-def test_at_any_phase_it_stands_until_it_is_re_armed(measured: Callable[[str], None]) -> None:
+def test_after_a_reboot_in_any_phase_it_stands_until_re_armed(measured: Callable[[str], None]) -> None:
     """Twenty-four moments of a cycle, an odometry period and a pattern; gone for no time, and for longer than any."""
     worst_stop_s = worst_echo_s = 0.0
     for k, reboot_s in enumerate(PHASES):
@@ -177,7 +177,7 @@ def test_no_jump_in_the_map(method: Literal["paper", "bayes"], measured: Callabl
     measured(f"{method}: from the reboot on, every object in every cycle within {worst_ft:.2f} ft of a drum")
 
 
-def test_a_restart_as_the_clock_wraps_is_seen_by_the_silent_ring(measured: Callable[[str], None]) -> None:
+def test_a_restart_at_the_wrap_of_the_clock_is_detected_by_the_missing_firings(measured: Callable[[str], None]) -> None:
     """The one moment when the clock does not tell: just as it would have begun anew by itself."""
     run = Run(3.0, 0.0, clock_start_us=2**32 - 3_000_000)
     run.drive()

@@ -58,7 +58,7 @@ class Scripted:
 
 
 @pytest.mark.promise("P11")
-async def test_the_last_good_one_is_kept_until_a_better_one_comes() -> None:
+async def test_the_last_valid_configuration_is_kept_until_a_valid_one_comes() -> None:
     script = Scripted(ConfigError("a", "b"), RuntimeError("of ours"), BEFORE, SLOWER, SLOWER)
     assert await script.attempt() == "the configuration is kept"
     assert [entry.get("problem") for entry in script.log.entries] == ["a", "b"]
@@ -73,7 +73,7 @@ async def test_the_last_good_one_is_kept_until_a_better_one_comes() -> None:
     assert threading.get_ident() not in script.threads
 
 
-async def test_what_the_process_cannot_be_readied_for_is_not_taken_over() -> None:
+async def test_settings_that_cannot_be_prepared_are_not_applied() -> None:
     script = Scripted(SLOWER, SLOWER)
     script.problem = "models: no kernels"
     assert await script.attempt() == "the configuration is kept"
@@ -97,7 +97,7 @@ async def test_a_change_from_the_console_during_an_attempt_is_replaced_by_the_fi
     assert script.live_settings.undo() == ()
 
 
-async def test_asked_again_while_it_reads_it_reads_once_more() -> None:
+async def test_requests_during_an_attempt_lead_to_one_more() -> None:
     script = Scripted(BEFORE, SLOWER)
     script.go_on.clear()
     script.reloader.request()
@@ -110,7 +110,7 @@ async def test_asked_again_while_it_reads_it_reads_once_more() -> None:
     assert script.taken == [SLOWER]
 
 
-async def test_a_run_that_ends_drops_what_is_under_way() -> None:
+async def test_the_end_of_a_run_drops_the_attempt_in_progress() -> None:
     script = Scripted(SLOWER)
     script.go_on.clear()
     script.reloader.request()
@@ -122,7 +122,7 @@ async def test_a_run_that_ends_drops_what_is_under_way() -> None:
 
 
 @pytest.mark.parametrize("method", ["paper", "bayes"])
-def test_perception_goes_on_with_other_constants(method: str) -> None:
+def test_perception_continues_with_other_settings(method: str) -> None:
     """Nothing that it remembers is lost, and new values are in force at once."""
     config = PerceptionConfig.model_validate({"method": method})
     perception = Perception(BEFORE.ring, BEFORE.models, config)

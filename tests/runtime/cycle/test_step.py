@@ -9,11 +9,11 @@ from drivers.messages import Flags, Pose, Twist
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import STANDSTILL, Command, Order
-from tests.runtime.script import PERIOD_S, TIMEOUT_S, Script
+from tests.runtime.scripted_step import PERIOD_S, TIMEOUT_S, ScriptedRobot
 
 
-def test_from_greeting_to_driving() -> None:
-    script = Script()
+def test_from_connecting_to_driving() -> None:
+    script = ScriptedRobot()
     for line in (LineState.CLOSED, LineState.HANDSHAKE):
         record = script.cycle(line=line, firing=False, odometry=False)
         assert (record.mode.mode, record.command) == (Mode.CONNECTING, None)
@@ -25,7 +25,7 @@ def test_from_greeting_to_driving() -> None:
 
 
 def test_ready_keeps_the_base_at_a_standstill_and_arming_releases_once() -> None:
-    script = Script()
+    script = ScriptedRobot()
     commands = [script.cycle().command for _ in range(5)]
     assert commands == [STANDSTILL] * 5
     commands = [script.cycle(request=Request.ARM, flags=Flags.LATCHED).command]
@@ -48,8 +48,8 @@ REASONS: list[tuple[str, dict[str, object], str]] = [
 
 
 @pytest.mark.parametrize(("found", "reason"), [row[1:] for row in REASONS], ids=[row[0] for row in REASONS])
-def test_halt_exactly_on_entering_safe_stop(found: dict[str, object], reason: str) -> None:
-    script = Script().driving()
+def test_halt_is_sent_exactly_on_entering_safe_stop(found: dict[str, object], reason: str) -> None:
+    script = ScriptedRobot().driving()
     record = script.cycle(**found)  # type: ignore[arg-type]
     assert record.mode.mode is Mode.SAFE_STOP
     assert reason in str(record.mode.reason)
@@ -60,7 +60,7 @@ def test_halt_exactly_on_entering_safe_stop(found: dict[str, object], reason: st
 
 
 def test_deadman_after_its_grace() -> None:
-    script = Script().driving()
+    script = ScriptedRobot().driving()
     assert script.cycle(flags=Flags.DEADMAN).mode.mode is Mode.DRIVE
     for _ in range(12):
         script.cycle()
@@ -69,9 +69,9 @@ def test_deadman_after_its_grace() -> None:
     assert "deadman" in str(record.mode.reason)
 
 
-def test_held_up_for_longer_than_the_deadman_it_does_not_drive_on_what_it_knew() -> None:
+def test_a_gap_longer_than_the_deadman_stops_the_drive() -> None:
     """As after SIGSTOP and SIGCONT: what waits in the buffer first is from before the base stopped by itself."""
-    script = Script().driving()
+    script = ScriptedRobot().driving()
     script.run_s += 0.3
     assert isinstance(script.cycle().command, Twist)
     script.run_s += 0.6
@@ -81,7 +81,7 @@ def test_held_up_for_longer_than_the_deadman_it_does_not_drive_on_what_it_knew()
 
 
 def test_re_arming_drives_on_and_a_halt_while_arming_latches_again() -> None:
-    script = Script().driving()
+    script = ScriptedRobot().driving()
     script.cycle(request=Request.HALT)
     assert script.cycle(request=Request.ARM).command is Order.RELEASE
     record = script.cycle(request=Request.HALT)
@@ -96,7 +96,7 @@ def test_re_arming_drives_on_and_a_halt_while_arming_latches_again() -> None:
 
 def test_a_failed_re_arm_latches_again() -> None:
     """The ring is silent: the cycle that would have driven finds the next reason, with the latch open."""
-    script = Script().driving()
+    script = ScriptedRobot().driving()
     script.cycle(request=Request.HALT)
     for _ in range(round(TIMEOUT_S / PERIOD_S) + 2):
         script.cycle(firing=False)
@@ -108,7 +108,7 @@ def test_a_failed_re_arm_latches_again() -> None:
 
 
 def test_no_odometry_is_a_reason_to_stop() -> None:
-    script = Script()
+    script = ScriptedRobot()
     script.cycle(odometry=False, firing=False)
     script.cycle(odometry=False, firing=False, request=Request.ARM)
     commands: list[Command] = []
@@ -121,7 +121,7 @@ def test_no_odometry_is_a_reason_to_stop() -> None:
 
 
 def test_a_silent_ring_is_a_reason_to_stop() -> None:
-    script = Script().driving()
+    script = ScriptedRobot().driving()
     begin_s = script.robot_s
     while script.state.mode.mode is Mode.DRIVE:
         record = script.cycle(firing=False)
@@ -130,8 +130,8 @@ def test_a_silent_ring_is_a_reason_to_stop() -> None:
     assert TIMEOUT_S < script.robot_s - begin_s < TIMEOUT_S + 2 * PERIOD_S
 
 
-def test_a_poisoned_pose_is_a_stop_and_no_exception() -> None:
-    script = Script().driving()
+def test_a_pose_that_is_not_finite_is_a_stop_and_no_exception() -> None:
+    script = ScriptedRobot().driving()
     script.pose = Pose(float("nan"), 0.0, 0.0)
     record = script.cycle(firing=False)
     assert (record.mode.mode, record.command) == (Mode.SAFE_STOP, Order.HALT)

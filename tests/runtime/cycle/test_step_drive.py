@@ -19,7 +19,7 @@ from runtime.cycle.modes import Mode, ModeState
 from runtime.cycle.step import Command, CycleRecord, Inputs, Order, State, step
 from runtime.simulation.closed_loop import simulate
 from runtime.timing.refinement_budget import within_quanta_per_cycle
-from tests.runtime.script import NOTHING, PERIOD_S, SETTINGS, Script
+from tests.runtime.scripted_step import NOTHING, PERIOD_S, SETTINGS, ScriptedRobot
 
 # A drive through the hallway, every input of it on record.
 
@@ -88,7 +88,7 @@ def test_the_same_inputs_give_the_same_records_to_the_bit(drive: Drive) -> None:
     assert left_behind(state) == left_behind(drive.state)
 
 
-def test_a_change_of_one_bit_is_seen(drive: Drive) -> None:
+def test_a_change_of_one_bit_is_detected(drive: Drive) -> None:
     """That the comparison above can fail."""
     k = next(k for k, record in enumerate(drive.records) if record.new_segments)
     record = drive.records[k]
@@ -109,9 +109,9 @@ def test_one_seed_is_one_drive(drive: Drive) -> None:
     assert bits(records) == bits(drive.records)
 
 
-def script_of(drive: Drive, quanta: int) -> Iterator[tuple[Script, CycleRecord]]:
+def script_of(drive: Drive, quanta: int) -> Iterator[tuple[ScriptedRobot, CycleRecord]]:
     """Play the drive on a script, whose log tells the order of things."""
-    script = Script(quanta=quanta)
+    script = ScriptedRobot(quanta=quanta)
     for record in drive.records:
         script.log.clear()
         yield (
@@ -123,7 +123,7 @@ def script_of(drive: Drive, quanta: int) -> Iterator[tuple[Script, CycleRecord]]
 
 
 @pytest.mark.parametrize("quanta", [0, 1, 3, 50])
-def test_the_command_goes_before_refinement_and_each_quantum_is_asked_for(drive: Drive, quanta: int) -> None:
+def test_the_command_precedes_refinement_and_each_quantum_needs_permission(drive: Drive, quanta: int) -> None:
     causes = set()
     for script, record in script_of(drive, quanta):
         expected: list[object] = [("command", record.command)]
@@ -145,7 +145,7 @@ def test_the_command_goes_before_refinement_and_each_quantum_is_asked_for(drive:
     assert causes >= {0: {"nothing", "budget"}, 1: {"nothing", "budget"}}.get(quanta, {"nothing", "converged"})
 
 
-def test_refinement_of_one_cycle_resumes_where_the_last_one_stood(drive: Drive) -> None:
+def test_refinement_resumes_where_the_last_cycle_ended(drive: Drive) -> None:
     """After the last echo, by one quantum a cycle or all at once: the same resting poses to the bit."""
     echoes = [replace(record, inputs=replace(record.inputs, request=None)) for record in drive.records]
     rested = []
@@ -195,7 +195,7 @@ def test_a_reboot_clears_the_map_and_the_leg(drive: Drive) -> None:
     assert "restarted" in str(state.mode.reason)
 
 
-def test_after_a_reboot_it_perceives_as_on_the_first_day(drive: Drive) -> None:
+def test_after_a_reboot_perception_is_as_at_the_start(drive: Drive) -> None:
     used, _ = played(drive.records)
     step(
         used,
@@ -221,7 +221,7 @@ def numberless(state: State) -> object:
     return bits([replace(seen, number=None) for seen in state.perception.objects()])
 
 
-def test_without_a_budget_the_record_says_so_exactly_where_something_was_left_to_do(drive: Drive) -> None:
+def test_without_a_budget_the_record_names_the_budget_exactly_where_work_was_left(drive: Drive) -> None:
     state = fresh()
     causes = set()
     for record in drive.records:

@@ -17,7 +17,7 @@ from runtime.simulation.evaluation import DrumRow, Outcome
 SEEN = DetectedObject("semicircle", 1.0, -2.0, 0.1 + 0.2, 1e-17, 39, 2.0 / 3.0)
 
 
-def test_the_forms_are_those_of_the_public_surface() -> None:
+def test_the_summaries_have_the_fields_of_the_public_surface() -> None:
     assert list(get_type_hints(ObjectRow))[:7] == ["model", "x", "y", "theta", "sigma", "support", "score"]
     assert {"objects", "cycles", "cycle_us", "late", "link", "mode", "stop_reasons", "timing"} <= set(
         get_type_hints(RunSummary)
@@ -28,7 +28,7 @@ def test_the_forms_are_those_of_the_public_surface() -> None:
     assert set(get_type_hints(DrumRow)) == {"truth", "estimate", "error"}
 
 
-def test_an_object_comes_back_to_the_bit(tmp_path: Path) -> None:
+def test_an_object_survives_json_to_the_bit(tmp_path: Path) -> None:
     path = tmp_path / "summary.json"
     write_json(str(path), {"objects": [object_row(SEEN)], "estimate": None, "nan": math.nan})
     text = path.read_text("utf-8")

@@ -12,7 +12,7 @@ from drivers.emulator.faults import Fault, Garbage, OdometryJump, Outliers, Stuc
 from runtime.cycle.alerts import Alerts
 from runtime.cycle.modes import Mode
 from runtime.cycle.summary import in_frame
-from tests.runtime.lying import FT, Run, hallway
+from tests.runtime.emulated_run import FT, Run, hallway
 
 pytestmark = [pytest.mark.compiled]
 promise = pytest.mark.promise("P9")

@@ -36,7 +36,7 @@ from runtime.support.kernel_loader import KernelLoader
 from runtime.support.logs import LogStatus
 from runtime.support.sd_notify import SdNotifier
 from runtime.timing.cycle_stats import CycleStats
-from tests.runtime.virtual import VirtualLoop, in_virtual_time
+from tests.runtime.virtual_time import VirtualLoop, in_virtual_time
 
 pytestmark = [pytest.mark.compiled, pytest.mark.promise("P10")]
 

@@ -8,7 +8,7 @@ import pytest
 from runtime.timing.cycle_stats import KEPT_MAX, CycleStats
 
 
-def test_empty_books_say_zero() -> None:
+def test_empty_stats_are_zero() -> None:
     stats = CycleStats(0.005)
     assert stats.cycle_us() == stats.lag_us() == {"p50": 0.0, "p99": 0.0, "max": 0.0}
     assert (stats.cycles, stats.late) == (0, 0)
@@ -35,7 +35,7 @@ def test_late_is_beyond_the_limit_only() -> None:
     assert (stats.cycles, stats.late) == (4, 2)
 
 
-def test_the_worst_outlives_the_window() -> None:
+def test_the_maximum_outlives_the_window() -> None:
     stats = CycleStats(0.005)
     stats.add_cycle(1.0, 2.0)
     for _ in range(KEPT_MAX):

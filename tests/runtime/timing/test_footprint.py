@@ -27,7 +27,7 @@ print(json.dumps(stats.close()), block[0])
 """
 
 
-def test_memory_that_is_filled_is_seen() -> None:
+def test_allocated_memory_is_measured() -> None:
     """In a process of its own: what other tests have left is given back at any time."""
     done = subprocess.run([sys.executable, "-c", FILLED], cwd=ROOT, text=True, capture_output=True, check=True)
     row = json.loads(done.stdout.rpartition(" ")[0])
@@ -36,7 +36,7 @@ def test_memory_that_is_filled_is_seen() -> None:
     assert row["rss_peak_mb"] >= row["growth_mb"]
 
 
-def test_processor_time_is_a_share_of_the_wall_clock() -> None:
+def test_cpu_time_is_a_share_of_elapsed_time() -> None:
     """Not asserted is how large the share of a busy loop is: others may run on this machine."""
     stats = Footprint(MemoryPolicy())
     end_cpu_s = time.process_time() + 0.05
@@ -48,7 +48,7 @@ def test_processor_time_is_a_share_of_the_wall_clock() -> None:
     assert row["collections"] == [0, 0, 0]
 
 
-def test_its_age_grows_with_the_clock() -> None:
+def test_the_age_of_the_process_grows_with_the_clock() -> None:
     before, begin_s = age_s(), time.monotonic()
     assert before is not None
     while time.monotonic() < begin_s + 0.02:
@@ -59,7 +59,7 @@ def test_its_age_grows_with_the_clock() -> None:
     assert before > 0.0
 
 
-def test_a_system_that_tells_nothing_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_system_without_proc_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_arguments: object, **_named: object) -> str:
         raise FileNotFoundError(2, "no such file")
 

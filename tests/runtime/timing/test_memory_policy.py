@@ -19,7 +19,7 @@ def rings() -> int:
     return sum(type(thing) is Ring for thing in gc.get_objects())
 
 
-def test_nothing_is_collected_without_being_asked_for() -> None:
+def test_nothing_is_collected_automatically() -> None:
     memory = MemoryPolicy()
     with memory.driving():
         for _ in range(5000):
@@ -31,7 +31,7 @@ def test_nothing_is_collected_without_being_asked_for() -> None:
     assert rings() == 0
 
 
-def test_young_garbage_goes_in_slack_and_only_there() -> None:
+def test_young_garbage_is_collected_in_slack_only() -> None:
     memory = MemoryPolicy()
     with memory.driving():
         for _ in range(3 * EVERY_CYCLES):
@@ -46,7 +46,7 @@ def test_young_garbage_goes_in_slack_and_only_there() -> None:
         assert memory.collections == [0, 3, 0]
 
 
-def test_what_lives_at_the_start_is_not_looked_at_again() -> None:
+def test_objects_alive_at_the_start_are_not_visited_again() -> None:
     memory = MemoryPolicy()
     old = [Ring() for _ in range(1000)]
     with memory.driving():
@@ -55,7 +55,7 @@ def test_what_lives_at_the_start_is_not_looked_at_again() -> None:
     assert gc.get_freeze_count() == 0
 
 
-def test_a_collection_that_somebody_else_asked_for_is_in_the_books() -> None:
+def test_a_collection_requested_elsewhere_is_counted() -> None:
     memory = MemoryPolicy()
     with memory.driving():
         gc.collect()
@@ -64,7 +64,7 @@ def test_a_collection_that_somebody_else_asked_for_is_in_the_books() -> None:
     assert memory.collections == [0, 0, 1], "after the drive it is nobody's business"
 
 
-def test_a_process_that_collects_nothing_by_itself_stays_that_way() -> None:
+def test_automatic_collection_stays_off_where_it_was_off() -> None:
     gc.disable()
     try:
         with MemoryPolicy().driving():

@@ -51,7 +51,7 @@ def test_an_overrun_is_counted_and_the_phase_kept(took_s: float, ahead: int, mis
 
 
 @pytest.mark.parametrize(("late_s", "missed"), [(0.001, 0), (0.024, 0), (0.026, 1), (0.051, 1), (0.26, 5), (0.28, 6)])
-def test_a_loop_that_is_held_up_is_late_by_as_much_and_goes_on_in_phase(late_s: float, missed: int) -> None:
+def test_a_delayed_loop_is_late_by_the_delay_and_keeps_its_phase(late_s: float, missed: int) -> None:
     pacer = Pacer(BEGIN, PERIOD)
     on_time(pacer)
     begun = pacer.begin(BEGIN + PERIOD + late_s)
@@ -131,7 +131,7 @@ def echoes(count: int, step_s: float, jitter_s: float = 0.0, begin_s: float = BE
 
 @pytest.mark.parametrize("jitter_s", [0.0, 0.002, 0.01])
 @pytest.mark.parametrize("phase_s", [0.0, 0.001, 0.02, 0.025, 0.049])
-def test_at_the_rings_own_pace_every_echo_begins_a_cycle_at_once(jitter_s: float, phase_s: float) -> None:
+def test_at_the_rings_own_rate_every_echo_begins_a_cycle_at_once(jitter_s: float, phase_s: float) -> None:
     ring = Ring(Pacer(BEGIN, PERIOD, PERIOD), echoes(400, PERIOD, jitter_s, BEGIN + phase_s))
     for _ in range(398):
         ring.cycle()
@@ -148,7 +148,7 @@ def test_at_the_rings_own_pace_every_echo_begins_a_cycle_at_once(jitter_s: float
     [(0.025, 0.05), (0.02, 0.05), (0.033, 0.05), (0.05, 0.05), (0.06, 0.05), (0.07, 0.05), (0.1, 0.05),
      (0.17, 0.05), (0.5, 0.05), (0.05, 0.2), (0.001, 0.05)],
 )  # fmt: skip
-def test_any_step_is_followed_at_a_rate_near_the_own_one(step_s: float, period_s: float) -> None:
+def test_any_step_is_followed_at_a_rate_near_the_configured_one(step_s: float, period_s: float) -> None:
     count = math.ceil(20.0 / step_s)
     ring = Ring(Pacer(BEGIN, period_s, step_s), echoes(count, step_s, 0.02 * step_s))
     while ring.run_s < BEGIN + 19.0:
@@ -169,7 +169,7 @@ def test_any_step_is_followed_at_a_rate_near_the_own_one(step_s: float, period_s
     assert ring.pacer.missed == 0
 
 
-def test_echoes_that_stop_and_come_again() -> None:
+def test_echoes_that_stop_and_resume() -> None:
     """It goes on at its own period within two steps, and an echo is followed again at once."""
     first, pause_s = echoes(100, PERIOD, 0.001), 2.013
     ring = Ring(Pacer(BEGIN, PERIOD, PERIOD), first + [t + 100 * PERIOD + pause_s for t in first])
@@ -188,7 +188,7 @@ def test_echoes_that_stop_and_come_again() -> None:
     assert ring.pacer.missed == 0
 
 
-def test_a_lost_echo_is_waited_for_a_quarter_step_and_the_phase_kept() -> None:
+def test_the_wait_for_a_lost_echo_is_a_quarter_step_and_keeps_the_phase() -> None:
     all_of_them = echoes(60, PERIOD)
     ring = Ring(Pacer(BEGIN, PERIOD, PERIOD), all_of_them[:20] + all_of_them[21:])
     for _ in range(58):
@@ -200,7 +200,7 @@ def test_a_lost_echo_is_waited_for_a_quarter_step_and_the_phase_kept() -> None:
     assert (after.late_s, after.missed, after.echo_age_s) == (0.0, 0, 0.0)
 
 
-def test_patience_ends_where_the_deadman_needs_a_command() -> None:
+def test_the_wait_ends_where_the_deadman_needs_a_command() -> None:
     period_s = 0.4
     ring = Ring(Pacer(BEGIN, period_s, period_s, 0.225), echoes(3, period_s))
     for _ in range(20):
@@ -212,7 +212,7 @@ def test_patience_ends_where_the_deadman_needs_a_command() -> None:
 @pytest.mark.parametrize(
     ("held_s", "late_s", "missed"), [(0.03, 0.0, 0), (0.06, 0.011, 0), (0.11, 0.061, 1), (0.31, 0.261, 5)]
 )
-def test_what_holds_the_loop_makes_an_echo_late_from_when_it_was_expected(
+def test_a_busy_loop_makes_an_echo_late_from_its_expected_arrival(
     held_s: float, late_s: float, missed: int
 ) -> None:
     ring = Ring(Pacer(BEGIN, PERIOD, PERIOD), echoes(100, PERIOD))
@@ -235,7 +235,7 @@ def test_what_holds_the_loop_makes_an_echo_late_from_when_it_was_expected(
     st.floats(0.0, 0.05),
     st.integers(0, 2**32),
 )
-def test_never_a_burst_and_never_starved_whatever_comes(
+def test_never_a_burst_and_never_starved_for_any_echoes(
     cycles: list[tuple[float, float]], step_s: float, jitter_s: float, seed: int
 ) -> None:
     chance = random.Random(seed)

@@ -47,18 +47,18 @@ def refusing(monkeypatch: pytest.MonkeyPatch) -> Libc:
     return libc
 
 
-def test_nothing_is_asked_for_that_nobody_named(refusing: Libc) -> None:
+def test_only_configured_precedence_is_requested(refusing: Libc) -> None:
     assert apply_realtime(NOTHING) == []
     assert refusing.calls == []
 
 
-def test_nothing_is_asked_for_by_default() -> None:
+def test_nothing_is_requested_by_default() -> None:
     default = RealtimeConfig()
     assert (default.slice_s, default.priority, default.core, default.lock_memory) == (None, None, None, False)
 
 
 @pytest.mark.usefixtures("refusing")
-def test_every_refusal_names_the_setting_the_reason_and_the_way_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_refusal_names_the_setting_the_reason_and_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("runtime.timing.realtime.platform.machine", lambda: "x86_64")
     core = min(os.sched_getaffinity(0))
     refusals = apply_realtime(RealtimeConfig(slice_s=0.001, priority=7, core=core, lock_memory=True))
@@ -70,13 +70,13 @@ def test_every_refusal_names_the_setting_the_reason_and_the_way_out(monkeypatch:
     assert "ulimit -l" in refusals[2]
 
 
-def test_a_core_that_is_not_there_is_named_beside_those_that_are() -> None:
+def test_a_missing_core_is_refused_with_the_list_of_present_ones() -> None:
     (line,) = apply_realtime(RealtimeConfig(core=4_000))
     assert line.startswith("realtime.core = 4000 is not a core this process may use (")
     assert str(min(os.sched_getaffinity(0))) in line
 
 
-def test_a_machine_whose_system_call_is_not_known_is_left_alone(
+def test_no_system_call_on_an_unknown_machine(
     refusing: Libc, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("runtime.timing.realtime.platform.machine", lambda: "abacus")
@@ -97,7 +97,7 @@ assert ("realtime.core" in named) == (os.sched_getaffinity(0) != {core}), refusa
 """
 
 
-def test_in_earnest_what_is_not_refused_is_so() -> None:
+def test_on_this_system_granted_requests_take_effect() -> None:
     """In a process of its own: nothing of it may stay with the tests that follow."""
     done = subprocess.run(
         [sys.executable, "-c", IN_EARNEST], cwd=ROOT, text=True, capture_output=True, timeout=60, check=False

@@ -21,7 +21,7 @@ from runtime.cycle.step import CycleRecord, State
 from runtime.cycle.summary import RunSummary
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.time_control import ENDED, HANGS, LEAD_S, NO_CYCLE, REAL_ROBOT, EmulatorTimeControl, NoTimeControl
-from tests.runtime.held import Held, held
+from tests.runtime.paused_time import PausableRun, pausable_run
 
 pytestmark = pytest.mark.compiled
 
@@ -56,7 +56,7 @@ class Watched:
 Act = Callable[[RobotProcess, Watched], Awaitable[None]]
 
 
-def run(it: Held, act: Act) -> tuple[RunSummary, Watched]:
+def run(it: PausableRun, act: Act) -> tuple[RunSummary, Watched]:
     """Drive, do something to it, and end."""
     watched = Watched(spend=it.loop.spend)
     process = RobotProcess(
@@ -87,8 +87,8 @@ def lived_s(robot: RobotDevice) -> float:
     return robot.truth.emulated_s
 
 
-def test_a_pause_of_any_length_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    with held(monkeypatch) as it:
+def test_a_pause_of_any_length_is_invisible_to_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pausable_run(monkeypatch) as it:
 
         async def act(_process: RobotProcess, watched: Watched) -> None:
             for pause_s in (0.0, 0.4, LONG_S):
@@ -116,8 +116,8 @@ def test_a_pause_of_any_length_is_not_there(monkeypatch: pytest.MonkeyPatch) -> 
     assert max(b - a for a, b in itertools.pairwise(firings)) < 1.5 * step_s, "no firing is missing"
 
 
-def test_the_base_never_notices_a_pause_and_nothing_moves_meanwhile(monkeypatch: pytest.MonkeyPatch) -> None:
-    with held(monkeypatch) as it:
+def test_a_pause_is_invisible_to_the_base_and_nothing_moves_in_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pausable_run(monkeypatch) as it:
 
         async def act(process: RobotProcess, watched: Watched) -> None:
             assert await it.control.pause() is None
@@ -139,8 +139,8 @@ def test_the_base_never_notices_a_pause_and_nothing_moves_meanwhile(monkeypatch:
     assert summary["stop_reasons"] == ["halted by the operator; re-arm to go on"]
 
 
-def test_one_step_is_one_cycle_and_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    with held(monkeypatch) as it:
+def test_one_step_is_one_cycle_and_one_period(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pausable_run(monkeypatch) as it:
 
         async def act(_process: RobotProcess, watched: Watched) -> None:
             assert await it.control.pause() is None
@@ -165,8 +165,8 @@ def test_one_step_is_one_cycle_and_its_time(monkeypatch: pytest.MonkeyPatch) -> 
     assert (summary["link"]["bad"], summary["link"]["lost"]) == (0, 0)
 
 
-def test_a_step_of_a_run_that_goes_on_pauses_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    with held(monkeypatch) as it:
+def test_a_step_pauses_a_run_that_is_not_paused(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pausable_run(monkeypatch) as it:
 
         async def act(_process: RobotProcess, watched: Watched) -> None:
             assert await it.control.single_step() is None
@@ -180,8 +180,8 @@ def test_a_step_of_a_run_that_goes_on_pauses_it(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize("factor", [0.1, 0.5, 3.0, 10.0])
-def test_another_speed_is_another_speed_and_nothing_else(monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
-    with held(monkeypatch) as it:
+def test_another_speed_changes_nothing_else(monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
+    with pausable_run(monkeypatch) as it:
 
         async def act(_process: RobotProcess, watched: Watched) -> None:
             assert await it.control.set_speed(factor) is None
@@ -206,7 +206,7 @@ def test_another_speed_is_another_speed_and_nothing_else(monkeypatch: pytest.Mon
 @pytest.mark.parametrize("hold_s", [0.01, 0.2, 3.0])
 def test_fast_motion_waits_for_a_slow_process(monkeypatch: pytest.MonkeyPatch, hold_s: float) -> None:
     """A machine that cannot keep up with ten times real time is slower, and no reason to stop."""
-    with held(monkeypatch) as it:
+    with pausable_run(monkeypatch) as it:
 
         async def act(_process: RobotProcess, watched: Watched) -> None:
             assert await it.control.set_speed(10.0) is None
@@ -222,7 +222,7 @@ def test_fast_motion_waits_for_a_slow_process(monkeypatch: pytest.MonkeyPatch, h
 
 
 def test_fast_motion_waits_for_slow_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
-    with held(monkeypatch) as it:
+    with pausable_run(monkeypatch) as it:
 
         async def act(_process: RobotProcess, watched: Watched) -> None:
             assert await it.control.set_speed(10.0) is None
@@ -235,7 +235,7 @@ def test_fast_motion_waits_for_slow_cycles(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_a_pause_in_fast_motion_keeps_its_speed(monkeypatch: pytest.MonkeyPatch) -> None:
-    with held(monkeypatch) as it:
+    with pausable_run(monkeypatch) as it:
 
         async def act(_process: RobotProcess, watched: Watched) -> None:
             assert await it.control.set_speed(4.0) is None
@@ -259,8 +259,8 @@ def test_a_pause_in_fast_motion_keeps_its_speed(monkeypatch: pytest.MonkeyPatch)
     assert (summary["mode"], summary["stop_reasons"]) == ("DRIVE", [])
 
 
-def test_a_run_that_is_paused_ends_in_good_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    with held(monkeypatch) as it:
+def test_a_paused_run_ends_in_good_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pausable_run(monkeypatch) as it:
 
         async def act(_process: RobotProcess, _watched: Watched) -> None:
             assert await it.control.pause() is None
@@ -271,8 +271,8 @@ def test_a_run_that_is_paused_ends_in_good_order(monkeypatch: pytest.MonkeyPatch
     assert summary["mode"] == "DRIVE"
 
 
-def test_an_emulator_that_hangs_is_told_and_the_run_stops_for_its_silence(monkeypatch: pytest.MonkeyPatch) -> None:
-    with held(monkeypatch) as it:
+def test_a_hanging_emulator_is_reported_and_the_run_stops_for_its_silence(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pausable_run(monkeypatch) as it:
 
         async def act(_process: RobotProcess, watched: Watched) -> None:
             it.links[0].is_hung = True
@@ -288,10 +288,10 @@ def test_an_emulator_that_hangs_is_told_and_the_run_stops_for_its_silence(monkey
 
 
 @pytest.mark.parametrize("when", ["running", "paused", "pausing"])
-def test_an_emulator_that_dies_is_told_and_the_run_goes_on_to_its_stop(
+def test_an_emulator_that_ends_is_reported_and_the_run_goes_on_to_its_stop(
     monkeypatch: pytest.MonkeyPatch, when: str
 ) -> None:
-    with held(monkeypatch) as it:
+    with pausable_run(monkeypatch) as it:
 
         async def act(_process: RobotProcess, watched: Watched) -> None:
             asked: asyncio.Task[str | None] | None = None
@@ -317,7 +317,7 @@ def test_a_thousand_random_commands(monkeypatch: pytest.MonkeyPatch) -> None:
     import random
 
     rng = random.Random(7)
-    with held(monkeypatch, "perception.method=paper", "behaviors.move_ahead.at_end=turn_back") as it:
+    with pausable_run(monkeypatch, "perception.method=paper", "behaviors.move_ahead.at_end=turn_back") as it:
 
         async def act(_process: RobotProcess, watched: Watched) -> None:
             calls: list[Callable[[], Awaitable[str | None]]] = [
@@ -340,8 +340,8 @@ def test_a_thousand_random_commands(monkeypatch: pytest.MonkeyPatch) -> None:
     assert max(b - a for a, b in itertools.pairwise(firings)) < 1.5 * step_s
 
 
-def test_what_cannot_be_asked(monkeypatch: pytest.MonkeyPatch) -> None:
-    with held(monkeypatch) as it:
+def test_invalid_requests_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pausable_run(monkeypatch) as it:
 
         async def before_the_first_cycle(control: EmulatorTimeControl) -> None:
             assert await control.pause() == NO_CYCLE
@@ -352,7 +352,7 @@ def test_what_cannot_be_asked(monkeypatch: pytest.MonkeyPatch) -> None:
         it.loop.run_until_complete(before_the_first_cycle(it.control))
 
 
-async def test_a_real_robot_s_time_is_nobody_s() -> None:
+async def test_the_time_of_a_real_robot_cannot_be_controlled() -> None:
     control = NoTimeControl()
     for answer in (await control.pause(), await control.resume(), await control.single_step(),
                    await control.set_speed(2.0)):  # fmt: skip
@@ -361,6 +361,6 @@ async def test_a_real_robot_s_time_is_nobody_s() -> None:
 
 
 def test_the_settings_are_those_of_the_hall(monkeypatch: pytest.MonkeyPatch) -> None:
-    with held(monkeypatch) as it:
+    with pausable_run(monkeypatch) as it:
         assert isinstance(it.settings, Settings)
         assert 1.0 / it.settings.cycle.rate_hz == CYCLE_S

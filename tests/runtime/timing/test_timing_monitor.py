@@ -153,7 +153,7 @@ class Run:
         return begun
 
 
-def test_ten_thousand_delays_are_booked_to_whoever_made_them_and_none_is_invented() -> None:
+def test_ten_thousand_delays_are_attributed_to_their_causes_and_none_is_invented() -> None:
     run = Run()
     run.begin()
     injected = delays(10_000, 11)
@@ -175,7 +175,7 @@ def test_ten_thousand_delays_are_booked_to_whoever_made_them_and_none_is_invente
     assert timing["callbacks"]["link receive"]["p50"] == pytest.approx(RECEIVE_US, abs=0.2)
 
 
-def test_without_delays_there_is_nothing_to_blame() -> None:
+def test_without_delays_there_are_no_causes() -> None:
     run = Run()
     run.begin()
     for _ in range(2_000):
@@ -202,7 +202,7 @@ def test_overruns_in_a_row_are_counted_until_a_cycle_keeps_its_time() -> None:
     assert (run.timing_monitor.overruns_in_a_row, run.timing_monitor.main_cause) == (0, "")
 
 
-def test_what_the_watch_saw_has_a_name() -> None:
+def test_a_stack_sample_names_the_cause() -> None:
     run, sights = Run(), [StackSample("Recorder.flush", "fsync"), StackSample("RobotProcess.run", "View.on_cycle")]
     run.timing_monitor = TimingMonitor(run.stats, run.machine.read, lambda: sights[0], ("link receive",))
     run.receive = run.timing_monitor.timed("link receive", run._at_receive)
@@ -215,7 +215,7 @@ def test_what_the_watch_saw_has_a_name() -> None:
     assert run.stats.causes["observers (in View.on_cycle)"] == 1
 
 
-def test_names_are_bounded() -> None:
+def test_the_number_of_causes_is_bounded() -> None:
     stats = CycleStats(LATE_US * US)
     for number in range(1000):
         stats.add_cause(f"callback {number}")
@@ -293,7 +293,7 @@ def test_the_step_marks_its_phases_and_no_overrun_delays_a_stop(
 # The real clocks.
 
 
-def test_the_meter_tells_work_from_sleep() -> None:
+def test_the_clock_sampler_distinguishes_work_from_sleep() -> None:
     meter = ClockSampler()
     before = meter.read()
     time.sleep(0.02)
@@ -316,7 +316,7 @@ def hold(watch: StallSampler) -> None:
         pass
 
 
-async def test_the_watch_names_the_callback_that_holds_the_loop() -> None:
+async def test_the_stall_sampler_names_the_callback_that_blocks_the_loop() -> None:
     watch = StallSampler()
     with watch.active():
         asyncio.get_running_loop().call_soon(hold, watch)
@@ -328,7 +328,7 @@ async def test_the_watch_names_the_callback_that_holds_the_loop() -> None:
         assert watch.sample is None
 
 
-async def test_the_watch_sees_nobody_where_the_loop_sleeps() -> None:
+async def test_the_stall_sampler_finds_nothing_while_the_loop_sleeps() -> None:
     watch, looks = StallSampler(), list[None]()
     look = watch._take_sample
 

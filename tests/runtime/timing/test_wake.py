@@ -29,7 +29,7 @@ async def waker(request: pytest.FixtureRequest) -> AsyncIterator[Waker]:
     made.close()
 
 
-async def test_it_never_wakes_before_the_deadline(waker: Waker) -> None:
+async def test_a_sleep_never_ends_before_the_deadline(waker: Waker) -> None:
     for _ in range(20):
         deadline_s = time.monotonic() + 0.0015
         assert not await waker.until(deadline_s)
@@ -37,14 +37,14 @@ async def test_it_never_wakes_before_the_deadline(waker: Waker) -> None:
         assert time.monotonic() >= deadline_s - 1e-6
 
 
-async def test_news_ends_the_sleep(waker: Waker) -> None:
+async def test_a_wake_ends_the_sleep(waker: Waker) -> None:
     begin_s = time.monotonic()
     asyncio.get_running_loop().call_later(0.005, waker.wake)
     assert await waker.until(begin_s + FAR_S)
     assert time.monotonic() < begin_s + 0.5 * FAR_S
 
 
-async def test_news_while_nobody_sleeps_ends_the_next_sleep_and_only_that(waker: Waker) -> None:
+async def test_a_wake_outside_a_sleep_ends_the_next_sleep_only(waker: Waker) -> None:
     waker.wake()
     waker.wake()
     assert await waker.until(time.monotonic() + FAR_S)
@@ -60,7 +60,7 @@ async def test_the_timer_of_a_sleep_that_was_ended_early_does_not_end_the_next_o
     assert time.monotonic() >= deadline_s - 1e-6
 
 
-async def test_a_deadline_long_past_still_lets_the_loop_take_in_what_had_arrived(waker: Waker) -> None:
+async def test_pending_input_is_processed_at_a_deadline_long_past(waker: Waker) -> None:
     """After an overrun the cycle must not begin with stale inputs while new ones wait in the kernel."""
     read, write = os.pipe()
     loop = asyncio.get_running_loop()
@@ -76,7 +76,7 @@ async def test_a_deadline_long_past_still_lets_the_loop_take_in_what_had_arrived
         os.close(write)
 
 
-async def test_what_arrived_together_with_the_deadline_is_taken_in(waker: Waker) -> None:
+async def test_input_that_arrives_at_the_deadline_is_processed(waker: Waker) -> None:
     read, write = os.pipe()
     os.set_blocking(read, False)
     loop = asyncio.get_running_loop()
@@ -117,7 +117,7 @@ async def test_a_cancelled_sleep_leaves_a_waker_that_works(waker: Waker) -> None
     assert await waker.until(time.monotonic() + FAR_S)
 
 
-async def test_the_timer_is_given_back() -> None:
+async def test_the_timer_is_released() -> None:
     gc.collect()  # or files that earlier tests have left go meanwhile
     before = open_files()
     for _ in range(3):
@@ -132,7 +132,7 @@ async def test_a_system_without_timerfd_gets_the_loops_timer(monkeypatch: pytest
     assert isinstance(best_timer(lambda: None), LoopTimer)
 
 
-async def test_deadlines_are_those_of_the_clock_it_was_given() -> None:
+async def test_deadlines_are_those_of_the_given_clock() -> None:
     waker = Waker(lambda: time.monotonic() + 1000.0)
     begin_s = time.monotonic()
     try:

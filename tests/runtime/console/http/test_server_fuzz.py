@@ -29,7 +29,7 @@ from runtime.support.kernel_loader import KernelLoader
 from runtime.timing.cycle_stats import CycleStats
 from tests.runtime.console.console_case import FREE_PORT, ConsoleCase, open_console
 from tests.runtime.console.sample_messages import ASYNC_COMMANDS, EDITS, ROBOT_REQUESTS
-from tests.runtime.virtual import in_virtual_time
+from tests.runtime.virtual_time import in_virtual_time
 
 AT_THE_DESK = 70_000
 OVER_THE_WIRE = 30_000

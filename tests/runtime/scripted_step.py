@@ -40,7 +40,7 @@ class Perceiving(Perception):
 
 
 @dataclass
-class Script:
+class ScriptedRobot:
     """A robot on paper: cycles at 20 Hz, each hearing odometry at the robot's time and a firing if there is one."""
 
     settings: Settings = SETTINGS
@@ -83,7 +83,7 @@ class Script:
         self.log.clear()
         return step(self.state, inputs, self.settings, lambda c: self.log.append(("command", c)), self.may_refine)
 
-    def driving(self) -> Script:
+    def driving(self) -> ScriptedRobot:
         """Arm and go on until it drives."""
         record = self.cycle()
         assert (record.mode.mode, record.command) == (Mode.READY, STANDSTILL)

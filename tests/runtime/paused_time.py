@@ -19,13 +19,13 @@ from drivers.registry import make_device
 from runtime.timing.run_clock import ScaledClock
 from runtime.timing.time_control import EmulatorTimeControl
 from runtime.timing.wake import LoopTimer
-from tests.runtime.virtual import STEP_S, MemoryLink, VirtualLoop
+from tests.runtime.virtual_time import STEP_S, MemoryLink, VirtualLoop
 
-DEAF_S = 0.001
+TRANSIT_S = 0.001
 """A law is on its way for so long."""
 
 
-class HeldLink(MemoryLink):
+class ScaledTimeLink(MemoryLink):
     """A line to a robot that lives by its follower's time; exchanges go on where that stands still."""
 
     follower: TimeScaleFollower
@@ -50,23 +50,23 @@ class HeldLink(MemoryLink):
                 self._turn = self._loop.call_later(pause_s, self._exchange)
 
 
-class Held(NamedTuple):
+class PausableRun(NamedTuple):
     """What a test holds in its hands."""
 
     loop: VirtualLoop
     settings: Settings
     robot: RobotDevice
-    links: list[HeldLink]
+    links: list[ScaledTimeLink]
     control: EmulatorTimeControl
     follower: TimeScaleFollower
 
 
 @contextlib.contextmanager
-def held(monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] = ()) -> Iterator[Held]:
+def pausable_run(monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] = ()) -> Iterator[PausableRun]:
     """Give a loop in which `RobotProcess` runs by `control.clock`."""
     settings = load_settings("hallway", ["link.port=memory", *sets])
     assert settings.world is not None
-    loop, links, follower = VirtualLoop(), list[HeldLink](), TimeScaleFollower()
+    loop, links, follower = VirtualLoop(), list[ScaledTimeLink](), TimeScaleFollower()
     robot = make_device(settings, settings.world, 3, faults=faults)
 
     on_the_way: deque[bytes] = deque()
@@ -74,12 +74,12 @@ def held(monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] 
     def send(line: bytes) -> None:
         if not links or not links[0].is_hung:
             on_the_way.append(line)
-            loop.call_later(DEAF_S, lambda: follower.receive(on_the_way.popleft()))
+            loop.call_later(TRANSIT_S, lambda: follower.receive(on_the_way.popleft()))
 
     control = EmulatorTimeControl(send, ScaledClock(loop.time))
 
-    def link(*args: object) -> HeldLink:
-        made = HeldLink(robot, loop, *args)  # type: ignore[arg-type]
+    def link(*args: object) -> ScaledTimeLink:
+        made = ScaledTimeLink(robot, loop, *args)  # type: ignore[arg-type]
         made.follower, made.control = follower, control
         links.append(made)
         return made
@@ -89,6 +89,6 @@ def held(monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] 
     monkeypatch.setattr("runtime.cycle.process.apply_realtime", lambda _realtime: ())
     asyncio.set_event_loop(None)
     try:
-        yield Held(loop, settings, robot, links, control, follower)
+        yield PausableRun(loop, settings, robot, links, control, follower)
     finally:
         loop.close()
