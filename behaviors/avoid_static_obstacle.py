@@ -1,4 +1,4 @@
-"""The avoid-static-obstacle schema (Arkin 1989): every echo pushes the robot away, the harder the nearer it is."""
+"""The avoid-static-obstacle schema (Arkin 1989): every echo repels the robot, more strongly if it is nearer."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ from perception.percept import Floats, Percept
 SCHEMA: Final = "avoid_static_obstacle"
 
 UNBOUNDED: Final = 1e6
-"""Magnitude inside the safety margin for a gain of one. The equation says infinity, but infinities from two sides
-add up to NaN; this outweighs every other schema at its largest gain by 10⁴ and still has a direction."""
+"""Magnitude inside the safety margin for a gain of one. Arkin's equation gives infinity, but infinities from two
+sides add up to NaN. This exceeds every other schema at its largest gain by 10⁴ and keeps its direction."""
+CANCELLED: Final = 1e-9
+"""A sum shorter than this share of its terms' lengths is what rounding leaves of pushes that cancel."""
 
 
 def repulsions(gaps_m: Floats, config: AvoidStaticObstacleConfig) -> Floats:
-    """Return the magnitude of each obstacle's push.
+    """Return the magnitude of the repulsion from each obstacle, shape (n,).
 
     Arkin, *Motor Schema-Based Mobile Robot Navigation*, IJRR 8(4), 1989: 0 for d > S, (S − d)/(S − R)·G for
     R < d ≤ S, and unbounded for d ≤ R.
@@ -41,26 +43,26 @@ def repulsions(gaps_m: Floats, config: AvoidStaticObstacleConfig) -> Floats:
 
 
 def avoid_static_obstacle(percept: Percept, body_radius_m: float, config: AvoidStaticObstacleConfig) -> Response:
-    """Return the sum of all pushes, each straight away from its echo.
+    """Return the sum of all repulsions, each directly away from its echo.
 
-    With ``summing="largest"`` the sum's direction is kept and its magnitude limited to the largest single push
-    along that direction: ten echoes of one wall then push like one wall, and opposite walls still cancel.
+    With ``summing="largest"`` the sum keeps its direction, and its magnitude is limited to the largest single
+    repulsion along that direction: ten echoes of one wall then repel like one wall, and opposite walls still cancel.
 
     Parameters
     ----------
     percept
         Pose and obstacles; without obstacles the vector is zero.
     body_radius_m
-        Distances count from the rim, this far from the pose.
+        Distances are measured from the rim, this far from the pose, m.
     config
-        The schema's constants.
+        The schema's settings.
     """
     if len(percept.obstacles) == 0:
         return Response(SCHEMA, 0.0, 0.0)
     dx = percept.pose.x - percept.obstacles[:, 0]
     dy = percept.pose.y - percept.obstacles[:, 1]
     distances = np.hypot(dx, dy)
-    # An echo in the robot's very centre has no direction; the way back is where the robot has just been safe.
+    # An echo at the robot's centre has no direction; the robot has just come from behind, so that way is free.
     centred = distances == 0.0
     dx[centred], dy[centred] = -math.cos(percept.pose.theta), -math.sin(percept.pose.theta)
     lengths = np.where(centred, 1.0, distances)
@@ -68,8 +70,8 @@ def avoid_static_obstacle(percept: Percept, body_radius_m: float, config: AvoidS
     px, py = pushes * dx, pushes * dy
     x, y = float(px.sum()), float(py.sum())
     magnitude = math.hypot(x, y)
-    # Not `== 0` to stay clear of dividing by what rounding leaves of pushes that cancel.
-    if config.summing == "largest" and magnitude > 1e-9 * float(np.hypot(px, py).sum()):
+    # Not `== 0`: that would divide by what rounding leaves of repulsions that cancel.
+    if config.summing == "largest" and magnitude > CANCELLED * float(np.hypot(px, py).sum()):
         largest = float((px * (x / magnitude) + py * (y / magnitude)).max())
         shrink = min(1.0, largest / magnitude)
         x, y = x * shrink, y * shrink

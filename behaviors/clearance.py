@@ -1,8 +1,8 @@
-"""How fast the robot may go straight ahead and still stop in time, whatever the schemas add up to.
+"""The speed from which the robot can stop before the nearest echo ahead, whatever the schemas request.
 
-Pushes cancel: with something right in front and something right behind, avoid-static-obstacle sums to nothing and
-move-ahead alone would drive on. So the arbiter limits the speed by what lies in the way, as an admissible velocity
-in the sense of Fox, Burgard & Thrun, *The Dynamic Window Approach to Collision Avoidance*, 1997.
+Repulsions cancel: between an obstacle in front and one behind, avoid-static-obstacle sums to zero, and move-ahead
+alone would drive on. So the arbiter limits the speed to the admissible velocity of Fox, Burgard & Thrun, *The Dynamic
+Window Approach to Collision Avoidance*, 1997.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from perception.percept import Percept
 
 
 def free_path_m(percept: Percept, reach_m: float) -> float:
-    """Return how far a disc of radius `reach_m` can go straight ahead before it meets an echo.
+    """Return how far a disc of radius `reach_m` can drive straight ahead before it meets an echo, m.
 
-    Zero where an echo ahead is inside the disc already, infinite where none is in the way.
+    Zero if an echo ahead is inside the disc already, infinite if the path is free.
     """
     if len(percept.obstacles) == 0:
         return math.inf
@@ -34,5 +34,15 @@ def free_path_m(percept: Percept, reach_m: float) -> float:
 
 
 def stoppable_speed_m_s(percept: Percept, body: BodyConfig, clearance_m: float) -> float:
-    """Return the speed from which the base, braking as hard as it can, keeps `clearance_m` to every echo ahead."""
+    """Return the highest speed from which full braking keeps `clearance_m` to every echo ahead, m/s.
+
+    Parameters
+    ----------
+    percept
+        Pose and obstacles of this cycle.
+    body
+        Radius and largest deceleration of the base.
+    clearance_m
+        Distance to keep between rim and echo, m.
+    """
     return math.sqrt(2.0 * body.acceleration_max_m_s2 * free_path_m(percept, body.radius_m + clearance_m))

@@ -1,7 +1,7 @@
-"""The move-ahead schema (Arkin 1989): a unit vector along a fixed heading, whatever the robot sees.
+"""The move-ahead schema (Arkin 1989): a unit vector along a fixed heading.
 
-How far it has come is state, and behaviours hide none: the leg goes in with each call and comes out again, so that
-a replay that starts from the same leg drives the same way.
+Progress is state, and behaviours hold none: the leg is passed in and returned with each call, so that a replay that
+starts from the same leg drives the same way.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ SCHEMA: Final = "move_ahead"
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """The way under way: where it began (metres, odometry's frame), which way it goes, whether it is over."""
+    """The current leg: its start (m, odometry's frame), whether it leads outbound, and whether it is finished."""
 
     origin_x: float
     origin_y: float
@@ -28,22 +28,22 @@ class Leg:
 
     @classmethod
     def starting_at(cls, pose: Pose) -> Leg:
-        """Return the leg of a drive that begins at `pose`."""
+        """Return the leg of a drive that starts at `pose`."""
         return cls(pose.x, pose.y)
 
 
 def move_ahead(percept: Percept, leg: Leg, config: MoveAheadConfig) -> tuple[Response, Leg]:
-    """Return the schema's vector and the leg to hand in next time.
+    """Return the schema's vector and the leg for the next call.
 
-    Distance counts along the heading only, so that a detour round an obstacle does not shorten the leg. A leg that
-    is done stays done even if the robot is pushed back: motion does not resume by itself.
+    Distance is measured along the heading only, so that a detour around an obstacle does not shorten the leg. A
+    finished leg stays finished even if the robot is pushed back: motion does not resume by itself.
 
     Parameters
     ----------
     percept
         Only the pose is used.
     leg
-        The leg so far; ``Leg.starting_at(pose)`` at the beginning of a drive.
+        The leg so far; ``Leg.starting_at(pose)`` at the start of a drive.
     config
         Gain, direction, and what happens after `distance_m`.
     """

@@ -1,9 +1,9 @@
-"""The move-to-goal schema (Arkin 1989): a vector towards a place, whatever the robot sees.
+"""The move-to-goal schema (Arkin 1989): a vector towards a goal.
 
-Far off, in the ballistic zone, its magnitude is the gain. Within the controlled zone (Arkin & Murphy 1990, docking)
-it falls with the distance, so that the robot comes in slowly. Within the success radius the goal is reached, and
-stays reached even if the robot is pushed away again: motion does not resume by itself. That it has been reached is
-state, and behaviours hide none: the goal goes in with each call and comes out again.
+Far from the goal, in the ballistic zone, its magnitude is the gain. Within the controlled zone (Arkin & Murphy 1990,
+docking) it falls with the distance, so that the robot arrives slowly. Within the success radius the goal is reached,
+and it stays reached even if the robot is pushed away: motion does not resume by itself. Behaviours hold no state, so
+the goal is passed in and returned with each call.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ SCHEMA: Final = "move_to_goal"
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A place to go to, in the odometry's frame, m."""
+    """A place to drive to (m, odometry's frame), and whether it has been reached."""
 
     x: float
     y: float
@@ -30,19 +30,19 @@ class Goal:
 
 
 def move_to_goal(percept: Percept, goal: Goal, config: MoveToGoalConfig) -> tuple[Response, Goal]:
-    """Return the schema's vector and the goal to hand in next time.
+    """Return the schema's vector and the goal for the next call.
 
-    With d the distance, C the controlled zone, G the gain: magnitude G for d ≥ C, G·d/C below, and nothing from the
-    success radius on.
+    With d the distance, C the controlled zone, G the gain: magnitude G for d ≥ C, G·d/C below, and zero within the
+    success radius.
 
     Parameters
     ----------
     percept
         Only the pose is used.
     goal
-        Where to, and whether the robot has been there.
+        The goal, and whether it has been reached.
     config
-        The schema's constants.
+        The schema's settings.
     """
     dx, dy = goal.x - percept.pose.x, goal.y - percept.pose.y
     distance = math.hypot(dx, dy)

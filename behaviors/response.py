@@ -1,4 +1,4 @@
-"""What every motor schema answers with: one named vector, so that the arbiter can add them without knowing them."""
+"""The result of a motor schema: one named vector, so that the arbiter can add vectors of any schemas."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """A schema's vector in the odometry's frame, its gain already in it; magnitude 1 asks for the base velocity."""
+    """A schema's vector in the odometry's frame, its gain included; length 1 requests the base velocity."""
 
     schema: str
     x: float

@@ -1,8 +1,8 @@
-"""Teleoperation as a schema among others (Arkin 1991): the operator's hand on the stick is one more vector.
+"""Teleoperation as one of the schemas (Arkin 1991): the operator's velocity is one more vector.
 
-What the operator asks for is a velocity, and standing still, turning on the spot and backing are part of it, which
-no vector can say; so the velocity goes to `behaviors.arbiter.limit_velocity` beside the vector. It holds for a moment only: a
-hand that has left the stick, or a page that was closed, must not drive on.
+A velocity includes standing still, turning on the spot and driving backwards, which a vector cannot express; so it
+also goes to `behaviors.arbiter.limit_velocity`. It is valid for a short time only: the robot must not drive on after
+the operator releases the stick or closes the page.
 """
 
 from __future__ import annotations
@@ -20,25 +20,45 @@ SCHEMA: Final = "teleoperation"
 
 @dataclass(frozen=True, slots=True)
 class Teleoperate:
-    """A velocity that the operator's hand asks for: v forward in m/s, w counter-clockwise in rad/s."""
+    """A velocity that the operator requests: v forward in m/s, w counter-clockwise in rad/s."""
 
     v: float
     w: float
     valid_s: float = 0.25
-    """For how long, s; never longer than the settings allow."""
+    """How long it is valid, s; the settings limit this."""
     kind: Literal["teleoperate"] = "teleoperate"
 
 
 TELEOPERATION_ENDED: Final = Teleoperate(0.0, 0.0)
-"""Nobody's hand is on the stick: the robot stands."""
+"""Teleoperation has ended: the robot stops within one cycle."""
 
 
-def teleoperation(percept: Percept, asked: Teleoperate, base_velocity_m_s: float) -> Response:
-    """Return the operator's vector: along the heading, or against it, magnitude 1 for the base velocity."""
-    magnitude = asked.v / base_velocity_m_s
+def teleoperation(percept: Percept, requested: Teleoperate, base_velocity_m_s: float) -> Response:
+    """Return the operator's vector: along the heading or against it, length 1 for the base velocity.
+
+    Parameters
+    ----------
+    percept
+        Only the heading is used.
+    requested
+        The operator's velocity.
+    base_velocity_m_s
+        Speed for a vector of length 1, m/s.
+    """
+    magnitude = requested.v / base_velocity_m_s
     return Response(SCHEMA, magnitude * math.cos(percept.pose.theta), magnitude * math.sin(percept.pose.theta))
 
 
-def is_expired(asked: Teleoperate, age_s: float, config: TeleoperationConfig) -> bool:
-    """Say whether a velocity asked for `age_s` ago holds no longer."""
-    return not 0.0 <= age_s < min(asked.valid_s, config.message_age_max_s)
+def is_expired(requested: Teleoperate, age_s: float, config: TeleoperationConfig) -> bool:
+    """Return whether a velocity requested `age_s` ago is no longer valid.
+
+    Parameters
+    ----------
+    requested
+        The operator's velocity.
+    age_s
+        Time since it arrived, s; negative if the clock went back.
+    config
+        Its `message_age_max_s` limits the validity.
+    """
+    return not 0.0 <= age_s < min(requested.valid_s, config.message_age_max_s)

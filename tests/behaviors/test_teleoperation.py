@@ -110,7 +110,7 @@ def test_a_velocity_that_is_none_stops(bad: float) -> None:
     for v, w in ((bad, 0.0), (0.0, bad)):
         decision = limit_velocity(Twist(v, w), (Response("hand", 0.0, 0.0),), at(0.0), BODY, CONFIG, ("hand",))
         assert isinstance(decision, Stop)
-        assert decision.reason.startswith("the velocity asked for (")
+        assert decision.reason.startswith("invalid velocity request (")
     assert isinstance(decide(bad, 0.0, at(0.0)), Stop), "its vector is none either"
 
 
