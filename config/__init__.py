@@ -1,1 +1,1 @@
-"""What can be set: the schema of every setting, how files become settings, and the files that are shipped."""
+"""Settings: their schema, how files become settings, and the shipped files."""

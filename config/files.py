@@ -1,4 +1,4 @@
-"""From a name or a path to a parsed TOML table, and one clear line for everything that can be wrong with a file."""
+"""Reading of TOML files by name or path, with a one-line error message for every problem of a file."""
 
 from __future__ import annotations
 
@@ -19,30 +19,30 @@ from config.errors import WRONG_CALL, UserError
 from config.layers import Source
 
 Kind: TypeAlias = Literal["robots", "worlds", "models", "runs"]
-"""What a file is about, and the folder the shipped ones of that kind lie in."""
+"""Kind of a file, and the folder of the shipped files of that kind."""
 
 SIZE_MAX = 1 << 18
-"""Bytes. Nothing a person writes comes near; /dev/zero and a recording given by mistake go far beyond."""
+"""Largest settings file, bytes: far more than a person writes, less than a recording given by mistake."""
 
 PIPE_WAIT_S = 5.0
-"""Patience with a pipe or a device that is named instead of a file."""
+"""Timeout for a pipe or a device given instead of a file, s."""
 
 DEPTH_MAX = 12
-"""Tables and lists within one another. The schema needs six."""
+"""Deepest nesting of tables and lists; the schema needs six."""
 
 
 _KEY = r"""(?:(?<![A-Za-z0-9_-])[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.){0,256}+"|'[^'\n]{0,256}+')"""
 _LONG_KEY = re.compile(rf"{_KEY}(?:[ \t]*+\.[ \t]*+{_KEY}){{31}}")
-"""A dotted key of 32 parts. Nothing in it backtracks, and parts too long for it are too few to matter."""
+"""A dotted key of 32 parts. The pattern does not backtrack."""
 
 
 class ConfigError(UserError):
-    """The settings are wrong: one line for each problem, ready to be shown to the user.
+    """Invalid settings: one line for each problem, ready to be shown to the user.
 
     Parameters
     ----------
     problems
-        One line each; never empty.
+        One line each; at least one.
     """
 
     exit_code = WRONG_CALL
@@ -53,12 +53,12 @@ class ConfigError(UserError):
 
 
 class TomlSyntaxError(ConfigError):
-    """Text that is not TOML."""
+    """Text that is not valid TOML."""
 
 
 @dataclass(frozen=True)
 class Document:
-    """A parsed file and where it came from."""
+    """A parsed file with its source."""
 
     table: dict[str, Any]
     source: Source
@@ -71,22 +71,22 @@ def list_shipped(kind: Kind) -> tuple[str, ...]:
 
 
 def read_document(kind: Kind, name: str | os.PathLike[str], named_by: Source | None = None) -> Document:
-    """Read a TOML file given by the name of a shipped one or by its path.
+    """Return the parsed TOML file of a shipped name or a path.
 
     Parameters
     ----------
     kind
-        What the file is about: where a bare name is looked up, and what an error calls it.
+        Kind of the file: the folder in which a bare name is looked up, and its name in errors.
     name
-        A bare name, or a path: whatever ends in .toml or contains a slash. A path is relative to the folder of
+        A bare name, or a path, which ends in .toml or contains a slash. A path is relative to the folder of
         `named_by`, or to the working directory.
     named_by
-        The source that names the file; None where the user did so directly.
+        Source that names the file; None if the user named it directly.
 
     Raises
     ------
     ConfigError
-        Where there is no such file, or it cannot be read, or is not TOML.
+        The file does not exist, cannot be read, or is not TOML.
     """
     is_path = not isinstance(name, str) or name.endswith(".toml") or "/" in name or os.sep in name
     if not is_path:
@@ -110,12 +110,12 @@ def read_document(kind: Kind, name: str | os.PathLike[str], named_by: Source | N
 
 
 def parse_document(data: bytes, shown: str) -> dict[str, Any]:
-    """Parse the bytes of a TOML file.
+    """Return the table of a TOML file given as bytes.
 
     Raises
     ------
     ConfigError
-        Where they are too many, not UTF-8 or not TOML, with line and column.
+        The bytes are too many, not UTF-8 or not TOML; the message has line and column.
     """
     if len(data) > SIZE_MAX:
         raise ConfigError(f"{shown}: larger than {SIZE_MAX >> 10} KiB, so not a settings file")
@@ -130,14 +130,14 @@ def parse_document(data: bytes, shown: str) -> dict[str, Any]:
 
 
 def parse_toml(text: str, shown: str) -> dict[str, Any]:
-    """Parse TOML text, and refuse what no setting can hold: deep nesting, integers beyond 64 bits.
+    """Return the table of a TOML text; refuse deep nesting and integers beyond 64 bits.
 
     Raises
     ------
     TomlSyntaxError
-        With line and column of what is not TOML.
+        The text is not TOML; the message has line and column.
     ConfigError
-        Where it is, and holds what no setting can.
+        The text is TOML but holds what no setting can.
     """
     _refuse_long_keys(text, shown)
     try:
@@ -153,26 +153,34 @@ def parse_toml(text: str, shown: str) -> dict[str, Any]:
 
 
 def one_line(text: str) -> str:
-    """Return `text`, with quotes and escapes where it would break a line or a terminal."""
+    """Return `text`, quoted and escaped if it holds unprintable characters."""
     return text if text.isprintable() else json.dumps(text)
 
 
 def dotted(location: Iterable[str | int]) -> str:
-    """Return a location as the user writes it: keys and numbers with dots in between."""
+    """Return a location as the user writes it: keys and numbers joined by dots."""
     keys = (k if isinstance(k, str) and re.fullmatch(r"[A-Za-z0-9_-]+", k) else json.dumps(k) for k in location)
     text = ".".join(keys)
     return text if len(text) <= 120 else text[:119] + "…"
 
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:
-    """Return `; did you mean …?` with the known name nearest to `word`, or nothing where none is near."""
+    """Return `; did you mean …?` with the known name nearest to `word`, or an empty string."""
     lower = {k.lower(): k for k in known}
     near = difflib.get_close_matches(word.lower()[:80], lower, n=1, cutoff=0.6)
     return f"; did you mean {lower[near[0]]}?" if near else ""
 
 
 def _read(path: Path) -> bytes:
-    """Return the file's bytes, one more than allowed at most; a pipe on which nobody writes ends in TimeoutError."""
+    """Return the file's bytes, up to one more than allowed.
+
+    Raises
+    ------
+    IsADirectoryError
+        The path is a directory.
+    TimeoutError
+        The path is a pipe or a device that sends no data.
+    """
     fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOCTTY | os.O_NONBLOCK)
     with os.fdopen(fd, "rb", buffering=0) as file:
         kind = os.fstat(fd).st_mode
@@ -188,6 +196,7 @@ def _read(path: Path) -> bytes:
 
 
 def _read_shipped(kind: Kind, name: str, named_by: Source | None) -> Document:
+    """Return the shipped file of a bare name."""
     known = list_shipped(kind)
     if name in known:
         data = (files("config") / kind / f"{name}.toml").read_bytes()
@@ -196,17 +205,17 @@ def _read_shipped(kind: Kind, name: str, named_by: Source | None) -> Document:
     what = kind.removesuffix("s")
     shown = f'{what} "{one_line(name)[:80]}"'
     where = shown if named_by is None else f"{named_by.name}: {shown}"
-    hint = did_you_mean(name, known) + _file_beside(name, Path() if named_by is None else named_by.base)
+    hint = did_you_mean(name, known) + _file_hint(name, Path() if named_by is None else named_by.base)
     raise ConfigError(f"{where}: no such {what}{hint}; {_known(kind)}; a path ends in .toml or contains a slash")
 
 
-def _file_beside(name: str, base: Path) -> str:
-    """Return a hint where a file lies at hand that the user may have meant by a bare name."""
+def _file_hint(name: str, base: Path) -> str:
+    """Return a hint if there is a file that the user may have meant by a bare name, or an empty string."""
     try:
-        beside = next((n for n in (name, f"{name}.toml") if name and (base / n).is_file()), None)
-    except (OSError, ValueError):  # too long for a file's name, or not fit for one
+        found = next((n for n in (name, f"{name}.toml") if name and (base / n).is_file()), None)
+    except (OSError, ValueError):  # not a valid file name
         return ""
-    return f"; a file is given by its path: ./{one_line(beside)}" if beside else ""
+    return f"; a file is given by its path: ./{one_line(found)}" if found else ""
 
 
 def _known(kind: Kind) -> str:
@@ -214,7 +223,7 @@ def _known(kind: Kind) -> str:
 
 
 def _placed(message: str, text: str) -> str:
-    """Put the place tomllib names behind its message in front of it."""
+    """Return a message of tomllib with its position moved to the front."""
     what, _, place = message.rpartition(" (at ")
     place = place.removesuffix(")")
     if place == "end of document":
@@ -224,7 +233,7 @@ def _placed(message: str, text: str) -> str:
 
 
 def _refuse_long_keys(text: str, shown: str) -> None:
-    """Refuse a.a.a.… before it is parsed: time and memory that tomllib takes grow with the square of its length."""
+    """Refuse long dotted keys before parsing: tomllib's time and memory grow with the square of their length."""
     found = _LONG_KEY.search(text)
     if found is not None:
         line = text.count("\n", 0, found.start()) + 1
@@ -233,6 +242,7 @@ def _refuse_long_keys(text: str, shown: str) -> None:
 
 
 def _refuse_extremes(table: dict[str, Any], shown: str) -> None:
+    """Refuse deep nesting and integers beyond 64 bits."""
     todo: list[tuple[tuple[str | int, ...], Any]] = [((), table)]
     while todo:
         location, value = todo.pop()

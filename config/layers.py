@@ -1,7 +1,7 @@
-"""Settings laid over one another, with the memory of where each value came from.
+"""Settings merged from several sources, with the source of each value.
 
-A run's settings come from several files and the command line. Once they are one tree, an error must still
-name the file in which the user finds the offending value; so the tree keeps its origins beside it.
+A run's settings come from several files and the command line. An error must name the file that holds the offending
+value, so the merged tree keeps the source of every value.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ from typing import Any, TypeAlias
 from config.errors import WRONG_CALL, UserError
 
 Location: TypeAlias = tuple[str | int, ...]
-"""The way from the root to a value: keys of tables, numbers of list entries."""
+"""Path from the root to a value: keys of tables, indices of list entries."""
 
 Holder: TypeAlias = dict[str, Any] | list[Any]
-"""A table or a list: what can hold a value."""
+"""A table or a list."""
 
 FIRING: Location = ("ring", "firing")
-"""The one table that is a single decision: naming another pattern replaces it whole."""
+"""The table that is replaced as a whole when another firing pattern is named."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """A place settings come from, and where its own root lies in the tree of all settings."""
+    """A source of settings, and the location of its root in the tree of all settings."""
 
     name: str
     base: Path = Path()
@@ -33,7 +33,7 @@ class Source:
     mount: Location = ()
 
     def mounted(self, mount: Location) -> Source:
-        """Return the same place with its root at `mount`."""
+        """Return the same source with its root at `mount`."""
         return replace(self, mount=mount)
 
     def local(self, location: Location) -> Location:
@@ -43,13 +43,13 @@ class Source:
 
 
 class PathError(UserError):
-    """A dotted path names no setting; the text says why."""
+    """A dotted path does not name a setting; the text says why."""
 
     exit_code = WRONG_CALL
 
 
 class Layers:
-    """A tree of settings to which sources are added, later ones on top."""
+    """A tree of settings to which sources are added; later ones take precedence."""
 
     def __init__(self, root: Source) -> None:
         self.tree: dict[str, Any] = {}
@@ -57,7 +57,17 @@ class Layers:
         self._order: list[str] = [root.name]
 
     def lay(self, table: dict[str, Any], source: Source, at: Location = ()) -> None:
-        """Lay `table` over what is there key by key; lists and single values are replaced whole."""
+        """Merge `table` into the tree key by key; lists and single values are replaced as a whole.
+
+        Parameters
+        ----------
+        table
+            Table to merge.
+        source
+            Source of its values.
+        at
+            Location of the table in the tree.
+        """
         under: Any = self.tree
         for key in at:
             under = under[key]
@@ -71,12 +81,21 @@ class Layers:
             self.lay(value, source, location)
 
     def put(self, location: Location, value: object, source: Source) -> None:
-        """Set one value, making the tables on the way to it.
+        """Set one value, creating the tables above it.
+
+        Parameters
+        ----------
+        location
+            Where to set it.
+        value
+            Value to set.
+        source
+            Its source.
 
         Raises
         ------
         PathError
-            Where the way leads through a single value, or past the end of a list.
+            The location leads through a single value, or past the end of a list.
         """
         holder: Any = self.tree
         way: Location = ()
@@ -89,16 +108,16 @@ class Layers:
         self._put(holder, value, (*way, _entry(holder, location[-1], way)), source)
 
     def source_of(self, location: Location) -> Source:
-        """Return where the value at `location` came from, or else the table it would belong to."""
+        """Return the source of the value at `location`, or of the table it would belong to."""
         found = next(location[:n] for n in range(len(location), -1, -1) if location[:n] in self._origins)
         return self._origins[found]
 
     def newest_first(self, sources: list[Source]) -> list[str]:
-        """Return the names of `sources`, each once, the one laid last first."""
+        """Return the distinct names of `sources`, the latest first."""
         return sorted({s.name for s in sources}, key=self._order.index, reverse=True)
 
     def sources_within(self, location: Location) -> list[Source]:
-        """Return every source that has a part in the value at `location`."""
+        """Return every source of the value at `location` and of values inside it."""
         inside = [s for where, s in self._origins.items() if where[: len(location)] == location]
         return [self.source_of(location), *inside]
 

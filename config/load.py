@@ -38,14 +38,14 @@ __all__ = [
 DEFAULT_RUN = "hallway"
 DEFAULT_WORLD = "hallway"
 DEFAULT_MODEL = "semicircle"
-"""The paper's experiment: what a run shows and recognises where its file does not say."""
+"""The paper's experiment: defaults of a run whose file does not name them."""
 
 MODELS_MAX = 64
-"""More files than that are not read for one run."""
+"""Largest number of model files of one run."""
 
 COMMAND_LINE = Source("command line")
 NAMES = ("robot", "world", "models")
-"""Keys of a run file that name other files; `robot` may instead be the section of that name."""
+"""Keys of a run file that name other files; `robot` may also be a section."""
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -56,7 +56,7 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> RobotConfig:
     Raises
     ------
     ConfigError
-        Where the file cannot be read or says something wrong.
+        The file cannot be read or is invalid.
     """
     return _load("robots", name_or_path, RobotConfig)
 
@@ -67,7 +67,7 @@ def load_world(name_or_path: str | os.PathLike[str]) -> WorldConfig:
     Raises
     ------
     ConfigError
-        Where the file cannot be read or says something wrong.
+        The file cannot be read or is invalid.
     """
     return _load("worlds", name_or_path, WorldConfig)
 
@@ -78,7 +78,7 @@ def load_model(name_or_path: str | os.PathLike[str]) -> ModelConfig:
     Raises
     ------
     ConfigError
-        Where the file cannot be read or says something wrong.
+        The file cannot be read or is invalid.
     """
     return _load("models", name_or_path, ModelConfig)
 
@@ -86,12 +86,14 @@ def load_model(name_or_path: str | os.PathLike[str]) -> ModelConfig:
 def load_any(
     name_or_path: str | os.PathLike[str], overrides: Sequence[str] = ()
 ) -> Settings | WorldConfig | ModelConfig:
-    """Load a file of whichever kind its top-level keys speak of; a robot file counts as a run with that robot.
+    """Return the settings, world or model of a file, whose kind follows from its top-level keys.
+
+    A robot file is loaded as a run with that robot.
 
     Raises
     ------
     ConfigError
-        Where the file cannot be read or says something wrong.
+        The file cannot be read or is invalid.
     """
     table = read_document("runs", name_or_path).table
     if not overrides:
@@ -119,7 +121,7 @@ def load_settings(
     Parameters
     ----------
     config
-        Name or path of a run file; the shipped hallway run where it is None.
+        Name or path of a run file; by default the shipped hallway run.
     overrides
         Texts of the form ``dotted.path=value``, each on top of the ones before it.
     robot, world, models
@@ -166,14 +168,14 @@ def load_settings(
 
 
 def override_settings(settings: Settings, name: str, overrides: Sequence[str]) -> Settings:
-    """Return settings that are already whole with single ones overridden.
+    """Return complete settings with single values overridden.
 
     Parameters
     ----------
     settings
-        Whole, as from a recording.
+        Complete settings, as from a recording.
     name
-        Where they come from, for complaints.
+        Name of their source in error messages.
     overrides
         Texts of the form ``dotted.path=value``.
 
@@ -196,16 +198,16 @@ def override_settings(settings: Settings, name: str, overrides: Sequence[str]) -
 
 
 def with_value(settings: Settings, name: str, location: Location, value: object) -> Settings:
-    """Return settings that are already whole with one value replaced.
+    """Return complete settings with one value replaced.
 
     Parameters
     ----------
     settings
-        Whole.
+        Complete settings.
     name
-        Where the value comes from, for complaints.
+        Name of the value's source in error messages.
     location
-        Where it goes.
+        Location of the value.
     value
         As a file would hold it; None where it is not given.
 
@@ -225,12 +227,12 @@ def with_value(settings: Settings, name: str, location: Location, value: object)
 
 
 def parse_model(text: str, name: str) -> ModelConfig:
-    """Return the object model that a text in TOML describes, named `name` in complaints.
+    """Return the object model of a TOML text, called `name` in error messages.
 
     Raises
     ------
     ConfigError
-        Where it is not TOML, or describes no model.
+        The text is not TOML, or not a model.
     """
     source = Source(name)
     layers = Layers(source)
@@ -253,9 +255,9 @@ def _validated(model: type[M], layers: Layers) -> M:
 
 
 def _robot_layer(names: Layers) -> tuple[Layers, list[str]]:
-    """Return the lowest layer, a robot file's, and what is wrong with its top level.
+    """Return the lowest layer, that of the robot file, and the problems of its top level.
 
-    Merged with a run file, a section that no robot file may have would go unnoticed.
+    They are checked here because a section that a robot file must not have is valid once merged with a run file.
     """
     named_by, name = names.source_of(("robot",)), names.tree["robot"]
     if not isinstance(name, str):
@@ -299,7 +301,7 @@ def _lay_models(names: Layers, settings: Layers) -> list[str]:
 
 
 def _named_table(kind: Kind, key: str, value: object, named_by: Source) -> tuple[dict[str, Any], Source, list[str]]:
-    """Return the table `value` names, or is, with its source; or what is wrong with it."""
+    """Return the table that `value` is or names, its source, and its problems."""
     if isinstance(value, dict):
         return value, named_by, []
     if not isinstance(value, str):

@@ -1,7 +1,7 @@
-"""The model file: the outline of an object to be recognised, as a polygon in the object's own frame.
+"""Schema of the model file: the outline of an object as a polygon in the object's frame.
 
-An outline that crosses itself or is a thousand times too large fits nothing and says nothing about why, so such
-files are refused, with the vertex to look at.
+An outline that crosses itself or has an impossible size never fits and gives no hint why, so such files are refused
+with the vertex at fault.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from config.strict import Point, Strict, TomlList
 Side: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
 
 EXTENT_MAX_M: Final = 20.0
-"""No ring of sensors hears around anything larger; who writes it has most likely given millimetres."""
+"""Largest extent of an outline; a larger one was most likely given in millimetres."""
 EXTENT_MIN_M: Final = 0.02
-"""Smaller than a range's own resolution."""
+"""Smallest extent of an outline, below the resolution of a range."""
 SAME_PLACE_M: Final = 1e-6
 
 
 class ModelConfig(Strict):
-    """An object model: a chain of vertices, open or closed, perhaps standing for an arc."""
+    """Object model: a chain of vertices, open or closed, which may approximate an arc."""
 
     name: str = Field(min_length=1, pattern=r"^[A-Za-z0-9_-]+$")
     vertices_m: TomlList[Point] = Field(min_length=2, max_length=64)
-    """Corners of the outline in order; the origin is the point whose position is reported."""
+    """Vertices of the outline in order; the origin is the point whose position is reported."""
     closed: bool
     arc_radius_m: float | None = Field(default=None, gt=0.0, le=100.0)
-    """The true radius about the origin where the vertices approximate an arc."""
+    """True radius about the origin if the vertices approximate an arc."""
 
     @model_validator(mode="after")
     def _proper_outline(self) -> ModelConfig:
@@ -64,17 +64,17 @@ class ModelConfig(Strict):
 
 
 def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
-    """Return twice the signed area of a triangle: positive where a, b, c turn counter-clockwise."""
+    """Return twice the signed area of a triangle, positive if a, b, c turn counter-clockwise."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def _within(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:
-    """Say whether `c`, which lies on the line through `a` and `b`, lies between them."""
+    """Return whether `c`, which lies on the line through `a` and `b`, lies between them."""
     return min(a[0], b[0]) <= c[0] <= max(a[0], b[0]) and min(a[1], b[1]) <= c[1] <= max(a[1], b[1])
 
 
 def _meet(first: Side, second: Side) -> bool:
-    """Say whether two sides have a point in common."""
+    """Return whether two sides have a point in common."""
     (a, b), (c, d) = first, second
     of_first, of_second = (_turn(c, d, a), _turn(c, d, b)), (_turn(a, b, c), _turn(a, b, d))
     if min(of_first) < 0.0 < max(of_first) and min(of_second) < 0.0 < max(of_second):
@@ -84,7 +84,7 @@ def _meet(first: Side, second: Side) -> bool:
 
 
 def _folds_back(first: Side, second: Side) -> bool:
-    """Say whether two sides that share a vertex lie on one another."""
+    """Return whether two sides that share a vertex overlap."""
     shared = next(p for p in first if p in second)
     p, q = next(p for p in first if p != shared), next(p for p in second if p != shared)
     along = (p[0] - shared[0]) * (q[0] - shared[0]) + (p[1] - shared[1]) * (q[1] - shared[1])

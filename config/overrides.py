@@ -12,26 +12,26 @@ OVERRIDE = Source("--set")
 
 @dataclass(frozen=True)
 class Override:
-    """One value and where it goes."""
+    """A value and its location."""
 
     location: Location
     value: object
-    """Whatever TOML holds."""
+    """Any TOML value."""
 
     @property
     def names_files(self) -> bool:
-        """Whether this says which files to read, so that it must act before they are read."""
+        """Whether the value names a file to read, so that it must be applied before files are read."""
         head, depth = self.location[0], len(self.location)
         return (head in ("robot", "world", "models") and depth == 1) or (head == "models" and depth == 2)
 
 
 def parse_override(text: str) -> Override:
-    """Parse `dotted.path=value`; the value is TOML, or else a string without its quotes.
+    """Return the override of a text `dotted.path=value`; the value is TOML, or a string without quotes.
 
     Raises
     ------
     ConfigError
-        Where the text has no such form.
+        The text does not have this form.
     """
     shown = one_line(text) if len(text) <= 60 else one_line(text[:59]) + "…"
     path, equals, value = text.partition("=")
@@ -44,7 +44,7 @@ def parse_override(text: str) -> Override:
 
 
 def apply_overrides(overrides: list[Override], layers: Layers) -> list[str]:
-    """Put each override on top of `layers`, and return a line for each that has no place there."""
+    """Apply the overrides to `layers`; return one line for each that cannot be applied."""
     problems = []
     for override in overrides:
         try:

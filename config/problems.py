@@ -1,4 +1,4 @@
-"""Plain words for what pydantic found: file, dotted path, value, what is allowed, the nearest known name."""
+"""Error messages for what pydantic found: file, dotted path, value, allowed values, the nearest known name."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ EXPECTED = MappingProxyType(
         "dict_type": "a table",
     }
 )
-"""What a field wants, by the kind of pydantic's complaint."""
+"""Expected type, by the type of pydantic's error."""
 
 GIVEN: tuple[tuple[type | tuple[type, ...], str], ...] = (
     (bool, "true or false"),
@@ -41,7 +41,7 @@ GIVEN: tuple[tuple[type | tuple[type, ...], str], ...] = (
     (dict, "a table"),
     ((datetime.date, datetime.time), "a date or time"),
 )
-"""What TOML held; bool comes before int because Python's bool is one."""
+"""Names of the types of TOML values; bool comes before int because Python's bool is an int."""
 
 BOUNDS = MappingProxyType(
     {
@@ -53,14 +53,14 @@ BOUNDS = MappingProxyType(
 )
 
 RENAMED_KEYS: Mapping[Location, str] = MappingProxyType({("perception", "full"): "perception.bayes"})
-"""Former names of settings and sections, each with its name now."""
+"""Former names of settings and sections, each with the present name."""
 RENAMED_VALUES: Mapping[tuple[Location, object], str] = MappingProxyType(
     {(("perception", "method"), "full"): "bayes"}
 )
-"""Former values of a setting, each with its name now."""
+"""Former values of settings, each with the present value."""
 
 PROBLEMS_MAX = 100
-"""Problems told at most; more of them means the file is of another kind altogether."""
+"""Largest number of problems reported; a file with more is probably of another kind."""
 
 
 def describe_errors(error: ValidationError, layers: Layers, model: type[BaseModel]) -> list[str]:
@@ -69,23 +69,23 @@ def describe_errors(error: ValidationError, layers: Layers, model: type[BaseMode
     Parameters
     ----------
     error
-        What pydantic raised for the tree of `layers`.
+        Error that pydantic raised for the tree of `layers`.
     layers
-        The tree, which knows where each value came from.
+        The tree, with the source of each value.
     model
-        The schema the tree was held against.
+        Schema that the tree was validated against.
     """
     found = error.errors(include_url=False)
     at_fault = {details["loc"] for details in found}
     above_faults = {where[:n] for where in at_fault for n in range(len(where))}
-    # A list is also called too short when its entries are bad; that is no second problem.
-    told = [d for d in found if d["type"] != "too_short" or d["loc"] not in above_faults]
-    lines = [_describe(details, layers, model) for details in told[:PROBLEMS_MAX]]
-    return lines if len(told) <= PROBLEMS_MAX else [*lines, f"… and {len(told) - PROBLEMS_MAX} problems more"]
+    # pydantic also reports a list with invalid entries as too short; that is not a second problem.
+    reported = [d for d in found if d["type"] != "too_short" or d["loc"] not in above_faults]
+    lines = [_describe(details, layers, model) for details in reported[:PROBLEMS_MAX]]
+    return lines if len(reported) <= PROBLEMS_MAX else [*lines, f"… and {len(reported) - PROBLEMS_MAX} problems more"]
 
 
 def shown(value: object) -> str:
-    """Return a value as TOML would write it, cut short where it is long."""
+    """Return a value as TOML writes it, shortened to 60 characters."""
     if isinstance(value, str):
         text = json.dumps(value, ensure_ascii=not value.isprintable())
     elif isinstance(value, bool):
@@ -100,12 +100,22 @@ def shown(value: object) -> str:
 
 
 def given_type(value: object) -> str:
-    """Return what kind of thing a value is, in TOML's terms."""
+    """Return the type of a value in TOML's terms."""
     return next((name for kinds, name in GIVEN if isinstance(value, kinds)), type(value).__name__)
 
 
 def unknown_key(location: Location, model: type[BaseModel], also: tuple[str, ...] = ()) -> str:
-    """Return the text for a key no schema knows: the nearest name here, or the same name elsewhere, or all names."""
+    """Return the message for an unknown key: the nearest name here, the same name elsewhere, or all names.
+
+    Parameters
+    ----------
+    location
+        Location of the key.
+    model
+        Schema of the whole tree.
+    also
+        Further names that are known here.
+    """
     key = str(location[-1])
     parent = _unwrapped(_annotation_at(model, location[:-1]))
     known = (*_fields(parent), *also)
@@ -130,10 +140,10 @@ def _describe(details: ErrorDetails, layers: Layers, model: type[BaseModel]) -> 
     if kind == "extra_forbidden":
         also = ("robot",) if len(location) == 1 and "models" in model.model_fields else ()
         return f"{source.name}: {path}: {unknown_key(location, model, also)}"
-    return f"{source.name}: {path} = {shown(value)}: {_complaint(details, model)}"
+    return f"{source.name}: {path} = {shown(value)}: {_message(details, model)}"
 
 
-def _complaint(details: ErrorDetails, model: type[BaseModel]) -> str:
+def _message(details: ErrorDetails, model: type[BaseModel]) -> str:
     location, kind, value = details["loc"], details["type"], details["input"]
     context = details.get("ctx", {})
     if kind in EXPECTED:
@@ -160,10 +170,10 @@ def _complaint(details: ErrorDetails, model: type[BaseModel]) -> str:
 
 
 def _describe_whole(location: Location, text: str, table: object, layers: Layers) -> str:
-    """Describe a disagreement among the values of one table: name the sources of those the text speaks of."""
+    """Return the line for a conflict among the values of one table, with the sources of the values that it names."""
     keys = table.keys() if isinstance(table, dict) else ()
-    spoken_of = [(*location, k) for k in keys if re.search(rf"\b{re.escape(k)}\b", text)]
-    sources = [s for where in spoken_of for s in [layers.source_of(where)]] or layers.sources_within(location)
+    named = [(*location, k) for k in keys if re.search(rf"\b{re.escape(k)}\b", text)]
+    sources = [s for where in named for s in [layers.source_of(where)]] or layers.sources_within(location)
     names = layers.newest_first(sources)
     path = dotted(sources[0].local(location) if len(names) == 1 else location)
     return f"{' over '.join(names)}: {path + ': ' if path else ''}{text}"
@@ -205,7 +215,7 @@ def _unwrapped(annotation: object) -> object:
 
 
 def _annotation_at(model: object, location: Location) -> object:
-    """Return the annotation of what lies at `location`; None beyond the schema's end."""
+    """Return the annotation at `location`, or None if the schema does not reach so far."""
     annotation = model
     for key in location:
         annotation = _unwrapped(annotation)

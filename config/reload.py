@@ -1,8 +1,7 @@
-"""A changed configuration for a process that runs: taken over whole, or not at all.
+"""Reload of the configuration of a running process: the new settings apply completely or not at all.
 
-A robot that is half on its old settings and half on its new ones is one that nobody configured. So the new settings
-are validated whole first; then every difference must be one that a running process can follow; and only then do they
-take the old ones' place, in one assignment. On any error the last good ones stay in force.
+The new settings are validated as a whole first. Then every difference must be one that a running process can apply.
+Only then do they replace the old ones, in one assignment. On any error the previous settings stay in force.
 """
 
 from __future__ import annotations
@@ -38,9 +37,9 @@ LIVE_SETTINGS: Final = frozenset(
         "ring.firing",
     }
 )
-"""Settings, and sections of them, that a running process follows. Everything else sizes an array, opens a port or
-describes a robot that does not change while it drives: it needs a restart, and so does a new setting until it is
-entered here. Models are followed where further ones come after those from before: see `Difference.live`."""
+"""Settings and sections that a running process can apply. All others size an array, open a port or describe the robot
+itself, so they need a restart, as does a new setting until it is listed here. Models can be appended, see
+`Difference.live`."""
 
 
 MODELS: Final = ("models",)
@@ -48,7 +47,7 @@ MODELS: Final = ("models",)
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A value that is not the same in two settings."""
+    """A value that differs between two settings."""
 
     location: Location
     before: object
@@ -61,10 +60,10 @@ class Difference:
 
     @property
     def live(self) -> bool:
-        """Whether a running process follows the change.
+        """Whether a running process can apply the change.
 
-        Further models are further explanations of what was heard, and nothing that is remembered says otherwise. A
-        model that goes or changes leaves objects behind that are called by it, so that needs a restart.
+        Appended models are further hypotheses, and the existing state stays valid. Removing or changing a model needs
+        a restart, because existing objects refer to it.
         """
         if self.location == MODELS and isinstance(self.before, tuple) and isinstance(self.after, tuple):
             return self.before == self.after[: len(self.before)]
@@ -77,14 +76,14 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class ReloadResult:
-    """What became of an attempt."""
+    """Result of a reload."""
 
     settings: Settings
-    """In force from now on: the new ones whole, or the very ones from before."""
+    """Settings in force from now on: the new ones, or the identical previous ones."""
     changed: tuple[Difference, ...] = ()
-    """What is new."""
+    """Differences that were applied."""
     problems: tuple[str, ...] = field(default=())
-    """Why nothing was taken over, one line each; empty where it was."""
+    """Why the new settings were refused, one line each; empty if they were applied."""
 
 
 def reload(current: Settings, propose: Callable[[], Settings]) -> ReloadResult:
@@ -93,9 +92,9 @@ def reload(current: Settings, propose: Callable[[], Settings]) -> ReloadResult:
     Parameters
     ----------
     current
-        In force so far; never touched.
+        Settings in force so far; never modified.
     propose
-        Loads and validates the new ones whole; raises ConfigError where they are no good.
+        Loads and validates the new settings; raises ConfigError if they are invalid.
     """
     try:
         proposed = propose()
@@ -109,7 +108,15 @@ def reload(current: Settings, propose: Callable[[], Settings]) -> ReloadResult:
 
 
 def differences(before: object, after: object, at: Location = ()) -> Iterator[Difference]:
-    """Yield every value that differs, in the order of the schema; lists are compared whole."""
+    """Yield every value that differs, in the order of the schema; lists are compared as a whole.
+
+    Parameters
+    ----------
+    before, after
+        Settings, or values within them, to compare.
+    at
+        Location of the two values.
+    """
     if isinstance(before, BaseModel) and type(before) is type(after):
         for key in type(before).model_fields:
             yield from differences(getattr(before, key), getattr(after, key), (*at, key))
@@ -124,7 +131,7 @@ def _shown(value: object) -> str:
 
 
 def _plain(value: object) -> object:
-    """Return models within lists as the tables that they were."""
+    """Return a value with the models in lists as tables."""
     if isinstance(value, tuple):
         return [_plain(v) for v in value]
     return value.model_dump() if isinstance(value, BaseModel) else value

@@ -72,7 +72,7 @@ def _preset_as_table(value: object) -> object:
 
 
 class RingConfig(Strict):
-    """The ring of sensors: regular (count and radius_m) or listed one by one (sensors)."""
+    """The ring of sensors: regular (count and radius_m) or listed individually (sensors)."""
 
     count: int | None = Field(default=None, ge=2, le=SENSORS_MAX)
     """Number of sensors of a regular ring; sensor 0 looks forward, the others follow counter-clockwise."""
@@ -155,7 +155,7 @@ class LinkConfig(Strict):
 
 
 class DriverConfig(Strict):
-    """Which driver speaks to the robot."""
+    """The driver of the robot."""
 
     driver: str = Field(default="denning", min_length=1, max_length=64)
     """Name of a shipped driver, or of one that an installed package provides: entry points `echolocate.drivers`."""

@@ -69,7 +69,7 @@ class ClustersConfig(Strict):
 
 
 class RelaxationConfig(Strict):
-    """Relaxation of the model onto a cluster's segments (paper §3.4)."""
+    """Relaxation of the model onto the segments of a cluster (paper §3.4)."""
 
     gamma: float = Field(default=2.0, gt=0.0, le=100.0)
     """γ: radius of a model side's sphere of influence over its length."""

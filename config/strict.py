@@ -1,6 +1,6 @@
-"""The one base class of every settings model: frozen, strict, and unknown keys are errors.
+"""Base class of every settings model: frozen, strict, and unknown keys are errors.
 
-A misspelt key that is silently ignored is a robot that drives with settings nobody chose.
+A misspelt key must not be ignored: the robot would drive with settings that were not intended.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Strict(BaseModel):
 
 
 def _list_as_tuple(value: object) -> object:
-    """Let TOML's only sequence type fill an immutable field."""
+    """Return a list as a tuple, and other values unchanged: TOML has no immutable sequence."""
     return tuple(value) if isinstance(value, list) else value
 
 
@@ -34,7 +34,7 @@ TomlList: TypeAlias = Annotated[tuple[T, ...], BeforeValidator(_list_as_tuple)]
 """An immutable sequence written as a TOML list."""
 
 Coordinate: TypeAlias = Annotated[float, Field(ge=-10_000.0, le=10_000.0)]
-"""A coordinate, metres; nobody drives ten kilometres by sonar, and the squares of a typo overflow."""
+"""A coordinate, m; the limit refuses typing errors whose squares would overflow."""
 
 Point: TypeAlias = Annotated[tuple[Coordinate, Coordinate], BeforeValidator(_list_as_tuple)]
 """A pair of coordinates in metres written as a TOML list of two numbers."""

@@ -32,7 +32,7 @@ ROOTS: dict[str, tuple[type[BaseModel], dict[str, Any], Callable[[Path], BaseMod
     "world": (WorldConfig, WORLD, load_world),
     "model": (ModelConfig, MODEL, load_model),
 }
-BESIDE = {"text": "oddly", "flag": True, "list": [1.5], "table": {"a": 1}, "number": 1.5, "integer": 7}
+WRONG_TYPES = {"text": "oddly", "flag": True, "list": [1.5], "table": {"a": 1}, "number": 1.5, "integer": 7}
 WRONG: dict[Any, tuple[str, ...]] = {
     float: ("text", "flag", "list", "table"),
     int: ("text", "flag", "list", "table", "number"),
@@ -119,7 +119,6 @@ def is_name_of_a_file(setting: Setting) -> bool:
     return setting.location in NAMES_FILES or (setting.root.startswith("run") and setting.location == ("robot",))
 
 
-
 def holder(table: Any, location: tuple[str | int, ...]) -> Any:
     for key in location[:-1]:
         table = table[key] if isinstance(key, int) else table.setdefault(key, {})
@@ -170,7 +169,7 @@ def test_no_field_of_any_model_is_left_out(record_property: Callable[[str, objec
     assert wanted <= {id(s.field) for s in SETTINGS}
     cases = sum(len(WRONG[s.kind]) for s in SETTINGS) + len(REQUIRED) + len(NAMED) + len(list(bounds()))
     record_property(
-        "measured", f"{len(wanted)} fields of {len(every)} models, {cases} harmed files, each told in a line"
+        "measured", f"{len(wanted)} fields of {len(every)} models, {cases} invalid files, each reported in a line"
     )
 
 
@@ -179,9 +178,9 @@ def test_every_number_has_a_lower_and_an_upper_bound() -> None:
     """Without both, a slip of the keyboard overflows somewhere far from the file that it is in."""
     for setting in SETTINGS:
         if setting.kind in (int, float):
-            told = [type(bound) for bound in setting.field.metadata]
-            assert {annotated_types.Ge, annotated_types.Gt} & {*told}, f"{setting} has no lower bound"
-            assert {annotated_types.Le, annotated_types.Lt} & {*told}, f"{setting} has no upper bound"
+            bounds = [type(bound) for bound in setting.field.metadata]
+            assert {annotated_types.Ge, annotated_types.Gt} & {*bounds}, f"{setting} has no lower bound"
+            assert {annotated_types.Le, annotated_types.Lt} & {*bounds}, f"{setting} has no upper bound"
 
 
 @pytest.mark.parametrize("root", ROOTS)
@@ -195,9 +194,9 @@ def test_the_unharmed_table_is_good(root: str, tmp_path: Path) -> None:
 def test_wrong_type(setting: Setting, tmp_path: Path) -> None:
     for given in WRONG[setting.kind]:
         table = copy.deepcopy(ROOTS[setting.root][1])
-        holder(table, setting.location)[setting.location[-1]] = BESIDE[given]
+        holder(table, setting.location)[setting.location[-1]] = WRONG_TYPES[given]
         lines = refused(setting, table, tmp_path)
-        shown = "{…}" if given == "table" else toml(BESIDE[given])
+        shown = "{…}" if given == "table" else toml(WRONG_TYPES[given])
         assert len(lines) == 1
         assert lines[0].startswith(f"{setting.path} = {shown}: {WANTED[setting.kind]}")
 

@@ -13,7 +13,7 @@ from config.load import ConfigError, load_robot, load_settings, load_world
 from tests.config.toml_text import ROBOT, document
 
 
-def complaint(path: str | Path) -> str:
+def message_of(path: str | Path) -> str:
     lines = set()
     for load in (load_robot, load_settings):
         with pytest.raises(ConfigError) as caught:
@@ -51,7 +51,7 @@ def complaint(path: str | Path) -> str:
 def test_not_settings(data: bytes, wanted: str, tmp_path: Path) -> None:
     path = tmp_path / "odd.toml"
     path.write_bytes(data)
-    line = complaint(path)
+    line = message_of(path)
     assert line.startswith(f"{path}: {wanted}")
     assert len(line) < len(str(path)) + 150
 
@@ -76,12 +76,12 @@ def test_a_byte_order_mark_and_windows_lines_do_no_harm(tmp_path: Path) -> None:
 
 def test_a_directory(tmp_path: Path) -> None:
     (tmp_path / "dir.toml").mkdir()
-    assert complaint(tmp_path / "dir.toml") == f"{tmp_path}/dir.toml: is a directory, not a TOML file"
+    assert message_of(tmp_path / "dir.toml") == f"{tmp_path}/dir.toml: is a directory, not a TOML file"
 
 
 def test_a_file_used_as_a_directory(tmp_path: Path) -> None:
     (tmp_path / "f.toml").write_text("")
-    assert complaint(tmp_path / "f.toml/g.toml").startswith(f"{tmp_path}/f.toml/g.toml: cannot be read: ")
+    assert message_of(tmp_path / "f.toml/g.toml").startswith(f"{tmp_path}/f.toml/g.toml: cannot be read: ")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="nothing is unreadable to root")
@@ -89,7 +89,7 @@ def test_an_unreadable_file(tmp_path: Path) -> None:
     path = tmp_path / "secret.toml"
     path.write_text("")
     path.chmod(0)
-    assert complaint(path) == f"{path}: cannot be read: Permission denied"
+    assert message_of(path) == f"{path}: cannot be read: Permission denied"
 
 
 @pytest.mark.parametrize("name", ["./a\0b.toml", "./\ud800.toml", "./a\nb.toml", "./" + "x" * 5000 + ".toml"])
@@ -100,7 +100,7 @@ def test_paths_no_system_has(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["", ".", "..", "a\0b", "\ud800", "a\nb", "x" * 5000])
-def test_names_nobody_gives(name: str) -> None:
+def test_unusual_names(name: str) -> None:
     with pytest.raises(ConfigError, match="no such world") as caught:
         load_world(name)
     assert str(caught.value).isprintable()
@@ -109,18 +109,18 @@ def test_names_nobody_gives(name: str) -> None:
 def test_an_endless_device() -> None:
     if not Path("/dev/zero").exists():
         pytest.skip("no such device here")
-    assert complaint("/dev/zero").startswith("/dev/zero: larger than")
+    assert message_of("/dev/zero").startswith("/dev/zero: larger than")
 
 
 @pytest.mark.promise("P14")
 def test_a_pipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a shell's <(…) gives is read to its end; one on which nobody writes is not waited for for ever."""
+    """A pipe from a shell's <(…) is read to its end; a pipe without a writer times out."""
     path = tmp_path / "pipe.toml"
     os.mkfifo(path)
     monkeypatch.setattr("config.files.PIPE_WAIT_S", 0.05)
     reader = os.open(path, os.O_RDWR)
     try:
-        assert complaint(path) == f"{path}: is a pipe from which nothing came for 0.05 s; give a file"
+        assert message_of(path) == f"{path}: is a pipe from which nothing came for 0.05 s; give a file"
     finally:
         os.close(reader)
     monkeypatch.undo()

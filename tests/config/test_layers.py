@@ -1,4 +1,4 @@
-"""Each error names the source of its value, once, and everything that is wrong is told."""
+"""Tests that each error names the source of its value once, and that every problem is reported."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_too_many_problems_are_counted_not_listed(tmp_path: Path) -> None:
     assert lines[-1] == "… and 4900 problems more"
 
 
-def test_entries_of_a_wrong_list_are_told_once() -> None:
+def test_entries_of_a_wrong_list_are_reported_once() -> None:
     assert problem(None, ["models.0.vertices_m=[[0, 1], [2]]"]) == "--set: models.0.vertices_m.1.1: missing"
     assert problem(None, ["ring.firing={sets=[[0, -1]]}"]).startswith("--set: ring.firing.sets.0.1 = -1: must be")
 

@@ -77,7 +77,7 @@ def test_an_unknown_name_in_a_run_names_the_run_and_the_known_ones(tmp_path: Pat
     assert problem(None, ["models.0=bix"]).startswith('--set: model "bix": no such model; did you mean box?')
 
 
-def test_a_bare_name_beside_a_file_of_that_name(tmp_path: Path) -> None:
+def test_bare_name_of_an_existing_file(tmp_path: Path) -> None:
     write(tmp_path / "mine.toml", ROBOT)
     with pytest.raises(ConfigError, match=r"a file is given by its path: \./mine\.toml"):
         load_robot("mine")
@@ -89,7 +89,7 @@ def test_a_missing_file_says_who_named_it_and_what_is_known(tmp_path: Path) -> N
     assert problem(run) == f"{tmp_path}/robots/mine.toml: file not found; named by {run}; known robots: denning"
 
 
-def test_every_missing_file_is_told(tmp_path: Path) -> None:
+def test_every_missing_file_is_reported(tmp_path: Path) -> None:
     run = write(tmp_path / "run.toml", {"robot": "a", "world": "b", "models": ["c", "box", "d"]})
     assert [line.split(":")[1] for line in problems(run)] == [' robot "a"', ' world "b"', ' model "c"', ' model "d"']
 

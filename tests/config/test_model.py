@@ -16,9 +16,9 @@ SQUARE = [(0.3, 0.3), (-0.3, 0.3), (-0.3, -0.3), (0.3, -0.3)]
 
 
 def write(folder: Path, vertices: list[tuple[float, float]], *, closed: bool = True, more: str = "") -> str:
-    path = folder / "thing.toml"
+    path = folder / "post.toml"
     listed = ", ".join(f"[{x}, {y}]" for x, y in vertices)
-    path.write_text(f'name = "thing"\nvertices_m = [{listed}]\nclosed = {str(closed).lower()}\n{more}\n')
+    path.write_text(f'name = "post"\nvertices_m = [{listed}]\nclosed = {str(closed).lower()}\n{more}\n')
     return str(path)
 
 
@@ -44,7 +44,7 @@ def test_it_is_refused_with_file_and_vertex(
     with pytest.raises(ConfigError) as caught:
         load_model(write(tmp_path, vertices, closed=closed, more=more))
     text = str(caught.value)
-    assert "thing.toml" in text
+    assert "post.toml" in text
     assert "\n" not in text
     assert all(word in text for word in words), text
 

@@ -102,7 +102,7 @@ def test_set_gone_wrong(text: str, wanted: str) -> None:
     assert len(line) < 250
 
 
-def test_every_bad_set_is_told() -> None:
+def test_every_bad_set_is_reported() -> None:
     assert len(problems(None, ["foo", "bar", "ring.count.x=1", "world=nowhere"])) == 4
 
 

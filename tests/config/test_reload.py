@@ -110,7 +110,7 @@ def test_what_needs_a_restart_says_so_by_name(
     change(table)
     table["behaviors"]["arbiter"] = {"base_velocity_m_s": 0.25}
     outcome = reload(before, lambda: settings_from(tmp_path, table))
-    assert outcome.settings is before, "a live change beside one that is not is not taken over either"
+    assert outcome.settings is before, "a live change together with another one is not applied either"
     assert outcome.changed == ()
     assert any(problem.startswith(line) for problem in outcome.problems), outcome.problems
     assert all(problem.endswith(": needs a restart") for problem in outcome.problems)
@@ -160,7 +160,7 @@ def test_any_number_of_random_reloads_are_atomic(record_property: Callable[[str,
     """Each is taken over whole or changes nothing; and no live difference is ever left out or added."""
     rng = random.Random(11)
     current = Settings.model_validate(copy.deepcopy(RUN))
-    told = {"taken over": 0, "no good": 0, "needs a restart": 0, "as before": 0}
+    counts = {"taken over": 0, "no good": 0, "needs a restart": 0, "as before": 0}
     table = copy.deepcopy(RUN)
     for _ in range(RELOADS):
         attempt = copy.deepcopy(table)
@@ -191,9 +191,9 @@ def test_any_number_of_random_reloads_are_atomic(record_property: Callable[[str,
         else:
             kind = "as before"
             assert wanted[0] == before
-        told[kind] += 1
+        counts[kind] += 1
         if kind != "taken over":
             assert current is before
         assert rendered(before) == text, "the last good one is untouched"
-    assert min(told.values()) > RELOADS // 100, told
-    record_property("measured", f"{RELOADS} random reloads, none half applied: {told}")
+    assert min(counts.values()) > RELOADS // 100, counts
+    record_property("measured", f"{RELOADS} random reloads, none half applied: {counts}")
