@@ -1,8 +1,8 @@
 """What is running when a cycle is overdue: one sample of the stack, taken only for cycles that are late.
 
 asyncio's own search for slow callbacks needs its debug mode, which slows every callback. Here an interval timer is
-set once a cycle to a moment at which the next cycle should long have begun, and set anew before it fires while all is
-well. Where it fires, the interpreter passes the frame that it was about to go on with.
+set once a cycle to a moment at which the next cycle should long have begun, and set again before it fires while
+all cycles are on time. Where it fires, the interpreter passes the frame that it was about to execute.
 """
 
 from __future__ import annotations

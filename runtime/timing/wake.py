@@ -1,8 +1,8 @@
 """Sleep until a deadline to the microsecond, or until woken.
 
 asyncio passes its timeouts to epoll in whole milliseconds, rounded up, and the kernel may add its timer slack: a
-cycle that sleeps that way begins 0.7 ms late at the median. A timerfd is a timer that the loop waits for as for any other
-file: it counts nanoseconds and gets no slack. `bench/waking.py` compares it with the alternatives.
+cycle that sleeps that way begins 0.7 ms late at the median. A timerfd is a timer that the loop waits for as for any
+other file: it counts nanoseconds and gets no slack. `bench/waking.py` compares it with the alternatives.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A whole run in virtual time on a robot that lies, and its objects against the truth, seen from the robot."""
+"""A whole run in virtual time on a robot with faults; its objects are compared with the truth."""
 
 from __future__ import annotations
 
@@ -51,7 +51,9 @@ class Run:
         self.line.exchange(self.run_s)
         request = Request.ARM if self.arms and self.state.mode.mode is Mode.READY else None
         inputs = gather_inputs(self.driver, self.run_s, request)
-        record = step(self.state, inputs, self.settings, lambda c: apply_command(self.driver, c), within_quanta_per_cycle)
+        record = step(
+            self.state, inputs, self.settings, lambda c: apply_command(self.driver, c), within_quanta_per_cycle
+        )
         self.firings += inputs.received.firings
         self.notes += inputs.received.notes
         return record

@@ -1,4 +1,4 @@
-"""A run in virtual time whose time can be held: the emulated robot in memory obeys the same laws as one on a pty."""
+"""A run in virtual time that can be paused: the emulated robot in memory follows the same time scales as on a pty."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from runtime.timing.wake import LoopTimer
 from tests.runtime.virtual_time import STEP_S, MemoryLink, VirtualLoop
 
 TRANSIT_S = 0.001
-"""A law is on its way for so long."""
+"""Time from sending a time scale until the emulator receives it, s."""
 
 
 class ScaledTimeLink(MemoryLink):
@@ -51,7 +51,7 @@ class ScaledTimeLink(MemoryLink):
 
 
 class PausableRun(NamedTuple):
-    """What a test holds in its hands."""
+    """A run and what controls its time."""
 
     loop: VirtualLoop
     settings: Settings
@@ -62,7 +62,9 @@ class PausableRun(NamedTuple):
 
 
 @contextlib.contextmanager
-def pausable_run(monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] = ()) -> Iterator[PausableRun]:
+def pausable_run(
+    monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] = ()
+) -> Iterator[PausableRun]:
     """Give a loop in which `RobotProcess` runs by `control.clock`."""
     settings = load_settings("hallway", ["link.port=memory", *sets])
     assert settings.world is not None

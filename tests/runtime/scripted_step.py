@@ -1,4 +1,4 @@
-"""The pure step on paper: a robot whose every cycle is written down; shared by the tests of the step."""
+"""The pure step with scripted inputs: a robot whose every cycle a test defines; shared by the tests of the step."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TIMEOUT_S = SETTINGS.behaviors.avoid_static_obstacle.echo_age_max_s
 
 
 class Perceiving(Perception):
-    """Perception that says when it refines."""
+    """Perception that logs when it refines."""
 
     log: list[object]
 
@@ -41,7 +41,7 @@ class Perceiving(Perception):
 
 @dataclass
 class ScriptedRobot:
-    """A robot on paper: cycles at 20 Hz, each hearing odometry at the robot's time and a firing if there is one."""
+    """A scripted robot: cycles at 20 Hz, each with odometry at the robot's time and a firing if there is one."""
 
     settings: Settings = SETTINGS
     quanta: int = 50
@@ -76,9 +76,14 @@ class ScriptedRobot:
         self.robot_s += PERIOD_S
         sensors = len(self.settings.ring.mounts)
         firings = (Firing(self.robot_s, self.pose, 0.0, np.full(sensors, 3.0)),) if firing else ()
-        told = Odometry(self.robot_s, self.pose, 0.0, Twist(0.0, 0.0), flags, 0) if odometry else None
+        reported = Odometry(self.robot_s, self.pose, 0.0, Twist(0.0, 0.0), flags, 0) if odometry else None
         inputs = Inputs(
-            self.run_s, line, trouble, Received(firings, told, rebooted), request, drive_request=self.drive_request
+            self.run_s,
+            line,
+            trouble,
+            Received(firings, reported, rebooted),
+            request,
+            drive_request=self.drive_request,
         )
         self.log.clear()
         return step(self.state, inputs, self.settings, lambda c: self.log.append(("command", c)), self.may_refine)

@@ -1,7 +1,7 @@
-"""The whole main process in virtual time: its own loop, rhythm, modes and driver, on an emulated robot in memory.
+"""The whole main process in virtual time: its own loop, scheduler, modes and driver, on an emulated robot in memory.
 
-The loop never waits: where it would, the clock goes on. Only the line is replaced, and the timer that the kernel
-keeps. What takes time takes as long as a test says, by moving the clock.
+The loop never waits: where it would, the clock advances. Only the line and the kernel's timer are replaced. A test
+simulates work by advancing the clock.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ REOPEN_S = 0.05
 
 
 class _Selector(selectors.SelectSelector):
-    """Instead of waiting it moves the clock on."""
+    """Advances the clock instead of waiting."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -47,14 +47,14 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def __init__(self) -> None:
         self.clock_of = _Selector()
         super().__init__(self.clock_of)
-        # Else a moment that rounding puts just after the clock's is waited for without end.
+        # Otherwise the loop waits forever for a moment that rounding puts just after the clock's.
         self._clock_resolution = 1e-7
 
     def time(self) -> float:
         return self.clock_of.host_s
 
     def spend(self, seconds: float) -> None:
-        """Let time pass as if something had held the loop."""
+        """Advance the clock as if a callback had blocked the loop."""
         self.clock_of.host_s += seconds
 
 
@@ -123,7 +123,7 @@ class MemoryLink:
         self.plugged = True
 
     def live(self) -> bytes:
-        """Let the robot live up to now, and return what it sent."""
+        """Advance the robot to now, and return what it sent."""
         return self._robot.advance(self._loop.time() - self._begin_s)
 
     def _exchange(self) -> None:

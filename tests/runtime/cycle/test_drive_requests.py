@@ -1,4 +1,4 @@
-"""What the operator wants driven, through the whole step: what moves, what stops it, and that nothing resumes."""
+"""Drive requests through the whole step: what moves the robot, what stops it, and that nothing resumes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FORWARD = Teleoperate(0.2, 0.1)
 
 
 class RequestedRobot(ScriptedRobot):
-    """A robot on paper that is told what to drive."""
+    """A scripted robot that gets drive requests."""
 
     def request_drive(self, drive_request: DriveRequest | None, **found: object) -> CycleRecord:
         self.drive_request = drive_request
@@ -37,7 +37,7 @@ class RequestedRobot(ScriptedRobot):
 
 
 def near(v: float, w: float) -> Any:
-    """Return what equals a velocity that rounding has touched."""
+    """Return what equals a velocity up to rounding."""
     return Twist(pytest.approx(v), pytest.approx(w))  # type: ignore[arg-type]
 
 
@@ -52,7 +52,7 @@ def driving(*sets: str) -> RequestedRobot:
 
 
 def hold_reason(script: RequestedRobot) -> str:
-    """Return why it stands, nothing where it does not."""
+    """Return why it stands, empty where it drives."""
     return script.state.hold_reason or ""
 
 
@@ -95,7 +95,7 @@ def test_a_goal_is_approached_and_the_robot_stands_there() -> None:
     assert hold_reason(script) == "the goal (0.00 m, 5.00 m) is reached"
     assert script.move_to(Pose(0.0, 3.0, 0.0)).command == STANDSTILL, "pushed away it does not set out again"
     command = script.request_drive(Goal(0.0, 5.0)).command
-    assert command != STANDSTILL, "told again it does"
+    assert command != STANDSTILL, "requested again, it drives"
     assert hold_reason(script) == ""
 
 
@@ -107,7 +107,7 @@ def test_teleoperation_drives_while_velocities_arrive_and_stops_within_a_quarter
         assert record.command == near(0.2, 0.1)
         assert hold_reason(script) == ""
     last_s = script.run_s
-    assert last_s - begin_s > 0.4, "longer than one word holds"
+    assert last_s - begin_s > 0.4, "longer than one velocity is valid"
     while (record := script.request_drive(None)).command != STANDSTILL:
         assert record.command == near(0.2, 0.1)
     assert 0.19 < script.run_s - last_s < 0.251
@@ -133,7 +133,7 @@ def test_teleoperation_is_limited_by_echoes_and_by_the_validity_of_a_velocity() 
     assert script.request_drive(None).command == STANDSTILL
 
 
-@pytest.mark.parametrize("drive_request", [Legs(), Goal(3.0, 0.0), FORWARD], ids=["legs", "goal", "hand"])
+@pytest.mark.parametrize("drive_request", [Legs(), Goal(3.0, 0.0), FORWARD], ids=["legs", "goal", "teleoperation"])
 def test_no_drive_request_moves_a_robot_that_is_not_in_drive(drive_request: DriveRequest) -> None:
     script = robot()
     for line in (LineState.CLOSED, LineState.HANDSHAKE):
@@ -157,7 +157,7 @@ STOPS: list[dict[str, object]] = [
 
 
 @pytest.mark.parametrize("found", STOPS, ids=["halt", "disarm", "line", "bumper", "reboot"])
-@pytest.mark.parametrize("drive_request", [Goal(30.0, 0.0), FORWARD], ids=["goal", "hand"])
+@pytest.mark.parametrize("drive_request", [Goal(30.0, 0.0), FORWARD], ids=["goal", "teleoperation"])
 @pytest.mark.parametrize("at_once", [True, False], ids=["said as it stops", "said before"])
 def test_after_a_stop_goal_and_teleoperation_do_not_resume(
     found: dict[str, object], drive_request: DriveRequest, at_once: bool
@@ -254,7 +254,7 @@ def test_an_invalid_drive_request_changes_nothing(drive_request: DriveRequest) -
     assert record.inputs.drive_request is drive_request
 
 
-@pytest.mark.parametrize("drive_request", [Legs(), Goal(9.0, 0.0), FORWARD], ids=["legs", "goal", "hand"])
+@pytest.mark.parametrize("drive_request", [Legs(), Goal(9.0, 0.0), FORWARD], ids=["legs", "goal", "teleoperation"])
 def test_vectors_of_a_stop_are_not_shown(drive_request: DriveRequest) -> None:
     script = driving()
     script.pose = Pose(math.nan, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""The modes: every transition in a table, and what must hold after any sequence of inputs_of_a_cycle."""
+"""The modes: every transition in a table, and what must hold after any sequence of inputs."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def flags(value: Flags) -> ModeInputs:
 WAITED, TOO_SOON, TOO_LONG = 1.01 * ARMING_MIN_S, 0.5 * ARMING_MIN_S, 1.01 * ARMING_MAX_S
 
 TRANSITIONS = [
-    # before, what is found, mode after, piece of the reason after, whether it is being armed
+    # mode before, inputs, mode after, part of the reason after, whether it is being armed
     (CONNECTING, line(LineState.CLOSED), Mode.CONNECTING, None, False),
     (CONNECTING, line(LineState.HANDSHAKE), Mode.CONNECTING, None, False),
     (CONNECTING, line(LineState.DOWN, "no answer"), Mode.CONNECTING, "no answer", False),
@@ -128,12 +128,16 @@ def test_a_failed_part_ends_every_mode_but_fault_and_arming_does_not_help() -> N
         later = replace(seen, run_s=NOW + 0.05)
         assert advance_by(after, later) == after, "it is entered once"
         armed = advance_by(after, replace(later, request=Request.ARM))
-        assert armed == ModeState(Mode.SAFE_STOP, NOW + 0.05, seen.fault), "and told again to whoever arms"
+        assert armed == ModeState(Mode.SAFE_STOP, NOW + 0.05, seen.fault), (
+            "and reported again on an ARM"
+        )
         lost = replace(later, line=LineState.CLOSED)
         assert advance_by(after, lost) == after
         assert "halted by the operator" in str(advance_by(after, replace(later, request=Request.HALT)).reason)
     assert advance_by(FAULT, seen) == FAULT
-    assert advance_by(DRIVE, replace(seen, line=LineState.CLOSED)).reason == seen.fault, "the cause, not what it does"
+    assert advance_by(DRIVE, replace(seen, line=LineState.CLOSED)).reason == seen.fault, (
+        "the cause, not the consequence"
+    )
 
 
 def test_the_table_covers_every_possible_transition() -> None:
@@ -177,7 +181,7 @@ def test_motion_never_resumes_by_itself(steps: list[ModeInputs], begin: ModeStat
             assert seen.request not in {Request.HALT, Request.DISARM}
             assert seen.line is LineState.READY
             assert not seen.flags & Flags.LATCHED
-            assert seen.gap_s <= GAP_MAX_S, "it drives on what it knew before it was held up"
+            assert seen.gap_s <= GAP_MAX_S, "it drives on data from before the gap"
             assert before.mode is Mode.DRIVE or armed, "DRIVE was entered without an ARM after the last stop"
         if seen.request is Request.ARM:
             armed = True

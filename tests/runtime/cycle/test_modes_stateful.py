@@ -1,4 +1,4 @@
-"""The modes as a machine with a memory: whatever a robot and an operator do in whatever order."""
+"""The modes as a state machine: any actions of robot and operator in any order."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class ModesMachine(RuleBasedStateMachine):
     @rule(gap_s=st.floats(GAP_MAX_S + 1e-6, 100.0))
     def held_up(self, gap_s: float) -> None:
         self.cycle(gap_s=gap_s)
-        assert self.state.mode is not Mode.DRIVE, "it drives on what it knew before"
+        assert self.state.mode is not Mode.DRIVE, "it drives on data from before the gap"
 
     @rule(cycles=st.integers(1, 40))
     def time_passes(self, cycles: int) -> None:

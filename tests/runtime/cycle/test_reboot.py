@@ -1,4 +1,4 @@
-"""P7: a robot that restarts in mid-run is seen, whenever it does: it stands until re-armed, its map begins anew."""
+"""P7: a restart of the robot is detected at any moment of a run: it stands until re-armed, with an empty map."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def test_after_a_reboot_in_any_phase_it_stands_until_re_armed(measured: Callable
         worst_echo_s = max(worst_echo_s, run.run_s - seen_s)
         assert run.driver.state is LineState.READY, "the pattern was sent again"
 
-        # It stands, however long nobody arms it.
+        # It stands until it is armed, however long that takes.
         run.until(lambda: run.run_s >= run.reboot_s + run.down_s + 3.0, 9.0)  # noqa: B023
         assert run.mode is Mode.SAFE_STOP
         late = [t for t in run.truths if t.emulated_s > reboot_s + STANDS_WITHIN_S]
@@ -177,8 +177,10 @@ def test_no_jump_in_the_map(method: Literal["paper", "bayes"], measured: Callabl
     measured(f"{method}: from the reboot on, every object in every cycle within {worst_ft:.2f} ft of a drum")
 
 
-def test_a_restart_at_the_wrap_of_the_clock_is_detected_by_the_missing_firings(measured: Callable[[str], None]) -> None:
-    """The one moment when the clock does not tell: just as it would have begun anew by itself."""
+def test_a_restart_at_the_wrap_of_the_clock_is_detected_by_missing_firings(
+    measured: Callable[[str], None],
+) -> None:
+    """The one moment when the clock shows no restart: just when it would have wrapped anyway."""
     run = Run(3.0, 0.0, clock_start_us=2**32 - 3_000_000)
     run.drive()
     run.until(lambda: run.run_s >= 3.0, 4.0)

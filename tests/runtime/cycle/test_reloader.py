@@ -1,4 +1,4 @@
-"""Reloading at run time: off the loop, one attempt at a time, the last word counts, every end is told in the log."""
+"""Reloading at run time: off the loop, one attempt at a time, the newest request counts, every result is logged."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ SLOWER = load_settings("hallway", ["behaviors.arbiter.base_velocity_m_s=0.2"])
 
 
 class Scripted:
-    """Proposes what it is told to; holds back until it is let go on."""
+    """Proposes scripted settings; can be blocked."""
 
     def __init__(self, *answers: Settings | Exception) -> None:
         self.answers = list(answers)
-        self.begun = threading.Event()
-        self.go_on = threading.Event()
-        self.go_on.set()
+        self.started = threading.Event()
+        self.unblocked = threading.Event()
+        self.unblocked.set()
         self.threads: set[int] = set()
         self.taken: list[Settings] = []
         self.log = LogCapture()
@@ -44,8 +44,8 @@ class Scripted:
 
     def _propose(self) -> Settings:
         self.threads.add(threading.get_ident())
-        self.begun.set()
-        assert self.go_on.wait(30.0)
+        self.started.set()
+        assert self.unblocked.wait(30.0)
         answer = self.answers.pop(0)
         if isinstance(answer, Exception):
             raise answer
@@ -86,11 +86,11 @@ async def test_settings_that_cannot_be_prepared_are_not_applied() -> None:
 async def test_a_change_from_the_console_during_an_attempt_is_replaced_by_the_files() -> None:
     script = Scripted(SLOWER)
     faster = load_settings("hallway", ["behaviors.arbiter.base_velocity_m_s=0.4"])
-    script.go_on.clear()
+    script.unblocked.clear()
     script.reloader.request()
-    assert await asyncio.to_thread(script.begun.wait, 30.0)
+    assert await asyncio.to_thread(script.started.wait, 30.0)
     script.live_settings.apply(faster, can_undo=True)
-    script.go_on.set()
+    script.unblocked.set()
     await script.reloader.settled()
     assert script.taken == [faster, SLOWER]
     assert script.log.entries[-1]["changed"] == ["behaviors.arbiter.base_velocity_m_s: 0.4 → 0.2"]
@@ -99,12 +99,12 @@ async def test_a_change_from_the_console_during_an_attempt_is_replaced_by_the_fi
 
 async def test_requests_during_an_attempt_lead_to_one_more() -> None:
     script = Scripted(BEFORE, SLOWER)
-    script.go_on.clear()
+    script.unblocked.clear()
     script.reloader.request()
-    assert await asyncio.to_thread(script.begun.wait, 30.0)
+    assert await asyncio.to_thread(script.started.wait, 30.0)
     for _ in range(4):
         script.reloader.request()
-    script.go_on.set()
+    script.unblocked.set()
     await script.reloader.settled()
     assert script.answers == [], "five requests are two attempts: one under way, one after it"
     assert script.taken == [SLOWER]
@@ -112,18 +112,18 @@ async def test_requests_during_an_attempt_lead_to_one_more() -> None:
 
 async def test_the_end_of_a_run_drops_the_attempt_in_progress() -> None:
     script = Scripted(SLOWER)
-    script.go_on.clear()
+    script.unblocked.clear()
     script.reloader.request()
-    assert await asyncio.to_thread(script.begun.wait, 30.0)
+    assert await asyncio.to_thread(script.started.wait, 30.0)
     script.reloader.cancel()
-    script.go_on.set()
+    script.unblocked.set()
     await script.reloader.settled()
     assert script.taken == []
 
 
 @pytest.mark.parametrize("method", ["paper", "bayes"])
 def test_perception_continues_with_other_settings(method: str) -> None:
-    """Nothing that it remembers is lost, and new values are in force at once."""
+    """Its state is kept, and new values are in force at once."""
     config = PerceptionConfig.model_validate({"method": method})
     perception = Perception(BEFORE.ring, BEFORE.models, config)
     other = PerceptionConfig.model_validate(

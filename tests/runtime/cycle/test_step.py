@@ -1,4 +1,4 @@
-"""The pure step: what it tells the base and when."""
+"""The pure step: its commands and when they are sent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pure step over a drive through the hallway: it repeats itself to the bit and spends its budget as told."""
+"""The pure step over a drive through the hallway: repeatable to the bit, and within its refinement budget."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def test_one_seed_is_one_drive(drive: Drive) -> None:
 
 
 def script_of(drive: Drive, quanta: int) -> Iterator[tuple[ScriptedRobot, CycleRecord]]:
-    """Play the drive on a script, whose log tells the order of things."""
+    """Replay the drive on a scripted robot, whose log shows the order of events."""
     script = ScriptedRobot(quanta=quanta)
     for record in drive.records:
         script.log.clear()

@@ -1,4 +1,4 @@
-"""What a run costs its machine, held against what this very process can be made to cost."""
+"""What a run uses of its machine, compared with known work of this test's own process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Garbage while driving: the old is set aside, the young goes in slack only, and the books say who collected."""
+"""Garbage while driving: old objects are excluded, young ones collected in slack only, collections counted."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Ring:
 
 def rings() -> int:
     # Not isinstance: that asks weak proxies, which other libraries leave behind, for the class of what is gone.
-    return sum(type(thing) is Ring for thing in gc.get_objects())
+    return sum(type(object_) is Ring for object_ in gc.get_objects())
 
 
 def test_nothing_is_collected_automatically() -> None:
@@ -61,7 +61,7 @@ def test_a_collection_requested_elsewhere_is_counted() -> None:
         gc.collect()
     assert memory.collections == [0, 0, 1]
     gc.collect()
-    assert memory.collections == [0, 0, 1], "after the drive it is nobody's business"
+    assert memory.collections == [0, 0, 1], "collections after the drive do not count"
 
 
 def test_automatic_collection_stays_off_where_it_was_off() -> None:

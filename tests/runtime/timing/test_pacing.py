@@ -20,9 +20,9 @@ TINY = 1e-7
 def on_time(pacer: Pacer, took_s: float = 0.001) -> CycleStart:
     """Begin a cycle at its deadline and end it."""
     run_s = pacer.deadline_s
-    begun = pacer.begin(run_s)
+    starts = pacer.begin(run_s)
     pacer.advance(run_s + took_s)
-    return begun
+    return starts
 
 
 # On its own.
@@ -45,8 +45,8 @@ def test_an_overrun_is_counted_and_the_phase_kept(took_s: float, ahead: int, mis
     pacer = Pacer(BEGIN, PERIOD)
     pacer.begin(BEGIN)
     assert pacer.advance(BEGIN + took_s) == pytest.approx(BEGIN + ahead * PERIOD, abs=1e-9)
-    begun = pacer.begin(pacer.deadline_s)
-    assert (begun.missed, pacer.missed, begun.late_s) == (missed, missed, 0.0)
+    starts = pacer.begin(pacer.deadline_s)
+    assert (starts.missed, pacer.missed, starts.late_s) == (missed, missed, 0.0)
     assert pacer.deadline_s == pytest.approx(BEGIN + (ahead + 1) * PERIOD, abs=1e-9)
 
 
@@ -54,9 +54,9 @@ def test_an_overrun_is_counted_and_the_phase_kept(took_s: float, ahead: int, mis
 def test_a_delayed_loop_is_late_by_the_delay_and_keeps_its_phase(late_s: float, missed: int) -> None:
     pacer = Pacer(BEGIN, PERIOD)
     on_time(pacer)
-    begun = pacer.begin(BEGIN + PERIOD + late_s)
-    assert begun.late_s == pytest.approx(late_s)
-    assert begun.missed == missed
+    starts = pacer.begin(BEGIN + PERIOD + late_s)
+    assert starts.late_s == pytest.approx(late_s)
+    assert starts.missed == missed
     assert pacer.deadline_s == pytest.approx(BEGIN + (missed + 2) * PERIOD)
 
 
@@ -92,7 +92,7 @@ class Ring:
     def __init__(self, pacer: Pacer, echoes_s: list[float]) -> None:
         self.pacer, self.echoes_s = pacer, deque(sorted(echoes_s))
         self.run_s = BEGIN
-        self.begun: list[tuple[float, CycleStart]] = []
+        self.starts: list[tuple[float, CycleStart]] = []
         self.came_s: list[float] = []
         """When the oldest echo of each cycle came, nan where none did."""
         self.waiting_s: list[float] = []
@@ -103,13 +103,13 @@ class Ring:
             self.pacer.on_echo(self.run_s, busy_since_s)
 
     def cycle(self, took_s: float = 0.001, held_s: float = 0.0) -> CycleStart:
-        """Wait for a cycle, run it, and have the loop held for a while after it."""
+        """Wait for a cycle, run it, and keep the loop busy for a while after it."""
         while self.pacer.deadline_s > self.run_s:
             next_echo_s = self.echoes_s[0] if self.echoes_s else math.inf
             self.run_s = min(next_echo_s, self.pacer.deadline_s)
             self._read(None)
-        begun = self.pacer.begin(self.run_s)
-        self.begun.append((self.run_s, begun))
+        starts = self.pacer.begin(self.run_s)
+        self.starts.append((self.run_s, starts))
         self.came_s.append(min(self.waiting_s, default=math.nan))
         self.waiting_s.clear()
         since_s = self.run_s
@@ -117,11 +117,11 @@ class Ring:
         self.pacer.advance(self.run_s)
         self.run_s += held_s
         self._read(since_s)
-        return begun
+        return starts
 
     @property
     def gaps_s(self) -> list[float]:
-        return [after - before for (before, _), (after, _) in itertools.pairwise(self.begun)]
+        return [after - before for (before, _), (after, _) in itertools.pairwise(self.starts)]
 
 
 def echoes(count: int, step_s: float, jitter_s: float = 0.0, begin_s: float = BEGIN + 0.0317) -> list[float]:
@@ -135,8 +135,8 @@ def test_at_the_rings_own_rate_every_echo_begins_a_cycle_at_once(jitter_s: float
     ring = Ring(Pacer(BEGIN, PERIOD, PERIOD), echoes(400, PERIOD, jitter_s, BEGIN + phase_s))
     for _ in range(398):
         ring.cycle()
-    locked = ring.begun[4:]
-    assert all(begun.echo_age_s == 0.0 and begun.late_s == 0.0 for _, begun in locked)
+    locked = ring.starts[4:]
+    assert all(starts.echo_age_s == 0.0 and starts.late_s == 0.0 for _, starts in locked)
     assert ring.pacer.is_locked
     assert ring.pacer.missed == 0
     assert max(ring.gaps_s[4:]) <= PERIOD + jitter_s + TINY
@@ -156,14 +156,14 @@ def test_any_step_is_followed_at_a_rate_near_the_configured_one(step_s: float, p
     locked_s = ring.pacer.period_s
     assert ring.pacer.is_locked
     assert 2 / 3 * period_s - TINY <= locked_s <= 1.5 * period_s + TINY
-    rate = len(ring.begun) / (ring.run_s - BEGIN)
+    rate = len(ring.starts) / (ring.run_s - BEGIN)
     assert rate == pytest.approx(1.0 / locked_s, rel=0.05)
-    begun = [b for at_s, b in ring.begun if at_s > BEGIN + 2.0]
+    starts = [b for at_s, b in ring.starts if at_s > BEGIN + 2.0]
     slot_s = min(step_s, locked_s)
     assert max(ring.gaps_s) <= max(period_s, locked_s + 0.75 * slot_s) + TINY
     assert min(ring.gaps_s[1:]) >= locked_s - 0.5 * slot_s - TINY
     if step_s >= period_s:
-        ages = [b.echo_age_s for b in begun if b.echo_age_s is not None]
+        ages = [b.echo_age_s for b in starts if b.echo_age_s is not None]
         assert len(ages) > 10
         assert max(ages) == 0.0, "no echo waits"
     assert ring.pacer.missed == 0
@@ -176,12 +176,12 @@ def test_echoes_that_stop_and_resume() -> None:
     while ring.run_s < first[-1] + 1.9:
         ring.cycle()
     assert not ring.pacer.is_locked
-    silent = [at_s for at_s, _ in ring.begun if at_s > first[-1] + (LOST_STEPS + 1) * PERIOD]
+    silent = [at_s for at_s, _ in ring.starts if at_s > first[-1] + (LOST_STEPS + 1) * PERIOD]
     assert len(silent) > 30
     assert [b - a for a, b in itertools.pairwise(silent)] == pytest.approx([PERIOD] * (len(silent) - 1))
     while ring.echoes_s:
         ring.cycle()
-    again = [b for at_s, b in ring.begun if at_s > first[0] + 100 * PERIOD + pause_s + 3 * PERIOD]
+    again = [b for at_s, b in ring.starts if at_s > first[0] + 100 * PERIOD + pause_s + 3 * PERIOD]
     assert len(again) > 90
     assert all(b.echo_age_s == 0.0 for b in again)
     assert max(ring.gaps_s) <= 1.75 * PERIOD + TINY, "the deadman is fed all the while"
@@ -193,9 +193,9 @@ def test_the_wait_for_a_lost_echo_is_a_quarter_step_and_keeps_the_phase() -> Non
     ring = Ring(Pacer(BEGIN, PERIOD, PERIOD), all_of_them[:20] + all_of_them[21:])
     for _ in range(58):
         ring.cycle()
-    (lost,) = (k for k, (_, b) in enumerate(ring.begun) if k > 3 and b.echo_age_s is None)
-    assert ring.begun[lost][0] == pytest.approx(all_of_them[20] + 0.25 * PERIOD)
-    at_s, after = ring.begun[lost + 1]
+    (lost,) = (k for k, (_, b) in enumerate(ring.starts) if k > 3 and b.echo_age_s is None)
+    assert ring.starts[lost][0] == pytest.approx(all_of_them[20] + 0.25 * PERIOD)
+    at_s, after = ring.starts[lost + 1]
     assert at_s == pytest.approx(all_of_them[21])
     assert (after.late_s, after.missed, after.echo_age_s) == (0.0, 0, 0.0)
 
@@ -212,20 +212,18 @@ def test_the_wait_ends_where_the_deadman_needs_a_command() -> None:
 @pytest.mark.parametrize(
     ("held_s", "late_s", "missed"), [(0.03, 0.0, 0), (0.06, 0.011, 0), (0.11, 0.061, 1), (0.31, 0.261, 5)]
 )
-def test_a_busy_loop_makes_an_echo_late_from_its_expected_arrival(
-    held_s: float, late_s: float, missed: int
-) -> None:
+def test_a_busy_loop_makes_an_echo_late_from_its_expected_arrival(held_s: float, late_s: float, missed: int) -> None:
     ring = Ring(Pacer(BEGIN, PERIOD, PERIOD), echoes(100, PERIOD))
     for _ in range(20):
         ring.cycle()
     ring.cycle(held_s=held_s)
-    begun = ring.cycle()
-    assert begun.late_s == pytest.approx(late_s, abs=1e-6)
-    assert begun.missed == missed
+    starts = ring.cycle()
+    assert starts.late_s == pytest.approx(late_s, abs=1e-6)
+    assert starts.missed == missed
     assert ring.pacer.missed == missed
     for _ in range(5):
         ring.cycle()
-    assert ring.begun[-1][1].echo_age_s == 0.0
+    assert ring.starts[-1][1].echo_age_s == 0.0
     assert min(ring.gaps_s[3:]) >= 0.5 * PERIOD - TINY, "no burst"
 
 
@@ -245,14 +243,14 @@ def test_never_a_burst_and_never_starved_for_any_echoes(
     locked_s = max(PERIOD, Pacer(BEGIN, PERIOD, step_s)._locked_s)
     free_s = BEGIN
     for took_s, held_s in cycles:
-        begun = ring.cycle(took_s, held_s)
-        at_s = ring.begun[-1][0]
-        assert begun.late_s >= 0.0
+        starts = ring.cycle(took_s, held_s)
+        at_s = ring.starts[-1][0]
+        assert starts.late_s >= 0.0
         assert at_s - free_s <= locked_s + 0.75 * min(step_s, locked_s) + TINY
         came_s = ring.came_s[-1]
-        assert (begun.echo_age_s is None) == math.isnan(came_s)
+        assert (starts.echo_age_s is None) == math.isnan(came_s)
         if came_s > free_s + TINY:
-            assert begun.echo_age_s == pytest.approx(at_s - came_s, abs=1e-6), "nothing held the loop"
+            assert starts.echo_age_s == pytest.approx(at_s - came_s, abs=1e-6), "the loop was not busy"
         free_s = ring.run_s
     least_s = min(Pacer(BEGIN, PERIOD, step_s)._locked_s, PERIOD) * 0.5
     assert all(gap_s >= least_s - TINY for gap_s in ring.gaps_s[1:])

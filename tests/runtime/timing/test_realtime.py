@@ -76,9 +76,7 @@ def test_a_missing_core_is_refused_with_the_list_of_present_ones() -> None:
     assert str(min(os.sched_getaffinity(0))) in line
 
 
-def test_no_system_call_on_an_unknown_machine(
-    refusing: Libc, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_system_call_on_an_unknown_machine(refusing: Libc, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("runtime.timing.realtime.platform.machine", lambda: "abacus")
     assert apply_realtime(RealtimeConfig()) == []
     assert refusing.calls == []

@@ -1,4 +1,4 @@
-"""A run whose time is held: nothing stops, nothing is lost, nothing moves, and one step is one cycle."""
+"""A paused run: nothing stops, nothing is lost, nothing moves, and one step is one cycle."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ async def until(done: Callable[[], bool], patience_s: float = 60.0) -> None:
             await asyncio.sleep(0.001)
 
 
-def lived_s(robot: RobotDevice) -> float:
+def emulated_s(robot: RobotDevice) -> float:
     return robot.truth.emulated_s
 
 
@@ -95,10 +95,10 @@ def test_a_pause_of_any_length_is_invisible_to_the_run(monkeypatch: pytest.Monke
                 assert await it.control.pause() is None
                 assert it.control.is_paused
                 cycles, pieces_in, here_s = len(watched.records), len(watched.pieces), it.control.clock()
-                where, robot_s = it.robot.truth, lived_s(it.robot)
+                where, robot_s = it.robot.truth, emulated_s(it.robot)
                 await asyncio.sleep(pause_s)
                 assert (len(watched.records), it.control.clock()) == (cycles, here_s)
-                assert (it.robot.truth, lived_s(it.robot)) == (where, robot_s)
+                assert (it.robot.truth, emulated_s(it.robot)) == (where, robot_s)
                 assert len(watched.pieces) <= pieces_in + 2, "what was on its way may come"
                 assert await it.control.resume() is None
                 await until(lambda before=cycles: len(watched.records) >= before + 40)  # type: ignore[misc]
@@ -145,13 +145,13 @@ def test_one_step_is_one_cycle_and_one_period(monkeypatch: pytest.MonkeyPatch) -
         async def act(_process: RobotProcess, watched: Watched) -> None:
             assert await it.control.pause() is None
             for _ in range(60):
-                cycles, before_s, robot_s = len(watched.records), it.control.clock(), lived_s(it.robot)
+                cycles, before_s, robot_s = len(watched.records), it.control.clock(), emulated_s(it.robot)
                 assert await it.control.single_step() is None
                 assert it.control.is_paused
                 assert len(watched.records) == cycles + 1
                 went_s = it.control.clock() - before_s
                 assert went_s <= 1.8 * CYCLE_S
-                assert lived_s(it.robot) - robot_s <= went_s + 0.02
+                assert emulated_s(it.robot) - robot_s <= went_s + 0.02
                 await asyncio.sleep(1.0)
                 assert len(watched.records) == cycles + 1
             first, last = watched.records[-60], watched.records[-1]
@@ -186,12 +186,12 @@ def test_another_speed_changes_nothing_else(monkeypatch: pytest.MonkeyPatch, fac
         async def act(_process: RobotProcess, watched: Watched) -> None:
             assert await it.control.set_speed(factor) is None
             assert it.control.speed == factor
-            begun_s, run_s, robot_s = it.loop.time(), it.control.clock(), lived_s(it.robot)
+            begun_s, run_s, robot_s = it.loop.time(), it.control.clock(), emulated_s(it.robot)
             cycles = len(watched.records)
             await until(lambda: len(watched.records) >= cycles + 100, 200.0)
             took_s = it.loop.time() - begun_s
             assert (it.control.clock() - run_s) / took_s == pytest.approx(factor, rel=0.1)
-            assert (lived_s(it.robot) - robot_s) / took_s == pytest.approx(factor, rel=0.1)
+            assert (emulated_s(it.robot) - robot_s) / took_s == pytest.approx(factor, rel=0.1)
             assert await it.control.set_speed(1.0) is None
             assert await it.control.set_speed(1.0) is None
             await until(lambda: len(watched.records) >= cycles + 140)

@@ -1,4 +1,4 @@
-"""The timing books in virtual time: every delay is booked to whoever made it, and none is invented."""
+"""The timing monitor in virtual time: every delay is attributed to its cause, and none is invented."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ BEGIN_US = 7_000_000
 
 
 class Machine:
-    """Clocks that only what happens moves; whole microseconds, so that books can be exact."""
+    """Clocks that only simulated work moves; in whole microseconds, so that statistics can be exact."""
 
     def __init__(self) -> None:
         self.host_us, self.thread_us, self.process_us, self.waits = BEGIN_US, 0, 0, 0
@@ -44,7 +44,7 @@ class Machine:
     def work(self, us: int) -> None:
         self.host_us, self.thread_us, self.process_us = self.host_us + us, self.thread_us + us, self.process_us + us
 
-    def be_put_aside(self, us: int) -> None:
+    def be_suspended(self, us: int) -> None:
         self.host_us += us
 
     def block(self, us: int) -> None:
@@ -70,7 +70,7 @@ def delays(count: int, seed: int) -> list[Delay]:
     for _ in range(count):
         place = chance.choice([*(phase.value for phase in Phase), "link receive", "untimed", "asleep", "nowhere"])
         how, cause = chance.choice(
-            [(Machine.work, place), (Machine.block, place), (Machine.be_put_aside, OUTSIDE),
+            [(Machine.work, place), (Machine.block, place), (Machine.be_suspended, OUTSIDE),
              (Machine.wait_for_thread, THREAD)]
         )  # fmt: skip
         if place == "untimed":
@@ -83,7 +83,7 @@ def delays(count: int, seed: int) -> list[Delay]:
 
 
 class Run:
-    """A loop on that machine, with one delay a slot, beside an account of its own in whole microseconds."""
+    """A loop on that machine with one delay a slot, and an independent account in whole microseconds."""
 
     def __init__(self) -> None:
         self.machine = Machine()
@@ -143,14 +143,14 @@ class Run:
 
     def begin(self) -> CycleStart:
         now, period_s = self.machine.read(), self.pacer.period_s
-        begun = self.pacer.begin(now.run_s)
-        self.timing_monitor.begin(now, begun, period_s, is_following=False)
+        start = self.pacer.begin(now.run_s)
+        self.timing_monitor.begin(now, start, period_s, is_following=False)
         if self.missed or self.machine.host_us > BEGIN_US:
             self.due_us += PERIOD_US
             self.deadline_us = self.due_us
         else:
             self.due_us = self.deadline_us = BEGIN_US + PERIOD_US
-        return begun
+        return start
 
 
 def test_ten_thousand_delays_are_attributed_to_their_causes_and_none_is_invented() -> None:
@@ -163,7 +163,7 @@ def test_ten_thousand_delays_are_attributed_to_their_causes_and_none_is_invented
         assert (run.pacer.missed, run.timing_monitor.overruns) == (run.missed, run.overruns), (number, delay)
     timing = run.timing_monitor.summary()
     assert (run.stats.cycles, run.stats.missed, timing["missed"]) == (10_000, run.missed, run.missed)
-    # The lateness of the last cycle, which has not ended, is not booked yet.
+    # The lateness of the last cycle, which has not ended, is not counted yet.
     assert run.late - 1 <= run.stats.late <= run.late
     assert sum(run.faults.values()) > 2_000
     assert set(run.faults) == {*(phase.value for phase in Phase), "link receive", UNTIMED, OUTSIDE, THREAD}
@@ -197,20 +197,20 @@ def test_overruns_in_a_row_are_counted_until_a_cycle_keeps_its_time() -> None:
     for cause in ("perceive", "perceive"):
         assert run.timing_monitor.main_cause == "refine"
         run.slot(Delay(cause, 60_000, Machine.work, cause))
-    assert run.timing_monitor.main_cause == "perceive", "the most frequent one of the row"
+    assert run.timing_monitor.main_cause == "perceive", "the most frequent cause"
     run.slot(Delay("nowhere", 0, Machine.work, ""))
     assert (run.timing_monitor.overruns_in_a_row, run.timing_monitor.main_cause) == (0, "")
 
 
 def test_a_stack_sample_names_the_cause() -> None:
-    run, sights = Run(), [StackSample("Recorder.flush", "fsync"), StackSample("RobotProcess.run", "View.on_cycle")]
-    run.timing_monitor = TimingMonitor(run.stats, run.machine.read, lambda: sights[0], ("link receive",))
+    run, samples = Run(), [StackSample("Recorder.flush", "fsync"), StackSample("RobotProcess.run", "View.on_cycle")]
+    run.timing_monitor = TimingMonitor(run.stats, run.machine.read, lambda: samples[0], ("link receive",))
     run.receive = run.timing_monitor.timed("link receive", run._at_receive)
     run.begin()
     run.slot(Delay("untimed", 70_000, Machine.work, ""))
     run.slot(Delay("untimed", 70_000, Machine.block, ""))
     assert run.stats.causes == {"callback Recorder.flush": 2}
-    sights.pop(0)
+    samples.pop(0)
     run.slot(Delay("observers", 70_000, Machine.work, ""))
     assert run.stats.causes["observers (in View.on_cycle)"] == 1
 
@@ -228,7 +228,7 @@ def test_the_number_of_causes_is_bounded() -> None:
 SETTINGS = load_settings("hallway", ["perception.method=paper"])
 
 
-class Slow(Perception):
+class SlowPerception(Perception):
     """Perception whose parts take their time."""
 
     machine: Machine
@@ -239,7 +239,7 @@ class Slow(Perception):
         return super().observe(firing)
 
     @property
-    def pending(self) -> bool:
+    def can_refine(self) -> bool:
         return self.refine_us > 0
 
     def refine(self) -> int:
@@ -254,10 +254,10 @@ def test_the_step_marks_its_phases_and_no_overrun_delays_a_stop(
     observe_us: int, command_us: int, refine_us: int
 ) -> None:
     machine = Machine()
-    perception = Slow(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
+    perception = SlowPerception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
     perception.machine, perception.observe_us = machine, observe_us
     stats = CycleStats(LATE_US * US)
-    keeper = TimingMonitor(stats, machine.read)
+    monitor = TimingMonitor(stats, machine.read)
     state, commands = State(perception), list[tuple[Command, int]]()
 
     def carry_out(command: Command) -> None:
@@ -275,12 +275,14 @@ def test_the_step_marks_its_phases_and_no_overrun_delays_a_stop(
             rebooted=False,
         )
         request = {1: Request.ARM, 25: Request.HALT}.get(cycle)
-        keeper.begin(machine.read(), CycleStart(began_us * US, 0.0, 0, None), 1e3, is_following=False)
+        monitor.begin(machine.read(), CycleStart(began_us * US, 0.0, 0, None), 1e3, is_following=False)
         inputs = Inputs(t_s, LineState.READY, None, heard, request)
-        record = step(state, inputs, SETTINGS, carry_out, lambda done: done < 1, keeper.mark)
-        keeper.end()
-        assert commands[-1][1] - began_us == observe_us, "the command waits for nothing but the part that always runs"
-        took = {span.name: round(span.took_s / US) for span in keeper._spans}
+        record = step(state, inputs, SETTINGS, carry_out, lambda done: done < 1, monitor.mark)
+        monitor.end()
+        assert commands[-1][1] - began_us == observe_us, (
+            "only `observe` precedes the command"
+        )
+        took = {span.name: round(span.took_s / US) for span in monitor._spans}
         assert took == {
             "perceive": observe_us, "decide": 0, "command": command_us, "refine": perception.refine_us
         }  # fmt: skip
@@ -294,52 +296,52 @@ def test_the_step_marks_its_phases_and_no_overrun_delays_a_stop(
 
 
 def test_the_clock_sampler_distinguishes_work_from_sleep() -> None:
-    meter = ClockSampler()
-    before = meter.read()
+    sampler = ClockSampler()
+    before = sampler.read()
     time.sleep(0.02)
-    slept = meter.read()
+    slept = sampler.read()
     assert slept.waits > before.waits
     assert slept.host_s - before.host_s >= 0.02
     assert slept.thread_s - before.thread_s < 0.5 * (slept.host_s - before.host_s)
-    while meter.read().thread_s - slept.thread_s < 0.02:
+    while sampler.read().thread_s - slept.thread_s < 0.02:
         pass
-    worked = meter.read()
+    worked = sampler.read()
     # The clocks are read one after another.
     assert worked.thread_s - slept.thread_s <= worked.process_s - slept.process_s + 0.01
 
 
-def hold(watch: StallSampler) -> None:
-    # Set in here: whoever runs when it rings is seen, and a busy machine may let it ring at once.
-    watch.sample_after(0.01)
+def hold(sampler: StallSampler) -> None:
+    # Set in here: the function that runs when the timer fires is sampled, which on a busy machine may be at once.
+    sampler.sample_after(0.01)
     end_s = time.monotonic() + 60.0
-    while watch.sample is None and time.monotonic() < end_s:
+    while sampler.sample is None and time.monotonic() < end_s:
         pass
 
 
 async def test_the_stall_sampler_names_the_callback_that_blocks_the_loop() -> None:
-    watch = StallSampler()
-    with watch.active():
-        asyncio.get_running_loop().call_soon(hold, watch)
+    sampler = StallSampler()
+    with sampler.active():
+        asyncio.get_running_loop().call_soon(hold, sampler)
         async with asyncio.timeout(60.0):
-            while watch.sample is None:
+            while sampler.sample is None:
                 await asyncio.sleep(0.001)
-        assert watch.sample in {("hold", "hold"), ("hold", "StallSampler.sample_after")}
-        watch.sample_after(600.0)
-        assert watch.sample is None
+        assert sampler.sample in {("hold", "hold"), ("hold", "StallSampler.sample_after")}
+        sampler.sample_after(600.0)
+        assert sampler.sample is None
 
 
 async def test_the_stall_sampler_finds_nothing_while_the_loop_sleeps() -> None:
-    watch, looks = StallSampler(), list[None]()
-    look = watch._take_sample
+    sampler, taken = StallSampler(), list[None]()
+    take_sample = sampler._take_sample
 
     def counted(number: int, frame: object) -> None:
-        looks.append(None)
-        look(number, frame)  # type: ignore[arg-type]
+        taken.append(None)
+        take_sample(number, frame)  # type: ignore[arg-type]
 
-    watch._take_sample = counted  # type: ignore[method-assign, assignment]
-    with watch.active():
-        watch.sample_after(0.005)
+    sampler._take_sample = counted  # type: ignore[method-assign, assignment]
+    with sampler.active():
+        sampler.sample_after(0.005)
         async with asyncio.timeout(60.0):
-            while not looks:
+            while not taken:
                 await asyncio.sleep(0.2)
-    assert watch.sample is None or watch.sample.callback.startswith("test_the_watch_sees_nobody")
+    assert sampler.sample is None or sampler.sample.callback.startswith("test_the_stall_sampler_finds_nothing")

@@ -92,7 +92,7 @@ async def test_input_that_arrives_at_the_deadline_is_processed(waker: Waker) -> 
             while time.monotonic() < deadline_s + 0.005:
                 pass
 
-        # Held up for too long in between, the machine has not made the case: once more.
+        # The machine was suspended for too long in between to test the case: try again.
         while began_s >= deadline_s:
             with contextlib.suppress(BlockingIOError):
                 os.read(read, 16)
