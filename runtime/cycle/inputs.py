@@ -32,7 +32,7 @@ class Inputs:
 
     run_s: float
     line: LineState
-    trouble: str | None
+    line_problem: str | None
     """Why the line is not READY, where the driver knows."""
     received: Received
     """Echoes and odometry that arrived."""
@@ -82,11 +82,11 @@ def gather_inputs(
     """
     driver.tick(run_s)
     gap_max_s = command_gap_max_s(driver)
-    line, trouble, received = driver.state, driver.problem, driver.take_received()
+    line, line_problem, received = driver.state, driver.problem, driver.take_received()
     return Inputs(
         run_s,
         line,
-        trouble,
+        line_problem,
         received,
         request,
         gap_max_s,

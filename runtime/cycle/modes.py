@@ -61,7 +61,17 @@ class ModeState:
     """When the arming under way began, by the run's clock; None while there is none."""
 
     def enter(self, mode: Mode, run_s: float, reason: str | None = None) -> ModeState:
-        """Return the state of having just entered `mode`."""
+        """Return the state of having just entered `mode`.
+
+        Parameters
+        ----------
+        mode : Mode
+            The one that is entered, possibly the present one again.
+        run_s : float
+            When, by the run's clock.
+        reason : str, optional
+            Why, for the operator.
+        """
         return ModeState(mode, run_s, reason)
 
     def entered_since(self, before: ModeState) -> bool:
@@ -99,20 +109,32 @@ def advance(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> Mod
     if inputs.line is not LineState.READY:
         if state.mode is Mode.SAFE_STOP:
             return replace(state, arming_run_s=None)
-        return replace(state, mode=Mode.CONNECTING, reason=inputs.trouble, arming_run_s=None)
+        return replace(state, mode=Mode.CONNECTING, reason=inputs.line_problem, arming_run_s=None)
     if state.mode is Mode.CONNECTING:
         state = state.enter(Mode.READY, run_s)
     return _advance_arming(state, inputs, flags, gap_s)
 
 
 def why_stop(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> str | None:
-    """Return the reason why driving must end, None where there is none; the parameters are those of `advance`."""
+    """Return the reason why driving must end, None where there is none.
+
+    Parameters
+    ----------
+    state : ModeState
+        The mode so far, which is DRIVE.
+    inputs : Inputs
+        The cycle's: line, requests, faults.
+    flags : Flags
+        The base's, as of the newest odometry.
+    gap_s : float
+        Time since the cycle before.
+    """
     if inputs.request is Request.HALT:
         return HALTED
     if inputs.fault is not None:
         return inputs.fault
     if inputs.line is not LineState.READY:
-        return inputs.trouble or LINE_REASONS[inputs.line]
+        return inputs.line_problem or LINE_REASONS[inputs.line]
     if gap_s > inputs.gap_max_s:
         # The received data may be from before the gap, and the base may have stopped by its deadman: the next
         # command would set it in motion again.

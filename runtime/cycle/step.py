@@ -233,7 +233,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings) -> Drive | Stop:
     silence_s = odometry.robot_s - state.last_firing_robot_s
     silence_max_s = behaviors.avoid_static_obstacle.echo_age_max_s
     if silence_s > silence_max_s:
-        likely = inputs.trouble or "check the ring's power and cable"
+        likely = inputs.line_problem or "check the ring's power and cable"
         return Stop(f"the ring has not reported for {silence_s:.1f} s: {likely}, then re-arm")
     if state.leg is None:
         state.leg = Leg.starting_at(odometry.pose)
