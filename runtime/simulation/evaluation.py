@@ -20,6 +20,8 @@ from runtime.cycle.summary import object_row
 from runtime.simulation.closed_loop import SimulationResult, simulate
 from runtime.timing.cycle_stats import Quantiles, worst_of
 
+CHI2_95: Final = 5.991
+"""The 95 % quantile of χ² with two degrees of freedom."""
 GATE_M: Final = FOOT_M
 """An estimate farther than a foot from every drum is a false one."""
 

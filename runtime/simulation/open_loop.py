@@ -13,8 +13,7 @@ from config.settings import Settings
 from config.world import BoxConfig, WorldConfig
 from drivers.messages import Firing
 from perception.pipeline import DetectedObject, Perception
-from runtime.analysis.plots.geometry import CHI2_95
-from runtime.simulation.evaluation import DrumRow, Outcome, match_drums, nearest_pairs
+from runtime.simulation.evaluation import CHI2_95, DrumRow, Outcome, match_drums, nearest_pairs
 from runtime.simulation.first_fix import FirstFix, FirstFixTracker, summarise_fixes
 from runtime.simulation.scene_names import SceneName
 from runtime.simulation.scenes import Hall, halls, readings

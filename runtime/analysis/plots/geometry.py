@@ -13,9 +13,8 @@ from config.world import WorldConfig
 from drivers.messages import Floats, Pose
 from perception.detected_object import DetectedObject
 from runtime.analysis.timeline import BEARING, RANGE, Timeline, X, Y
+from runtime.simulation.evaluation import CHI2_95
 
-CHI2_95: Final = 5.991
-"""The 95 % quantile of χ² of two degrees of freedom."""
 MARGIN_M: Final = 0.45
 
 
