@@ -1,1 +1,1 @@
-"""Bytes to robot and back: the messages any robot speaks, the line they travel on, one folder a robot."""
+"""Bytes to robot and back: the messages of any robot, its line, and a folder for each robot family."""

@@ -1,7 +1,7 @@
-"""Which sensors fire together, and when: a pure schedule, whatever robot carries it out.
+"""Which sensors fire together, and when: a pure schedule for any robot.
 
-Sensors that fire together must not hear one another's echoes, and a firing must not begin before the last one's
-window has closed; the first is the user's choice of sets, the second is checked here.
+Sensors that fire together must not hear each other's echoes, and a firing must not start before the window of the
+last one has closed. The first is up to the user's choice of sets, the second is checked here.
 """
 
 from __future__ import annotations
@@ -21,11 +21,12 @@ _AT_A_TIME: Mapping[Preset, tuple[int, ...]] = MappingProxyType(
         "thirds": (3,),
         "quadrants": (4,),
         "octets": (8,),
-        # Partners 3 n and 8 n places on: in a ring of 24 no two sensors fire together in both.
+        # In a ring of 24 the partners are 3n and 8n places apart: no two sensors fire together in both.
         "alternating": (8, 3),
     }
 )
 _TOLERANCE_S = 1e-9
+"""Slack for the rounding of decimal fractions."""
 
 
 class FiringError(UserError):
@@ -36,7 +37,7 @@ class FiringError(UserError):
 
 @dataclass(frozen=True, slots=True)
 class FiringPattern:
-    """Firings in turn, for ever: bit i of a mask is sensor i, one mask each `step_period_s`."""
+    """A cyclic schedule: every `step_period_s` the sensors of the next mask fire; bit i of a mask is sensor i."""
 
     masks: tuple[int, ...]
     step_period_s: float
@@ -44,7 +45,7 @@ class FiringPattern:
 
 
 def time_of_flight_s(window_m: float) -> float:
-    """Return how long sound takes to `window_m` and back, seconds."""
+    """Return how long sound takes to the end of the window and back, s."""
     return 2.0 * window_m / SOUND_SPEED_M_S
 
 
@@ -54,12 +55,12 @@ def sensors(mask: int) -> tuple[int, ...]:
 
 
 def firing_pattern(ring: RingConfig) -> FiringPattern:
-    """Return the schedule that `ring` asks for.
+    """Return the schedule that `ring` configures.
 
     Raises
     ------
     FiringError
-        The preset does not divide the ring, a set names a sensor that is not there, or a step is shorter than the
+        The preset does not divide the ring, a set names a missing sensor, or a step is shorter than the
         time sound needs to the end of its window and back.
     """
     count = len(ring.mounts)
@@ -104,7 +105,7 @@ def _check_step(step_period_s: float, window_m: float) -> None:
     needed_s = time_of_flight_s(window_m)
     if step_period_s >= needed_s - _TOLERANCE_S:
         return
-    # Rounded to the safe side, so that what the message proposes is accepted.
+    # Rounded to the safe side, so that the values in the message are accepted.
     shortest_s = math.ceil(needed_s * 1e4) / 1e4
     longest_m = math.floor(step_period_s * SOUND_SPEED_M_S / 2.0 * 1e3) / 1e3
     raise FiringError(

@@ -1,8 +1,8 @@
-"""One serial line for life: opened, opened again after each loss, never waited for, and truthful about its end.
+"""One serial line, opened again after each loss; it never blocks the loop, and always reports why it was lost.
 
-The only importer of `serial_asyncio`, because that library needs watching: its write buffer has no bound, an
-exception in a data handler leaves the port up and deaf, and its `close()` on a stalled peer never ends. So writes
-are refused beyond a bound, handlers are guarded, and a line is ended by `abort()` alone.
+The only importer of `serial_asyncio`, because that library needs care: its write buffer is unbounded, an exception in
+a data handler leaves the port open but no longer read, and its `close()` never returns if the peer has stalled. So
+writes are refused beyond a bound, handlers are guarded, and a line is ended by `abort()` only.
 """
 
 from __future__ import annotations
@@ -24,12 +24,15 @@ from drivers.serial_port import OPENING_ERRORS, LinkError, OpenPort, open_port, 
 __all__ = ["Link", "LinkError"]
 
 _WRITABLE_MAX = 256
-"""Bytes waiting in this process beyond which the line is not `writable`: the system's own buffer is full then."""
+"""Bytes waiting in this process beyond which the line is not `writable`: the system's own buffer is then full."""
 _BUFFER_MAX = 4096
 """Bytes waiting beyond which nothing is accepted; the room above `_WRITABLE_MAX` is for a HALT."""
 _OPEN_TIMEOUT_S = 3.0
+"""Longest time to open a port, s; a good one takes milliseconds, some USB adapters a second."""
 _FLUSH_S = 0.2
+"""Longest time to send what is waiting when the line is closed, s."""
 _FLUSH_POLL_S = 0.002
+"""Time between looks at the system's own buffer, s."""
 
 
 class Link:
@@ -40,12 +43,12 @@ class Link:
     config
         Port, baud rate, and the waits between attempts to open it.
     on_opened, on_data, on_closed
-        Called in the loop: the line is open; bytes came; the line is gone, and why. What they raise ends the line,
-        not the program; it is opened again after a wait.
+        Called in the loop: the line is open; bytes arrived; the line is lost, with the reason. An exception in one of
+        them ends the line, not the program; the line is opened again after a wait.
     opener
-        Opens the port, in a thread; for tests.
+        Opens the port, in a thread; tests replace it.
     open_timeout_s
-        Patience with an opening.
+        Longest time to open the port.
     """
 
     def __init__(
@@ -64,69 +67,69 @@ class Link:
         self._on_closed = on_closed
         self._opener = opener
         self._open_timeout_s = open_timeout_s
-        self._line: _Line | None = None
+        self._line: _Connection | None = None
         self._last_error: str | None = None
 
     @property
     def config(self) -> LinkConfig:
-        """The line's settings."""
+        """The settings of the line."""
         return self._config
 
     @property
     def is_open(self) -> bool:
-        """True while bytes can go and come."""
-        return self._line is not None and self._line.up
+        """True while the line can send and receive."""
+        return self._line is not None and self._line.is_open
 
     @property
     def writable(self) -> bool:
-        """True while what is sent leaves without waiting for the peer to read."""
-        return self._line is not None and self._line.up and self._line.waiting <= _WRITABLE_MAX
+        """True while bytes leave this process at once, so that nothing sent now is late."""
+        return self._line is not None and self._line.is_open and self._line.waiting <= _WRITABLE_MAX
 
     @property
     def waiting(self) -> int:
-        """Bytes sent that have not left this process; never more than 4 KiB."""
+        """Number of bytes sent that have not left this process; never more than 4 KiB."""
         return 0 if self._line is None else self._line.waiting
 
     @property
     def last_error(self) -> str | None:
-        """Why the line was lost or could not be opened the last time, in one line; None while all is well."""
+        """Why the line was lost or could not be opened, in one line; None while it is open."""
         return self._last_error
 
     def send(self, data: bytes) -> bool:
-        """Put bytes on the line; return False where it is not open or the peer has long stopped reading.
+        """Send bytes; return False if the line is not open or the peer has long stopped reading.
 
-        Bytes are taken whole or not at all, so that frames stay whole.
+        All bytes are accepted or none, so that frames stay whole.
         """
         line = self._line
-        if line is None or not line.up or line.waiting + len(data) > _BUFFER_MAX:
+        if line is None or not line.is_open or line.waiting + len(data) > _BUFFER_MAX:
             return False
         if data:
             line.transport.write(data)
         return True
 
     async def open_once(self) -> None:
-        """Open the line, unless it is open.
+        """Open the line, unless it is already open.
 
         Raises
         ------
         LinkError
-            It cannot be opened; the message says why in one line.
+            The line cannot be opened; the message says why.
         """
         if self._line is not None:
             return
         try:
             port = await _open_off_loop(self._config, self._opener, self._open_timeout_s)
-            line = _Line(self, port)
+            line = _Connection(self, port)
         except LinkError as e:
             self._last_error = str(e)
             raise
         self._line = line
-        await line.made.wait()
+        await line.opened.wait()
 
     async def run(self) -> None:
         """Keep the line open until cancelled, then end it.
 
-        The wait before the next attempt doubles with each failure and begins anew once bytes have come.
+        The wait before the next attempt doubles with each failure, and is short again once bytes have arrived.
         """
         wait_s = self._config.reopen_first_s
         try:
@@ -135,8 +138,8 @@ class Link:
                     await self.open_once()
                 line = self._line
                 if line is not None:
-                    await line.gone.wait()
-                    if line.fruitful:
+                    await line.lost.wait()
+                    if line.has_received:
                         wait_s = self._config.reopen_first_s
                 await asyncio.sleep(wait_s)
                 wait_s = min(2.0 * wait_s, self._config.reopen_max_s)
@@ -144,7 +147,7 @@ class Link:
             await self.stop()
 
     async def stop(self) -> None:
-        """End the line: give what has been sent a fifth of a second to leave, then abort."""
+        """End the line: wait up to 0.2 s for sent bytes to leave, then abort."""
         line = self._line
         if line is None:
             return
@@ -152,10 +155,10 @@ class Link:
         try:
             drained = await line.flush(_FLUSH_S)
         finally:
-            line.end("it was closed at this end", drained=drained)
-        await line.gone.wait()
+            line.end("closed by this program", drained=drained)
+        await line.lost.wait()
 
-    def _made(self) -> None:
+    def _opened(self) -> None:
         self._last_error = None
         self._guard("opening", self._on_opened)
 
@@ -168,14 +171,14 @@ class Link:
         self._guard("closing", lambda: self._on_closed(reason))
 
     def _guard(self, what: str, call: Callable[[], None]) -> None:
-        """Call a handler; what it raises becomes the end of the line, with the culprit named."""
+        """Call a handler; an exception in it ends the line, with its place in the reason."""
         try:
             call()
-        except Exception as e:  # noqa: BLE001 - a handler may raise anything, and the line must not stay up and deaf
-            culprit = traceback.extract_tb(e.__traceback__)[-1]
+        except Exception as e:  # noqa: BLE001 - a handler may raise anything, and the line must not stay open unread
+            place = traceback.extract_tb(e.__traceback__)[-1]
             reason = (
-                f"the handler of {what} failed with {type(e).__name__}: {e} ({culprit.filename}:{culprit.lineno}, in "
-                f"{culprit.name}); a fault of this program: report it with this line"
+                f"the handler of {what} failed with {type(e).__name__}: {e} ({place.filename}:{place.lineno}, in "
+                f"{place.name}); a fault of this program: report it with this line"
             )
             self._last_error = reason
             if self._line is not None:
@@ -183,11 +186,11 @@ class Link:
 
 
 class _Transport(serial_asyncio.SerialTransport):  # type: ignore[misc]  # the library has no types
-    """The library's transport, minus three habits.
+    """The library's transport with three changes.
 
-    What is written leaves at once, as far as the line takes it: bytes that waited for the loop's next turn would
-    leave after whatever holds that turn up, and a command that was right then may be wrong by minutes. An unplugged
-    cable is no program error. And an end is an end.
+    Bytes are written at once, as far as the line accepts them: if they waited for the loop's next turn, whatever
+    delays that turn would delay a command, which may then be wrong. An unplugged cable is not reported as a program
+    error. And every end is an abort.
     """
 
     def write(self, data: bytes) -> None:
@@ -197,7 +200,7 @@ class _Transport(serial_asyncio.SerialTransport):  # type: ignore[misc]  # the l
             try:
                 data = data[os.write(self._serial.fileno(), data) :]
             except BlockingIOError:
-                pass  # the peer does not read: it has to wait after all
+                pass  # the peer does not read: the bytes have to wait
             except OSError as e:
                 self._fatal_error(e)
                 return
@@ -208,17 +211,17 @@ class _Transport(serial_asyncio.SerialTransport):  # type: ignore[misc]  # the l
         self._abort(exc)
 
     def _close(self, exc: BaseException | None = None) -> None:
-        # After a failed read the library would wait for its writes to leave, on a line that is gone.
+        # After a failed read the library would wait for its writes to leave, on a line that is lost.
         self._abort(exc)
 
 
-class _Line(asyncio.Protocol):
-    """One opening of the line, from open to lost."""
+class _Connection(asyncio.Protocol):
+    """One connection: the line from its opening to its loss."""
 
     def __init__(self, link: Link, port: serial.Serial) -> None:
-        self.fruitful = False
-        self.made = asyncio.Event()
-        self.gone = asyncio.Event()
+        self.has_received = False
+        self.opened = asyncio.Event()
+        self.lost = asyncio.Event()
         self._link = link
         self._drained = asyncio.Event()
         self._drained.set()
@@ -226,30 +229,30 @@ class _Line(asyncio.Protocol):
         self._port = port
         try:
             self.transport = _Transport(asyncio.get_running_loop(), self, port)
-        except OPENING_ERRORS as e:  # it sets the port up anew, which may be gone again
+        except OPENING_ERRORS as e:  # it configures the port again, which may be lost by now
             port.close()
             raise opening_error(link.config, e) from e
-        # Any byte that waits counts as not drained.
+        # Any waiting byte counts as not drained.
         self.transport.set_write_buffer_limits(high=0, low=0)
 
     @property
-    def up(self) -> bool:
-        """True from its beginning to its end."""
-        return self.made.is_set() and not self.transport.is_closing()
+    def is_open(self) -> bool:
+        """True from the opening to the loss."""
+        return self.opened.is_set() and not self.transport.is_closing()
 
     @property
     def waiting(self) -> int:
-        """Bytes that have not left this process."""
+        """Number of bytes that have not left this process."""
         return int(self.transport.get_write_buffer_size())
 
     def connection_made(self, _transport: asyncio.BaseTransport) -> None:
-        self.made.set()
-        if self.up:
-            self._link._made()
+        self.opened.set()
+        if self.is_open:
+            self._link._opened()
 
     def data_received(self, data: bytes) -> None:
-        if self.up:
-            self.fruitful = True
+        if self.is_open:
+            self.has_received = True
             self._link._received(data)
 
     def pause_writing(self) -> None:
@@ -259,33 +262,33 @@ class _Line(asyncio.Protocol):
         self._drained.set()
 
     def connection_lost(self, exc: BaseException | None) -> None:
-        text = " ".join(str(exc).split()) if exc is not None else "it ended without a word"
+        text = " ".join(str(exc).split()) if exc is not None else "no reason given"
         reason = self._reason or (
             f"the line {self._link.config.port} was lost ({text}); likely it was unplugged or the robot's side "
-            f"ended: plug it in again, it is opened again by itself"
+            f"ended: plug it in again; it is then opened again automatically"
         )
-        self.made.set()
-        self.gone.set()
+        self.opened.set()
+        self.lost.set()
         self._drained.set()
         self._link._lost(reason)
 
     def end(self, reason: str, *, drained: bool = False) -> None:
-        """Abort, once: `connection_lost` follows soon, with `reason`."""
+        """Abort the connection, once; `connection_lost` follows soon, with `reason`."""
         if self.transport.is_closing():
             return
         self._reason = reason
         if not drained:
-            # The library drains the port before it closes it, for as long as a stalled peer likes.
+            # The library drains the port before it closes it, without limit if the peer has stalled.
             with contextlib.suppress(OSError, termios.error):
                 self._port.reset_output_buffer()
         self.transport.abort()
 
     async def flush(self, timeout_s: float) -> bool:
-        """Wait until all bytes have left the machine, for `timeout_s` at most; return whether they have."""
+        """Wait until all bytes have left the machine, at most for `timeout_s`; return whether they have."""
         with contextlib.suppress(TimeoutError, OSError, termios.error):
             async with asyncio.timeout(timeout_s):
                 await self._drained.wait()
-                while self.up and self._port.out_waiting:
+                while self.is_open and self._port.out_waiting:
                     await asyncio.sleep(_FLUSH_POLL_S)
                 return True
         return False
@@ -294,13 +297,13 @@ class _Line(asyncio.Protocol):
 async def _open_off_loop(config: LinkConfig, opener: OpenPort, timeout_s: float) -> serial.Serial:
     """Open the port in a thread of its own.
 
-    The thread is a daemon, so that a port that never opens keeps neither the loop nor the process from ending; one
-    that opens after all when nobody waits any more is closed again.
+    The thread is a daemon, so that a port that never opens blocks neither the loop nor the end of the process. A port
+    that opens after the timeout is closed again.
 
     Raises
     ------
     LinkError
-        It cannot be opened, or not within `timeout_s`.
+        The port cannot be opened, or not within `timeout_s`.
     """
     if config.port is None:
         raise LinkError("no serial port is named; give it as --port or link.port")
@@ -310,7 +313,7 @@ async def _open_off_loop(config: LinkConfig, opener: OpenPort, timeout_s: float)
     def hand_over(port: serial.Serial | None, error: BaseException | None) -> None:
         if port is None:
             if not opened.done():
-                opened.set_exception(error or OSError("it opened as nothing"))
+                opened.set_exception(error or OSError("the opener returned no port"))
         elif opened.done():
             port.close()
         else:

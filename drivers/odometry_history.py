@@ -1,4 +1,4 @@
-"""The odometry of the last few seconds, to look up where the base was when an older firing took place."""
+"""The odometry of the last few seconds, to look up the pose of an earlier firing."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drivers.se2 import interpolate
 
 
 class OdometryHistory:
-    """A fixed number of odometry samples, times ascending; the oldest leaves for a new one."""
+    """A limited number of odometry samples with ascending times; a new one replaces the oldest."""
 
     def __init__(self, capacity: int) -> None:
         self._samples: deque[Odometry] = deque(maxlen=capacity)
@@ -20,11 +20,11 @@ class OdometryHistory:
 
     @property
     def newest(self) -> Odometry | None:
-        """The last sample, None where there is none."""
+        """The newest sample, None if there is none."""
         return self._samples[-1] if self._samples else None
 
     def add(self, sample: Odometry) -> None:
-        """Take the next sample; one that is not later than the newest is ignored."""
+        """Add a sample; one that is not later than the newest is ignored."""
         if not self._samples or sample.robot_s > self._samples[-1].robot_s:
             self._samples.append(sample)
 
@@ -32,23 +32,33 @@ class OdometryHistory:
         """Forget all samples."""
         self._samples.clear()
 
-    def at(self, t_s: float, gap_max_s: float) -> tuple[Pose, float] | None:
-        """Return the pose and ring yaw at `t_s`, interpolated between the samples around it.
+    def at(self, robot_s: float, gap_max_s: float) -> tuple[Pose, float] | None:
+        """Return the pose and ring yaw at a time, interpolated between the samples around it.
 
-        Returns None where no sample is as old or as new, or the two around it are more than `gap_max_s` apart.
+        Parameters
+        ----------
+        robot_s
+            The time, by the robot's clock.
+        gap_max_s
+            Longest time between two samples to interpolate over.
+
+        Returns
+        -------
+        tuple of Pose and float, or None
+            None if the time is outside the samples, or the two around it are too far apart.
         """
         newest = self.newest
-        if newest is None or t_s > newest.robot_s:
+        if newest is None or robot_s > newest.robot_s:
             return None
-        if t_s == newest.robot_s:
+        if robot_s == newest.robot_s:
             return newest.pose, newest.ring_yaw
-        # A firing is a few samples old, so the search from the newest back is short.
+        # A firing is only a few samples old, so the search from the newest backwards is short.
         for after, before in pairwise(reversed(self._samples)):
-            if before.robot_s <= t_s:
+            if before.robot_s <= robot_s:
                 gap_s = after.robot_s - before.robot_s
-                if gap_s > gap_max_s and t_s != before.robot_s:
+                if gap_s > gap_max_s and robot_s != before.robot_s:
                     return None
-                share = (t_s - before.robot_s) / gap_s
+                share = (robot_s - before.robot_s) / gap_s
                 yaw = before.ring_yaw + share * (after.ring_yaw - before.ring_yaw)
                 return interpolate(before.pose, after.pose, share), yaw
         return None

@@ -1,6 +1,6 @@
-"""Motion at a constant twist: the exponential and logarithm of SE(2), and interpolation by them.
+"""Motion at constant twist: exponential and logarithm of SE(2), and interpolation with them.
 
-Between two odometry samples a base moves along an arc, not along a chord; a firing is placed on that arc.
+Between two odometry samples a base moves along an arc, not along its chord; a firing is placed on that arc.
 """
 
 from __future__ import annotations
@@ -10,15 +10,23 @@ import math
 from drivers.messages import Pose
 
 _SMALL_RAD = 1e-4
-"""Below this the series is exact to the last bit or two, and the closed form divides small by small."""
+"""Angle below which the series is used: it is exact to a bit or two, while the closed form divides two small
+numbers."""
 
 
 def exp(x: float, y: float, theta: float) -> Pose:
-    """Return where the twist (x, y, theta), held for unit time, takes a body from the origin.
+    """Return the pose that a constant twist reaches from the origin in unit time.
+
+    Parameters
+    ----------
+    x, y
+        Velocity, m per unit time.
+    theta
+        Turning rate, rad per unit time.
 
     Notes
     -----
-    With V = [[sin θ/θ, −(1 − cos θ)/θ], [(1 − cos θ)/θ, sin θ/θ]] the place is V·(x, y): Selig, *Geometric
+    With V = [[sin θ/θ, −(1 − cos θ)/θ], [(1 − cos θ)/θ, sin θ/θ]] the position is V·(x, y): Selig, *Geometric
     Fundamentals of Robotics*, 2nd ed., §4.5; Sola et al., *A micro Lie theory*, eq. 155-158.
     """
     if abs(theta) < _SMALL_RAD:
@@ -30,9 +38,9 @@ def exp(x: float, y: float, theta: float) -> Pose:
 
 
 def log(pose: Pose) -> tuple[float, float, float]:
-    """Return the twist (x, y, theta) that takes a body from the origin to `pose` in unit time.
+    """Return the constant twist (x, y, theta) that reaches `pose` from the origin in unit time.
 
-    `pose.theta` is taken as it is, not wrapped. The inverse of V is [[c, h], [−h, c]] with h = θ/2, c = h/tan h.
+    `pose.theta` is not wrapped. The inverse of V is [[c, h], [−h, c]] with h = θ/2, c = h/tan h.
 
     Raises
     ------
@@ -47,10 +55,17 @@ def log(pose: Pose) -> tuple[float, float, float]:
 
 
 def interpolate(start: Pose, end: Pose, share: float) -> Pose:
-    """Return the pose after `share` (0 to 1) of the way from `start` to `end` at a constant twist.
+    """Return a pose between two poses, on the path of a constant twist.
 
-    Headings are unwrapped: the body turns by ``end.theta - start.theta``. Past half a turn the arc says nothing of
-    the true path, and the place is interpolated along the chord.
+    Headings are unwrapped: the body turns by ``end.theta - start.theta``. Beyond half a turn the arc is unlikely to
+    be the true path, and the position is interpolated along the chord.
+
+    Parameters
+    ----------
+    start, end
+        The two poses.
+    share
+        Share of the time between them, 0 to 1.
     """
     if share <= 0.0:
         return start

@@ -1,7 +1,7 @@
-"""Opening a serial port, and saying in one line why it cannot be opened.
+"""Open a serial port, and explain in one line why it cannot be opened.
 
-Opening blocks: on a lost USB adapter, or a driver that waits for a modem line, for as long as it likes. So `link`
-does it in a thread.
+Opening blocks, without limit on a lost USB adapter or a driver that waits for a modem line. So `link` does it in a
+thread.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ OpenPort: TypeAlias = Callable[[LinkConfig], serial.Serial]
 
 
 OPENING_ERRORS = (OSError, ValueError, OverflowError, termios.error)
-"""What the serial library raises where a port cannot be opened or set up."""
+"""The exceptions of the serial library if a port cannot be opened or configured."""
 
 
 class LinkError(UserError):
@@ -30,7 +30,7 @@ class LinkError(UserError):
 
 
 def open_port(config: LinkConfig) -> serial.Serial:
-    """Open the port, for this process alone. Blocks."""
+    """Return the opened port, locked for this process; blocks until it is open."""
     return serial.Serial(config.port, config.baud, exclusive=True, timeout=0, write_timeout=0)
 
 
@@ -44,7 +44,7 @@ def opening_error(config: LinkConfig, error: BaseException) -> LinkError:
 
 
 def explain(config: LinkConfig, error: BaseException) -> str:
-    """Return in one line why `config.port` could not be opened."""
+    """Return the message for a port that could not be opened, in one line."""
     port = config.port
     number = getattr(error, "errno", None)
     text = " ".join(str(error).split())
@@ -66,7 +66,7 @@ def explain(config: LinkConfig, error: BaseException) -> str:
     if number in (errno.EISDIR, errno.ENOTTY) or not_a_tty:
         return f"{port} is not a serial port ({text}); give the serial device of the robot as --port or link.port"
     if isinstance(error, TimeoutError):
-        return f"opening {port} does not come to an end ({text}); likely its adapter hangs: unplug and plug it again"
+        return f"opening {port} takes too long ({text}); likely its adapter hangs: unplug and plug it again"
     if isinstance(error, ValueError | OverflowError):
         return f"{port} cannot be set to {config.baud} baud ({text}); correct link.baud"
     return f"cannot open {port} ({text}); check the cable and the port's name"

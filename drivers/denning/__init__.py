@@ -1,1 +1,1 @@
-"""The Denning MRV-III of PROTOCOL.md: its wire format and the robot on top of it."""
+"""The Denning MRV-III of PROTOCOL.md: its wire format, its driver and an emulated robot."""

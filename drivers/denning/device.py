@@ -1,8 +1,8 @@
-"""The robot's side of the protocol, without any I/O and in its own time.
+"""The emulated robot's side of the ring-and-base protocol: without I/O, and in its own time.
 
-The robot lives through events: body ticks, firings, windows that close, odometry, the deadman, faults. `advance`
-lives through all of them up to a moment and returns the bytes that have left the transmitter by then; it makes no
-difference how the time is cut into calls. So the same robot serves a pty in real time and a test in virtual time.
+The robot is an event simulation: body ticks, firings, ends of windows, odometry, the deadman, faults. `advance`
+simulates all events up to a time and returns the bytes that have left the transmitter by then; how the time is split
+into calls makes no difference. So the same robot serves a pty in real time and a test in virtual time.
 """
 
 from __future__ import annotations
@@ -46,11 +46,13 @@ from drivers.emulator.uart import Uart
 from drivers.messages import Flags, Pose, Twist
 
 DEADMAN_MS = 500
+"""The base ramps to a stop this long after the last DRIVE; reported in IDENT."""
 ODOMETRY_PERIOD_MS = 20
+"""Time between odometry frames; reported in IDENT."""
 TICK_US = 5_000
-"""The body moves in steps of at most this length."""
+"""Longest step of the body's simulation, µs."""
 NAME = "denning"
-_LATCHED, _DEADMAN = int(Flags.LATCHED), int(Flags.DEADMAN)  # asked at every event: an enumeration is slow
+_LATCHED, _DEADMAN = int(Flags.LATCHED), int(Flags.DEADMAN)  # used at every event, where an enumeration is slow
 _STILL = Twist(0.0, 0.0)
 
 
@@ -60,13 +62,13 @@ class DenningDevice:
     Parameters
     ----------
     robot, world
-        What it is and where it stands.
+        What the robot is, and what surrounds it.
     seed
-        Everything random follows from it.
+        Seed of all random numbers.
     faults
         What goes wrong, and when.
     clock_start_us
-        What the robot's own clock shows at the first start: 0 on a real one, near 2³² to see it wrap soon.
+        First reading of the robot's own clock, µs: 0 on a real robot, near 2³² to see it wrap soon.
 
     Raises
     ------
@@ -74,7 +76,7 @@ class DenningDevice:
         The ring has more sensors than the protocol's masks have bits.
     """
 
-    # What a restart begins anew; see `_boot`.
+    # Reset by a restart; see `_boot`.
     _clock_offset_us: int
     _decoder: Decoder
     _seq: int
@@ -95,25 +97,25 @@ class DenningDevice:
         clock_start_us: int = 0,
     ) -> None:
         mounts = robot.ring.mounts
-        self._sensors, most = len(mounts), frames.SENSORS_MAX
-        if self._sensors > most:
-            raise DriverError(f"the ring has {self._sensors} sensors: the protocol's masks have room for {most}")
+        self._sensors, sensors_max = len(mounts), frames.SENSORS_MAX
+        if self._sensors > sensors_max:
+            raise DriverError(f"the ring has {self._sensors} sensors: the protocol supports at most {sensors_max}")
         seeds = np.random.SeedSequence(seed).spawn(6)
-        of_sonar, of_drift, self._boots, *noises = map(np.random.default_rng, seeds)
-        self._output_noise, self._input_noise, self._outliers = noises
+        sonar_rng, drift_rng, self._boot_rng, *noises = map(np.random.default_rng, seeds)
+        self._output_rng, self._input_rng, self._outlier_rng = noises
         self._ring_radius_mm = round(1000.0 * max(math.hypot(m.x_m, m.y_m) for m in mounts))
         scene = compile_scene(world)
         start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
-        self._body = Body(robot.body, scene, start, world.odometry, of_drift)
-        self._sonar = Sonar(robot.ring, scene, world.acoustics, of_sonar)
+        self._body = Body(robot.body, scene, start, world.odometry, drift_rng)
+        self._sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
         self._uart = Uart(robot.link.baud)
         self._outbox = bytearray()
         self._now_us = self._moved_us = 0
-        self._ahead_us: int | None = None  # the next event, until something happens
+        self._next_event_us: int | None = None  # None once something may have changed it
         self._faults = FaultSchedule(faults)
         self._boot_id = self._new_boot_id()
         self._boot(clock_start_us)
-        # Load the compiled kernels now: the first firing has no time for it.
+        # Load the compiled kernels now, so that the first firing is not late.
         clearance(start.x, start.y, scene.circles, scene.segments)
         self._sonar.true_echoes(start, start.theta, np.zeros(self._sensors, dtype=np.bool_))
 
@@ -125,34 +127,34 @@ class DenningDevice:
 
     @property
     def flags(self) -> Flags:
-        """What the base reports of itself; BUMPER and MOTOR_FAULT say why it latched and go with the latch."""
+        """The base's status; BUMPER and MOTOR_FAULT say why it is latched and are cleared with the latch."""
         return self._flags
 
     @property
     def boot_id(self) -> int:
-        """Of this start."""
+        """The random number of this start, as in IDENT."""
         return self._boot_id
 
     @property
     def plugged(self) -> bool:
-        """False while the line is pulled out."""
+        """False while the line is unplugged."""
         return not self._faults.has(Unplug)
 
     @property
     def dropped(self) -> int:
-        """Frames that did not fit into the transmitter's queue."""
+        """Number of frames that did not fit into the transmitter's queue."""
         return self._uart.dropped
 
     def advance(self, to_s: float) -> bytes:
-        """Live until `to_s`, seconds after the start, and return the bytes that have left the robot by then."""
+        """Simulate up to `to_s` seconds after the start and return the bytes that have left the robot by then."""
         to_us = round(to_s * 1e6)
-        while (at_us := self._next_us() if self._ahead_us is None else self._ahead_us) <= to_us:
-            self._now_us, self._ahead_us = at_us, None
+        while (at_us := self._next_us() if self._next_event_us is None else self._next_event_us) <= to_us:
+            self._now_us, self._next_event_us = at_us, None
             self._move()
-            self._meet_faults()
+            self._update_faults()
             if not self._faults.has(Reboot):
-                self._do_what_is_due()
-        self._now_us, self._ahead_us = max(self._now_us, to_us), at_us
+                self._handle_events()
+        self._now_us, self._next_event_us = max(self._now_us, to_us), at_us
         self._collect()
         if not self._outbox:
             return b""
@@ -165,19 +167,19 @@ class DenningDevice:
         return WireFrameCounter()
 
     def receive(self, data: bytes) -> None:
-        """Take bytes from the host, at the moment to which the robot has advanced."""
+        """Take bytes from the host, at the time to which the robot has advanced."""
         if not data or not self.plugged or self._faults.has(Deaf) or self._faults.has(Reboot):
             return
-        self._ahead_us = None
+        self._next_event_us = None
         for bit_errors in self._faults.all(BitErrors):
-            data = flip_bits(data, bit_errors.rate, self._input_noise)
+            data = flip_bits(data, bit_errors.rate, self._input_rng)
         for frame in self._decoder.feed(data):
             self._move()
             self._obey(frame)
         for seq, code in self._decoder.take_rejected():
             self._send(frames.Nak(0, seq, code))
 
-    # What the host asks for.
+    # Commands of the host.
 
     def _obey(self, frame: frames.Frame) -> None:
         match frame:
@@ -204,7 +206,7 @@ class DenningDevice:
             case Drive() if Flags.LATCHED in self._flags:
                 self._send(frames.Nak(0, frame.seq, NakCode.LATCHED))
             case Drive():
-                # The base obeys as far as its limits allow; a command beyond them is no reason to stop.
+                # The body clamps the velocity to its limits.
                 self._target = Twist(frame.v_mm_s * 1e-3, frame.w_mrad_s * 1e-3)
                 self._drive_seq = frame.seq
                 self._deadman_us = self._now_us + 1000 * DEADMAN_MS
@@ -227,13 +229,13 @@ class DenningDevice:
         self._target = _STILL
 
     def _latch_again(self) -> None:
-        """Latch where a bumper is still pressed or a motor still broken: that cannot be released."""
+        """Latch if a bumper is still pressed or a motor still faulty: that cannot be released."""
         if self._faults.has(Bumper):
             self._latch(Flags.BUMPER)
         if self._faults.has(MotorFault):
             self._latch(Flags.MOTOR_FAULT)
 
-    # What the robot does by itself.
+    # Events.
 
     def _next_us(self) -> int:
         next_us = self._moved_us // TICK_US * TICK_US + TICK_US
@@ -253,7 +255,7 @@ class DenningDevice:
         return max(self._now_us, next_us)
 
     def _move(self) -> None:
-        """Move the body up to now."""
+        """Move the body up to the present event."""
         target, within_s = self._target, None
         dt_s = (self._now_us - self._moved_us) * 1e-6
         if dt_s <= 0.0:
@@ -267,7 +269,7 @@ class DenningDevice:
             self._latch(Flags.BUMPER)
         self._moved_us = self._now_us
 
-    def _do_what_is_due(self) -> None:
+    def _handle_events(self) -> None:
         now = self._now_us
         if now >= self._deadman_us and not self._flags.value & _DEADMAN:
             self._flags |= Flags.DEADMAN
@@ -275,7 +277,7 @@ class DenningDevice:
         while self._echoes and self._echoes[0][0] <= now:
             self._send(self._echoes.popleft()[1])
         if (step := self._rotation.step(now)) is not None:
-            tenths = self._listen(step.mask, step.window_m)
+            tenths = self._echo_bytes(step.mask, step.window_m)
             echo = frames.Echo(0, self._clock_us(step.at_us), step.number, step.mask, tenths)
             self._echoes.append((step.closes_us, echo))
         if self._odometry_us <= now:
@@ -284,15 +286,15 @@ class DenningDevice:
         for garbage in self._faults.all(Garbage):
             if now % TICK_US == 0:
                 count = max(1, round(garbage.bytes_per_s * TICK_US * 1e-6))
-                self._transmit(self._output_noise.bytes(count))
+                self._transmit(self._output_rng.bytes(count))
 
-    def _listen(self, mask: int, window_m: float) -> tuple[int, ...]:
+    def _echo_bytes(self, mask: int, window_m: float) -> tuple[int, ...]:
         """Return the echo byte of each sensor in `mask`, lowest first."""
         fired = [i for i in range(self._sensors) if mask >> i & 1]
         ranges = self._sonar.fire(self._body.pose, self._body.ring_yaw, fired, window_m)
         for outliers in self._faults.all(Outliers):
-            wild = self._outliers.random(len(ranges)) < outliers.share
-            ranges[wild] = self._outliers.uniform(0.0, window_m, len(ranges))[wild]
+            wild = self._outlier_rng.random(len(ranges)) < outliers.share
+            ranges[wild] = self._outlier_rng.uniform(0.0, window_m, len(ranges))[wild]
         stuck = {fault.sensor: fault.range_m for fault in self._faults.all(StuckSensor)}
         return tuple(echo_byte(stuck[i] if i in stuck else float(ranges[i])) for i in fired)
 
@@ -313,23 +315,23 @@ class DenningDevice:
             )
         )
 
-    # What goes wrong.
+    # Faults.
 
-    def _meet_faults(self) -> None:
-        """Let faults begin and end whose time has come."""
+    def _update_faults(self) -> None:
+        """Start and end the faults whose time has come."""
         if self._faults.next_us is None:
             return
         for begins, fault in self._faults.due(self._now_us):
             self._collect()
-            self._faults.turn(fault, on=begins)
+            self._faults.set_active(fault, on=begins)
             if begins:
-                self._suffer(fault)
+                self._start_fault(fault)
             elif isinstance(fault, Reboot) and not self._faults.has(Reboot):
                 self._boot_id = self._new_boot_id()
                 self._body.reset_odometry()
                 self._boot(0)
 
-    def _suffer(self, fault: Fault) -> None:
+    def _start_fault(self, fault: Fault) -> None:
         match fault:
             case Reboot():
                 self._boot(0)
@@ -341,7 +343,7 @@ class DenningDevice:
                 self._body.jump_odometry(fault.dx_m, fault.dy_m, fault.dheading_rad)
 
     def _boot(self, clock_start_us: int) -> None:
-        """Begin as after power-on, except for the body, which stays where it is."""
+        """Start as after power-on, except for the body, which stays where it is."""
         self._clock_offset_us = clock_start_us - self._now_us
         self._decoder = Decoder("host")
         self._seq = 0
@@ -356,7 +358,7 @@ class DenningDevice:
         self._odometry_us = self._now_us + 1000 * ODOMETRY_PERIOD_MS
 
     def _new_boot_id(self) -> int:
-        return int(self._boots.integers(1, 2**32))
+        return int(self._boot_rng.integers(1, 2**32))
 
     # The line.
 
@@ -364,11 +366,11 @@ class DenningDevice:
         return (at_us + self._clock_offset_us) % 2**32
 
     def _send(self, frame: RobotFrame) -> None:
-        """Queue `frame` under the robot's next sequence number, which is spent even if the frame is lost."""
+        """Queue `frame` with the next sequence number, which counts as used even if the frame is lost."""
         data = encode(frame, self._seq)
         self._seq = (self._seq + 1) % 256
         for bit_errors in self._faults.all(BitErrors):
-            data = flip_bits(data, bit_errors.rate, self._output_noise)
+            data = flip_bits(data, bit_errors.rate, self._output_rng)
         self._transmit(data)
 
     def _transmit(self, data: bytes) -> None:
@@ -377,7 +379,7 @@ class DenningDevice:
             self._uart.send(data, self._now_us)
 
     def _collect(self) -> None:
-        """Take what has left the transmitter; into an unplugged line it leaves for nowhere."""
+        """Collect what has left the transmitter; bytes sent into an unplugged line are lost."""
         left = self._uart.take(self._now_us)
         if left and self.plugged:
             self._outbox += left

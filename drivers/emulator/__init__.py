@@ -1,1 +1,1 @@
-"""The robot side as a program of its own: acoustics, body, and the device that speaks the protocol."""
+"""What the emulated robots of all families share: acoustics, body, faults, transports, control of time."""

@@ -1,7 +1,7 @@
-"""Compile a kernel with numba and keep its type: the decorator numba ships is untyped.
+"""The decorator that compiles the emulator's kernels; unlike numba's own it keeps their type.
 
-Keep every kernel in one file with what it calls: the cache on disk knows only the file a kernel stands in. A place
-where nothing can be cached (no writable folder at all) costs a compilation at each start, not the start itself.
+Keep every kernel in one file with what it calls: numba's cache on disk notices changes in that file only. If no
+folder is writable, kernels are compiled at each start.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def kernel(function: F) -> F:
-    """Return `function` compiled at its first call, from numba's cache on disk where there is one."""
+    """Return `function` compiled at its first call, or loaded from numba's cache on disk."""
     try:
         return cast(F, numba.njit(cache=True)(function))
     except RuntimeError as error:

@@ -1,4 +1,4 @@
-"""Which faults are on: the fault script as a clockwork that the robot asks."""
+"""Which faults are active: the fault script as a schedule that the emulated robot queries."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ F = TypeVar("F", bound=Fault)
 
 
 class FaultSchedule:
-    """Faults begin and end in the order of their times; one without duration ends right after it began."""
+    """Starts and ends faults in the order of their times; a fault without duration ends right after it starts."""
 
     def __init__(self, faults: Sequence[Fault]) -> None:
         edges = []
@@ -26,29 +26,29 @@ class FaultSchedule:
 
     @property
     def next_us(self) -> int | None:
-        """When the next fault begins or ends, microseconds; None where nothing more happens."""
+        """When the next fault starts or ends, µs; None if no more do."""
         return self._edges[0][0] if self._edges else None
 
     def due(self, now_us: int) -> Iterator[tuple[bool, Fault]]:
-        """Yield each fault that begins (True) or ends (False) by now; the caller turns it on or off."""
+        """Yield each fault that starts (True) or ends (False) by now; the caller calls `set_active`."""
         while self._edges and self._edges[0][0] <= now_us:
             _, begins, fault = self._edges.popleft()
             yield begins, fault
 
-    def turn(self, fault: Fault, *, on: bool) -> None:
-        """Count a fault on or off."""
+    def set_active(self, fault: Fault, *, on: bool) -> None:
+        """Mark a fault as active or not."""
         if on:
             self._active.append(fault)
         else:
             self._active.remove(fault)
 
     def has(self, kind: type[Fault]) -> bool:
-        """Tell whether a fault of this kind is on."""
-        # Asked at every event; mostly there is none.
+        """Return whether a fault of this kind is active."""
+        # Called at every event; mostly there is none.
         return bool(self._active) and any(isinstance(fault, kind) for fault in self._active)
 
     def all(self, kind: type[F]) -> list[F]:
-        """Return the faults of this kind that are on."""
+        """Return the active faults of this kind."""
         return [fault for fault in self._active if isinstance(fault, kind)] if self._active else []
 
 

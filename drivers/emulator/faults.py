@@ -23,7 +23,7 @@ from config.strict import Strict, TomlList
 
 class _Timed(Strict):
     at_s: float = Field(ge=0.0)
-    """Seconds after the emulator began."""
+    """Seconds after the emulator's start."""
     duration_s: float = Field(default=0.0, ge=0.0)
 
 
@@ -55,7 +55,7 @@ class BitErrors(_Timed):
 
 
 class Reboot(_Timed):
-    """The robot restarts, and is gone for `duration_s`."""
+    """The robot restarts, and is off for `duration_s`."""
 
     kind: Literal["reboot"]
 
@@ -73,7 +73,7 @@ class MotorFault(_Timed):
 
 
 class StuckSensor(_Timed):
-    """A sensor reports one range whatever there is; without a range it reports a fault."""
+    """A sensor always reports the same range; without a range it reports a fault."""
 
     kind: Literal["stuck_sensor"]
     sensor: int = Field(ge=0, le=23)
@@ -81,7 +81,7 @@ class StuckSensor(_Timed):
 
 
 class Outliers(_Timed):
-    """Sensors report any range inside their window, whatever there is."""
+    """Sensors report random ranges inside their window."""
 
     kind: Literal["outliers"]
     share: float = Field(default=0.2, gt=0.0, le=1.0)
@@ -98,7 +98,7 @@ class OdometryJump(_Timed):
 
 
 class Unplug(_Timed):
-    """The line is pulled out for `duration_s`: a hang-up, and no port to open."""
+    """The line is unplugged for `duration_s`: a hang-up, and no port to open."""
 
     kind: Literal["unplug"]
 
@@ -120,7 +120,7 @@ def load_faults(path: str | Path) -> tuple[Fault, ...]:
     Raises
     ------
     ConfigError
-        The file cannot be read, is not TOML, or holds something that is not a fault; a line for each problem.
+        The file cannot be read, is not TOML, or does not describe faults; a line for each problem.
     """
     shown = one_line(str(path))
     try:
@@ -138,7 +138,7 @@ def load_faults(path: str | Path) -> tuple[Fault, ...]:
 
 
 def _describe(details: ErrorDetails) -> str:
-    # Behind the number of a fault pydantic names its kind, which is no key of the file.
+    # After the number of a fault, pydantic names its kind, which is not a key of the file.
     where = dotted(part for i, part in enumerate(details["loc"]) if i != 2)
     given = "" if isinstance(details["input"], dict | list | tuple) else f" = {shown_value(details['input'])}"
     text = details["msg"]

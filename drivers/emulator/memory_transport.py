@@ -1,7 +1,7 @@
-"""A driver and an emulated robot joined in memory, in virtual time: the whole conversation without a line.
+"""A driver and an emulated robot connected in memory, in virtual time.
 
-Time goes by as the caller says, in short steps on the way, so that question and answer follow each other as they
-would on a real line. Nothing here waits, and one seed gives one run.
+Time passes as the caller says, in short steps, so that commands and answers alternate as they would on a real line.
+Nothing here waits, and the same seed gives the same run.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from drivers.emulator.robot_device import RobotDevice
 OnBytes: TypeAlias = Callable[[Literal["in", "out"], float, bytes], None]
 
 STEP_S = 0.005
-"""Bytes change hands this often."""
+"""Time between exchanges, s."""
 
 
 class MemoryLine:
@@ -28,9 +28,9 @@ class MemoryLine:
     robot
         The robot's end, not yet advanced.
     start_s
-        The host's time at which the robot's begins.
+        The run's time at the robot's start.
     on_bytes
-        Gets what changes hands, seen from the host, and when.
+        Called with the direction as seen from the host, the run's time, and the bytes.
     """
 
     def __init__(
@@ -43,31 +43,31 @@ class MemoryLine:
         self._steps = 0
         self._open = False
 
-    def exchange(self, now_s: float) -> None:
-        """Move bytes both ways up to the host's time `now_s`; opens and closes the driver as the line does."""
-        while (self._steps + 1) * STEP_S <= now_s - self._start_s:
+    def exchange(self, run_s: float) -> None:
+        """Move bytes both ways up to the run's time `run_s`; tells the driver when the line opens and closes."""
+        while (self._steps + 1) * STEP_S <= run_s - self._start_s:
             self._steps += 1
             self._exchange_at(self._steps * STEP_S)
-        self._exchange_at(now_s - self._start_s)
+        self._exchange_at(run_s - self._start_s)
 
-    def _exchange_at(self, t_s: float) -> None:
-        now_s = self._start_s + t_s
-        data = self._robot.advance(t_s)
+    def _exchange_at(self, emulated_s: float) -> None:
+        run_s = self._start_s + emulated_s
+        data = self._robot.advance(emulated_s)
         plugged = self._robot.plugged
         if plugged and not self._open:
-            self._driver.line_opened(now_s)
+            self._driver.line_opened(run_s)
         elif self._open and not plugged:
             self._driver.line_closed()
         self._open = plugged
         if not plugged:
             return
         if data:
-            self._driver.receive(data, now_s)
-        self._driver.tick(now_s)
+            self._driver.receive(data, run_s)
+        self._driver.tick(run_s)
         answer = self._driver.outgoing(writable=True)
         self._robot.receive(answer)
         if self._on_bytes is not None:
             if data:
-                self._on_bytes("in", now_s, data)
+                self._on_bytes("in", run_s, data)
             if answer:
-                self._on_bytes("out", now_s, answer)
+                self._on_bytes("out", run_s, answer)

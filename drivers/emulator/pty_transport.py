@@ -1,7 +1,8 @@
-"""The emulator as a program: the robot on a pseudo-terminal, in real time.
+"""The emulator as a program: an emulated robot on a pseudo-terminal, in real time.
 
-A pty is not a serial line, and what it lacks is added here: bytes leave at the line's speed (the robot's own
-transmitter sees to it), bytes nobody reads are lost instead of waiting, and a line without a host is no error.
+A pty differs from a serial line, and this module makes up for that: bytes that the host does not read in time are
+lost instead of waiting, and a line without a host is not an error. That bytes leave at the line's speed is up to the
+robot's transmitter.
 """
 
 from __future__ import annotations
@@ -29,14 +30,16 @@ from drivers.emulator.truth_trace import TruthTrace
 from drivers.registry import make_device
 
 PERIOD_S = 0.002
-"""The robot catches up with the wall clock this often."""
+"""Time between two turns of the main loop, s."""
 LAG_MAX_S = 0.1
-"""A process held up for longer than this stood still: its robot does not live through the rest in a burst."""
+"""Longest lag behind the host's clock that is caught up, s; after a longer one the emulated time slips."""
 LINGER_S = 4.0
-"""How long the robot outlives its parent: long enough to be seen stopping by itself."""
+"""How long the emulator runs on after its parent has ended, s: long enough to see the robot stop by itself."""
 _STEP_S = 0.01
+"""Longest step of the simulation between two exchanges of bytes, s."""
 _READ_MAX = 4096
 _NO_HOST = frozenset({errno.EIO, errno.ENXIO})
+"""Errors of a pty whose other end is not open."""
 
 
 class EmulatorError(UserError):
@@ -44,22 +47,22 @@ class EmulatorError(UserError):
 
 
 class PtyPort:
-    """The master's end of a pty, and the link under which the other end is found.
+    """The emulator's end of a pty, and a symbolic link to the host's end.
 
     Parameters
     ----------
     link_path
-        A symbolic link to keep pointing at the pty; none where not given.
+        The symbolic link to keep pointing at the pty; None for no link.
 
     Attributes
     ----------
     dropped
-        Bytes that nobody read in time.
+        Number of bytes that the host did not read in time.
 
     Raises
     ------
     EmulatorError
-        `link_path` is taken by something that is not a link to a pty, or cannot be made.
+        `link_path` exists and is not a link to a pty, or the link cannot be made.
     """
 
     def __init__(self, link_path: str | None) -> None:
@@ -72,16 +75,16 @@ class PtyPort:
 
     @property
     def path(self) -> str:
-        """What a host opens."""
+        """The path that a host opens."""
         return self._slave_name if self._link is None else str(self._link)
 
     @property
     def is_open(self) -> bool:
-        """False while the line is pulled out."""
+        """False while the line is unplugged."""
         return self._master is not None
 
     def open(self) -> None:
-        """Make a pty in raw mode and point the link at it."""
+        """Open a new pty in raw mode and point the link at it."""
         master, slave = os.openpty()
         try:
             tty.setraw(slave)
@@ -98,7 +101,7 @@ class PtyPort:
             raise
 
     def close(self) -> None:
-        """Hang up and take the link away."""
+        """Hang up and remove the link."""
         if self._master is None:
             return
         os.close(self._master)
@@ -109,7 +112,7 @@ class PtyPort:
                     self._link.unlink()
 
     def read(self) -> bytes | None:
-        """Return what the host wrote, without waiting; None where no host has the pty open."""
+        """Return the bytes that the host wrote, without waiting; None if no host has the pty open."""
         if self._master is None:
             return None
         try:
@@ -120,14 +123,14 @@ class PtyPort:
             if error.errno not in _NO_HOST:
                 raise
             if self._has_host:
-                self._forget_unread()
+                self._discard_unread()
             self._has_host = False
             return None
         self._has_host = True
         return data
 
     def write(self, data: bytes) -> None:
-        """Hand `data` to the host, without waiting; what does not fit is lost, as on a line without flow control."""
+        """Send bytes to the host, without waiting; those that do not fit are lost, as without flow control."""
         written = 0
         if self._master is not None:
             try:
@@ -138,23 +141,23 @@ class PtyPort:
         self.dropped += len(data) - written
 
     async def wait(self, timeout_s: float) -> None:
-        """Wait until the host has written something, for `timeout_s` at most."""
+        """Wait until the host has written something, at most for `timeout_s`."""
         master = self._master
-        if master is None or not self._has_host:  # a pty without a host is readable all the time
+        if master is None or not self._has_host:  # a pty without a host is always readable
             await asyncio.sleep(timeout_s)
             return
         loop = asyncio.get_running_loop()
-        over = asyncio.Event()
-        timer = loop.call_later(timeout_s, over.set)
-        loop.add_reader(master, over.set)
+        done = asyncio.Event()
+        timer = loop.call_later(timeout_s, done.set)
+        loop.add_reader(master, done.set)
         try:
-            await over.wait()
+            await done.wait()
         finally:
             loop.remove_reader(master)
             timer.cancel()
 
-    def _forget_unread(self) -> None:
-        """Throw away what the last host left unread: a pty keeps it for the next one, a serial port does not."""
+    def _discard_unread(self) -> None:
+        """Discard what the last host did not read: a pty keeps it for the next host, a serial port does not."""
         with contextlib.suppress(OSError, termios.error):
             slave = os.open(self._slave_name, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
             try:
@@ -170,52 +173,59 @@ class PtyPort:
             target = link.readlink()
             if link.exists() and not str(target).startswith("/dev/pts/"):
                 raise EmulatorError(
-                    f"{link} already is a link to {target}, which is not a pty: remove it or choose another path"
+                    f"{link} is a link to {target}, which is not a pty: remove it or choose another path"
                 )
         elif link.exists():
-            raise EmulatorError(f"{link} already exists and is not a link: remove it or choose another path")
-        fresh = link.with_name(f".{link.name}.{os.getpid()}")
+            raise EmulatorError(f"{link} exists and is not a link: remove it or choose another path")
+        new_link = link.with_name(f".{link.name}.{os.getpid()}")
         try:
-            fresh.symlink_to(self._slave_name)
-            fresh.replace(link)
+            new_link.symlink_to(self._slave_name)
+            new_link.replace(link)
         except OSError as error:
             reason = os.strerror(error.errno or 0)
             raise EmulatorError(f"cannot make the link {link}: {reason}; choose another path") from error
 
 
 class SlippingClock:
-    """The robot's time, tied to the host's clock; slips rather than bursts when the process was held up.
+    """The emulated time, which follows the host's clock but slips when the process was suspended.
+
+    Without slipping, the simulation would catch up in a burst of events after a suspension.
+
+    Parameters
+    ----------
+    start_s
+        The clock's reading at the emulator's start.
 
     Attributes
     ----------
     slipped_s
-        Time the robot did not live through.
+        Time that was skipped.
     """
 
-    def __init__(self, now_s: float) -> None:
-        self._start_s = now_s
-        self._robot_s = 0.0
+    def __init__(self, start_s: float) -> None:
+        self._start_s = start_s
+        self._emulated_s = 0.0
         self.slipped_s = 0.0
 
     @property
-    def robot_s(self) -> float:
-        """How far the robot has come."""
-        return self._robot_s
+    def emulated_s(self) -> float:
+        """The emulated time, s since the start."""
+        return self._emulated_s
 
     def steps(self, now_s: float, *, may_slip: bool = True) -> Iterator[float]:
-        """Yield the robot's times to advance to, one after another, up to the host's time `now_s`."""
-        lag_s = now_s - self._start_s - self._robot_s
+        """Yield the emulated times to advance to, in steps, up to the clock's reading `now_s`."""
+        lag_s = now_s - self._start_s - self._emulated_s
         if may_slip and lag_s > LAG_MAX_S:
             self._start_s += lag_s - LAG_MAX_S
             self.slipped_s += lag_s - LAG_MAX_S
         until_s = now_s - self._start_s
-        while self._robot_s < until_s:
-            self._robot_s = min(until_s, self._robot_s + _STEP_S)
-            yield self._robot_s
+        while self._emulated_s < until_s:
+            self._emulated_s = min(until_s, self._emulated_s + _STEP_S)
+            yield self._emulated_s
 
-    def host_s(self, robot_s: float) -> float:
-        """Return the host's time at the robot's time `robot_s`."""
-        return self._start_s + robot_s
+    def reading_at(self, emulated_s: float) -> float:
+        """Return the clock's reading at an emulated time."""
+        return self._start_s + emulated_s
 
 
 async def serve(
@@ -233,35 +243,34 @@ async def serve(
     control: tuple[int, int] | None = None,
     clock: Callable[[], float] = time.monotonic,
 ) -> None:
-    """Be a robot on a pty until SIGTERM or SIGINT.
+    """Run an emulated robot on a pty until SIGTERM or SIGINT.
 
     Parameters
     ----------
     robot, world, faults, seed
         As for `drivers.registry.make_device`.
     link_path
-        Where to put a symbolic link to the pty; it is removed at the end.
+        Path of a symbolic link to the pty; it is removed at the end.
     trace_path
-        Where to write the truth, see `TruthTrace`.
+        File for the true states, see `TruthTrace`.
     latency_path
-        Where to write when echoes left and commands came, see `LatencyTrace`.
+        File for the times of echoes and drive commands, see `LatencyTrace`.
     ready
-        Called once, with the path to open, when a host can open it.
+        Called once, with the path to open, as soon as a host can open it.
     exit_with_parent
-        End by itself `LINGER_S` after the process that started this one is gone.
+        End `LINGER_S` after the parent process has ended.
     clock_start_us
         As for `drivers.registry.make_device`.
     control
-        Two file descriptors: laws of time are read from the one, and how far the robot has lived is written to the
-        other, see `TimeChannel`. The truth is then written by the run's clock, which is the host's until it is
-        held for the first time.
+        Two file descriptors: time scales are read from the first, and acknowledged on the second, see `TimeChannel`.
+        The true states then have the run's clock, which equals the host's until it is paused for the first time.
     clock
         The host's monotonic clock, seconds.
 
     Raises
     ------
     EmulatorError
-        The link or the trace cannot be made, or there is no channel to be controlled by.
+        The link or a trace cannot be made, or the file descriptors cannot be used.
     drivers.driver.DriverError
         See `drivers.registry.make_device`.
     """
@@ -282,27 +291,27 @@ async def serve(
         stack.callback(port.close)
         channel = None if control is None else _open_channel(control, stack)
         ready(port.path)
-        timeline = SlippingClock(clock())
+        emulated = SlippingClock(clock())
         orphaned_s: float | None = None
         while not stop.is_set():
-            host_s = now_s = clock()
+            host_s = run_s = clock()
             pause_s, may_slip = PERIOD_S, True
             if channel is not None:
                 channel.receive(host_s)
                 scale = channel.follower.scale
-                now_s = channel.follower.run_at(host_s)
+                run_s = channel.follower.run_at(host_s)
                 pause_s, may_slip = PERIOD_S / max(1.0, scale.factor), scale.is_real_time
-            stood_s = timeline.robot_s
-            for robot_s in timeline.steps(now_s, may_slip=may_slip):
-                _exchange(device, port, robot_s, latency, clock)
+            before_s = emulated.emulated_s
+            for emulated_s in emulated.steps(run_s, may_slip=may_slip):
+                _exchange(device, port, emulated_s, latency, clock)
                 if trace is not None:
                     truth = device.truth
-                    trace.write(truth, timeline.host_s(truth.emulated_s))
+                    trace.write(truth, emulated.reading_at(truth.emulated_s))
             if channel is not None:
-                if timeline.robot_s == stood_s:
-                    # Time stands still, and a HALT is heard nevertheless.
-                    _exchange(device, port, stood_s, latency, clock)
-                channel.acknowledge(now_s)
+                if emulated.emulated_s == before_s:
+                    # Time is paused, but a HALT must be received.
+                    _exchange(device, port, before_s, latency, clock)
+                channel.acknowledge(run_s)
             if exit_with_parent and orphaned_s is None and os.getppid() != parent:
                 orphaned_s = host_s
             if orphaned_s is not None and host_s - orphaned_s > LINGER_S:
@@ -313,34 +322,36 @@ async def serve(
 def _exchange(
     device: RobotDevice,
     port: PtyPort,
-    robot_s: float,
+    emulated_s: float,
     latency: LatencyTrace | None,
     clock: Callable[[], float],
 ) -> None:
-    """Advance the robot and move bytes both ways."""
-    left = device.advance(robot_s)
+    """Advance the robot to `emulated_s` and move bytes both ways."""
+    data = device.advance(emulated_s)
     if port.is_open and not device.plugged:
         port.close()
     elif device.plugged and not port.is_open:
         port.open()
-    heard = port.read()
-    if heard and latency is not None:
-        latency.received(heard, clock())
-    # With no host on the line bytes go nowhere: the pty would keep them for the next one to open it.
-    if heard is not None and left:
+    received = port.read()
+    if received and latency is not None:
+        latency.received(received, clock())
+    # Without a host the bytes are dropped: the pty would keep them for the next host.
+    if received is not None and data:
         sent_s = clock()
-        port.write(left)
+        port.write(data)
         if latency is not None:
-            latency.sent(left, sent_s)
-    if heard:
-        device.receive(heard)
+            latency.sent(data, sent_s)
+    if received:
+        device.receive(received)
 
 
 def _open_channel(control: tuple[int, int], stack: contextlib.ExitStack) -> TimeChannel:
     try:
         channel = TimeChannel(*control)
     except OSError as error:
-        raise EmulatorError(f"cannot be controlled: {os.strerror(error.errno or 0)}; give it two pipes") from error
+        raise EmulatorError(
+            f"cannot use the control channel: {os.strerror(error.errno or 0)}; pass two pipes"
+        ) from error
     stack.callback(channel.close)
     return channel
 
@@ -349,4 +360,6 @@ def _open_trace(trace_path: str, stack: contextlib.ExitStack) -> TextIO:
     try:
         return stack.enter_context(Path(trace_path).open("w", encoding="ascii"))
     except OSError as error:
-        raise EmulatorError(f"cannot write the trace {trace_path}: {os.strerror(error.errno or 0)}") from error
+        raise EmulatorError(
+            f"cannot write the trace {trace_path}: {os.strerror(error.errno or 0)}; choose another path"
+        ) from error

@@ -1,6 +1,6 @@
-"""The truth trace: where the emulated robot really was, for whoever judges the one that was driven.
+"""The truth trace: the true states of the emulated robot as a CSV file, to compare with what the program reported.
 
-Rows are flushed as they are written: a test reads the file while the emulator runs, and after it was killed.
+Rows are flushed as they are written, so that a test can read them while the emulator runs and after it was killed.
 """
 
 from __future__ import annotations
@@ -11,16 +11,16 @@ from drivers.emulator.robot_device import GroundTruth
 
 HEADER = "t_s,host_s,x_m,y_m,heading_rad,ring_yaw_rad,v_m_s,w_rad_s,flags"
 PERIOD_S = 0.01
-"""Time from row to row: 100 Hz."""
+"""Time between rows, s."""
 
 
 class TruthTrace:
-    """Writes truth as CSV.
+    """Writes the true state as CSV.
 
     Parameters
     ----------
     file
-        Where to; stays the caller's to close.
+        Where to write; the caller closes it.
     """
 
     def __init__(self, file: TextIO) -> None:
@@ -30,7 +30,7 @@ class TruthTrace:
         file.flush()
 
     def write(self, truth: GroundTruth, host_s: float) -> None:
-        """Write a row if one is due; `host_s` is the host's monotonic clock at `truth.emulated_s`."""
+        """Write a row if one is due; `host_s` is the host's monotonic clock at that time."""
         if truth.emulated_s < self._due_s:
             return
         self._due_s = truth.emulated_s + PERIOD_S

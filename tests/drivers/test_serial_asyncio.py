@@ -66,7 +66,7 @@ async def test_close_on_a_stalled_peer_never_reports_connection_lost(ends: Ends)
         while link.send(bytes(64)):
             await asyncio.sleep(0)
         await asyncio.wait_for(link.stop(), TIMEOUT_S)
-        assert host.closed.get_nowait() == "it was closed at this end"
+        assert host.closed.get_nowait() == "closed by this program"
         assert not link.is_open
         assert link.waiting == 0
 

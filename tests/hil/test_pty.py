@@ -378,8 +378,8 @@ def test_the_emulators_clock_slips_rather_than_bursts() -> None:
     timeline = SlippingClock(100.0)
     strides = list(timeline.steps(100.035))
     assert strides == pytest.approx([0.01, 0.02, 0.03, 0.035])
-    assert timeline.host_s(0.035) == pytest.approx(100.035)
+    assert timeline.reading_at(0.035) == pytest.approx(100.035)
     assert list(timeline.steps(100.035)) == []
     assert list(timeline.steps(105.0))[-1] == pytest.approx(0.035 + LAG_MAX_S)
     assert timeline.slipped_s == pytest.approx(105.0 - 100.035 - LAG_MAX_S)
-    assert timeline.host_s(0.035 + LAG_MAX_S) == pytest.approx(105.0)
+    assert timeline.reading_at(0.035 + LAG_MAX_S) == pytest.approx(105.0)
