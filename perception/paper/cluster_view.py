@@ -1,8 +1,8 @@
-"""Clusters of the segments in the map (paper Table 1) for display; the Bayesian method has none of its own."""
+"""Clusters of the map's segments for display (paper Table 1), because the Bayesian method forms none itself."""
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -10,17 +10,36 @@ from config.settings import PerceptionConfig
 from drivers.messages import Floats
 from perception.paper.clusters import cluster_segments
 
-DECIMALS: Final = 3
-"""Rows are rounded to millimetres."""
+PLACES: Final = 3
+"""Decimals of coordinates: millimetres."""
+
+
+class ClusterBox(NamedTuple):
+    """A cluster and the rectangle around it, m, in the odometry frame."""
+
+    x: float
+    """Middle of the rectangle."""
+    y: float
+    length: float
+    """Side along x."""
+    width: float
+    """Side along y."""
+    angle: float
+    """Of the rectangle: always 0."""
+    segments: int
+    """Number of segments in the cluster."""
+    centre_x: float
+    """Mean of the segments' centres."""
+    centre_y: float
 
 
 class ClusterView:
-    """Clusters segments as the paper's method does.
+    """Groups segments as the paper's method does.
 
     Parameters
     ----------
     config : PerceptionConfig
-        The threshold T, the least segments of a cluster, and the largest number of clusters.
+        The threshold T, the least number of segments of a cluster, and the greatest number of clusters.
     """
 
     def __init__(self, config: PerceptionConfig) -> None:
@@ -28,11 +47,8 @@ class ClusterView:
         self._centres = np.zeros((config.clusters.clusters_max, 2))
         self._sizes = np.zeros(config.clusters.clusters_max, dtype=np.int64)
 
-    def rows(self, segments: Floats) -> list[list[float]]:
-        """Return one row for each cluster: its bounding rectangle, the number of its segments, and its centre.
-
-        A row holds the rectangle's middle x, y, its width along x and y, its angle, which is 0, the number of
-        segments, and the centre x, y of the cluster (m).
+    def boxes(self, segments: Floats) -> list[ClusterBox]:
+        """Return the clusters of these segments.
 
         Parameters
         ----------
@@ -43,19 +59,21 @@ class ClusterView:
         if n == 0:
             return []
         labels = np.full(n, -1, dtype=np.int64)
-        segments = np.ascontiguousarray(segments, dtype=np.float64)
+        contiguous = np.ascontiguousarray(segments, dtype=np.float64)
         count = cluster_segments(
-            segments, np.ones(n, dtype=np.int64), 0, n, self._config.threshold_m, labels, self._centres, self._sizes
+            contiguous, np.ones(n, dtype=np.int64), 0, n, self._config.threshold_m, labels, self._centres, self._sizes
         )
         low = np.full((count, 2), np.inf)
         high = np.full((count, 2), -np.inf)
         inside = labels >= 0
-        for end_points in (segments[inside, 0:2], segments[inside, 2:4]):
-            np.minimum.at(low, labels[inside], end_points)
-            np.maximum.at(high, labels[inside], end_points)
-        sizes = self._sizes[:count]
-        table = np.column_stack(
-            [0.5 * (low + high), high - low, np.zeros(count), sizes, self._centres[:count]]
-        )[sizes >= self._config.segments_min]  # fmt: skip
-        rows: list[list[float]] = np.round(table, DECIMALS).tolist()
-        return rows
+        for points in (contiguous[inside, 0:2], contiguous[inside, 2:4]):
+            np.minimum.at(low, labels[inside], points)
+            np.maximum.at(high, labels[inside], points)
+        middles = np.round(0.5 * (low + high), PLACES).tolist()
+        sides = np.round(high - low, PLACES).tolist()
+        centres = np.round(self._centres[:count], PLACES).tolist()
+        return [
+            ClusterBox(*middles[k], *sides[k], 0.0, size, *centres[k])
+            for k, size in enumerate(self._sizes[:count].tolist())
+            if size >= self._config.segments_min
+        ]

@@ -72,7 +72,7 @@ def _drive_and_edit(settings: Settings, method: str, models: Sequence[ModelConfi
 
     perception = _perception(settings, method, models)
     _drive(settings, perception)
-    ClusterView(settings.perception).rows(perception.segments().geometry)  # the console shows them for either method
+    ClusterView(settings.perception).boxes(perception.segments().geometry)  # the console shows them for either method
     numbers = tuple(perception.segments().numbers[:2].tolist())
     perception.edit(PinSegments(numbers, pinned=True))
     for model in models:

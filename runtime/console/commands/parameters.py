@@ -1,7 +1,7 @@
-"""The parameters that may be changed while the robot runs, as read off the schema: no list of them is kept by hand.
+"""The settings that the page can change, derived from the configuration schema.
 
-Whatever `config.reload` lets a running process follow and one value can say is in it, with the bounds, the choices
-and the words of the schema itself.
+They are the settings that a running process can follow (`config.reload`) and that have a single plain value, with the
+bounds, choices and descriptions of the schema.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from config.reload import Difference
 from config.settings import Settings
 
 KINDS: Final = ((bool, "bool"), (int, "int"), (float, "float"), (str, "text"))
-"""Plain types, bool before the int that it is."""
+"""Plain types and their names on the wire; bool stands before int, of which it is a subclass."""
 UNITS: Final = MappingProxyType({
     "_m_s": "m/s", "_rad_s": "rad/s", "_per_s": "1/s", "_deg": "°", "_rad": "rad", "_hz": "Hz", "_m": "m", "_s": "s"
 })  # fmt: skip
-"""Endings of names, the longer before those that they end in."""
+"""Units by the ending of a name; a longer ending stands before its own endings."""
 
 
 class Parameter(TypedDict):
-    """A parameter, as the page is told of it."""
+    """A setting as the page gets it."""
 
     path: str
     label: str
@@ -38,12 +38,12 @@ class Parameter(TypedDict):
     kind: str
     choices: list[str] | None
     optional: bool
-    """Whether null is a value."""
+    """Whether null is a valid value."""
     help: str
 
 
 def parameters(settings: Settings) -> list[Parameter]:
-    """Return every live parameter with its present value, in the order of the schema."""
+    """Return every setting that the page can change, with its current value, in the order of the schema."""
     return list(_within(settings, ()))
 
 
@@ -52,13 +52,13 @@ def _within(model: BaseModel, at: Location) -> Iterator[Parameter]:
         location, value = (*at, name), getattr(model, name)
         if isinstance(value, BaseModel):
             yield from _within(value, location)
-        elif Difference(location, None, None).live and (told := _parameter(location, field, value)) is not None:
-            told["help"] = " ".join((field.description or type(model).__doc__ or "").split())
-            yield told
+        elif Difference(location, None, None).live and (found := _parameter(location, field, value)) is not None:
+            found["help"] = " ".join((field.description or type(model).__doc__ or "").split())
+            yield found
 
 
 def _parameter(location: Location, field: FieldInfo, value: Any) -> Parameter | None:  # noqa: ANN401
-    """Return a field as a parameter, None where it takes more than one plain value."""
+    """Return a field as a parameter, None if its value is not a single plain one."""
     kinds = [kind for kind in _options(field.annotation) if kind is not type(None)]
     if len(kinds) != 1:
         return None
@@ -85,17 +85,19 @@ def _parameter(location: Location, field: FieldInfo, value: Any) -> Parameter | 
 
 
 def _label(name: str) -> str:
-    """Return a name in words, its unit apart."""
+    """Return a name in words, with its unit in parentheses."""
     ending = next((ending for ending in UNITS if name.endswith(ending)), "")
     unit = f" ({UNITS[ending]})" if ending else ""
     return name.removesuffix(ending).replace("_", " ") + unit
 
 
 def _options(annotation: Any) -> tuple[Any, ...]:  # noqa: ANN401 - an annotation can be anything
+    """Return the members of a union, or the annotation alone."""
     return get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
 
 
 def _bounds(field: FieldInfo) -> tuple[float | None, float | None]:
+    """Return a field's lower and upper bound, None where there is none."""
     low: float | None = None
     high: float | None = None
     for bound in field.metadata:

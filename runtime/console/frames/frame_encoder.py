@@ -107,7 +107,7 @@ class FrameEncoder:
         self._fired: set[int] = set()
         self._segments = SegmentDelta()
         self._clusters = ClusterView(settings.perception)
-        self._cluster_rows: list[list[float]] = []
+        self._cluster_boxes: list[list[float]] = []
         self._segment_counts: tuple[int, int] | None = None
         self._is_stale = True
         self._number = 0
@@ -161,7 +161,7 @@ class FrameEncoder:
             "firing": sorted(self._fired),
             "ranges": _json_numbers(np.where(np.isinf(self._ranges_m), NO_ECHO, self._ranges_m), 4),
             "age": _json_numbers(robot_s - self._fired_s, 3),
-            "clusters": self._cluster_rows,
+            "clusters": self._cluster_boxes,
             "objects": [_object(detected) for detected in state.perception.labelled_objects()],
             "vectors": [[r.schema, round(r.x, 4), round(r.y, 4)] for r in state.vectors],
             "drive_request": _drive_request(state.drive_request),
@@ -203,7 +203,7 @@ class FrameEncoder:
             return self._segments.unchanged()
         self._segment_counts, self._is_stale = counts, False
         now = perception.segments()
-        self._cluster_rows = self._clusters.rows(now.geometry)
+        self._cluster_boxes = [list(box) for box in self._clusters.boxes(now.geometry)]
         rows = np.column_stack([now.geometry, now.times])
         return self._segments.update(now.numbers, rows, now.numbers[now.pinned == 1])
 
