@@ -72,8 +72,9 @@ class ClusterView:
         middles = np.round(0.5 * (low + high), PLACES).tolist()
         sides = np.round(high - low, PLACES).tolist()
         centres = np.round(self._centres[:count], PLACES).tolist()
+        rows = zip(middles, sides, self._sizes[:count].tolist(), centres, strict=True)
         return [
-            ClusterBox(*middles[k], *sides[k], 0.0, size, *centres[k])
-            for k, size in enumerate(self._sizes[:count].tolist())
+            ClusterBox(x, y, length, width, 0.0, size, centre_x, centre_y)
+            for (x, y), (length, width), size, (centre_x, centre_y) in rows
             if size >= self._config.segments_min
         ]

@@ -96,7 +96,7 @@ class Console:
         self._config = settings.console
         self._limits = Limits(clients=settings.console.clients_max) if limits is None else limits
         self._console_log = ConsoleLog(log, clock)
-        self._shown = settings
+        self._shown_models = settings.models
         self.hub = ClientHub(self._limits, clock, lambda: self.dispatcher.end_teleoperation())
         self.tuning = Tuning(run.live_settings, prepare, self._on_tuned, emulated=emulated)
         run.live_settings.subscribe(self._show_settings)
@@ -221,9 +221,9 @@ class Console:
         self._log.info("configuration changed from the console", changed=[str(difference) for difference in changed])
 
     def _show_settings(self, settings: Settings) -> None:
-        before, self._shown = self._shown, settings
+        before, self._shown_models = self._shown_models, settings.models
         self._publisher.adopt(settings)
-        if settings.models != before.models:
+        if settings.models != before:
             self.hub.begin_session(self._session())
         else:
             self.hub.broadcast({"type": "parameters", "parameters": parameters(settings)})

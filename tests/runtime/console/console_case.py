@@ -1,4 +1,4 @@
-"""A console on a robot that keeps what it is asked for, over real sockets: shared by the tests here."""
+"""A console over real sockets, on a stub of the robot's process that notes what it is asked for."""
 
 from __future__ import annotations
 
@@ -42,20 +42,20 @@ FREE_PORT = "console.port=0"
 
 
 @dataclass
-class Counted:
-    """A driver, as far as frames tell of it."""
+class StubDriver:
+    """A driver, as far as frames show it."""
 
     counts: LinkCounts = field(default_factory=lambda: LinkCounts(7, 1, 2))
 
 
 @dataclass
-class FakeRun:
-    """In place of `RobotProcess`: it does nothing, and keeps what it is asked for."""
+class StubRun:
+    """In place of `RobotProcess`: does nothing and notes what it is asked for."""
 
     settings: Settings
     log: Any
     asked: list[object] = field(default_factory=list)
-    room: int = 8
+    edits_max: int = 8
     name: str | None = "denning"
 
     def __post_init__(self) -> None:
@@ -73,7 +73,7 @@ class FakeRun:
         self.asked.append(drive_request)
 
     def edit(self, edit: Edit) -> bool:
-        if self.room == 0:
+        if self.edits_max == 0:
             return False
         self.asked.append(edit)
         return True
@@ -82,9 +82,8 @@ class FakeRun:
         return Evidence(number, "semicircle", supporting=3.5, opposing=-1.0) if number == 1 else None
 
 
-
 class Page:
-    """A page, as far as the server can tell."""
+    """A page, reduced to its websocket."""
 
     def __init__(self, socket: aiohttp.ClientWebSocketResponse) -> None:
         self.socket = socket
@@ -92,14 +91,14 @@ class Page:
         self._id = 0
 
     async def next(self, *kinds: str) -> dict[str, Any]:
-        """Return the next message of some kind, keeping all on the way to it."""
+        """Return the next message of these types; keep every message."""
         while True:
             message = await asyncio.wait_for(self.socket.receive(), TIMEOUT_S)
             assert message.type is aiohttp.WSMsgType.TEXT, message
-            told: dict[str, Any] = orjson.loads(message.data)
-            self.received.append(told)
-            if told["type"] in kinds:
-                return told
+            content: dict[str, Any] = orjson.loads(message.data)
+            self.received.append(content)
+            if content["type"] in kinds:
+                return content
 
     async def send(self, **message: Any) -> int:
         self._id += 1
@@ -107,12 +106,12 @@ class Page:
         return self._id
 
     async def answer(self, number: int) -> dict[str, Any]:
-        while (told := await self.next("answer"))["id"] != number:
+        while (answer := await self.next("answer"))["id"] != number:
             pass
-        return told
+        return answer
 
     async def ask(self, **message: Any) -> dict[str, Any]:
-        """Say something and return the answer."""
+        """Send a message and return its answer."""
         return await self.answer(await self.send(**message))
 
     async def closed(self) -> int | None:
@@ -126,9 +125,9 @@ class Page:
 
 @dataclass
 class ConsoleCase:
-    """A console, its robot, and whoever looks at it."""
+    """A console, the stub of its robot, and a session for pages."""
 
-    run: FakeRun
+    run: StubRun
     console: Console
     session: aiohttp.ClientSession
     log: list[dict[str, Any]]
@@ -148,7 +147,7 @@ class ConsoleCase:
         return self.url.query["token"]
 
     async def connect(self, *, token: str | None = "", origin: str | None = "", host: str | None = None) -> Page:
-        """Open a page; an empty token or origin is the right one."""
+        """Connect a page; an empty token or origin stands for the right one."""
         query = {} if token is None else {"token": token or self.token}
         headers = {} if origin is None else {"Origin": origin or self.origin}
         if host is not None:
@@ -159,7 +158,7 @@ class ConsoleCase:
         return Page(socket)
 
     async def page(self) -> Page:
-        """Open a page and hear its greeting."""
+        """Connect a page and wait for its session message."""
         page = await self.connect()
         await page.next("session")
         return page
@@ -167,36 +166,36 @@ class ConsoleCase:
     def cycles(
         self, count: int = 1, *, step_s: float = 0.05, outcomes: tuple[str | None, ...] = (), **inputs: Any
     ) -> None:
-        """Let cycles end, each with a firing of three sensors."""
+        """Run cycles, each with a firing of three sensors."""
         for _ in range(count):
             self.cycle += 1
             self.clock[0] += step_s
-            t_s = 0.05 * self.cycle
+            robot_s = 0.05 * self.cycle
             ranges = np.full(len(self.run.settings.ring.mounts), np.nan)
             ranges[self.cycle % 8 :: 8] = 1.5, np.inf, 2.5
             pose = Pose(0.02 * self.cycle, 0.0, 0.0)
-            odometry = Odometry(t_s, pose, 0.0, Twist(0.3, 0.0), Flags.NONE, 0)
-            heard = Received((Firing(t_s, pose, 0.0, ranges),), odometry, rebooted=False)
+            odometry = Odometry(robot_s, pose, 0.0, Twist(0.3, 0.0), Flags.NONE, 0)
+            received = Received((Firing(robot_s, pose, 0.0, ranges),), odometry, rebooted=False)
             state = self.run.state
             state.cycle, state.odometry = self.cycle, odometry
             refused = tuple(Refused(k, why) for k, why in enumerate(outcomes) if why is not None)
-            made = sum(state.perception.observe(firing) for firing in heard.firings)
+            made = sum(state.perception.observe(firing) for firing in received.firings)
             record = CycleRecord(
-                self.cycle, replace(Inputs(t_s, LineState.READY, None, heard), **inputs), ModeState(Mode.DRIVE),
-                Twist(0.3, 0.0), made, state.perception.counts.segments, state.perception.counts.hypotheses, 2, 2,
-                "quota", refused,
+                self.cycle, replace(Inputs(robot_s, LineState.READY, None, received), **inputs),
+                ModeState(Mode.DRIVE), Twist(0.3, 0.0), made, state.perception.counts.segments,
+                state.perception.counts.hypotheses, 2, 2, "quota", refused,
             )  # fmt: skip
-            self.console.on_cycle(record, state, self.run.stats, Counted())  # type: ignore[arg-type]
+            self.console.on_cycle(record, state, self.run.stats, StubDriver())  # type: ignore[arg-type]
 
     def refusals(self) -> list[str]:
-        """Return what the log says was refused."""
+        """Return the reasons of all refusals in the log."""
         return [str(line["reason"]) for line in self.log if line["event"] == "console refused"]
 
     async def settled(self, done: Callable[[], bool], what: str) -> None:
-        """Let the loop go on until something is so."""
+        """Run the loop until a condition holds."""
         end_s = host_time.monotonic() + TIMEOUT_S
         while not done():
-            assert host_time.monotonic() < end_s, f"it never came: {what}"
+            assert host_time.monotonic() < end_s, f"timed out waiting for {what}"
             await asyncio.sleep(0.001)
 
 
@@ -209,7 +208,7 @@ async def open_console(
     limits: Limits | None = None,
     emulated: bool = True,
 ) -> AsyncIterator[ConsoleCase]:
-    """Open a console; its clock goes on with cycles only."""
+    """Open a console whose clock advances with cycles only."""
     lines: list[dict[str, Any]] = []
     clock = [1000.0]
 
@@ -219,7 +218,7 @@ async def open_console(
 
     log = structlog.wrap_logger(None, processors=[structlog.processors.add_log_level, keep])
     settings = load_settings("hallway", ["perception.method=paper", FREE_PORT, *sets])
-    run = FakeRun(settings, log)
+    run = StubRun(settings, log)
     console = Console(
         run, log, KernelLoader(log), emulated=emulated, time=time,
         recording=recording, replay=replay, limits=limits, clock=lambda: clock[0],

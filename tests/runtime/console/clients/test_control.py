@@ -1,4 +1,4 @@
-"""One client has the control; it is asked for, handed over, kept, and lost where nobody uses it."""
+"""One client has control: it is requested, granted, kept, and lost if it is not used."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from runtime.console.clients.control import REQUEST_TIMEOUT_S, Control, Holder
 
 
 @dataclass(eq=False)
-class Somebody:
+class StubClient:
     number: int
     has_token: bool = True
 
@@ -21,58 +21,58 @@ class Somebody:
         return f"client {self.number}"
 
 
-class Controlled:
-    """A control and what it told."""
+class Notified:
+    """A control, and whom it notified."""
 
     def __init__(self) -> None:
-        self.told: list[tuple[int, int | None]] = []
-        self.left: list[int] = []
-        self.control = Control(self._tell, lambda client: self.left.append(client.number))
+        self.messages: list[tuple[int, int | None]] = []
+        self.lost: list[int] = []
+        self.control = Control(self._notify, lambda client: self.lost.append(client.number))
 
-    def _tell(self, client: Holder, asker: Holder | None) -> None:
-        self.told.append((client.number, None if asker is None else asker.number))
+    def _notify(self, client: Holder, requester: Holder | None) -> None:
+        self.messages.append((client.number, None if requester is None else requester.number))
 
 
 @pytest.fixture
-def case() -> tuple[Controlled, Control, Somebody, Somebody]:
-    controlled, first, second = Controlled(), Somebody(1), Somebody(2)
-    controlled.control.join(first)
-    controlled.control.join(second)
-    return controlled, controlled.control, first, second
+def case() -> tuple[Notified, Control, StubClient, StubClient]:
+    notified, first, second = Notified(), StubClient(1), StubClient(2)
+    notified.control.join(first)
+    notified.control.join(second)
+    return notified, notified.control, first, second
 
 
-Case = tuple[Controlled, Control, Somebody, Somebody]
+Case = tuple[Notified, Control, StubClient, StubClient]
 
 
-def test_the_first_has_it(case: Case) -> None:
-    controlled, control, first, second = case
+def test_the_first_client_has_control(case: Case) -> None:
+    notified, control, first, second = case
     assert control.is_held_by(first)
     assert not control.is_held_by(second)
-    assert controlled.told == []
+    assert notified.messages == []
 
 
-def test_who_may_only_watch_never_has_it() -> None:
-    control = Controlled().control
-    watcher = Somebody(1, has_token=False)
+def test_a_client_without_token_never_gets_control() -> None:
+    control = Notified().control
+    watcher = StubClient(1, has_token=False)
     control.join(watcher)
     assert not control.is_held_by(watcher)
 
 
-def test_it_is_asked_for_and_granted(case: Case) -> None:
-    controlled, control, first, second = case
-    validate = control.request(second, 0.0)
-    assert validate is not None
-    assert "client 1 has control" in validate
+def test_control_is_requested_and_granted(case: Case) -> None:
+    notified, control, first, second = case
+    reason = control.request(second, 0.0)
+    assert reason is not None
+    assert "client 1 has control" in reason
     assert control.is_held_by(first)
-    assert controlled.told == [(1, 2)]
+    assert notified.messages == [(1, 2)]
     assert control.grant(3) == "client 3 does not ask for control"
     assert control.grant(2) is None
     assert control.is_held_by(second)
-    assert controlled.told[1:] == [(1, None), (2, None)]
-    assert controlled.left == [1]
+    assert notified.messages[1:] == [(1, None), (2, None)]
+    assert notified.lost == [1]
 
 
-def test_it_is_kept_by_who_takes_it_again(case: Case) -> None:
+def test_a_holder_declines_by_requesting_control_again(case: Case) -> None:
     _, control, first, second = case
     control.request(second, 0.0)
     assert control.request(first, 1.0) is None
@@ -80,10 +80,10 @@ def test_it_is_kept_by_who_takes_it_again(case: Case) -> None:
     assert control.is_held_by(first)
 
 
-def test_who_is_idle_loses_it_once_asked(case: Case) -> None:
+def test_an_idle_holder_loses_control_after_a_request(case: Case) -> None:
     _, control, first, second = case
     control.expire(1e9)
-    assert control.is_held_by(first), "nobody has asked"
+    assert control.is_held_by(first), "no client has asked"
     control.request(second, 0.0)
     control.note_use(first, REQUEST_TIMEOUT_S - 1.0)
     control.note_use(second, REQUEST_TIMEOUT_S)
@@ -93,8 +93,8 @@ def test_who_is_idle_loses_it_once_asked(case: Case) -> None:
     assert control.is_held_by(second)
 
 
-def test_it_goes_to_who_asked_when_it_is_given_up_or_lost(case: Case) -> None:
-    controlled, control, first, second = case
+def test_released_or_lost_control_passes_to_the_requester(case: Case) -> None:
+    notified, control, first, second = case
     control.release()
     assert not control.is_held_by(first)
     assert not control.is_held_by(second)
@@ -102,37 +102,37 @@ def test_it_goes_to_who_asked_when_it_is_given_up_or_lost(case: Case) -> None:
     control.request(second, 0.0)
     control.leave(first)
     assert control.is_held_by(second)
-    assert controlled.left == [1, 1]
+    assert notified.lost == [1, 1]
     control.leave(second)
     assert not control.is_held_by(second)
 
 
-@given(st.lists(st.tuples(st.sampled_from(["join", "leave", "take", "give", "grant", "used", "expire"]),
+@given(st.lists(st.tuples(st.sampled_from(["join", "leave", "request", "release", "grant", "use", "expire"]),
                           st.integers(0, 3), st.floats(0.0, 100.0))))  # fmt: skip
-def test_never_two(steps: list[tuple[str, int, float]]) -> None:
-    control = Controlled().control
-    people = [Somebody(n, has_token=n != 3) for n in range(4)]
-    there: set[int] = set()
-    for what, who, now_s in steps:
-        one = people[who]
-        if what == "join":
-            there.add(who)
-            control.join(one)
-        elif who in there:
-            match what:
+def test_at_most_one_client_has_control(steps: list[tuple[str, int, float]]) -> None:
+    control = Notified().control
+    clients = [StubClient(n, has_token=n != 3) for n in range(4)]
+    connected: set[int] = set()
+    for action, number, host_s in steps:
+        client = clients[number]
+        if action == "join":
+            connected.add(number)
+            control.join(client)
+        elif number in connected:
+            match action:
                 case "leave":
-                    there.remove(who)
-                    control.leave(one)
-                case "take" if one.has_token:
-                    control.request(one, now_s)
-                case "give" if control.is_held_by(one):
+                    connected.remove(number)
+                    control.leave(client)
+                case "request" if client.has_token:
+                    control.request(client, host_s)
+                case "release" if control.is_held_by(client):
                     control.release()
-                case "grant" if control.is_held_by(one):
-                    control.grant(int(now_s) % 4)
-                case "used":
-                    control.note_use(one, now_s)
+                case "grant" if control.is_held_by(client):
+                    control.grant(int(host_s) % 4)
+                case "use":
+                    control.note_use(client, host_s)
                 case "expire":
-                    control.expire(now_s)
-        holders = [n for n in range(4) if control.is_held_by(people[n])]
+                    control.expire(host_s)
+        holders = [n for n in range(4) if control.is_held_by(clients[n])]
         assert len(holders) <= 1
-        assert set(holders) <= there - {3}
+        assert set(holders) <= connected - {3}

@@ -1,4 +1,4 @@
-"""Messages that take their time: the run's time, recording, recordings; answered when they are done."""
+"""Commands that take time: time control, recording, replay; answered when they are done."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from tests.runtime.console.console_case import open_console
 from tests.runtime.console.sample_messages import ASYNC_COMMANDS
 
 
-class Held:
-    """Time, recording and recordings, held by somebody who keeps what is asked for."""
+class StubControl:
+    """Stub of time control, recording and replay that notes what it is asked for."""
 
     def __init__(self) -> None:
-        self.did: list[str] = []
-        self.validate: str | None = None
-        self.go = asyncio.Event()
-        self.go.set()
+        self.calls: list[str] = []
+        self.refusal: str | None = None
+        self.release = asyncio.Event()
+        self.release.set()
         self.left: list[Viewer] = []
         self.is_paused = True
         self.speed = 2.0
         self.now = RecordingStatus("run.mcap", 10, 0)
 
     async def _do(self, what: str) -> str | None:
-        await self.go.wait()
-        self.did.append(what)
-        return self.validate
+        await self.release.wait()
+        self.calls.append(what)
+        return self.refusal
 
     async def _show(self, what: str) -> None:
-        validate = await self._do(what)
-        if validate is not None:
-            raise CommandError(validate)
+        refusal = await self._do(what)
+        if refusal is not None:
+            raise CommandError(refusal)
 
     async def pause(self) -> str | None:
         return await self._do("pause")
@@ -81,60 +81,60 @@ class Held:
         self.left.append(viewer)
 
     async def report(self) -> bytes:
-        if self.validate is not None:
-            raise CommandError(self.validate)
+        if self.refusal is not None:
+            raise CommandError(self.refusal)
         return b"<h1>report</h1>"
 
     async def close(self) -> None:
-        self.did.append("close")
+        self.calls.append("close")
 
 
 @pytest.mark.parametrize(("message", "done"), ASYNC_COMMANDS, ids=lambda value: str(value)[:30])
-async def test_what_takes_its_time(message: dict[str, Any], done: str) -> None:
-    held = Held()
-    async with open_console(time=held, recording=held, replay=held) as case:
+async def test_an_async_command_is_answered_when_it_is_done(message: dict[str, Any], done: str) -> None:
+    stub = StubControl()
+    async with open_console(time=stub, recording=stub, replay=stub) as case:
         page = await case.page()
         assert (await page.ask(**message))["ok"]
-        assert held.did == [done]
-        held.validate = "not just now"
+        assert stub.calls == [done]
+        stub.refusal = "not just now"
         assert (await page.ask(**message))["error"] == "not just now"
-        held.validate = None
-        held.go.clear()
+        stub.refusal = None
+        stub.release.clear()
         slow = await page.send(**message)
         assert "still running" in (await page.ask(**message))["error"]
-        assert (await page.ask(type="halt"))["ok"], "a HALT does not wait behind it"
-        held.go.set()
+        assert (await page.ask(type="halt"))["ok"], "HALT does not wait for it"
+        stub.release.set()
         assert (await page.answer(slow))["ok"]
     async with open_console() as case:
         page = await case.page()
         assert (await page.ask(**message))["error"] == f"{message['type']}: not available in this run"
 
 
-async def test_a_page_that_leaves_in_the_middle_of_it() -> None:
-    held = Held()
-    async with open_console(time=held, recording=held, replay=held) as case:
+async def test_a_client_that_leaves_ends_its_command() -> None:
+    stub = StubControl()
+    async with open_console(time=stub, recording=stub, replay=stub) as case:
         page = await case.page()
-        held.go.clear()
+        stub.release.clear()
         await page.send(type="open_recording", file="run.mcap")
-        await case.settled(lambda: bool(case.console._tasks), "the work")
+        await case.settled(lambda: bool(case.console._tasks), "the task")
         await page.socket.close()
-        await case.settled(lambda: not case.console._tasks, "that it is given up")
-        assert len(held.left) == 1
+        await case.settled(lambda: not case.console._tasks, "the end of the task")
+        assert len(stub.left) == 1
 
 
-async def test_work_that_fails_is_a_fault_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
-    held = Held()
-    monkeypatch.setattr(held, "_do", lambda _what: 1 / 0)
-    async with open_console(time=held, recording=held, replay=held) as case:
+async def test_an_unexpected_error_is_a_fault_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    stub = StubControl()
+    monkeypatch.setattr(stub, "_do", lambda _what: 1 / 0)
+    async with open_console(time=stub, recording=stub, replay=stub) as case:
         page = await case.page()
         await page.send(type="pause")
         await case.settled(lambda: any(line["event"] == "a part failed" for line in case.log), "a line in the log")
         assert "console command 1" in str(case.run.health.fault())
 
 
-async def test_a_recording_is_shown_to_who_opened_it_only() -> None:
-    held = Held()
-    async with open_console(time=held, recording=held, replay=held) as case:
+async def test_a_recording_is_shown_only_to_the_client_that_opened_it() -> None:
+    stub = StubControl()
+    async with open_console(time=stub, recording=stub, replay=stub) as case:
         page, other = await case.page(), await case.page()
         assert (await page.ask(type="open_recording", file="run.mcap"))["data"] == {"seconds": 3.0}
         case.cycles()
@@ -147,7 +147,7 @@ async def test_a_recording_is_shown_to_who_opened_it_only() -> None:
         assert (await page.next("state"))["segments"]["whole"]
         async with case.session.get(case.url.with_path("/report", keep_query=True)) as answer:
             assert await answer.text() == "<h1>report</h1>"
-        held.validate = "nothing is being recorded"
+        stub.refusal = "nothing is being recorded"
         async with case.session.get(case.url.with_path("/report", keep_query=True)) as answer:
-            assert (answer.status, await answer.text()) == (409, held.validate)
-    assert held.did[-1] == "close"
+            assert (answer.status, await answer.text()) == (409, stub.refusal)
+    assert stub.calls[-1] == "close"

@@ -1,7 +1,7 @@
-"""A hundred thousand messages that make no sense, or too much: none raises, none moves the robot.
+"""A hundred thousand malformed or oversized messages: none raises an error, none moves the robot.
 
-Most go to the desk itself, where what they do is seen at once; the others over a websocket, and some to a whole
-process in virtual time, whose emulated base tells whether it moved.
+Most go to the dispatcher, where their effect is seen at once; others over a websocket, and some to a whole process in
+virtual time, whose emulated base shows whether it moved.
 """
 
 from __future__ import annotations
@@ -28,20 +28,14 @@ from runtime.cycle.step import CycleRecord, State
 from runtime.support.kernel_loader import KernelLoader
 from runtime.timing.cycle_stats import CycleStats
 from tests.runtime.console.console_case import FREE_PORT, ConsoleCase, open_console
-from tests.runtime.console.sample_messages import ASYNC_COMMANDS, EDITS, ROBOT_REQUESTS
+from tests.runtime.console.sample_messages import ALL
 from tests.runtime.virtual_time import in_virtual_time
 
-AT_THE_DESK = 70_000
-OVER_THE_WIRE = 30_000
+TO_DISPATCHER = 70_000
+OVER_WEBSOCKET = 30_000
 IN_A_RUN = 4_000
 BOUNDLESS = Limits(messages_per_s=1e9, queue_messages=10**9, queue_bytes=10**12)
 
-GOOD: list[dict[str, Any]] = [
-    *(row[0] for row in ROBOT_REQUESTS), *(row[0] for row in EDITS), *(row[0] for row in ASYNC_COMMANDS),
-    {"type": "take_control"}, {"type": "release_control"}, {"type": "grant_control", "client": 2},
-    {"type": "evidence", "object": 1}, {"type": "load_model", "toml": "name = 1"}, {"type": "undo_parameter"},
-    {"type": "set_parameter", "path": "behaviors.arbiter.base_velocity_m_s", "value": 0.4}, {"type": "save_toml"},
-]  # fmt: skip
 ODD: list[Any] = [
     None, True, -1, 0, 2**53, 2**70, 1e308, -0.0, "", "x", "\x00", "halt", "arm", "🤖" * 50, [], [[]], {},
     {"type": "arm"}, ["arm"], float("nan"), float("inf"), "NaN", 10**400, "a" * 2000, {"id": 1}, [1.5], "behaviors..",
@@ -50,7 +44,7 @@ ODD: list[Any] = [
 
 
 def mutated(rng: random.Random, message: dict[str, Any]) -> dict[str, Any]:
-    """Return a message with something in it that should not be there, or nothing where something should."""
+    """Return a message with arguments added, removed or replaced."""
     message = {"id": rng.randrange(1000), **message}
     for _ in range(rng.choice((1, 1, 2, 3))):
         keys = list(message)
@@ -64,19 +58,19 @@ def mutated(rng: random.Random, message: dict[str, Any]) -> dict[str, Any]:
                     rng.choice(ODD)
                 )
             case 3:
-                message |= rng.choice(GOOD)
+                message |= rng.choice(ALL)
             case _:
                 message[rng.choice(keys) if keys else "id"] = [message.copy()]
     return message
 
 
 def text_of(value: Any) -> str:
-    """Return JSON, with the numbers in it that JSON does not have."""
+    """Return JSON that may hold NaN and infinities."""
     return json.dumps(value, ensure_ascii=False)
 
 
 def garbled(rng: random.Random, text: str) -> str:
-    """Return a text with some of it gone, doubled or replaced."""
+    """Return a text with parts removed, doubled or replaced."""
     for _ in range(rng.randrange(1, 4)):
         at, length = rng.randrange(len(text) + 1), rng.randrange(1, 8)
         filling = rng.choice(("", text[at : at + length] * 2, chr(rng.randrange(1, 0xD800)), '"', "}", "[[[[", "\\u"))
@@ -86,7 +80,7 @@ def garbled(rng: random.Random, text: str) -> str:
 
 def messages(rng: random.Random, count: int) -> Iterator[str]:
     for _ in range(count):
-        good = rng.choice(GOOD)
+        good = rng.choice(ALL)
         match rng.randrange(4):
             case 0:
                 yield garbled(rng, text_of({"id": 1, **good}))
@@ -96,18 +90,18 @@ def messages(rng: random.Random, count: int) -> Iterator[str]:
                 yield text_of(mutated(rng, good))
 
 
-class NoWire:
-    """Takes everything."""
+class NullTransport:
+    """A transport that accepts everything."""
 
     async def send(self, data: bytes) -> None:
-        """Take it."""
+        """Accept it."""
 
     def abort(self) -> None:
-        """Be cut."""
-        raise AssertionError("cut by its own queue")
+        """Fail: the client's queue is not bounded here."""
+        raise AssertionError("disconnected by its own queue")
 
 
-def has_form(text: str) -> bool:
+def is_well_formed(text: str) -> bool:
     try:
         READER.read(text)
     except MalformedMessage:
@@ -115,22 +109,22 @@ def has_form(text: str) -> bool:
     return True
 
 
-async def test_at_the_desk() -> None:
-    """What has no form does nothing even from who has the control; from a watcher only a HALT does anything."""
+async def test_messages_to_the_dispatcher() -> None:
+    """Malformed messages do nothing even from the client in control; from another client only HALT does anything."""
     rng = random.Random(1)
     async with open_console(limits=BOUNDLESS) as case:
         hub = case.console.hub
-        controller, watcher = (hub.join(NoWire(), name, {}, has_token=True) for name in ("first", "second"))
-        stranger = hub.join(NoWire(), "third", {}, has_token=False)
-        formed = 0
-        for k, text in enumerate(messages(rng, AT_THE_DESK)):
+        controller, watcher = (hub.join(NullTransport(), name, {}, has_token=True) for name in ("first", "second"))
+        stranger = hub.join(NullTransport(), "third", {}, has_token=False)
+        well_formed = 0
+        for k, text in enumerate(messages(rng, TO_DISPATCHER)):
             if k % 5000 == 0:
                 for client in (controller, watcher, stranger):
                     client._queue.clear()
             case.console.dispatcher.receive(stranger, text)
             assert case.run.asked == []
-            if has_form(text):
-                formed += 1
+            if is_well_formed(text):
+                well_formed += 1
                 if '"take_control"' not in text:
                     case.console.dispatcher.receive(watcher, text)
                     assert set(case.run.asked) <= {Request.HALT}
@@ -140,18 +134,18 @@ async def test_at_the_desk() -> None:
                 assert orjson.loads(controller._queue[-1])["ok"] is False
             case.run.asked.clear()
         assert hub.control.is_held_by(controller)
-        assert formed > 0.01 * AT_THE_DESK, "nothing came near a message: this says little"
+        assert well_formed > 0.01 * TO_DISPATCHER, "too few messages are well-formed to test anything"
         for client in (controller, watcher, stranger):
             hub.leave(client)
 
 
-async def test_over_the_wire() -> None:
+async def test_messages_over_a_websocket() -> None:
     rng = random.Random(2)
     async with open_console(limits=BOUNDLESS) as case:
         first, second = await case.page(), await case.page()
         sent = {id(first): 0, id(second): 0}
-        for k, text in enumerate(messages(rng, OVER_THE_WIRE)):
-            page = first if not has_form(text) else second
+        for k, text in enumerate(messages(rng, OVER_WEBSOCKET)):
+            page = first if not is_well_formed(text) else second
             if '"take_control"' in text:
                 continue
             await page.socket.send_str(text)
@@ -161,12 +155,12 @@ async def test_over_the_wire() -> None:
                 await answered(case, second, sent[id(second)])
                 sent = dict.fromkeys(sent, 0)
                 assert set(case.run.asked) <= {Request.HALT}
-        assert (await first.ask(type="arm"))["ok"], "it is as it was"
+        assert (await first.ask(type="arm"))["ok"], "its state is unchanged"
         assert case.run.asked[-1] is Request.ARM
 
 
 async def answered(case: ConsoleCase, page: Any, count: int) -> None:
-    """Hear as many answers as there were messages."""
+    """Wait for as many answers as there were messages."""
     for _ in range(count):
         await page.next("answer")
     page.received.clear()
@@ -176,9 +170,9 @@ async def answered(case: ConsoleCase, page: Any, count: int) -> None:
 @pytest.mark.compiled
 @pytest.mark.parametrize("armed", [False, True])
 def test_a_whole_process_does_not_move(monkeypatch: pytest.MonkeyPatch, *, armed: bool) -> None:
-    """Standing it stays where it is, whatever a watcher says and whatever senseless thing the controller does.
+    """Neither a watching client's messages nor malformed ones of the client in control move the robot.
 
-    Armed, with a hand on the stick that asks for standstill, the same: what has no form drives nowhere.
+    Armed and teleoperated to stand still, it does not move either.
     """
     rng = random.Random(3)
     texts = messages(rng, IN_A_RUN)
@@ -199,9 +193,9 @@ def test_a_whole_process_does_not_move(monkeypatch: pytest.MonkeyPatch, *, armed
                 if text is None:
                     process.stop()
                     return
-                is_halt = has_form(text) and '"halt"' in text
+                is_halt = is_well_formed(text) and '"halt"' in text
                 if not is_halt and '"take_control"' not in text:
-                    console.dispatcher.receive(watcher if has_form(text) else controller, text)
+                    console.dispatcher.receive(watcher if is_well_formed(text) else controller, text)
             for client in (watcher, controller):
                 client._queue.clear()
 
@@ -212,7 +206,9 @@ def test_a_whole_process_does_not_move(monkeypatch: pytest.MonkeyPatch, *, armed
             process, log, KernelLoader(log), emulated=True,
             limits=BOUNDLESS, clock=loop.time,
         )  # fmt: skip
-        controller, watcher = (console.hub.join(NoWire(), name, {}, has_token=True) for name in ("first", "second"))
+        controller, watcher = (
+            console.hub.join(NullTransport(), name, {}, has_token=True) for name in ("first", "second")
+        )
         summary = loop.run_until_complete(process.run(arm=False, seconds=None))
         assert robot.truth.pose == start
     assert moved

@@ -1,4 +1,4 @@
-"""ReplayClient as processes of their own: opened, moved about in, closed, and told apart by who looks on."""
+"""Replay workers as processes: opened, moved, closed, and one for each client."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Page:
-    """A client that keeps what it is shown."""
+    """A client that keeps what it is sent."""
 
     def __init__(self) -> None:
         self.is_gone = False
         self.live: list[bool] = []
         self.frames: list[EncodedFrame] = []
-        self.said: list[dict[str, Any]] = []
+        self.messages: list[dict[str, Any]] = []
 
     def switch(self, *, live: bool) -> None:
         self.live.append(live)
@@ -51,7 +51,7 @@ class Page:
         self.frames.append(frame)
 
     def send(self, message: dict[str, Any]) -> None:
-        self.said.append(message)
+        self.messages.append(message)
 
     @property
     def last(self) -> dict[str, Any]:
@@ -65,18 +65,18 @@ async def until(done: Callable[[], bool]) -> None:
 
 
 @asynccontextmanager
-async def players(folder: Path, current: str | None = None) -> AsyncIterator[ReplayClient]:
-    made = ReplayClient(folder, PROGRAM, lambda: current)
+async def replay_client(folder: Path, current: str | None = None) -> AsyncIterator[ReplayClient]:
+    client = ReplayClient(folder, PROGRAM, lambda: current)
     try:
-        yield made
+        yield client
     finally:
-        await made.close()
+        await client.close()
 
 
-async def test_a_recording_on_the_page(folder: Path) -> None:
+async def test_a_recording_is_opened_moved_and_closed(folder: Path) -> None:
     page = Page()
-    async with players(folder) as made:
-        about = await made.open(page, "hall.mcap")
+    async with replay_client(folder) as client:
+        about = await client.open(page, "hall.mcap")
         assert about["about"] == {"sensors": 24, "emulated": True}
         assert (about["file"], about["cycles"], about["duration_s"]) == ("hall.mcap", 100, 4.95)
         assert about["modes"][-1][1] == "DRIVE"
@@ -85,86 +85,86 @@ async def test_a_recording_on_the_page(folder: Path) -> None:
         assert (page.last["cycle"], page.last["segments"]) == (1, {"whole": True})
         changes = orjson.loads(page.frames[-1].encode(follows=True, dropped=3, controls=False))
         assert (changes["segments"], changes["dropped"], changes["controller"]) == ({"whole": False}, 3, False)
-        await made.seek(page, 3.0)
+        await client.seek(page, 3.0)
         await until(lambda: page.last["cycle"] == 61)
-        await made.step(page, -1)
+        await client.step(page, -1)
         await until(lambda: page.last["cycle"] == 60)
-        await made.play(page, 50.0)
+        await client.play(page, 50.0)
         await until(lambda: page.last["cycle"] == 100 and not page.last["playing"])
-        await made.close_recording(page)
+        await client.close_recording(page)
         assert page.live == [False, True]
         with pytest.raises(ReplayError, match="no recording is open"):
-            await made.seek(page, 1.0)
+            await client.seek(page, 1.0)
         count = len(page.frames)
         await asyncio.sleep(0)
         assert len(page.frames) == count
 
 
-async def test_what_cannot_be_opened(folder: Path) -> None:
+async def test_invalid_recordings_positions_and_speeds_are_refused(folder: Path) -> None:
     page = Page()
-    async with players(folder) as made:
+    async with replay_client(folder) as client:
         for name in ("", "none.mcap", "../runs/hall.mcap", str(folder / "hall.mcap"), "hall", "/etc/passwd"):
             with pytest.raises(ReplayError, match="there is no recording"):
-                await made.open(page, name)
+                await client.open(page, name)
         with pytest.raises(ReplayError, match=r"broken\.mcap: holds no message"):
-            await made.open(page, "broken.mcap")
+            await client.open(page, "broken.mcap")
         assert page.live == []
         with pytest.raises(ReplayError, match="finite"):
-            await made.seek(page, float("nan"))
+            await client.seek(page, float("nan"))
         for speed in (1e9, -1.0, float("nan")):
             with pytest.raises(ReplayError, match="speed"):
-                await made.play(page, speed)
+                await client.play(page, speed)
 
 
-async def test_only_so_many_at_a_time_and_none_is_left_behind(folder: Path) -> None:
+async def test_the_number_of_workers_is_limited_and_none_outlives_the_client(folder: Path) -> None:
     pages = [Page() for _ in range(WORKERS_MAX)]
-    async with players(folder) as made:
-        await asyncio.gather(*(made.open(page, "hall.mcap") for page in pages))
-        processes = [playing._process.pid for playing in made._open.values()]
+    async with replay_client(folder) as client:
+        await asyncio.gather(*(client.open(page, "hall.mcap") for page in pages))
+        processes = [replay._process.pid for replay in client._open.values()]
         assert len(set(processes)) == WORKERS_MAX
         assert all(os.getpriority(os.PRIO_PROCESS, pid) >= NICENESS for pid in processes)
         with pytest.raises(ReplayError, match="open already"):
-            await made.open(Page(), "hall.mcap")
-        made.leave(pages[0])
-        await until(lambda: not made._closing)
+            await client.open(Page(), "hall.mcap")
+        client.leave(pages[0])
+        await until(lambda: not client._closing)
         another = Page()
-        await made.open(another, "hall.mcap")
+        await client.open(another, "hall.mcap")
     for pid in processes:
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
 
 
-async def test_a_player_that_dies_is_told(folder: Path) -> None:
+async def test_a_worker_that_died_is_reported(folder: Path) -> None:
     page = Page()
-    async with players(folder) as made:
-        await made.open(page, "hall.mcap")
-        (playing,) = made._open.values()
-        playing._process.kill()
-        await until(lambda: playing.is_over)
+    async with replay_client(folder) as client:
+        await client.open(page, "hall.mcap")
+        (replay,) = client._open.values()
+        replay._process.kill()
+        await until(lambda: replay.is_over)
         with pytest.raises(ReplayError, match="has ended"):
-            await made.seek(page, 1.0)
-        await made.open(page, "hall.mcap")
+            await client.seek(page, 1.0)
+        await client.open(page, "hall.mcap")
 
 
-async def test_a_program_that_is_none_is_told_in_a_line(folder: Path) -> None:
-    made = ReplayClient(folder, "tests.runtime.console.no_such", lambda: None)
+async def test_a_missing_program_is_reported_in_one_line(folder: Path) -> None:
+    client = ReplayClient(folder, "tests.runtime.console.no_such", lambda: None)
     with pytest.raises(ReplayError, match="no_such"):
-        await made.open(Page(), "hall.mcap")
+        await client.open(Page(), "hall.mcap")
 
 
-async def test_the_list_and_the_one_under_way(folder: Path, tmp_path: Path) -> None:
-    async with players(folder, str(folder / "hall.mcap")) as made:
-        found = await made.recordings()
+async def test_recordings_are_listed_with_the_one_in_progress(folder: Path, tmp_path: Path) -> None:
+    async with replay_client(folder, str(folder / "hall.mcap")) as client:
+        found = await client.recordings()
         assert {one["file"]: one["live"] for one in found} == {"hall.mcap": True, "broken.mcap": False}
     elsewhere = str(tmp_path / "elsewhere.mcap")
     shutil.copy(folder / "hall.mcap", elsewhere)
-    async with players(folder, elsewhere) as made:
-        found = await made.recordings()
+    async with replay_client(folder, elsewhere) as client:
+        found = await client.recordings()
         assert (found[0]["file"], found[0]["live"]) == (elsewhere, True)
-        assert (await made.open(Page(), elsewhere))["cycles"] == 100
+        assert (await client.open(Page(), elsewhere))["cycles"] == 100
 
 
-def test_a_listing(folder: Path, tmp_path: Path) -> None:
+def test_only_files_of_the_folder_are_recordings(folder: Path, tmp_path: Path) -> None:
     assert list_recordings(tmp_path / "none") == []
     (tmp_path / "folder.mcap").mkdir()
     assert list_recordings(tmp_path) == []
@@ -173,28 +173,28 @@ def test_a_listing(folder: Path, tmp_path: Path) -> None:
     assert find_recording(folder, "../hall.mcap") is None
 
 
-async def test_the_page_of_a_run_that_goes_on(folder: Path, tmp_path: Path) -> None:
+async def test_the_report_of_a_run_in_progress(folder: Path, tmp_path: Path) -> None:
     whole = (folder / "hall.mcap").read_bytes()
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(whole[: int(0.7 * len(whole))])
-    async with players(folder, str(cut)) as made:
-        first = asyncio.create_task(made.report())
+    async with replay_client(folder, str(cut)) as client:
+        first = asyncio.create_task(client.report())
         await asyncio.sleep(0)
-        with pytest.raises(ReplayError, match="already"):
-            await made.report()
+        with pytest.raises(ReplayError, match="in progress"):
+            await client.report()
         page = (await first).decode()
         assert page.startswith("<!doctype html>")
         assert "Pictures" in page
-    async with players(folder) as made:
-        with pytest.raises(ReplayError, match="nothing is being recorded"):
-            await made.report()
+    async with replay_client(folder) as client:
+        with pytest.raises(ReplayError, match="not being recorded"):
+            await client.report()
     with pytest.raises(ReplayError, match=r"broken\.mcap: holds no message"):
         await make_report(folder / "broken.mcap", "m")
     with pytest.raises(ReplayError, match="not done within"):
         await make_report(cut, "m", timeout_s=0.01)
 
 
-async def test_a_process_beside_is_ended_whatever_it_does() -> None:
+async def test_a_child_process_is_ended_at_once() -> None:
     process = await start_child(ECHOLOCATE, ["report", "--help"], pipes=False, low_priority=True)
     await kill_child(process)
     assert process.returncode is not None

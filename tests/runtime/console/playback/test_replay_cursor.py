@@ -1,4 +1,4 @@
-"""Moving about in a recording: wherever one comes from, a cycle and what it left are the same, to the bit."""
+"""Seeking in a recording: from wherever it starts, a cycle and the state after it are the same, to the bit."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CYCLES = 200
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("played") / "hall.mcap"
+    path = tmp_path_factory.mktemp("replayed") / "hall.mcap"
     settings = hall()
     other = settings.model_copy(update={"cycle": settings.cycle.model_copy(update={"perception_budget_s": 0.01})})
     record(settings, path, SECONDS, reloads={90: other})
@@ -33,102 +33,104 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def truth(run: Path) -> list[dict[str, Any]]:
-    """Return every cycle as it comes when one begins at the beginning and goes on to the end."""
+    """Return every cycle, replayed from the beginning to the end."""
     with open_recording(run) as recording:
-        playback = ReplayCursor(recording)
-        seen = []
-        while (shown := playback.next_cycle()) is not None:
-            seen.append(fingerprint(shown))
-    assert [one["cycle"] for one in seen] == list(range(1, CYCLES + 1))
-    return seen
+        cursor = ReplayCursor(recording)
+        cycles = []
+        while (replayed := cursor.next_cycle()) is not None:
+            cycles.append(fingerprint(replayed))
+    assert [one["cycle"] for one in cycles] == list(range(1, CYCLES + 1))
+    return cycles
 
 
 @pytest.fixture
-def playback(run: Path) -> Iterator[ReplayCursor]:
+def cursor(run: Path) -> Iterator[ReplayCursor]:
     with open_recording(run) as recording:
         yield ReplayCursor(recording)
 
 
-def arrive(playback: ReplayCursor, position: int) -> dict[str, Any]:
-    """Go somewhere and return what is there."""
+def seek_to(cursor: ReplayCursor, position: int) -> dict[str, Any]:
+    """Seek to a position and return the cycle there."""
     last, steps = None, 0
-    for shown in playback.seek(position):
-        last, steps = shown, steps + 1
+    for replayed in cursor.seek(position):
+        last, steps = replayed, steps + 1
     assert last is not None
     assert steps <= 2.0 * 20 + LOOK_BACK + 1, "a keyframe is every two seconds"
     return fingerprint(last)
 
 
-def test_what_there_is_to_know(playback: ReplayCursor) -> None:
-    assert playback.cycles == CYCLES
-    assert playback.duration_s == pytest.approx(SECONDS - 0.05)
-    assert playback.modes[0][1].mode.value == "READY"
-    assert playback.modes[-1][1].mode.value == "DRIVE"
-    assert playback.position_at(-1.0) == 1
-    assert playback.position_at(0.0) == 1
-    assert playback.position_at(1.0) == 21
-    assert playback.position_at(1e9) == CYCLES
-    assert playback.time_of(21) == pytest.approx(1.0)
+def test_the_description_of_a_recording(cursor: ReplayCursor) -> None:
+    assert cursor.cycles == CYCLES
+    assert cursor.duration_s == pytest.approx(SECONDS - 0.05)
+    assert cursor.modes[0][1].mode.value == "READY"
+    assert cursor.modes[-1][1].mode.value == "DRIVE"
+    assert cursor.position_at(-1.0) == 1
+    assert cursor.position_at(0.0) == 1
+    assert cursor.position_at(1.0) == 21
+    assert cursor.position_at(1e9) == CYCLES
+    assert cursor.time_of(21) == pytest.approx(1.0)
 
 
-def test_anywhere_from_anywhere(playback: ReplayCursor, truth: list[dict[str, Any]]) -> None:
+def test_seek_from_anywhere_to_anywhere(cursor: ReplayCursor, truth: list[dict[str, Any]]) -> None:
     rng = random.Random(5)
     for position in [CYCLES, 1, 2, CYCLES, 100, 99, 98, 97, *(rng.randint(1, CYCLES) for _ in range(25))]:
-        assert arrive(playback, position) == truth[position - 1]
-        assert playback.position == position
-        assert playback.t_s == pytest.approx(0.05 * (position - 1))
+        assert seek_to(cursor, position) == truth[position - 1]
+        assert cursor.position == position
+        assert cursor.t_s == pytest.approx(0.05 * (position - 1))
         if position < CYCLES:
-            shown = playback.next_cycle()
-            assert shown is not None
-            assert fingerprint(shown) == truth[position]
-    assert arrive(playback, CYCLES + 50) == truth[-1]
-    assert playback.next_cycle() is None
-    assert arrive(playback, -3) == truth[0]
+            replayed = cursor.next_cycle()
+            assert replayed is not None
+            assert fingerprint(replayed) == truth[position]
+    assert seek_to(cursor, CYCLES + 50) == truth[-1]
+    assert cursor.next_cycle() is None
+    assert seek_to(cursor, -3) == truth[0]
 
 
-def test_the_way_back_is_short_once_it_was_gone(
-    playback: ReplayCursor, monkeypatch: pytest.MonkeyPatch, truth: list[dict[str, Any]]
+def test_kept_states_make_a_seek_backward_short(
+    cursor: ReplayCursor, monkeypatch: pytest.MonkeyPatch, truth: list[dict[str, Any]]
 ) -> None:
     monkeypatch.setattr("runtime.console.playback.replay_cursor.KEEP_PERIOD", 10)
-    while playback.next_cycle() is not None:
+    while cursor.next_cycle() is not None:
         pass
     for position in range(CYCLES - 1, CYCLES - 30, -1):
         steps, last = 0, {}
-        for shown in playback.seek(position):
-            steps, last = steps + 1, fingerprint(shown) if playback.position == position else {}
+        for replayed in cursor.seek(position):
+            steps, last = steps + 1, fingerprint(replayed) if cursor.position == position else {}
         assert steps <= 10 + LOOK_BACK
         assert last == truth[position - 1]
-    assert playback._kept_bytes <= KEPT_BYTES
+    assert cursor._kept_bytes <= KEPT_BYTES
 
 
-def test_little_is_kept(playback: ReplayCursor, monkeypatch: pytest.MonkeyPatch, truth: list[dict[str, Any]]) -> None:
+def test_kept_states_are_bounded(
+    cursor: ReplayCursor, monkeypatch: pytest.MonkeyPatch, truth: list[dict[str, Any]]
+) -> None:
     monkeypatch.setattr("runtime.console.playback.replay_cursor.KEEP_PERIOD", 10)
-    list(playback.seek(40))
-    one = playback._kept_bytes // len(playback._kept)
+    list(cursor.seek(40))
+    one = cursor._kept_bytes // len(cursor._kept)
     monkeypatch.setattr("runtime.console.playback.replay_cursor.KEPT_BYTES", 3 * one)
-    list(playback.seek(CYCLES))
-    assert playback._kept_bytes <= 3 * one
-    assert arrive(playback, 120) == truth[119]
+    list(cursor.seek(CYCLES))
+    assert cursor._kept_bytes <= 3 * one
+    assert seek_to(cursor, 120) == truth[119]
 
 
-def test_a_recording_that_begins_in_the_middle(run: Path, tmp_path: Path, truth: list[dict[str, Any]]) -> None:
-    """As when recording is switched on in mid-run: the first thing in it is a keyframe."""
+def test_a_recording_that_starts_in_mid_run(run: Path, tmp_path: Path, truth: list[dict[str, Any]]) -> None:
+    """As when recording is switched on in mid-run: it starts with a keyframe."""
     entries = entries_of(run)
     frames = [at for at, entry in enumerate(entries) if entry.topic == KEYFRAME]
     path = tmp_path / "part.mcap"
     rewrite([entries[0], *entries[frames[1] - 1 :]], path)
     with open_recording(path) as recording:
-        playback = ReplayCursor(recording)
-        seen = []
-        while (shown := playback.next_cycle()) is not None:
-            seen.append(fingerprint(shown))
-        assert 0 < len(seen) < CYCLES
-        assert seen == truth[-len(seen) :]
-        for position in (len(seen), 1, len(seen) // 2):
-            assert arrive(playback, position) == seen[position - 1]
+        cursor = ReplayCursor(recording)
+        cycles = []
+        while (replayed := cursor.next_cycle()) is not None:
+            cycles.append(fingerprint(replayed))
+        assert 0 < len(cycles) < CYCLES
+        assert cycles == truth[-len(cycles) :]
+        for position in (len(cycles), 1, len(cycles) // 2):
+            assert seek_to(cursor, position) == cycles[position - 1]
 
 
-def test_over_a_gap(run: Path, tmp_path: Path, truth: list[dict[str, Any]]) -> None:
+def test_seek_over_a_gap(run: Path, tmp_path: Path, truth: list[dict[str, Any]]) -> None:
     entries, numbers = entries_of(run), iter(range(1, CYCLES + 1))
     kept: list[RawMessage] = []
     for entry in entries:
@@ -138,25 +140,25 @@ def test_over_a_gap(run: Path, tmp_path: Path, truth: list[dict[str, Any]]) -> N
     path = tmp_path / "gap.mcap"
     rewrite(kept, path)
     with open_recording(path) as recording:
-        playback = ReplayCursor(recording)
-        assert playback.cycles == CYCLES - 10
-        shown = list(playback.seek(playback.position_at(3.0)))[-1]
-        assert fingerprint(shown) == truth[shown.record.cycle - 1]
-        assert shown.record.cycle > 60
+        cursor = ReplayCursor(recording)
+        assert cursor.cycles == CYCLES - 10
+        replayed = list(cursor.seek(cursor.position_at(3.0)))[-1]
+        assert fingerprint(replayed) == truth[replayed.record.cycle - 1]
+        assert replayed.record.cycle > 60
 
 
-def test_bookmarks(run: Path, tmp_path: Path) -> None:
+def test_bookmarks_have_their_time(run: Path, tmp_path: Path) -> None:
     entries, path = entries_of(run), tmp_path / "marked.mcap"
     cycles = [at for at, entry in enumerate(entries) if entry.topic == CYCLE]
     at = cycles[40]
     mark = RawMessage(BOOKMARK, entries[at].log_ns, encode(Bookmark(run_s=2.05, cycle=41, text="here <it> was")))
     rewrite([*entries[: at + 1], mark, *entries[at + 1 :]], path)
     with open_recording(path) as recording:
-        playback = ReplayCursor(recording)
-        assert [(round(s, 6), text) for s, text in playback.bookmarks] == [(2.0, "here <it> was")]
+        cursor = ReplayCursor(recording)
+        assert [(round(s, 6), text) for s, text in cursor.bookmarks] == [(2.0, "here <it> was")]
 
 
-def test_what_holds_no_cycle(run: Path, tmp_path: Path) -> None:
+def test_a_recording_without_cycles_is_refused(run: Path, tmp_path: Path) -> None:
     path = tmp_path / "none.mcap"
     rewrite([entry for entry in entries_of(run) if entry.topic == RUN_INFO][:1], path)
     with open_recording(path) as recording, pytest.raises(RecordingError, match="holds no cycle"):

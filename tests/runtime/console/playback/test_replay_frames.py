@@ -1,4 +1,4 @@
-"""A recording's frames, made by the program of `run`: as those of a live run, and in order without a gap."""
+"""Frames of a recording, made by the program of `run`: like those of a live run, in order and without a gap."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SECONDS = 5.0
 
 
 def operator(_cycle: int, state: State) -> OperatorInput:
-    """Arm, and take a segment out of the map now and then."""
+    """Arm, and delete a segment every fifteen cycles."""
     numbers = state.perception.segments().numbers.tolist()
     edits = (DeleteSegments((numbers[0],)),) if state.cycle % 15 == 0 and numbers else ()
     return OperatorInput(Request.ARM if state.mode.mode is Mode.READY else None, edits=edits)
@@ -39,42 +39,42 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_changes_of_all_frames_come_to_the_map_of_the_last(folder: Path) -> None:
+def test_the_changes_of_all_frames_add_up_to_the_last_map(folder: Path) -> None:
     seen: dict[int, Any] = {}
     with open_recording(folder / "hall.mcap") as recording:
-        playback = ReplayCursor(recording)
-        played = make_replay_frames(parse_settings(recording.info.settings), emulated=recording.info.emulated)
-        for shown in playback.seek(playback.cycles):
-            played.take(shown.record)
-            picture = played.frame(shown, PlaybackPosition(playback.t_s, is_playing=True, speed=2.0))
-            changes, whole = orjson.loads(picture.changes), orjson.loads(picture.whole)
+        cursor = ReplayCursor(recording)
+        frames = make_replay_frames(parse_settings(recording.info.settings), emulated=recording.info.emulated)
+        for replayed in cursor.seek(cursor.cycles):
+            frames.take(replayed.record)
+            parts = frames.frame(replayed, PlaybackPosition(cursor.t_s, is_playing=True, speed=2.0))
+            changes, whole = orjson.loads(parts.changes), orjson.loads(parts.whole)
             if changes["whole"]:
                 seen.clear()
             for number in changes["removed"]:
                 del seen[number]
             seen |= {row[0]: row for row in changes["added"]}
-            numbers = shown.state.perception.segments().numbers.tolist()
+            numbers = replayed.state.perception.segments().numbers.tolist()
             assert sorted(seen) == sorted(row[0] for row in whole["added"]) == sorted(numbers)
-        head = orjson.loads(picture.head + b"}")
+        head = orjson.loads(parts.head + b"}")
     assert len(seen) > 10
-    assert (head["cycle"], head["mode"]) == (playback.cycles, "DRIVE")
-    assert head["playback"] == {"s": playback.t_s, "is_playing": True, "speed": 2.0}
-    assert (head["paused"], head["speed"]) == (False, 1.0), "that is the live run's affair"
-    assert len(head["objects"]) == len(shown.state.perception.labelled_objects())
+    assert (head["cycle"], head["mode"]) == (cursor.cycles, "DRIVE")
+    assert head["playback"] == {"s": cursor.t_s, "is_playing": True, "speed": 2.0}
+    assert (head["paused"], head["speed"]) == (False, 1.0), "time control is shown of the live run only"
+    assert len(head["objects"]) == len(replayed.state.perception.labelled_objects())
 
 
 @pytest.mark.realtime
 @pytest.mark.usefixtures("warm_kernels")
-async def test_a_page_is_shown_a_recording(folder: Path) -> None:
-    page, players = Page(), ReplayClient(folder, REPLAY_PROGRAM, lambda: None)
+async def test_a_client_is_shown_a_recording(folder: Path) -> None:
+    page, client = Page(), ReplayClient(folder, REPLAY_PROGRAM, lambda: None)
     try:
-        about = (await players.open(page, "hall.mcap"))["about"]
+        about = (await client.open(page, "hall.mcap"))["about"]
         assert (len(about["ring"]["mounts"]), about["emulated"], "units" in about) == (24, True, False)
         assert len(about["truth"]["drums"]) > 0
-        await players.seek(page, 4.0)
+        await client.seek(page, 4.0)
         await until(lambda: bool(page.frames) and page.last["playback"]["s"] == pytest.approx(4.0))
         assert page.last["segments"]["whole"]
         assert len(page.last["segments"]["added"]) > 10
         assert page.last["controller"] is True
     finally:
-        await players.close()
+        await client.close()

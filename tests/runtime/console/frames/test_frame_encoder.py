@@ -1,0 +1,78 @@
+"""The fields of a frame, and segments as changes or whole."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from tests.runtime.console.console_case import ConsoleCase, open_console
+
+Segments = dict[int, list[float]]
+
+
+def apply(segments: Segments, changes: dict[str, Any]) -> None:
+    """Apply the changes of a frame as the page does."""
+    if changes["whole"]:
+        segments.clear()
+    for number in changes["removed"]:
+        del segments[number]
+    for number, *row in changes["added"]:
+        assert number not in segments
+        segments[number] = row
+
+
+def assert_same_segments(segments: Segments, case: ConsoleCase) -> None:
+    """Assert that the page has the segments of the map."""
+    now = case.run.state.perception.segments()
+    assert sorted(segments) == sorted(now.numbers.tolist())
+    for number, geometry in zip(now.numbers.tolist(), now.geometry.tolist(), strict=True):
+        assert segments[number][:5] == pytest.approx(geometry, abs=1e-4)
+
+
+async def test_the_fields_of_a_frame() -> None:
+    async with open_console() as case:
+        page = await case.page()
+        case.cycles(3)
+        frame = await page.next("state")
+        assert frame["cycle"] == 3
+        assert frame["mode"] == "CONNECTING"
+        assert frame["pose"] == [0.06, 0.0, 0.0]
+        assert frame["twist"] == [0.3, 0.0]
+        assert frame["firing"] == [1, 2, 3, 9, 10, 11, 17, 18, 19], "of all cycles since the last frame"
+        assert (frame["ranges"][3], frame["ranges"][11], frame["ranges"][0]) == (1.5, -1.0, None)
+        assert (frame["age"][3], frame["age"][1], frame["age"][0]) == (0.0, 0.1, None)
+        assert frame["link"] == {"frames": 7, "bad": 1, "lost": 2}
+        assert frame["quanta"] == 2
+        assert frame["refinement"] == "quota"
+        assert frame["drive_request"]["kind"] == "legs"
+        assert frame["controller"] is True
+        assert frame["clients"] == 1
+        assert frame["recording"] is None
+        assert frame["paused"] is False
+
+
+async def test_changes_add_up_to_all_segments() -> None:
+    async with open_console() as case:
+        page, segments = await case.page(), Segments()
+        for k in range(60):
+            case.cycles()
+            frame = await page.next("state")
+            apply(segments, frame["segments"])
+            assert frame["segments"]["whole"] == (k == 0)
+            assert frame["dropped"] == 0
+            assert_same_segments(segments, case)
+        assert segments, "the map is empty, so nothing was tested"
+
+
+async def test_a_later_client_gets_all_segments() -> None:
+    async with open_console() as case:
+        first = await case.page()
+        case.cycles(40)
+        await first.next("state")
+        page, segments = await case.page(), Segments()
+        case.cycles()
+        frame = await page.next("state")
+        assert frame["segments"]["whole"]
+        apply(segments, frame["segments"])
+        assert_same_segments(segments, case)

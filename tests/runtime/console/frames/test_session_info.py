@@ -1,0 +1,26 @@
+"""The session message: robot, models, parameters, and the true world of an emulator."""
+
+from __future__ import annotations
+
+from tests.runtime.console.console_case import open_console
+
+
+async def test_the_session_message_describes_robot_models_and_world() -> None:
+    async with open_console() as case:
+        page = await case.page()
+        session = page.received[0]
+        assert session["role"] == "control"
+        assert session["name"] == "denning"
+        assert session["emulated"] is True
+        assert len(session["ring"]["mounts"]) == 24
+        assert len(session["truth"]["drums"]) == 6
+        assert session["models"][0]["name"] == "semicircle"
+        assert session["period_s"] == 0.05
+        paths = {parameter["path"] for parameter in session["parameters"]}
+        assert {"behaviors.avoid_static_obstacle.avoid_obstacle_gain", "cycle.perception_budget_s"} <= paths
+        assert (await case.page()).received[0]["role"] == "watch"
+
+
+async def test_a_real_robot_has_no_true_world() -> None:
+    async with open_console(emulated=False) as case:
+        assert (await case.page()).received[0]["truth"] is None

@@ -1,0 +1,31 @@
+"""The console as a part of the run: hints for the terminal, its health, and its warning when it is reachable."""
+
+from __future__ import annotations
+
+from tests.runtime.console.console_case import open_console
+
+
+async def test_hints_name_the_start_url_and_the_tunnel() -> None:
+    async with open_console() as case:
+        first, second = case.console.hints()
+        assert first == f"console: {case.console.url}"
+        assert second.startswith("from another machine: ssh -L ")
+        assert not [line for line in case.log if line["level"] == "warning"]
+
+
+async def test_a_console_open_to_other_machines_warns() -> None:
+    async with open_console("console.host=0.0.0.0") as case:
+        assert case.console.tunnel is None
+        (warning,) = [line for line in case.log if line["level"] == "warning"]
+        assert "anyone with the token can drive" in str(warning["event"])
+
+
+async def test_a_console_that_stops_listening_is_unhealthy() -> None:
+    async with open_console() as case:
+        assert case.console.probe() is None
+        server = case.console._server
+        assert server is not None
+        assert server._server is not None
+        server._server.close()
+        assert case.console.probe() == "it does not listen any more"
+        case.console._server = None
