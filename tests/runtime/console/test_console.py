@@ -28,4 +28,3 @@ async def test_a_console_that_stops_listening_is_unhealthy() -> None:
         assert server._server is not None
         server._server.close()
         assert case.console.probe() == "it does not listen any more"
-        case.console._server = None

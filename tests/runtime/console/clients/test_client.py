@@ -32,7 +32,10 @@ class SlowTransport:
         self.aborted = True
 
 
-async def test_a_slow_client_skips_frames_and_gets_the_newest_with_all_segments() -> None:
+async def test_a_slow_client_skips_frames_and_gets_the_newest_with_all_segments(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("runtime.console.frames.frame_publisher.IDLE_PERIOD_S", 1e6)  # frames of cycles only
     async with open_console() as case:
         case.cycles()
         transport = SlowTransport(2)
