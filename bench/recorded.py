@@ -21,19 +21,19 @@ class Stopwatch:
     def __init__(self) -> None:
         self.samples_us: list[tuple[float, float]] = []
         """Wall time, and the thread's own processor time, of each cycle."""
-        self._wall_s = self._cpu_s = 0.0
+        self._took_s = self._cpu_s = 0.0
 
     def timed(self, call: Callable[..., None], *, ends: bool = False) -> Callable[..., None]:
         """Return `call` with its time taken; one that `ends` a cycle makes a sample of all since the last."""
 
         def timed(*args: Any) -> None:
-            wall_s, cpu_s = time.monotonic(), time.thread_time()
+            begin_host_s, cpu_s = time.monotonic(), time.thread_time()
             call(*args)
-            self._wall_s += time.monotonic() - wall_s
+            self._took_s += time.monotonic() - begin_host_s
             self._cpu_s += time.thread_time() - cpu_s
             if ends:
-                self.samples_us.append((1e6 * self._wall_s, 1e6 * self._cpu_s))
-                self._wall_s = self._cpu_s = 0.0
+                self.samples_us.append((1e6 * self._took_s, 1e6 * self._cpu_s))
+                self._took_s = self._cpu_s = 0.0
 
         return timed
 

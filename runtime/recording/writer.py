@@ -193,17 +193,17 @@ class RecordingWriter:
         self._guarded(lambda: self._enter(item))
 
     def _tick(self) -> None:
-        now_s = time.monotonic()
-        if now_s - self._flushed_s >= FLUSH_S:
+        host_s = time.monotonic()
+        if host_s - self._flushed_s >= FLUSH_S:
             self._guarded(self._flush)
-            self._flushed_s = now_s
-        if now_s - self._synced_s >= SYNC_S:
+            self._flushed_s = host_s
+        if host_s - self._synced_s >= SYNC_S:
             self._guarded(self._sync)
             self._synced_s = time.monotonic()
-        if now_s - self._limited_s >= RETRY_S and self._file is not None:
+        if host_s - self._limited_s >= RETRY_S and self._file is not None:
             path = self._file.path
             self._guarded(lambda: self._target.enforce_limits(path))
-            self._limited_s = now_s
+            self._limited_s = host_s
 
     def _guarded(self, act: Callable[[], None]) -> None:
         """Do something with the disk; if it fails, abandon the file and try a new one later."""

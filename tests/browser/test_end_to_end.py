@@ -112,13 +112,13 @@ class Oversleep:
 
 async def halted_after(robot: Run, opened: Opened) -> tuple[float, float]:
     """Press the space bar; return the delay until the base latched, and the control's delay, s."""
-    wall_s = time.time() - time.monotonic()
+    unix_minus_host_s = time.time() - time.monotonic()
     oversleep = Oversleep()
     control = asyncio.create_task(oversleep.work())
     await opened.page.keyboard.press("Space")
     await robot.sees(lambda now: bool(now.flags & Flags.LATCHED), "a base that halts")
     control.cancel()
-    pressed_s = await opened.page.evaluate("() => window.pressedAt") / 1000.0 - wall_s
+    pressed_s = await opened.page.evaluate("() => window.pressedAt") / 1000.0 - unix_minus_host_s
     latched = next(row for row in robot.truth.rows if row.host_s > pressed_s and row.flags & Flags.LATCHED)
     return latched.host_s - pressed_s, oversleep.worst_s
 

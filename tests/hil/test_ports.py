@@ -73,10 +73,10 @@ class Stranger:
 def run_on(folder: Path, port: str, timeout_s: float = 0.0) -> Iterator[Running]:
     """Run on a port, and check that the run ends within `timeout_s` after its start."""
     with BareStarts() as bare:
-        start_s = time.monotonic()
+        begin_host_s = time.monotonic()
         with running(folder, "run", "run", "--port", port, "--arm", "--seconds", "600") as run:
             yield run
-            took_s = time.monotonic() - start_s
+            took_s = time.monotonic() - begin_host_s
     # A second for what is neither: taking Python down again, and looking whether it has ended.
     assert took_s < timeout_s + 1.0 + STARTS_MAX * bare.longest_s
 

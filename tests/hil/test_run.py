@@ -37,9 +37,9 @@ async def bare_loop(running_too: Running) -> CycleStats:
     """Do nothing at all at 20 Hz while the robot drives: what this machine does to any loop just now."""
     stats, pacer = CycleStats(LATE_SHARE * PERIOD_S), Pacer(time.monotonic(), PERIOD_S)
     while running_too.process.poll() is None:
-        start_s = time.monotonic()
-        stats.add_cycle(0.0, start_s - pacer.deadline_s)
-        stats.missed += max(0, math.floor((start_s - pacer.deadline_s) / PERIOD_S))
+        begin_host_s = time.monotonic()
+        stats.add_cycle(0.0, begin_host_s - pacer.deadline_s)
+        stats.missed += max(0, math.floor((begin_host_s - pacer.deadline_s) / PERIOD_S))
         await asyncio.sleep(max(0.0, pacer.advance(time.monotonic()) - time.monotonic()))
     return stats
 
@@ -139,12 +139,12 @@ def test_two_runs_in_a_row_on_the_same_robot(tmp_path: Path) -> None:
     with emulated(tmp_path) as robot:
         for name in ("first", "second"):
             path = tmp_path / f"{name}.json"
-            start_s = time.monotonic()
+            begin_host_s = time.monotonic()
             with drive(tmp_path, robot, name, "--arm", "--seconds", "2.5", "--json", str(path)) as run:
                 assert run.end() == 0
             assert run.modes() == ["READY", "DRIVE"]
             assert run.error_lines == []
-            assert max(row.v for row in rows(robot.trace) if row.host_s > start_s) > 0.2
+            assert max(row.v for row in rows(robot.trace) if row.host_s > begin_host_s) > 0.2
             summary = summary_of(path)
             assert (summary["mode"], summary["stop_reasons"]) == ("DRIVE", [])
             assert (summary["link"]["bad"], summary["link"]["lost"]) == (0, 0)
@@ -154,10 +154,10 @@ def test_two_runs_in_a_row_on_the_same_robot(tmp_path: Path) -> None:
 @stalls_excused
 def test_from_start_to_first_cycle_takes_as_long_as_a_few_bare_starts(tmp_path: Path) -> None:
     with emulated(tmp_path) as robot, BareStarts() as bare:
-        start_s = time.monotonic()
+        begin_host_s = time.monotonic()
         with drive(tmp_path, robot) as run:
             run.comes_to("READY")
-            took_s = time.monotonic() - start_s
+            took_s = time.monotonic() - begin_host_s
     logging.getLogger(__name__).info("%.2f s, a bare start %.2f s", took_s, bare.longest_s)
     # On an idle machine, whose bare start is 0.35 s, that is five seconds.
     assert took_s < 1.0 + STARTS_MAX * bare.longest_s

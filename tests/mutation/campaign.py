@@ -189,13 +189,13 @@ def main(modules: Sequence[str]) -> int:
     load_libraries()
     outcomes = []
     for module in modules or list(TARGETS):
-        start_s = time.monotonic()
+        begin_host_s = time.monotonic()
         outcome = campaign(module, TARGETS[module])
         outcomes.append(outcome)
         many = len(outcome.killed) + len(outcome.survived)
         sys.stdout.write(
             f"{module}: {len(outcome.killed)} of {many} killed ({100 * outcome.share:.1f} %), "
-            f"{time.monotonic() - start_s:.0f} s\n"
+            f"{time.monotonic() - begin_host_s:.0f} s\n"
         )
         for m in outcome.survived:
             sys.stdout.write(f"  {'' if m.key in ACCEPTED.get(module, {}) else 'NEW '}line {m.line} {m.key}\n")

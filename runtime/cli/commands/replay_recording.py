@@ -225,10 +225,10 @@ def live_view(recording: Recording, speed: float, units: Units) -> Iterator[OnSt
     view = View(settings, console, units) if console.is_terminal and not console.is_dumb_terminal else None
     driver, stats = make_driver(settings), CycleStats(late_after_s=math.inf)
     driver.line_opened(0.0)
-    start_s: tuple[float, float] | None = None  # of the first cycle, by the run's clock and the host's
+    begin_s: tuple[float, float] | None = None  # of the first cycle, by the run's clock and the host's
 
     def on_step(found: ReplayStep, replayer: Replayer) -> None:
-        nonlocal start_s
+        nonlocal begin_s
         if found.message.topic == SERIAL["in"]:
             for run_s, data in decode(SerialBytes, found.message.data).pieces():
                 driver.receive(data, run_s)
@@ -236,9 +236,9 @@ def live_view(recording: Recording, speed: float, units: Units) -> Iterator[OnSt
         if found.replayed is None or replayer.state is None:
             return
         run_s, host_s = found.replayed.inputs.run_s, time.monotonic()
-        if start_s is None:
-            start_s = (run_s, host_s)
-        due_s = start_s[1] + (run_s - start_s[0]) / speed
+        if begin_s is None:
+            begin_s = (run_s, host_s)
+        due_s = begin_s[1] + (run_s - begin_s[0]) / speed
         if due_s > host_s:
             time.sleep(due_s - host_s)
         stats.add_cycle(0.0, max(0.0, host_s - due_s))
