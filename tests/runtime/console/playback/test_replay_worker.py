@@ -32,11 +32,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 class WorkerCase:
     """A worker in virtual time, and the frames it has shown."""
 
-<<<<<<< HEAD
     def __init__(self, cursor: ReplayCursor) -> None:
-=======
-    def __init__(self, playback: ReplayCursor) -> None:
->>>>>>> 0586b68 (Name the last moments of the host's clock host_s)
         self.host_s = 50.0
         self.frames: list[tuple[float, int, int, dict[str, Any]]] = []
         self.worked = 0
@@ -53,13 +49,8 @@ class WorkerCase:
     def do(self, **command: object) -> None:
         self.worker.execute(command)
 
-<<<<<<< HEAD
     def run_for(self, seconds: float, work_s: float = 0.0) -> None:
         """Let time pass; each replayed cycle takes `work_s`."""
-=======
-    def live(self, seconds: float, work_s: float = 0.0) -> None:
-        """Let time go by; each cycle's work takes `work_s`."""
->>>>>>> 0586b68 (Name the last moments of the host's clock host_s)
         end_s = self.host_s + seconds
         while (wait_s := self.worker.wait_s) < end_s - self.host_s:
             self.host_s += wait_s
@@ -111,19 +102,11 @@ def test_it_plays_at_the_recorded_pace_and_stops_at_the_end(it: WorkerCase) -> N
     it.run_for(0.5)
     it.frames.clear()
     it.do(do="play", speed=1.0)
-<<<<<<< HEAD
     start_s = it.host_s
     it.run_for(3.0)
     assert it.last["s"] == pytest.approx(5.0, abs=0.06)
     for host_s, _, _, frame in it.frames:
         assert frame["s"] - 2.0 == pytest.approx(host_s - start_s, abs=0.06)
-=======
-    begun_s = it.host_s
-    it.live(3.0)
-    assert it.last["s"] == pytest.approx(5.0, abs=0.06)
-    for host_s, _, _, frame in it.frames:
-        assert frame["s"] - 2.0 == pytest.approx(host_s - begun_s, abs=0.06)
->>>>>>> 0586b68 (Name the last moments of the host's clock host_s)
         assert frame["playing"]
     it.run_for(20.0)
     assert (it.last["cycle"], it.last["playing"]) == (CYCLES, False)
@@ -135,11 +118,7 @@ def test_it_plays_at_the_recorded_pace_and_stops_at_the_end(it: WorkerCase) -> N
 
 def test_the_frame_rate_is_bounded_at_any_speed(it: WorkerCase) -> None:
     it.do(do="play", speed=20.0)
-<<<<<<< HEAD
     it.run_for(0.4)
-=======
-    it.live(0.4)
->>>>>>> 0586b68 (Name the last moments of the host's clock host_s)
     times = [host_s for host_s, _, _, _ in it.frames]
     assert len(times) >= 4
     assert min(b - a for a, b in itertools.pairwise(times)) >= FRAME_PERIOD_S - 1e-9
