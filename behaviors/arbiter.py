@@ -130,12 +130,12 @@ def limit_velocity(
     c, s = math.cos(percept.pose.theta), math.sin(percept.pose.theta)
     x, y = sum(r.x for r in responses), sum(r.y for r in responses)
     along = config.base_velocity_m_s * (c * x + s * y)
-    aside = max(-1.0, min(1.0, c * y - s * x))
+    lateral = max(-1.0, min(1.0, c * y - s * x))
     w = requested.w
     if requested.v > 0.0:
         fastest = min(requested.v, body.speed_max_m_s, stoppable_speed_m_s(percept, body, config.clearance_m))
         v = max(0.0, min(along, fastest))
-        w += config.turn_gain_per_s * aside * v / config.base_velocity_m_s
+        w += config.turn_gain_per_s * lateral * v / config.base_velocity_m_s
     else:
         pose = replace(percept.pose, theta=percept.pose.theta + math.pi)
         behind = stoppable_speed_m_s(replace(percept, pose=pose), body, config.clearance_m)

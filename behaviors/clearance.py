@@ -25,12 +25,12 @@ def free_path_m(percept: Percept, reach_m: float) -> float:
     c, s = math.cos(percept.pose.theta), math.sin(percept.pose.theta)
     dx = percept.obstacles[:, 0] - percept.pose.x
     dy = percept.obstacles[:, 1] - percept.pose.y
-    ahead, aside = c * dx + s * dy, c * dy - s * dx
-    in_the_way = (ahead > 0.0) & (np.abs(aside) < reach_m)
+    ahead, lateral = c * dx + s * dy, c * dy - s * dx
+    in_the_way = (ahead > 0.0) & (np.abs(lateral) < reach_m)
     if not in_the_way.any():
         return math.inf
-    ahead, aside = ahead[in_the_way], aside[in_the_way]
-    return max(0.0, float((ahead - np.sqrt(reach_m * reach_m - aside * aside)).min()))
+    ahead, lateral = ahead[in_the_way], lateral[in_the_way]
+    return max(0.0, float((ahead - np.sqrt(reach_m * reach_m - lateral * lateral)).min()))
 
 
 def stoppable_speed_m_s(percept: Percept, body: BodyConfig, clearance_m: float) -> float:

@@ -114,7 +114,7 @@ class Line:
 
 
 def same_line(known: Line, new: Line) -> bool:
-    """Tell whether a new line is a known one: parallel, near, and beginning about where that one ends."""
+    """Return whether a new line is a known one: parallel, near, and beginning about where that one ends."""
     place = new.origin + new.c * new.normal
     return (
         float(known.normal @ new.normal) > 0.98
@@ -161,7 +161,7 @@ def update_line(
 
 
 def stands_in_wall(lines: Iterable[Line], place: Array, rho: float) -> bool:
-    """Tell whether a body's centre would lie in a long wall that was heard often, or its near part."""
+    """Return whether a body's centre would lie in a long wall that was heard often, or its near part."""
     return any(
         line.echoes > 10
         and line.high - line.low > 2 * FT
@@ -264,7 +264,7 @@ def remembered(memory: list[Array], q: Array, now: float, spacing: float, gap: f
 def bears_on(
     q: Array, centre: Array, rho: float, free: bool, ours: bool, opt: float, inside: float, gate: float, reach: float
 ) -> bool:  # fmt: skip
-    """Tell whether a reading is for a circle (a hit of its own), or against (through it, or free and short of it)."""
+    """Return whether a reading supports a circle (its own hit) or contradicts it (through it, or free and short)."""
     d, ahead = off_axis(q, centre)
     if ahead <= 0 or ahead < opt * d - 0.01 * FT:
         return False
@@ -313,7 +313,7 @@ def next_in_turn(
     """Return whose turn it is, −1 nobody's, and who waits.
 
     Worth is unseen readings for an object's size, fourfold where unsure, raised above the threshold where work is
-    owed; half of it counts at the end of the reach. Whoever was passed over more than sixty times comes first.
+    owed; half of it counts at the end of the reach. The one passed over more than sixty times comes first.
     """
     worth = fresh / (kept + 8.0) * np.where((sigma > 0.03 * FT) | (likely < 0.95), 4.0, 1.0) + owed * (
         threshold + 1e-6
@@ -359,7 +359,7 @@ def is_called(
     called: bool, established: bool, known: bool, probability: float, sure: float, near: float,
     rivals: Sequence[float], wall: float, dispersion: float, llr: float, unknown: float, variances: Sequence[float],
 ) -> bool:  # fmt: skip
-    """Tell whether a circle is called by a model's name: given when sure, kept while likely and well placed."""
+    """Return whether a circle is called by a model's name: given when sure, kept while likely and well placed."""
     share = 1.1 if max(rivals) < -20 else 1.25
     seen_round = dispersion >= 0.008
     possible = established and known and seen_round and llr > share * unknown and max(variances) < (0.17 * FT) ** 2
@@ -370,7 +370,7 @@ def is_called(
 def is_sure_polygon(
     established: bool, probability: float, least: float, hits: float, variances: Sequence[float], kept: Array
 ) -> bool:  # fmt: skip
-    """Tell whether a polygon may be called by its name: seen from near, and from more than one direction."""
+    """Return whether a polygon may be called by its name: seen from near, and from more than one direction."""
     heard = kept[kept[:, 4] < SILENT]
     if not len(heard) or heard[:, 4].min() > 6.5 * FT:
         return False

@@ -1,4 +1,4 @@
-"""A page reduced to its socket: it connects, says what it is told to, and reads or does not, without a loop."""
+"""A page reduced to its socket: it connects, sends what the test asks for, and reads or does not, without a loop."""
 
 from __future__ import annotations
 

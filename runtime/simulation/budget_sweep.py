@@ -62,7 +62,7 @@ class DetectionLog:
     cycles: int = 0
     _way_m: float = 0.0
     _before: Pose | None = None
-    _told: object = None
+    _reported: object = None
 
     def on_cycle(self, record: CycleRecord, truth: GroundTruth) -> None:
         """Count the quanta and measure the way."""
@@ -75,11 +75,11 @@ class DetectionLog:
 
     def on_state(self, _record: CycleRecord, state: State, start: Pose) -> None:
         """Look at what is reported."""
-        told = state.perception.objects()
-        if told is self._told or state.run_s is None:
+        reported = state.perception.objects()
+        if reported is self._reported or state.run_s is None:
             return
-        self._told = told
-        for place in (start.compose(Pose(seen.x, seen.y, seen.theta)) for seen in told):
+        self._reported = reported
+        for place in (start.compose(Pose(seen.x, seen.y, seen.theta)) for seen in reported):
             for i, drum in enumerate(self.world.drum):
                 if i not in self.when and math.hypot(place.x - drum.x_m, place.y - drum.y_m) <= GATE_M:
                     self.when[i] = (state.run_s, self._way_m)
@@ -115,7 +115,7 @@ def drive(
 
     Raises
     ------
-    Complaint
+    UserError
         A drive did not come to its end.
     """
     looks, errors, found, false = [], [], 0, 0

@@ -60,7 +60,9 @@ async def start_emulator(arguments: Sequence[str], clock: ScaledClock | None = N
         listener: asyncio.Task[None] | None = None
         try:
             await _wait_until_ready(process)
-            control = EmulatorTimeControl(lambda line: _write(process, line), ScaledClock() if clock is None else clock)
+            control = EmulatorTimeControl(
+                lambda line: _write(process, line), ScaledClock() if clock is None else clock
+            )
             listener = asyncio.create_task(_listen(process, control), name="emulator's time")
             yield EmulatorHandle(str(port), control)
         finally:
@@ -120,7 +122,7 @@ async def _end(process: asyncio.subprocess.Process) -> None:
 
 
 def _signal(process: asyncio.subprocess.Process, number: signal.Signals) -> None:
-    """Send a signal past asyncio, whose own way may reap the child first and then complains that it is unknown."""
+    """Send a signal past asyncio, which may reap the child first and then not find it."""
     if process.returncode is None:
         with contextlib.suppress(ProcessLookupError):
             os.kill(process.pid, number)

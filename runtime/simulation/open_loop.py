@@ -83,21 +83,23 @@ def run_hall(settings: Settings, hall: Hall, seed: int) -> HallOutcome:
         cycle_stats.add_cycle(time.perf_counter() - begin)
         watch.look(float(firing.pose.x), seen)
     drums, boxes, false = match_objects(hall.world, seen, settings.models)
-    return HallOutcome(drums, boxes, false, heard[-1].robot_s, cycle_stats, inside_ellipse(drums, seen), watch.fixes())
+    return HallOutcome(
+        drums, boxes, false, heard[-1].robot_s, cycle_stats, inside_ellipse(drums, seen), watch.fixes()
+    )
 
 
 def inside_ellipse(drums: Iterable[DrumRow], seen: Iterable[DetectedObject]) -> list[bool]:
-    """Tell for each drum found with a covariance whether it stands in the 95 % ellipse of its estimate."""
+    """Return for each drum found with a covariance whether it lies in the 95 % ellipse of its estimate."""
     by_place = {(s.x, s.y): s.covariance for s in seen}
-    told = []
+    is_inside = []
     for row in drums:
         covariance = None if row["estimate"] is None else by_place.get(row["estimate"])
         if covariance is not None and row["estimate"] is not None:
             xx, xy, yy = covariance
             dx, dy = row["truth"][0] - row["estimate"][0], row["truth"][1] - row["estimate"][1]
             squared = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
-            told.append(squared <= CHI2_95)
-    return told
+            is_inside.append(squared <= CHI2_95)
+    return is_inside
 
 
 def match_objects(
@@ -105,7 +107,7 @@ def match_objects(
 ) -> tuple[list[DrumRow], list[BoxRow], int]:
     """Set round models against the world's drums and the others against its boxes; count what matches nothing.
 
-    What is named after none of the models, as a wall, claims to be neither and is not judged.
+    What is named after none of the models, as a wall, is neither and is not counted.
     """
     models = list(models)
     is_round = {model.name: model.arc_radius_m is not None for model in models}
@@ -152,7 +154,7 @@ def summarise_scene(name: SceneName, outcomes: list[HallOutcome], models: Iterab
     boxes = [row for outcome in outcomes for row in outcome.boxes] if with_boxes else []
     errors = [e for rows in (drums, boxes) for row in rows if (e := row["error"]) is not None]
     elapsed_s = sum(outcome.cycle_stats.total_s for outcome in outcomes)
-    inside = [told for outcome in outcomes for told in outcome.inside]
+    inside = [one for outcome in outcomes for one in outcome.inside]
     return {
         "scene": name,
         "halls": len(outcomes),

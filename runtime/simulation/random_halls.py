@@ -34,13 +34,13 @@ Placed = list[tuple[float, float, float]]
 
 def _rows(rng: np.random.Generator) -> tuple[Placed, float]:
     """Return what stands along both sides as (x, y, radius), ft, and where the longer side ends."""
-    things = np.array([DRUM] * 8 + [BOX, POST, BARREL])
+    objects = np.array([DRUM] * 8 + [BOX, POST, BARREL])
     while True:
-        rng.shuffle(things)
+        rng.shuffle(objects)
         cut = 6 if rng.random() < 0.5 else 5
         placed: Placed = []
         end = 0.0
-        for side, radii in ((1.0, things[:cut]), (-1.0, things[cut:])):
+        for side, radii in ((1.0, objects[:cut]), (-1.0, objects[cut:])):
             x = float(rng.uniform(-1.0, 1.5))
             for radius in radii.tolist():
                 x += radius

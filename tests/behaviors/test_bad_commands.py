@@ -109,7 +109,7 @@ def test_a_million_random_schema_outputs(measured: Callable[[str], None]) -> Non
     measured(f"{DECISIONS:,} decisions: {drives:,} DRIVEs on the wire, {stops:,} stops, 0 bad commands")
 
 
-def test_a_driver_told_anything_sends_nothing_bad(measured: Callable[[str], None]) -> None:
+def test_driver_given_any_velocity_sends_nothing_bad(measured: Callable[[str], None]) -> None:
     """The driver does not rely on the arbiter: it refuses what is no velocity, and holds the rest to the limits."""
     rng = np.random.default_rng(4)
     refused = total = 0

@@ -92,7 +92,7 @@ def test_there_and_back_again() -> None:
     assert -0.5 < min(pose.x for pose in run.path[600:]) < 0.05
 
 
-def test_stops_where_it_is_told() -> None:
+def test_stops_at_the_configured_distance() -> None:
     config = BehaviorsConfig(move_ahead=MoveAheadConfig(distance_m=1.0))
     run = drive(World(), Pose(0.0, 0.0, 0.0), config, 6.0)
     assert 1.0 <= run.path[-1].x < 1.15

@@ -82,7 +82,7 @@ def test_what_lies_the_other_way_does_not_matter(heading: float) -> None:
         (0.3, -0.25, 0.2),  # a push of magnitude 1 is worth the base velocity
         (0.3, -0.75, 0.0),
         (0.3, -1e6, 0.0),
-        (0.3, 5.0, 0.3),  # nobody is pushed on
+        (0.3, 5.0, 0.3),  # no one is pushed on
         (-0.3, 0.25, -0.2),
         (-0.3, 1e6, 0.0),
         (-0.3, -5.0, -0.3),

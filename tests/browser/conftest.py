@@ -43,15 +43,15 @@ async def server(hall: Hall) -> AsyncIterator[FakeServer]:
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def opener(browser: Browser, shots: Callable[[str], Path]) -> AsyncIterator[Opener]:
+async def opener(browser: Browser, screenshots: Callable[[str], Path]) -> AsyncIterator[Opener]:
     """Open pages, and check at the end that none reported an error."""
-    async with Opener(browser, shots) as pages:
+    async with Opener(browser, screenshots) as pages:
         yield pages
     pages.check()
 
 
 @pytest.fixture
-def shots(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[str], Path]:
+def screenshots(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[str], Path]:
     """Where a screenshot goes: the folder given by --screenshots, or the test's own."""
     folder = request.config.getoption("screenshots")
     where = tmp_path if folder is None else Path(folder)

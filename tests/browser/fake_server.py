@@ -17,7 +17,7 @@ from tests.browser.synthetic_run import Hall, greeting
 
 PAGE: Final = Path(__file__).parents[2] / "runtime" / "console" / "page"
 POLICY: Final = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
-PATIENCE_S: Final = 30.0
+TIMEOUT_S: Final = 30.0
 TOKEN: Final = "right-token"
 TOML: Final = "[cycle]\nperception_budget_s = 0.005\n"
 KINDS: Final = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
@@ -62,7 +62,7 @@ class FakeServer:
     silent: bool = False
     """Send nothing, like a process that hangs."""
     port: int = 0
-    _news: asyncio.Event = field(default_factory=asyncio.Event)
+    _changed: asyncio.Event = field(default_factory=asyncio.Event)
     _counted: int = 0
 
     @property
@@ -72,10 +72,10 @@ class FakeServer:
     async def wait(self, kind: str, count: int = 1) -> dict[str, Any]:
         """Wait for the `count`-th message of a kind, and return it without its id."""
         try:
-            async with asyncio.timeout(PATIENCE_S):
+            async with asyncio.timeout(TIMEOUT_S):
                 while len(self.of(kind)) < count:
-                    self._news.clear()
-                    await self._news.wait()
+                    self._changed.clear()
+                    await self._changed.wait()
         except TimeoutError:
             raise AssertionError(f"no {kind} came, only {[m['type'] for m in self.received]}") from None
         return {key: value for key, value in self.of(kind)[count - 1].items() if key not in {"id", "type"}}
@@ -88,7 +88,7 @@ class FakeServer:
         """Return the times at which they were received, by the loop's clock."""
         return [t for m, t in zip(self.received, self.arrived_s, strict=True) if m["type"] == kind]
 
-    async def tell(self, message: dict[str, Any]) -> None:
+    async def send(self, message: dict[str, Any]) -> None:
         """Send a message to every page."""
         for client in list(self.clients):
             with contextlib.suppress(ConnectionError):
@@ -139,7 +139,7 @@ class FakeServer:
     async def report(self, request: web.Request) -> web.StreamResponse:
         self.received.append({"type": "GET /report", "id": 0, "token": request.query.get("token")})
         self.arrived_s.append(asyncio.get_running_loop().time())
-        self._news.set()
+        self._changed.set()
         return web.Response(text="<!doctype html><title>report</title><h1>Report</h1>", content_type="text/html")
 
     async def talk(self, request: web.Request) -> web.StreamResponse:
@@ -163,7 +163,7 @@ class FakeServer:
     async def _hear(self, client: Client, message: dict[str, Any]) -> None:
         self.received.append(message)
         self.arrived_s.append(asyncio.get_running_loop().time())
-        self._news.set()
+        self._changed.set()
         kind = message["type"]
         error, at = self.refusals.get(kind, (None, None))
         data = None

@@ -12,9 +12,9 @@ from typing import Any, Literal, Self
 
 from playwright.async_api import Browser, BrowserContext, Page, expect
 
-from tests.browser.fake_server import PATIENCE_S
+from tests.browser.fake_server import TIMEOUT_S
 
-DESK, PHONE, PROJECTOR = (1440, 900), (360, 740), (1920, 1080)
+DESKTOP, PHONE, PROJECTOR = (1440, 900), (360, 740), (1920, 1080)
 PROBES = Path(__file__).parent / "probes"
 MODULE = "import('/page/main.js')"
 
@@ -24,7 +24,7 @@ class Opened:
     """A page, the errors it reported, and where its screenshots go."""
 
     page: Page
-    shots: Callable[[str], Path]
+    screenshots: Callable[[str], Path]
     errors: list[str] = field(default_factory=list)
 
     async def screen(self, x: float, y: float) -> tuple[float, float]:
@@ -70,21 +70,21 @@ class Opened:
         """Show a panel."""
         await self.page.get_by_role("tab", name=name, exact=True).click()
 
-    async def shot(self, name: str) -> None:
+    async def save_screenshot(self, name: str) -> None:
         """Save a screenshot."""
-        await self.page.screenshot(path=self.shots(name))
+        await self.page.screenshot(path=self.screenshots(name))
 
     async def says(self, selector: str, words: str) -> None:
         """Wait until an element contains a text."""
-        await expect(self.page.locator(selector)).to_contain_text(words, timeout=1000 * PATIENCE_S)
+        await expect(self.page.locator(selector)).to_contain_text(words, timeout=1000 * TIMEOUT_S)
 
 
 class Opener:
     """Opens pages and closes them at the end."""
 
-    def __init__(self, browser: Browser, shots: Callable[[str], Path]) -> None:
+    def __init__(self, browser: Browser, screenshots: Callable[[str], Path]) -> None:
         self._browser = browser
-        self._shots = shots
+        self._screenshots = screenshots
         self._contexts: list[BrowserContext] = []
         self._opened: list[Opened] = []
 
@@ -102,7 +102,7 @@ class Opener:
             await self._contexts.pop().close()
 
     async def open(
-        self, url: str, size: tuple[int, int] = DESK, *, scheme: Literal["dark", "light"] = "light",
+        self, url: str, size: tuple[int, int] = DESKTOP, *, scheme: Literal["dark", "light"] = "light",
         touch: bool = False, calm: bool = False, script: str | None = None, live: bool = True,
     ) -> Opened:  # fmt: skip
         """Open a page and wait for its first state."""
@@ -111,12 +111,12 @@ class Opener:
             device_scale_factor=2 if touch else 1, reduced_motion="reduce" if calm else "no-preference",
             accept_downloads=True,
         )  # fmt: skip
-        context.set_default_timeout(1000 * PATIENCE_S)
+        context.set_default_timeout(1000 * TIMEOUT_S)
         self._contexts.append(context)
         if script is not None:
             await context.add_init_script(script)
         page = await context.new_page()
-        opened = Opened(page, self._shots)
+        opened = Opened(page, self._screenshots)
         page.on("pageerror", lambda error: opened.errors.append(str(error)))
         page.on("console", lambda said: opened.errors.extend([said.text] * (said.type == "error")))
         self._opened.append(opened)
@@ -133,7 +133,7 @@ class Opener:
 
 async def until(done: Callable[[], Awaitable[object]], what: str) -> None:
     """Wait until a condition holds."""
-    end_s = time.monotonic() + PATIENCE_S
+    end_s = time.monotonic() + TIMEOUT_S
     while not await done():
         assert time.monotonic() < end_s, f"it never came: {what}"
         await asyncio.sleep(0.02)

@@ -8,7 +8,7 @@ import pytest
 from playwright.async_api import expect
 
 from tests.browser.fake_server import PAGE, FakeServer
-from tests.browser.open_page import DESK, PHONE, PROJECTOR, Opened, Opener
+from tests.browser.open_page import DESKTOP, PHONE, PROJECTOR, Opened, Opener
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
@@ -22,23 +22,23 @@ async def scene(server: FakeServer, opener: Opener, size: tuple[int, int], **mor
     server.paused, server.cycle = True, 170
     opened = await opener.open(server.url, size, **more)
     await opened.steady()
-    await server.tell({"type": "log", "timestamp": "2026-01-02T10:11:12Z", "level": "warning",
+    await server.send({"type": "log", "timestamp": "2026-01-02T10:11:12Z", "level": "warning",
                        "event": "a sensor hears less", "fields": {"sensor": "17"}})  # fmt: skip
-    await server.tell({"type": "log", "timestamp": "2026-01-02T10:11:13Z", "level": "error",
+    await server.send({"type": "log", "timestamp": "2026-01-02T10:11:13Z", "level": "error",
                        "event": "the line was lost", "fields": {}})  # fmt: skip
     return opened
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 async def test_all_text_has_contrast(server: FakeServer, opener: Opener, scheme: Literal["light", "dark"]) -> None:
-    opened = await scene(server, opener, DESK, scheme=scheme, calm=True)
+    opened = await scene(server, opener, DESKTOP, scheme=scheme, calm=True)
     for panel in PANELS:
         await opened.tab(panel)
         texts = await opened.probe("texts")
         assert len(texts) > 30
         faint = [(words, round(ratio, 2)) for words, ratio, large in texts if ratio < (AA_LARGE if large else AA)]
         assert not faint, (panel, faint)
-        await opened.shot(f"{scheme}-{panel.lower()}")
+        await opened.save_screenshot(f"{scheme}-{panel.lower()}")
 
 
 @pytest.mark.parametrize("mode", ["READY", "SAFE_STOP", "FAULT", "CONNECTING"])
@@ -47,7 +47,7 @@ async def test_each_mode_has_contrast_text_and_a_shape(
     server: FakeServer, opener: Opener, mode: str, scheme: Literal["light", "dark"]
 ) -> None:
     server.mode, server.reason = mode, "bumper contact: free the robot, then re-arm"
-    opened = await scene(server, opener, DESK, scheme=scheme, calm=True)
+    opened = await scene(server, opener, DESKTOP, scheme=scheme, calm=True)
     await opened.says("#mode-name", mode.replace("_", " "))
     assert await opened.page.locator("#mode-icon").get_attribute("href") == f"#m-{mode.lower()}"
     texts = await opened.probe("texts")
@@ -60,7 +60,7 @@ async def test_each_mode_has_contrast_text_and_a_shape(
 
 
 async def test_every_control_has_an_accessible_name(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, DESK)
+    opened = await scene(server, opener, DESKTOP)
     for panel in PANELS:
         await opened.tab(panel)
         assert await opened.probe("unnamed") == []
@@ -68,20 +68,20 @@ async def test_every_control_has_an_accessible_name(server: FakeServer, opener: 
 
 @pytest.mark.parametrize(
     ("name", "size"),
-    [("phone", PHONE), ("desk", DESK), ("projector", PROJECTOR), ("tablet", (820, 1180)), ("side", (740, 360))],
+    [("phone", PHONE), ("desktop", DESKTOP), ("projector", PROJECTOR), ("tablet", (820, 1180)), ("side", (740, 360))],
 )
 async def test_it_fits_every_screen(server: FakeServer, opener: Opener, name: str, size: tuple[int, int]) -> None:
     touch = name in {"phone", "side"}
     opened = await scene(server, opener, size, touch=touch)
     seen = [p for p in (*PANELS, "Cycle") if await opened.page.get_by_role("tab", name=p, exact=True).is_visible()]
-    assert ("Cycle" in seen) == (name not in {"desk", "projector"})
+    assert ("Cycle" in seen) == (name not in {"desktop", "projector"})
     for panel in seen:
         await opened.tab(panel)
         wide = await opened.probe("too_wide")
         assert wide["page"] <= 0, (panel, wide)
         assert max(wide["panel"]) <= 0, (panel, wide)
         assert wide["tabs"] <= 0, (panel, wide)
-        await opened.shot(f"{name}-{panel.lower()}")
+        await opened.save_screenshot(f"{name}-{panel.lower()}")
     assert await opened.page.locator("#mode-name").is_visible()
     box = await opened.page.locator("#map-front").bounding_box()
     assert box is not None
@@ -97,7 +97,7 @@ async def test_touch_targets_are_large_enough(server: FakeServer, opener: Opener
 
 
 async def test_panels_are_reached_with_keys_alone(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, DESK)
+    opened = await scene(server, opener, DESKTOP)
     page = opened.page
     await page.locator("#tab-objects").focus()
     for panel in ("drive", "layers", "tune", "time", "log", "objects"):
@@ -109,7 +109,7 @@ async def test_panels_are_reached_with_keys_alone(server: FakeServer, opener: Op
 
 
 async def test_focus_cycles_and_is_always_visible(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, DESK)
+    opened = await scene(server, opener, DESKTOP)
     page = opened.page
     await opened.tab("Drive")
     met = []
@@ -124,7 +124,7 @@ async def test_focus_cycles_and_is_always_visible(server: FakeServer, opener: Op
 
 
 async def test_tools_are_radio_buttons(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, DESK)
+    opened = await scene(server, opener, DESKTOP)
     page = opened.page
     await page.locator("#tool-pan").focus()
     await page.keyboard.press("ArrowDown")
@@ -136,21 +136,21 @@ async def test_tools_are_radio_buttons(server: FakeServer, opener: Opener) -> No
 
 
 async def test_keys_are_listed(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, DESK)
+    opened = await scene(server, opener, DESKTOP)
     await opened.page.keyboard.press("?")
     await opened.says("#dialog", "HALT, except while you type text")
-    await opened.shot("keys")
+    await opened.save_screenshot("keys")
     await opened.page.keyboard.press("Escape")
     await expect(opened.page.locator("#dialog")).to_be_hidden()
 
 
 async def test_the_map_has_a_text_description(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, DESK)
+    opened = await scene(server, opener, DESKTOP)
     await opened.says("#map-text", "6 objects: drum at 7.0, 4.0 ft")
 
 
 async def test_reduced_motion_is_respected(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, DESK, calm=True)
+    opened = await scene(server, opener, DESKTOP, calm=True)
     moving = (
         "() => [...document.querySelectorAll('*')]"
         ".filter((e) => getComputedStyle(e).transitionDuration !== '0s').length"
@@ -159,7 +159,7 @@ async def test_reduced_motion_is_respected(server: FakeServer, opener: Opener) -
 
 
 async def test_a_change_of_colour_scheme_applies_at_once(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, DESK)
+    opened = await scene(server, opener, DESKTOP)
     corner = "() => document.getElementById('map-back').toDataURL()"
     light = await opened.page.evaluate(corner)
     await opened.page.emulate_media(color_scheme="dark")
@@ -169,7 +169,7 @@ async def test_a_change_of_colour_scheme_applies_at_once(server: FakeServer, ope
 
 
 async def test_nothing_is_loaded_from_elsewhere(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, DESK)
+    opened = await scene(server, opener, DESKTOP)
     asked = await opened.page.evaluate("() => performance.getEntriesByType('resource').map((e) => e.name)")
     assert len(asked) > 20
     assert all(name.startswith((f"http://127.0.0.1:{server.port}/page/", "blob:")) for name in asked), asked

@@ -51,7 +51,7 @@ async def test_every_layer_draws_something_and_can_be_switched(server: FakeServe
         assert without != whole, f"{name} draws nothing"
         await boxes.nth(index).check()
         assert await picture(opened) == whole, f"{name} is not what it was"
-    await opened.shot("layers")
+    await opened.save_screenshot("layers")
 
 
 async def test_true_outlines_are_drawn_only_if_reported(server: FakeServer, opener: Opener) -> None:
@@ -177,7 +177,7 @@ async def test_tape_measures_from_drum_to_drum(server: FakeServer, opener: Opene
     await page.mouse.up()
     await opened.says("#announce", "Tape: 3.0")
     assert "ft at 0°" in (await page.locator("#announce").inner_text())
-    await opened.shot("tape")
+    await opened.save_screenshot("tape")
 
     await page.locator("#map-front").press("Escape")
     await page.mouse.click(*start)
@@ -201,7 +201,7 @@ async def test_objects_are_listed_as_text(server: FakeServer, opener: Opener) ->
     await opened.says("#evidence", "21.4 nats")
     await opened.says("#evidence", "2.4 nats")
     await opened.says("#evidence", "3 of them against")
-    await opened.shot("picked")
+    await opened.save_screenshot("picked")
 
 
 async def test_ring_charts_and_facts(server: FakeServer, opener: Opener) -> None:
@@ -233,7 +233,7 @@ async def test_ring_charts_and_facts(server: FakeServer, opener: Opener) -> None
 async def test_the_log_can_be_searched_and_is_never_markup(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     for n, level in enumerate(("debug", "info", "warning", "error")):
-        await server.tell({"type": "log", "timestamp": 1.5 + n, "level": level, "event": f"event {level}",
+        await server.send({"type": "log", "timestamp": 1.5 + n, "level": level, "event": f"event {level}",
                            "fields": {"name": "<img src=x onerror=alert(1)>"}})  # fmt: skip
     await opened.tab("Log")
     lines = opened.page.locator("#log li")
@@ -269,7 +269,7 @@ async def test_it_reconnects_and_receives_the_whole_map(server: FakeServer, open
 async def test_a_wrong_token_is_reported(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url.replace("right", "wrong"), live=False)
     await opened.says("#banner-connection", "token is missing or wrong")
-    await opened.shot("wrong-token")
+    await opened.save_screenshot("wrong-token")
     opened.errors.clear()  # the browser's own words on the refusal
 
 
@@ -286,7 +286,7 @@ async def test_objects_without_a_model_are_shown(server: FakeServer, opener: Ope
     opened = await still(server, opener)
     await expect(opened.page.locator("#objects li")).to_have_count(12)
     await opened.says("#objects", "wall")
-    await opened.shot("walls")
+    await opened.save_screenshot("walls")
 
 
 async def test_removed_segments_disappear(server: FakeServer, opener: Opener) -> None:

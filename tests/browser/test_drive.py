@@ -67,7 +67,7 @@ async def test_halt_latches_and_shows_the_reason(server: FakeServer, opener: Ope
     await opened.says("#reason", "halted by the operator")
     await opened.says("#announce", "Mode safe stop: halted by the operator")
     await opened.says("#banner-stopped", "halted by the operator")
-    await opened.shot("halted")
+    await opened.save_screenshot("halted")
     assert not server.of("arm"), "nothing arms by itself"
     await opened.page.locator("#banner-stopped").get_by_role("button", name="Re-arm").click()
     assert await server.wait("arm") == {}
@@ -147,7 +147,7 @@ async def test_an_observer_can_halt_but_not_drive(server: FakeServer, opener: Op
     await opened.says("#toasts", "ask for control first")
     await opened.page.mouse.up()
     assert not server.of("teleoperate")
-    await opened.shot("watching")
+    await opened.save_screenshot("watching")
     await opened.page.keyboard.press("Space")
     await server.wait("halt")
 
@@ -159,9 +159,9 @@ async def test_control_is_requested_and_handed_over(server: FakeServer, opener: 
     await second.page.locator("#banner-watching").get_by_role("button", name="Ask for control").click()
     await server.wait("take_control")
     await second.says("#toasts", "has been asked for it")
-    await server.tell({"type": "role", "role": "control", "asked_by": "client 2 (127.0.0.1)", "client": 2})
+    await server.send({"type": "role", "role": "control", "asked_by": "client 2 (127.0.0.1)", "client": 2})
     await first.says("#banner-asked", "client 2 (127.0.0.1) asks for control")
-    await first.shot("asked")
+    await first.save_screenshot("asked")
     await first.page.locator("#banner-asked").get_by_role("button", name="Hand over").click()
     assert await server.wait("grant_control") == {"client": 2}
     server.controller = 2
@@ -196,7 +196,7 @@ async def test_the_pad_drives_while_it_is_held(server: FakeServer, opener: Opene
     )
     assert last["w"] == pytest.approx(0.5 * 1.0 * 0.447, abs=0.03), "left is counter-clockwise"
     await opened.says("#teleop-state", "driving:")
-    await opened.shot("pad")
+    await opened.save_screenshot("pad")
     await opened.page.mouse.up()
     await has_let_go(server)
     await opened.says("#teleop-state", "released")
@@ -336,7 +336,7 @@ async def test_a_goal_by_click_and_by_numbers(server: FakeServer, opener: Opener
     goal = await server.wait("goal")
     assert (goal["x"], goal["y"]) == pytest.approx((3.2, -0.2), abs=0.02)
     await opened.says("#drive-request-text", "To the goal at 10.5")
-    await opened.shot("goal")
+    await opened.save_screenshot("goal")
     await page.locator("#goal-x").fill("10")
     await page.locator("#goal-y").fill("-1,5")
     await page.keyboard.press("Enter")
@@ -389,7 +389,7 @@ async def test_a_thumb_drives_and_halts_on_a_phone(server: FakeServer, opener: O
     await touch.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})
     await still_sends(server)
     assert server.of("teleoperate")[-1]["v"] > 0.2
-    await opened.shot("phone-driving")
+    await opened.save_screenshot("phone-driving")
     await touch.send("Input.dispatchTouchEvent", {"type": "touchCancel", "touchPoints": []})
     await has_let_go(server)
     await opened.page.get_by_role("button", name="HALT").tap()

@@ -70,7 +70,7 @@ async def test_a_lasso_selects_segments_to_pin_and_unpin(server: FakeServer, ope
     ))  # fmt: skip
     assert len(inside) > 10
     await expect(page.locator("#selection-count")).to_have_text(f"{len(inside)} segments")
-    await opened.shot("lasso")
+    await opened.save_screenshot("lasso")
     await page.locator("#selection-pin").click()
     pinned = await server.wait("pin_segments")
     assert sorted(pinned["numbers"]) == inside
@@ -117,7 +117,7 @@ async def test_a_model_is_placed_by_pressing_and_rotated_by_dragging(server: Fak
     await page.mouse.move(*await opened.screen(3.0, 0.0))
     await page.mouse.down()
     await page.mouse.move(*await opened.screen(3.0, 0.5), steps=6)
-    await opened.shot("place")
+    await opened.save_screenshot("place")
     await page.mouse.up()
     placed = await server.wait("place_model")
     assert placed["model"] == "box"
@@ -141,7 +141,7 @@ async def test_an_object_is_dragged_and_rotated(server: FakeServer, opener: Open
     await page.mouse.move(*await opened.screen(cx + reach, cy))
     await page.mouse.down()
     await page.mouse.move(*await opened.screen(cx, cy + reach), steps=6)
-    await opened.shot("turn")
+    await opened.save_screenshot("turn")
     await page.mouse.up()
     turned = await server.wait("move_object", 2)
     assert (turned["x"], turned["y"], turned["theta"]) == pytest.approx((cx, cy, math.pi / 2), abs=0.03)
@@ -233,7 +233,7 @@ async def test_a_parameter_is_set_and_its_error_shown_beside_it(server: FakeServ
     await expect(gain).to_have_attribute("aria-invalid", "true")
     await expect(field(opened, GAIN).locator(".error")).to_have_text("must be at most 100")
     await expect(gain).to_have_value("1000")
-    await opened.shot("refused")
+    await opened.save_screenshot("refused")
 
     await gain.fill("much")
     await gain.press("Enter")
@@ -283,6 +283,6 @@ async def test_a_finger_selects_on_a_phone(server: FakeServer, opener: Opener) -
     await opened.page.locator("#tool-select").tap()
     await opened.page.touchscreen.tap(*await middle(opened, 8))
     await expect(opened.page.locator("#selection-count")).to_have_text("1 segment")
-    await opened.shot("phone-chosen")
+    await opened.save_screenshot("phone-chosen")
     await opened.page.get_by_role("button", name="Delete").tap()
     assert len((await server.wait("delete_segments"))["numbers"]) == 1

@@ -58,7 +58,7 @@ async def run(folder: Path, opener: Opener) -> AsyncIterator[Run]:
         try:
             yield Run(command, url, Truth(trace), recording)
         finally:
-            await opener.leave()  # before the server goes: no page is to complain of that
+            await opener.leave()  # before the server goes: no page reports that
 
 
 @pytest.fixture(autouse=True)
@@ -84,7 +84,7 @@ async def test_the_page_shows_six_recognised_drums(tmp_path: Path, opener: Opene
         assert await opened.world("run.segments.size") > 20
         assert await opened.world("run.state.ranges.some((r) => r > 0)")
         assert await opened.world("run.chart.length") > 10
-        await opened.shot("six-drums")
+        await opened.save_screenshot("six-drums")
 
 
 @stalls_excused
@@ -199,7 +199,7 @@ async def test_operator_actions_are_replayed_bit_identically(tmp_path: Path, ope
 
         await page.locator("#objects li").first.click()
         await opened.says("#evidence", "for it")
-        await opened.shot("evidence")
+        await opened.save_screenshot("evidence")
         number = await opened.world("selection.object")
         await page.get_by_role("button", name="Confirm").click()
         await opened.says("#toasts", "confirmed")

@@ -12,7 +12,7 @@ from statistics import median
 import pytest
 
 from tests.browser.fake_server import FakeServer
-from tests.browser.open_page import DESK, Opener
+from tests.browser.open_page import DESKTOP, Opener
 from tests.browser.synthetic_run import Hall
 
 pytestmark = [pytest.mark.realtime, pytest.mark.asyncio(loop_scope="session")]
@@ -26,7 +26,7 @@ CONTROL_FRAMES_PER_S = 45.0
 
 @pytest.mark.parametrize("hall", [Hall(segments=500, objects=40, moving=False)], ids=["full"])
 async def test_thirty_frames_a_second(server: FakeServer, opener: Opener, measured: Callable[[str], None]) -> None:
-    opened = await opener.open(server.url, DESK)
+    opened = await opener.open(server.url, DESKTOP)
     await opened.steady()
     await opened.until("run.segments.size === 500 && run.state.objects.length === 40", "the whole scene")
     renderer = await opened.probe("renderer")
@@ -39,7 +39,7 @@ async def test_thirty_frames_a_second(server: FakeServer, opener: Opener, measur
         page.append(await opened.probe("frames_per_s", "page"))
         if len(page) >= ROUNDS and max(page) >= FRAMES_PER_S:
             break
-    await opened.shot("full")
+    await opened.save_screenshot("full")
     best, free = max(page), max(control)
     measured(f"{median(page):.0f} frames/s, at best {best:.0f}; a page that draws a hundred lines: {free:.0f}")
     assert best >= FRAMES_PER_S or best >= free * FRAMES_PER_S / CONTROL_FRAMES_PER_S, (page, control)

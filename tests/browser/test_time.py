@@ -86,7 +86,7 @@ async def test_a_recording_is_opened_scrubbed_played_and_left(server: FakeServer
     assert await server.wait("step_recording") == {"cycles": 1}
     await page.get_by_role("button", name="Back one cycle").click()
     assert await server.wait("step_recording", 2) == {"cycles": -1}
-    await opened.shot("recording")
+    await opened.save_screenshot("recording")
     await page.keyboard.press("Space")
     await server.wait("halt")  # HALT means the robot, whatever is looked at
     await page.locator("#banner-playback").get_by_role("button", name="Back to the live run").click()
@@ -123,7 +123,7 @@ async def test_a_screenshot_is_a_picture_of_the_map(server: FakeServer, opener: 
     download = await saved.value
     assert download.suggested_filename.startswith("echolocate-")
     data = (await download.path()).read_bytes()
-    opened.shots("saved-screenshot").write_bytes(data)
+    opened.screenshots("saved-screenshot").write_bytes(data)
     image = Image.open(BytesIO(data)).convert("RGB")
     width, height = await opened.world("[view.width, view.height]")
     assert image.size == (2 * width, 2 * (height + 34))

@@ -88,10 +88,10 @@ class Cable:
         for _ in range(round(seconds / STEP_S)):
             self.step()
 
-    def until_echo(self, patience_s: float) -> float:
-        """Run until a firing arrives, for `patience_s` at most; return how long that took."""
-        begun, before = self.now_s, len(self.firings)
+    def until_echo(self, timeout_s: float) -> float:
+        """Run until a firing arrives, for `timeout_s` at most; return how long that took."""
+        started, before = self.now_s, len(self.firings)
         while len(self.firings) == before:
-            assert self.now_s - begun <= patience_s, f"no echo within {patience_s} s: {self.driver.problem}"
+            assert self.now_s - started <= timeout_s, f"no echo within {timeout_s} s: {self.driver.problem}"
             self.step()
-        return self.now_s - begun
+        return self.now_s - started

@@ -20,12 +20,12 @@ def ends(tmp_path: Path) -> Iterator[Ends]:
 
 
 @pytest.fixture
-async def loop_complaints() -> AsyncIterator[None]:
+async def loop_errors() -> AsyncIterator[None]:
     """Fail on whatever would reach a user as a traceback from the loop."""
-    complaints: list[object] = []
-    asyncio.get_running_loop().set_exception_handler(lambda _, context: complaints.append(context))
+    errors: list[object] = []
+    asyncio.get_running_loop().set_exception_handler(lambda _, context: errors.append(context))
     yield
-    assert complaints == []
+    assert errors == []
 
 
 @pytest.fixture

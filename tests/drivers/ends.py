@@ -1,4 +1,4 @@
-"""The two ends of a serial line over a real pty, and waiting for what they tell; shared by the tests of the line."""
+"""The two ends of a serial line over a real pty, and waiting for their reports; shared by the tests of the line."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Ends:
 
 
 class Host:
-    """The handlers of a link, each telling a queue."""
+    """The handlers of a link, each feeding a queue."""
 
     def __init__(self) -> None:
         self.opened: asyncio.Queue[None] = asyncio.Queue()

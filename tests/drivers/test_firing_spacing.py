@@ -40,7 +40,7 @@ def test_a_million_firings_through_reconnects(measured: Callable[[str], None]) -
     rng = np.random.default_rng(11)
     known = patterns(rng)
     rotation, now_us, fired, reconnects, tightest = Rotation(), 0, 0, 0, math.inf
-    begun_us, closes_us, step_us = -(10**9), 0, 0
+    start_us, closes_us, step_us = -(10**9), 0, 0
     current = known[1]
     while fired < FIRINGS:
         # A line is lost and found again after a few steps, or while the first one is still under way.
@@ -56,12 +56,12 @@ def test_a_million_firings_through_reconnects(measured: Callable[[str], None]) -
                 break
             fired += 1
             assert step.at_us >= closes_us, "it fires while the last one still listens"
-            assert step.at_us - begun_us >= step_us, "a step was cut short"
-            if step.at_us - begun_us < 10**8:
-                tightest = min(tightest, (step.at_us - begun_us) / max(1, step_us))
-            begun_us, closes_us = step.at_us, step.closes_us
+            assert step.at_us - start_us >= step_us, "a step was cut short"
+            if step.at_us - start_us < 10**8:
+                tightest = min(tightest, (step.at_us - start_us) / max(1, step_us))
+            start_us, closes_us = step.at_us, step.closes_us
             flight_s = 2.0 * step.window_m / SOUND_SPEED_M_S
-            assert closes_us - begun_us >= 1e6 * flight_s
+            assert closes_us - start_us >= 1e6 * flight_s
             # Which pattern this step belongs to: a new one takes effect here, and not before.
             step_us = (rotation.next_us or until_us) - step.at_us if rotation.next_us is not None else 0
         now_us = until_us

@@ -17,7 +17,7 @@ from drivers.link import Link, LinkError
 from tests.drivers.ends import Ends, Host, running, soon
 from tests.hil.machine import TIMEOUT_S, stalls_excused
 
-pytestmark = pytest.mark.usefixtures("loop_complaints")
+pytestmark = pytest.mark.usefixtures("loop_errors")
 
 
 async def test_bytes_go_both_ways(ends: Ends) -> None:
@@ -190,12 +190,12 @@ async def test_a_peer_that_stops_reading_fills_no_memory_and_holds_up_nothing(en
         assert not link.send(b"x" * 64)
         assert sent < 200_000
         assert link.send(b""), "nothing always fits"
-        begun = asyncio.get_running_loop().time()
-    assert asyncio.get_running_loop().time() - begun < 2.0, "stopping is bounded"
+        started = asyncio.get_running_loop().time()
+    assert asyncio.get_running_loop().time() - started < 2.0, "stopping is bounded"
     assert await soon(host.closed) == "closed by this program"
 
 
-async def test_unplugged_while_bytes_wait_is_told_at_once_and_without_a_traceback(ends: Ends) -> None:
+async def test_unplugged_while_bytes_wait_is_reported_at_once_and_without_a_traceback(ends: Ends) -> None:
     host = Host()
     link = host.link(ends.path)
     async with running(link):
@@ -213,7 +213,7 @@ async def test_not_writable_yet_leaves_room_for_a_halt(ends: Ends) -> None:
     async with running(link):
         await soon(host.opened)
         sent = 0
-        while link.writable:  # nobody reads
+        while link.writable:  # no one reads
             assert link.send(b"x" * 64)
             sent += 64
         assert link.waiting > 256
@@ -223,7 +223,7 @@ async def test_not_writable_yet_leaves_room_for_a_halt(ends: Ends) -> None:
         assert link.writable
 
 
-async def test_what_a_handler_raises_ends_the_line_and_names_the_culprit(ends: Ends) -> None:
+async def test_what_a_handler_raises_ends_the_line_and_names_the_cause(ends: Ends) -> None:
     host = Host()
 
     def careless(data: bytes) -> None:

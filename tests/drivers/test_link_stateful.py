@@ -25,15 +25,15 @@ WAITING_MAX = 4096
 class LinkMachine(RuleBasedStateMachine):
     """A link that is kept open, and a pty whose other end is unplugged, deaf, talkative, or plugged in again.
 
-    The model: bytes accepted since the line was last opened arrive, in order and whole; a line is told opened and
+    The model: bytes accepted since the line was last opened arrive, in order and whole; a line is reported opened and
     closed in turn; nothing that happens reaches the loop's exception handler.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self.loop = asyncio.new_event_loop()
-        self.complaints: list[object] = []
-        self.loop.set_exception_handler(lambda _, context: self.complaints.append(context))
+        self.errors: list[object] = []
+        self.loop.set_exception_handler(lambda _, context: self.errors.append(context))
         self.folder = tempfile.TemporaryDirectory()
         self.ends = Ends(Path(self.folder.name) / "robot")
         self.plugged = True
@@ -126,7 +126,7 @@ class LinkMachine(RuleBasedStateMachine):
     @precondition(lambda self: self.plugged)
     @rule()
     def a_handler_fails(self) -> None:
-        """The line ends, is told, and is opened again by itself."""
+        """The line ends, is reported, and is opened again by itself."""
         self.fail_next = True
         before = self.events.count("opened")
         os.write(self.ends.master, b"x")
@@ -175,9 +175,9 @@ class LinkMachine(RuleBasedStateMachine):
             self.loop.run_until_complete(asyncio.wait_for(self.task, TIMEOUT_S))
 
     @invariant()
-    def nothing_piles_up_and_nothing_is_told_twice(self) -> None:
+    def nothing_piles_up_and_nothing_is_reported_twice(self) -> None:
         assert self.link.waiting <= WAITING_MAX
-        assert self.complaints == []
+        assert self.errors == []
         assert self.events == ["opened", "closed"] * (len(self.events) // 2) + ["opened"] * (len(self.events) % 2)
         assert self.plugged or not self.link.is_open
 
@@ -186,7 +186,7 @@ class LinkMachine(RuleBasedStateMachine):
             self.cancel()
             assert not self.link.is_open
             assert not asyncio.all_tasks(self.loop)
-            assert self.complaints == []
+            assert self.errors == []
         finally:
             self.ends.unplug()
             self.folder.cleanup()
@@ -198,7 +198,7 @@ QUICK = settings(
     stateful_step_count=25,
     deadline=None,
     derandomize=True,  # `make soak` looks further
-    phases=(Phase.generate,),  # each step takes real time, and one that fails its whole patience
+    phases=(Phase.generate,),  # each step takes real time, and one that fails its whole timeout
     suppress_health_check=list(HealthCheck),
 )
 LinkMachine.TestCase.settings = QUICK

@@ -88,7 +88,7 @@ class Footprint(NamedTuple):
 
 @contextlib.asynccontextmanager
 async def hosted(config: LinkConfig) -> AsyncIterator[tuple[DenningDriver, asyncio.Queue[None], asyncio.Queue[str]]]:
-    """Keep a driver on a line; gives it, a queue told of each firing, and one told of each loss."""
+    """Keep a driver on a line; gives it, a queue of firings, and a queue of losses."""
     driver, firings, lost = DenningDriver(ROBOT), asyncio.Queue[None](), asyncio.Queue[str]()
     loop = asyncio.get_running_loop()
 
@@ -171,11 +171,11 @@ async def test_cut_for_real_within_what_the_robot_says(tmp_path: Path, measured:
                     device.cut_said = None
                     await asyncio.sleep(0.2)
                     device.plug()
-                    begun_s = asyncio.get_running_loop().time()
+                    start_s = asyncio.get_running_loop().time()
                     while not firings.empty():
                         firings.get_nowait()
                     await soon(firings)
-                    tries.append(asyncio.get_running_loop().time() - begun_s)
+                    tries.append(asyncio.get_running_loop().time() - start_s)
                 assert tries[-1] <= 1.0, (cut, tries)
                 worst_s = max(worst_s, tries[-1])
         finally:
@@ -186,10 +186,10 @@ async def test_cut_for_real_within_what_the_robot_says(tmp_path: Path, measured:
 @pytest.mark.realtime
 @pytest.mark.promise("P5")
 async def test_a_thousand_times_unplugged_and_plugged_again(tmp_path: Path, measured: Callable[[str], None]) -> None:
-    complaints: list[object] = []
-    asyncio.get_running_loop().set_exception_handler(lambda _, context: complaints.append(context))
+    errors: list[object] = []
+    asyncio.get_running_loop().set_exception_handler(lambda _, context: errors.append(context))
     measured(await replug(tmp_path / "robot", 1000))
-    assert complaints == []
+    assert errors == []
 
 
 @pytest.mark.soak

@@ -16,7 +16,7 @@ from drivers.serial_port import open_port
 from tests.drivers.ends import Ends, Host, running, soon
 from tests.hil.machine import TIMEOUT_S
 
-pytestmark = pytest.mark.usefixtures("loop_complaints")
+pytestmark = pytest.mark.usefixtures("loop_errors")
 
 
 async def test_write_buffers_without_bound_past_pause_writing(ends: Ends) -> None:
@@ -37,7 +37,7 @@ async def test_write_buffers_without_bound_past_pause_writing(ends: Ends) -> Non
 
 
 async def test_an_exception_in_data_received_goes_to_the_loop_and_the_port_stays_up(ends: Ends) -> None:
-    """Ours ends the line with the culprit's name and opens it again; the loop's handler is not bothered."""
+    """Ours ends the line with the cause's name and opens it again; the loop's handler is not bothered."""
     host = Host()
 
     def careless(data: bytes) -> None:
@@ -58,7 +58,7 @@ async def test_an_exception_in_data_received_goes_to_the_loop_and_the_port_stays
 
 
 async def test_close_on_a_stalled_peer_never_reports_connection_lost(ends: Ends) -> None:
-    """Ours aborts: the end is told within its fifth of a second, though nobody reads what waits."""
+    """Ours aborts: the end is reported within its fifth of a second, though no one reads what waits."""
     host = Host()
     link = host.link(ends.path)
     async with running(link):
@@ -73,7 +73,7 @@ async def test_close_on_a_stalled_peer_never_reports_connection_lost(ends: Ends)
 
 @pytest.mark.parametrize("busy", [False, True], ids=["idle", "with bytes waiting"])
 async def test_after_an_unplug_read_drain_and_wait_closed_all_raise(ends: Ends, busy: bool) -> None:
-    """Ours tells it once, by the handler; sending, asking and stopping afterwards raise nothing."""
+    """Ours reports it once, by the handler; sending, asking and stopping afterwards raise nothing."""
     host = Host()
     link = host.link(ends.path)
     await link.open_once()
@@ -93,7 +93,7 @@ async def test_after_an_unplug_read_drain_and_wait_closed_all_raise(ends: Ends, 
 
 
 async def test_opening_blocks(ends: Ends) -> None:
-    """Ours opens in a thread: the loop goes on meanwhile, and an opening without end is given up and told."""
+    """Ours opens in a thread: the loop goes on meanwhile, and an opening without end is given up and reported."""
     host, release, ticks = Host(), threading.Event(), 0
 
     def opener(config: LinkConfig) -> serial.Serial:
@@ -115,7 +115,7 @@ async def test_opening_blocks(ends: Ends) -> None:
 
 @pytest.mark.parametrize("opens", [True, False])
 async def test_wait_for_swallows_a_cancellation_that_comes_with_the_result(ends: Ends, opens: bool) -> None:
-    """Ours ends when it is told to, also in the very turn of the loop in which the port opens, and closes it."""
+    """Ours ends when it is asked to, also in the very turn of the loop in which the port opens, and closes it."""
     host, release, ports = Host(), threading.Event(), list[serial.Serial]()
 
     def opener(config: LinkConfig) -> serial.Serial:
@@ -133,7 +133,7 @@ async def test_wait_for_swallows_a_cancellation_that_comes_with_the_result(ends:
     thread.join()  # what it has to say waits for the loop's next turn; so does the cancellation behind it
     asyncio.get_running_loop().call_soon(task.cancel)
     done, _ = await asyncio.wait([task], timeout=TIMEOUT_S)
-    assert done, "it was told to end and goes on for ever"
+    assert done, "it was asked to end and goes on for ever"
     assert task.cancelled()
     assert not any(port.is_open for port in ports)
     assert not link.is_open
@@ -149,16 +149,16 @@ async def test_the_fast_fork_freezes_the_loop_on_a_peer_that_stops_reading(ends:
             await asyncio.sleep(0)
         longest_s = 0.0
         for _ in range(1000):
-            begun_s = time.thread_time()
+            start_s = time.thread_time()
             link.send(bytes(64))
             await asyncio.sleep(0)
-            longest_s = max(longest_s, time.thread_time() - begun_s)
+            longest_s = max(longest_s, time.thread_time() - start_s)
         # A frozen loop would not come here at all. The processor's own time: a busy machine does not count.
         assert longest_s < 1.0
         assert link.is_open
 
 
-async def test_a_pty_opens_twice_without_complaint_unless_it_is_exclusive(ends: Ends) -> None:
+async def test_a_pty_opens_twice_without_error_unless_it_is_exclusive(ends: Ends) -> None:
     """Ours asks for it alone, so the second to come is refused, and may have it once the first has gone."""
     first, second = Host(), Host()
     one, two = first.link(ends.path), second.link(ends.path)

@@ -37,7 +37,7 @@ ATTEMPTS = 8
 
 
 class Peer(Ends):
-    """A robot that sends odometry at 50 Hz and answers, and can be told to fall silent or to stop reading."""
+    """A robot that sends odometry at 50 Hz and answers, and can be made to fall silent or to stop reading."""
 
     def __init__(self, path: Path, *, names_drives: bool = True) -> None:
         super().__init__(path)
@@ -188,7 +188,7 @@ async def stall(path: Path, how: str, seconds: float) -> tuple[float, float, int
             async with running(host.link), tasks(peer.run, host.run, gaps.run):
                 await host.until(lambda: host.driver.state is LineState.READY and host.asked > 10)
                 gaps.counting = control.counting = True
-                begun_s = time.monotonic()
+                start_s = time.monotonic()
                 peer.mute, peer.deaf = how != "not reading", how != "mute"
                 await asyncio.sleep(seconds)
                 gaps.counting = control.counting = False
@@ -202,7 +202,7 @@ async def stall(path: Path, how: str, seconds: float) -> tuple[float, float, int
         assert not any(isinstance(frame, Drive) for frame in heard[first_halt:]), "the newest command is HALT"
         stale = [frame for frame in heard[before:first_halt] if isinstance(frame, Drive)]
         assert len(stale) <= DEAD_WITHIN_S / CYCLE_S
-        return gaps.worst_s, control.worst_s, host.unsent_max, host.down_s - begun_s
+        return gaps.worst_s, control.worst_s, host.unsent_max, host.down_s - start_s
     finally:
         peer.unplug()
 
@@ -270,7 +270,7 @@ async def test_the_newest_drive_wins_over_a_full_line(tmp_path: Path, measured: 
         peer.unplug()
     drives = [frame.v_mm_s for frame in peer.heard if isinstance(frame, Drive)]
     assert drives[-1] == newest
-    assert host.asked - len(drives) >= 499, "those that nobody could take were replaced, not kept"
+    assert host.asked - len(drives) >= 499, "those that no one could take were replaced, not kept"
     replaced = host.asked - len(drives)
     measured(f"not reading: {replaced} DRIVEs replaced by newer ones, ≤ {host.unsent_max} bytes unsent")
 

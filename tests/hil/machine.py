@@ -1,7 +1,7 @@
 """State of the machine during a test: whether it stalled, and how long a bare start takes.
 
 Real-time tests check a program, not the machine that runs it. A virtual machine that stalls for half a second stops
-the robot, as it must, and fails a test although the program is correct. Therefore a witness that only sleeps and wakes
+the robot, as it must, and fails a test although the program is correct. A witness that only sleeps and wakes therefore
 runs during each trial. A failed trial during which the machine stalled is repeated; any other failure counts.
 """
 

@@ -86,7 +86,7 @@ def test_byte_by_byte_is_the_same_as_whole(side: Side) -> None:
     assert single.rejected == whole.rejected
 
 
-def test_what_the_device_must_refuse_can_be_told_apart() -> None:
+def test_what_the_device_must_refuse_can_be_distinguished() -> None:
     decoder = Decoder("host")
     for body in (
         bytes((0x7F, 10)),
@@ -170,7 +170,7 @@ def test_the_longest_frame_passes_and_one_byte_more_does_not() -> None:
     assert (decoder.take_rejected(), decoder.bad) == ([], 2)
 
 
-def test_refusals_nobody_takes_do_not_pile_up() -> None:
+def test_refusals_no_one_takes_do_not_pile_up() -> None:
     decoder = Decoder("host")
     for seq in range(256):
         decoder.feed(stuffed(bytes((0x7F, seq))))

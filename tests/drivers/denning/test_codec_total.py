@@ -83,8 +83,8 @@ def test_a_thousand_million_bytes(side: Side, measured: Measured) -> None:
     measured(f"{total:.0e} bytes from the {side}: {frames:,} frames, {bad:,} dropped, ≤ {held} bytes held")
 
 
-def test_memory_does_not_grow_with_what_nobody_takes() -> None:
-    """Refusals that nobody asks for, and a frame that never ends, hold a few kilobytes and no more."""
+def test_memory_does_not_grow_with_what_no_one_takes() -> None:
+    """Refusals that no one asks for, and a frame that never ends, hold a few kilobytes and no more."""
     decoder = Decoder("host")
     noise = b"".join(framed(bytes((0x7F, seq))) for seq in range(256)) + b"\xff" * 5000
     decoder.feed(noise)

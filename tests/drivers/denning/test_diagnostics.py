@@ -1,4 +1,4 @@
-"""A Denning in virtual time whose clock wraps, that falls silent, turns deaf or starts again: noticed and told."""
+"""A Denning in virtual time whose clock wraps, that falls silent, turns deaf or restarts: detected and reported."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def test_a_silent_ring_is_asked_about_at_a_modest_pace(bench: Bench) -> None:
         bench.odom(t_us)
         bench.robot.tick(bench.now)
         hellos += len(only(bench.heard(), Hello))
-    assert bench.state() is LineState.READY, "nobody need answer"
+    assert bench.state() is LineState.READY, "no one need answer"
     assert 15 <= hellos <= 20
 
 
@@ -237,7 +237,7 @@ def test_a_clock_or_pose_that_leaps_is_asked_about_and_not_joined_to_the_past(
     assert bench.state() is LineState.READY
     bench.say(Echo(0, t_us + 10_000, 0, 1, (10,)))
     heard = bench.robot.take_received()
-    assert heard.firings == (), "nothing tells where that was"
+    assert heard.firings == (), "the place of the echo is unknown"
     assert heard.odometry is not None
     assert heard.odometry.pose == Pose(x * 1e-4, 0.0, 0.0)
     assert bench.robot.late_echoes == 1

@@ -186,15 +186,15 @@ def test_noise_instead_of_an_answer_points_at_the_baud_rate() -> None:
 
 
 @pytest.mark.parametrize(
-    ("broken", "told"), [(1, "nothing received for 0.41 s"), (9, "9 corrupt frames came in place of it: noise")]
+    ("broken", "message"), [(1, "nothing received for 0.41 s"), (9, "9 corrupt frames came in place of it: noise")]
 )
 def test_noise_in_place_of_odometry_is_named_and_one_broken_frame_is_not(
-    bench: Bench, broken: int, told: str
+    bench: Bench, broken: int, message: str
 ) -> None:
     bench.robot.receive(b"\x9f\x33\0" * broken, bench.now)
     bench.pass_time(0.41)
     assert bench.state() is LineState.DOWN
-    assert told in (bench.robot.problem or "")
+    assert message in (bench.robot.problem or "")
 
 
 def test_noise_in_place_of_echoes_is_named_once_they_are_overdue(bench: Bench) -> None:

@@ -125,7 +125,7 @@ def test_a_robot_that_answers_all_but_halt_is_down() -> None:
     assert "no answer to 3 HALT commands although the robot sends" in (bench.robot.problem or "")
 
 
-def test_release_clears_a_pending_halt_and_waits_for_nobody(bench: Bench) -> None:
+def test_release_clears_a_pending_halt_without_waiting(bench: Bench) -> None:
     bench.robot.halt()
     bench.heard()
     bench.robot.release()
@@ -155,7 +155,7 @@ def test_while_latched_a_refused_drive_is_no_trouble(bench: Bench) -> None:
     assert bench.robot.problem is None
 
 
-def test_a_refused_release_is_told_and_not_repeated(bench: Bench) -> None:
+def test_a_refused_release_is_reported_and_not_repeated(bench: Bench) -> None:
     bench.robot.release()
     (release,) = bench.heard()
     bench.say(Nak(0, release.seq, NakCode.LATCHED))

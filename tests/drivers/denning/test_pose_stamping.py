@@ -159,7 +159,7 @@ def test_a_wider_window_counts_from_the_pattern_on_and_a_narrower_one_after_it(b
 
 @pytest.mark.promise("P9")
 @pytest.mark.parametrize(("x", "heading"), [(3048, 0), (-3048, 0), (50_000, 0), (0, 5000), (3048, -20_000)])
-def test_a_leap_of_the_odometry_is_taken_out_and_told(bench: Bench, x: int, heading: int) -> None:
+def test_a_leap_of_the_odometry_is_taken_out_and_reported(bench: Bench, x: int, heading: int) -> None:
     """Poses go on as the wheels say; the robot's own odometry is `frame` away."""
     t_us = bench.run(0.4, t_us=0)
     bench.robot.take_received()
@@ -216,7 +216,7 @@ def test_a_fault_of_the_sensors_beyond_the_ring_is_passed_over() -> None:
     assert np.nansum(firing.ranges_m) == pytest.approx(0.3048)
 
 
-def test_firings_nobody_takes_do_not_pile_up(bench: Bench) -> None:
+def test_firings_no_one_takes_do_not_pile_up(bench: Bench) -> None:
     for k in range(1100):
         bench.odom(k * PERIOD_US)
         bench.say(Echo(0, k * PERIOD_US, 0, 1, (10,)))

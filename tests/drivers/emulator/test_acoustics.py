@@ -165,7 +165,7 @@ def test_specular_is_exactly_the_first_visible_mirror() -> None:
 
 
 @pytest.mark.parametrize("specular", [False, True])
-def test_reflecting_point_lies_at_the_distance_told(specular: bool) -> None:
+def test_reflecting_point_lies_at_the_reported_distance(specular: bool) -> None:
     for world, _, sensors, half in random_cases(4, 50):
         for (sensor, _axis), (distance, x, y) in zip(
             sensors, echoes(world, sensors, half, specular=specular), strict=True
@@ -241,13 +241,13 @@ def test_joint_of_two_walls_in_line_is_no_corner() -> None:
     assert sorted(scene.corners["x"]) == [0.0, 2.0]
 
 
-def test_nearer_thing_hides_farther_one() -> None:
+def test_nearer_object_hides_farther_one() -> None:
     far = wall(5, -5, 5, 5)
     slab = wall(2, -0.1, 2.4, 0.4)  # crosses the sight line and sends its own echo elsewhere
     assert hear(world_of("specular", wall=(far,))) == pytest.approx(5)
     assert hear(world_of("specular", wall=(far, slab))) == math.inf
-    aside = drum(2.5, 0.7, 0.75)  # its centre is out of the beam, its side in the line of sight
-    assert hear(world_of("specular", wall=(far,), drum=(aside,))) == math.inf
+    off_axis = drum(2.5, 0.7, 0.75)  # its centre is out of the beam, its side in the line of sight
+    assert hear(world_of("specular", wall=(far,), drum=(off_axis,))) == math.inf
     assert hear(world_of("specular", wall=(far,), drum=(drum(2.5, 0.8, 0.75),))) == pytest.approx(5)
 
 

@@ -174,7 +174,7 @@ def test_odometry_begins_at_zero_wherever_the_robot_stands() -> None:
     assert body.ring_yaw == pytest.approx(1.0 + body.odometry_ring_yaw)
 
 
-def test_odometry_scale_stretches_the_way_and_not_the_turn() -> None:
+def test_odometry_scale_scales_the_distance_and_not_the_turn() -> None:
     body = make(odometry={"scale": 1.1})
     run(body, 4.0, Twist(0.5, 0.0))
     assert body.odometry_pose.x == pytest.approx(1.1 * body.pose.x)

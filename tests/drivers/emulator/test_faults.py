@@ -1,4 +1,4 @@
-"""Faults to order: what each does to the emulated robot, how it ends, and what a bad fault script is told."""
+"""Faults to order: what each does to the emulated robot, how it ends, and what a bad fault script is reported."""
 
 from __future__ import annotations
 

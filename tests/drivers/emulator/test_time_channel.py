@@ -49,7 +49,7 @@ def test_bytes_leave_no_faster_than_the_line() -> None:
             assert most <= window * 0.001 * baud / 10 + 1
 
 
-def test_slow_line_loses_whole_frames_and_its_numbers_tell() -> None:
+def test_slow_line_loses_whole_frames_as_its_sequence_numbers_show() -> None:
     h = host(baud=9600)
     h.send(Pattern, 50, 255, (ALL,))
     h.run(10.0)

@@ -1,4 +1,4 @@
-"""The emulator's time under a law: what a line says, what is obeyed, and what is told about it."""
+"""The emulator's time under a law: what a line says, what is obeyed, and what is reported about it."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_a_law_is_answered_once_and_free_time_is_silent() -> None:
     assert follower.acknowledge(1.5) == b""
 
 
-def test_a_robot_that_has_lived_on_stands_where_it_is() -> None:
+def test_robot_ahead_of_the_scale_waits() -> None:
     follower = TimeScaleFollower()
     follower.acknowledge(10.02)
     follower.receive(TimeScale(0.0, 0.0, 1.0, 10.0).encode(1))
@@ -98,15 +98,15 @@ def test_a_robot_that_has_lived_on_stands_where_it_is() -> None:
     assert follower.acknowledge(10.02) == b""
 
 
-def test_what_is_lived_in_held_time_is_told_as_it_goes() -> None:
+def test_time_run_while_held_is_acknowledged() -> None:
     follower = TimeScaleFollower()
     follower.acknowledge(10.0)
     follower.receive(TimeScale(50.0, 10.0, 2.0, 10.5).encode(4))
-    told = [follower.acknowledge(follower.run_at(host_s)) for host_s in (50.125, 50.1875, 50.25, 50.3)]
-    assert told == [b"acknowledged 4 10.25\n", b"acknowledged 4 10.375\n", b"acknowledged 4 10.5\n", b""]
+    reported = [follower.acknowledge(follower.run_at(host_s)) for host_s in (50.125, 50.1875, 50.25, 50.3)]
+    assert reported == [b"acknowledged 4 10.25\n", b"acknowledged 4 10.375\n", b"acknowledged 4 10.5\n", b""]
 
 
-def test_held_time_goes_on_where_nobody_holds_it_any_more() -> None:
+def test_held_time_goes_on_where_no_one_holds_it_any_more() -> None:
     follower = TimeScaleFollower()
     follower.acknowledge(10.0)
     follower.receive(TimeScale(0.0, 0.0, 1.0, 10.0).encode(1))
@@ -125,7 +125,7 @@ def pipes() -> Iterator[tuple[int, int, int, int]]:
             os.close(fd)
 
 
-def test_over_pipes_nobody_waits(pipes: tuple[int, int, int, int]) -> None:
+def test_over_pipes_no_one_waits(pipes: tuple[int, int, int, int]) -> None:
     reads, writes, theirs, answers = pipes
     channel = TimeChannel(reads, writes)
     channel.receive(1.0)

@@ -95,7 +95,7 @@ def test_the_paper_s_method_keeps_no_false_object(lie: str, measured: Callable[[
 
 
 @promise
-def test_a_leap_is_told_and_the_robot_drives_on(measured: Callable[[str], None]) -> None:
+def test_a_leap_is_reported_and_the_robot_drives_on(measured: Callable[[str], None]) -> None:
     run = hallway(3, leap(FROM_S, 0.0))
     run.until(FROM_S + 1.0)
     assert run.state.mode.mode is Mode.DRIVE

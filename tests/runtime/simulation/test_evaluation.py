@@ -76,7 +76,7 @@ def test_twenty_times_as_fast_as_the_robot(tmp_path: Path) -> None:
 def test_an_experiment_leaves_recording_pictures_and_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     outcome = experiment(tmp_path, "irregular", "--seeds", "3", "--out", str(out))
-    told = capsys.readouterr().out
+    reported = capsys.readouterr().out
     spread = outcome["spread"]
     assert spread["seeds"] == 3
     assert spread["mean"] == pytest.approx(outcome["mean_error"], rel=0.2)
@@ -84,17 +84,17 @@ def test_an_experiment_leaves_recording_pictures_and_page(tmp_path: Path, capsys
     of_worst = outcome["drums"][8 * spread["worst_seed"] : 8 * spread["worst_seed"] + 8]
     assert max(row["error"] or 0.0 for row in of_worst) == spread["worst"]
     assert 0.0 < spread["deviation"] < spread["worst"]
-    assert "3 seeds: mean error" in told
+    assert "3 seeds: mean error" in reported
     files = {path.name for path in out.iterdir()}
     kinds = ("svg", "pdf", "png")
     pictures = {f"{name}.{kind}" for name in ("raw", "segments", "clusters", "models") for kind in kinds}
     assert files >= {"irregular.mcap", "irregular.html", "overview.gif", *pictures}
-    assert all(str(out / name) in told for name in files)
+    assert all(str(out / name) in reported for name in files)
     recorded = out / "irregular.mcap"
     assert run_command(["replay", str(recorded), "--verify"]) == DONE
     with open_recording(recorded) as recording:
         assert recording.world == load_settings("irregular").world
-    # The recording is the run of seed 0, and the page tells its errors.
+    # The recording is the run of seed 0, and the page lists its errors.
     page = (out / "irregular.html").read_text("utf-8")
     truth = next(row for row in outcome["drums"][:8] if row["error"] is not None)
     assert f"{truth['error'] / FT:.3f}" in page
@@ -130,13 +130,13 @@ def test_the_irregular_hallway_with_one_per_cent_noise(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", [101, 202])
-def test_the_irregular_hallway_on_seeds_nobody_chose(seed: int) -> None:
+def test_the_irregular_hallway_on_seeds_no_one_chose(seed: int) -> None:
     outcome = summarise([run_seed(*settings_of("irregular"), seed)])
     assert sum(row["estimate"] is not None for row in outcome["drums"]) >= 7
     assert outcome["false"] <= 1
 
 
-def test_a_robot_that_does_not_come_through_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_that_does_not_come_through_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     """A wall across the hallway."""
     monkeypatch.setattr("runtime.simulation.evaluation.SECONDS_MAX", 40.0)
     settings, world = settings_of("hallway")

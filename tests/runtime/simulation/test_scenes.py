@@ -34,7 +34,7 @@ def heard(hall: Hall, seed: int = 0) -> Floats:
     return np.array([firing.ranges_m for firing in readings(RING, hall, seed)])
 
 
-def test_the_ring_is_the_one_the_scenes_are_told_for() -> None:
+def test_the_ring_is_the_one_of_the_scenes() -> None:
     assert len(RING.mounts) == 24
     assert [math.hypot(m.x_m, m.y_m) / FT for m in RING.mounts] == pytest.approx([1.25] * 24)
     assert RING.beam_half_angle_deg == 12.0
@@ -67,7 +67,7 @@ def test_boxes_face_the_path_or_turn_a_corner_to_it_under_both_acoustics() -> No
     assert halls("boxes") == halls("boxes_facing") + halls("boxes_45")
 
 
-def test_noise_is_as_told() -> None:
+def test_noise_is_as_specified() -> None:
     def sound(name: SceneName) -> list[float]:
         a = halls(name)[0].world.acoustics
         return [a.noise_m / FT, a.dropout, a.outliers, a.noise_relative, (a.outlier_max_m or 0.0) / FT]
@@ -125,8 +125,8 @@ def closed_form_ft(hall: Hall, x: float, y: float, angle: float) -> float:
             continue
         others = [p for j, p in enumerate(places_ft(hall)) if j != k]
         ahead = [(ox - x) * ux + (oy - y) * uy for ox, oy in others]
-        aside = [abs((ox - x) * uy - (oy - y) * ux) for ox, oy in others]
-        if not any(0.0 < a < away - 1.0 and b < 1.0 for a, b in zip(ahead, aside, strict=True)):
+        lateral = [abs((ox - x) * uy - (oy - y) * ux) for ox, oy in others]
+        if not any(0.0 < a < away - 1.0 and b < 1.0 for a, b in zip(ahead, lateral, strict=True)):
             best = min(best, away - 1.0)
     return best
 

@@ -73,7 +73,7 @@ def test_it_needs_nothing_else(page: str) -> None:
     assert len(page.encode()) < SIZE_MAX
 
 
-def test_it_tells_the_run(page: str) -> None:
+def test_page_describes_the_run(page: str) -> None:
     text = " ".join(Reader(page).text)
     for title in ("Objects", "Pictures", "Timing", "Line", "Modes and stop reasons", "Settings", "Made by"):
         assert title in text
@@ -115,8 +115,8 @@ def test_an_svg_within_a_page() -> None:
         '<g id="a"><path d="M 1.23456 2" style="stroke: #0072b2" clip-path="url(#c)"/>'
         '<use xlink:href="#a"/></g></svg>'
     )
-    assert inlined(svg, "p", "told") == (
-        '<svg role="img" aria-label="told"><g id="p-a"><path d="M 1.23 2" style="stroke: var(--echo)" '
+    assert inlined(svg, "p", "label") == (
+        '<svg role="img" aria-label="label"><g id="p-a"><path d="M 1.23 2" style="stroke: var(--echo)" '
         'clip-path="url(#p-c)"/><use href="#p-a"/></g></svg>'
     )
     for variable in VARIABLES.values():
