@@ -188,7 +188,7 @@ def _schema_mismatch(given: Counter[str], expected: Counter[str]) -> str:
     if missing := sorted(expected - given):
         return f"no answer from the schema {', '.join(missing)}: the decision is incomplete, so the robot stops"
     surplus = ", ".join(sorted(given - expected))
-    return f"the schema {surplus} answered without being asked, so the robot stops: check which schemas the request needs"
+    return f"the schema {surplus} answered without being asked, so the robot stops: check the schemas of the request"
 
 
 def _is_finite(value: float) -> bool:

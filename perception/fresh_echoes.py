@@ -69,8 +69,8 @@ class FreshEchoes:
         """Enter the echoes of a firing."""
         pose = firing.pose
         record_echoes(
-            firing.ranges_m, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), float(firing.robot_s),
-            self._points, self._times, self._heard,
+            firing.ranges_m, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw),
+            float(firing.robot_s), self._points, self._times, self._heard,
         )  # fmt: skip
 
     def points(self, robot_s: float, age_max_s: float) -> Floats:

@@ -47,7 +47,7 @@ NEIGHBOUR_MAX_RAD: Final = math.radians(31.0)
 surfaces."""
 NEAR_SHARE: Final = 0.45
 """Near limit as a share of the ring's reach. Along a straight wall a beam measures up to 2.2 times as far as its
-neighbour 15° nearer to the wall, so an echo beyond this does not tell what the neighbour should hear."""
+neighbour 15° nearer to the wall, so an echo beyond this does not predict what the neighbour hears."""
 SAME_AXIS_RAD: Final = 1e-6
 """Sensors whose axes differ by less look the same way and are not neighbours."""
 TOLERANCE_MIN_M: Final = 0.005
@@ -71,12 +71,12 @@ def neighbours_of(axes: Floats) -> Ints:
     """
     neighbours: Ints = np.full((len(axes), 2), -1, np.int64)
     for i, axis in enumerate(axes):
-        aside = np.remainder(axes - axis, 2.0 * math.pi)
-        left = [k for k in np.argsort(aside) if SAME_AXIS_RAD < aside[k] <= NEIGHBOUR_MAX_RAD]
+        bearings = np.remainder(axes - axis, 2.0 * math.pi)
+        left = [k for k in np.argsort(bearings) if SAME_AXIS_RAD < bearings[k] <= NEIGHBOUR_MAX_RAD]
         right = [
             k
-            for k in np.argsort(-aside)
-            if 2.0 * math.pi - NEIGHBOUR_MAX_RAD <= aside[k] < 2.0 * math.pi - SAME_AXIS_RAD
+            for k in np.argsort(-bearings)
+            if 2.0 * math.pi - NEIGHBOUR_MAX_RAD <= bearings[k] < 2.0 * math.pi - SAME_AXIS_RAD
         ]
         if left and right:
             neighbours[i] = left[0], right[0]

@@ -1,6 +1,6 @@
 """Outline segments: the paper's second step (§3.2), after McKerrow (1993).
 
-One range only tells that a surface touches an arc. Two ranges of one sensor from two places tell more: the common
+One range only shows that a surface touches an arc. Two ranges of one sensor from two places show more: the common
 tangent of both arcs is the best estimate of the surface that returned both echoes.
 """
 
