@@ -1,1 +1,1 @@
-"""What every part of the runtime uses: errors, child processes, background writers, file locks, the kernel cache."""
+"""What all of runtime uses: log, health, background writer, child processes, file locks, the kernel cache."""

@@ -1,4 +1,4 @@
-"""Settings that are allowed, each by itself, and still unwise together."""
+"""Warnings about settings that are valid each by itself and unwise in combination."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from config.settings import Settings
 
 
 def lint_settings(settings: Settings) -> list[str]:
-    """Return what an experienced operator would say about these settings, a sentence each."""
-    said = []
+    """Return warnings about these settings, one sentence each."""
+    warnings = []
     blind_m = settings.ring.range_min_m
     avoid, arbiter = settings.behaviors.avoid_static_obstacle, settings.behaviors.arbiter
     margins = {
@@ -16,14 +16,14 @@ def lint_settings(settings: Settings) -> list[str]:
     }
     for path, margin_m in margins.items():
         if margin_m <= blind_m:
-            said.append(
-                f"{path} = {margin_m} is not above ring.range_min_m = {blind_m}: nothing nearer than that is ever "
-                "reported, so this margin never acts; make it larger"
+            warnings.append(
+                f"{path} = {margin_m} is not above ring.range_min_m = {blind_m}: nearer obstacles are "
+                "never reported, so this margin has no effect; make it larger"
             )
-    pace_hz = 1.0 / settings.ring.firing.step_period_s
-    if settings.cycle.rate_hz < 0.5 * pace_hz:
-        said.append(
-            f"cycle.rate_hz = {settings.cycle.rate_hz:g} is less than half the ring's {pace_hz:g} firings a second: "
+    firing_hz = 1.0 / settings.ring.firing.step_period_s
+    if settings.cycle.rate_hz < 0.5 * firing_hz:
+        warnings.append(
+            f"cycle.rate_hz = {settings.cycle.rate_hz:g} is less than half of {firing_hz:g} firings a second: "
             "several firings wait for each cycle"
         )
-    return said
+    return warnings

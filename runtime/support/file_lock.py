@@ -1,7 +1,9 @@
-"""One writer to a file: the lock lies on the file itself, so that none can be left over.
+"""Lock a file for one writing process, with `flock` on the file itself.
 
-A lock file beside it would outlive a crash and lie about who is there. `flock` ends with the process that holds it,
-however that ends; what is left of a recorder that died is an ordinary file, and the next one simply takes it.
+A separate lock file would survive a crash. This lock ends with the process that holds it; what a killed recorder
+leaves is an ordinary file that the next one may write.
+
+(filelock and portalocker truncate the file or need a separate one.)
 """
 
 from __future__ import annotations
@@ -21,28 +23,27 @@ _TRIES: Final = 10
 
 @contextlib.contextmanager
 def file_lock(path: Path, named: str) -> Iterator[None]:
-    """Hold the file at `path` for this process alone; it is made if it is not there, and its content left untouched.
+    """Lock the file at `path` during the block; create it if it does not exist, and leave its content untouched.
 
-    What is no ordinary file (a pipe, /dev/null) has no content that two could spoil, and is not locked.
+    Only regular files are locked: a pipe or /dev/null has no content that two writers could spoil.
 
     Parameters
     ----------
     path : Path
         The file.
     named : str
-        What a complaint calls it, as ``--record run.csv``.
+        How an error message names it, e.g. ``--record run.csv``.
 
     Raises
     ------
     UserError
-        Another process holds it, or it cannot be opened.
+        Another process holds the lock, or the file cannot be opened.
     """
     try:
         fd = _lock(path)
     except BlockingIOError:
         raise UserError(
-            f"{named}: another process writes to this file; end that one (`fuser {path}` names it) "
-            "or choose another file",
+            f"{named}: another process writes to this file; end it (`fuser {path}` shows it) or choose another file",
             FAILED,
         ) from None
     except OSError as error:
@@ -54,14 +55,14 @@ def file_lock(path: Path, named: str) -> Iterator[None]:
 
 
 def _lock(path: Path) -> int:
-    """Return a descriptor that holds the lock.
+    """Return a file descriptor that holds the lock.
 
     Raises
     ------
     BlockingIOError
-        Another process holds it.
+        Another process holds the lock.
     OSError
-        The file cannot be opened, or its file system knows no locks.
+        The file cannot be opened, or its file system has no locks.
     """
     for _ in range(_TRIES):
         fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOCTTY | os.O_NONBLOCK, 0o666)
@@ -76,6 +77,6 @@ def _lock(path: Path) -> int:
         except BaseException:
             os.close(fd)
             raise
-        # Between being opened and being locked it was replaced: what is locked is no longer the file of that name.
+        # The file was replaced between opening and locking: the locked one no longer has this name.
         os.close(fd)
     raise BlockingIOError

@@ -1,9 +1,8 @@
-"""No silent death: every part of the process has a name, and one question tells whether all of them still work.
+"""The health of the process: every task and thread has a name, and one call says whether all of them still run.
 
-A part is a task of the loop or a thread beside it. A part that has ended is not well, whatever ended it; one that
-only takes long is: a thread may wait for a disk or a terminal for as long as it likes. The cycle asks before it
-decides anything, so a robot with a part missing stands, and neither its deadman nor a watchdog is fed by anything but
-the cycle.
+A part that has ended is a fault, whatever ended it. A part that only takes long is none: a thread may wait for a disk
+or a terminal for any time. The cycle checks for faults before it decides anything, so with a part missing the robot
+halts. Only the cycle feeds the deadman and the watchdog.
 """
 
 from __future__ import annotations
@@ -20,98 +19,98 @@ if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
 Probe: TypeAlias = Callable[[], str | None]
-"""Says what is wrong with a part, None while nothing is."""
+"""Returns what is wrong with a part, None while nothing is."""
 
 ENDED: Final = (
-    "the part `{}` of this program has ended ({}), likely by a fault of the program: see the log, then start it again"
+    "the part `{}` of this program has ended ({}), likely through a program error: see the log, then restart it"
 )
-RAISED: Final = "{} failed, likely by a fault of the program: see the log, then re-arm"
-UNASKED: Final = "it was ended from outside"
-_MACHINERY: Final = str(Path(asyncio.__file__).parent)
+RAISED: Final = "{} failed, likely through a program error: see the log, then re-arm"
+NO_ERROR: Final = "it ended without an error"
+_ASYNCIO_FOLDER: Final = str(Path(asyncio.__file__).parent)
 
 
 class Worker(threading.Thread):
-    """A thread that can be asked how it ended; it never keeps the process from ending.
+    """A daemon thread that keeps the exception that ended it.
 
     Parameters
     ----------
     name : str
-        What the part is called.
+        Name of the part.
     work : callable
-        What it does; it returns only when told to.
+        What the thread does; it returns only at the end of the run.
     """
 
     def __init__(self, name: str, work: Callable[[], None]) -> None:
         super().__init__(name=name, daemon=True)
         self._work = work
         self.failure: str | None = None
-        """What ended it, None where nothing did but its own work's end."""
+        """The exception that ended it, in one line; None if there was none."""
 
     def run(self) -> None:
-        """Work, and keep what is raised for whoever asks."""
+        """Do the work; keep the exception that it raises."""
         try:
             self._work()
-        except Exception as error:  # noqa: BLE001 - whatever it is, it must not go unseen
+        except Exception as error:  # noqa: BLE001 - any exception must be reported
             self.failure = describe_exception(error)
 
     def probe(self) -> str | None:
-        """Say how it ended; None while it runs."""
-        return None if self.is_alive() else self.failure or UNASKED
+        """Return how the thread ended; None while it runs."""
+        return None if self.is_alive() else self.failure or NO_ERROR
 
 
 class Health:
-    """What is known of the parts.
+    """The health of all parts of the process.
 
     Parameters
     ----------
     log : structlog logger
-        Told of every part's end, with the traceback.
+        Receives a line with the traceback when a part ends or fails.
     """
 
     def __init__(self, log: FilteringBoundLogger) -> None:
         self._log = log
         self._probes: dict[str, Probe] = {}
         self._ended: dict[str, str] = {}
-        self._accident: str | None = None
+        self._unhandled_error: str | None = None
         self._is_over = False
 
     def watch(self, name: str, probe: Probe) -> None:
-        """Ask `probe` from now on."""
+        """Check the part with this probe from now on."""
         self._probes[name] = probe
 
     def watch_task(self, name: str, task: asyncio.Task[None]) -> None:
-        """Hold a task to run for as long as anybody asks."""
+        """Treat the end of this task as a fault from now on."""
 
         def done(task: asyncio.Task[None]) -> None:
             error = None if task.cancelled() else task.exception()
-            self._end(name, UNASKED if error is None else describe_exception(error), error)
+            self._end(name, NO_ERROR if error is None else describe_exception(error), error)
 
         task.add_done_callback(done)
 
-    def report(self, who: str, error: BaseException) -> None:
-        """Take note of what a part has caught that it should never have met; as of a callback that raised."""
-        what = f"{who} ({describe_exception(error)})"
-        self._accident = RAISED.format(what)
-        self._log.error("a part failed", culprit=what, exc_info=error)
+    def report(self, part: str, error: BaseException) -> None:
+        """Report an unexpected exception that a part has caught."""
+        what = f"{part} ({describe_exception(error)})"
+        self._unhandled_error = RAISED.format(what)
+        self._log.error("a part failed", source=what, exc_info=error)
 
     def begin_shutdown(self) -> None:
-        """Let parts end from now on: the run does."""
+        """Allow parts to end from now on, because the run ends."""
         self._is_over = True
 
     def fault(self) -> str | None:
-        """Return what is wrong and whose fault it is, None where all is well.
+        """Return what is wrong, with the name of the part; None if nothing is.
 
-        What a callback has raised is told once: the callback is over. A part that has ended is told ever after.
+        A callback's exception is returned once, as the callback is over; a part that has ended, at every call.
         """
-        accident, self._accident = self._accident, None
+        unhandled_error, self._unhandled_error = self._unhandled_error, None
         for name, probe in self._probes.items():
             if name not in self._ended and (how := probe()) is not None:
                 self._end(name, how)
-        return next(iter(self._ended.values()), accident)
+        return next(iter(self._ended.values()), unhandled_error)
 
     @contextmanager
     def catching_unhandled_errors(self) -> Iterator[None]:
-        """Take note of what callbacks of the loop raise, and of exceptions that nobody waited for."""
+        """Report exceptions of the loop's callbacks, and of tasks that nothing awaits, during the block."""
         loop = asyncio.get_running_loop()
         before = loop.get_exception_handler()
         loop.set_exception_handler(self._on_unhandled_error)
@@ -129,23 +128,25 @@ class Health:
     def _on_unhandled_error(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         error, task = context.get("exception"), context.get("future") or context.get("task")
         if isinstance(error, BaseException):
-            who = f"task `{task.get_name()}`" if isinstance(task, asyncio.Task) else f"callback `{_culprit(error)}`"
-            what = f"{who} ({describe_exception(error)})"
+            source = f"callback `{_first_own_function(error)}`"
+            if isinstance(task, asyncio.Task):
+                source = f"task `{task.get_name()}`"
+            what = f"{source} ({describe_exception(error)})"
         else:
             what = str(context.get("message", "a callback"))
-        self._accident = RAISED.format(what)
-        self._log.error("a callback failed", culprit=what, exc_info=error)
+        self._unhandled_error = RAISED.format(what)
+        self._log.error("a callback failed", source=what, exc_info=error)
 
 
 def describe_exception(error: BaseException) -> str:
-    """Return an exception in one line, with the place it came from."""
+    """Return an exception in one line, with file, line and function that raised it."""
     frames = traceback.extract_tb(error.__traceback__)
     where = f", {Path(frames[-1].filename).name}:{frames[-1].lineno} in {frames[-1].name}" if frames else ""
     return f"{type(error).__name__}: {' '.join(str(error).split())}{where}"
 
 
-def _culprit(error: BaseException) -> str:
-    """Return the first function below the loop's own machinery."""
+def _first_own_function(error: BaseException) -> str:
+    """Return the first function in the traceback that is not part of asyncio."""
     frames = traceback.extract_tb(error.__traceback__)
-    ours = (frame.name for frame in frames if not frame.filename.startswith(_MACHINERY))
-    return next(ours, "unknown")
+    own = (frame.name for frame in frames if not frame.filename.startswith(_ASYNCIO_FOLDER))
+    return next(own, "unknown")

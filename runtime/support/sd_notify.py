@@ -1,7 +1,7 @@
-"""What a service manager is told: ready, still well, stopping, and in which mode; systemd's sd_notify protocol.
+"""Notify the service manager (systemd's sd_notify protocol) that the service is ready, alive, or stopping.
 
-A datagram to the socket that NOTIFY_SOCKET names, and nothing more, so no library is needed. It is sent from the loop
-and never waits. The watchdog is fed by the cycle alone: a thread would feed it for a loop that stands still.
+A message is one datagram to the socket named by NOTIFY_SOCKET. It is sent from the loop and never waits; libraries
+for this protocol block or ignore errors. Only the cycle feeds the watchdog: a thread would do so for a hanging loop.
 """
 
 from __future__ import annotations
@@ -13,33 +13,33 @@ from collections.abc import Mapping
 from typing import Final
 
 SHARE: Final = 0.25
-"""The watchdog is fed so much of its patience apart: three of the four may be lost."""
+"""Interval of watchdog messages, as a share of the watchdog's timeout: three of four may be lost."""
 STATUS_MAX: Final = 400
-"""Characters of a status; a manager shows one line."""
+"""Longest status, characters; a manager shows one line."""
 
 
 class SdNotifier:
-    """Tells the service manager; without one it does nothing.
+    """Sends messages to the service manager; does nothing without one.
 
     Parameters
     ----------
     address : str, optional
         Path of the socket, or its abstract name after an ``@``.
     watchdog_s : float, optional
-        How long the manager waits for a sign of life; None where it does not wait for any.
+        Timeout of the manager's watchdog; None without a watchdog.
 
     Attributes
     ----------
-    lost
-        Messages that the manager did not take.
-    last_error
+    lost : int
+        Messages that could not be sent.
+    last_error : str or None
         Why, the last time.
     """
 
     def __init__(self, address: str | None = None, watchdog_s: float | None = None) -> None:
         self._address = "\0" + address[1:] if address is not None and address.startswith("@") else address
-        self._every_s = None if watchdog_s is None else SHARE * watchdog_s
-        self._fed_s = float("-inf")
+        self._watchdog_interval_s = None if watchdog_s is None else SHARE * watchdog_s
+        self._watchdog_sent_s = float("-inf")
         self._is_ready = False
         self._status: str | None = None
         self.lost = 0
@@ -51,46 +51,46 @@ class SdNotifier:
 
     @classmethod
     def from_environment(cls, environment: Mapping[str, str] = os.environ) -> SdNotifier:
-        """Return a notifier for whoever started this process."""
+        """Return a notifier for the service manager that started this process, if one did."""
         pid, microseconds = environment.get("WATCHDOG_PID"), environment.get("WATCHDOG_USEC", "")
-        is_meant = pid is None or pid == str(os.getpid())
-        watchdog_s = int(microseconds) * 1e-6 if is_meant and microseconds.isdecimal() else 0.0
+        is_for_us = pid is None or pid == str(os.getpid())
+        watchdog_s = int(microseconds) * 1e-6 if is_for_us and microseconds.isdecimal() else 0.0
         address = environment.get("NOTIFY_SOCKET")
         return cls(address if address and address[0] in "/@" else None, watchdog_s or None)
 
     def alive(self, host_s: float) -> None:
-        """Tell that all is well at `host_s`: at first that the service is ready, from then on to the watchdog."""
+        """Report that the service works at the time `host_s`: READY the first time, then WATCHDOG at its interval."""
         if not self._is_ready:
             self._is_ready = True
-            self._tell("READY=1")
-        if self._every_s is not None and host_s - self._fed_s >= self._every_s:
-            self._fed_s = host_s
-            self._tell("WATCHDOG=1")
+            self._send("READY=1")
+        if self._watchdog_interval_s is not None and host_s - self._watchdog_sent_s >= self._watchdog_interval_s:
+            self._watchdog_sent_s = host_s
+            self._send("WATCHDOG=1")
 
     def status(self, text: str) -> None:
-        """Show a line to whoever asks the manager."""
+        """Set the status line that the manager shows."""
         line = " ".join(text.split())[:STATUS_MAX]
         if line != self._status:
             self._status = line
-            self._tell(f"STATUS={line}")
+            self._send(f"STATUS={line}")
 
     def stopping(self) -> None:
-        """Tell that the service ends, in good order."""
-        self._tell("STOPPING=1")
+        """Report that the service is stopping."""
+        self._send("STOPPING=1")
 
     def close(self) -> None:
-        """Say nothing more."""
+        """Close the socket; later messages are dropped."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
 
-    def _tell(self, line: str) -> None:
+    def _send(self, line: str) -> None:
         if self._socket is None or self._address is None:
             return
         try:
             self._socket.sendto(line.encode(), self._address)
         except OSError as error:
-            # A manager that is busy or restarts; it asks for nothing but the next sign of life.
+            # The manager is busy or restarts; the next message may reach it.
             self.lost += 1
             self.last_error = error.strerror or str(error)
 

@@ -1,7 +1,7 @@
-"""A folder for what a run needs while it lasts, gone with it; also after a run that could not clear up behind itself.
+"""A temporary folder for a run. It is removed at the end of the run, or after a SIGKILL at the start of the next one.
 
-Nobody hears SIGKILL. So each start takes away what runs before it have left, and tells a folder that is in use by its
-lock, which the system itself gives up with the process that holds it: a number could by now be another process's.
+A folder in use is recognised by its lock, which the system releases with the process that holds it; a process number
+in the name could by now belong to another process.
 """
 
 from __future__ import annotations
@@ -20,39 +20,39 @@ from typing import Final
 PREFIX: Final = "echolocate-run-"
 
 YOUNG_S: Final = 60.0
-"""A younger folder is left alone: its owner may be about to lock it."""
+"""A younger folder is not removed: its owner may be about to lock it."""
 
 
 @contextlib.contextmanager
 def temp_folder() -> Iterator[Path]:
-    """Give a fresh folder in the system's temporary place that only this user can enter.
+    """Yield a new folder for temporary files that only this user can enter, and remove it at the end.
 
     Raises
     ------
     OSError
-        It cannot be made.
+        It cannot be created.
     """
-    sweep()
-    folder = Path(tempfile.mkdtemp(prefix=PREFIX))
-    lock = _lock(folder)
-    try:
-        yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-        if lock is not None:
-            os.close(lock)
+    remove_stale_folders()
+    with tempfile.TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True) as name:
+        folder = Path(name)
+        lock = _lock(folder)
+        try:
+            yield folder
+        finally:
+            if lock is not None:
+                os.close(lock)
 
 
-def sweep() -> None:
-    """Take away what this user's runs have left behind whose process is gone."""
-    with contextlib.suppress(OSError):  # a place that cannot be listed is told where a folder is made in it
+def remove_stale_folders() -> None:
+    """Remove the folders of this user's runs whose process no longer exists."""
+    with contextlib.suppress(OSError):  # if it cannot be listed, creating a folder in it reports that
         for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
-            if _is_ours(folder) and (lock := _lock(folder)) is not None:
+            if _may_be_stale(folder) and (lock := _lock(folder)) is not None:
                 shutil.rmtree(folder, ignore_errors=True)
                 os.close(lock)
 
 
-def _is_ours(folder: Path) -> bool:
+def _may_be_stale(folder: Path) -> bool:
     try:
         found = folder.lstat()
     except OSError:
@@ -62,7 +62,7 @@ def _is_ours(folder: Path) -> bool:
 
 
 def _lock(folder: Path) -> int | None:
-    """Return what holds the lock of a folder; None where another process does, or the file system knows no locks."""
+    """Return a descriptor that holds the lock of a folder; None if another process does or there are no locks."""
     fd = None
     try:
         fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)

@@ -291,7 +291,9 @@ async def run_process(
             from runtime.cli.commands.serve_console import serve_console
 
             page = await stack.enter_async_context(
-                serve_console(process, settings, log, kernel_loader, recording, control, emulated=emulated, units=units)
+                serve_console(
+                    process, settings, log, kernel_loader, recording, control, emulated=emulated, units=units
+                )
             )
             log_status.listeners.append(page.hub.on_log)
             stack.callback(log_status.listeners.remove, page.hub.on_log)

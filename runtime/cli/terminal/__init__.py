@@ -1,1 +1,1 @@
-"""What a terminal shows of a run while it lasts, and the keys it takes."""
+"""The live view of a run on a terminal, and its keys."""

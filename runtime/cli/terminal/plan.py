@@ -1,4 +1,4 @@
-"""A plan of what the robot sees, in characters: segments, objects, the trail and the robot itself."""
+"""A plan view in characters: segments, objects, the trail and the robot."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from perception.pipeline import DetectedObject
 
 ARROWS: Final = "→↗↑↖←↙↓↘"
 CELL_ASPECT: Final = 2.0
-"""A character cell is about this much taller than wide."""
+"""Height of a character cell divided by its width, on usual terminals."""
 MARGIN_M: Final = 0.6
+"""Space around the outermost points."""
 
 
 class Plan:
@@ -23,7 +24,7 @@ class Plan:
     Parameters
     ----------
     points : iterable of (x, y)
-        What must be inside, m.
+        Points inside the rectangle, m.
     columns, rows : int
         Size in characters.
     """
@@ -44,21 +45,21 @@ class Plan:
         return self._cell
 
     def mark(self, x: float, y: float, character: str, style: str) -> None:
-        """Put a character at a place; places outside are left out."""
+        """Draw a character at a point, m; points outside are ignored."""
         column = math.floor((x - self._left) / self._cell)
         row = math.floor((self._top - y) / (self._cell * CELL_ASPECT))
         if 0 <= column < self._columns and 0 <= row < self._rows:
             self._cells[row, column] = (character, style)
 
     def circle(self, x: float, y: float, radius: float, character: str, style: str) -> None:
-        """Draw a circle."""
+        """Draw a circle of characters around a point, m."""
         steps = max(8, math.ceil(4.0 * math.pi * radius / self._cell))
         for k in range(steps):
             angle = 2.0 * math.pi * k / steps
             self.mark(x + radius * math.cos(angle), y + radius * math.sin(angle), character, style)
 
     def text(self) -> Text:
-        """Return the raster."""
+        """Return the raster as text."""
         text = Text(no_wrap=True)
         for row in range(self._rows):
             for column in range(self._columns):
@@ -84,11 +85,11 @@ def draw_plan(
     pose : Pose
         Of the robot.
     trail : list of (x, y)
-        Where it was, m.
+        Earlier positions, m.
     segments : (n, 5) float
-        Outline segments: ends x, y, x, y (m), normal (rad).
+        Outline segments: end points x, y, x, y (m), direction of the normal (rad).
     objects : tuple of DetectedObject
-        What is recognised.
+        Recognised objects.
     size_m : dict
         Radius at which to draw each model, m.
     columns, rows : int

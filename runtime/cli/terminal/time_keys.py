@@ -1,4 +1,4 @@
-"""The run's time under two keys of the terminal: p holds it and lets it go on, s lets one cycle go by."""
+"""Time control by two keys of the terminal: p pauses and resumes the emulated run, s steps by one cycle."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ if TYPE_CHECKING:
 
 
 class TimeKeys:
-    """Asks for what a key stands for, one thing at a time; what cannot be done is told in the log.
+    """Carries out one key at a time; the log says why a key had no effect.
 
     Parameters
     ----------
     control : TimeControl
-        Holds the run's time.
+        Of the run.
     log : structlog logger
-        For the user.
+        Receives why a key had no effect.
     """
 
     def __init__(self, control: TimeControl, log: FilteringBoundLogger) -> None:
@@ -29,14 +29,15 @@ class TimeKeys:
         self._task: asyncio.Task[None] | None = None
 
     def press(self, key: str) -> None:
-        """Take a key; one pressed while the last is being carried out is dropped."""
+        """Handle a key, unless the last one is still being carried out."""
         control = self._control
         if self._task is None or self._task.done():
             if key == "p":
-                self._task = asyncio.create_task(self._ask(control.resume if control.is_paused else control.pause))
+                request = control.resume if control.is_paused else control.pause
+                self._task = asyncio.create_task(self._carry_out(request))
             elif key == "s":
-                self._task = asyncio.create_task(self._ask(control.single_step))
+                self._task = asyncio.create_task(self._carry_out(control.single_step))
 
-    async def _ask(self, what: Callable[[], Awaitable[str | None]]) -> None:
-        if (why := await what()) is not None:
-            self._log.warning("time is not held", reason=why)
+    async def _carry_out(self, request: Callable[[], Awaitable[str | None]]) -> None:
+        if (why := await request()) is not None:
+            self._log.warning("the run cannot be paused or stepped", reason=why)

@@ -1,7 +1,7 @@
-"""The live terminal view: mode and reason, the plan, objects, ring, line and timing.
+"""The live view of a run on a terminal (mode, plan, objects, ring, link and timing), and the keys it takes.
 
-A terminal can be slow or held by Ctrl-S, so the loop only leaves the latest picture's ingredients in a slot; a
-thread draws them. Keys go the other way: a arms, space halts, q quits; p and s hold the time of an emulator.
+A terminal can be slow or held by Ctrl-S. So the loop only stores a snapshot of the latest cycle; a thread draws it.
+Keys: a arms, space halts, q quits; p pauses and s steps an emulated run.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ EVERY_CYCLES: Final = 5
 """Draw every fifth cycle: 4 Hz at 20 Hz."""
 TRAIL: Final = 400
 SWITCH_INTERVAL_S: Final = 0.0005
-"""While a thread draws, the loop waits for the interpreter this long at most."""
+"""Longest wait of the loop for the interpreter while the thread draws."""
 STYLES: Final = MappingProxyType(
     {"DRIVE": "bold white on green", "SAFE_STOP": "bold white on red", "FAULT": "bold white on red"}
 )
@@ -56,7 +56,7 @@ KEYS: Final = MappingProxyType({" ": Request.HALT, "h": Request.HALT, "a": Reque
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """What one picture is made from; nothing in it changes any more."""
+    """What the view shows of a cycle; nothing in it changes any more."""
 
     mode: ModeState
     pose: Pose | None
@@ -72,9 +72,9 @@ class Snapshot:
     lag_us: Quantiles
     missed: int = 0
     faults: tuple[tuple[str, int], ...] = ()
-    """Culprits of late and overrun cycles, and how many each."""
+    """Causes of late and overrun cycles, with the number of cycles."""
     sensors: tuple[str, ...] = ()
-    """Why sensors are not believed."""
+    """Why sensors are masked."""
 
 
 class View:
@@ -83,11 +83,11 @@ class View:
     Parameters
     ----------
     settings : Settings
-        For the ring's reach and the models' sizes.
+        Of the run.
     console : Console
         The terminal.
     units : {"m", "ft"}
-        For the list of objects.
+        Units of the table of objects.
     """
 
     def __init__(self, settings: Settings, console: Console, units: Units) -> None:
@@ -100,18 +100,28 @@ class View:
         self._ranges = np.full(len(settings.ring.mounts), np.nan)
         self._trail: deque[tuple[float, float]] = deque(maxlen=TRAIL)
         self.console_url: str | None = None
-        """Where the operator console is, None where there is none."""
+        """Address of the operator console; None without one."""
         self._slot: Snapshot | None = None
         self._wake = threading.Event()
         self._done = False
-        self._painter = Worker("view", self._paint)
+        self._thread = Worker("view", self._draw)
 
     def probe(self) -> str | None:
-        """Say how its thread ended; None while it draws. See `runtime.support.health`."""
-        return self._painter.probe()
+        """Return how its thread ended; None while it draws. See `runtime.support.health`."""
+        return self._thread.probe()
 
     def on_cycle(self, record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
-        """Leave the ingredients of the next picture in the slot."""
+        """Store what the view shows next.
+
+        Parameters
+        ----------
+        record, state : CycleRecord, State
+            Of the cycle.
+        stats : CycleStats
+            Of the run.
+        driver : RobotDriver
+            For the counts of the link.
+        """
         for firing in record.inputs.received.firings:
             fired = ~np.isnan(firing.ranges_m)
             self._ranges[fired] = firing.ranges_m[fired]
@@ -131,19 +141,19 @@ class View:
 
     @contextlib.contextmanager
     def shown(self) -> Iterator[None]:
-        """Own the terminal while the run lasts."""
+        """Show the view during the block."""
         interval_s = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH_INTERVAL_S)
-        self._painter.start()
+        self._thread.start()
         try:
             yield
         finally:
             self._done = True
             self._wake.set()
-            self._painter.join(timeout=1.0)
+            self._thread.join(timeout=1.0)
             sys.setswitchinterval(interval_s)
 
-    def _paint(self) -> None:
+    def _draw(self) -> None:
         with Live(console=self._console, auto_refresh=False, screen=False) as live:
             while not self._done:
                 self._wake.wait()
@@ -153,7 +163,7 @@ class View:
                     live.update(self.picture(snapshot), refresh=True)
 
     def picture(self, snapshot: Snapshot) -> Group:
-        """Return the picture of one moment."""
+        """Return the view of a snapshot."""
         mode = snapshot.mode
         head = Text.assemble((f" {mode.mode.value} ", STYLES.get(mode.mode.value, "bold black on yellow")))
         head.append(f"  {mode.reason or ''}")
@@ -191,11 +201,11 @@ class View:
         )
         if snapshot.faults:
             worst = sorted(snapshot.faults, key=lambda fault: -fault[1])[:FAULTS_SHOWN]
-            grid.add_row("late by", ", ".join(f"{culprit}: {count}" for culprit, count in worst))
+            grid.add_row("late by", ", ".join(f"{cause}: {count}" for cause, count in worst))
         return grid
 
     def _ring(self, ranges: Floats) -> str:
-        """Return a bar a sensor: the nearer the echo the higher; a dot heard nothing."""
+        """Return a bar per sensor, higher for a nearer echo, or a dot without an echo."""
         bars = []
         for r in ranges:
             near = 0.0 if not np.isfinite(r) else 1.0 - min(float(r) / self._reach_m, 1.0)
@@ -204,7 +214,7 @@ class View:
 
 
 def millis(quantiles: Quantiles) -> str:
-    """Return median and 99th percentile as text."""
+    """Return median and 99th percentile as text, in milliseconds."""
     return f"{quantiles['p50'] / 1e3:.2f} ms (p99 {quantiles['p99'] / 1e3:.2f})"
 
 
@@ -214,7 +224,17 @@ def keys(
     on_quit: Callable[[], None],
     on_other: Callable[[str], None] = lambda _key: None,
 ) -> Iterator[None]:
-    """Read single keys from the terminal while the run lasts; without a terminal there are none."""
+    """Read single keys from the terminal during the block, if there is one.
+
+    Parameters
+    ----------
+    on_request : callable
+        Called for the keys of `KEYS`.
+    on_quit : callable
+        Called for q, and when the terminal is gone.
+    on_other : callable
+        Called with any other key.
+    """
     if not sys.stdin.isatty():
         yield
         return
@@ -223,13 +243,13 @@ def keys(
     loop = asyncio.get_running_loop()
 
     def read() -> None:
-        # Not through sys.stdin: what that keeps in its buffer wakes nobody.
+        # Not through sys.stdin: what is in its buffer does not wake the loop.
         try:
             pressed = os.read(fd, KEYS_MAX)
         except OSError:
             pressed = b""
         if not pressed:
-            # The terminal is gone, and with it whoever could have halted the robot.
+            # The terminal is gone, and with it the keys that halt the robot.
             loop.remove_reader(fd)
             on_quit()
         for key in pressed.decode(errors="replace"):

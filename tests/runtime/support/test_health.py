@@ -116,7 +116,7 @@ class Watched:
         assert stopped <= PLANT + WITHIN
         assert any(culprit in reason for reason in summary["stop_reasons"]), summary["stop_reasons"]
         reason = next(reason for reason in summary["stop_reasons"] if culprit in reason)
-        assert "likely by a fault of the program: see the log" in reason
+        assert "likely through a program error: see the log" in reason
         if self.arm_at is None:
             assert all(self.modes[cycle] is Mode.SAFE_STOP for cycle in range(stopped, LAST))
             assert not [frame for cycle, frame in self.sent if isinstance(frame, Drive) and cycle >= stopped]
@@ -142,7 +142,7 @@ def test_a_task_that_is_killed(monkeypatch: pytest.MonkeyPatch, measured: Callab
     run = Watched(plant, monkeypatch, arm_at=PLANT + 20)
     summary = run.run()
     assert names == {"link"}, "a task that no test kills"
-    run.stands_because(summary, "the part `link` of this program has ended (it was ended from outside)")
+    run.stands_because(summary, "the part `link` of this program has ended (it ended without an error)")
     assert all(run.modes[cycle] is Mode.SAFE_STOP for cycle in range(PLANT + WITHIN, LAST))
     assert run.flags & Flags.DEADMAN, "its line is closed: it has stopped by itself"
     assert max(run.fed) <= PLANT + WITHIN < LAST - 20, "and so will the watchdog ring"

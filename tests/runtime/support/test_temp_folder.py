@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from runtime.support.temp_folder import PREFIX, YOUNG_S, sweep, temp_folder
+from runtime.support.temp_folder import PREFIX, YOUNG_S, remove_stale_folders, temp_folder
 
 ROOT = Path(__file__).parents[3]
 OWNER = """
@@ -57,7 +57,7 @@ def test_what_a_killed_run_has_left_goes_with_the_next_start(tmp_path: Path) -> 
     process, folder = owner()
     with process:
         aged(folder)
-        sweep()
+        remove_stale_folders()
         assert (folder / "robot").is_symlink(), "its owner lives"
         process.kill()
     assert folder.exists()
@@ -76,5 +76,5 @@ def test_what_is_not_ours_stays(tmp_path: Path) -> None:
     file.touch()
     os.utime(file, (0.0, 0.0))
     others = {young, link, file, elsewhere, aged(Path(tempfile.mkdtemp(prefix="echolocate-bench-")))}
-    sweep()
+    remove_stale_folders()
     assert set(tmp_path.iterdir()) == others

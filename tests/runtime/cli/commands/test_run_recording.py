@@ -81,5 +81,6 @@ def test_a_ring_log_that_is_whole_is_no_complaint(tmp_path: Path) -> None:
     recording.raise_if_incomplete()
     assert len(list(read_ring_log(path))) == 100
     assert recording.summary_row == {
-        "file": str(path), "files": 1, "bytes": path.stat().st_size, "dropped": 0, "last_error": None, "sync_max_s": 0.0,
+        "file": str(path), "files": 1, "bytes": path.stat().st_size, "dropped": 0, "last_error": None,
+        "sync_max_s": 0.0,
     }  # fmt: skip
