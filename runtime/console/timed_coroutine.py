@@ -29,8 +29,8 @@ def timed_coroutine(timed: Timed, name: str, work: Coroutine[Any, Any, T]) -> Ge
     work : coroutine
         Not yet started; closed at the end.
     """
-    send, throw = timed(name, work.send), timed(name, work.throw)
-    step, value = send, None
+    resume, resume_with_error = timed(name, work.send), timed(name, work.throw)
+    step, value = resume, None
     try:
         while True:
             try:
@@ -40,8 +40,8 @@ def timed_coroutine(timed: Timed, name: str, work: Coroutine[Any, Any, T]) -> Ge
                 return result
             value = None
             try:
-                value, step = (yield waits_for), send
+                value, step = (yield waits_for), resume
             except BaseException as error:  # noqa: BLE001 - a cancellation too is for the work to handle
-                value, step = error, throw
+                value, step = error, resume_with_error
     finally:
         work.close()

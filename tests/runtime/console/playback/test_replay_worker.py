@@ -38,7 +38,7 @@ class WorkerCase:
         self.worked = 0
         self.worker = ReplayWorker(
             cursor,
-            lambda told: make_stub_frames(parse_settings(told), emulated=True),
+            lambda settings: make_stub_frames(parse_settings(settings), emulated=True),
             self._show,
             lambda: self.host_s,
         )
