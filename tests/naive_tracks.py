@@ -1,4 +1,4 @@
-"""Slow, readable oracles of how the Bayesian method keeps its tracks, its walls and its noise: plain Python, in metres.
+"""Slow, readable oracles of how the Bayesian method keeps its tracks, walls and noise: plain Python, in metres.
 
 Nothing here is called by the product, and nothing of the product is called here; constants are said once more.
 """

@@ -1,8 +1,8 @@
 """State of the machine during a test: whether it stalled, and how long a bare start takes.
 
 Real-time tests check a program, not the machine that runs it. A virtual machine that stalls for half a second stops
-the robot, as it must, and fails a test although the program is correct. A witness that only sleeps and wakes therefore
-runs during each trial. A failed trial during which the machine stalled is repeated; any other failure counts.
+the robot, as it must, and fails a test although the program is correct. So a witness that only sleeps and wakes runs
+during each trial. A failed trial during which the machine stalled is repeated; any other failure counts.
 """
 
 from __future__ import annotations
