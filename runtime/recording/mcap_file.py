@@ -15,7 +15,7 @@ from runtime.recording.schema import FORMAT
 
 PROFILE: Final = "echolocate"
 CHUNK_BYTES: Final = 256 * 1024
-"""Largest chunk, bytes: no damage to a file costs more than this around it."""
+"""Largest chunk, bytes: a corrupt byte costs no more than one chunk."""
 
 INDEX: Final = IndexType.CHUNK | IndexType.ATTACHMENT | IndexType.METADATA
 """No index of single messages: with chunks this small it would take a third of the file."""

@@ -162,7 +162,7 @@ class McapScanner:
         return None, len(self._data)
 
     def _is_cut_off(self, at: int) -> bool:
-        """Return whether the file just ends in the middle of this record, which is no damage."""
+        """Return whether the file just ends in the middle of this record, which does not count as corrupt."""
         if at + RECORD_HEADER > len(self._data):
             return True
         code, length = struct.unpack_from("<BQ", self._data, at)

@@ -86,7 +86,7 @@ class Recording:
 
     @property
     def corrupt_regions(self) -> list[CorruptRegion]:
-        """Damage found by the last full pass over the messages; complete once that is exhausted."""
+        """The corrupt regions found by the last full pass over the messages; complete once that is exhausted."""
         return self._scanner.corrupt_regions
 
     @property

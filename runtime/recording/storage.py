@@ -30,7 +30,7 @@ class RecordingTarget(Protocol):
         ...
 
     def is_part_full(self, part_bytes: int) -> bool:
-        """Return whether a file of this size should be closed and the next one begun."""
+        """Return whether a file of this size should be closed and followed by the next one."""
         ...
 
 

@@ -128,7 +128,7 @@ class RecordingWriter:
     Attributes
     ----------
     wants_keyframe : bool
-        A keyframe is needed for the replay to go on: a file has begun, or something is missing.
+        A keyframe is needed for the replay to go on: a new file, or something is missing.
     """
 
     def __init__(

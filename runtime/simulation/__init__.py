@@ -1,1 +1,1 @@
-"""The robot without hardware or waiting: whole drives in virtual time, through halls whose truth is known."""
+"""Runs without a robot: the closed loop in virtual time, scenes with known truth, and the emulator as a process."""

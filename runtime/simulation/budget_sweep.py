@@ -1,8 +1,8 @@
-"""What a smaller budget costs: the same drives down a long hall, refinement cut short at different times.
+"""The effect of a smaller refinement budget: the same drives down a long hall under several budgets.
 
-Anytime perception promises answers that come later with less time and are no worse in the end. Each row is a budget:
-when the answers came, and what they were when the robot had arrived. A drum is answered from the cycle in which it is
-first reported, within the gate of Table 2.
+Anytime perception promises that with less time objects are reported later but are no worse in the end. Each row is a
+budget: when objects were reported, and their errors at the end. A drum counts as reported from the cycle in which an
+object within the gate of Table 2 is reported.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ from runtime.simulation.long_hall import WAY_M, long_hall
 from runtime.timing.refinement_budget import RefinementBudget
 
 QUANTA_PER_FIRING: Final = 50
-"""So many that time, and nothing else, ends refinement."""
+"""So high that only the budget ends refinement."""
 
 
 class BudgetRow(TypedDict):
-    """What came of a budget over all drives; metres and seconds."""
+    """Results of a budget over all drives, metres and seconds."""
 
     budget: float
-    """ms, or quanta."""
+    """In ms, or in quanta per cycle."""
     quanta: float
-    """A cycle, on average."""
+    """Mean per cycle."""
     cut_short: float
-    """Share of the cycles whose budget was spent before everything was improved."""
+    """Share of the cycles whose budget was spent before refinement had converged."""
     first_s: float | None
-    """Until the first drum was reported, on average over the drives."""
+    """Time until the first drum was reported, mean over the drives."""
     first_m: float | None
-    """The robot's way until then."""
+    """Distance driven until then, mean over the drives."""
     way_m: float | None
-    """The robot's way until a drum was reported, on average over the drums."""
+    """Distance driven until a drum was reported, mean over the drums."""
     drums: int
     found: int
     false: int
@@ -52,20 +52,20 @@ class BudgetRow(TypedDict):
 
 @dataclass
 class DetectionLog:
-    """Looks on at one drive and notes when each drum is reported for the first time."""
+    """Records when each drum of a drive is first reported."""
 
     world: WorldConfig
     when: dict[int, tuple[float, float]] = field(default_factory=dict)
-    """Time (s) and way (m) of each drum's first report."""
+    """Time (s) and distance driven (m) at each drum's first report, by the drum's index."""
     quanta: int = 0
     cut: int = 0
     cycles: int = 0
     _way_m: float = 0.0
     _before: Pose | None = None
-    _reported: object = None
+    _last_objects: object = None
 
     def on_cycle(self, record: CycleRecord, truth: GroundTruth) -> None:
-        """Count the quanta and measure the way."""
+        """Count the quanta and measure the distance driven."""
         before, self._before = self._before, truth.pose
         if before is not None:
             self._way_m += math.hypot(truth.pose.x - before.x, truth.pose.y - before.y)
@@ -74,19 +74,29 @@ class DetectionLog:
         self.cycles += 1
 
     def on_state(self, _record: CycleRecord, state: State, start: Pose) -> None:
-        """Look at what is reported."""
-        reported = state.perception.objects()
-        if reported is self._reported or state.run_s is None:
+        """Record the drums that are reported for the first time.
+
+        Parameters
+        ----------
+        _record : CycleRecord
+            Not used.
+        state : State
+            After the cycle.
+        start : Pose
+            Where the odometry began, in world coordinates.
+        """
+        objects = state.perception.objects()
+        if objects is self._last_objects or state.run_s is None:
             return
-        self._reported = reported
-        for place in (start.compose(Pose(seen.x, seen.y, seen.theta)) for seen in reported):
+        self._last_objects = objects
+        for place in (start.compose(Pose(seen.x, seen.y, seen.theta)) for seen in objects):
             for i, drum in enumerate(self.world.drum):
                 if i not in self.when and math.hypot(place.x - drum.x_m, place.y - drum.y_m) <= GATE_M:
                     self.when[i] = (state.run_s, self._way_m)
 
 
 def long_hall_settings(settings: Settings) -> Settings:
-    """Return the settings for a drive down the hall once, with no limit on refinement but the budget."""
+    """Return the settings for one drive down the hall, with refinement limited only by the budget."""
     ahead = settings.behaviors.move_ahead.model_copy(update={"distance_m": WAY_M, "at_end": "stop"})
     bayes = settings.perception.bayes.model_copy(update={"quanta_per_firing": QUANTA_PER_FIRING})
     return settings.model_copy(
@@ -100,54 +110,54 @@ def long_hall_settings(settings: Settings) -> Settings:
 def drive(
     settings: Settings, budget: float, refinement_budget: Callable[[], RefinementBudget], seeds: Sequence[int]
 ) -> BudgetRow:
-    """Drive down a hall for each seed under one budget.
+    """Drive down a hall for each seed under one budget and return the results.
 
     Parameters
     ----------
     settings : Settings
         From `long_hall_settings`.
     budget : float
-        What the row is called.
+        For the row.
     refinement_budget : callable
-        Makes what carries the budget out.
+        Returns a new budget for each drive.
     seeds : sequence of int
-        Of the halls and of everything random in them.
+        Of the halls and of all randomness in them.
 
     Raises
     ------
     UserError
-        A drive did not come to its end.
+        A drive did not reach the end of the hall.
     """
-    looks, errors, found, false = [], [], 0, 0
+    logs, errors, found, false = [], [], 0, 0
     for seed in seeds:
         world = long_hall(seed)
-        looking = DetectionLog(world)
+        detections = DetectionLog(world)
         run = simulate(
             settings,
             world,
             seed,
             SECONDS_MAX,
-            looking.on_cycle,
+            detections.on_cycle,
             refinement_budget=refinement_budget(),
-            on_state=looking.on_state,
+            on_state=detections.on_state,
         )
         require_finished(run, seed, SECONDS_MAX)
         rows, wrong = match_drums(world, estimates(run))
         errors += [row["error"] for row in rows if row["error"] is not None]
         found += sum(row["estimate"] is not None for row in rows)
         false += wrong
-        looks.append(looking)
-    cycles = sum(look.cycles for look in looks)
-    firsts = [min(look.when.values()) for look in looks if look.when]
-    ways = [way for look in looks for _, way in look.when.values()]
+        logs.append(detections)
+    cycles = sum(log.cycles for log in logs)
+    firsts = [min(log.when.values()) for log in logs if log.when]
+    ways = [way for log in logs for _, way in log.when.values()]
     return {
         "budget": budget,
-        "quanta": sum(look.quanta for look in looks) / cycles,
-        "cut_short": sum(look.cut for look in looks) / cycles,
+        "quanta": sum(log.quanta for log in logs) / cycles,
+        "cut_short": sum(log.cut for log in logs) / cycles,
         "first_s": _mean([s for s, _ in firsts]),
         "first_m": _mean([m for _, m in firsts]),
         "way_m": _mean(ways),
-        "drums": sum(len(look.world.drum) for look in looks),
+        "drums": sum(len(log.world.drum) for log in logs),
         "found": found,
         "false": false,
         "mean_error": _mean(errors),

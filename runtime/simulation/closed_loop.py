@@ -1,7 +1,7 @@
-"""The closed loop in virtual time: the same robot, protocol and cycle as on a line, as fast as the machine can.
+"""The closed loop in virtual time: the same robot, protocol and cycle as over a serial line, as fast as possible.
 
-No wall clock decides anything here, so one seed is one run. Refinement gets a fixed number of quanta a cycle in
-place of a time budget.
+No real clock has any influence, so the same seed gives the same run. Refinement gets a fixed number of quanta per
+cycle in place of a time budget.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.refinement_budget import QUANTA_PER_CYCLE, QuantumBudget, RefinementBudget
 
 SETTLING_S: Final = 1.0
-"""How long a robot that has arrived still listens, so that the last echoes count."""
+"""Time that a run continues after the robot has arrived, so that the last echoes count."""
 
 
 @dataclass(frozen=True, slots=True)
 class OperatorInput:
-    """What an operator says in a cycle."""
+    """What an operator requests in a cycle."""
 
     request: Request | None = None
     drive_request: DriveRequest | None = None
@@ -40,7 +40,7 @@ class OperatorInput:
 
 @dataclass(frozen=True, slots=True)
 class SimulationResult:
-    """What a run in virtual time left behind."""
+    """The result of a run in virtual time."""
 
     state: State
     start: Pose
@@ -67,33 +67,33 @@ def simulate(
     on_bytes: OnBytes | None = None,
     operator: Callable[[int, State], OperatorInput] | None = None,
 ) -> SimulationResult:
-    """Drive through `world` until the leg is done, the robot stops for a reason, or the time is up.
+    """Drive through `world` until the leg is done, the robot stops or the time is up, and return the result.
 
     Parameters
     ----------
     settings : Settings
         The robot and everything it does.
     world : WorldConfig
-        What it meets.
+        The true world.
     seed : int
-        Of everything random.
+        Of all randomness.
     seconds_max : float
         Virtual time after which the run ends.
     on_cycle : callable, optional
-        Gets every record, and the truth of that moment.
+        Called with every record and the ground truth at that moment.
     refinement_budget : RefinementBudget, optional
-        How much refinement a cycle may do; `QUANTA_PER_CYCLE` where not given.
+        Of each cycle; `QUANTA_PER_CYCLE` quanta if not given.
     on_state : callable, optional
-        Gets every record, the state it left, and where the odometry began.
+        Called with every record, the state after it, and where the odometry began.
     clock_start_us : int
-        What the robot's own clock shows at first, µs; it wraps at 2³².
+        The robot's own clock at the start, µs; it wraps at 2³².
     reload : callable, optional
-        Asked with the number of each cycle for settings to go on with from there, as after a reload.
+        Called with the number of each cycle; returns new settings in force from there on, as after a reload, or None.
     on_bytes : callable, optional
-        Gets what goes over the line, either way, and when.
+        Called with direction, time and data of everything that goes over the line.
     operator : callable, optional
-        Asked with the number of each cycle, and the state before it, for what an operator says in it. It arms only
-        where it says so, and a drive does not end by itself.
+        Called with the number of each cycle and the state before it; returns the operator's input. The robot is then
+        armed only by that input, and the run lasts for `seconds_max`.
     """
     refinement_budget = QuantumBudget(QUANTA_PER_CYCLE) if refinement_budget is None else refinement_budget
     robot = make_device(settings, world, seed, clock_start_us=clock_start_us)
@@ -103,17 +103,21 @@ def simulate(
     start = robot.truth.pose
     began = time.perf_counter()
     cycle_stats = CycleStats(late_after_s=math.inf, is_touched=True)
-    until, now = seconds_max, 0.0
-    while now < until:
-        now = (cycle_stats.cycles + 1) / settings.cycle.rate_hz
+    until, run_s = seconds_max, 0.0
+    while run_s < until:
+        run_s = (cycle_stats.cycles + 1) / settings.cycle.rate_hz
         if reload is not None and (other := reload(cycle_stats.cycles + 1)) is not None:
             settings = other
             driver.set_firing(settings.ring)
             apply_settings(state, settings)
-        line.exchange(now)
+        line.exchange(run_s)
         request = Request.ARM if state.mode.mode is Mode.READY else None
-        said = OperatorInput(request) if operator is None else operator(cycle_stats.cycles + 1, state)
-        inputs = replace(gather_inputs(driver, now, said.request), drive_request=said.drive_request, edits=said.edits)
+        operator_input = OperatorInput(request) if operator is None else operator(cycle_stats.cycles + 1, state)
+        inputs = replace(
+            gather_inputs(driver, run_s, operator_input.request),
+            drive_request=operator_input.drive_request,
+            edits=operator_input.edits,
+        )
         step_s = time.perf_counter()
         refinement_budget.begin()
         record = step(state, inputs, settings, lambda c: apply_command(driver, c), refinement_budget)
@@ -123,5 +127,5 @@ def simulate(
         if on_state is not None:
             on_state(record, state, start)
         if operator is None and (state.mode.mode is Mode.SAFE_STOP or (state.leg is not None and state.leg.done)):
-            until = min(until, now + SETTLING_S)
-    return SimulationResult(state, start, robot.truth, now, time.perf_counter() - began, cycle_stats, driver.counts)
+            until = min(until, run_s + SETTLING_S)
+    return SimulationResult(state, start, robot.truth, run_s, time.perf_counter() - began, cycle_stats, driver.counts)

@@ -1,4 +1,4 @@
-"""The emulator as a child process: started, waited for, and ended by the robot's main process."""
+"""The emulator as a child process of the robot's main process."""
 
 from __future__ import annotations
 
@@ -17,41 +17,42 @@ from runtime.timing.run_clock import ScaledClock
 from runtime.timing.time_control import EmulatorTimeControl
 
 READY_WORD: Final = "ready"
-"""First word of the one line the emulator prints."""
+"""First word of the line that the emulator prints when it is ready."""
 
 START_MAX_S: Final = 60.0
-"""Even a machine that compiles the emulator's kernels is through by then."""
+"""Longest wait for the emulator, which may have to compile its kernels first."""
 
 END_MAX_S: Final = 2.0
+"""Longest wait for the emulator to end by itself."""
 
 
 class EmulatorHandle(NamedTuple):
-    """An emulator of this process's own."""
+    """A running emulator."""
 
     port: str
-    """The port it answers on."""
+    """The path of its serial port."""
     control: EmulatorTimeControl
-    """Holds its time; `control.clock` is the clock for the run on it."""
+    """Control of its time; `control.clock` is the clock of a run with it."""
 
 
 @contextlib.asynccontextmanager
 async def start_emulator(arguments: Sequence[str], clock: ScaledClock | None = None) -> AsyncIterator[EmulatorHandle]:
-    """Run ``echolocate emulate`` beside this process.
+    """Run ``echolocate emulate`` as a child process while the context lasts, and yield its port and time control.
 
-    It gets a session of its own, so that Ctrl-C on the terminal reaches this process only, which then halts the
-    robot before it goes. When this process is killed the emulated base stops by itself and the emulator ends.
+    It gets its own session, so that Ctrl-C in the terminal reaches only this process, which then halts the robot
+    before it ends. If this process is killed, the emulated base stops by itself and the emulator ends.
 
     Parameters
     ----------
     arguments : sequence of str
         Further arguments of the command.
     clock : ScaledClock, optional
-        The run's, where it must be known before the emulator is.
+        The run's clock, if it is needed before the emulator.
 
     Raises
     ------
     UserError
-        The emulator did not get ready; its own words are in the message.
+        The emulator did not start; its own error is in the message.
     """
     with contextlib.ExitStack() as stack:
         port = _folder(stack) / "robot"
@@ -77,7 +78,7 @@ def _folder(stack: contextlib.ExitStack) -> Path:
         return stack.enter_context(temp_folder())
     except OSError as error:
         raise UserError(
-            f"no temporary folder can be made for the emulator: {error.strerror or error}; make room, or name "
+            f"no temporary folder can be created for the emulator: {error.strerror or error}; make room, or name "
             "another place in TMPDIR",
             FAILED,
         ) from error
@@ -122,7 +123,7 @@ async def _end(process: asyncio.subprocess.Process) -> None:
 
 
 def _signal(process: asyncio.subprocess.Process, number: signal.Signals) -> None:
-    """Send a signal past asyncio, which may reap the child first and then not find it."""
+    """Send a signal without asyncio, whose own method may reap the child first and then fails."""
     if process.returncode is None:
         with contextlib.suppress(ProcessLookupError):
             os.kill(process.pid, number)

@@ -1,4 +1,4 @@
-"""The paper's simulated experiment: drive down the hall, and set estimates against truth as its Table 2 does."""
+"""The paper's simulated experiment: drive down the hall and compare estimates with the truth, as in its Table 2."""
 
 from __future__ import annotations
 
@@ -23,9 +23,10 @@ from runtime.timing.cycle_stats import Quantiles, worst_of
 CHI2_95: Final = 5.991
 """The 95 % quantile of χ² with two degrees of freedom."""
 GATE_M: Final = FOOT_M
-"""An estimate farther than a foot from every drum is a false one."""
+"""An estimate farther than this (a foot) from every drum is false."""
 
 SECONDS_MAX: Final = 600.0
+"""Virtual time after which a drive has failed; a normal one takes about a tenth of it."""
 
 
 class DrumRow(TypedDict):
@@ -37,7 +38,7 @@ class DrumRow(TypedDict):
 
 
 class Outcome(TypedDict):
-    """The experiment's summary: the JSON form of the public surface."""
+    """The experiment's summary, as `--json` writes it."""
 
     drums: list[DrumRow]
     false: int
@@ -46,23 +47,23 @@ class Outcome(TypedDict):
     times_real_time: float
     cycle_us: Quantiles
     spread: NotRequired[Spread]
-    """Where there was more than one seed."""
+    """Only with more than one seed."""
 
 
 class Spread(TypedDict):
-    """Errors over many seeds, each seed's drums taken together, m."""
+    """Errors over many seeds, m."""
 
     seeds: int
     mean: float
     deviation: float
-    """Of the seeds' mean errors."""
+    """Standard deviation of the seeds' mean errors."""
     worst: float
     """The largest error of a single drum."""
     worst_seed: int
-    """The first that had it."""
+    """The first seed with that error."""
     missed: int
     missed_most: int
-    """Drums not found by the seed that found fewest."""
+    """Drums not found by the worst seed."""
     false: int
 
 
@@ -77,7 +78,7 @@ class SeedOutcome:
     elapsed_s: float
     cycle_us: Quantiles
     end: dict[str, Any] = field(default_factory=dict)
-    """What a recording of it says at its end, as a run's summary does."""
+    """The summary at the end of a recording of it."""
 
 
 def run_seed(
@@ -87,19 +88,23 @@ def run_seed(
     on_state: Callable[[CycleRecord, State, Pose], None] | None = None,
     on_bytes: OnBytes | None = None,
 ) -> SeedOutcome:
-    """Run the experiment once in virtual time.
+    """Run the experiment once in virtual time and return its outcome.
 
     Parameters
     ----------
-    settings, world, seed
-        The robot, what it meets, and everything random.
+    settings : Settings
+        The robot and everything it does.
+    world : WorldConfig
+        The true world.
+    seed : int
+        Of all randomness.
     on_state, on_bytes : callable, optional
-        A recorder's, as `simulate` calls them.
+        As `simulate` calls them; for a recorder.
 
     Raises
     ------
     UserError
-        The robot stopped for a reason, touched something, or did not get through in `SECONDS_MAX`.
+        The robot stopped, touched an obstacle, or did not arrive within `SECONDS_MAX`.
     """
     run = simulate(settings, world, seed, SECONDS_MAX, on_state=on_state, on_bytes=on_bytes)
     require_finished(run, seed, SECONDS_MAX)
@@ -110,29 +115,38 @@ def run_seed(
 
 
 def require_finished(run: SimulationResult, seed: int, seconds_max: float) -> None:
-    """Refuse a drive that did not come through.
+    """Check that a drive reached the end of the hall.
+
+    Parameters
+    ----------
+    run : SimulationResult
+        The drive.
+    seed : int
+        For the message.
+    seconds_max : float
+        Its time limit, for the message, s.
 
     Raises
     ------
     UserError
-        The robot stopped for a reason, touched something, or did not get through in `seconds_max`.
+        The robot stopped, touched an obstacle, or did not arrive within `seconds_max`.
     """
     if run.state.mode.mode is Mode.SAFE_STOP:
         raise UserError(
             f"seed {seed}: the robot stopped after {run.virtual_s:.1f} s: {run.state.mode.reason}", FAILED
         )
     if run.truth.contacts:
-        raise UserError(f"seed {seed}: the robot touched something", FAILED)
+        raise UserError(f"seed {seed}: the robot touched an obstacle", FAILED)
     if run.state.leg is None or not run.state.leg.done:
         raise UserError(
-            f"seed {seed}: the robot did not get through in {seconds_max:.0f} s: look for a way that is too narrow "
-            "for its radius and safety margin",
+            f"seed {seed}: the robot did not arrive within {seconds_max:.0f} s: check for a passage that is too "
+            "narrow for its radius and safety margin",
             FAILED,
         )
 
 
 def simulation_summary(run: SimulationResult) -> dict[str, Any]:
-    """Return the summary of a run in virtual time: what there is of ``echolocate run``'s without a clock."""
+    """Return the summary of a run in virtual time: that of ``echolocate run`` without the timing."""
     counts = run.counts
     return {
         "objects": [object_row(seen) for seen in run.state.perception.objects()],
@@ -145,13 +159,13 @@ def simulation_summary(run: SimulationResult) -> dict[str, Any]:
 
 
 def estimates(run: SimulationResult) -> list[tuple[float, float]]:
-    """Return where objects were seen, in world coordinates, m."""
+    """Return the estimated positions of the objects in world coordinates, m."""
     places = [run.start.compose(Pose(o.x, o.y, o.theta)) for o in run.state.perception.objects()]
     return [(p.x, p.y) for p in places]
 
 
 def match_drums(world: WorldConfig, seen: list[tuple[float, float]]) -> tuple[list[DrumRow], int]:
-    """Pair drums with estimates, nearest pairs first and each at most once; return the rows and the false ones."""
+    """Match estimates with drums by `nearest_pairs`; return a row for each drum and the number of false estimates."""
     drums = [(d.x_m, d.y_m) for d in world.drum]
     match = nearest_pairs(drums, seen)
     rows: list[DrumRow] = []
@@ -163,7 +177,7 @@ def match_drums(world: WorldConfig, seen: list[tuple[float, float]]) -> tuple[li
 
 
 def nearest_pairs(truth: list[tuple[float, float]], seen: list[tuple[float, float]]) -> dict[int, int]:
-    """Return which seen place belongs to which true one: nearest pairs first, each once, none beyond the gate."""
+    """Return the index of the estimate for each matched true position: nearest pairs first, none beyond the gate."""
     pairs = sorted((math.dist(t, e), i, j) for i, t in enumerate(truth) for j, e in enumerate(seen))
     match: dict[int, int] = {}
     for distance, i, j in pairs:
@@ -173,7 +187,7 @@ def nearest_pairs(truth: list[tuple[float, float]], seen: list[tuple[float, floa
 
 
 def spread(outcomes: Sequence[SeedOutcome]) -> Spread | None:
-    """Return how much the seeds differ, None where no drum was found by any."""
+    """Return how much the seeds differ; None if none of them found a drum."""
     means, worst = [], []
     for outcome in outcomes:
         errors = [row["error"] for row in outcome.rows if row["error"] is not None]
@@ -196,7 +210,7 @@ def spread(outcomes: Sequence[SeedOutcome]) -> Spread | None:
 
 
 def summarise(outcomes: list[SeedOutcome]) -> Outcome:
-    """Return the summary over all runs: their rows one after another."""
+    """Return the summary over all runs, with their rows one after another."""
     rows = [row for outcome in outcomes for row in outcome.rows]
     errors = [row["error"] for row in rows if row["error"] is not None]
     elapsed_s = sum(outcome.elapsed_s for outcome in outcomes)

@@ -1,7 +1,7 @@
-"""How long before the robot passes a drum it is surely known where it stands: what a robot can still act upon.
+"""How far before passing a drum its position is reliably known, so that the robot can still act upon it.
 
-A fix is sure from the first reading on after which the drum is always reported to within a quarter of a foot, to the
-end of the drive: a right guess that is taken back is none.
+The first fix is the first reading from which on, to the end of the drive, the drum is always reported to within a
+quarter of a foot. A correct report that is withdrawn later does not count.
 """
 
 from __future__ import annotations
@@ -16,37 +16,39 @@ from config.world import DrumConfig
 from perception.detected_object import DetectedObject
 
 WITHIN_M: Final = 0.25 * FOOT_M
+"""Largest position error of a fix: about the paper's mean error of 0.249 ft (Table 2)."""
 EARLY_FIX_M: Final = 4.0 * FOOT_M
-"""How long before is asked for."""
+"""Distance before the drum at which a fix counts as early."""
 ROUNDING_M: Final = 1e-9
+"""Tolerance of that comparison."""
 
 
 class FirstFix(TypedDict):
-    """First sure fixes of all drums of a scene, metres along the hall before passing; negative after it."""
+    """First fixes of all drums of a scene: metres along the hall before passing; negative after it."""
 
     least: float | None
-    """Without where a drum was never fixed."""
+    """None if a drum was never fixed."""
     median: float
-    """Of the drums that were."""
+    """Of the drums that were fixed."""
     share: float
-    """Of all drums, how many were fixed `EARLY_FIX_M` before."""
+    """Share of all drums that were fixed at least `EARLY_FIX_M` before."""
 
 
 class FirstFixTracker:
-    """Watches the drums of one straight drive.
+    """Finds the first fix of each drum of one straight drive.
 
     Parameters
     ----------
     drums : sequence of DrumConfig
-        What stands there.
+        The drums.
     """
 
     def __init__(self, drums: Sequence[DrumConfig]) -> None:
         self._drums = drums
         self._before: list[float | None] = [None] * len(drums)
 
-    def look(self, x: float, seen: Iterable[DetectedObject]) -> None:
-        """Enter what is reported with the robot at `x` (m) along the hall."""
+    def update(self, x: float, seen: Iterable[DetectedObject]) -> None:
+        """Add the objects reported with the robot at `x` (m) along the hall."""
         places = [(o.x, o.y) for o in seen]
         for i, drum in enumerate(self._drums):
             if not any(math.dist(place, (drum.x_m, drum.y_m)) <= WITHIN_M for place in places):
@@ -55,12 +57,12 @@ class FirstFixTracker:
                 self._before[i] = drum.x_m - x
 
     def fixes(self) -> list[float | None]:
-        """Return for each drum how far before it the robot was at its first sure fix, m; None where there is none."""
+        """Return for each drum how far before it the robot was at the first fix, m; None without a fix."""
         return list(self._before)
 
 
 def summarise_fixes(fixes: Sequence[float | None]) -> FirstFix | None:
-    """Return least, median and the share that was early enough; None where no drum was ever fixed."""
+    """Return minimum, median and the share of early fixes; None if no drum was ever fixed."""
     had = [fix for fix in fixes if fix is not None]
     if not had:
         return None

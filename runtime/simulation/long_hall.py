@@ -1,4 +1,4 @@
-"""A hall of forty drums: more than any reading shows, so that a small budget has something to put off.
+"""A hall of forty drums: more than refinement under a small budget can keep up with.
 
 Two columns of twenty, each drum moved a little along the hall and across it, ranges with 1 % noise.
 """
@@ -15,7 +15,7 @@ from config.world import AcousticsConfig, DrumConfig, StartConfig, WorldConfig
 A_SIDE: Final = 20
 RADIUS_FT: Final = 1.0
 PITCH_FT: Final = 3.2
-"""From drum to drum along the hall: six inches at least are open between two."""
+"""Distance from drum to drum along the hall; at least six inches between two stay free."""
 ACROSS_FT: Final = 4.2
 ALONG_MOVE_FT: Final = 0.3
 ACROSS_MOVE_FT: Final = 0.4
@@ -23,11 +23,11 @@ FROM_FT: Final = -6.0
 BEYOND_FT: Final = 6.0
 
 WAY_M: Final = (A_SIDE * PITCH_FT - FROM_FT + BEYOND_FT) * FOOT_M
-"""From the start past the last drum into the open, m."""
+"""Distance from the start to beyond the last drum, m."""
 
 
 def long_hall(seed: int) -> WorldConfig:
-    """Return such a hall; another seed, other places."""
+    """Return the hall; the seed determines the positions of the drums."""
     rng = np.random.default_rng(np.random.SeedSequence([seed, 4]))
     moves = rng.uniform(-1.0, 1.0, (2, A_SIDE, 2)).tolist()
     drums = [

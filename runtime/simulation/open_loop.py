@@ -1,4 +1,4 @@
-"""The experiment without the robot: perception alone on a scene's readings, and what it saw set against the truth."""
+"""The experiment without the robot: perception alone on the readings of a scene, compared with the truth."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from runtime.timing.cycle_stats import CycleStats, worst_of
 
 _QUARTER_TURN: Final = 0.5 * math.pi
 RADIUS_TOLERANCE_M: Final = 0.01
-"""A cylinder is a drum to be found where its radius is a model's to within this."""
+"""A cylinder counts as a drum to be found if its radius equals a model's to within this."""
 
 
 class BoxRow(TypedDict):
-    """A box, metres in world coordinates; its angle error is what remains after turns that leave it as it is."""
+    """A box, metres in world coordinates. Its angle error takes its symmetry into account."""
 
     truth: tuple[float, float]
     estimate: tuple[float, float] | None
@@ -35,15 +35,15 @@ class BoxRow(TypedDict):
 
 
 class SceneOutcome(Outcome):
-    """The experiment's summary, with boxes where the scene holds boxes."""
+    """The experiment's summary, with the boxes of the scene."""
 
     scene: SceneName
     boxes: list[BoxRow]
     halls: int
     inside_95: float | None
-    """Share of the drums found that stand inside their 95 % ellipse; without where the method gives none."""
+    """Share of the found drums inside their 95 % ellipse; None if the method gives no covariance."""
     first_fix: FirstFix | None
-    """How long before passing drums were fixed; without where the way is not straight or nothing was."""
+    """How far before passing the drums were fixed; None if the path is not straight or no drum was fixed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,13 +57,13 @@ class HallOutcome:
     cycle_stats: CycleStats
     """What the readings took."""
     inside: list[bool]
-    """For each drum found with a covariance, whether it stands in the 95 % ellipse."""
+    """For each drum found with a covariance, whether it is inside the 95 % ellipse."""
     fixes: list[float | None]
-    """For each drum of a straight hall, how far before it the robot was at its first sure fix, m."""
+    """For each drum of a straight hall, how far before it the robot was at its first fix, m."""
 
 
 def perceive(perception: Perception, firing: Firing) -> tuple[DetectedObject, ...]:
-    """Take in one reading, improve until nothing is left to improve, and return what is recognised then."""
+    """Process one reading, refine until convergence, and return the recognised objects."""
     perception.observe(firing)
     while perception.can_refine and perception.refine():
         pass
@@ -71,43 +71,62 @@ def perceive(perception: Perception, firing: Firing) -> tuple[DetectedObject, ..
 
 
 def run_hall(settings: Settings, hall: Hall, seed: int) -> HallOutcome:
-    """Drive through `hall` once and set what was seen against what stands there."""
+    """Drive through a hall once and return how the recognised objects compare with the truth.
+
+    Parameters
+    ----------
+    settings : Settings
+        Ring, models and perception.
+    hall : Hall
+        The world and the path.
+    seed : int
+        Of the noise.
+    """
     perception = Perception(settings.ring, settings.models, settings.perception)
     seen: tuple[DetectedObject, ...] = ()
     heard = list(readings(settings.ring, hall, seed))
     cycle_stats = CycleStats(late_after_s=math.inf)
-    watch = FirstFixTracker(() if hall.path else hall.world.drum)
+    fix_tracker = FirstFixTracker(() if hall.path else hall.world.drum)
     for firing in heard:
         begin = time.perf_counter()
         seen = perceive(perception, firing)
         cycle_stats.add_cycle(time.perf_counter() - begin)
-        watch.look(float(firing.pose.x), seen)
+        fix_tracker.update(float(firing.pose.x), seen)
     drums, boxes, false = match_objects(hall.world, seen, settings.models)
     return HallOutcome(
-        drums, boxes, false, heard[-1].robot_s, cycle_stats, inside_ellipse(drums, seen), watch.fixes()
+        drums, boxes, false, heard[-1].robot_s, cycle_stats, inside_ellipse(drums, seen), fix_tracker.fixes()
     )
 
 
 def inside_ellipse(drums: Iterable[DrumRow], seen: Iterable[DetectedObject]) -> list[bool]:
-    """Return for each drum found with a covariance whether it lies in the 95 % ellipse of its estimate."""
+    """Return for each drum found with a covariance whether it is inside the 95 % ellipse of its estimate."""
     by_place = {(s.x, s.y): s.covariance for s in seen}
-    is_inside = []
+    inside = []
     for row in drums:
         covariance = None if row["estimate"] is None else by_place.get(row["estimate"])
         if covariance is not None and row["estimate"] is not None:
             xx, xy, yy = covariance
             dx, dy = row["truth"][0] - row["estimate"][0], row["truth"][1] - row["estimate"][1]
             squared = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
-            is_inside.append(squared <= CHI2_95)
-    return is_inside
+            inside.append(squared <= CHI2_95)
+    return inside
 
 
 def match_objects(
     world: WorldConfig, seen: Iterable[DetectedObject], models: Iterable[ModelConfig]
 ) -> tuple[list[DrumRow], list[BoxRow], int]:
-    """Set round models against the world's drums and the others against its boxes; count what matches nothing.
+    """Match objects of round models with drums, others with boxes; return both rows and the number of false objects.
 
-    What is named after none of the models, as a wall, is neither and is not counted.
+    Objects that are of none of the models, such as walls, are ignored.
+
+    Parameters
+    ----------
+    world : WorldConfig
+        The truth.
+    seen : iterable of DetectedObject
+        In world coordinates.
+    models : iterable of ModelConfig
+        The models that were looked for.
     """
     models = list(models)
     is_round = {model.name: model.arc_radius_m is not None for model in models}
@@ -134,27 +153,46 @@ def match_objects(
 
 
 def angle_error(box: BoxConfig, theta: float) -> float:
-    """Return by how much `theta` misses the nearest of the angles at which the box looks as it does, rad."""
+    """Return the difference of `theta` to the nearest angle at which the box looks the same, rad."""
     period = _QUARTER_TURN if box.width_m == box.depth_m else 2.0 * _QUARTER_TURN
     return abs((theta - math.radians(box.angle_deg) + 0.5 * period) % period - 0.5 * period)
 
 
 def run_scene(settings: Settings, name: SceneName, seed: int) -> list[HallOutcome]:
-    """Drive through every hall of a scene; halls differ in their noise as well."""
+    """Drive through every hall of a scene and return the outcomes; each hall has its own noise.
+
+    Parameters
+    ----------
+    settings : Settings
+        Ring, models and perception.
+    name : SceneName
+        The scene.
+    seed : int
+        Of the scene and the noise.
+    """
     return [run_hall(settings, hall, seed * 1000 + i) for i, hall in enumerate(halls(name, seed))]
 
 
 def summarise_scene(name: SceneName, outcomes: list[HallOutcome], models: Iterable[ModelConfig]) -> SceneOutcome:
     """Return the summary over all drives.
 
-    Boxes have rows only where a model other than a round one was looked for; else they are there to be left alone.
+    Boxes have rows only if a model that is not round was looked for.
+
+    Parameters
+    ----------
+    name : SceneName
+        The scene.
+    outcomes : list of HallOutcome
+        The drives.
+    models : iterable of ModelConfig
+        The models that were looked for.
     """
     with_boxes = any(model.arc_radius_m is None for model in models)
     drums = [row for outcome in outcomes for row in outcome.drums]
     boxes = [row for outcome in outcomes for row in outcome.boxes] if with_boxes else []
     errors = [e for rows in (drums, boxes) for row in rows if (e := row["error"]) is not None]
     elapsed_s = sum(outcome.cycle_stats.total_s for outcome in outcomes)
-    inside = [one for outcome in outcomes for one in outcome.inside]
+    inside = [is_inside for outcome in outcomes for is_inside in outcome.inside]
     return {
         "scene": name,
         "halls": len(outcomes),

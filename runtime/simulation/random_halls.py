@@ -1,7 +1,7 @@
-"""Random irregular halls: a room, eight drums, a box and two cylinders that are no drums, and a swerving way through.
+"""Random irregular halls: a room with eight drums, a box, two cylinders that are no drums, and a winding path.
 
-They are what recognition is judged on: no two alike, decoys among the drums, mirrors for walls. Each seed is one
-hall. Lengths are written in feet, as for the other scenes.
+Recognition is evaluated on them: all different, with distractors among the drums and walls that reflect like mirrors.
+Each seed gives one hall. Lengths are in feet, as for the other scenes.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ DRUM: Final = 1.0
 POST: Final = 0.35
 BARREL: Final = 2.2
 BOX: Final = 1.45
-"""Radii, ft; a box needs this much room."""
+"""Radii, ft; for a box, of the circle that it needs."""
 LENGTH_MAX: Final = 26.0
 STEP: Final = 0.05
-"""From firing to firing, ft."""
+"""Distance between firings, ft."""
 FROM: Final = -6.5
 BOX_SIDE: Final = 2.0
 
@@ -33,14 +33,14 @@ Placed = list[tuple[float, float, float]]
 
 
 def _rows(rng: np.random.Generator) -> tuple[Placed, float]:
-    """Return what stands along both sides as (x, y, radius), ft, and where the longer side ends."""
-    objects = np.array([DRUM] * 8 + [BOX, POST, BARREL])
+    """Return the objects along both sides as (x, y, radius), ft, and the end of the longer side."""
+    radii_ft = np.array([DRUM] * 8 + [BOX, POST, BARREL])
     while True:
-        rng.shuffle(objects)
+        rng.shuffle(radii_ft)
         cut = 6 if rng.random() < 0.5 else 5
         placed: Placed = []
         end = 0.0
-        for side, radii in ((1.0, objects[:cut]), (-1.0, objects[cut:])):
+        for side, radii in ((1.0, radii_ft[:cut]), (-1.0, radii_ft[cut:])):
             x = float(rng.uniform(-1.0, 1.5))
             for radius in radii.tolist():
                 x += radius
@@ -54,19 +54,19 @@ def _rows(rng: np.random.Generator) -> tuple[Placed, float]:
 def random_hall(
     seed: int, acoustics: AcousticsConfig = ACOUSTICS
 ) -> tuple[WorldConfig, tuple[tuple[float, float, float], ...]]:
-    """Return a hall and the way through it.
+    """Return a hall and the path through it.
 
     Parameters
     ----------
     seed : int
         Which hall.
     acoustics : AcousticsConfig
-        How it sounds: mirrors, 1 % noise, 3 % outliers and 5 % drop-outs where not given.
+        By default specular, with 1 % noise, 3 % outliers and 5 % drop-outs.
 
     Returns
     -------
     (WorldConfig, tuple of (x, y, ring_yaw))
-        The hall, and where the ring fires: metres, radians. The two cylinders are drums of other radii there.
+        The hall, and the poses at which the ring fires, m and rad. The two cylinders are drums of other radii there.
     """
     rng = np.random.default_rng(np.random.SeedSequence([seed, 2]))
     placed, end = _rows(rng)

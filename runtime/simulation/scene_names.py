@@ -1,4 +1,4 @@
-"""What the scenes are called: apart from the scenes, so that the command line can offer them without loading them."""
+"""The names of the scenes, separate from the scenes so that the command line can offer them without loading them."""
 
 from __future__ import annotations
 

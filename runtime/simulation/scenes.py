@@ -1,8 +1,7 @@
-"""Scenes to measure recognition on: halls as pure data, and a drive through each that needs no robot.
+"""Scenes for measuring recognition: halls as pure data, and drives through them that need no robot.
 
-A drive with exact poses and whole-ring readings takes the base, the line and the clock out of the comparison, so
-that an error in the table is perception's own, and other estimators can be given the very same readings. Lengths
-are written in feet, as the paper writes them.
+Exact poses and readings of the whole ring exclude the base, the serial line and the clock, so that all errors are
+perception's own, and other estimators can get the same readings. Lengths are in feet, as in the paper.
 """
 
 from __future__ import annotations
@@ -25,34 +24,34 @@ from runtime.simulation.random_halls import random_hall
 from runtime.simulation.scene_names import SceneName
 
 PLACES_FT: Final = tuple((x, y) for y in (4.0, -4.0) for x in (1.0, 4.0, 7.0))
-"""Where the paper's six drums stand (its Table 2)."""
+"""Positions of the paper's six drums (its Table 2)."""
 FROM_FT: Final = -6.0
 TO_FT: Final = 14.0
 STEP_FT: Final = 0.25
 READINGS: Final = 1 + round((TO_FT - FROM_FT) / STEP_FT)
-"""Readings of one way down the hall."""
+"""Readings of one drive down the hall."""
 SPEED_M_S: Final = 0.3
-"""How fast the robot goes; with it a reading comes every quarter of a second."""
+"""Speed of the robot; there is a reading every quarter of a second."""
 
 DRUM_RADIUS_FT: Final = 1.0
 BOX_SIDE_FT: Final = 2.0
 WALLS_FT: Final = ((-14.0, 8.0, 17.0, 8.0), (-14.0, -8.0, 17.0, -8.0), (17.0, -8.0, 17.0, 8.0))
-"""y = ±8 and x = 17; the side walls begin far behind the robot."""
+"""Ends x, y, x, y: walls at y = ±8 and x = 17, of which the side walls start far behind the robot."""
 MOVES_FT: Final = 0.4
-"""Drums are moved by up to this along the hall and across it."""
+"""Largest random offset of a drum along the hall and across it."""
 MOVED_HALLS: Final = 10
 OCTET: Final = 3
-"""On a path every third sensor fires at a time, in turn."""
+"""On a path every third sensor fires at once, in turn."""
 
 
 @dataclass(frozen=True, slots=True)
 class Hall:
-    """A world to drive through, and what to call it."""
+    """A named world with a path through it."""
 
     name: str
     world: WorldConfig
     path: tuple[tuple[float, float, float], ...] = ()
-    """Where the ring fires, octet by octet: x, y (m) and its direction (rad); straight down the hall without."""
+    """Where the ring fires, octet by octet: x, y (m) and its direction (rad). Empty: straight down the hall."""
 
 
 def halls(name: SceneName, seed: int = 0) -> tuple[Hall, ...]:
@@ -60,32 +59,32 @@ def halls(name: SceneName, seed: int = 0) -> tuple[Hall, ...]:
 
     Parameters
     ----------
-    name
-        Which scene.
-    seed
-        Of where the drums of `moved` and `jit10` stand; both have the same places; and of all that is in `halls`.
-        The other scenes have no chance in them but their noise.
+    name : SceneName
+        The scene.
+    seed : int
+        Of the drums' offsets in `moved` and `jit10`, which are the same in both, and of everything in `halls`. The
+        other scenes do not depend on it.
     """
     return _SCENES[name](seed)
 
 
 def readings(ring: RingConfig, hall: Hall, seed: int, passes: int = 1) -> Iterator[Firing]:
-    """Yield what the ring hears on its way down the hall, and then up and down again, at exact poses.
+    """Yield the readings of a drive down the hall, and then back and forth again, at exact poses.
 
-    All sensors fire at once, `READINGS` times a pass; in a hall with a path, octets in turn, one at each of its
-    places. The ring does not turn at the hall's ends, as on a synchro
-    drive. Poses are in world coordinates; time goes on at `SPEED_M_S`.
+    All sensors fire at once, `READINGS` times a pass; in a hall with a path, the octets fire in turn, one at each of
+    its points. As on a synchro drive, the ring does not turn at the ends of the hall. Poses are in world coordinates;
+    times follow from `SPEED_M_S`.
 
     Parameters
     ----------
-    ring
+    ring : RingConfig
         The sensors.
-    hall
-        What they are in.
-    seed
+    hall : Hall
+        The world and the path.
+    seed : int
         Of the noise.
-    passes
-        How often to go through the hall.
+    passes : int
+        Number of drives through the hall.
     """
     acoustics = hall.world.acoustics
     sonar = Sonar(
@@ -103,7 +102,7 @@ def readings(ring: RingConfig, hall: Hall, seed: int, passes: int = 1) -> Iterat
 
 
 def _along(path: tuple[tuple[float, float, float], ...], passed: int, sonar: Sonar, sensors: int) -> Iterator[Firing]:
-    """Yield a way along a path and, every other time, back."""
+    """Yield the readings along a path, on every other pass backwards."""
     for k, (x, y, yaw) in enumerate(path[:: -1 if passed % 2 else 1]):
         pose = Pose(x, y, 0.0)
         t_s = (passed * len(path) + k) * math.dist(path[0][:2], path[-1][:2]) / len(path) / SPEED_M_S

@@ -1,1 +1,1 @@
-"""Runs in the forms of other programs: tables for spreadsheets and data frames, Foxglove, ROS 2, ring logs."""
+"""Export of runs for other programs: tables for spreadsheets and data frames, Foxglove, ROS 2, ring logs."""

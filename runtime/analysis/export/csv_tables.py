@@ -13,7 +13,7 @@ import numpy as np
 from runtime.analysis.timeline import BEARING, RANGE, ROBOT_T, SENSOR, T, Timeline, X, Y
 
 Table: TypeAlias = Mapping[str, Sequence[Any]]
-"""Columns by name, all of one length; None stands for what is not known."""
+"""Columns by name, all of the same length. None means unknown."""
 
 FRAME_NOTE = "metres, radians, seconds after the first cycle; coordinates in the frame of the odometry"
 
@@ -29,7 +29,7 @@ def tables(timeline: Timeline) -> dict[str, Table]:
 
 
 def _echoes(timeline: Timeline) -> Table:
-    """Return one row for each sensor that fired; `heard` says whether anything came back."""
+    """Return one row for each sensor that fired; `heard` is whether it received an echo."""
     rows = timeline.echoes
     heard = np.isfinite(rows[:, RANGE])
     reach = np.where(heard, rows[:, RANGE], np.nan)
@@ -48,7 +48,7 @@ def _echoes(timeline: Timeline) -> Table:
 
 
 def _segments(timeline: Timeline) -> Table:
-    """Return one row for each outline segment that was in the run's own map when anybody looked."""
+    """Return one row for each outline segment that was in the run's own map at any snapshot."""
     names = ("first_seen_s", "last_seen_s", "x1_m", "y1_m", "x2_m", "y2_m", "normal_rad")
     return {name: timeline.segments[:, i].tolist() for i, name in enumerate(names)}
 
@@ -73,17 +73,17 @@ def _objects(timeline: Timeline) -> Table:
 
 
 def _odometry(timeline: Timeline) -> Table:
-    way = timeline.odometry
+    path_rows = timeline.odometry
     return {
-        "t_s": [t for t, _ in way],
-        "robot_t_s": [o.robot_s for _, o in way],
-        "x_m": [o.pose.x for _, o in way],
-        "y_m": [o.pose.y for _, o in way],
-        "heading_rad": [o.pose.theta for _, o in way],
-        "ring_yaw_rad": [o.ring_yaw for _, o in way],
-        "v_m_s": [o.twist.v for _, o in way],
-        "w_rad_s": [o.twist.w for _, o in way],
-        "flags": [int(o.flags) for _, o in way],
+        "t_s": [t for t, _ in path_rows],
+        "robot_t_s": [o.robot_s for _, o in path_rows],
+        "x_m": [o.pose.x for _, o in path_rows],
+        "y_m": [o.pose.y for _, o in path_rows],
+        "heading_rad": [o.pose.theta for _, o in path_rows],
+        "ring_yaw_rad": [o.ring_yaw for _, o in path_rows],
+        "v_m_s": [o.twist.v for _, o in path_rows],
+        "w_rad_s": [o.twist.w for _, o in path_rows],
+        "flags": [int(o.flags) for _, o in path_rows],
     }
 
 
@@ -92,7 +92,7 @@ def _known(values: list[float]) -> list[float | None]:
 
 
 def write_csv(timeline: Timeline, folder: Path) -> list[Path]:
-    """Write a CSV file for each table; what is not known is an empty cell.
+    """Write a CSV file for each table and return the files; unknown values are empty cells.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def write_csv(timeline: Timeline, folder: Path) -> list[Path]:
 
 
 def write_parquet(timeline: Timeline, folder: Path) -> list[Path]:
-    """Write a Parquet file for each table; its metadata says units and frame.
+    """Write a Parquet file for each table and return the files; their metadata holds units and frame.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def write_parquet(timeline: Timeline, folder: Path) -> list[Path]:
     for name, table in tables(timeline).items():
         schema = pa.schema(
             [(column, kinds.get(column, pa.float64())) for column in table],
-            metadata={"echolocate": FRAME_NOTE, "begun_unix_ns": str(timeline.start_unix_ns)},
+            metadata={"echolocate": FRAME_NOTE, "start_unix_ns": str(timeline.start_unix_ns)},
         )
         path = folder / f"{name}.parquet"
         pq.write_table(pa.table(dict(table), schema=schema), path, compression="zstd")

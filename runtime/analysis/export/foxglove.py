@@ -1,7 +1,7 @@
-"""A run for Foxglove: an MCAP whose channels have Foxglove's own schemas, through its SDK.
+"""Export of a run for Foxglove: an MCAP file with Foxglove's own schemas, written by its SDK.
 
-Frames: `world` (where the truth is known) → `odom` → `base`, which turns with the wheels. What the ring hears is in
-`odom` with the pose that the ring had at that very firing.
+Frames: `world` (if the true world is known) → `odom` → `base`, which turns with the wheels. Echoes are in `odom`,
+from the pose that the ring had at their firing.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from runtime.analysis.export.shapes import (
     SEGMENT,
     TRUTH,
     Colour,
-    Round,
+    FiringScan,
     even_radius,
-    rounds,
-    turned,
+    firing_scans,
     whole_ring,
+    yaw_quaternion,
 )
-from runtime.analysis.plots.geometry import outline, things
+from runtime.analysis.plots.geometry import outline, world_outlines
 from runtime.analysis.timeline import BEARING, RANGE, LogEntry, RunSnapshot, Timeline, X, Y
 
 ARC_POINTS: Final = 9
@@ -42,7 +42,7 @@ Places = Iterable[Iterable[float]]
 
 
 def write_foxglove(timeline: Timeline, path: Path) -> list[Path]:
-    """Write a run as an MCAP for Foxglove.
+    """Write a run as an MCAP file for Foxglove and return the file.
 
     Raises
     ------
@@ -51,46 +51,46 @@ def write_foxglove(timeline: Timeline, path: Path) -> list[Path]:
     """
     context = foxglove.Context()
     with path.open("wb") as file:
-        disk = _Disk(file)
+        file_guard = _ErrorKeepingFile(file)
         try:
-            with foxglove.open_mcap(disk, context=context):
-                _Teller(timeline, context).tell()
+            with foxglove.open_mcap(file_guard, context=context):
+                _RunExporter(timeline, context).write()
         except RuntimeError:
-            if disk.refusal is None:
+            if file_guard.error is None:
                 raise
-            raise disk.refusal from None
+            raise file_guard.error from None
     return [path]
 
 
-class _Disk:
-    """A file that keeps why it would not be written: the SDK tells only that something went wrong."""
+class _ErrorKeepingFile:
+    """A file that keeps its OSError: the SDK reports only that something went wrong."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
-        self.refusal: OSError | None = None
+        self.error: OSError | None = None
 
     def write(self, data: bytes | bytearray) -> int:
         """Write, as a file does."""
-        return self._kept(lambda: self._file.write(data))
+        return self._keep_error(lambda: self._file.write(data))
 
     def seek(self, offset: int, whence: int = 0) -> int:
         """Seek, as a file does."""
-        return self._kept(lambda: self._file.seek(offset, whence))
+        return self._keep_error(lambda: self._file.seek(offset, whence))
 
     def flush(self) -> None:
         """Flush, as a file does."""
-        self._kept(self._file.flush)
+        self._keep_error(self._file.flush)
 
-    def _kept(self, act: Callable[[], T]) -> T:
+    def _keep_error(self, act: Callable[[], T]) -> T:
         try:
             return act()
         except OSError as error:
-            self.refusal = self.refusal or error
+            self.error = self.error or error
             raise
 
 
-class _Teller:
-    """Writes a run into channels."""
+class _RunExporter:
+    """Writes a run into Foxglove channels."""
 
     def __init__(self, timeline: Timeline, context: foxglove.Context) -> None:
         self._timeline = timeline
@@ -105,23 +105,23 @@ class _Teller:
         self._truth = ch.SceneUpdateChannel("/truth", context=context)
         self._log = ch.LogChannel("/log", context=context)
 
-    def tell(self) -> None:
+    def write(self) -> None:
         """Write everything, in order of time."""
         timeline = self._timeline
         poses = [(t, o.pose) for t, o in timeline.odometry] or [(m.t_s, m.pose) for m in timeline.snapshots]
-        items: list[tuple[float, Callable[[int], None]]] = [(0.0, self._tell_truth)]
-        items += [(t, partial(self._tell_pose, pose)) for t, pose in poses]
-        items += [(part.t_s, partial(self._tell_round, part)) for part in rounds(timeline)]
+        items: list[tuple[float, Callable[[int], None]]] = [(0.0, self._write_truth)]
+        items += [(t, partial(self._write_pose, pose)) for t, pose in poses]
+        items += [(scan.t_s, partial(self._write_scan, scan)) for scan in firing_scans(timeline)]
         items += [(snapshot.t_s, partial(self._write_snapshot, snapshot)) for snapshot in timeline.snapshots]
-        items += [(max(0.0, said.t_s), partial(self._tell_line, said)) for said in timeline.log]
-        for t_s, tell in sorted(items, key=lambda item: item[0]):
-            tell(timeline.unix_ns(t_s))
+        items += [(max(0.0, entry.t_s), partial(self._write_log_entry, entry)) for entry in timeline.log]
+        for t_s, write in sorted(items, key=lambda item: item[0]):
+            write(timeline.unix_ns(t_s))
 
-    def _tell_truth(self, at: int) -> None:
+    def _write_truth(self, at: int) -> None:
         self._frame("world", "odom", self._timeline.start, at)
         if self._timeline.world is None:
             return
-        closed, lines = things(self._timeline.world)
+        closed, lines = world_outlines(self._timeline.world)
         loops = [_line(points.tolist(), TRUTH, closed=True) for points in closed]
         walls = [_line(points.tolist(), TRUTH, closed=False) for points in lines]
         entity = fx.SceneEntity(timestamp=_stamp(at), frame_id="world", id="truth", lines=[*loops, *walls])
@@ -134,29 +134,29 @@ class _Teller:
         )  # fmt: skip
         self._frames.log(fx.FrameTransforms(transforms=[frame]), log_time=at)
 
-    def _tell_pose(self, pose: Pose, at: int) -> None:
+    def _write_pose(self, pose: Pose, at: int) -> None:
         self._frame("odom", "base", pose, at)
-        told = fx.PoseInFrame(timestamp=_stamp(at), frame_id="odom", pose=_placed(pose.x, pose.y, pose.theta))
-        self._pose.log(told, log_time=at)
+        message = fx.PoseInFrame(timestamp=_stamp(at), frame_id="odom", pose=_placed(pose.x, pose.y, pose.theta))
+        self._pose.log(message, log_time=at)
 
-    def _tell_round(self, part: Round, at: int) -> None:
-        """Write a firing: one scan of an even ring, or of any other an arc for each sensor."""
+    def _write_scan(self, scan: FiringScan, at: int) -> None:
+        """Write a firing: one scan for an even ring, otherwise an arc for each sensor."""
         ring = self._timeline.settings.ring
         radius, sensors = even_radius(ring), len(ring.mounts)
         if radius is not None:
-            scan = fx.LaserScan(
-                timestamp=_stamp(at), frame_id="odom", pose=_placed(part.x, part.y, part.yaw), start_angle=0.0,
-                end_angle=2.0 * math.pi * (sensors - 1) / sensors, ranges=whole_ring(sensors, radius, part),
+            message = fx.LaserScan(
+                timestamp=_stamp(at), frame_id="odom", pose=_placed(scan.x, scan.y, scan.yaw), start_angle=0.0,
+                end_angle=2.0 * math.pi * (sensors - 1) / sensors, ranges=whole_ring(sensors, radius, scan),
             )  # fmt: skip
-            self._ring.log(scan, log_time=at)
+            self._ring.log(message, log_time=at)
             return
         half = math.radians(ring.beam_half_angle_deg)
-        for row in part.rows.tolist():
-            scan = fx.LaserScan(
+        for row in scan.rows.tolist():
+            message = fx.LaserScan(
                 timestamp=_stamp(at), frame_id="odom", pose=_placed(row[X], row[Y], row[BEARING]),
                 start_angle=-half, end_angle=half, ranges=[row[RANGE]] * ARC_POINTS,
             )  # fmt: skip
-            self._ring.log(scan, log_time=at)
+            self._ring.log(message, log_time=at)
 
     def _write_snapshot(self, snapshot: RunSnapshot, at: int) -> None:
         ends = snapshot.segments.reshape(-1, 2).tolist()
@@ -184,10 +184,10 @@ class _Teller:
             texts.append(text)
         _scene(self._objects, "models", shapes, texts, at)
 
-    def _tell_line(self, said: LogEntry, at: int) -> None:
+    def _write_log_entry(self, entry: LogEntry, at: int) -> None:
         levels = {"debug": fx.LogLevel.Debug, "warning": fx.LogLevel.Warning, "error": fx.LogLevel.Error}
-        level = levels.get(said.level, fx.LogLevel.Info)
-        self._log.log(fx.Log(timestamp=_stamp(at), level=level, message=said.text, name="echolocate"), log_time=at)
+        level = levels.get(entry.level, fx.LogLevel.Info)
+        self._log.log(fx.Log(timestamp=_stamp(at), level=level, message=entry.text, name="echolocate"), log_time=at)
 
 
 def _scene(
@@ -197,7 +197,7 @@ def _scene(
     texts: list[fx.TextPrimitive],
     at: int,
 ) -> None:
-    """Replace an entity as a whole: what is no longer known goes."""
+    """Replace an entity as a whole, so that elements that are gone disappear."""
     entity = fx.SceneEntity(timestamp=_stamp(at), frame_id="odom", id=name, lines=lines, texts=texts)
     channel.log(fx.SceneUpdate(entities=[entity]), log_time=at)
 
@@ -213,7 +213,7 @@ def _stamp(at: int) -> fx.Timestamp:
 
 
 def _quaternion(yaw: float) -> fx.Quaternion:
-    x, y, z, w = turned(yaw)
+    x, y, z, w = yaw_quaternion(yaw)
     return fx.Quaternion(x=x, y=y, z=z, w=w)
 
 

@@ -1,7 +1,8 @@
-"""A run as a ROS 2 bag, without ROS: sensor_msgs/Range, nav_msgs/Odometry, markers and frames, through rosbags.
+"""Export of a run as a ROS 2 bag, without ROS: ranges, odometry, markers and frames, written by rosbags.
 
-Topics: `/sonar/s00` … each in a frame of its own below `ring`; `/odom`; `/markers`; `/tf` and `/tf_static`. The
-frame `ring` is where the ring was at the last firing: on a synchro drive it does not turn with `base_link`.
+Topics: `/sonar/s00` … (sensor_msgs/Range), each in its own frame below `ring`; `/odom`; `/markers`; `/tf` and
+`/tf_static`. The frame `ring` is the pose of the ring at the last firing: on a synchro drive it does not turn with
+`base_link`.
 """
 
 from __future__ import annotations
@@ -17,8 +18,17 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from drivers.messages import Odometry, Pose
-from runtime.analysis.export.shapes import CLUSTER, MODEL, SEGMENT, TRUTH, Colour, Round, rounds, turned
-from runtime.analysis.plots.geometry import outline, things
+from runtime.analysis.export.shapes import (
+    CLUSTER,
+    MODEL,
+    SEGMENT,
+    TRUTH,
+    Colour,
+    FiringScan,
+    firing_scans,
+    yaw_quaternion,
+)
+from runtime.analysis.plots.geometry import outline, world_outlines
 from runtime.analysis.timeline import RANGE, SENSOR, RunSnapshot, Timeline
 
 if TYPE_CHECKING:
@@ -27,14 +37,14 @@ if TYPE_CHECKING:
 VERSION: Final = 9
 LINE_M: Final = 0.02
 STRIP, LINES = 4, 5
-"""Kinds of `visualization_msgs/Marker`."""
+"""Types of `visualization_msgs/Marker`."""
 DELETE_ALL: Final = 3
 
 Points = list[tuple[float, float]]
 
 
 def write_bag(timeline: Timeline, folder: Path) -> list[Path]:
-    """Write a run as a ROS 2 bag, a folder that must not exist yet; its storage is MCAP.
+    """Write a run as a ROS 2 bag and return its folder, which must not exist yet; its storage is MCAP.
 
     Raises
     ------
@@ -42,11 +52,11 @@ def write_bag(timeline: Timeline, folder: Path) -> list[Path]:
         It cannot be written.
     """
     with Writer(folder, version=VERSION, storage_plugin=StoragePlugin.MCAP) as writer:
-        _Teller(timeline, writer).tell()
+        _RunExporter(timeline, writer).write()
     return [folder]
 
 
-class _Teller:
+class _RunExporter:
     """Writes a run into a bag."""
 
     def __init__(self, timeline: Timeline, writer: Writer) -> None:
@@ -57,17 +67,17 @@ class _Teller:
         self._models = {model.name: model for model in timeline.settings.models}
         self._whole = timeline.settings.perception.method == "bayes"
 
-    def tell(self) -> None:
+    def write(self) -> None:
         """Write everything, in order of time."""
         timeline = self._timeline
-        items: list[tuple[float, Callable[[int], None]]] = [(0.0, self._tell_still)]
-        items += [(t, partial(self._tell_odometry, odometry)) for t, odometry in timeline.odometry]
-        items += [(part.t_s, partial(self._tell_round, part)) for part in rounds(timeline)]
+        items: list[tuple[float, Callable[[int], None]]] = [(0.0, self._write_static)]
+        items += [(t, partial(self._write_odometry, odometry)) for t, odometry in timeline.odometry]
+        items += [(scan.t_s, partial(self._write_scan, scan)) for scan in firing_scans(timeline)]
         items += [(snapshot.t_s, partial(self._write_snapshot, snapshot)) for snapshot in timeline.snapshots]
         if not timeline.odometry:
-            items += [(m.t_s, partial(self._tell_base, m.pose)) for m in timeline.snapshots]
-        for t_s, tell in sorted(items, key=lambda item: item[0]):
-            tell(timeline.unix_ns(t_s))
+            items += [(m.t_s, partial(self._write_base, m.pose)) for m in timeline.snapshots]
+        for t_s, write in sorted(items, key=lambda item: item[0]):
+            write(timeline.unix_ns(t_s))
 
     def _make(self, kind: str, **values: Msgarg) -> Msg:
         return self._store.types[kind](**values)
@@ -88,7 +98,7 @@ class _Teller:
         return self._make("geometry_msgs/msg/Point", x=float(x), y=float(y), z=0.0)
 
     def _turn(self, yaw: float) -> Msg:
-        x, y, z, w = turned(yaw)
+        x, y, z, w = yaw_quaternion(yaw)
         return self._make("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w)
 
     def _placed(self, pose: Pose) -> Msg:
@@ -97,7 +107,7 @@ class _Teller:
         )
 
     def _frames(self, topic: str, frames: list[tuple[str, str, Pose]], at: int) -> None:
-        told = [
+        message = [
             self._make(
                 "geometry_msgs/msg/TransformStamped", header=self._header(parent, at), child_frame_id=child,
                 transform=self._make(
@@ -107,24 +117,24 @@ class _Teller:
             )
             for parent, child, pose in frames
         ]  # fmt: skip
-        self._write(topic, "tf2_msgs/msg/TFMessage", self._make("tf2_msgs/msg/TFMessage", transforms=told), at)
+        self._write(topic, "tf2_msgs/msg/TFMessage", self._make("tf2_msgs/msg/TFMessage", transforms=message), at)
 
-    def _tell_still(self, at: int) -> None:
-        """Write what never moves: the sensors on the ring, where the odometry began, what stood there."""
+    def _write_static(self, at: int) -> None:
+        """Write what never moves: the sensors on the ring, the start of the odometry, the true world."""
         mounts = enumerate(self._timeline.settings.ring.mounts)
         sensors = [("ring", f"sonar_{i:02d}", Pose(x, y, angle)) for i, (x, y, angle) in mounts]
         self._frames("/tf_static", [("world", "odom", self._timeline.start), *sensors], at)
         if self._timeline.world is not None:
-            closed, lines = things(self._timeline.world)
+            closed, lines = world_outlines(self._timeline.world)
             rows = [*((_looped(points.tolist())) for points in closed), *(points.tolist() for points in lines)]
             markers = [self._marker("truth", i, STRIP, row, TRUTH, at, "world") for i, row in enumerate(rows)]
             self._markers("/truth", markers, at)
 
-    def _tell_base(self, pose: Pose, at: int) -> None:
+    def _write_base(self, pose: Pose, at: int) -> None:
         self._frames("/tf", [("odom", "base_link", pose)], at)
 
-    def _tell_odometry(self, odometry: Odometry, at: int) -> None:
-        self._tell_base(odometry.pose, at)
+    def _write_odometry(self, odometry: Odometry, at: int) -> None:
+        self._write_base(odometry.pose, at)
         unknown = np.zeros(36)
         twist = self._make(
             "geometry_msgs/msg/Twist", linear=self._vector(odometry.twist.v, 0.0),
@@ -139,12 +149,12 @@ class _Teller:
         )  # fmt: skip
         self._write("/odom", "nav_msgs/msg/Odometry", message, at)
 
-    def _tell_round(self, part: Round, at: int) -> None:
+    def _write_scan(self, scan: FiringScan, at: int) -> None:
         ring = self._timeline.settings.ring
-        self._frames("/tf", [("odom", "ring", Pose(part.x, part.y, part.yaw))], at)
-        for row in part.rows:
+        self._frames("/tf", [("odom", "ring", Pose(scan.x, scan.y, scan.yaw))], at)
+        for row in scan.rows:
             name = f"s{int(row[SENSOR]):02d}"
-            # Beyond the largest range: REP 117's way to say that nothing came back.
+            # Without an echo the range is inf, as REP 117 defines.
             message = self._make(
                 "sensor_msgs/msg/Range", header=self._header(f"sonar_{name[1:]}", at), radiation_type=0,
                 field_of_view=2.0 * math.radians(ring.beam_half_angle_deg), min_range=ring.range_min_m,

@@ -1,4 +1,4 @@
-"""What exports for three-dimensional viewers share: turned frames, scans of a firing, outlines of objects."""
+"""What exports for 3D viewers share: quaternions, colours, and the scan of each firing."""
 
 from __future__ import annotations
 
@@ -14,39 +14,40 @@ from drivers.messages import Floats
 from runtime.analysis.timeline import BEARING, RANGE, ROBOT_T, SENSOR, T, Timeline, X, Y
 
 HEIGHT_M = 0.9
-"""Of what is drawn upright: a drum's."""
+"""Height of what is drawn upright, m: that of a drum."""
 EVEN_M = 1e-6
+"""Tolerance for the positions of sensors on an even ring, m and rad."""
 
 Colour = tuple[float, float, float]
 SEGMENT: Final = (0.84, 0.37, 0.0)
 CLUSTER: Final = (0.0, 0.62, 0.45)
 MODEL: Final = (0.0, 0.45, 0.70)
 TRUTH: Final = (0.6, 0.6, 0.6)
-"""Red, green and blue of what is drawn, from 0 to 1; close to the pictures' own, see `drawing.style`."""
+"""Red, green and blue, from 0 to 1; close to the colours of the figures, see `runtime.analysis.plots.plot_style`."""
 
-Quarter = tuple[float, float, float, float]
+Quaternion = tuple[float, float, float, float]
 
 
-def turned(yaw: float) -> Quarter:
-    """Return a turn about the vertical as a quaternion x, y, z, w."""
+def yaw_quaternion(yaw: float) -> Quaternion:
+    """Return a rotation by `yaw` (rad) about the vertical as a quaternion x, y, z, w."""
     return (0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Round:
+class FiringScan:
     """The readings of one firing."""
 
     t_s: float
     x: float
     y: float
     yaw: float
-    """Where the ring was, and its direction."""
+    """Pose of the ring."""
     rows: Floats
-    """Of `Timeline.echoes`."""
+    """The rows of `Timeline.echoes`."""
 
 
-def rounds(timeline: Timeline) -> Iterator[Round]:
-    """Yield the firings of a run, each with where the ring was, worked out from its sensors' places."""
+def firing_scans(timeline: Timeline) -> Iterator[FiringScan]:
+    """Yield the firings of a run, each with the pose of the ring, computed from the positions of its sensors."""
     rows, mounts = timeline.echoes, timeline.settings.ring.mounts
     if not len(rows):
         return
@@ -56,13 +57,13 @@ def rounds(timeline: Timeline) -> Iterator[Round]:
         mx, my, angle = mounts[int(first[SENSOR])]
         yaw = float(first[BEARING]) - angle
         c, s = math.cos(yaw), math.sin(yaw)
-        yield Round(
+        yield FiringScan(
             float(first[T]), float(first[X]) - c * mx + s * my, float(first[Y]) - s * mx - c * my, yaw, part
         )  # fmt: skip
 
 
 def even_radius(ring: RingConfig) -> float | None:
-    """Return the radius of a ring whose sensors stand evenly on a circle and look outwards, else None."""
+    """Return the radius of a ring whose sensors are evenly spaced on a circle and point outwards; None otherwise."""
     mounts = ring.mounts
     radius = math.hypot(mounts[0][0], mounts[0][1])
     step = 2.0 * math.pi / len(mounts)
@@ -73,9 +74,19 @@ def even_radius(ring: RingConfig) -> float | None:
     return radius
 
 
-def whole_ring(sensors: int, radius: float, part: Round) -> list[float]:
-    """Return a firing's ranges from the ring's centre, one a sensor; NaN did not fire."""
+def whole_ring(sensors: int, radius: float, scan: FiringScan) -> list[float]:
+    """Return a firing's ranges from the ring's centre, one for each sensor; NaN if it did not fire.
+
+    Parameters
+    ----------
+    sensors : int
+        Number of sensors.
+    radius : float
+        Of the ring, m.
+    scan : FiringScan
+        The firing.
+    """
     ranges = np.full(sensors, np.nan)
-    ranges[part.rows[:, SENSOR].astype(int)] = part.rows[:, RANGE] + radius
-    told: list[float] = ranges.tolist()
-    return told
+    ranges[scan.rows[:, SENSOR].astype(int)] = scan.rows[:, RANGE] + radius
+    ranges_list: list[float] = ranges.tolist()
+    return ranges_list

@@ -1,1 +1,1 @@
-"""Pictures of a run as the paper draws them; the only place that knows matplotlib."""
+"""Figures of a run as in the paper. The only package that imports matplotlib."""

@@ -1,6 +1,6 @@
-"""The run as a moving picture: everything that was known, as it came to be known.
+"""A run as an animation: what was known at each moment.
 
-Frames are drawn one by one and handed to whoever makes a file of them: pillow a GIF, ffmpeg an MP4 where it is there.
+Frames are drawn one by one. Pillow makes a GIF of them and ffmpeg, if it is installed, an MP4.
 """
 
 from __future__ import annotations
@@ -20,40 +20,44 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 from PIL import Image
 
-from runtime.analysis.plots.layers import draw_arcs, draw_clusters, draw_objects, draw_segments, draw_things, draw_way
+from runtime.analysis.plots.layers import draw_arcs, draw_clusters, draw_objects, draw_path, draw_segments, draw_world
 from runtime.analysis.plots.paper_figures import Canvas, legend
 from runtime.analysis.plots.plot_style import MUTED
 from runtime.analysis.timeline import RANGE, RunSnapshot, Timeline
 from runtime.support.length_format import Units
 
 FRAMES_MAX: Final = 72
+"""Frames at most, so that the GIF stays below a few megabytes."""
 SECONDS: Final = 8.0
-"""How long the picture moves, before it rests on the end."""
+"""Duration of the animation before it pauses on the last frame."""
 REST_S: Final = 2.5
+"""Pause on the last frame."""
 DPI: Final = 100
 ROOM_IN: Final = 1.45
-"""The legend has everything in it."""
+"""Height for title, axis label and legend, which lists everything."""
 COLOURS: Final = 128
-NEAR: Final = 8
+"""Colours in the GIF's palette."""
+COLOUR_STEP: Final = 8
+"""Colours closer than this in every channel count as one, because pillow does not distinguish them."""
 ECHOES_SHOWN: Final = 48
-"""The newest: two rounds of a ring of 24."""
+"""Newest echoes drawn: two firings of a ring of 24."""
 
 Pixels = NDArray[np.uint8]
 
 
 def frames(timeline: Timeline, units: Units) -> Iterator[Pixels]:
-    """Yield the frames, RGB of shape (height, width, 3), all of one size."""
+    """Yield the frames as RGB arrays of shape (height, width, 3), all of the same size."""
     snapshots = timeline.snapshots[:: max(1, math.ceil(len(timeline.snapshots) / FRAMES_MAX))]
     if timeline.last is not None and snapshots[-1] is not timeline.last:
         snapshots.append(timeline.last)
     canvas = Canvas(timeline, units)
     figure, axes = canvas.figure(ROOM_IN)
-    painter: Any = FigureCanvasAgg(figure)  # whose methods have no types
+    painter: Any = FigureCanvasAgg(figure)  # its methods have no types
     figure.set_dpi(DPI)
-    handles = draw_things(axes, timeline, canvas.frame)
+    handles = draw_world(axes, timeline, canvas.frame)
     _title(axes, timeline.last, timeline)
     still = set(_drawn(axes))
-    if timeline.last is not None:  # laid out for everything that will ever be in it
+    if timeline.last is not None:  # the layout includes everything that any frame shows
         legend(figure, [*handles, *_draw(axes, timeline, timeline.last, canvas)])
     painter.draw()
     figure.set_layout_engine("none")
@@ -75,8 +79,10 @@ def _drawn(axes: Axes) -> list[Artist]:
 def _title(axes: Axes, snapshot: RunSnapshot | None, timeline: Timeline) -> None:
     if snapshot is not None:
         axes.set_title(f"{snapshot.t_s:5.1f} s of {timeline.seconds:.1f} s")
-        words = f"{len(snapshot.segments)} segments, {len(snapshot.clusters)} clusters, {len(snapshot.objects)} objects known"
-        axes.set_title(words, loc="right", fontsize=8.5, fontweight="normal", color=MUTED)
+        counts = (
+            f"{len(snapshot.segments)} segments, {len(snapshot.clusters)} clusters, {len(snapshot.objects)} objects"
+        )
+        axes.set_title(counts, loc="right", fontsize=8.5, fontweight="normal", color=MUTED)
 
 
 def _draw(axes: Axes, timeline: Timeline, snapshot: RunSnapshot, canvas: Canvas) -> list[Line2D]:
@@ -88,15 +94,28 @@ def _draw(axes: Axes, timeline: Timeline, snapshot: RunSnapshot, canvas: Canvas)
         *draw_arcs(axes, newest, math.radians(settings.ring.beam_half_angle_deg), frame),
         *draw_segments(axes, snapshot.segments, frame, faint=True),
         *draw_clusters(axes, snapshot.clusters, settings.perception.clusters.segments_min, frame),
-        *draw_objects(axes, snapshot.objects, timeline, frame, "m", told=False),
-        *draw_way(axes, poses, frame, settings.body.radius_m),
+        *draw_objects(axes, snapshot.objects, timeline, frame, "m", labelled=False),
+        *draw_path(axes, poses, frame, settings.body.radius_m),
     ]
 
 
 def save_moving(
     timeline: Timeline, units: Units, folder: Path, name: str, on_frame: Callable[[], None] = lambda: None
 ) -> list[Path]:
-    """Write the moving picture as a GIF, and as an MP4 where ffmpeg is there; return the files.
+    """Write the animation as a GIF and, if ffmpeg is installed, as an MP4, and return the files.
+
+    Parameters
+    ----------
+    timeline : Timeline
+        The run.
+    units : {"m", "ft"}
+        Unit of the axes.
+    folder : Path
+        Where the files go.
+    name : str
+        Their name without the suffix.
+    on_frame : callable
+        Called after each frame, for a progress bar.
 
     Raises
     ------
@@ -126,11 +145,11 @@ def _gif(shown: list[Pixels], step_s: float, path: Path) -> Path:
 
 
 def _palette(shown: list[Pixels]) -> Image.Image:
-    """Return one palette for all frames, the colours that cover most of two of them: nothing flickers or shifts."""
+    """Return one palette for all frames, so that nothing flickers: the colours that cover most of two frames."""
     pixels = np.concatenate([shown[len(shown) // 2].reshape(-1, 3), shown[-1].reshape(-1, 3)])
     colours, counts = np.unique(pixels, axis=0, return_counts=True)
     colours = colours[np.argsort(-counts)]
-    _, first = np.unique(colours // NEAR, axis=0, return_index=True)  # pillow does not tell nearer ones apart
+    _, first = np.unique(colours // COLOUR_STEP, axis=0, return_index=True)
     palette = Image.new("P", (1, 1))
     palette.putpalette(colours[np.sort(first)[:COLOURS]].astype(np.uint8).tobytes())
     return palette

@@ -1,4 +1,4 @@
-"""Pictures into files: SVG, PDF and PNG, the same run the same bytes."""
+"""Figures as SVG, PDF and PNG files. The same run gives the same bytes."""
 
 from __future__ import annotations
 
@@ -20,21 +20,30 @@ TIGHT: Final[MappingProxyType[str, Any]] = MappingProxyType({"bbox_inches": "tig
 
 @contextlib.contextmanager
 def styled(*, text_as_text: bool = False) -> Iterator[None]:
-    """Draw in the house's style; text as paths, which look the same everywhere, or as text, which is small."""
+    """Apply this program's style to figures drawn inside; text as paths looks the same everywhere but is larger."""
     rc: Any = {**RC, "svg.fonttype": "none" if text_as_text else "path"}
     with mpl.rc_context(rc):
         yield
 
 
 def undated(kind: str) -> dict[str, Any]:
-    """Return what to tell of a file besides its picture: nothing that changes from day to day."""
+    """Return the metadata of a file of this format, without a date, so that it never changes."""
     if kind == "svg":
         return {"Date": None, "Creator": None, "Format": None, "Type": None}
     return {"CreationDate": None, "Creator": "echolocate"} if kind == "pdf" else {"Software": "echolocate"}
 
 
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Write a picture in every format and return the files.
+    """Write a figure in every format and return the files.
+
+    Parameters
+    ----------
+    figure : Figure
+        What to write.
+    folder : Path
+        Where the files go.
+    name : str
+        Their name without the suffix.
 
     Raises
     ------
@@ -48,7 +57,7 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
 
 
 def svg_of(figure: Figure) -> str:
-    """Return a picture as the text of an SVG."""
+    """Return a figure as the text of an SVG."""
     text = io.StringIO()
     figure.savefig(text, format="svg", metadata=undated("svg"), **TIGHT)
     return text.getvalue()

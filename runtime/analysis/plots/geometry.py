@@ -1,4 +1,4 @@
-"""Shapes to draw, as numbers: arcs of echoes, outlines of what stood there and of models, ellipses; no matplotlib."""
+"""Shapes to draw, as arrays: arcs of echoes, outlines of the true world and of models, ellipses. No matplotlib."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ MARGIN_M: Final = 0.45
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """The plane in which a picture is drawn: the odometry's, moved to the world's and measured in its unit."""
+    """The coordinates of a figure: world coordinates in the unit of its axes."""
 
     start: Pose
     unit_m: float
 
     def points(self, xy: Floats) -> Floats:
-        """Return points (…, 2) of the odometry's frame, m, in the picture's."""
+        """Return points (…, 2) of the odometry's frame (m) in the figure's coordinates."""
         c, s = math.cos(self.start.theta), math.sin(self.start.theta)
         turned = xy @ np.array([[c, s], [-s, c]])
         placed: Floats = (turned + np.array([self.start.x, self.start.y])) / self.unit_m
         return placed
 
     def world(self, xy: Floats) -> Floats:
-        """Return points of the world in the picture."""
+        """Return points (…, 2) of the world (m) in the figure's coordinates."""
         scaled: Floats = xy / self.unit_m
         return scaled
 
@@ -41,7 +41,15 @@ class Frame:
 def arcs(echoes: Floats, half_angle: float) -> Floats:
     """Return the arc of each echo as one cubic Bézier curve: control points of shape (n, 4, 2), m.
 
-    An arc of 24° is met by it to a millionth of its radius (handles of 4/3 tan(φ/4) radii, φ the whole angle).
+    With handles of 4/3 tan(φ/4) radii, φ the whole angle (the standard approximation of a circular arc by one cubic),
+    an arc of 24° is exact to a millionth of its radius.
+
+    Parameters
+    ----------
+    echoes : array (n, 7)
+        Rows of `Timeline.echoes`, with finite ranges.
+    half_angle : float
+        Of the beam, rad.
     """
     radius, bearing = echoes[:, RANGE, None], echoes[:, BEARING, None]
     handle = 4.0 / 3.0 * math.tan(half_angle / 2.0)
@@ -55,20 +63,36 @@ def arcs(echoes: Floats, half_angle: float) -> Floats:
 
 
 def circle(x: float, y: float, radius: float, corners: int = 72) -> Floats:
-    """Return a circle as a closed polygon."""
+    """Return a circle as a closed polygon, array (corners, 2).
+
+    Parameters
+    ----------
+    x, y, radius : float
+        Centre and radius, m.
+    corners : int
+        Of the polygon.
+    """
     turn = np.linspace(0.0, 2.0 * math.pi, corners, endpoint=False)
     return np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)])
 
 
 def rotated(points: Floats, x: float, y: float, theta: float) -> Floats:
-    """Return points of a thing's own frame where it stands."""
+    """Return points (n, 2) of an object's own frame in the frame in which it has the pose x, y, theta.
+
+    Parameters
+    ----------
+    points : array (n, 2)
+        In the object's own frame, m.
+    x, y, theta : float
+        Pose of the object, m and rad.
+    """
     c, s = math.cos(theta), math.sin(theta)
     placed: Floats = points @ np.array([[c, s], [-s, c]]) + np.array([x, y])
     return placed
 
 
-def things(world: WorldConfig) -> tuple[list[Floats], list[Floats]]:
-    """Return what stands in a world: closed outlines, and lines, m."""
+def world_outlines(world: WorldConfig) -> tuple[list[Floats], list[Floats]]:
+    """Return the closed outlines (drums, boxes, polygons) and the lines (walls) of a world, each an array (n, 2)."""
     closed = [circle(d.x_m, d.y_m, d.radius_m) for d in world.drum]
     for box in world.box:
         w, d = 0.5 * box.width_m, 0.5 * box.depth_m
@@ -79,16 +103,16 @@ def things(world: WorldConfig) -> tuple[list[Floats], list[Floats]]:
 
 
 def outline(seen: DetectedObject, model: ModelConfig | None, *, whole: bool) -> tuple[Floats, bool]:
-    """Return the outline of an object where it was seen, and whether it is closed, m.
+    """Return the outline of a recognised object as points (n, 2) in m, and whether it is closed.
 
     Parameters
     ----------
     seen : DetectedObject
         The object.
     model : ModelConfig, optional
-        Its model; without one a small circle marks it.
+        Its model; without one the outline is a small circle.
     whole : bool
-        Draw an arc as the circle that it stands for: the Bayesian method locates circles, the paper's chords.
+        Return the whole circle of which a model is an arc: the Bayesian method locates circles, the paper's chords.
     """
     if model is None:
         return circle(seen.x, seen.y, 0.1), True
@@ -98,7 +122,7 @@ def outline(seen: DetectedObject, model: ModelConfig | None, *, whole: bool) -> 
 
 
 def ellipse(seen: DetectedObject) -> Floats | None:
-    """Return the 95 % ellipse of an object's place, m; None where its covariance is not known."""
+    """Return the 95 % confidence ellipse of an object's position as points (n, 2), m; None without a covariance."""
     if seen.covariance is None:
         return None
     xx, xy, yy = seen.covariance
@@ -109,14 +133,14 @@ def ellipse(seen: DetectedObject) -> Floats | None:
 
 
 def window(timeline: Timeline, frame: Frame) -> tuple[float, float, float, float]:
-    """Return left, right, bottom, top of what must be seen, in the picture's unit."""
+    """Return left, right, bottom and top of the region to show, in the figure's coordinates."""
     margin = MARGIN_M / frame.unit_m
     reach = timeline.settings.body.radius_m / frame.unit_m + 0.3 * margin
     way = np.array([(m.pose.x, m.pose.y) for m in timeline.snapshots] or [(0.0, 0.0)])
     placed = frame.points(way)
     corners = [placed.min(axis=0) - reach, placed.max(axis=0) + reach]
     if timeline.world is not None:
-        closed, lines = things(timeline.world)
+        closed, lines = world_outlines(timeline.world)
         places = [frame.world(points) for points in (*closed, *lines)]
     else:
         rows = np.empty((0, 4)) if timeline.last is None else timeline.last.segments

@@ -1,6 +1,6 @@
-"""The parts that pictures of a run are put together from, each drawn into a pair of axes under a name of its own.
+"""The layers of which figures of a run consist. Each `draw_` function draws one layer and returns its legend entries.
 
-The names are the ids of groups in an SVG, so that a reader, or a test, finds what is in it.
+Each element gets an id in the SVG, by which a reader or a test finds it.
 """
 
 from __future__ import annotations
@@ -19,42 +19,56 @@ from matplotlib.patheffects import withStroke
 
 from drivers.messages import Floats, Pose
 from perception.detected_object import DetectedObject
-from runtime.analysis.plots.geometry import Frame, arcs, ellipse, outline, rotated, things
-from runtime.analysis.plots.plot_style import CLUSTER, ECHO, INK, MODEL, MUTED, PAPER, ROBOT, SEGMENT, THING
+from runtime.analysis.plots.geometry import Frame, arcs, ellipse, outline, rotated, world_outlines
+from runtime.analysis.plots.plot_style import CLUSTER, ECHO, INK, MODEL, MUTED, PAPER, ROBOT, SEGMENT, TRUTH
 from runtime.analysis.timeline import RANGE, BookmarkEntry, Cluster, Timeline
 from runtime.simulation.evaluation import nearest_pairs
 from runtime.support.length_format import Units, format_length
 
 ARCS_MAX: Final = 4000
-"""Drawn in a picture; more are a grey mass, and megabytes."""
+"""Arcs drawn in a figure. More merge into a grey area and take megabytes."""
 
 
-def draw_things(axes: Axes, timeline: Timeline, frame: Frame) -> list[Line2D]:
-    """Draw what stood there, where it is known."""
+def draw_world(axes: Axes, timeline: Timeline, frame: Frame) -> list[Line2D]:
+    """Draw the true world if it is known."""
     if timeline.world is None:
         return []
-    closed, lines = things(timeline.world)
+    closed, lines = world_outlines(timeline.world)
     outlines = [frame.world(points) for points in closed]
-    polygons = PolyCollection(outlines, facecolor=THING, edgecolor=MUTED, linewidth=1.0, alpha=0.55, zorder=1)
+    polygons = PolyCollection(outlines, facecolor=TRUTH, edgecolor=MUTED, linewidth=1.0, alpha=0.55, zorder=1)
     polygons.set_gid("truth")
     axes.add_collection(polygons)
     if lines:
         walls = LineCollection([frame.world(points) for points in lines], color=MUTED, linewidth=2.5, zorder=1)
         walls.set_gid("truth-walls")
         axes.add_collection(walls)
-    return [Line2D([], [], marker="o", markersize=9, linestyle="", markerfacecolor=THING, markeredgecolor=MUTED,
+    return [Line2D([], [], marker="o", markersize=9, linestyle="", markerfacecolor=TRUTH, markeredgecolor=MUTED,
                    label="truth")]  # fmt: skip
 
 
-def draw_way(axes: Axes, poses: Sequence[Pose], frame: Frame, radius_m: float) -> list[Line2D]:
-    """Draw the robot at the last pose, and the way to it."""
+def draw_path(axes: Axes, poses: Sequence[Pose], frame: Frame, radius_m: float) -> list[Line2D]:
+    """Draw the robot at the last pose and its path.
+
+    Parameters
+    ----------
+    axes : Axes
+        Drawn into.
+    poses : sequence of Pose
+        In the odometry's frame.
+    frame : Frame
+        Coordinates of the figure.
+    radius_m : float
+        Of the robot.
+    """
     if not poses:
         return []
-    way = frame.points(np.array([(p.x, p.y) for p in poses]))
-    (line,) = axes.plot(way[:, 0], way[:, 1], color=ROBOT, linewidth=1.6, linestyle=(0, (4, 2)), zorder=2, gid="way")
-    line.set_label("way of the robot")
+    path = frame.points(np.array([(p.x, p.y) for p in poses]))
+    (line,) = axes.plot(
+        path[:, 0], path[:, 1], color=ROBOT, linewidth=1.6, linestyle=(0, (4, 2)), zorder=2, gid="path"
+    )
+    line.set_label("path of the robot")
     last = poses[-1]
-    body = Circle((way[-1, 0], way[-1, 1]), radius_m / frame.unit_m, facecolor="none", edgecolor=ROBOT,
+    body = Circle((path[-1, 0], path[-1, 1]), radius_m / frame.unit_m, facecolor="none", edgecolor=ROBOT,
                   linewidth=1.6, zorder=5)  # fmt: skip
     body.set_gid("robot")
     axes.add_patch(body)
@@ -64,7 +78,7 @@ def draw_way(axes: Axes, poses: Sequence[Pose], frame: Frame, radius_m: float) -
 
 
 def draw_bookmarks(axes: Axes, bookmarks: Sequence[BookmarkEntry], frame: Frame) -> list[Line2D]:
-    """Draw where the robot was when each bookmark was put, under the bookmark's number."""
+    """Draw the number of each bookmark at the robot's position at that moment."""
     style: Any = {"marker": "D", "markersize": 5, "linestyle": "", "color": PAPER, "markeredgecolor": INK}
     placed = [(number, mark.pose) for number, mark in enumerate(bookmarks, 1) if mark.pose is not None]
     for number, pose in placed:
@@ -74,14 +88,26 @@ def draw_bookmarks(axes: Axes, bookmarks: Sequence[BookmarkEntry], frame: Frame)
     return [Line2D([], [], label="bookmark", **style)] if placed else []
 
 
-def heard(echoes: Floats) -> Floats:
-    """Return the echoes that came back, thinned evenly where they are too many."""
+def received_echoes(echoes: Floats) -> Floats:
+    """Return the rows of echoes with a finite range, thinned evenly to at most `ARCS_MAX`."""
     back = echoes[np.isfinite(echoes[:, RANGE])]
     return back[:: max(1, math.ceil(len(back) / ARCS_MAX))]
 
 
 def draw_arcs(axes: Axes, echoes: Floats, half_angle: float, frame: Frame) -> list[Line2D]:
-    """Draw each echo as the arc from which it may have come."""
+    """Draw each echo as the arc on which its reflection may lie.
+
+    Parameters
+    ----------
+    axes : Axes
+        Drawn into.
+    echoes : array (n, 7)
+        Rows of `Timeline.echoes`, with finite ranges.
+    half_angle : float
+        Of the beam, rad.
+    frame : Frame
+        Coordinates of the figure.
+    """
     curves = frame.points(arcs(echoes, half_angle))
     codes = np.tile([Path.MOVETO, Path.CURVE4, Path.CURVE4, Path.CURVE4], len(curves))
     if len(curves):
@@ -93,7 +119,19 @@ def draw_arcs(axes: Axes, echoes: Floats, half_angle: float, frame: Frame) -> li
 
 
 def draw_segments(axes: Axes, segments: Floats, frame: Frame, *, faint: bool = False) -> list[Line2D]:
-    """Draw outline segments, (n, 4) ends."""
+    """Draw outline segments.
+
+    Parameters
+    ----------
+    axes : Axes
+        Drawn into.
+    segments : array (n, 4)
+        Ends x, y, x, y, m.
+    frame : Frame
+        Coordinates of the figure.
+    faint : bool
+        Draw them thinner and paler.
+    """
     lines = LineCollection(
         list(frame.points(segments.reshape(-1, 2, 2))), color=SEGMENT, linewidth=0.9 if faint else 1.3,
         alpha=0.45 if faint else 0.85, zorder=3,
@@ -104,7 +142,19 @@ def draw_segments(axes: Axes, segments: Floats, frame: Frame, *, faint: bool = F
 
 
 def draw_clusters(axes: Axes, clusters: Iterable[Cluster], least: int, frame: Frame) -> list[Line2D]:
-    """Draw clusters as the paper does: a rectangle, and an X at the centre; those too small for a model dotted."""
+    """Draw clusters as the paper does: a rectangle and an X at the centre; too small ones with dotted lines.
+
+    Parameters
+    ----------
+    axes : Axes
+        Drawn into.
+    clusters : iterable of Cluster
+        In the odometry's frame.
+    least : int
+        Segments that a cluster needs to be matched with a model.
+    frame : Frame
+        Coordinates of the figure.
+    """
     handles = {}
     for number, cluster in enumerate(clusters, 1):
         large = cluster.segments >= least
@@ -129,12 +179,28 @@ def draw_objects(
     frame: Frame,
     units: Units,
     *,
-    told: bool = True,
+    labelled: bool = True,
 ) -> list[Line2D]:
-    """Draw the models where they were matched, with the error of each where the truth is known."""
+    """Draw the models at the recognised poses, with the error of each if the true world is known.
+
+    Parameters
+    ----------
+    axes : Axes
+        Drawn into.
+    objects : sequence of DetectedObject
+        In the odometry's frame.
+    timeline : Timeline
+        The run.
+    frame : Frame
+        Coordinates of the figure.
+    units : {"m", "ft"}
+        Unit of the errors.
+    labelled : bool
+        Write names and errors.
+    """
     models = {model.name: model for model in timeline.settings.models}
     whole = timeline.settings.perception.method == "bayes"
-    known = match_to_truth(objects, timeline) if told else {}
+    known = match_to_truth(objects, timeline) if labelled else {}
     for number, seen in enumerate(objects, 1):
         points, closed = outline(seen, models.get(seen.model), whole=whole)
         shape = Polygon(frame.points(points), closed=closed, facecolor="none", edgecolor=MODEL, linewidth=2.2,
@@ -149,7 +215,7 @@ def draw_objects(
         x, y = frame.points(np.array([[seen.x, seen.y]]))[0]
         axes.plot(x, y, marker="+", color=INK, markersize=7, markeredgewidth=1.2, zorder=7, linestyle="",
                   gid=f"centre-{number}")  # fmt: skip
-        if told:
+        if labelled:
             model = models.get(seen.model)
             reach = 0.1 if model is None else model.arc_radius_m or max(math.hypot(*v) for v in model.vertices_m)
             one = known.get(number - 1)
@@ -163,12 +229,12 @@ def draw_objects(
             )
     if not objects:
         return []
-    kind = "matched model, + its place" + (", its error" if known else "")
+    kind = "matched model, + its position" + (", its error" if known else "")
     return [Line2D([], [], color=MODEL, linewidth=2.2, marker="+", markeredgecolor=INK, label=kind)]
 
 
 def _label(axes: Axes, text: str, at: tuple[float, float], reach: float, *, up: bool) -> None:
-    """Write beyond a thing's rim, on the side away from the middle, where there is room."""
+    """Write a label above or below an object, on the side away from the middle of the figure."""
     note = axes.annotate(
         text, (at[0], at[1] + (reach if up else -reach)), xytext=(0.0, 4.0 if up else -4.0),
         textcoords="offset points", ha="center", va="bottom" if up else "top", fontsize=8, zorder=8,
@@ -176,15 +242,15 @@ def _label(axes: Axes, text: str, at: tuple[float, float], reach: float, *, up: 
     note.set_path_effects([withStroke(linewidth=2.5, foreground=PAPER)])
 
 
-class Thing(NamedTuple):
-    """Something that stood there and was recognised: its name as in Table 2, and how far off it was seen, m."""
+class MatchedObject(NamedTuple):
+    """A true object that was recognised: its name as in Table 2, and the position error, m."""
 
     name: str
     error_m: float
 
 
-def match_to_truth(objects: Sequence[DetectedObject], timeline: Timeline) -> dict[int, Thing]:
-    """Return what each object stands for, where that is something that stood there and the truth is known."""
+def match_to_truth(objects: Sequence[DetectedObject], timeline: Timeline) -> dict[int, MatchedObject]:
+    """Return the true object that each recognised one matches, by index; empty if the true world is not known."""
     if timeline.world is None:
         return {}
     placed = [timeline.start.compose(Pose(o.x, o.y, o.theta)) for o in objects]
@@ -192,4 +258,4 @@ def match_to_truth(objects: Sequence[DetectedObject], timeline: Timeline) -> dic
     truth = [(d.x_m, d.y_m) for d in drums] + [(b.x_m, b.y_m) for b in boxes]
     names = [f"drum {i}" for i in range(1, len(drums) + 1)] + [f"box {i}" for i in range(1, len(boxes) + 1)]
     pairs = nearest_pairs(truth, [(p.x, p.y) for p in placed])
-    return {j: Thing(names[i], math.dist(truth[i], (placed[j].x, placed[j].y))) for i, j in pairs.items()}
+    return {j: MatchedObject(names[i], math.dist(truth[i], (placed[j].x, placed[j].y))) for i, j in pairs.items()}

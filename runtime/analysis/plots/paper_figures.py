@@ -1,4 +1,4 @@
-"""The four pictures of a run that the paper has of each of its two: raw data, segments, clusters, matched models."""
+"""The four figures that the paper shows of each run: raw data, segments, clusters and matched models."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from runtime.analysis.plots.layers import (
     draw_bookmarks,
     draw_clusters,
     draw_objects,
+    draw_path,
     draw_segments,
-    draw_things,
-    draw_way,
-    heard,
+    draw_world,
+    received_echoes,
 )
 from runtime.analysis.plots.plot_style import MUTED, WIDTH_IN
 from runtime.analysis.timeline import RANGE, Timeline
@@ -30,23 +30,23 @@ from runtime.support.length_format import Units
 
 HEIGHT_MIN_IN, HEIGHT_MAX_IN = 3.0, 8.5
 ROOM_IN: Final = 1.2
-"""For title, axis label and legend."""
+"""Height for title, axis label and legend."""
 
 
 @dataclass(frozen=True, slots=True)
 class Canvas:
-    """Where a picture of a run goes: its plane and its unit."""
+    """The frame and the size of the figures of a run."""
 
     timeline: Timeline
     units: Units
 
     @property
     def frame(self) -> Frame:
-        """The plane."""
+        """The coordinates of the figures."""
         return Frame(self.timeline.start, FOOT_M if self.units == "ft" else 1.0)
 
     def figure(self, room_in: float = ROOM_IN) -> tuple[Figure, Axes]:
-        """Return an empty picture, as high as the run's shape asks for, with some room around the plane."""
+        """Return an empty figure with the run's proportions, plus `room_in` inches of height for text."""
         left, right, bottom, top = window(self.timeline, self.frame)
         height = (WIDTH_IN - 0.7) * (top - bottom) / (right - left) + room_in
         figure = Figure(figsize=(WIDTH_IN, min(max(height, HEIGHT_MIN_IN), HEIGHT_MAX_IN)), layout="constrained")
@@ -55,14 +55,14 @@ class Canvas:
         return figure, axes
 
     def prepare(self, axes: Axes) -> None:
-        """Give axes the run's window, equal scales, and labels."""
+        """Set the region, equal scales and labels of the axes."""
         left, right, bottom, top = window(self.timeline, self.frame)
         axes.set(xlim=(left, right), ylim=(bottom, top), xlabel=f"x ({self.units})", ylabel=f"y ({self.units})")
         axes.set_aspect("equal", adjustable="box")
 
 
 def paper_figures(timeline: Timeline) -> tuple[int, int, int, int] | None:
-    """Return the numbers of the paper's figures of the same run, None where it has none."""
+    """Return the numbers of the paper's figures of the same scene; None if there are none."""
     for name, first in (("hallway", 6), ("irregular", 10)):
         if timeline.world is not None and timeline.world == load_world(name):
             return (first, first + 1, first + 2, first + 3)
@@ -70,14 +70,14 @@ def paper_figures(timeline: Timeline) -> tuple[int, int, int, int] | None:
 
 
 def pictures(timeline: Timeline, units: Units) -> dict[str, Figure]:
-    """Return the four pictures of a run's end by name, in the paper's order."""
+    """Return the four figures of the end of a run by name, in the paper's order."""
     canvas, last = Canvas(timeline, units), timeline.last
     if last is None:
         return {}
     numbers = paper_figures(timeline)
     half = math.radians(timeline.settings.ring.beam_half_angle_deg)
     least = timeline.settings.perception.clusters.segments_min
-    arcs_shown = heard(timeline.echoes)
+    arcs_shown = received_echoes(timeline.echoes)
     count, shown = int((timeline.echoes[:, RANGE] < math.inf).sum()), len(arcs_shown)
     few = f", {shown:,} of them drawn" if shown < count else ""
     method = "the Bayesian method" if timeline.settings.perception.method == "bayes" else "relaxation"
@@ -99,26 +99,26 @@ def pictures(timeline: Timeline, units: Units) -> dict[str, Figure]:
             axes, last.objects, timeline, frame, units
         )
 
-    told = {
+    layers = {
         "raw": ("Raw data", f"{count:,} echoes in {timeline.seconds:.0f} s{few}", raw),
         "segments": ("Segments", f"{len(last.segments):,} outline segments in the map", segments),
         "clusters": ("Clusters", f"{len(last.clusters)} clusters of outline segments", clusters),
         "models": ("Matched models", f"{len(last.objects)} recognised, by {method}", models),
     }
     drawn = {}
-    for at, (name, (title, line, draw)) in enumerate(told.items()):
+    for at, (name, (title, line, draw)) in enumerate(layers.items()):
         like = "" if numbers is None else f", as the paper's Figure {numbers[at]}"
-        drawn[name] = _picture(canvas, f"{title}{like}", line, draw)
+        drawn[name] = _figure(canvas, f"{title}{like}", line, draw)
     return drawn
 
 
-def _picture(canvas: Canvas, title: str, line: str, draw: Callable[[Axes], list[Line2D]]) -> Figure:
+def _figure(canvas: Canvas, title: str, line: str, draw: Callable[[Axes], list[Line2D]]) -> Figure:
     figure, axes = canvas.figure()
     timeline, frame = canvas.timeline, canvas.frame
     handles = draw(axes)
-    handles += draw_things(axes, timeline, frame)
+    handles += draw_world(axes, timeline, frame)
     poses = [m.pose for m in timeline.snapshots]
-    handles += draw_way(axes, poses, frame, timeline.settings.body.radius_m)
+    handles += draw_path(axes, poses, frame, timeline.settings.body.radius_m)
     handles += draw_bookmarks(axes, timeline.bookmarks, frame)
     axes.set_title(title)
     axes.set_title(line, loc="right", fontsize=8.5, fontweight="normal", color=MUTED)
@@ -127,6 +127,6 @@ def _picture(canvas: Canvas, title: str, line: str, draw: Callable[[Axes], list[
 
 
 def legend(figure: Figure, handles: Sequence[Line2D]) -> None:
-    """Put the legend below the picture, where it hides nothing."""
+    """Put the legend below the figure, where it hides nothing."""
     columns = {4: 2, 7: 4}.get(len(handles), min(len(handles), 3))
     figure.legend(handles=list(handles), loc="outside lower center", ncols=columns)

@@ -1,4 +1,4 @@
-"""How pictures look: one ink, the Okabe-Ito colours that everybody can tell apart, and never colour alone."""
+"""The style of figures: Okabe-Ito colours, which everybody can distinguish, and never only colour as difference."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ INK: Final = "#1c1c1c"
 MUTED: Final = "#6e6e6e"
 GRID: Final = "#e3e3e3"
 PAPER: Final = "#ffffff"
-THING: Final = "#cfcfcf"
-"""What stood there."""
+TRUTH: Final = "#cfcfcf"
+"""The true world."""
 ECHO: Final = "#0072b2"
 SEGMENT: Final = "#d55e00"
 CLUSTER: Final = "#009e73"
@@ -18,7 +18,7 @@ MODEL: Final = "#0072b2"
 ROBOT: Final = "#cc79a7"
 
 WIDTH_IN: Final = 7.2
-"""Of a picture; two columns of a page."""
+"""Width of a figure: two columns of a page."""
 DPI: Final = 200
 
 RC: Final[MappingProxyType[str, Any]] = MappingProxyType(

@@ -1,4 +1,4 @@
-"""The course of a run over time: when objects became known and how well, and how the cycles kept their rhythm."""
+"""The history of a run: objects known, their errors, and the time between cycles, over time."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from runtime.analysis.timeline import Timeline
 from runtime.support.length_format import Units
 
 
-def course(timeline: Timeline, units: Units) -> Figure:
-    """Return the picture: objects known, their errors where the truth is known, and the time from cycle to cycle."""
+def history_figure(timeline: Timeline, units: Units) -> Figure:
+    """Return the figure: objects known, their errors if the true world is known, and the time between cycles."""
     with_errors = timeline.world is not None
     figure = Figure(figsize=(WIDTH_IN, 4.6 if with_errors else 3.2), layout="constrained")
     panels = figure.subplots(3 if with_errors else 2, 1, sharex=True)
@@ -26,7 +26,7 @@ def course(timeline: Timeline, units: Units) -> Figure:
     known.set_ylabel("objects known")
     known.set_ylim(bottom=0.0)
     known.yaxis.set_major_locator(MaxNLocator(integer=True))
-    known.set_title("Course of the run")
+    known.set_title("History of the run")
     if with_errors:
         unit = FOOT_M if units == "ft" else 1.0
         errors = [
@@ -41,12 +41,13 @@ def course(timeline: Timeline, units: Units) -> Figure:
         panels[1].set_ylim(bottom=0.0)
         if at:
             panels[1].legend(loc="upper right", ncols=2)
-    rhythm = panels[-1]
+    periods = panels[-1]
     gaps = 1e3 * np.array(timeline.cycle_gaps_s)
-    rhythm.plot(np.cumsum(timeline.cycle_gaps_s), gaps, marker=".", markersize=3, linestyle="", color=ECHO, alpha=0.6,
+    times_s = np.cumsum(timeline.cycle_gaps_s)
+    periods.plot(times_s, gaps, marker=".", markersize=3, linestyle="", color=ECHO, alpha=0.6,
                 gid="gaps", rasterized=len(gaps) > 2000)  # fmt: skip
-    rhythm.set(xlabel="t (s)", ylabel="between cycles (ms)")
-    rhythm.set_ylim(bottom=0.0)
+    periods.set(xlabel="t (s)", ylabel="between cycles (ms)")
+    periods.set_ylim(bottom=0.0)
     for number, mark in enumerate(timeline.bookmarks, 1):
         for panel in panels:
             panel.axvline(mark.t_s, color=MUTED, linewidth=0.9, linestyle=(0, (1, 1.5)), gid=f"bookmark-{number}")

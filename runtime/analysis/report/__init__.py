@@ -1,1 +1,1 @@
-"""A run on one page of HTML that needs nothing else: tables, pictures, stats and settings."""
+"""A self-contained HTML page about a run: tables, figures, statistics and settings."""

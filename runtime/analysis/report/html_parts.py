@@ -1,4 +1,4 @@
-"""Pieces of a page: escaped text, tables, tiles. Whatever stands in a file is text here and never markup."""
+"""Parts of a page: escaped text, tables, tiles. All content is escaped, so that it never becomes markup."""
 
 from __future__ import annotations
 
@@ -9,20 +9,30 @@ from pydantic import BaseModel
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, text: bool = False) -> str:
-    """Return a table; `text` for words rather than numbers."""
+    """Return a table.
+
+    Parameters
+    ----------
+    headings : sequence of str
+        One for each column.
+    rows : iterable of sequence of str
+        The cells.
+    text : bool
+        Align the cells for words rather than for numbers.
+    """
     head = "".join(f"<th>{escape(h)}</th>" for h in headings)
     body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
     kind = ' class="text"' if text else ""
     return f'<div class="card"><table{kind}><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
-def tile(value: str, told: str) -> str:
-    """Return a number that counts, and what it is."""
-    return f'<div class="tile"><b>{escape(value)}</b><span>{escape(told)}</span></div>'
+def tile(value: str, label: str) -> str:
+    """Return a key figure with its label."""
+    return f'<div class="tile"><b>{escape(value)}</b><span>{escape(label)}</span></div>'
 
 
 def section(title: str, *content: str) -> str:
-    """Return a section, nothing where it has no content."""
+    """Return a section; an empty string if it has no content."""
     inside = "".join(content)
     return f"<section><h2>{escape(title)}</h2>{inside}</section>" if inside else ""
 
@@ -33,7 +43,7 @@ def note(text: str, *, bad: bool = False) -> str:
 
 
 def flattened(model: BaseModel, path: str = "") -> list[tuple[str, str]]:
-    """Return every setting by its dotted path, as one would set it."""
+    """Return every setting as a dotted path, as `--set` takes it, and its value."""
     rows: list[tuple[str, str]] = []
     for name in type(model).model_fields:
         value = getattr(model, name)

@@ -1,6 +1,6 @@
-"""Pictures within a page: SVG without headers, with ids of its own, few digits, and the page's colours.
+"""SVG figures inside an HTML page: no header, unique ids, few digits, and the page's colours.
 
-In a page that is read in the dark a picture's ink must be light; so colours become the page's variables.
+On a dark page the lines of a figure must be light, so its colours become CSS variables of the page.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import re
 from types import MappingProxyType
 from typing import Final
 
-from runtime.analysis.plots.plot_style import CLUSTER, ECHO, GRID, INK, MUTED, PAPER, ROBOT, SEGMENT, THING
+from runtime.analysis.plots.plot_style import CLUSTER, ECHO, GRID, INK, MUTED, PAPER, ROBOT, SEGMENT, TRUTH
 
 VARIABLES: Final = MappingProxyType(
     {
@@ -17,7 +17,7 @@ VARIABLES: Final = MappingProxyType(
         MUTED: "--muted",
         GRID: "--grid",
         PAPER: "--paper",
-        THING: "--thing",
+        TRUTH: "--truth",
         ECHO: "--echo",
         SEGMENT: "--segment",
         CLUSTER: "--cluster",
@@ -29,17 +29,17 @@ COLOUR: Final = re.compile("|".join(map(re.escape, VARIABLES)))
 FONT: Final = re.compile(r"font: ([^;\"]*?)'DejaVu Sans'[^;\"]*")
 
 
-def inlined(svg: str, prefix: str, told: str) -> str:
+def inlined(svg: str, prefix: str, label: str) -> str:
     """Return an SVG as an element of an HTML page.
 
     Parameters
     ----------
     svg : str
-        As matplotlib writes it, its text as text.
+        As matplotlib writes it, with text as text.
     prefix : str
-        Goes before its ids, which are then unique in the page.
-    told : str
-        What is to be seen, for those who do not see it; free of quotes and angle brackets.
+        Added to all ids, which makes them unique in the page.
+    label : str
+        Description for screen readers; without quotes and angle brackets.
     """
     svg = svg[svg.index("<svg") :]
     svg = re.sub(r"\sxmlns(:\w+)?=\"[^\"]*\"", "", svg)
@@ -52,4 +52,4 @@ def inlined(svg: str, prefix: str, told: str) -> str:
     svg = FONT.sub(r"font: \1system-ui, sans-serif", svg)
     svg = COLOUR.sub(lambda found: f"var({VARIABLES[found[0]]})", svg)
     svg = re.sub(r"\n\s*", "\n", svg)
-    return svg.replace("<svg", f'<svg role="img" aria-label="{told}"', 1)
+    return svg.replace("<svg", f'<svg role="img" aria-label="{label}"', 1)

@@ -1,4 +1,4 @@
-"""The page of a run: Table 2 and its errors, pictures, timing, line, modes and stop reasons, settings."""
+"""The report page of a run: Table 2, figures, timing, serial link, modes, stop reasons and settings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from runtime import VERSION
 from runtime.analysis.plots.figure_files import styled, svg_of
 from runtime.analysis.plots.layers import match_to_truth
 from runtime.analysis.plots.paper_figures import paper_figures, pictures
-from runtime.analysis.plots.run_history import course
+from runtime.analysis.plots.run_history import history_figure
 from runtime.analysis.report.html_parts import note, section, settings_list, table, tile
 from runtime.analysis.report.inline_svg import inlined
 from runtime.analysis.report.stylesheet import CSS
@@ -28,25 +28,25 @@ from runtime.support.length_format import Units, format_length, format_point
 LOG_SHOWN: Final = 40
 CAPTIONS: Final = MappingProxyType(
     {
-        "raw": "Every echo as the arc from which it may have come.",
+        "raw": "Every echo as the arc on which its reflection may lie.",
         "segments": "Outline segments: tangents to the arcs of two readings of one sensor.",
         "clusters": "Clusters of outline segments by minimum distance, as rectangles with an X at the centre.",
-        "models": "Models where they were matched, over what stood there where that is known.",
+        "models": "Models at their matched poses, over the true world if it is known.",
     }
 )
 
 
 def page(timeline: Timeline, units: Units) -> str:
-    """Return the page as one text of HTML that refers to nothing outside itself."""
+    """Return the page as one HTML text that refers to nothing outside itself."""
     name = escape(timeline.path.name)
     body = "".join(
         (
             _head(timeline, units),
             section("Objects", _table_2(timeline, units), _others(timeline, units)),
-            section("Pictures", _pictures(timeline, units)),
+            section("Figures", _pictures(timeline, units)),
             section("Bookmarks", *_bookmarks(timeline, units)),
             section("Timing", *_timing(timeline)),
-            section("Line", *_line(timeline)),
+            section("Link", *_line(timeline)),
             section("Modes and stop reasons", *_modes(timeline)),
             section("Log: warnings and errors", _log(timeline)),
             section("Made by", _made_by(timeline)),
@@ -61,7 +61,7 @@ def page(timeline: Timeline, units: Units) -> str:
     )
 
 
-def _judged(timeline: Timeline) -> tuple[list[DrumRow], list[BoxRow], int] | None:
+def _match_truth(timeline: Timeline) -> tuple[list[DrumRow], list[BoxRow], int] | None:
     if timeline.world is None:
         return None
     placed = [timeline.start.compose(Pose(o.x, o.y, o.theta)) for o in timeline.objects]
@@ -76,11 +76,11 @@ def _head(timeline: Timeline, units: Units) -> str:
     method = {"bayes": "Bayesian method", "paper": "paper's method"}[timeline.settings.perception.method]
     when = "" if timeline.started is None else f"{timeline.started}, "
     tiles = []
-    if (judged := _judged(timeline)) is not None:
-        drums, boxes, false = judged
+    if (matches := _match_truth(timeline)) is not None:
+        drums, boxes, false = matches
         rows = [*drums, *boxes]
         errors = [row["error"] for row in rows if row["error"] is not None]
-        tiles.append(tile(f"{len(errors)} of {len(rows)}", f"things found, {false} false"))
+        tiles.append(tile(f"{len(errors)} of {len(rows)}", f"objects found, {false} false"))
         if errors:
             tiles.append(tile(f"{format_length(sum(errors) / len(errors), units, 3)} {units}", "mean error"))
             tiles.append(tile(f"{format_length(max(errors), units, 3)} {units}", "worst error"))
@@ -89,7 +89,7 @@ def _head(timeline: Timeline, units: Units) -> str:
     back = int(np.isfinite(timeline.echoes[:, RANGE]).sum())
     tiles.append(tile(f"{back:,}", f"echoes of {len(timeline.echoes):,} readings"))
     tiles.append(tile(f"{timeline.cycles:,}", "cycles" if timeline.modes else "firings"))
-    tiles.append(tile(f"{timeline.seconds:.1f} s", "long"))
+    tiles.append(tile(f"{timeline.seconds:.1f} s", "duration"))
     about = escape(f"{when}{method}, version {timeline.versions.get('echolocate', VERSION)}")
     notes = "".join(note(text, bad=True) for text in timeline.notes)
     title = escape(timeline.path.stem)
@@ -98,9 +98,9 @@ def _head(timeline: Timeline, units: Units) -> str:
 
 def _table_2(timeline: Timeline, units: Units) -> str:
     """Return the paper's Table 2 of this run, with errors."""
-    if (judged := _judged(timeline)) is None:
-        return note("What stood there is not known, so no error is told.")
-    drums, boxes, false = judged
+    if (matches := _match_truth(timeline)) is None:
+        return note("The true world is not known, so there are no errors.")
+    drums, boxes, false = matches
     heads = ["", f"truth ({units})", f"estimate ({units})", f"error ({units})"]
     rows = []
     for what, number, row in [
@@ -116,12 +116,16 @@ def _table_2(timeline: Timeline, units: Units) -> str:
                 "" if error is None else format_length(error, units, 3),
             ]
         )
-    told = note(f"As the paper's Table 2, in world coordinates. {false} recognised where nothing of the kind stands.")
+    notes_below = note(
+        f"As the paper's Table 2, in world coordinates. {false} objects recognised where there is none."
+    )
     numbers = paper_figures(timeline)
     if numbers is not None and numbers[0] == 6:
         mean, worst = (format_length(FOOT_M * feet, units, 3) for feet in (0.249, 0.349))
-        told += note(f"The paper's own Table 2 has a mean error of {mean} {units} and a worst of {worst} {units}.")
-    return table(heads, rows) + told
+        notes_below += note(
+            f"The paper's own Table 2 has a mean error of {mean} {units} and a worst of {worst} {units}."
+        )
+    return table(heads, rows) + notes_below
 
 
 def _others(timeline: Timeline, units: Units) -> str:
@@ -142,16 +146,18 @@ def _others(timeline: Timeline, units: Units) -> str:
         ]
         for name, o in zip(names, timeline.objects, strict=True)
     ]
-    return note("What the run itself reports, in the odometry's frame, named as in the picture:") + table(heads, rows)
+    return note("As the run itself reports them, in the odometry's frame, named as in the figure:") + table(
+        heads, rows
+    )
 
 
 def _pictures(timeline: Timeline, units: Units) -> str:
     with styled(text_as_text=True):
         drawn = {
             **{name: (svg_of(figure), CAPTIONS[name]) for name, figure in pictures(timeline, units).items()},
-            "course": (
-                svg_of(course(timeline, units)),
-                "Objects known, their errors, and the cycles' rhythm.",
+            "history": (
+                svg_of(history_figure(timeline, units)),
+                "Objects known, their errors, and the time between cycles.",
             ),
         }
     figures = "".join(
@@ -173,7 +179,7 @@ def _bookmarks(timeline: Timeline, units: Units) -> list[str]:
                 mark.text,
             ]
         )
-    return [table(["", "after", f"robot at ({units})", "what"], rows, text=True)] if rows else []
+    return [table(["", "after", f"robot at ({units})", "text"], rows, text=True)] if rows else []
 
 
 def _timing(timeline: Timeline) -> list[str]:
@@ -185,23 +191,23 @@ def _timing(timeline: Timeline) -> list[str]:
         rows.append((str(name), _spread(spread)))
     for name, spread in timing.get("callbacks", {}).items():
         rows.append((f"between cycles: {name}", _spread(spread)))
-    for name, told in (("late", "a cycle begins after it is due by"), ("echo_wait", "an echo waits for its cycle")):
+    for name, label in (("late", "a cycle begins after it is due by"), ("echo_wait", "an echo waits for its cycle")):
         if name in timing:
-            rows.append((told, _spread(timing[name])))
+            rows.append((label, _spread(timing[name])))
     if not timing and "cycle_us" in summary:
         rows.append(("a whole cycle", _spread(summary["cycle_us"])))
     if rows:
         heads = ["ms", "median", "p99", "p99.9", "worst"]
         parts.append(table(heads, [[name, *("" if math.isnan(v) else f"{v:.2f}" for v in vs)] for name, vs in rows]))
     else:
-        parts.append(note("The run's own books are not in the file: it was cut off, or this is a ring log."))
+        parts.append(note("The file has no summary of the run: it was cut off, or this is a ring log."))
     if timeline.cycle_gaps_s:
         q = 1e3 * np.quantile(timeline.cycle_gaps_s, [0.0, 0.5, 0.99, 1.0])
         what = "cycle to cycle" if timeline.modes else "firing to firing"
         parts.append(note(f"From {what}, ms: least {q[0]:.1f}, median {q[1]:.1f}, p99 {q[2]:.1f}, most {q[3]:.1f}."))
     if "late" in summary:
-        by = ", ".join(f"{culprit} ({count})" for culprit, count in timing.get("faults", {}).items())
-        whose = f"; by fault of {by}" if by else ""
+        by = ", ".join(f"{fault} ({count})" for fault, count in timing.get("faults", {}).items())
+        whose = f"; caused by {by}" if by else ""
         parts.append(note(f"{summary['late']} cycles late, {summary.get('missed', 0)} missed{whose}."))
     if timeline.refinement_stops:
         causes = ", ".join(f"{cause} {count}" for cause, count in sorted(timeline.refinement_stops.items()))
@@ -218,7 +224,7 @@ def _line(timeline: Timeline) -> list[str]:
     counts = timeline.counts
     rows = []
     if link is not None:
-        rows.append(["as the run counted", *(f"{link[key]:,}" for key in ("frames", "bad", "lost"))])
+        rows.append(["counted during the run", *(f"{link[key]:,}" for key in ("frames", "bad", "lost"))])
     if counts is not None:
         rows.append(["in the recorded bytes", *(f"{n:,}" for n in (counts.frames, counts.bad, counts.lost))])
     return [table(["", "frames", "bad", "lost"], rows)] if rows else []
@@ -231,15 +237,17 @@ def _modes(timeline: Timeline) -> list[str]:
     if not timeline.modes:
         return []
     rows = [[f"{m.t_s:.2f} s", m.mode, m.reason or ""] for m in timeline.modes]
-    told = note("Never stopped for a reason.") if not reasons else "".join(note(r, bad=True) for r in reasons)
-    return [told, table(["after", "mode", "why"], rows, text=True)]
+    notes_below = (
+        note("The robot never stopped for a reason.") if not reasons else "".join(note(r, bad=True) for r in reasons)
+    )
+    return [notes_below, table(["after", "mode", "reason"], rows, text=True)]
 
 
 def _log(timeline: Timeline) -> str:
     said = [line for line in timeline.log if line.level not in {"info", "debug"}]
     rows = [[f"{line.t_s:.2f} s", line.level, line.text] for line in said[:LOG_SHOWN]]
     more = note(f"and {len(said) - LOG_SHOWN} more") if len(said) > LOG_SHOWN else ""
-    return table(["after", "level", "what"], rows, text=True) + more if rows else ""
+    return table(["after", "level", "message"], rows, text=True) + more if rows else ""
 
 
 def _made_by(timeline: Timeline) -> str:

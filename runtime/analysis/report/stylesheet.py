@@ -1,4 +1,4 @@
-"""How the page looks: by day, by night, on paper, and on a phone."""
+"""The style of the page: light, dark, printed, and on a phone."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import Final
 
 CSS: Final = """
 :root { color-scheme: light dark;
-  --page: #f6f6f4; --paper: #ffffff; --ink: #1c1c1c; --muted: #6e6e6e; --grid: #e3e3e3; --thing: #cfcfcf;
+  --page: #f6f6f4; --paper: #ffffff; --ink: #1c1c1c; --muted: #6e6e6e; --grid: #e3e3e3; --truth: #cfcfcf;
   --echo: #0072b2; --segment: #d55e00; --cluster: #009e73; --robot: #cc79a7; --bad: #b3261e; }
 @media screen and (prefers-color-scheme: dark) { :root {
-  --page: #111315; --paper: #1a1d20; --ink: #ececec; --muted: #a2a6aa; --grid: #33383d; --thing: #5a6066;
+  --page: #111315; --paper: #1a1d20; --ink: #ececec; --muted: #a2a6aa; --grid: #33383d; --truth: #5a6066;
   --echo: #56b4e9; --segment: #f28e4c; --cluster: #3ecfa4; --robot: #e3a4c6; --bad: #ff8a80; } }
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--page); color: var(--ink); font: 15px/1.5 system-ui, sans-serif; }

@@ -149,7 +149,7 @@ def test_report_and_figures_show_them(tmp_path: Path) -> None:
     section = text[text.index("<h2>Bookmarks</h2>") :]
     assert re.findall(r"<td>(\d\.\d\d) s</td>", section[: section.index("</section>")]) == ["2.00", "3.00"]
     assert {f"models-bookmark-{n}" for n in (1, 2)} <= set(re.findall(r'id="([^"]*)"', text))
-    assert {f"course-bookmark-{n}" for n in (1, 2)} <= set(re.findall(r'id="([^"]*)"', text))
+    assert {f"history-bookmark-{n}" for n in (1, 2)} <= set(re.findall(r'id="([^"]*)"', text))
     assert run_command(["figures", str(path), "--out", str(tmp_path / "drawn")]) == DONE
     assert 'id="bookmark-2"' in (tmp_path / "drawn" / "raw.svg").read_text("utf-8")
 

@@ -61,7 +61,7 @@ def page(hall_run: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
     return path.read_text("utf-8")
 
 
-def test_it_needs_nothing_else(page: str) -> None:
+def test_page_is_self_contained(page: str) -> None:
     reader = Reader(page)
     assert reader.open == []
     assert all(link.startswith("#") for link in reader.links), reader.links
@@ -73,9 +73,9 @@ def test_it_needs_nothing_else(page: str) -> None:
     assert len(page.encode()) < SIZE_MAX
 
 
-def test_page_describes_the_run(page: str) -> None:
+def test_page_shows_the_run(page: str) -> None:
     text = " ".join(Reader(page).text)
-    for title in ("Objects", "Pictures", "Timing", "Line", "Modes and stop reasons", "Settings", "Made by"):
+    for title in ("Objects", "Figures", "Timing", "Link", "Modes and stop reasons", "Settings", "Made by"):
         assert title in text
     assert page.count("<svg") == 5
     drums = re.findall(r"<td>drum \d</td><td>\(([^)]*)\)</td>", page)
@@ -86,29 +86,29 @@ def test_page_describes_the_run(page: str) -> None:
     named = re.findall(r"<td>(drum \d), semicircle</td>", page)
     assert len(set(named)) == len(named) == len(errors), "each by the name that it has in Table 2"
     assert "not found" in text, "the last drums are not reached in that time"
-    assert "Never stopped for a reason." in text
+    assert "The robot never stopped for a reason." in text
     assert "behaviors.arbiter.base_velocity_m_s" in text
     assert "Refinement ended by: budget" in text
     assert "0.249 ft" in text
 
 
-def test_a_page_beside_a_ring_log(hall_log: Path, tmp_path: Path) -> None:
+def test_page_of_a_ring_log(hall_log: Path, tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     log.write_bytes(hall_log.read_bytes())
     assert run_command(["report", str(log)]) == DONE
     page = (tmp_path / "log.html").read_text("utf-8")
-    assert "What stood there is not known" in page
+    assert "The true world is not known" in page
     assert Reader(page).open == []
 
 
-def test_what_a_file_holds_is_text() -> None:
+def test_content_is_escaped() -> None:
     evil = "<script>alert('x')</script>&\""
     for made in (table([evil], [[evil]]), note(evil)):
         assert "<script" not in made
         assert html.escape(evil) in made
 
 
-def test_an_svg_within_a_page() -> None:
+def test_inlined_svg() -> None:
     svg = (
         '<?xml version="1.0"?><!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/x.dtd">'
         '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"><!-- a -->'
@@ -120,4 +120,4 @@ def test_an_svg_within_a_page() -> None:
         'clip-path="url(#p-c)"/><use href="#p-a"/></g></svg>'
     )
     for variable in VARIABLES.values():
-        assert CSS.count(f"{variable}:") == 2, "by day and by night"
+        assert CSS.count(f"{variable}:") == 2, "in light and dark mode"

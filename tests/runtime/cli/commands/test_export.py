@@ -114,13 +114,13 @@ def test_foxglove(hall_run: Path, timeline: Timeline, tmp_path: Path) -> None:
 
 
 def test_a_scan_puts_echoes_where_they_were(timeline: Timeline) -> None:
-    from runtime.analysis.export.shapes import even_radius, rounds, whole_ring
+    from runtime.analysis.export.shapes import even_radius, firing_scans, whole_ring
 
     radius = even_radius(timeline.settings.ring)
     assert radius is not None
     assert radius == pytest.approx(0.381)
     count = 0
-    for part in rounds(timeline):
+    for part in firing_scans(timeline):
         ranges = whole_ring(24, radius, part)
         for row in part.rows:
             reach = ranges[int(row[1])]

@@ -50,7 +50,7 @@ def test_every_picture_in_every_form(drawn: Path) -> None:
         assert 0.5 < (pixels == 255).all(axis=1).mean() < 0.99, "mostly paper, and not nothing"
         text = (drawn / f"{name}.svg").read_text("utf-8")
         assert "truth" in ids(drawn / f"{name}.svg")
-        assert {"way", "robot"} <= ids(drawn / f"{name}.svg")
+        assert {"path", "robot"} <= ids(drawn / f"{name}.svg")
         assert "<dc:date>" not in text
         assert len(text) < 600_000
 
