@@ -1,4 +1,4 @@
-"""Perceptions on which a person does something, each made once a file: see `tests.perception.edited`."""
+"""Fixtures of perceptions to edit, computed once for each test file: see `tests.perception.edited`."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from tests.perception.halls import drive
 
 @pytest.fixture(scope="module")
 def firings() -> list[Firing]:
-    """A way past the first four drums, and 3 ft of it once more."""
+    """Return a drive past the first four drums, and another one past 3 ft of them."""
     once = list(drive(load_world("hallway"), (-4.0, SEEN_TO_FT)))
     return [*once, *drive(load_world("hallway"), (-1.0, 3.0), begin_s=once[-1].robot_s + 1.0, y_ft=0.5)]
 
 
 @pytest.fixture(scope="module", params=["paper", pytest.param("bayes", marks=pytest.mark.compiled)])
 def remembered(request: pytest.FixtureRequest, firings: list[Firing]) -> tuple[str, Snapshot]:
-    """Return a method, and what it remembers after that way."""
+    """Return a method's name and its state after the first drive."""
     perception = fresh(request.param)
     for firing in passed(firings):
         hear(perception, firing)
@@ -30,7 +30,7 @@ def remembered(request: pytest.FixtureRequest, firings: list[Firing]) -> tuple[s
 
 @pytest.fixture(scope="module")
 def early(firings: list[Firing]) -> Snapshot:
-    """Return what the Bayesian method remembers when it has come to the first drums."""
+    """Return the state of the Bayesian method when it reaches the first drums."""
     perception = fresh("bayes")
     for firing in firings[:EARLY]:
         hear(perception, firing)
@@ -46,7 +46,7 @@ def seen(remembered: tuple[str, Snapshot]) -> Perception:
 
 
 @pytest.fixture
-def begun(early: Snapshot) -> Perception:
+def reached_drums(early: Snapshot) -> Perception:
     perception = fresh("bayes")
     perception.restore(early)
     return perception

@@ -1,4 +1,4 @@
-"""A drive past four drums, and perceptions that remember it; shared by the tests of what a person does to them."""
+"""A drive past four drums, and perceptions that have observed it; shared by the tests of edits."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from perception.pipeline import DetectedObject, Perception
 from tests.perception.halls import FT
 
 EARLY = 61
-"""Firings until the first drums are in sight."""
+"""Firings until the first drums are detected."""
 SEEN_TO_FT = 6.0
-"""The drive ends here, with four drums in sight or just passed."""
+"""The first drive ends at this x, ft, with four drums detected."""
 DRUM = (1.0 * FT, 4.0 * FT)
 METHODS = ("paper", "bayes")
 
@@ -50,7 +50,7 @@ def settle(perception: Perception) -> None:
 
 
 def at(perception: Perception, place: tuple[float, float], within_m: float = 0.15) -> DetectedObject | None:
-    """Return the object at a place, None where there is none."""
+    """Return the object nearest to a place (m), None if there is none within `within_m`."""
     near = [o for o in perception.objects() if math.dist((o.x, o.y), place) < within_m]
     return min(near, key=lambda o: math.dist((o.x, o.y), place)) if near else None
 

@@ -1,4 +1,4 @@
-"""What a person hears of what was perceived and edited: why not, what speaks for it; and what is kept of it all."""
+"""Edits: refusals, the evidence for objects, snapshots of edited state, and models added while it runs."""
 
 from __future__ import annotations
 
@@ -51,31 +51,33 @@ REFUSED: list[tuple[Edit, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("edit", "why"), REFUSED, ids=lambda v: v if isinstance(v, str) else v.kind)
-def test_what_cannot_be_done_is_said_and_changes_nothing(seen: Perception, edit: Edit, why: str) -> None:
+@pytest.mark.parametrize(("edit", "reason"), REFUSED, ids=lambda v: v if isinstance(v, str) else v.kind)
+def test_an_impossible_edit_is_refused_with_a_reason_and_changes_nothing(
+    seen: Perception, edit: Edit, reason: str
+) -> None:
     before = seen.snapshot()
     refused = seen.edit(edit)
     assert refused is not None
-    assert why in refused
+    assert reason in refused
     assert refused.isprintable()
     after = seen.snapshot()
     assert all(np.array_equal(before[name], after[name], equal_nan=before[name].dtype.kind == "f") for name in before)
     assert seen.evidence(NOWHERE) is None
 
 
-def test_there_is_room_for_so_many_and_a_word_on_it(seen: Perception) -> None:
+def test_the_number_of_placed_objects_is_limited(seen: Perception) -> None:
     refused = [seen.edit(PlaceModel("box", 0.8 * k, -3.0, 0.0)) for k in range(40)]
     assert refused[0] is None
-    told = [r for r in refused if r is not None]
-    assert told
-    assert all("reject one first" in r for r in told)
-    assert sum(o.placed for o in seen.objects()) == 40 - len(told)
+    reasons = [r for r in refused if r is not None]
+    assert reasons
+    assert all("reject one first" in r for r in reasons)
+    assert sum(o.placed for o in seen.objects()) == 40 - len(reasons)
 
 
 # Evidence.
 
 
-def test_evidence_is_what_the_readings_say_and_looking_changes_nothing(seen: Perception) -> None:
+def test_evidence_agrees_with_the_objects_and_changes_nothing(seen: Perception) -> None:
     before = seen.snapshot()
     for o in seen.objects():
         evidence = seen.evidence(number_of(o))
@@ -94,7 +96,7 @@ def test_evidence_is_what_the_readings_say_and_looking_changes_nothing(seen: Per
                 end = (
                     arc.x + arc.range_m * math.cos(arc.direction), arc.y + arc.range_m * math.sin(arc.direction)
                 )  # fmt: skip
-                assert math.dist(end, (o.x, o.y)) < 0.9, "it ends about where the object is"
+                assert math.dist(end, (o.x, o.y)) < 0.9, "the reading ends near the object"
             assert len(heard) == pytest.approx(o.support, abs=0.2 * o.support + 3)
             if o.model == "semicircle":
                 names = [name for name, _ in evidence.rivals]
@@ -110,12 +112,12 @@ def test_evidence_is_what_the_readings_say_and_looking_changes_nothing(seen: Per
     assert all(before[name].tobytes() == after[name].tobytes() for name in before)
 
 
-def test_evidence_on_what_is_no_model(begun: Perception) -> None:
-    """A track that looks like a post is told as one, and cannot be confirmed as a model."""
+def test_evidence_for_an_object_that_is_not_a_model(reached_drums: Perception) -> None:
+    """A track that resembles a post is labelled as one and cannot be confirmed as a model."""
     from perception.bayes.bayes_method import BayesPerception
     from perception.bayes.state import ESTABLISHED, KIND, ST
 
-    seen = begun
+    seen = reached_drums
     method = seen.method
     assert isinstance(method, BayesPerception)
     s, p = method.memory, method.settings
@@ -131,11 +133,11 @@ def test_evidence_on_what_is_no_model(begun: Perception) -> None:
     assert "none of the models" in refused
 
 
-# Memory.
+# Snapshots and models.
 
 
-def test_a_snapshot_holds_all_that_was_edited(seen: Perception, firings: list[Firing]) -> None:
-    """From a snapshot taken amid edits everything goes on to the bit."""
+def test_a_snapshot_holds_the_edited_state(seen: Perception, firings: list[Firing]) -> None:
+    """Perception continues from a snapshot taken between edits with identical results."""
     objects, listed = seen.objects(), seen.segments().numbers.tolist()
     edits: list[Edit] = [
         DeleteSegments(tuple(listed[:4])), PinSegments(tuple(listed[5:9]), pinned=True),
@@ -156,8 +158,8 @@ def test_a_snapshot_holds_all_that_was_edited(seen: Perception, firings: list[Fi
     assert [name for name in mine if mine[name].tobytes() != theirs[name].tobytes()] == []
 
 
-def test_models_are_added_while_it_perceives(seen: Perception, firings: list[Firing]) -> None:
-    """Known objects stay what and where they are; the new ones are placed, and compared from then on."""
+def test_models_are_added_while_perception_runs(seen: Perception, firings: list[Firing]) -> None:
+    """Known objects keep their labels and places; the new models can be placed and are compared from then on."""
     method = "bayes" if is_bayes(seen) else "paper"
     chosen = SETTINGS[method]
     post = load_model("drum").model_copy(update={"name": "bollard", "arc_radius_m": 0.12})
@@ -165,7 +167,7 @@ def test_models_are_added_while_it_perceives(seen: Perception, firings: list[Fir
     before = {o.number: o for o in seen.objects()}
     models = (*chosen.models, post, crate)
     seen.set_models(chosen.models)
-    assert {o.number: o for o in seen.objects()} == before, "nothing new is nothing"
+    assert {o.number: o for o in seen.objects()} == before, "the same models change nothing"
     seen.set_models(models)
     after: dict[Any, DetectedObject] = {o.number: o for o in seen.objects()}
     if is_bayes(seen):
@@ -180,51 +182,51 @@ def test_models_are_added_while_it_perceives(seen: Perception, firings: list[Fir
     assert {o.model for o in seen.objects() if o.placed} == {"bollard", "crate"}
     other = Perception(chosen.ring, models, chosen.perception)
     other.restore(seen.snapshot())
-    assert other.objects() == seen.objects(), "its memory is that of one that knew them from the start"
+    assert other.objects() == seen.objects(), "its state is that of a perception with all models from the start"
 
 
-def test_every_edit_in_turn_on_the_first_things_seen(begun: Perception, firings: list[Firing]) -> None:
-    """The Bayesian method: what each leaves is there, and from its snapshot, or one of an older program, all goes on."""
-    drum = next(o for o in begun.objects() if o.model == "semicircle")
-    numbers = begun.segments().numbers.tolist()
+def test_every_edit_in_turn_on_the_first_objects(reached_drums: Perception, firings: list[Firing]) -> None:
+    """The Bayesian method: each edit takes effect, and a restored snapshot reports the same objects."""
+    drum = next(o for o in reached_drums.objects() if o.model == "semicircle")
+    numbers = reached_drums.segments().numbers.tolist()
     pins, doomed = tuple(numbers[:3]), tuple(numbers[3:6])
     for edit in (
         PinSegments(pins, pinned=True), DeleteSegments(doomed), PlaceModel("semicircle", -0.3, 0.2, 0.0),
         PlaceModel("box", -0.2, -0.3, 0.3), MoveObject(number_of(drum), drum.x + 0.05, drum.y, 0.0),
     ):  # fmt: skip
-        assert begun.edit(edit) is None
+        assert reached_drums.edit(edit) is None
     drums, boxes = (
-        {o.number: o for o in begun.objects() if o.placed and o.model == m} for m in ("semicircle", "box")
+        {o.number: o for o in reached_drums.objects() if o.placed and o.model == m} for m in ("semicircle", "box")
     )
-    (by_hand,) = drums.keys() - {drum.number}
+    (placed_drum,) = drums.keys() - {drum.number}
     (box,) = boxes
-    assert by_hand is not None
+    assert placed_drum is not None
     assert box is not None
-    assert begun.edit(MoveObject(box, -0.1, -0.3, 0.1)) is None
-    assert begun.edit(MoveObject(by_hand, 1.5, 0.0, 0.1)) is None
-    assert begun.edit(MoveObject(box, 1.0, 0.0, 0.1)) is None
+    assert reached_drums.edit(MoveObject(box, -0.1, -0.3, 0.1)) is None
+    assert reached_drums.edit(MoveObject(placed_drum, 1.5, 0.0, 0.1)) is None
+    assert reached_drums.edit(MoveObject(box, 1.0, 0.0, 0.1)) is None
     for firing in firings[EARLY : EARLY + 12]:
-        hear(begun, firing)
-    assert {by_hand, box, drum.number} <= {o.number for o in begun.objects()}
-    for number in (by_hand, box):
-        evidence = begun.evidence(number)
+        hear(reached_drums, firing)
+    assert {placed_drum, box, drum.number} <= {o.number for o in reached_drums.objects()}
+    for number in (placed_drum, box):
+        evidence = reached_drums.evidence(number)
         assert evidence is not None
         assert evidence.opposing <= 0.0
     other = fresh("bayes")
-    other.restore(begun.snapshot())
-    assert other.objects() == begun.objects()
+    other.restore(reached_drums.snapshot())
+    assert other.objects() == reached_drums.objects()
     post = load_model("drum").model_copy(update={"name": "bollard", "arc_radius_m": 0.12})
-    begun.set_models((*SETTINGS["bayes"].models, post))
-    assert {o.number for o in begun.objects()} >= {by_hand, box}
-    assert begun.edit(RejectObject(box)) is None
-    assert begun.edit(RejectObject(by_hand)) is None
-    assert {o.number for o in begun.objects()}.isdisjoint({by_hand, box})
-    assert set(pins) <= set(begun.segments().numbers.tolist())
-    assert set(doomed).isdisjoint(begun.segments().numbers.tolist())
-    refused = begun.edit(PlaceModel("chair", 0.0, 0.0, 0.0))
+    reached_drums.set_models((*SETTINGS["bayes"].models, post))
+    assert {o.number for o in reached_drums.objects()} >= {placed_drum, box}
+    assert reached_drums.edit(RejectObject(box)) is None
+    assert reached_drums.edit(RejectObject(placed_drum)) is None
+    assert {o.number for o in reached_drums.objects()}.isdisjoint({placed_drum, box})
+    assert set(pins) <= set(reached_drums.segments().numbers.tolist())
+    assert set(doomed).isdisjoint(reached_drums.segments().numbers.tolist())
+    refused = reached_drums.edit(PlaceModel("chair", 0.0, 0.0, 0.0))
     assert refused is not None
-    assert [begun.edit(PlaceModel("box", 0.1 * k, 3.0, 0.0)) is None for k in range(30)].count(False) > 0
-    refused = begun.edit(PinSegments((*pins, 10**6), pinned=False))
+    assert [reached_drums.edit(PlaceModel("box", 0.1 * k, 3.0, 0.0)) is None for k in range(30)].count(False) > 0
+    refused = reached_drums.edit(PinSegments((*pins, 10**6), pinned=False))
     assert refused is not None
-    assert begun.edit(ClearMap()) is None
-    assert begun.labelled_objects() == ()
+    assert reached_drums.edit(ClearMap()) is None
+    assert reached_drums.labelled_objects() == ()

@@ -1,4 +1,4 @@
-"""What a person does to what was perceived, by both methods: it is done, and it lasts as it should."""
+"""Operators' edits by both methods: each takes effect and lasts as long as it should."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_objects_and_segments_keep_their_numbers(seen: Perception, firings: list
     common = kept.keys() & after.keys()
     assert common
     assert all(kept[n] == after[n] for n in common)
-    assert max(after) > max(kept), "new ones have new numbers"
+    assert max(after) > max(kept), "new segments have new numbers"
     times = listed.times
     assert np.isfinite(times).all()
     assert (times <= firings[-1].robot_s).all()
@@ -64,7 +64,7 @@ def test_objects_and_segments_keep_their_numbers(seen: Perception, firings: list
 # Segments.
 
 
-def test_deleted_segments_are_gone_and_the_rest_is_as_it_was(seen: Perception) -> None:
+def test_deleting_segments_leaves_the_others_unchanged(seen: Perception) -> None:
     numbers, ends, times, _ = seen.segments()
     doomed, total = tuple(numbers[::3].tolist()), seen.counts.segments_total
     assert seen.edit(DeleteSegments(doomed)) is None
@@ -79,13 +79,13 @@ def test_deleted_segments_are_gone_and_the_rest_is_as_it_was(seen: Perception) -
     refused = seen.edit(DeleteSegments((doomed[0], int(numbers[1]))))
     assert refused is not None
     assert f"segment {doomed[0]};" in refused
-    assert int(numbers[1]) not in seen.segments().numbers, "the other one is done"
+    assert int(numbers[1]) not in seen.segments().numbers, "the other segment was deleted"
     refused = seen.edit(DeleteSegments(doomed))
     assert refused is not None
     assert f"and {len(doomed) - 5} more" in refused
 
 
-def test_pinned_segments_outlast_whatever_comes(seen: Perception, firings: list[Firing]) -> None:
+def test_pinned_segments_stay_until_unpinned(seen: Perception, firings: list[Firing]) -> None:
     listed = seen.segments()
     pins = tuple(listed.numbers[np.argsort(listed.times)][:: max(1, len(listed.numbers) // 12)].tolist())
     assert seen.edit(PinSegments(pins, pinned=True)) is None
@@ -105,10 +105,10 @@ def test_pinned_segments_outlast_whatever_comes(seen: Perception, firings: list[
     for lap in range(4, 8):
         for firing in passed(firings):
             seen.observe(replace(firing, robot_s=firing.robot_s + 200.0 * lap))
-    assert not set(pins) <= set(seen.segments().numbers.tolist()), "let go, they leave as any other"
+    assert not set(pins) <= set(seen.segments().numbers.tolist()), "unpinned segments leave like any other"
 
 
-def test_what_is_not_in_the_map_cannot_be_pinned(seen: Perception) -> None:
+def test_segments_that_are_not_in_the_map_cannot_be_pinned(seen: Perception) -> None:
     known = int(seen.segments().numbers[0])
     refused = seen.edit(PinSegments((known, 10**9), pinned=True))
     assert refused is not None
@@ -127,8 +127,8 @@ def test_what_is_not_in_the_map_cannot_be_pinned(seen: Perception) -> None:
 
 
 @pytest.mark.parametrize(("off_x", "off_y"), [(0.12, 0.0), (-0.05, -0.1), (0.0, 0.0)])
-def test_a_model_that_is_placed_relaxes_onto_what_was_heard(seen: Perception, off_x: float, off_y: float) -> None:
-    """The paper's method has segments of its own for it, the full one readings."""
+def test_a_placed_model_relaxes_onto_the_readings(seen: Perception, off_x: float, off_y: float) -> None:
+    """The paper's method relaxes it onto segments, the Bayesian method onto readings."""
     rested = there(seen)
     assert seen.edit(RejectObject(number_of(rested))) is None
     settle(seen)
@@ -145,10 +145,8 @@ def test_a_model_that_is_placed_relaxes_onto_what_was_heard(seen: Perception, of
 
 
 @pytest.mark.parametrize("model", ["semicircle", "box"])
-def test_a_model_that_is_placed_is_there_at_once_and_stays(
-    seen: Perception, firings: list[Firing], model: str
-) -> None:
-    """In the middle of the way, where nothing is and much was heard to say so."""
+def test_a_placed_model_is_reported_at_once_and_stays(seen: Perception, firings: list[Firing], model: str) -> None:
+    """It is placed on the driven path, where many readings show free space."""
     before = {o.number for o in seen.objects()}
     assert seen.edit(PlaceModel(model, 0.4, 0.1, 0.3)) is None
     (new,) = [o for o in seen.objects() if o.number not in before]
@@ -190,7 +188,7 @@ def test_a_moved_object_keeps_its_number_and_relaxes_back(seen: Perception, firi
         assert found.probability > 0.9
 
 
-def test_an_object_moved_far_away_is_judged_by_what_was_heard_there(seen: Perception) -> None:
+def test_an_object_moved_far_away_is_judged_by_the_readings_there(seen: Perception) -> None:
     rested = there(seen)
     number = number_of(rested)
     assert seen.edit(MoveObject(number, 0.4, 0.0, 0.0)) is None
@@ -204,9 +202,7 @@ def test_an_object_moved_far_away_is_judged_by_what_was_heard_there(seen: Percep
     assert math.dist((found.x, found.y), (rested.x, rested.y)) < 0.1
 
 
-def test_a_rejected_object_is_gone_and_only_new_readings_bring_it_back(
-    seen: Perception, firings: list[Firing]
-) -> None:
+def test_only_new_readings_bring_a_rejected_object_back(seen: Perception, firings: list[Firing]) -> None:
     number = number_of(there(seen))
     others = {o.number for o in seen.objects()} - {number}
     assert seen.edit(RejectObject(number)) is None
@@ -217,7 +213,7 @@ def test_a_rejected_object_is_gone_and_only_new_readings_bring_it_back(
     last = list(passed(firings))[-1]
     for k in range(20):
         hear(seen, replace(last, robot_s=last.robot_s + 0.05 * k))
-    assert at(seen, DRUM, 0.3) is None, "standing where it stood the robot hears nothing new"
+    assert at(seen, DRUM, 0.3) is None, "a robot at rest gets no new evidence"
     back = None
     for firing in again(firings):
         hear(seen, firing)
@@ -228,11 +224,11 @@ def test_a_rejected_object_is_gone_and_only_new_readings_bring_it_back(
         assert back.number != number
 
 
-def test_a_confirmed_object_is_reported_however_little_speaks_for_it(
-    begun: Perception, firings: list[Firing]
+def test_a_confirmed_object_is_reported_whatever_its_evidence(
+    reached_drums: Perception, firings: list[Firing]
 ) -> None:
-    """The Bayesian method, early on: something is about to be a drum, and is not sure enough to be called one."""
-    seen = begun
+    """The Bayesian method, early: a track resembles a drum but is not certain enough to be reported as one."""
+    seen = reached_drums
     doubtful = [o for o in seen.labelled_objects() if o.model == "unknown"]
     assert doubtful
     number = number_of(doubtful[0])
@@ -273,9 +269,7 @@ def test_a_confirmed_object_of_the_papers_method_outlasts_its_segments(seen: Per
     assert seen.objects() == ()
 
 
-def test_after_the_map_is_cleared_all_begins_anew_but_numbers_and_obstacles(
-    seen: Perception, firings: list[Firing]
-) -> None:
+def test_clearing_the_map_keeps_number_counters_and_obstacles(seen: Perception, firings: list[Firing]) -> None:
     numbers, listed = {o.number for o in seen.objects()}, set(seen.segments().numbers.tolist())
     assert seen.edit(PinSegments(tuple(listed)[:2], pinned=True)) is None
     obstacles = seen.obstacles(firings[-1].robot_s, 1e9)

@@ -1,4 +1,4 @@
-"""The paper's claims about the whole: it recognises and locates, joins continuously, forgets by age, starts warm."""
+"""The paper's statements about the whole method: recognition, continuous joining, ageing and warm starts."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def errors_ft(objects: tuple[DetectedObject, ...], places_ft: list[tuple[float, 
 HALL = [(x, y) for x in (1.0, 4.0, 7.0) for y in (4.0, -4.0)]
 
 
-def test_six_drums_and_no_seventh_within_table_2() -> None:
+def test_exactly_six_drums_are_found_within_the_errors_of_table_2() -> None:
     perception = perceive(settings())
     for firing in drive(load_world("hallway")):
         perception.observe(firing)
@@ -53,8 +53,8 @@ def test_six_drums_and_no_seventh_within_table_2() -> None:
     assert all(o.model == "semicircle" and 0.0 < o.score <= 1.0 and 0.0 < o.sigma < 0.1 for o in objects)
 
 
-def test_objects_are_found_while_driving_not_at_the_end() -> None:
-    """Segments join continuously: each pair of drums is there a foot after the robot has passed it."""
+def test_objects_are_found_while_driving() -> None:
+    """Segments join continuously: each pair of drums is found within a foot after the robot has passed it."""
     perception = perceive(settings())
     found_at: dict[int, float] = {}
     for firing in drive(load_world("hallway")):
@@ -68,7 +68,7 @@ def test_objects_are_found_while_driving_not_at_the_end() -> None:
 
 
 def test_warm_starts_take_a_few_iterations() -> None:
-    """Paper §3.4: "only a few iterations are required" once a model has rested and the map changes gracefully."""
+    """Paper §3.4: "only a few iterations are required" once a model has come to rest and the map changes gradually."""
     perception = perceive(settings())
     warm = []
     for firing in drive(load_world("hallway")):
@@ -86,8 +86,8 @@ def test_warm_starts_take_a_few_iterations() -> None:
     assert np.median(warm) < 0.7 * cold
 
 
-def test_quanta_change_when_not_what() -> None:
-    """Refining two iterations at a time comes to rest at the very pose that one long relaxation does."""
+def test_the_size_of_quanta_does_not_change_results() -> None:
+    """Refining two iterations at a time ends at the same pose as one long relaxation."""
     firings = list(drive(load_world("hallway"), (-6.0, 3.0)))
     poses = []
     for per_quantum in (2, 1000):
@@ -100,7 +100,7 @@ def test_quanta_change_when_not_what() -> None:
 
 
 def test_refinement_takes_turns() -> None:
-    """No candidate waits for another to come to rest first."""
+    """No candidate waits until another is at rest."""
     perception = perceive(settings(relaxation=RelaxationConfig(iterations_per_quantum=1)))
     for firing in drive(load_world("hallway"), (-6.0, 8.0)):
         perception.observe(firing)
@@ -129,8 +129,8 @@ def test_old_segments_leave_and_their_objects_with_them() -> None:
     assert perception.objects() == ()
 
 
-def test_a_drum_that_was_taken_away_is_contradicted() -> None:
-    """Echoes from a wall behind where it stood take its segments off the map."""
+def test_the_segments_of_a_removed_drum_are_contradicted() -> None:
+    """Echoes from a wall behind its former place remove its segments from the map."""
     world = drums((4.0, 3.5))
     behind = WallConfig(x1_m=-20.0, y1_m=7.0 * FT, x2_m=20.0, y2_m=7.0 * FT)
     wall = load_world("hallway").model_copy(update={"drum": (), "wall": (behind,)})
@@ -148,7 +148,7 @@ def test_a_drum_that_was_taken_away_is_contradicted() -> None:
     assert near.sum() <= 2  # a segment seen from the side only is faced by no sensor that hears the wall
 
 
-def test_a_full_map_lets_the_oldest_go() -> None:
+def test_a_full_map_drops_its_oldest_segments() -> None:
     perception = perceive(settings(map=MapConfig(capacity=64)))
     for firing in drive(load_world("hallway")):
         perception.observe(firing)
@@ -160,8 +160,8 @@ def test_a_full_map_lets_the_oldest_go() -> None:
     assert list(outline.times[order]) == sorted(outline.times[order])
 
 
-def test_a_cluster_that_was_split_is_one_object() -> None:
-    """A small T splits each drum's segments over two clusters; both candidates rest on the same drum."""
+def test_a_split_cluster_is_one_object() -> None:
+    """A small T splits each drum's segments into two clusters; both candidates come to rest on the same drum."""
     perception = perceive(settings(clusters=ClustersConfig(threshold_m=0.33)))
     for firing in drive(load_world("hallway")):
         perception.observe(firing)
@@ -170,7 +170,7 @@ def test_a_cluster_that_was_split_is_one_object() -> None:
     assert len(perception.objects()) == 6
 
 
-def test_of_two_models_the_better_one_is_named() -> None:
+def test_of_two_models_the_better_fit_is_reported() -> None:
     shipped = settings()
     models = (load_model("box"), load_model("semicircle"))
     perception = Perception(shipped.ring, models, shipped.perception)
@@ -180,8 +180,8 @@ def test_of_two_models_the_better_one_is_named() -> None:
     assert [o.model for o in perception.objects()].count("semicircle") == 6
 
 
-def test_a_turning_body_sees_the_same() -> None:
-    """With a ring that turns with its body, sensors sweep over the drums; positions come out alike."""
+def test_a_turning_body_gives_the_same_objects() -> None:
+    """With a ring that turns with its body, sensors sweep over the drums; positions agree."""
     world = drums((4.0, 4.0), (4.0, -4.0))
     straight, turning = perceive(settings()), perceive(settings())
     sonar = Sonar(load_settings("hallway").ring, compile_scene(world), world.acoustics, np.random.default_rng(0))
@@ -197,7 +197,7 @@ def test_a_turning_body_sees_the_same() -> None:
         assert max(errors_ft(perception.objects(), [(4.0, 4.0), (4.0, -4.0)])) <= TABLE_2_MAX_FT
 
 
-def test_forgetting_begins_anew() -> None:
+def test_a_reset_empties_the_map() -> None:
     chosen = settings()
     perception = Perception(chosen.ring, chosen.models, chosen.perception)
     for firing in drive(load_world("hallway"), (-6.0, 5.0)):
@@ -231,7 +231,7 @@ def test_noise_of_one_percent_leaves_at_least_seven_of_eight(seed: int) -> None:
 
 
 def test_echoes_are_obstacles_until_the_sensor_fires_again_or_they_age() -> None:
-    """A reading at maximum range clears its own obstacle and nobody else's."""
+    """A reading at maximum range clears only its own sensor's obstacle."""
     chosen = settings()
     perception = Perception(chosen.ring, chosen.models, chosen.perception)
     ranges = np.full(24, np.nan)

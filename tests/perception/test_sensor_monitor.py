@@ -1,4 +1,4 @@
-"""P8: sensors that lie are found out and masked; honest ones never are, whatever the hall."""
+"""P8: faulty sensors are detected and masked; healthy ones never are, in any hall."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def ring(
 def firings(
     config: RingConfig, world: WorldConfig, path: Path, lies: Mapping[int, float] | None = None
 ) -> Iterator[Firing]:
-    """Yield what the ring hears along a path, one firing a pose; who lies always says the same."""
+    """Yield the firings along a path, one for each pose; the sensors in `lies` always report that range."""
     sonar = Sonar(config, compile_scene(world), world.acoustics, np.random.default_rng(1))
     masks = [sensors(mask) for mask in firing_pattern(config).masks]
     for k, ((x, y, yaw), fired) in enumerate(zip(path, itertools.cycle(masks), strict=False)):
@@ -59,7 +59,7 @@ def firings(
 
 
 def found(config: RingConfig, heard: Iterable[Firing]) -> Found:
-    """Return everything that was ever reported, and after which way, m."""
+    """Return every fault that was ever reported, with the distance driven until then, m."""
     watch, reports, way, last = SensorMonitor(config), dict[tuple[int, SensorFault], float](), 0.0, None
     for firing in heard:
         way += 0.0 if last is None else math.hypot(firing.pose.x - last.x, firing.pose.y - last.y)
@@ -71,8 +71,8 @@ def found(config: RingConfig, heard: Iterable[Firing]) -> Found:
 
 
 @promise
-def test_no_honest_sensor_is_masked(measured: Callable[[str], None]) -> None:
-    """Random halls, mirrors and rough walls, with and without noise, on swerving ways, the ring turning or not."""
+def test_no_healthy_sensor_is_masked(measured: Callable[[str], None]) -> None:
+    """Random halls, specular and rough walls, with and without noise, on winding paths, with a turning ring or not."""
     halls = 0
     presets: tuple[Preset, ...] = ("octets", "alternating", "single")
     for preset, acoustics in itertools.product(presets, (MIRRORS, ROUGH, NOISY, WILD)):
@@ -88,10 +88,10 @@ def test_no_honest_sensor_is_masked(measured: Callable[[str], None]) -> None:
 
 @promise
 @pytest.mark.parametrize("acoustics", [MIRRORS, ROUGH])
-def test_equal_readings_are_honest_where_nothing_should_change_them(
+def test_equal_readings_are_legitimate_if_nothing_should_change_them(
     acoustics: AcousticsConfig, measured: Callable[[str], None]
 ) -> None:
-    """At rest before a wall, along one, between two, with slipping wheels, and at whatever angle."""
+    """At rest before a wall, along one, between two, with slipping wheels, and at any angle."""
     for angle in np.radians(np.arange(0.0, 90.0, 15.0)).tolist():
         c, s = math.cos(angle), math.sin(angle)
         walls = tuple(
@@ -113,7 +113,7 @@ def test_equal_readings_are_honest_where_nothing_should_change_them(
 
 
 @promise
-def test_a_stuck_sensor_is_masked_and_said_to_be(measured: Callable[[str], None]) -> None:
+def test_a_stuck_sensor_is_masked_and_reported(measured: Callable[[str], None]) -> None:
     ways: list[float] = []
     for sensor, stuck_m in itertools.product(range(24), (0.1524, 1.2)):
         world, path = random_hall(sensor, NOISY)
@@ -135,7 +135,7 @@ def test_a_stuck_sensor_is_masked_and_said_to_be(measured: Callable[[str], None]
 
 
 @promise
-def test_a_failing_sensor_is_reported_and_one_that_is_not_to_fire_is_not(measured: Callable[[str], None]) -> None:
+def test_a_failing_sensor_is_reported_but_not_one_outside_the_pattern(measured: Callable[[str], None]) -> None:
     world, path = random_hall(0, NOISY)
     for sensor in range(24):
         got = found(RING, firings(RING, world, path[: MISSED_FIRINGS_MAX + 1], {sensor: FAULTY}))
@@ -154,10 +154,10 @@ def test_a_failing_sensor_is_reported_and_one_that_is_not_to_fire_is_not(measure
 
 
 @promise
-def test_a_sensor_that_never_hears_keeps_its_silence_to_itself_until_it_hears(
+def test_the_silence_of_a_silent_sensor_is_masked_until_its_first_echo(
     measured: Callable[[str], None],
 ) -> None:
-    """In a hall of rough things, where both neighbours hear."""
+    """In a hall of rough objects, where both neighbours hear echoes."""
     caught = 0
     for sensor in range(24):
         world, path = random_hall(sensor, ROUGH)
@@ -182,7 +182,7 @@ def test_a_sensor_that_never_hears_keeps_its_silence_to_itself_until_it_hears(
     measured(f"24 sensors that never hear: the silence of {caught} not believed")
 
 
-def test_a_stuck_sensor_comes_back_when_it_behaves() -> None:
+def test_a_stuck_sensor_returns_to_use_when_it_behaves() -> None:
     world, path = random_hall(3, NOISY)
     watch, config = SensorMonitor(RING), RING
     for firing in firings(config, world, path, {7: 1.2}):
@@ -197,7 +197,7 @@ def test_a_stuck_sensor_comes_back_when_it_behaves() -> None:
 
 
 def crosstalk(config: RingConfig, halls: range) -> tuple[int, int, int, int]:
-    """Return readings that are crosstalk, those that are believed, honest readings, and those that are not."""
+    """Return the counts of crosstalk readings, trusted ones among them, true readings, and untrusted ones among them."""
     heard = through = honest = lost = 0
     for hall in halls:
         world, path = random_hall(hall, MIRRORS)
@@ -233,7 +233,7 @@ def test_octets_of_the_ring_s_own_beam_hear_no_partner(measured: Callable[[str],
         ("every second sensor and octets in turn", ring(sets=(*TWO, *THREE)), 0.1),
     ],
 )
-def test_another_partner_exposes_crosstalk(
+def test_another_firing_partner_exposes_crosstalk(
     name: str, config: RingConfig, share: float, measured: Callable[[str], None]
 ) -> None:
     heard, through, honest, lost = crosstalk(config, range(6))
@@ -246,7 +246,7 @@ def test_another_partner_exposes_crosstalk(
 
 
 @promise
-def test_crosstalk_that_stays_is_masked_and_says_who() -> None:
+def test_persistent_crosstalk_is_masked_and_names_the_partners() -> None:
     """Two sensors of one set, one of which reads short in it; in the other set it does not."""
     config = ring(sets=((0, 2), (0, 12)))
     watch = SensorMonitor(config)
@@ -267,7 +267,7 @@ def test_crosstalk_that_stays_is_masked_and_says_who() -> None:
 
 
 def test_sets_without_a_pattern_are_not_compared() -> None:
-    """A log that names whoever has news, say."""
+    """For example a log that lists only the sensors with new readings."""
     watch, rng = SensorMonitor(RING), np.random.default_rng(5)
     for k in range(400):
         ranges = np.where(rng.random(24) < 0.5, rng.uniform(0.5, 7.0, 24), np.nan)
@@ -275,7 +275,7 @@ def test_sets_without_a_pattern_are_not_compared() -> None:
         assert watch.filter(firing) == (firing, firing)
 
 
-def test_masks_stand_before_map_and_obstacles_and_go_with_the_snapshot() -> None:
+def test_masks_apply_to_map_and_obstacles_and_are_part_of_the_snapshot() -> None:
     perception = Perception(RING, SETTINGS.models, SETTINGS.perception)
     world, path = random_hall(3, NOISY)
     drive = list(firings(RING, world, path, {7: 1.2}))
