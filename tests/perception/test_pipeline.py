@@ -68,7 +68,7 @@ def test_objects_are_found_while_driving() -> None:
 
 
 def test_warm_starts_take_a_few_iterations() -> None:
-    """Paper §3.4: "only a few iterations are required" once a model has come to rest and the map changes gradually."""
+    """Paper §3.4: "only a few iterations are required" once a model is at rest and the map changes gradually."""
     perception = perceive(settings())
     warm = []
     for firing in drive(load_world("hallway")):

@@ -72,7 +72,7 @@ def found(config: RingConfig, heard: Iterable[Firing]) -> Found:
 
 @promise
 def test_no_healthy_sensor_is_masked(measured: Callable[[str], None]) -> None:
-    """Random halls, specular and rough walls, with and without noise, on winding paths, with a turning ring or not."""
+    """Random halls, specular and rough walls, with and without noise, on winding paths, the ring turning or not."""
     halls = 0
     presets: tuple[Preset, ...] = ("octets", "alternating", "single")
     for preset, acoustics in itertools.product(presets, (MIRRORS, ROUGH, NOISY, WILD)):
@@ -197,7 +197,7 @@ def test_a_stuck_sensor_returns_to_use_when_it_behaves() -> None:
 
 
 def crosstalk(config: RingConfig, halls: range) -> tuple[int, int, int, int]:
-    """Return the counts of crosstalk readings, trusted ones among them, true readings, and untrusted ones among them."""
+    """Return counts: crosstalk readings, trusted ones of these, true readings, untrusted ones of those."""
     heard = through = honest = lost = 0
     for hall in halls:
         world, path = random_hall(hall, MIRRORS)
