@@ -152,8 +152,8 @@ def compile_refinement(part: str) -> None:
 
     settings = load_settings(None)
     bayes = settings.perception.bayes
-    told = make_settings(settings.ring, settings.models, bayes)
-    handle = hold(make_state(len(settings.ring.mounts), told, bayes.tracks_max), told)
+    kernel_settings = make_settings(settings.ring, settings.models, bayes)
+    handle = hold(make_state(len(settings.ring.mounts), kernel_settings, bayes.tracks_max), kernel_settings)
     refine = {BAYES: quantum, POLYGONS: pquantum}[part]
     refine(handle, bayes.fresh_share)
 

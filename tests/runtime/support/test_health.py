@@ -1,4 +1,4 @@
-"""P10: whatever part of the process ends or raises, the robot stands within two cycles, and the culprit is named."""
+"""P10: when any part of the process ends or raises, the robot halts within two cycles; the reason names the part."""
 
 from __future__ import annotations
 
@@ -191,7 +191,7 @@ def test_a_callback_that_raises_is_over_and_may_be_armed_after(monkeypatch: pyte
 
 
 def test_the_cycle_itself_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nobody is left to go on: the base is halted on the way out."""
+    """The process cannot go on: it halts the base before it ends."""
 
     def plant(_process: RobotProcess, loop: VirtualLoop) -> None:
         task = asyncio.current_task(loop)

@@ -98,7 +98,7 @@ def test_an_unwritable_home_falls_back(home: Path) -> None:
     assert folder.is_dir()
     (home.parent / "tmp").rename(home.parent / "gone")
     (home.parent / "tmp").mkdir()
-    (home.parent / "tmp" / f"echolocate-{os.getuid()}").write_text("taken by somebody else")
+    (home.parent / "tmp" / f"echolocate-{os.getuid()}").write_text("taken by another user")
     last = kernels.cache_folder()
     assert last.is_dir()
     assert last.parent == home.parent / "tmp"

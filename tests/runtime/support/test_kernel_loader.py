@@ -63,7 +63,7 @@ def aside(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Kernels:
 async def test_what_was_never_compiled_is_compiled_once_and_loaded_by_a_thread(aside: Kernels) -> None:
     assert set(await asyncio.gather(aside.ready(ROUND, BOXES), aside.ready(ROUND, BOXES))) == {None}
     assert aside.compiled == [POLYGONS]
-    assert aside.loaded == [(POLYGONS,), (POLYGONS,)], "by whoever asks: it costs little"
+    assert aside.loaded == [(POLYGONS,), (POLYGONS,)], "each caller loads them: it costs little"
     assert threading.get_ident() not in aside.threads
     assert aside.ready.loaded == 14
     assert [entry["event"] for entry in aside.log.entries] == [

@@ -32,7 +32,7 @@ def test_each_line_of_the_file_is_json(tmp_path: Path, capsys: pytest.CaptureFix
     assert shown.out == ""
     assert "mode" in shown.err
     assert "DRIVE" in shown.err
-    assert "\x1b" not in shown.err, "no colours where nobody sees them"
+    assert "\x1b" not in shown.err, "no colours without a terminal"
 
 
 def test_level_keeps_lesser_lines_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

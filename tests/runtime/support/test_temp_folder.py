@@ -1,4 +1,4 @@
-"""A run's folder: gone at its end, or with the next start where the run was killed; nobody else's is touched."""
+"""The folder of a run is removed at its end, or by the next start if it was killed; no other folder is touched."""
 
 from __future__ import annotations
 

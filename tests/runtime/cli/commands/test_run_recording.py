@@ -26,7 +26,7 @@ def firing(number: int) -> Firing:
 
 
 def stuck(path: Path) -> int:
-    """Make a file that takes nothing until somebody reads it; return what keeps it from being whole."""
+    """Make a file that blocks writers until it is read; return the descriptor to read it from."""
     os.mkfifo(path)
     return os.open(path, os.O_RDONLY | os.O_NONBLOCK)
 
