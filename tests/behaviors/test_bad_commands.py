@@ -16,7 +16,7 @@ from drivers.denning import frames
 from drivers.denning.codec import Decoder
 from drivers.messages import Twist
 from perception.percept import Percept, Pose
-from tests.drivers.scripted import CONFIG, Bench
+from tests.drivers.driver_harness import CONFIG, DriverHarness
 
 pytestmark = pytest.mark.promise("P3")
 
@@ -45,12 +45,12 @@ def some_arbiter(rng: np.random.Generator) -> ArbiterConfig:
     )
 
 
-def ready(body: BodyConfig) -> Bench:
+def ready(body: BodyConfig) -> DriverHarness:
     """A driver that has greeted its robot."""
-    bench = Bench(CONFIG.model_copy(update={"body": body}))
-    bench.open()
-    bench.greet()
-    return bench
+    harness = DriverHarness(CONFIG.model_copy(update={"body": body}))
+    harness.open()
+    harness.handshake()
+    return harness
 
 
 def drives_in(data: bytes) -> list[frames.Drive]:
@@ -73,7 +73,7 @@ def test_a_million_random_schema_outputs(measured: Callable[[str], None]) -> Non
     drives = stops = 0
     for _ in range(DECISIONS // BLOCK):
         body, config = some_body(rng), some_arbiter(rng)
-        bench, out = ready(body), bytearray()
+        harness, out = ready(body), bytearray()
         wild = rng.random((BLOCK, 1, 1)) < 0.5
         vectors = np.where(wild, numbers(rng, (BLOCK, 2, 2)), rng.normal(0.0, 1.0, (BLOCK, 2, 2)))
         percepts = []
@@ -97,8 +97,8 @@ def test_a_million_random_schema_outputs(measured: Callable[[str], None]) -> Non
             assert isinstance(decision, Drive)
             assert 0.0 <= decision.twist.v <= body.speed_max_m_s
             assert abs(decision.twist.w) <= body.turn_max_rad_s
-            bench.robot.drive(decision.twist)
-            out += bench.robot.outgoing(writable=True)
+            harness.robot.drive(decision.twist)
+            out += harness.robot.outgoing(writable=True)
         sent = drives_in(bytes(out))
         assert len(sent) == asked, "each decision is one DRIVE"
         assert all(0 <= drive.v_mm_s <= 1e3 * body.speed_max_m_s + 1e-6 for drive in sent)
@@ -115,17 +115,17 @@ def test_driver_given_any_velocity_sends_nothing_bad(measured: Callable[[str], N
     refused = total = 0
     for _ in range(10):
         body = some_body(rng)
-        bench, out, asked = ready(body), bytearray(), 0
+        harness, out, asked = ready(body), bytearray(), 0
         for v, w in numbers(rng, (2000, 2)).tolist():
             total += 1
             try:
-                bench.robot.drive(Twist(v, w))
+                harness.robot.drive(Twist(v, w))
             except ValueError:
                 refused += 1
                 assert not (math.isfinite(v) and math.isfinite(w))
             else:
                 asked += 1
-            out += bench.robot.outgoing(writable=True)
+            out += harness.robot.outgoing(writable=True)
         sent = drives_in(bytes(out))
         assert len(sent) == asked
         assert all(abs(drive.v_mm_s) <= 1e3 * body.speed_max_m_s + 1e-6 for drive in sent)

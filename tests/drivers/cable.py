@@ -27,14 +27,14 @@ WORLD = WorldConfig(drum=(DrumConfig(x_m=3.0, y_m=1.5, radius_m=0.3), DrumConfig
 
 @dataclass
 class Cable:
-    """The line, its two ends, and the time.
+    """A driver, an emulated robot, and the line between them.
 
     Attributes
     ----------
     cut_after
-        Bytes of each opening that pass one way before the line is cut; none where it is not.
+        Direction and number of bytes after which each connection is cut; None = never.
     passed
-        Bytes of this opening so far.
+        Bytes of this connection so far, by direction.
     """
 
     faults: tuple[Fault, ...] = ()
@@ -63,7 +63,7 @@ class Cable:
         self.driver.line_closed()
 
     def step(self) -> None:
-        """Let a step's time pass, and a host drive on; ends with the line cut where that byte is reached."""
+        """Let one step pass while the host drives; cut the line when the chosen byte is reached."""
         self.steps += 1
         said = self.robot.advance(self.now_s)
         if self.plugged:

@@ -1,4 +1,4 @@
-"""A line over a pty, and a robot that has greeted, for the tests of the drivers."""
+"""A line over a pty, and a driver after its handshake, for the tests of the drivers."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from pathlib import Path
 
 import pytest
 
-from tests.drivers.ends import Ends
-from tests.drivers.scripted import Bench
+from tests.drivers.driver_harness import DriverHarness
+from tests.drivers.pty_pair import PtyPair
 
 
 @pytest.fixture
-def ends(tmp_path: Path) -> Iterator[Ends]:
-    pty = Ends(tmp_path / "robot")
+def pty(tmp_path: Path) -> Iterator[PtyPair]:
+    pty = PtyPair(tmp_path / "robot")
     yield pty
     pty.unplug()
 
 
 @pytest.fixture
 async def loop_errors() -> AsyncIterator[None]:
-    """Fail on whatever would reach a user as a traceback from the loop."""
+    """Fail on any exception that the event loop would print as a traceback."""
     errors: list[object] = []
     asyncio.get_running_loop().set_exception_handler(lambda _, context: errors.append(context))
     yield
@@ -29,8 +29,8 @@ async def loop_errors() -> AsyncIterator[None]:
 
 
 @pytest.fixture
-def bench() -> Bench:
-    ready = Bench()
+def harness() -> DriverHarness:
+    ready = DriverHarness()
     ready.open()
-    ready.greet()
+    ready.handshake()
     return ready

@@ -1,4 +1,4 @@
-"""Bytes as a bad line delivers them: frames, broken frames, frames with nonsense inside, and plain noise."""
+"""Bytes as a bad line delivers them: valid frames, corrupt frames, frames with invalid content, and noise."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def blocks(side: Side, seed: int, total: int) -> Iterator[bytes]:
 
 
 def _spoilt(kind: str, block: np.ndarray[tuple[int, ...], np.dtype[np.uint8]], rng: np.random.Generator) -> bytes:
-    """Return a piece of a good conversation, or what this kind of noise makes of it."""
+    """Return a block of valid frames, changed by this kind of noise."""
     length = len(block)
     match kind:
         case "flipped":

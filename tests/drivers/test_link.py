@@ -14,15 +14,15 @@ import serial
 
 from config.robot import LinkConfig
 from drivers.link import Link, LinkError
-from tests.drivers.ends import Ends, Host, running, soon
+from tests.drivers.pty_pair import Host, PtyPair, running, soon
 from tests.hil.machine import TIMEOUT_S, stalls_excused
 
 pytestmark = pytest.mark.usefixtures("loop_errors")
 
 
-async def test_bytes_go_both_ways(ends: Ends) -> None:
+async def test_bytes_go_both_ways(pty: PtyPair) -> None:
     host = Host()
-    link = host.link(ends.path)
+    link = host.link(pty.path)
     assert not link.send(b"too early")
     await link.open_once()
     await soon(host.opened)
@@ -31,8 +31,8 @@ async def test_bytes_go_both_ways(ends: Ends) -> None:
         assert link.writable
         assert link.last_error is None
         assert link.send(bytes(range(256)))
-        assert await ends.read(256) == bytes(range(256))
-        os.write(ends.master, b"\0\x11\x13\n\r\xff")
+        assert await pty.read(256) == bytes(range(256))
+        os.write(pty.master, b"\0\x11\x13\n\r\xff")
         got = bytearray()
         while len(got) < 6:
             chunk = await soon(host.data)
@@ -43,51 +43,51 @@ async def test_bytes_go_both_ways(ends: Ends) -> None:
 
 
 @pytest.mark.promise("P1")
-async def test_what_is_sent_leaves_though_the_loop_is_held_up_right_then(ends: Ends) -> None:
+async def test_what_is_sent_leaves_though_the_loop_is_held_up_right_then(pty: PtyPair) -> None:
     """Else a command would leave when the loop goes on, long after it was right."""
     host = Host()
-    link = host.link(ends.path)
+    link = host.link(pty.path)
     async with running(link):
         await soon(host.opened)
         assert link.send(b"drive")
         assert link.waiting == 0
-        ready, _, _ = select.select([ends.master], [], [], TIMEOUT_S)
+        ready, _, _ = select.select([pty.master], [], [], TIMEOUT_S)
         assert ready, "it waits for a turn of the loop"
-        assert os.read(ends.master, 64) == b"drive"
+        assert os.read(pty.master, 64) == b"drive"
 
 
-async def test_what_was_sent_last_leaves_before_the_line_is_closed(ends: Ends) -> None:
+async def test_what_was_sent_last_leaves_before_the_line_is_closed(pty: PtyPair) -> None:
     host = Host()
-    link = host.link(ends.path)
+    link = host.link(pty.path)
     async with running(link):
         await soon(host.opened)
         link.send(b"halt")
-    assert await ends.read(4) == b"halt"
+    assert await pty.read(4) == b"halt"
 
 
-async def test_unplugged_and_plugged_again(ends: Ends) -> None:
+async def test_unplugged_and_plugged_again(pty: PtyPair) -> None:
     host = Host()
-    link = host.link(ends.path)
+    link = host.link(pty.path)
     async with running(link):
         for _ in range(3):
             await soon(host.opened)
             link.send(b"under way")
-            ends.unplug()
+            pty.unplug()
             reason = await soon(host.closed)
             assert "was lost" in reason
             assert "plug it in again" in reason
             assert not link.is_open
             assert not link.writable
             assert not link.send(b"gone")
-            ends.plug()
+            pty.plug()
         await soon(host.opened)
         assert link.last_error is None
-        os.write(ends.master, b"back")
+        os.write(pty.master, b"back")
         got = await soon(host.data)
         assert got == b"back"
 
 
-async def test_attempts_to_reopen_are_spaced_out(ends: Ends) -> None:
+async def test_attempts_to_reopen_are_spaced_out(pty: PtyPair) -> None:
     host = Host()
     attempts: asyncio.Queue[float] = asyncio.Queue()
     loop = asyncio.get_running_loop()
@@ -96,7 +96,7 @@ async def test_attempts_to_reopen_are_spaced_out(ends: Ends) -> None:
         loop.call_soon_threadsafe(attempts.put_nowait, loop.time())
         raise serial.SerialException(2, f"could not open port {config.port}")
 
-    link = host.link(ends.path, opener=opener)
+    link = host.link(pty.path, opener=opener)
     async with running(link):
         times = [await soon(attempts) for _ in range(6)]
     gaps = [after - before for before, after in pairwise(times)]
@@ -126,9 +126,9 @@ async def test_no_port_at_all_says_so() -> None:
         await Host().link(None).open_once()
 
 
-async def test_a_port_in_use_says_so(ends: Ends) -> None:
+async def test_a_port_in_use_says_so(pty: PtyPair) -> None:
     host = Host()
-    first, second = host.link(ends.path), Host().link(ends.path)
+    first, second = host.link(pty.path), Host().link(pty.path)
     async with running(first):
         await soon(host.opened)
         with pytest.raises(LinkError, match="in use by another program; find it with `fuser"):
@@ -143,15 +143,15 @@ async def test_a_port_in_use_says_so(ends: Ends) -> None:
         (serial.SerialException("something new"), r"cannot open .* \(something new\); check the cable"),
     ],
 )
-async def test_other_reasons_have_their_line(ends: Ends, error: Exception, text: str) -> None:
+async def test_other_reasons_have_their_line(pty: PtyPair, error: Exception, text: str) -> None:
     def opener(_: LinkConfig) -> serial.Serial:
         raise error
 
     with pytest.raises(LinkError, match=text):
-        await Host().link(ends.path, opener=opener).open_once()
+        await Host().link(pty.path, opener=opener).open_once()
 
 
-async def test_a_port_that_never_opens_does_not_hold_the_loop(ends: Ends) -> None:
+async def test_a_port_that_never_opens_does_not_hold_the_loop(pty: PtyPair) -> None:
     host, release, closed = Host(), threading.Event(), threading.Event()
 
     class Late(serial.Serial):
@@ -166,15 +166,15 @@ async def test_a_port_that_never_opens_does_not_hold_the_loop(ends: Ends) -> Non
         return late
 
     with pytest.raises(LinkError, match="takes too long"):
-        await asyncio.wait_for(host.link(ends.path, opener=opener, open_timeout_s=0.02).open_once(), TIMEOUT_S)
+        await asyncio.wait_for(host.link(pty.path, opener=opener, open_timeout_s=0.02).open_once(), TIMEOUT_S)
     release.set()
     assert await asyncio.to_thread(closed.wait, TIMEOUT_S), "what opens too late is closed again"
 
 
 @stalls_excused
-async def test_a_peer_that_stops_reading_fills_no_memory_and_holds_up_nothing(ends: Ends) -> None:
+async def test_a_peer_that_stops_reading_fills_no_memory_and_holds_up_nothing(pty: PtyPair) -> None:
     host = Host()
-    link = host.link(ends.path)
+    link = host.link(pty.path)
     async with running(link):
         await soon(host.opened)
         sent = 0
@@ -195,21 +195,21 @@ async def test_a_peer_that_stops_reading_fills_no_memory_and_holds_up_nothing(en
     assert await soon(host.closed) == "closed by this program"
 
 
-async def test_unplugged_while_bytes_wait_is_reported_at_once_and_without_a_traceback(ends: Ends) -> None:
+async def test_unplugged_while_bytes_wait_is_reported_at_once_and_without_a_traceback(pty: PtyPair) -> None:
     host = Host()
-    link = host.link(ends.path)
+    link = host.link(pty.path)
     async with running(link):
         await soon(host.opened)
         while link.send(b"x" * 64):
             await asyncio.sleep(0)
-        ends.unplug()
+        pty.unplug()
         assert "was lost" in await soon(host.closed)
         assert not link.is_open
 
 
-async def test_not_writable_yet_leaves_room_for_a_halt(ends: Ends) -> None:
+async def test_not_writable_yet_leaves_room_for_a_halt(pty: PtyPair) -> None:
     host = Host()
-    link = host.link(ends.path)
+    link = host.link(pty.path)
     async with running(link):
         await soon(host.opened)
         sent = 0
@@ -219,25 +219,25 @@ async def test_not_writable_yet_leaves_room_for_a_halt(ends: Ends) -> None:
         assert link.waiting > 256
         assert link.send(b"halt")
         assert not link.send(b"x" * 4000), "a frame is taken whole or not at all"
-        assert (await ends.read(sent + 4))[sent:] == b"halt"
+        assert (await pty.read(sent + 4))[sent:] == b"halt"
         assert link.writable
 
 
-async def test_what_a_handler_raises_ends_the_line_and_names_the_cause(ends: Ends) -> None:
+async def test_what_a_handler_raises_ends_the_line_and_names_the_cause(pty: PtyPair) -> None:
     host = Host()
 
     def careless(data: bytes) -> None:
         raise KeyError(data.decode())
 
     link = Link(
-        LinkConfig(port=str(ends.path), reopen_first_s=0.001),
+        LinkConfig(port=str(pty.path), reopen_first_s=0.001),
         lambda: host.opened.put_nowait(None),
         careless,
         host.closed.put_nowait,
     )
     async with running(link):
         await soon(host.opened)
-        os.write(ends.master, b"boom")
+        os.write(pty.master, b"boom")
         reason = await soon(host.closed)
         assert "the handler of received data failed with KeyError: 'boom'" in reason
         assert "test_link.py" in reason
@@ -245,7 +245,7 @@ async def test_what_a_handler_raises_ends_the_line_and_names_the_cause(ends: End
         await soon(host.opened)
 
 
-async def test_handlers_of_opening_and_closing_may_fail_too(ends: Ends) -> None:
+async def test_handlers_of_opening_and_closing_may_fail_too(pty: PtyPair) -> None:
     opened: asyncio.Queue[None] = asyncio.Queue()
     times = iter(range(2))
 
@@ -257,7 +257,7 @@ async def test_handlers_of_opening_and_closing_may_fail_too(ends: Ends) -> None:
     def on_closed(_: str) -> None:
         raise ZeroDivisionError("at closing")
 
-    link = Link(LinkConfig(port=str(ends.path), reopen_first_s=0.001), on_opened, lambda _: None, on_closed)
+    link = Link(LinkConfig(port=str(pty.path), reopen_first_s=0.001), on_opened, lambda _: None, on_closed)
     async with running(link):
         await soon(opened)
         assert not link.is_open

@@ -16,7 +16,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from config.robot import LinkConfig
 from drivers.link import Link
-from tests.drivers.ends import Ends
+from tests.drivers.pty_pair import PtyPair
 from tests.hil.machine import TIMEOUT_S
 
 WAITING_MAX = 4096
@@ -35,13 +35,13 @@ class LinkMachine(RuleBasedStateMachine):
         self.errors: list[object] = []
         self.loop.set_exception_handler(lambda _, context: self.errors.append(context))
         self.folder = tempfile.TemporaryDirectory()
-        self.ends = Ends(Path(self.folder.name) / "robot")
+        self.pty = PtyPair(Path(self.folder.name) / "robot")
         self.plugged = True
         self.events: list[str] = []
         self.heard = bytearray()
         self.accepted = bytearray()
         self.fail_next = False
-        config = LinkConfig(port=str(self.ends.path), reopen_first_s=0.001, reopen_max_s=0.004)
+        config = LinkConfig(port=str(self.pty.path), reopen_first_s=0.001, reopen_max_s=0.004)
         self.link = Link(config, self._opened, self._data, self._closed)
         self.task: asyncio.Task[None] | None = None
         self.start()
@@ -79,7 +79,7 @@ class LinkMachine(RuleBasedStateMachine):
         """Read what has come to the other end by now."""
         got = bytearray()
         with contextlib.suppress(BlockingIOError):
-            while piece := os.read(self.ends.master, 65536):
+            while piece := os.read(self.pty.master, 65536):
                 got += piece
         return bytes(got)
 
@@ -119,7 +119,7 @@ class LinkMachine(RuleBasedStateMachine):
         if not self.link.is_open:
             return
         self.heard.clear()
-        os.write(self.ends.master, data)
+        os.write(self.pty.master, data)
         self.until(lambda: len(self.heard) >= len(data), "what was said")
         assert bytes(self.heard) == data
 
@@ -129,21 +129,21 @@ class LinkMachine(RuleBasedStateMachine):
         """The line ends, is reported, and is opened again by itself."""
         self.fail_next = True
         before = self.events.count("opened")
-        os.write(self.ends.master, b"x")
+        os.write(self.pty.master, b"x")
         self.until(lambda: self.events.count("opened") > before and self.link.is_open, "open again")
         self.drain()
 
     @precondition(lambda self: self.plugged)
     @rule()
     def unplug(self) -> None:
-        self.ends.unplug()
+        self.pty.unplug()
         self.plugged = False
         self.until(lambda: not self.link.is_open, "lost")
 
     @precondition(lambda self: not self.plugged)
     @rule()
     def plug(self) -> None:
-        self.ends.plug()
+        self.pty.plug()
         self.plugged = True
         self.until(lambda: self.link.is_open, "open again")
         assert self.link.last_error is None
@@ -188,7 +188,7 @@ class LinkMachine(RuleBasedStateMachine):
             assert not asyncio.all_tasks(self.loop)
             assert self.errors == []
         finally:
-            self.ends.unplug()
+            self.pty.unplug()
             self.folder.cleanup()
             self.loop.close()
 

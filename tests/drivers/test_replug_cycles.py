@@ -22,13 +22,13 @@ from drivers.denning.frames import Ack, Echo, Hello, Ident, Odom, Pattern, Robot
 from drivers.driver import LineState
 from drivers.link import Link
 from tests.drivers.cable import ROBOT
-from tests.drivers.ends import Ends, running, soon
+from tests.drivers.pty_pair import PtyPair, running, soon
 
 GROWTH_MAX = 32 * 1024
 """Bytes by which memory may differ, whatever the number of cycles."""
 
 
-class Device(Ends):
+class Device(PtyPair):
     """A robot of few words on the other end: it answers, and fires once for each pattern."""
 
     def __init__(self, path: Path) -> None:

@@ -13,16 +13,16 @@ import serial
 from config.robot import LinkConfig
 from drivers.link import Link, LinkError
 from drivers.serial_port import open_port
-from tests.drivers.ends import Ends, Host, running, soon
+from tests.drivers.pty_pair import Host, PtyPair, running, soon
 from tests.hil.machine import TIMEOUT_S
 
 pytestmark = pytest.mark.usefixtures("loop_errors")
 
 
-async def test_write_buffers_without_bound_past_pause_writing(ends: Ends) -> None:
+async def test_write_buffers_without_bound_past_pause_writing(pty: PtyPair) -> None:
     """Ours takes 4 KiB and then says no, frame by frame, and what was taken arrives whole."""
     host = Host()
-    link = host.link(ends.path)
+    link = host.link(pty.path)
     async with running(link):
         await soon(host.opened)
         frame, taken, waited = b"0123456789abcdef", 0, 0
@@ -32,11 +32,11 @@ async def test_write_buffers_without_bound_past_pause_writing(ends: Ends) -> Non
             assert link.waiting <= 4096
         assert taken < 20_000
         assert waited > 4096 - len(frame)
-        assert await ends.read(taken * len(frame)) == frame * taken
+        assert await pty.read(taken * len(frame)) == frame * taken
         assert link.waiting == 0
 
 
-async def test_an_exception_in_data_received_goes_to_the_loop_and_the_port_stays_up(ends: Ends) -> None:
+async def test_an_exception_in_data_received_goes_to_the_loop_and_the_port_stays_up(pty: PtyPair) -> None:
     """Ours ends the line with the cause's name and opens it again; the loop's handler is not bothered."""
     host = Host()
 
@@ -45,22 +45,22 @@ async def test_an_exception_in_data_received_goes_to_the_loop_and_the_port_stays
             raise ArithmeticError("planted")
         host.data.put_nowait(data)
 
-    config = LinkConfig(port=str(ends.path), reopen_first_s=0.001)
+    config = LinkConfig(port=str(pty.path), reopen_first_s=0.001)
     link = Link(config, lambda: host.opened.put_nowait(None), careless, host.closed.put_nowait)
     async with running(link):
         await soon(host.opened)
-        os.write(ends.master, b"bad")
+        os.write(pty.master, b"bad")
         assert "ArithmeticError: planted" in await soon(host.closed)
         assert not link.is_open
         await soon(host.opened)
-        os.write(ends.master, b"good")
+        os.write(pty.master, b"good")
         assert await soon(host.data) == b"good"
 
 
-async def test_close_on_a_stalled_peer_never_reports_connection_lost(ends: Ends) -> None:
+async def test_close_on_a_stalled_peer_never_reports_connection_lost(pty: PtyPair) -> None:
     """Ours aborts: the end is reported within its fifth of a second, though no one reads what waits."""
     host = Host()
-    link = host.link(ends.path)
+    link = host.link(pty.path)
     async with running(link):
         await soon(host.opened)
         while link.send(bytes(64)):
@@ -72,15 +72,15 @@ async def test_close_on_a_stalled_peer_never_reports_connection_lost(ends: Ends)
 
 
 @pytest.mark.parametrize("busy", [False, True], ids=["idle", "with bytes waiting"])
-async def test_after_an_unplug_read_drain_and_wait_closed_all_raise(ends: Ends, busy: bool) -> None:
+async def test_after_an_unplug_read_drain_and_wait_closed_all_raise(pty: PtyPair, busy: bool) -> None:
     """Ours reports it once, by the handler; sending, asking and stopping afterwards raise nothing."""
     host = Host()
-    link = host.link(ends.path)
+    link = host.link(pty.path)
     await link.open_once()
     await soon(host.opened)
     while busy and link.send(bytes(64)):
         await asyncio.sleep(0)
-    ends.unplug()
+    pty.unplug()
     assert "was lost" in await soon(host.closed)
     assert not link.send(b"gone")
     assert not link.is_open
@@ -92,7 +92,7 @@ async def test_after_an_unplug_read_drain_and_wait_closed_all_raise(ends: Ends, 
         await link.open_once()
 
 
-async def test_opening_blocks(ends: Ends) -> None:
+async def test_opening_blocks(pty: PtyPair) -> None:
     """Ours opens in a thread: the loop goes on meanwhile, and an opening without end is given up and reported."""
     host, release, ticks = Host(), threading.Event(), 0
 
@@ -101,7 +101,7 @@ async def test_opening_blocks(ends: Ends) -> None:
         release.wait(TIMEOUT_S)
         return open_port(config)
 
-    link = host.link(ends.path, opener=opener, open_timeout_s=TIMEOUT_S)
+    link = host.link(pty.path, opener=opener, open_timeout_s=TIMEOUT_S)
     opening = asyncio.create_task(link.open_once())
     while ticks < 20:
         await asyncio.sleep(0.001)
@@ -114,7 +114,7 @@ async def test_opening_blocks(ends: Ends) -> None:
 
 
 @pytest.mark.parametrize("opens", [True, False])
-async def test_wait_for_swallows_a_cancellation_that_comes_with_the_result(ends: Ends, opens: bool) -> None:
+async def test_wait_for_swallows_a_cancellation_that_comes_with_the_result(pty: PtyPair, opens: bool) -> None:
     """Ours ends when it is asked to, also in the very turn of the loop in which the port opens, and closes it."""
     host, release, ports = Host(), threading.Event(), list[serial.Serial]()
 
@@ -125,10 +125,10 @@ async def test_wait_for_swallows_a_cancellation_that_comes_with_the_result(ends:
         ports.append(open_port(config))
         return ports[-1]
 
-    link = host.link(ends.path, opener=opener, open_timeout_s=TIMEOUT_S)
+    link = host.link(pty.path, opener=opener, open_timeout_s=TIMEOUT_S)
     task = asyncio.create_task(link.run())
     await asyncio.sleep(0)
-    (thread,) = [one for one in threading.enumerate() if one.name == f"open {ends.path}"]
+    (thread,) = [one for one in threading.enumerate() if one.name == f"open {pty.path}"]
     release.set()
     thread.join()  # what it has to say waits for the loop's next turn; so does the cancellation behind it
     asyncio.get_running_loop().call_soon(task.cancel)
@@ -139,10 +139,10 @@ async def test_wait_for_swallows_a_cancellation_that_comes_with_the_result(ends:
     assert not link.is_open
 
 
-async def test_the_fast_fork_freezes_the_loop_on_a_peer_that_stops_reading(ends: Ends) -> None:
+async def test_the_fast_fork_freezes_the_loop_on_a_peer_that_stops_reading(pty: PtyPair) -> None:
     """Ours never waits for the port: with the line full every call returns, and the loop turns."""
     host = Host()
-    link = host.link(ends.path)
+    link = host.link(pty.path)
     async with running(link):
         await soon(host.opened)
         while link.send(bytes(64)):
@@ -158,10 +158,10 @@ async def test_the_fast_fork_freezes_the_loop_on_a_peer_that_stops_reading(ends:
         assert link.is_open
 
 
-async def test_a_pty_opens_twice_without_error_unless_it_is_exclusive(ends: Ends) -> None:
+async def test_a_pty_opens_twice_without_error_unless_it_is_exclusive(pty: PtyPair) -> None:
     """Ours asks for it alone, so the second to come is refused, and may have it once the first has gone."""
     first, second = Host(), Host()
-    one, two = first.link(ends.path), second.link(ends.path)
+    one, two = first.link(pty.path), second.link(pty.path)
     await one.open_once()
     await soon(first.opened)
     with pytest.raises(LinkError, match="in use by another program"):
@@ -172,17 +172,17 @@ async def test_a_pty_opens_twice_without_error_unless_it_is_exclusive(ends: Ends
     await two.stop()
 
 
-async def test_the_master_gets_eio_when_the_last_slave_closes_and_the_robot_lives_on(ends: Ends) -> None:
+async def test_the_master_gets_eio_when_the_last_slave_closes_and_the_robot_lives_on(pty: PtyPair) -> None:
     """A host that comes back finds the same line, also after the other end has seen it hang up."""
     host = Host()
-    link = host.link(ends.path)
-    os.close(ends._slave)  # as the emulator does: the host's is the only one
+    link = host.link(pty.path)
+    os.close(pty._slave)  # as the emulator does: the host's is the only one
     for _ in range(3):
         await link.open_once()
         await soon(host.opened)
-        os.write(ends.master, b"hello")
+        os.write(pty.master, b"hello")
         assert await soon(host.data) == b"hello"
         await link.stop()
         with pytest.raises(OSError, match="Input/output error"):
-            os.read(ends.master, 100)
-    ends._slave = os.open(os.devnull, os.O_RDONLY)
+            os.read(pty.master, 100)
+    pty._slave = os.open(os.devnull, os.O_RDONLY)

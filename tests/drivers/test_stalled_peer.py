@@ -22,7 +22,7 @@ from drivers.emulator.faults import Deaf, Fault, Mute
 from drivers.link import Link
 from drivers.messages import Twist
 from tests.drivers.cable import CYCLE_STEPS, ROBOT, STEP_S, Cable
-from tests.drivers.ends import Ends, running
+from tests.drivers.pty_pair import PtyPair, running
 from tests.hil.machine import TIMEOUT_S, stalls_excused
 
 pytestmark = pytest.mark.promise("P6")
@@ -36,7 +36,7 @@ ATTEMPTS = 8
 """The machine may hold up this loop and not its control; it does not do so eight times in a row."""
 
 
-class Peer(Ends):
+class Peer(PtyPair):
     """A robot that sends odometry at 50 Hz and answers, and can be made to fall silent or to stop reading."""
 
     def __init__(self, path: Path, *, names_drives: bool = True) -> None:

@@ -25,7 +25,7 @@ from drivers.denning.frames import (
 )
 from drivers.driver import DriverError
 from drivers.messages import Flags, Twist
-from tests.drivers.emulated import ALL, WORLD, Host, host, robot_config
+from tests.drivers.device_host import ALL, WORLD, Host, host, robot_config
 from tests.drivers.vectors import THIRDS
 
 # Conversation.

@@ -16,12 +16,12 @@ from drivers.denning.frames import (
     RobotFrame,
 )
 from drivers.messages import Flags, LinkCounts, Pose
-from tests.drivers.scripted import CONFIG, IDENT, ODOM, PERIOD_US, Bench
+from tests.drivers.driver_harness import CONFIG, IDENT, ODOM, PERIOD_US, DriverHarness
 from tests.drivers.vectors import OCTETS
 
 
-def test_odometry_in_si(bench: Bench) -> None:
-    bench.odom(
+def test_odometry_in_si(harness: DriverHarness) -> None:
+    harness.odom(
         1_000_000,
         x_0p1mm=12345,
         y_0p1mm=-6789,
@@ -32,22 +32,22 @@ def test_odometry_in_si(bench: Bench) -> None:
         flags=0b11001,
         last_drive_seq=9,
     )
-    odometry = bench.robot.take_received().odometry
+    odometry = harness.robot.take_received().odometry
     assert odometry is not None
     assert odometry.robot_s == pytest.approx(1.0)
     assert (odometry.pose.x, odometry.pose.y, odometry.pose.theta) == pytest.approx((1.2345, -0.6789, 7.0))
     assert (odometry.ring_yaw, odometry.twist.v, odometry.twist.w) == pytest.approx((-0.01, 0.305, -0.25))
     assert odometry.flags == Flags.LATCHED | Flags.DEADMAN | Flags.BATTERY_LOW
     assert odometry.last_drive_seq == 9
-    assert bench.robot.take_received().odometry is None
+    assert harness.robot.take_received().odometry is None
 
 
-def test_a_firing_has_the_pose_of_its_own_moment(bench: Bench) -> None:
+def test_a_firing_has_the_pose_of_its_own_moment(harness: DriverHarness) -> None:
     # A quarter of a circle of radius 0.1 m around (0, 0.1); the ring does something else.
     for t_us, x, y, heading in ((0, 0, 0, 0), (PERIOD_US, 1000, 1000, 15708)):
-        bench.odom(t_us, x_0p1mm=x, y_0p1mm=y, heading_1em4rad=heading, ring_yaw_1em4rad=2000 + t_us // 100)
-    bench.say(Echo(0, PERIOD_US // 2, 0, 0x800021, (30, 255, 0)))
-    (firing,) = bench.robot.take_received().firings
+        harness.odom(t_us, x_0p1mm=x, y_0p1mm=y, heading_1em4rad=heading, ring_yaw_1em4rad=2000 + t_us // 100)
+    harness.send(Echo(0, PERIOD_US // 2, 0, 0x800021, (30, 255, 0)))
+    (firing,) = harness.robot.take_received().firings
     assert firing.robot_s == pytest.approx(0.01)
     assert (firing.pose.x, firing.pose.y, firing.pose.theta) == pytest.approx(
         (0.1 * math.sqrt(0.5), 0.1 - 0.1 * math.sqrt(0.5), math.pi / 4), abs=1e-4
@@ -59,20 +59,20 @@ def test_a_firing_has_the_pose_of_its_own_moment(bench: Bench) -> None:
     assert np.isnan(np.delete(firing.ranges_m, [0, 5])).all()
 
 
-def test_an_echo_before_its_odometry_is_held_and_keeps_its_turn(bench: Bench) -> None:
-    bench.odom(0)
-    bench.say(Echo(0, 10_000, 0, 1, (10,)), Echo(0, 30_000, 1, 1, (20,)))
-    assert bench.robot.take_received().firings == ()
-    bench.odom(PERIOD_US, x_0p1mm=100)
-    (first,) = bench.robot.take_received().firings
+def test_an_echo_before_its_odometry_is_held_and_keeps_its_turn(harness: DriverHarness) -> None:
+    harness.odom(0)
+    harness.send(Echo(0, 10_000, 0, 1, (10,)), Echo(0, 30_000, 1, 1, (20,)))
+    assert harness.robot.take_received().firings == ()
+    harness.odom(PERIOD_US, x_0p1mm=100)
+    (first,) = harness.robot.take_received().firings
     assert first.pose.x == pytest.approx(0.005)
-    bench.odom(2 * PERIOD_US, x_0p1mm=300)
-    (second,) = bench.robot.take_received().firings
+    harness.odom(2 * PERIOD_US, x_0p1mm=300)
+    (second,) = harness.robot.take_received().firings
     assert second.pose.x == pytest.approx(0.02)
-    assert bench.robot.late_echoes == 0
+    assert harness.robot.late_echoes == 0
 
 
-def test_one_chunk_or_byte_by_byte_is_the_same(bench: Bench) -> None:
+def test_one_chunk_or_byte_by_byte_is_the_same(harness: DriverHarness) -> None:
     frames: list[RobotFrame] = [
         replace(ODOM, t_us=0),
         Echo(0, 10_000, 0, 1, (10,)),
@@ -80,31 +80,31 @@ def test_one_chunk_or_byte_by_byte_is_the_same(bench: Bench) -> None:
         Echo(0, 15_000, 1, 2, (11,)),
     ]
     data = b"".join(encode(replace(frame, seq=2 + k)) for k, frame in enumerate(frames))
-    other = Bench()
+    other = DriverHarness()
     other.open()
-    other.greet()
-    bench.robot.receive(data, bench.now)
+    other.handshake()
+    harness.robot.receive(data, harness.now)
     for i in range(len(data)):
         other.robot.receive(data[i : i + 1], other.now)
-    whole, single = bench.robot.take_received(), other.robot.take_received()
+    whole, single = harness.robot.take_received(), other.robot.take_received()
     assert [(f.robot_s, f.pose, f.ring_yaw) for f in whole.firings] == [
         (f.robot_s, f.pose, f.ring_yaw) for f in single.firings
     ]
     assert len(whole.firings) == 2
     assert whole.odometry == single.odometry
-    assert bench.robot.counts == other.robot.counts == LinkCounts(frames=6)
+    assert harness.robot.counts == other.robot.counts == LinkCounts(frames=6)
 
 
-def test_an_echo_that_nothing_places_is_dropped_and_counted(bench: Bench) -> None:
-    bench.odom(1_000_000)
-    bench.say(Echo(0, 990_000, 0, 1, (10,)))
-    assert bench.robot.late_echoes == 1, "older than the history"
-    bench.say(Echo(0, 1_040_000, 0, 1, (10,)))
-    bench.odom(1_100_000)
-    assert bench.robot.late_echoes == 2, "between two samples too far apart"
-    bench.say(Echo(0, 1_100_000, 0, 1, (10,)), Echo(0, 1_090_000, 0, 1, (10,)), Echo(0, 9_000_000, 0, 1, (10,)))
-    assert bench.robot.late_echoes == 4, "before the one before it, and from a far future"
-    assert [f.robot_s for f in bench.robot.take_received().firings] == pytest.approx([1.1])
+def test_an_echo_that_nothing_places_is_dropped_and_counted(harness: DriverHarness) -> None:
+    harness.odom(1_000_000)
+    harness.send(Echo(0, 990_000, 0, 1, (10,)))
+    assert harness.robot.late_echoes == 1, "older than the history"
+    harness.send(Echo(0, 1_040_000, 0, 1, (10,)))
+    harness.odom(1_100_000)
+    assert harness.robot.late_echoes == 2, "between two samples too far apart"
+    harness.send(Echo(0, 1_100_000, 0, 1, (10,)), Echo(0, 1_090_000, 0, 1, (10,)), Echo(0, 9_000_000, 0, 1, (10,)))
+    assert harness.robot.late_echoes == 4, "before the one before it, and from a far future"
+    assert [f.robot_s for f in harness.robot.take_received().firings] == pytest.approx([1.1])
 
 
 @pytest.mark.promise("P8")
@@ -114,113 +114,113 @@ def test_late_doubled_and_out_of_window_echoes_go_no_further(measured: Callable[
     near = CONFIG.ring.model_copy(
         update={"firing": FiringConfig(preset="octets", window_m=window * 0.03048, step_period_s=0.02)}
     )
-    bench = Bench(CONFIG.model_copy(update={"ring": near}))
-    bench.open()
-    bench.greet()
+    harness = DriverHarness(CONFIG.model_copy(update={"ring": near}))
+    harness.open()
+    harness.handshake()
     good: list[Echo] = []
     t_us = 0
-    bench.odom(t_us)
+    harness.odom(t_us)
     for k in range(200):
         t_us += PERIOD_US
         mask = OCTETS[k % 3]
         tenths = tuple(window + 1 + k if (i + k) % 4 == 0 else 255 if i % 3 else window - i for i in range(8))
         echo = Echo(0, t_us - 5_000, k % 3, mask, tuple(min(t, 254) if t != 255 else 255 for t in tenths))
-        bench.now += 0.02
-        bench.odom(t_us)
-        bench.say(echo, echo)
+        harness.now += 0.02
+        harness.odom(t_us)
+        harness.send(echo, echo)
         if good:
-            bench.say(good[-1])
+            harness.send(good[-1])
         good.append(echo)
-    firings = bench.robot.take_received().firings
+    firings = harness.robot.take_received().firings
     assert [f.robot_s for f in firings] == pytest.approx([1e-6 * echo.t_us for echo in good])
     for firing in firings:
         heard = firing.ranges_m[np.isfinite(firing.ranges_m)]
         assert (heard <= window * 0.03048 + 1e-9).all()
         assert heard.size + np.isinf(firing.ranges_m).sum() == 6, "the others are kept"
-    assert bench.robot.late_echoes == 200 + 199
-    assert bench.robot.out_of_window == (200 + 200 + 199) * 2
+    assert harness.robot.late_echoes == 200 + 199
+    assert harness.robot.out_of_window == (200 + 200 + 199) * 2
     measured(
         f"200 firings, each echo twice and once late, a quarter of the ranges beyond the window: {len(firings)} "
         f"firings and 0 such ranges came through"
     )
 
 
-def test_a_wider_window_counts_from_the_pattern_on_and_a_narrower_one_after_it(bench: Bench) -> None:
-    t_us = bench.run(0.4, t_us=0)
+def test_a_wider_window_counts_from_the_pattern_on_and_a_narrower_one_after_it(harness: DriverHarness) -> None:
+    t_us = harness.run(0.4, t_us=0)
     far = Echo(0, t_us - 5_000, 0, OCTETS[0], (200,) * 8)
     narrow = CONFIG.ring.model_copy(update={"firing": FiringConfig(preset="octets", window_m=2.0)})
-    bench.robot.set_firing(narrow)
-    bench.say(far)
-    assert np.isfinite(bench.robot.take_received().firings[-1].ranges_m).sum() == 8, "an echo of the pattern before"
-    t_us = bench.run(0.4, t_us=t_us)
-    bench.say(replace(far, t_us=t_us - 5_000))
-    assert np.isnan(bench.robot.take_received().firings[-1].ranges_m).all()
+    harness.robot.set_firing(narrow)
+    harness.send(far)
+    assert np.isfinite(harness.robot.take_received().firings[-1].ranges_m).sum() == 8, "an echo of the pattern before"
+    t_us = harness.run(0.4, t_us=t_us)
+    harness.send(replace(far, t_us=t_us - 5_000))
+    assert np.isnan(harness.robot.take_received().firings[-1].ranges_m).all()
 
 
 @pytest.mark.promise("P9")
 @pytest.mark.parametrize(("x", "heading"), [(3048, 0), (-3048, 0), (50_000, 0), (0, 5000), (3048, -20_000)])
-def test_a_leap_of_the_odometry_is_taken_out_and_reported(bench: Bench, x: int, heading: int) -> None:
+def test_a_leap_of_the_odometry_is_taken_out_and_reported(harness: DriverHarness, x: int, heading: int) -> None:
     """Poses go on as the wheels say; the robot's own odometry is `frame` away."""
-    t_us = bench.run(0.4, t_us=0)
-    bench.robot.take_received()
+    t_us = harness.run(0.4, t_us=0)
+    harness.robot.take_received()
     for _ in range(2):  # one that leaps very far is asked who it is, and answers
         t_us += PERIOD_US
-        bench.pass_time(0.02)
-        bench.odom(t_us, x_0p1mm=x, heading_1em4rad=heading, ring_yaw_1em4rad=heading)
-        bench.answer()
-        bench.answer()
-    heard = bench.robot.take_received()
+        harness.pass_time(0.02)
+        harness.odom(t_us, x_0p1mm=x, heading_1em4rad=heading, ring_yaw_1em4rad=heading)
+        harness.answer()
+        harness.answer()
+    heard = harness.robot.take_received()
     assert heard.odometry is not None
     assert heard.odometry.pose == Pose(0.0, 0.0, 0.0)
     assert heard.odometry.ring_yaw == 0.0
     (note,) = heard.notes
     assert "jumped" in note
     assert "check wheels" in note
-    frame = bench.robot.odometry_origin
+    frame = harness.robot.odometry_origin
     assert (frame.x, frame.y, frame.theta) == pytest.approx((x * 1e-4, 0.0, heading * 1e-4))
     assert not heard.rebooted
 
 
-def test_a_base_that_moves_in_leaps_is_believed(bench: Bench) -> None:
+def test_a_base_that_moves_in_leaps_is_believed(harness: DriverHarness) -> None:
     """One whose odometry comes in steps, or that is faster than its file says, does not leap: it moves so."""
     t_us = 0
     for k in range(100):
         t_us += PERIOD_US
-        bench.pass_time(0.02)
-        bench.odom(t_us, x_0p1mm=2000 * (k // 3))
-    heard = bench.robot.take_received()
+        harness.pass_time(0.02)
+        harness.odom(t_us, x_0p1mm=2000 * (k // 3))
+    heard = harness.robot.take_received()
     assert heard.odometry is not None
     assert heard.odometry.pose.x == pytest.approx(6.6)
     assert heard.notes == ()
 
 
-def test_echoes_without_odometry_do_not_pile_up(bench: Bench) -> None:
-    bench.odom(0)
+def test_echoes_without_odometry_do_not_pile_up(harness: DriverHarness) -> None:
+    harness.odom(0)
     for k in range(200):
-        bench.say(Echo(0, 1000 + k, 0, 1, (10,)))
-    assert bench.robot.late_echoes == 200 - 64
-    bench.odom(PERIOD_US)
-    assert len(bench.robot.take_received().firings) == 64
+        harness.send(Echo(0, 1000 + k, 0, 1, (10,)))
+    assert harness.robot.late_echoes == 200 - 64
+    harness.odom(PERIOD_US)
+    assert len(harness.robot.take_received().firings) == 64
 
 
 def test_a_fault_of_the_sensors_beyond_the_ring_is_passed_over() -> None:
     ring = CONFIG.ring.model_copy(update={"count": 16})
-    bench = Bench(CONFIG.model_copy(update={"ring": ring}))
-    bench.ident = replace(IDENT, sensors=16)
-    bench.open()
-    bench.greet()
-    bench.odom(0)
-    bench.say(Echo(0, 0, 0, 0x810000 | 1, (10, 11, 12)))
-    (firing,) = bench.robot.take_received().firings
+    harness = DriverHarness(CONFIG.model_copy(update={"ring": ring}))
+    harness.ident = replace(IDENT, sensors=16)
+    harness.open()
+    harness.handshake()
+    harness.odom(0)
+    harness.send(Echo(0, 0, 0, 0x810000 | 1, (10, 11, 12)))
+    (firing,) = harness.robot.take_received().firings
     assert firing.ranges_m.shape == (16,)
     assert np.nansum(firing.ranges_m) == pytest.approx(0.3048)
 
 
-def test_firings_no_one_takes_do_not_pile_up(bench: Bench) -> None:
+def test_firings_no_one_takes_do_not_pile_up(harness: DriverHarness) -> None:
     for k in range(1100):
-        bench.odom(k * PERIOD_US)
-        bench.say(Echo(0, k * PERIOD_US, 0, 1, (10,)))
-        bench.now += 0.02
-    firings = bench.robot.take_received().firings
+        harness.odom(k * PERIOD_US)
+        harness.send(Echo(0, k * PERIOD_US, 0, 1, (10,)))
+        harness.now += 0.02
+    firings = harness.robot.take_received().firings
     assert len(firings) == 1024
     assert firings[-1].robot_s == pytest.approx(1099 * 0.02)

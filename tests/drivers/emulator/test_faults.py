@@ -21,7 +21,7 @@ from drivers.denning.frames import (
 )
 from drivers.emulator.faults import load_faults
 from drivers.messages import Flags, Twist
-from tests.drivers.emulated import host, script
+from tests.drivers.device_host import host, script
 from tests.drivers.vectors import THIRDS
 
 # Faults.

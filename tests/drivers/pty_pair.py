@@ -19,8 +19,8 @@ from tests.hil.machine import TIMEOUT_S
 T = TypeVar("T")
 
 
-class Ends:
-    """A pty whose slave is found under `path`, as an unplugged and replugged device is."""
+class PtyPair:
+    """Both ends of a pty; a link at `path` comes and goes like a device that is plugged in and unplugged."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

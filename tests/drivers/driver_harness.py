@@ -1,4 +1,4 @@
-"""A driver of a Denning in virtual time, and on the other side a device whose every word the test says."""
+"""A Denning's driver in virtual time, against a device whose every frame the test sends."""
 
 from __future__ import annotations
 
@@ -34,33 +34,33 @@ ODOM = Odom(0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
 PERIOD_US = 20_000
 
 
-class Bench:
-    """A robot driver and, on the other side, a device whose every word the test says."""
+class DriverHarness:
+    """A driver, and a device whose every frame the test sends."""
 
     def __init__(self, config: RobotConfig = CONFIG) -> None:
         self.robot = DenningDriver(config)
         self.now = 100.0
         self.ident = IDENT
         self.last_drive = 0
-        self._ears = Decoder("host")
+        self._decoder = Decoder("host")
         self._seq = 0
 
     def open(self) -> None:
-        self._ears = Decoder("host")
+        self._decoder = Decoder("host")
         self.robot.line_opened(self.now)
 
     def state(self) -> LineState:
         return self.robot.state
 
-    def heard(self, *, writable: bool = True) -> list[Frame]:
-        """What the device hears now."""
-        return self._ears.feed(self.robot.outgoing(writable=writable))
+    def received(self, *, writable: bool = True) -> list[Frame]:
+        """Return the frames that the driver sends now."""
+        return self._decoder.feed(self.robot.outgoing(writable=writable))
 
     @property
     def device_lost(self) -> int:
-        return self._ears.lost + self._ears.bad
+        return self._decoder.lost + self._decoder.bad
 
-    def say(self, *frames: RobotFrame) -> None:
+    def send(self, *frames: RobotFrame) -> None:
         for frame in frames:
             self.robot.receive(encode(replace(frame, seq=self._seq)), self.now)
             self._seq = (self._seq + 1) % 256
@@ -70,28 +70,28 @@ class Bench:
         self.robot.tick(self.now)
 
     def answer(self) -> list[Frame]:
-        """Answer as a good device does; return what it heard."""
-        heard = self.heard()
-        for frame in heard:
+        """Answer like a healthy device; return the frames that the driver sent."""
+        frames = self.received()
+        for frame in frames:
             match frame:
                 case Hello():
-                    self.say(self.ident)
+                    self.send(self.ident)
                 case Pattern() | Halt() | Release():
-                    self.say(Ack(0, frame.seq))
+                    self.send(Ack(0, frame.seq))
                 case _:
                     pass
-        return heard
+        return frames
 
-    def greet(self) -> None:
+    def handshake(self) -> None:
         for _ in range(2):
             self.answer()
         assert self.state() is LineState.READY
 
     def odom(self, t_us: int, **fields: int) -> None:
-        self.say(replace(ODOM, t_us=t_us % 2**32, **fields))
+        self.send(replace(ODOM, t_us=t_us % 2**32, **fields))
 
     def run(self, seconds: float, *, t_us: int) -> int:
-        """Let a good device drive on, odometry and all; return its clock."""
+        """Run a healthy device that sends odometry; return its clock."""
         for _ in range(round(seconds / 0.02)):
             t_us += PERIOD_US
             self.now += 0.02

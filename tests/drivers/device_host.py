@@ -1,4 +1,4 @@
-"""An emulated robot in virtual time and a host that writes down what it says; shared by the tests of the emulator."""
+"""An emulated robot in virtual time, and a host that records its frames; shared by the tests of the emulator."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def next_event_s(robot: DenningDevice) -> float:
 
 
 class Host:
-    """A host's end that writes down everything with the time it came."""
+    """A host that records every frame with the time of its arrival."""
 
     def __init__(self, robot: DenningDevice) -> None:
         self.robot = robot
