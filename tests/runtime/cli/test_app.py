@@ -43,7 +43,7 @@ def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "binary.csv").write_bytes(bytes(range(256)))
 
 
-def complaints(captured: str) -> list[str]:
+def errors(captured: str) -> list[str]:
     """Return the lines of stderr that are no log lines; each is a complaint."""
     assert "Traceback" not in captured
     lines = [line for line in captured.splitlines() if not LOG_LINE.match(line)]
@@ -121,19 +121,19 @@ WRONG: list[tuple[list[str], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("arguments", "culprit"), WRONG, ids=[" ".join(row[0]) for row in WRONG])
-def test_a_wrong_call(arguments: list[str], culprit: str, capfd: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(("arguments", "cause"), WRONG, ids=[" ".join(row[0]) for row in WRONG])
+def test_a_wrong_call(arguments: list[str], cause: str, capfd: pytest.CaptureFixture[str]) -> None:
     assert run_command(arguments) == WRONG_CALL
     captured = capfd.readouterr()
     assert captured.out == ""
-    (line,) = complaints(captured.err)
-    assert culprit in line
+    (line,) = errors(captured.err)
+    assert cause in line
 
 
 def test_each_problem_has_a_line_of_its_own(capfd: pytest.CaptureFixture[str]) -> None:
     sets = ["--set", "cycle.rate_hz=0", "--set", "ring.beam_half_angle_deg=wide", "--set", "nowhere.x=1"]
     assert run_command(["check", "hallway", *sets]) == WRONG_CALL
-    lines = complaints(capfd.readouterr().err)
+    lines = errors(capfd.readouterr().err)
     assert len(lines) == len({*lines}) >= 2
     assert not [line for line in lines if sum(word in line for word in ("rate_hz", "half_angle", "nowhere")) != 1]
 
@@ -153,11 +153,11 @@ FAILING: list[tuple[list[str], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("arguments", "culprit"), FAILING, ids=[" ".join(row[0]) for row in FAILING])
-def test_work_that_failed(arguments: list[str], culprit: str, capfd: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(("arguments", "cause"), FAILING, ids=[" ".join(row[0]) for row in FAILING])
+def test_work_that_failed(arguments: list[str], cause: str, capfd: pytest.CaptureFixture[str]) -> None:
     assert run_command(arguments) == FAILED
-    (line,) = complaints(capfd.readouterr().err)
-    assert culprit in line
+    (line,) = errors(capfd.readouterr().err)
+    assert cause in line
     assert Path("regular").read_bytes() == b""
 
 
@@ -216,7 +216,7 @@ def test_main_exits_with_the_code(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(["frobnicate"])
     assert caught.value.code == WRONG_CALL
-    assert len(complaints(capsys.readouterr().err)) == 1
+    assert len(errors(capsys.readouterr().err)) == 1
 
 
 def test_as_a_program_too() -> None:
@@ -226,7 +226,7 @@ def test_as_a_program_too() -> None:
     )  # fmt: skip
     assert done.returncode == WRONG_CALL
     assert done.stdout == ""
-    assert len(complaints(done.stderr)) == 1
+    assert len(errors(done.stderr)) == 1
 
 
 def test_a_reader_that_leaves_is_no_traceback() -> None:

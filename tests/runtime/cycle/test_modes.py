@@ -128,9 +128,7 @@ def test_a_failed_part_ends_every_mode_but_fault_and_arming_does_not_help() -> N
         later = replace(seen, run_s=NOW + 0.05)
         assert advance_by(after, later) == after, "it is entered once"
         armed = advance_by(after, replace(later, request=Request.ARM))
-        assert armed == ModeState(Mode.SAFE_STOP, NOW + 0.05, seen.fault), (
-            "and reported again on an ARM"
-        )
+        assert armed == ModeState(Mode.SAFE_STOP, NOW + 0.05, seen.fault), "and reported again on an ARM"
         lost = replace(later, line=LineState.CLOSED)
         assert advance_by(after, lost) == after
         assert "halted by the operator" in str(advance_by(after, replace(later, request=Request.HALT)).reason)

@@ -71,8 +71,8 @@ class Run:
         self.truths.append(self.robot.truth)
         return record
 
-    def until(self, done: Callable[[], bool], patience_s: float, request: Request | None = None) -> None:
-        give_up_s = self.run_s + patience_s
+    def until(self, done: Callable[[], bool], timeout_s: float, request: Request | None = None) -> None:
+        give_up_s = self.run_s + timeout_s
         while not done():
             assert self.run_s < give_up_s, (self.state.mode, self.driver.state, self.driver.problem)
             self.cycle(request)

@@ -1,4 +1,4 @@
-"""Recordings that were cut off or damaged anywhere: nothing raises, little is lost, and what is lost is told."""
+"""Recordings that were cut off or damaged anywhere: nothing raises, little is lost, and what is lost is reported."""
 
 from __future__ import annotations
 
@@ -47,9 +47,9 @@ def small(small_file: Path) -> bytes:
     return small_file.read_bytes()
 
 
-def salvaged(data: bytes) -> tuple[list[list[RawMessage]], McapScanner]:
-    salvage = McapScanner(memoryview(data))
-    return list(salvage.chunks()), salvage
+def scanned(data: bytes) -> tuple[list[list[RawMessage]], McapScanner]:
+    scanner = McapScanner(memoryview(data))
+    return list(scanner.chunks()), scanner
 
 
 def chunks_at(data: bytes) -> list[tuple[int, int]]:
@@ -67,36 +67,36 @@ def test_the_account_of_chunks_is_right(small: bytes) -> None:
     found = chunks_at(small)
     assert len(found) == 2
     assert all(small[begin] == Opcode.CHUNK for begin, _ in found)
-    chunks, salvage = salvaged(small)
+    chunks, scanner = scanned(small)
     assert [len(chunk) for chunk in chunks] == [10] * 2
-    assert (salvage.corrupt_regions, salvage.finished) == ([], True)
+    assert (scanner.corrupt_regions, scanner.finished) == ([], True)
 
 
 def test_cut_off_anywhere_every_complete_chunk_is_read(small: bytes) -> None:
     ends = [end for _, end in chunks_at(small)]
     for cut in [*range(ends[-1] + 50), *range(ends[-1] + 50, len(small), 37)]:  # beyond is the index
-        chunks, salvage = salvaged(small[:cut])
+        chunks, scanner = scanned(small[:cut])
         assert len(chunks) == sum(end <= cut for end in ends), cut
-        assert not salvage.finished
+        assert not scanner.finished
         if cut >= 8:
-            told = [damage for damage in salvage.corrupt_regions if "end of the file" not in damage.description]
-            assert told == [], (cut, told)
+            found = [damage for damage in scanner.corrupt_regions if "end of the file" not in damage.description]
+            assert found == [], (cut, found)
 
 
-def test_one_flipped_bit_costs_a_chunk_at_most_and_is_told(small: bytes) -> None:
-    whole, _ = salvaged(small)
+def test_one_flipped_bit_costs_a_chunk_at_most_and_is_reported(small: bytes) -> None:
+    whole, _ = scanned(small)
     rng = random.Random(0)
     heads = {at + k for begin, end in chunks_at(small) for at in (begin, end) for k in range(-8, 60)}
     index = chunks_at(small)[-1][1] + 60
     for at in sorted(heads | {*range(60), *range(60, index, 3), *range(index, len(small), 23)}):
         data = bytearray(small)
         data[at] ^= 1 << rng.randrange(8)
-        chunks, salvage = salvaged(bytes(data))
+        chunks, scanner = scanned(bytes(data))
         lost = [chunk for chunk in whole if chunk not in chunks]
         assert len(lost) <= 1, (at, len(lost))
         assert all(chunk in whole for chunk in chunks), (at, "what was not written is read")
-        # Zstandard has bits that no reader looks at: what costs nothing need not be told.
-        assert salvage.corrupt_regions or not lost, (at, "nothing is told")
+        # Zstandard has bits that no reader looks at: what costs nothing need not be found.
+        assert scanner.corrupt_regions or not lost, (at, "nothing is reported")
 
 
 @settings(max_examples=150, deadline=None)
@@ -104,18 +104,18 @@ def test_one_flipped_bit_costs_a_chunk_at_most_and_is_told(small: bytes) -> None
 def test_any_bytes_anywhere_raise_nothing(small_file: Path, junk: bytes, at: int, over: int) -> None:
     small = small_file.read_bytes()
     at %= len(small)
-    chunks, salvage = salvaged(small[:at] + junk + small[at + over :])
-    whole, _ = salvaged(small)
+    chunks, scanner = scanned(small[:at] + junk + small[at + over :])
+    whole, _ = scanned(small)
     assert all(chunk in whole for chunk in chunks)
     if not chunks:
-        assert salvage.corrupt_regions
+        assert scanner.corrupt_regions
 
 
 @pytest.mark.parametrize("data", [b"", b"\x89", b"\x89MCAP0\r\n", bytes(5000), bytes(range(256)) * 40])
 def test_what_is_no_recording_at_all_raises_nothing(data: bytes) -> None:
-    chunks, salvage = salvaged(data)
+    chunks, scanner = scanned(data)
     assert chunks == []
-    assert not salvage.finished
+    assert not scanner.finished
 
 
 def test_a_lost_chunk_is_got_over_at_the_next_keyframe(run: Path, tmp_path: Path) -> None:
@@ -142,7 +142,7 @@ def test_recovered_it_is_whole_again(run: Path, tmp_path: Path, capsys: pytest.C
     restored = tmp_path / "cut-recovered.mcap"
     before, after = entries_of(cut), entries_of(restored)
     assert before == after
-    assert salvaged(restored.read_bytes())[1].finished
+    assert scanned(restored.read_bytes())[1].finished
     assert run_command(["replay", str(restored), "--verify"]) == DONE
     assert sorted(path.name for path in tmp_path.iterdir()) == ["cut-recovered.mcap", "cut.mcap"]
     with restored.open("rb") as file:

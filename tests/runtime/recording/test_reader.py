@@ -28,7 +28,9 @@ READING = {
 COMMANDS = {**READING, "recover": ("recover", "{file}", "--out", "{out}")}
 
 
-def told(command: tuple[str, ...], file: Path, out: Path, capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
+def outcome_of(
+    command: tuple[str, ...], file: Path, out: Path, capsys: pytest.CaptureFixture[str]
+) -> tuple[int, str]:
     """Run a command on a file; return its exit code and the one line that it says."""
     code = run_command([word.format(file=file, out=out) for word in command])
     err = capsys.readouterr().err
@@ -67,7 +69,7 @@ def test_wrong_files(command: tuple[str, ...], tmp_path: Path, capsys: pytest.Ca
         "folder.mcap": "Is a directory", "nowhere.mcap": "No such file",
     }  # fmt: skip
     for name, reason in why.items():
-        code, line = told(command, tmp_path / name, tmp_path / "out", capsys)
+        code, line = outcome_of(command, tmp_path / name, tmp_path / "out", capsys)
         assert code == WRONG_CALL
         assert name in line
         assert reason in line
@@ -85,7 +87,7 @@ def test_another_format_is_refused_with_both_versions(
 ) -> None:  # fmt: skip
     path = tmp_path / "other.mcap"
     rewrite_as(hall_run, path, version)
-    code, line = told(command, path, tmp_path / "out", capsys)
+    code, line = outcome_of(command, path, tmp_path / "out", capsys)
     assert code == WRONG_CALL
     assert f"has recording format {version} (written by echolocate 9)" in line
     assert f"reads format {FORMAT} only" in line
@@ -99,7 +101,7 @@ def test_a_message_of_another_form(
     """Whole by its checksum, and written by a version that knew cycles otherwise."""
     odd = tmp_path / "odd.mcap"
     rewrite([e._replace(data=b'{"record": 7}') if e.topic == CYCLE else e for e in entries_of(hall_run)], odd)
-    code, line = told(command, odd, tmp_path / "out", capsys)
+    code, line = outcome_of(command, odd, tmp_path / "out", capsys)
     assert code == WRONG_CALL
     assert "is not valid in this version (record: " in line
 
@@ -107,16 +109,16 @@ def test_a_message_of_another_form(
 def test_a_newer_file_is_restored_as_it_is_or_refused_as_newer(
     newer: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Its messages need not be understood to be copied; of what nobody here can read it is said why."""
+    """Its messages need not be understood to be copied; of what no one here can read it is said why."""
     cut, restored = tmp_path / "cut.mcap", tmp_path / "restored.mcap"
     cut.write_bytes(newer.read_bytes()[:-500])
     assert run_command(["recover", str(cut), "--out", str(restored)]) == DONE
     capsys.readouterr()
     assert entries_of_any(restored) == entries_of_any(newer)
-    code, line = told(READING["replay"], restored, tmp_path / "out", capsys)
+    code, line = outcome_of(READING["replay"], restored, tmp_path / "out", capsys)
     assert (code, f"format {FORMAT + 1} " in line) == (WRONG_CALL, True)
     cut.write_bytes(newer.read_bytes()[:90])
-    code, line = told(COMMANDS["recover"], cut, tmp_path / "none.mcap", capsys)
+    code, line = outcome_of(COMMANDS["recover"], cut, tmp_path / "none.mcap", capsys)
     assert (code, f"format {FORMAT + 1} " in line) == (WRONG_CALL, True)
 
 
@@ -145,7 +147,7 @@ def test_a_disk_that_fills_up(
     command: tuple[str, ...], hall_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with disk_of(2048):
-        code, line = told(command, hall_run, tmp_path / "out", capsys)
+        code, line = outcome_of(command, hall_run, tmp_path / "out", capsys)
     assert code == FAILED
     assert f"{tmp_path / 'out'}" in line
     assert "File too large" in line
@@ -154,6 +156,6 @@ def test_a_disk_that_fills_up(
 
 def test_a_summary_that_does_not_fit(hall_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with disk_of(16):
-        code, line = told(("replay", "{file}", "--json", "{out}"), hall_run, tmp_path / "x.json", capsys)
+        code, line = outcome_of(("replay", "{file}", "--json", "{out}"), hall_run, tmp_path / "x.json", capsys)
     assert code == FAILED
     assert "--json" in line

@@ -39,7 +39,7 @@ from tests.recorded import SECONDS, entries_of, hall, record, verify_file
 def test_everything_that_happened_is_in_it(run: Path) -> None:
     entries = entries_of(run)
     by_topic = {topic: [e for e in entries if e.topic == topic] for topic in CHANNELS}
-    assert [topic for topic, found in by_topic.items() if not found] == [SETTINGS, BOOKMARK], "nobody asked for it"
+    assert [topic for topic, found in by_topic.items() if not found] == [SETTINGS, BOOKMARK], "no one asked for it"
     (end,) = by_topic[SUMMARY]
     assert json.loads(end.data) == {"summary": {"mode": "DRIVE", "cycles": 240.0}}
     assert [decode(Cycle, e.data).record.cycle for e in by_topic[CYCLE]] == list(range(1, int(20 * SECONDS) + 1))
@@ -88,9 +88,9 @@ def test_the_stock_reader_reads_it_and_its_own_schemas_hold(run: Path) -> None:
             assert schema is not None
             assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
             if schema.id not in validators:
-                told = json.loads(schema.data)
-                jsonschema.Draft202012Validator.check_schema(told)
-                validators[schema.id] = jsonschema.Draft202012Validator(told)
+                found = json.loads(schema.data)
+                jsonschema.Draft202012Validator.check_schema(found)
+                validators[schema.id] = jsonschema.Draft202012Validator(found)
             validators[schema.id].validate(json.loads(message.data))
             seen[channel.topic] = seen.get(channel.topic, 0) + 1
         assert summary.statistics.message_count == sum(seen.values()) == len(entries_of(run))
@@ -155,14 +155,14 @@ class Full(SingleFile):
         return Path("/dev/full")
 
 
-def test_a_full_disk_is_told_and_nothing_waits_for_it() -> None:
+def test_a_full_disk_is_reported_and_nothing_waits_for_it() -> None:
     status = record(hall(), Full(Path()), 3.0)
     assert status.last_error is not None
     assert "No space left" in status.last_error
     assert status.dropped > 20
 
 
-def test_a_folder_that_is_none_is_told(tmp_path: Path) -> None:
+def test_a_folder_that_that_is_missing_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     settings = hall()
     status = record(settings, RotatingFolder(tmp_path / "file", "run", settings.recording), 1.0)

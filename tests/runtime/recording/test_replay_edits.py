@@ -1,4 +1,4 @@
-"""A person's hands and drive_requests in a recording: inputs like any other, replayed to the bit from wherever one begins."""
+"""Edits and drive requests in a recording: inputs like any other, replayed to the bit from any start."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def edited(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     box = load_model("box")
     before = hall(f"perception.method={request.param}")
     before = before.model_copy(update={"models": (*before.models, box)})
-    # From cycle 350 on it knows one thing more.
+    # From cycle 350 on it has one edit more.
     more = before.model_copy(update={"models": (*before.models, box.model_copy(update={"name": "crate"}))})
     hands = Hands()
     status = record(before, path, SECONDS, operator=hands, reloads={350: more})
@@ -99,7 +99,7 @@ def records_of(entries: list[RawMessage]) -> list[CycleRecord]:
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("since_s", [0.0, 7.0, 9.0, 13.0, 17.0, 25.0])
-def test_replayed_to_the_bit_with_edits_and_wishes(edited: Path, since_s: float) -> None:
+def test_replayed_to_the_bit_with_edits_and_drive_requests(edited: Path, since_s: float) -> None:
     with open_recording(edited) as recording:
         result = verify_recording(recording, since_s=since_s)
     assert result.first_difference is None, str(result.first_difference)
@@ -110,7 +110,7 @@ def test_replayed_to_the_bit_with_edits_and_wishes(edited: Path, since_s: float)
 
 
 @pytest.mark.compiled
-def test_the_record_tells_what_was_done_and_what_was_refused(edited: Path) -> None:
+def test_the_record_holds_what_was_done_and_what_was_refused(edited: Path) -> None:
     records = records_of(entries_of(edited))
     assert len(records) == CYCLES
     asked = [(r, i, edit) for r in records for i, edit in enumerate(r.inputs.edits)]
@@ -147,9 +147,9 @@ def test_without_one_edit_the_replay_goes_another_way(edited: Path, tmp_path: Pa
     entries = entries_of(edited)
     for i, entry in enumerate(entries):
         if entry.topic == CYCLE and decode(Cycle, entry.data).record.cycle == 150:
-            told = orjson.loads(entry.data)
-            told["record"]["inputs"]["edits"] = told["record"]["inputs"]["edits"][:1]
-            entries[i] = entry._replace(data=orjson.dumps(told))
+            found = orjson.loads(entry.data)
+            found["record"]["inputs"]["edits"] = found["record"]["inputs"]["edits"][:1]
+            entries[i] = entry._replace(data=orjson.dumps(found))
     rewrite(entries, tmp_path / "x.mcap")
     with open_recording(tmp_path / "x.mcap") as recording:
         result = verify_recording(recording)

@@ -54,9 +54,9 @@ def test_it_is_in_the_record_and_in_force_from_its_cycle_on(reloaded: Path, tmp_
     assert change.cycle == AT
     where = [e.topic for e in entries].index(SETTINGS)
     assert sum(e.topic == CYCLE for e in entries[:where]) == AT - 1
-    told = [parse_settings(decode(RunInfo, e.data).settings) for e in entries[where:] if e.topic == RUN_INFO]
-    assert told
-    assert all(t == parse_settings(change.settings) for t in told), "a replay may begin at any keyframe"
+    found = [parse_settings(decode(RunInfo, e.data).settings) for e in entries[where:] if e.topic == RUN_INFO]
+    assert found
+    assert all(t == parse_settings(change.settings) for t in found), "a replay may begin at any keyframe"
     # Without it the replay goes another way.
     first = entries[0]
     deaf = [e._replace(data=first.data) if e.topic == RUN_INFO else e for e in entries if e.topic != SETTINGS]
@@ -70,12 +70,12 @@ def test_it_is_in_the_record_and_in_force_from_its_cycle_on(reloaded: Path, tmp_
 @pytest.mark.compiled
 def test_a_retelling_knows_of_it(reloaded: Path) -> None:
     with open_recording(reloaded) as recording:
-        told = compare_runs(recording, recording.settings)
-    assert told.first_change_s is not None
-    assert told.first_change_s >= (AT - 1) / 20.0 - 0.1
+        found = compare_runs(recording, recording.settings)
+    assert found.first_change_s is not None
+    assert found.first_change_s >= (AT - 1) / 20.0 - 0.1
 
 
-def test_a_run_without_a_cycle_is_told_plainly(
+def test_a_run_without_a_cycle_is_reported_plainly(
     reloaded: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, summary = tmp_path / "none.mcap", tmp_path / "none.json"

@@ -1,4 +1,4 @@
-"""The ring log: what is written comes back to the bit, and whatever a stranger's file holds is told in one line."""
+"""The ring log: a written file reads back to the bit, and every problem of a foreign file is reported in one line."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ def log(tmp_path: Path, content: str | bytes) -> Path:
     return path
 
 
-def complaint(path: Path, sensors: int | None = None) -> str:
+def error_message(path: Path, sensors: int | None = None) -> str:
     with pytest.raises(RingLogError) as caught:
         list(read_ring_log(path, sensors))
     text = str(caught.value)
     assert len(text.splitlines()) == 1
     assert text.isprintable()
     assert text.startswith(f"{path}: ")
-    assert ";" in text, "a complaint ends with what to do"
+    assert ";" in text, "an error ends with what to do"
     assert len(text) < len(str(path)) + 300
     return text.removeprefix(f"{path}: ")
 
@@ -90,7 +90,7 @@ def test_infinity_may_be_spelt_as_programs_do(tmp_path: Path, cell: str) -> None
     "cell", ["nan", "NaN", "-0.5", "-inf", "1e999", "1_000", "abc", " ", "1,5", "١", "0x10", "--1"]
 )
 def test_bad_range_names_row_column_value_and_what_is_allowed(tmp_path: Path, cell: str) -> None:
-    text = complaint(log(tmp_path, f'{HEADER}0,0,0,0,1,1\n0,0,0,0,1,"{cell}"\n'))
+    text = error_message(log(tmp_path, f'{HEADER}0,0,0,0,1,1\n0,0,0,0,1,"{cell}"\n'))
     assert text.startswith(f"row 3 column 'r01' is {cell!a}; allowed is metres ≥ 0, 'inf'")
 
 
@@ -99,13 +99,13 @@ def test_bad_range_names_row_column_value_and_what_is_allowed(tmp_path: Path, ce
 def test_bad_stamp_names_row_column_value_and_what_is_allowed(tmp_path: Path, column: int, cell: str) -> None:
     cells = ["0", "0", "0", "0", "1", "-1"]
     cells[column] = cell
-    text = complaint(log(tmp_path, HEADER + "\r\n" + ",".join(cells) + "\n"))
+    text = error_message(log(tmp_path, HEADER + "\r\n" + ",".join(cells) + "\n"))
     found = f"is {cell!r}" if cell else "is empty"
     assert text.startswith(f"row 3 column '{['t', 'x', 'y', 'theta'][column]}' {found}; allowed is a finite number")
 
 
 def test_empty_ring_yaw_is_not_taken_for_none(tmp_path: Path) -> None:
-    text = complaint(log(tmp_path, "t,x,y,theta,ring_yaw,r00\n0,0,0,1,,3\n"))
+    text = error_message(log(tmp_path, "t,x,y,theta,ring_yaw,r00\n0,0,0,1,,3\n"))
     assert text.startswith("row 2 column 'ring_yaw' is empty")
 
 
@@ -128,19 +128,19 @@ def test_empty_ring_yaw_is_not_taken_for_none(tmp_path: Path) -> None:
     ],
 )
 def test_bad_header(tmp_path: Path, header: str, expected: str) -> None:
-    text = complaint(log(tmp_path, f"{header}\n0,0,0,0,0,0\n"))
+    text = error_message(log(tmp_path, f"{header}\n0,0,0,0,0,0\n"))
     assert text.startswith(expected)
     assert "t,x,y,theta[,ring_yaw],r00,r01" in text
 
 
 @pytest.mark.parametrize("row", ["0,0,0,0,1", "0,0,0,0,1,1,1", "0", "0;0;0;0;1;1"])
 def test_row_of_another_length(tmp_path: Path, row: str) -> None:
-    text = complaint(log(tmp_path, f"{HEADER}0,0,0,0,1,1\n{row}\n"))
+    text = error_message(log(tmp_path, f"{HEADER}0,0,0,0,1,1\n{row}\n"))
     assert text.startswith(f"row 3 has {row.count(',') + 1} cells where the header has 6; ")
 
 
 def test_time_runs_backwards(tmp_path: Path) -> None:
-    text = complaint(log(tmp_path, f"{HEADER}1.5,0,0,0,1,1\n1.5,0,0,0,1,1\n\n1.25,0,0,0,1,1\n"))
+    text = error_message(log(tmp_path, f"{HEADER}1.5,0,0,0,1,1\n1.5,0,0,0,1,1\n\n1.25,0,0,0,1,1\n"))
     assert text.startswith("row 5 column 't' is 1.25, earlier than 1.5 before it; t never decreases")
 
 
@@ -150,7 +150,7 @@ def test_a_quote_too_few_does_not_swallow_the_rest_of_the_file(tmp_path: Path) -
     path = log(tmp_path, f'{HEADER}0,0,0,0,1,"1\n"\n' + '","\n' * 200_000)
     tracemalloc.start()
     try:
-        assert complaint(path).startswith("row 2 is not CSV (unexpected end of data)")
+        assert error_message(path).startswith("row 2 is not CSV (unexpected end of data)")
         assert tracemalloc.get_traced_memory()[1] < 2_000_000
     finally:
         tracemalloc.stop()
@@ -159,22 +159,22 @@ def test_a_quote_too_few_does_not_swallow_the_rest_of_the_file(tmp_path: Path) -
 def test_sensor_count_differs(tmp_path: Path) -> None:
     path = log(tmp_path, f"{HEADER}0,0,0,0,1,1\n")
     assert len(list(read_ring_log(path, sensors=2))) == 1
-    text = complaint(path, sensors=24)
+    text = error_message(path, sensors=24)
     assert "2 sensor columns (r00 to r01)" in text
     assert "24 sensors" in text
 
 
 @pytest.mark.parametrize("content", [b"", b"\xef\xbb\xbf", b"\n\r\n"])
 def test_empty_file(tmp_path: Path, content: bytes) -> None:
-    assert complaint(log(tmp_path, content)).startswith("is empty; ")
+    assert error_message(log(tmp_path, content)).startswith("is empty; ")
 
 
 def test_header_alone(tmp_path: Path) -> None:
-    assert complaint(log(tmp_path, HEADER + "\n")).startswith("holds no firing")
+    assert error_message(log(tmp_path, HEADER + "\n")).startswith("holds no firing")
 
 
 def test_not_utf8_names_the_row_and_byte(tmp_path: Path) -> None:
-    text = complaint(log(tmp_path, HEADER.encode() + b"0,0,0,0,1,1\n0,0,\xff\n"))
+    text = error_message(log(tmp_path, HEADER.encode() + b"0,0,0,0,1,1\n0,0,\xff\n"))
     assert text.startswith("row 3 is not UTF-8 (0xff at byte 5); ")
 
 
@@ -184,7 +184,7 @@ def test_not_utf8_names_the_row_and_byte(tmp_path: Path) -> None:
     ids=["nuls at the end", "utf-16", "binary"],
 )
 def test_binary(tmp_path: Path, content: bytes) -> None:
-    assert "holds NUL bytes" in complaint(log(tmp_path, content))
+    assert "holds NUL bytes" in error_message(log(tmp_path, content))
 
 
 @pytest.mark.parametrize(
@@ -198,7 +198,7 @@ def test_binary(tmp_path: Path, content: bytes) -> None:
     ids=["quote never closed", "field over the limit", "text after a quote", "carriage returns alone"],
 )
 def test_not_csv(tmp_path: Path, content: str) -> None:
-    text = complaint(log(tmp_path, content))
+    text = error_message(log(tmp_path, content))
     assert "is not CSV" in text
     assert text.startswith("row 1 " if content.count("\n") == 0 else "row 2 ")
 
@@ -207,20 +207,20 @@ def test_endless_line_is_not_read_to_its_end(tmp_path: Path) -> None:
     path = log(tmp_path, HEADER)
     with path.open("ab") as file:
         file.truncate(1 << 40)  # a sparse terabyte of zeros, which would never fit
-    assert "row 2 is longer than" in complaint(path)
+    assert "row 2 is longer than" in error_message(path)
 
 
 def test_long_cell_is_shown_short(tmp_path: Path) -> None:
-    text = complaint(log(tmp_path, f"{HEADER}0,0,0,0,1,{chr(228) * 5000}\n"))
+    text = error_message(log(tmp_path, f"{HEADER}0,0,0,0,1,{chr(228) * 5000}\n"))
     assert text.startswith("row 2 column 'r01' is '\\xe4")
 
 
 def test_absent_file_and_folder(tmp_path: Path) -> None:
-    assert complaint(tmp_path / "none.csv").startswith("cannot be read: No such file or directory; check")
-    assert complaint(tmp_path).startswith("cannot be read: Is a directory; check")
+    assert error_message(tmp_path / "none.csv").startswith("cannot be read: No such file or directory; check")
+    assert error_message(tmp_path).startswith("cannot be read: Is a directory; check")
 
 
-def test_a_complaint_comes_only_after_the_good_rows(tmp_path: Path) -> None:
+def test_an_error_comes_only_after_the_good_rows(tmp_path: Path) -> None:
     firings = read_ring_log(log(tmp_path, f"{HEADER}0,0,0,0,1,1\nbad\n"))
     assert next(firings).robot_s == 0.0
     with pytest.raises(RingLogError, match="row 3"):
@@ -271,7 +271,7 @@ def test_a_damaged_file_is_read_or_refused_and_nothing_else(tmp_path: Path, data
             assert math.isfinite(got.robot_s)
             assert not (got.ranges_m < 0.0).any()
     except RingLogError:
-        complaint(path)
+        error_message(path)
 
 
 @pytest.mark.parametrize(

@@ -65,9 +65,9 @@ def test_so_is_one_in_a_process_of_its_own(run: Path, since: str, tmp_path: Path
         text=True, timeout=120, check=False,
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (DONE, "")
-    told = json.loads(summary.read_bytes())
-    assert told["verify"]["differences"] == 0
-    assert told["cycles"] >= 20 * (SECONDS - float(since))
+    found = json.loads(summary.read_bytes())
+    assert found["verify"]["differences"] == 0
+    assert found["cycles"] >= 20 * (SECONDS - float(since))
 
 
 @pytest.mark.compiled
@@ -98,7 +98,7 @@ def test_the_first_difference_is_named(run: Path, tmp_path: Path) -> None:
 
 @pytest.mark.compiled
 def test_a_memory_that_differs_is_named(run: Path, tmp_path: Path) -> None:
-    """The map of a keyframe holds what no record tells: one bit of it is a difference."""
+    """The map of a keyframe holds what no record holds: one bit of it is a difference."""
     entries = entries_of(run)
     where = [i for i, entry in enumerate(entries) if entry.topic == KEYFRAME][2]
     frame = decode(Keyframe, entries[where].data)
@@ -120,7 +120,7 @@ def test_a_memory_that_differs_is_named(run: Path, tmp_path: Path) -> None:
     )
 
 
-def test_other_settings_tell_what_would_have_been(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_comparison_with_other_settings(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command(["replay", str(run), "--set", "perception.method=paper", "--set", "cycle.rate_hz=20"]) == DONE
     out = capsys.readouterr().out
     assert out.index("as it was") < out.index("with the other settings")
@@ -150,7 +150,7 @@ def test_a_state_that_is_put_back_is_whole(run: Path) -> None:
             fresh_state(hall("perception.method=paper")).perception.restore(perception_snapshot(frames[-1]))
 
 
-def complaint(arguments: list[str], capsys: pytest.CaptureFixture[str], code: int) -> str:
+def error_message(arguments: list[str], capsys: pytest.CaptureFixture[str], code: int) -> str:
     assert run_command(arguments) == code
     err = capsys.readouterr().err
     assert err.startswith("echolocate: ")
@@ -163,9 +163,9 @@ def test_files_that_are_no_recordings(command: str, tmp_path: Path, capsys: pyte
     files = {"empty.mcap": b"", "wrong.mcap": b"t,x,y,theta\n" * 99, "magic.mcap": b"\x89MCAP0\r\n"}
     for name, data in files.items():
         (tmp_path / name).write_bytes(data)
-        assert name in complaint([command, str(tmp_path / name)], capsys, WRONG_CALL)
-    assert "is empty" in complaint([command, str(tmp_path / "empty.mcap")], capsys, WRONG_CALL)
-    assert "nowhere.mcap" in complaint([command, str(tmp_path / "nowhere.mcap")], capsys, WRONG_CALL)
+        assert name in error_message([command, str(tmp_path / name)], capsys, WRONG_CALL)
+    assert "is empty" in error_message([command, str(tmp_path / "empty.mcap")], capsys, WRONG_CALL)
+    assert "nowhere.mcap" in error_message([command, str(tmp_path / "nowhere.mcap")], capsys, WRONG_CALL)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(files)
 
 
@@ -175,30 +175,30 @@ def test_a_newer_file_and_a_strange_one(run: Path, tmp_path: Path, capsys: pytes
     about = decode(RunInfo, entries[0].data)
     newer = [entries[0]._replace(data=encode(about.model_copy(update={"format": FORMAT + 1}))), *entries[1:]]
     rewrite(newer, Path(path), f"echolocate/{FORMAT + 1}")
-    assert f"has recording format {FORMAT + 1} " in complaint(["replay", path], capsys, WRONG_CALL)
+    assert f"has recording format {FORMAT + 1} " in error_message(["replay", path], capsys, WRONG_CALL)
     odd = about.model_copy(update={"settings": {**about.settings, "warp": 9}})
     rewrite([entries[0]._replace(data=encode(odd)), *entries[1:]], Path(path))
-    assert "warp" in complaint(["replay", path], capsys, WRONG_CALL)
+    assert "warp" in error_message(["replay", path], capsys, WRONG_CALL)
     from mcap.writer import Writer
 
     with Path(path).open("wb") as file:
         writer = Writer(file)
         writer.start("ros2", "other")
         writer.finish()
-    assert "ros2" in complaint(["replay", path], capsys, WRONG_CALL)
+    assert "ros2" in error_message(["replay", path], capsys, WRONG_CALL)
     with pytest.raises(RecordingError), open_recording(Path(path)):
         pass
 
 
 def test_calls_that_make_no_sense(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "--to" in complaint(["replay", str(run), "--from", "5", "--to", "4"], capsys, WRONG_CALL)
-    assert "--speed" in complaint(["replay", str(run), "--speed", "0"], capsys, WRONG_CALL)
-    assert "--verify" in complaint(["replay", str(run), "--verify", "--with", "irregular"], capsys, WRONG_CALL)
-    assert "warp" in complaint(["replay", str(run), "--set", "warp=9"], capsys, WRONG_CALL)
-    assert "itself" in complaint(["recover", str(run), "--out", str(run)], capsys, WRONG_CALL)
-    assert "nowhere" in complaint(["recover", str(run), "--out", str(tmp_path / "nowhere" / "x")], capsys, FAILED)
+    assert "--to" in error_message(["replay", str(run), "--from", "5", "--to", "4"], capsys, WRONG_CALL)
+    assert "--speed" in error_message(["replay", str(run), "--speed", "0"], capsys, WRONG_CALL)
+    assert "--verify" in error_message(["replay", str(run), "--verify", "--with", "irregular"], capsys, WRONG_CALL)
+    assert "warp" in error_message(["replay", str(run), "--set", "warp=9"], capsys, WRONG_CALL)
+    assert "itself" in error_message(["recover", str(run), "--out", str(run)], capsys, WRONG_CALL)
+    assert "nowhere" in error_message(["recover", str(run), "--out", str(tmp_path / "nowhere" / "x")], capsys, FAILED)
     (tmp_path / "x.csv").write_text("t,x,y,theta,r00\n0,0,0,0,1\n")
-    assert "ring log" in complaint(["replay", str(tmp_path / "x.csv"), "--verify"], capsys, WRONG_CALL)
+    assert "ring log" in error_message(["replay", str(tmp_path / "x.csv"), "--verify"], capsys, WRONG_CALL)
 
 
 @pytest.mark.compiled

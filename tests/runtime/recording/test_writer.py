@@ -55,7 +55,7 @@ def cycles_of(path: Path) -> list[int]:
     for entry in entries_of(path):
         if entry.topic == CYCLE:
             number = re.match(rb'\{"record":\{"cycle":(\d+),', entry.data)
-            assert number is not None, "what a player counts by"
+            assert number is not None, "the replay counts by it"
             found.append(int(number[1]))
     return found
 
@@ -108,7 +108,7 @@ def test_on_in_mid_run(tmp_path: Path) -> None:
     assert verify_file(path).differences == 0
 
 
-def test_bookmarks_are_in_it_and_in_nobody_s_way(tmp_path: Path) -> None:
+def test_bookmarks_are_in_it_and_without_side_effects(tmp_path: Path) -> None:
     path, refused = tmp_path / "run.mcap", list[str | None]()
 
     def mark(recorder: Recorder) -> None:
@@ -182,7 +182,7 @@ async def in_folder_of(
 
 
 @pytest.mark.parametrize("record", [None, "firings.csv"])
-async def test_a_run_that_records_nothing_may_be_told_to(tmp_path: Path, record: str | None) -> None:
+async def test_a_run_that_records_nothing_may_be_switched_on(tmp_path: Path, record: str | None) -> None:
     log = None if record is None else str(tmp_path / record)
     folder = tmp_path / "runs"
 

@@ -77,8 +77,8 @@ def run(it: PausableRun, act: Act) -> tuple[RunSummary, Watched]:
     return it.loop.run_until_complete(whole()), watched
 
 
-async def until(done: Callable[[], bool], patience_s: float = 60.0) -> None:
-    async with asyncio.timeout(patience_s):
+async def until(done: Callable[[], bool], timeout_s: float = 60.0) -> None:
+    async with asyncio.timeout(timeout_s):
         while not done():
             await asyncio.sleep(0.001)
 
@@ -186,10 +186,10 @@ def test_another_speed_changes_nothing_else(monkeypatch: pytest.MonkeyPatch, fac
         async def act(_process: RobotProcess, watched: Watched) -> None:
             assert await it.control.set_speed(factor) is None
             assert it.control.speed == factor
-            begun_s, run_s, robot_s = it.loop.time(), it.control.clock(), emulated_s(it.robot)
+            start_s, run_s, robot_s = it.loop.time(), it.control.clock(), emulated_s(it.robot)
             cycles = len(watched.records)
             await until(lambda: len(watched.records) >= cycles + 100, 200.0)
-            took_s = it.loop.time() - begun_s
+            took_s = it.loop.time() - start_s
             assert (it.control.clock() - run_s) / took_s == pytest.approx(factor, rel=0.1)
             assert (emulated_s(it.robot) - robot_s) / took_s == pytest.approx(factor, rel=0.1)
             assert await it.control.set_speed(1.0) is None

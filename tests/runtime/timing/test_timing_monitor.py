@@ -279,9 +279,7 @@ def test_the_step_marks_its_phases_and_no_overrun_delays_a_stop(
         inputs = Inputs(t_s, LineState.READY, None, heard, request)
         record = step(state, inputs, SETTINGS, carry_out, lambda done: done < 1, monitor.mark)
         monitor.end()
-        assert commands[-1][1] - began_us == observe_us, (
-            "only `observe` precedes the command"
-        )
+        assert commands[-1][1] - began_us == observe_us, "only `observe` precedes the command"
         took = {span.name: round(span.took_s / US) for span in monitor._spans}
         assert took == {
             "perceive": observe_us, "decide": 0, "command": command_us, "refine": perception.refine_us

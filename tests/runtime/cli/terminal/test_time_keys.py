@@ -55,7 +55,7 @@ async def test_keys_hold_time_one_thing_after_the_other() -> None:
     assert control.asked == ["pause", "step", "step", "resume", "pause", "resume"]
 
 
-async def test_what_cannot_be_done_is_told() -> None:
+async def test_what_cannot_be_done_is_reported() -> None:
     with capture_logs() as lines:
         keys = TimeKeys(NoTimeControl(), get_logger())
         for key in ("p", "s"):
