@@ -1,6 +1,6 @@
 """The protocol that every robot's driver fulfils: a sans-I/O object between the bytes of a line and messages.
 
-The runtime moves bytes between a line and a driver, and tells the driver the time. A driver never waits, reads a
+The runtime moves bytes between a line and a driver, and gives the driver the time. A driver never waits, reads a
 clock or opens a port. So the same driver runs on a serial port, on the emulator's pty, and in virtual time in memory.
 `drivers.registry` says how a package adds a driver.
 """
@@ -75,7 +75,7 @@ class RobotDriver(Protocol):
     def identity(self) -> Identity | None:
         """The robot's description of itself; the last one known while it is connecting again, None before the first.
 
-        Its `deadman_s` tells the runtime how long two drive commands may be apart.
+        Its `deadman_s` is how long two drive commands may be apart.
         """
 
     @property

@@ -1,6 +1,6 @@
 """The decorator that compiles the emulator's kernels; unlike numba's own it keeps their type.
 
-Keep every kernel in one file with what it calls: numba's cache on disk notices changes in that file only. If no
+Keep every kernel in one file with what it calls: numba's cache on disk detects changes in that file only. If no
 folder is writable, kernels are compiled at each start.
 """
 

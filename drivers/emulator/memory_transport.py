@@ -44,7 +44,7 @@ class MemoryLine:
         self._open = False
 
     def exchange(self, run_s: float) -> None:
-        """Move bytes both ways up to the run's time `run_s`; tells the driver when the line opens and closes."""
+        """Move bytes both ways up to the run's time `run_s`; notify the driver when the line opens and closes."""
         while (self._steps + 1) * STEP_S <= run_s - self._start_s:
             self._steps += 1
             self._exchange_at(self._steps * STEP_S)

@@ -165,5 +165,5 @@ def timing_line(summary: RunSummary) -> str:
         f"{summary['cycles']} cycles, {timing['following']:.0%} of them with the ring; {summary['late']} late, "
         f"{timing['missed']} missed, {timing['overruns']} overruns"
     )
-    by = ", ".join(f"{culprit} ({count})" for culprit, count in timing["faults"].items())
+    by = ", ".join(f"{cause} ({count})" for cause, count in timing["faults"].items())
     return f"{line}; by fault of: {by}" if by else line

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 EARLY: Final = 0.5
 """Share of a step by which an echo may begin a cycle before its time; an earlier echo waits for the next one."""
 
-ECHO_PATIENCE: Final = 0.25
+ECHO_WAIT_SHARE: Final = 0.25
 """Wait this fraction of a step past the expected echo; then the cycle begins without it."""
 
 LOST_STEPS: Final = 2.5
@@ -28,7 +28,7 @@ class CycleStart(NamedTuple):
     """How a cycle began."""
 
     due_s: float
-    """When it should have begun, by the run's clock."""
+    """When it should have started, by the run's clock."""
     late_s: float
     """How much later it did, s; never below zero."""
     missed: int
@@ -167,7 +167,8 @@ class Pacer:
         expected_s = self._echo_s + math.ceil((earliest_s - self._echo_s) / self._step_s) * self._step_s
         if expected_s <= begin_s + self._locked_s + EARLY * self._slot_s:
             self._due_s = expected_s
-            self._deadline_s = min(expected_s + ECHO_PATIENCE * self._slot_s, max(begin_s + self._gap_s, expected_s))
+            latest_s = max(begin_s + self._gap_s, expected_s)
+            self._deadline_s = min(expected_s + ECHO_WAIT_SHARE * self._slot_s, latest_s)
         else:
             self._due_s = self._deadline_s = begin_s + self._locked_s
 

@@ -17,7 +17,7 @@ from drivers.emulator.time_scale import REAL_TIME, TimeScale
 LEASE_S: Final = 0.002
 """How far time goes on past the next cycle's deadline where it is scaled, s.
 
-It goes no farther until that cycle has begun, so that no cycle misses its deadline, however slow the machine is.
+It goes no farther until that cycle has started, so that no cycle misses its deadline, however slow the machine is.
 """
 
 LEASE_MIN_S: Final = 0.0005

@@ -1,7 +1,7 @@
 """What is running when a cycle is overdue: one sample of the stack, taken only for cycles that are late.
 
 asyncio's own search for slow callbacks needs its debug mode, which slows every callback. Here an interval timer is
-set once a cycle to a moment at which the next cycle should long have begun, and set again before it fires while
+set once a cycle to a moment at which the next cycle should long have started, and set again before it fires while
 all cycles are on time. Where it fires, the interpreter passes the frame that it was about to execute.
 """
 
@@ -31,7 +31,7 @@ class StackSample(NamedTuple):
 
 
 class StallSampler:
-    """Samples the stack at a given moment if the cycle has not begun by then."""
+    """Samples the stack at a given moment if the cycle has not started by then."""
 
     def __init__(self) -> None:
         self._is_active = False

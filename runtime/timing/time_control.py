@@ -27,7 +27,7 @@ HANGS: Final = (
     f"the emulator did not answer within {ANSWER_MAX_S:.0f} s, likely it is stopped or the machine is overloaded; "
     "the run goes on in real time"
 )
-NO_CYCLE: Final = "no cycle has begun yet: wait until the robot has answered"
+NO_CYCLE: Final = "no cycle has started yet: wait until the robot has answered"
 REAL_ROBOT: Final = (
     "the time of a robot on a port cannot be paused: only a run with an emulator of its own (without --port) can be "
     "paused, stepped or sped up"

@@ -26,13 +26,12 @@ ACCEPTED: Mapping[str, Mapping[str, str]] = MappingProxyType(
                 "a second safety check: earlier checks refuse every value that could reach it"
             ),
             "arbitrate: return _outside(v, w) → return None": "the same safety check: no value reaches it",
-            "limit_velocity: asked.v > 0.0 → asked.v >= 0.0": "zero speed stays zero, ahead or back",
+            "limit_velocity: requested.v > 0.0 → requested.v >= 0.0": "zero speed stays zero, ahead or back",
             "limit_velocity: percept.pose.theta + math.pi → percept.pose.theta - math.pi": "the same direction",
             "limit_velocity: abs(v) <= body.speed_max_m_s and abs(w) <= body.turn_max_rad_s → "
             "abs(v) <= body.speed_max_m_s or abs(w) <= body.turn_max_rad_s": "the second safety check, as above",
             "limit_velocity: return _outside(v, w) → return None": "no value reaches it",
-            "_outside: return Stop(f\"the arbiter worked out a velocity outside the base's limits "
-            "(v {v:g} m/s, w {w:g} rad… → return None": "no value reaches it",
+            "_outside: return Stop(f\"the arbiter computed a velocity outside the base's limits (v {v:g} m/s, w {w:g} rad/s… → return None": "no value reaches it",
             "_is_finite: return False → return None": "both values are falsy",
             "_course_speed_m_s: angle_rad < CAUTIOUS_ANGLE_RAD → angle_rad <= CAUTIOUS_ANGLE_RAD": (
                 "at that angle both branches give the cautious velocity"

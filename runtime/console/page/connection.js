@@ -77,14 +77,14 @@ export class Connection extends Emitter {
   }
 
   // Sends a message and resolves to its answer's data; rejects with a RequestError that says why not.
-  request(message, patience_ms = ANSWER_MAX_MS) {
+  request(message, timeout_ms = ANSWER_MAX_MS) {
     return new Promise((resolve, refuse) => {
       const id = this.#transmit(message, refuse);
       if (id === null) return;
       const timer = setTimeout(() => {
         this.#pending.delete(id);
-        refuse(new RequestError(`no answer to "${message.type}" in ${patience_ms / 1000} s`, { answered: false }));
-      }, patience_ms);
+        refuse(new RequestError(`no answer to "${message.type}" in ${timeout_ms / 1000} s`, { answered: false }));
+      }, timeout_ms);
       this.#pending.set(id, { resolve, refuse, timer });
     });
   }

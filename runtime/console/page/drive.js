@@ -70,7 +70,7 @@ export class Drive {
       this.controller = controller;
       for (const element of document.querySelectorAll(".control")) element.disabled = !controller;
       this.#mode(this.run.state);
-      if (!controller) this.teleoperation.stop("somebody else controls");
+      if (!controller) this.teleoperation.stop("another client controls");
       this.notifications.banner("watching", controller ? null : "You are watching.", { buttons: [
         ["Ask for control", () => this.#ask({ type: "take_control" })], ["Just watch", () => this.notifications.banner("watching", null)],
       ] });

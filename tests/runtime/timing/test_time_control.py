@@ -27,7 +27,7 @@ pytestmark = pytest.mark.compiled
 
 CYCLE_S = 0.05
 LONG_S = 30.0
-"""Sixty times the base's deadman, and far beyond any patience with the line."""
+"""Sixty times the base's deadman, and far beyond any timeout of the line."""
 
 
 @dataclass
