@@ -31,7 +31,8 @@ ACCEPTED: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "limit_velocity: abs(v) <= body.speed_max_m_s and abs(w) <= body.turn_max_rad_s → "
             "abs(v) <= body.speed_max_m_s or abs(w) <= body.turn_max_rad_s": "the second safety check, as above",
             "limit_velocity: return _outside(v, w) → return None": "no value reaches it",
-            "_outside: return Stop(f\"the arbiter computed a velocity outside the base's limits (v {v:g} m/s, w {w:g} rad/s… → return None": "no value reaches it",
+            "_outside: return Stop(f\"the arbiter computed a velocity outside the base's limits "
+            "(v {v:g} m/s, w {w:g} rad/s… → return None": "no value reaches it",
             "_is_finite: return False → return None": "both values are falsy",
             "_course_speed_m_s: angle_rad < CAUTIOUS_ANGLE_RAD → angle_rad <= CAUTIOUS_ANGLE_RAD": (
                 "at that angle both branches give the cautious velocity"
