@@ -1,4 +1,4 @@
-"""The one way a function here becomes a compiled kernel.
+"""The decorators that compile a function as a kernel.
 
 Numba's own decorator is untyped; this one keeps the signature visible to the type checker. Kernels are plain
 module-level functions on float64 arrays with preallocated outputs: no fastmath (it breaks NaN and infinity, which
@@ -28,9 +28,9 @@ Ints = NDArray[np.int64]
 def kernel(function: F) -> F:
     """Compile `function` in nopython mode, with numba's file cache.
 
-    A kernel allocates nothing and owns nothing: whoever calls it keeps the arrays. So it is compiled without numba's
-    reference counts, which cost two atomic additions for each array of each call, a hundred where the Bayesian method's
-    memory is handed on. An allocation in a kernel is an error when it is compiled.
+    A kernel allocates nothing and owns nothing: its caller keeps the arrays. So it is compiled without numba's
+    reference counts, which cost two atomic additions for each array of each call. An allocation in a kernel is an
+    error when it is compiled.
     """
     return cast("F", numba.njit(**BORROWING)(function))
 
@@ -38,10 +38,3 @@ def kernel(function: F) -> F:
 def owning_kernel(function: F) -> F:
     """Compile `function` as `kernel` does, with reference counts: for what allocates or takes numba's objects."""
     return cast("F", numba.njit(cache=True)(function))
-
-
-@kernel
-def copy_span(source: Floats, begin: int, count: int, target: Floats, at: int) -> None:
-    """Copy `count` values of one row into another; numba allocates where a slice is assigned to a slice."""
-    for k in range(count):
-        target[at + k] = source[begin + k]

@@ -1,9 +1,9 @@
 """Records with named fields that compiled kernels read and write: numpy structured arrays, declared as classes.
 
-A subclass of `Record` declares each field once; both the array's dtype and the type checker's view come from it. Every
-field takes 8 bytes: a float, an int, a record, or a fixed number of either. Kernels take arrays of records, not single
-ones, because an array is handed to compiled code a hundred times faster. Without a compiler (`NUMBA_DISABLE_JIT=1`) a
-list of light objects on the same memory stands in for each array; numpy's own records would be twenty times slower.
+A subclass of `Record` declares each field once; both the array's dtype and the type checker's view come from it. A
+field is a number of 8 bytes, a record, or a fixed number of either. Kernels take arrays of records, not single ones,
+because an array is handed to compiled code a hundred times faster. Without a compiler (`NUMBA_DISABLE_JIT=1`) a list
+of light objects on the same memory stands in for each array; numpy's own records would be twenty times slower.
 """
 
 from __future__ import annotations
@@ -78,10 +78,14 @@ def records(record: type[R], array: NDArray[Any]) -> Records[R]:
     return cast("Records[R]", array)
 
 
+def array_of(of: Records[Any]) -> NDArray[Any]:
+    """Return the array that `records` was made from."""
+    return cast("NDArray[Any]", of.array if isinstance(of, _RecordList) else of)
+
+
 def column(of: Records[Any], name: str) -> NDArray[Any]:
     """Return one field of all records as a view, whose first axis is the record; `of` comes from `records`."""
-    array = of.array if isinstance(of, _RecordList) else of
-    return cast("NDArray[Any]", cast("Any", array)[name])
+    return array_of(of)[name]
 
 
 def _dtype(hint: Any) -> tuple[Any, ...]:  # noqa: ANN401 - an annotation may be anything
@@ -119,8 +123,18 @@ def _views(record: type[Record], raw: memoryview, begin: int, count: int, size: 
     return [view(raw, at, floats[at : at + size], ints[at : at + size]) for at in ends[:-1]]
 
 
+class _View:
+    """Base of the stand-ins for a record."""
+
+    __slots__ = ("_at", "_floats", "_ints", "_parts", "_raw")
+
+    def __init__(self, raw: memoryview, at: int, floats: memoryview, ints: memoryview) -> None:
+        self._raw, self._at, self._floats, self._ints = raw, at, floats, ints
+        self._parts: dict[str, Any] = {}
+
+
 def _view_class(name: str, fields: dict[str, Any], dtype: np.dtype[Any]) -> type:
-    """Return the class of a record's stand-in: numbers are properties, arrays and records are made at their first use.
+    """Return the class of a record's stand-in, which makes arrays and inner records at their first use.
 
     Parameters
     ----------
@@ -131,13 +145,7 @@ def _view_class(name: str, fields: dict[str, Any], dtype: np.dtype[Any]) -> type
     dtype : dtype
         The record's, for the places of the fields.
     """
-    members: dict[str, Any] = {"__slots__": ("_at", "_floats", "_ints", "_parts", "_raw")}
-
-    def __init__(self: Any, raw: memoryview, at: int, floats: memoryview, ints: memoryview) -> None:  # noqa: ANN401, N807
-        self._raw, self._at, self._floats, self._ints = raw, at, floats, ints
-        self._parts = {}
-
-    members["__init__"] = __init__
+    members: dict[str, Any] = {"__slots__": ()}
     for field, hint in fields.items():
         at = cast("Any", dtype.fields)[field][1] // ITEM_BYTES
         if hint is float:
@@ -146,7 +154,7 @@ def _view_class(name: str, fields: dict[str, Any], dtype: np.dtype[Any]) -> type
             members[field] = _number("_ints", at)
         else:
             members[field] = _part(field, hint, at)
-    return type(f"{name}View", (), members)
+    return type(f"{name}View", (_View,), members)
 
 
 def _number(of: str, at: int) -> property:

@@ -1,7 +1,7 @@
-"""Other explanations of the very readings an object was made from, each with its own best pose.
+"""Other explanations of the readings an object was made from, each fitted with its own best pose.
 
-Two explanations can be compared only on the same readings; one that was fitted to others would win or lose by what
-it was not asked.
+Two explanations can be compared only on the same readings; one that was fitted to others would win or lose by
+readings it was not scored on.
 """
 
 from __future__ import annotations
@@ -10,36 +10,55 @@ import math
 from typing import Final
 
 from perception.bayes.noise_estimation import noise_variance
+from perception.bayes.parameters import SettingsRecord
 from perception.bayes.range_fit import fit_circle, fit_line, score_circle, score_line
-from perception.bayes.state import NOISE, Settings, State
-from perception.kernel import Floats, kernel
+from perception.bayes.state import Reading, StateRecord
+from perception.kernel import kernel
+from perception.records import Records
 
 SOFT: Final = 9.0
-"""Robustness of the fits, σ²."""
-HOPELESS: Final = -1e9
+"""Robustness of the fits: how many σ² a residual may have before it counts for a quarter."""
+HOPELESS_NAT: Final = -1e9
+"""Evidence of what cannot be fitted."""
 
 
 @kernel
-def mean_bearing(w: Floats, n: int, cx: float, cy: float, rho: float, gate: float) -> tuple[int, float, float]:
-    """Return how many readings end near a circle, and the sum of their unit bearings to its centre."""
-    m = 0
+def bearing_sum(
+    readings: Records[Reading], cx: float, cy: float, radius: float, gate: float
+) -> tuple[int, float, float]:
+    """Return how many readings end near a circle, and the sum of their unit bearings to its centre.
+
+    Parameters
+    ----------
+    readings : (n,) Reading
+        Raw ranges.
+    cx, cy, radius, gate : float
+        The circle, and how near to it a reading has to end, m.
+    """
+    count = 0
     sx = 0.0
     sy = 0.0
-    for j in range(n):
-        dx = cx - w[j, 0]
-        dy = cy - w[j, 1]
+    for j in range(len(readings)):
+        q = readings[j]
+        dx = cx - q.x
+        dy = cy - q.y
         d = math.sqrt(dx * dx + dy * dy)
-        if abs(w[j, 4] - (d - rho)) < gate and d > 0.0:
+        if abs(q.range_m - (d - radius)) < gate and d > 0.0:
             sx += dx / d
             sy += dy / d
-            m += 1
-    return m, sx, sy
+            count += 1
+    return count, sx, sy
 
 
 @kernel
-def towards(s: State, p: Settings, n: int, cx: float, cy: float, rho: float) -> tuple[float, float]:
-    """Return the mean direction from the sensors that hear a circle to its centre; zeros where none does."""
-    _, x, y = mean_bearing(s.w, n, cx, cy, rho, p.gate)
+def mean_bearing(
+    readings: Records[Reading], cx: float, cy: float, radius: float, gate: float
+) -> tuple[float, float]:  # fmt: skip
+    """Return the mean direction from the sensors that hear a circle to its centre; zeros where none does.
+
+    The parameters are those of `bearing_sum`.
+    """
+    _, x, y = bearing_sum(readings, cx, cy, radius, gate)
     m = math.hypot(x, y)
     if m == 0.0:
         return 0.0, 0.0
@@ -47,40 +66,73 @@ def towards(s: State, p: Settings, n: int, cx: float, cy: float, rho: float) -> 
 
 
 @kernel
-def score(s: State, p: Settings, n: int, x: float, y: float, rho: float) -> float:
-    """Return the log ratio of a circle on the readings in `s.w`; `s.stats` tells the rest."""
-    score_circle(
-        s.w, n, x, y, rho, p.cos_opt, p.cos_half, p.cos_in, p.gate, p.miss, p.short, p.levels[int(s.g[NOISE])],
-        p.per_metre, p.table, p.inv_step, s.stats,
-    )  # fmt: skip
-    return float(s.stats[0])
+def score(s: StateRecord, p: SettingsRecord, n: int, x: float, y: float, radius: float) -> float:
+    """Return the log ratio (nat) of a circle on the first `n` readings of the scratch, whose `score` is written.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    n : int
+        Readings.
+    x, y, radius : float
+        The circle, m.
+    """
+    scratch = s[0].scratch
+    score_circle(scratch.readings[:n], x, y, radius, p, s[0].noise_level, scratch.score)
+    return scratch.score.log_likelihood_ratio
 
 
 @kernel
-def compete_circle(s: State, p: Settings, n: int, cx: float, cy: float, rho: float, rho2: float, steps: int) -> float:
-    """Return the log ratio of a circle of another radius on the same surface; `s.fit` holds its centre."""
-    ux, uy = towards(s, p, n, cx, cy, rho)
+def fit_other_circle(
+    s: StateRecord, p: SettingsRecord, n: int, cx: float, cy: float, radius: float, other: float, steps: int
+) -> float:
+    """Return the log ratio (nat) of a circle of another radius on the same surface; scratch holds its `circle_fit`.
+
+    Parameters
+    ----------
+    s, p, n
+        As for `score`.
+    cx, cy, radius : float
+        The known circle, m.
+    other : float
+        The other radius, m.
+    steps : int
+        Steps of the fit.
+    """
+    scratch = s[0].scratch
+    readings = scratch.readings[:n]
+    ux, uy = mean_bearing(readings, cx, cy, radius, p[0].gate_m)
     if ux == 0.0 and uy == 0.0:
-        return HOPELESS
+        return HOPELESS_NAT
     var0, rel2 = noise_variance(s, p)
-    k = rho2 - rho
+    k = other - radius
     if not fit_circle(
-        s.w, n, cx + k * ux, cy + k * uy, rho2, p.cos_opt, p.gate, SOFT, var0, rel2, steps, s.fit
+        readings, cx + k * ux, cy + k * uy, other, p, SOFT, var0, rel2, steps, scratch.circle_fit
     ):  # fmt: skip
-        return HOPELESS
-    return score(s, p, n, s.fit[0], s.fit[1], rho2)
+        return HOPELESS_NAT
+    return score(s, p, n, scratch.circle_fit.x, scratch.circle_fit.y, other)
 
 
 @kernel
-def compete_line(s: State, p: Settings, n: int, cx: float, cy: float, rho: float, steps: int) -> float:
-    """Return the log ratio of a straight line along the same surface; `s.fit` holds normal and distance about c."""
-    ux, uy = towards(s, p, n, cx, cy, rho)
+def fit_other_line(
+    s: StateRecord, p: SettingsRecord, n: int, cx: float, cy: float, radius: float, steps: int
+) -> float:  # fmt: skip
+    """Return the log ratio (nat) of a line along the same surface; scratch holds its `line_fit` about the centre.
+
+    Parameters
+    ----------
+    s, p, n, cx, cy, radius, steps
+        As for `fit_other_circle`.
+    """
+    scratch = s[0].scratch
+    readings = scratch.readings[:n]
+    ux, uy = mean_bearing(readings, cx, cy, radius, p[0].gate_m)
     if ux == 0.0 and uy == 0.0:
-        return HOPELESS
+        return HOPELESS_NAT
     var0, rel2 = noise_variance(s, p)
-    fit_line(s.w, n, ux, uy, cx, cy, -rho, p.cos_opt, p.gate, SOFT, var0, rel2, steps, s.fit)
-    score_line(
-        s.w, n, s.fit[0], s.fit[1], cx, cy, s.fit[2], p.cos_opt, p.cos_half, p.cos_in, p.gate, p.miss,
-        p.levels[int(s.g[NOISE])], p.per_metre, p.table, p.inv_step, s.stats,
-    )  # fmt: skip
-    return float(s.stats[0])
+    fit_line(
+        readings, ux, uy, cx, cy, -radius, p[0].cos_may_answer, p[0].gate_m, SOFT, var0, rel2, steps, scratch.line_fit
+    )
+    score_line(readings, scratch.line_fit, cx, cy, p, s[0].noise_level, scratch.line_score)
+    return scratch.line_score.log_likelihood_ratio

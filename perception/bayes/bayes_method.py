@@ -16,27 +16,28 @@ from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import BayesConfig, PerceptionConfig
 from drivers.messages import Firing
-from perception.bayes.entry import hold, observe, pquantum, quantum, sure_circles
 from perception.bayes.evidence import evidence_of
-from perception.bayes.kernel_settings import circle_models, library, make_settings, tuned
+from perception.bayes.kernel_settings import apply_config, apply_library, circle_models, copied, make_settings
 from perception.bayes.map_edits import edit_memory, row_of
+from perception.bayes.naming import POLYGON_PROBABILITY, Reported, report_circles, sure_polygons
 from perception.bayes.object_report import (
-    POLYGON_PROBABILITY,
-    TOLD,
-    circle,
-    other_things,
-    polygon,
+    alternative_labels,
+    circle_object,
+    other_objects,
+    polygon_object,
     rival_label,
-    rival_labels,
-    sure_polygons,
 )
+from perception.bayes.observe import observe
 from perception.bayes.pinned_segments import Pins
-from perception.bayes.segment_list import drawn, listed
-from perception.bayes.state import KIND, MODEL, PPROB, PROB, PT, SEGMENTS, ST, clear, make_state
-from perception.bayes.state_migration import inherit, number_heirs
+from perception.bayes.polygon_tracks import polygon_quantum
+from perception.bayes.refine import quantum
+from perception.bayes.segment_list import drawn, mapped_segments
+from perception.bayes.state import BUCKET_CAPACITY, FREE, MAX_POLYGONS, Memory
+from perception.bayes.state_migration import migrate
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import Edit, Evidence, Segments
 from perception.kernel import Floats
+from perception.records import records, zeros
 from perception.sensor_mounts import mounts_array
 
 
@@ -53,23 +54,22 @@ class BayesPerception:
         What a user may set.
     """
 
-    SCRATCH: Final = ("_sure", "_told", "_handle")
-    """No memory: what reporting works with, and another way to the memory."""
-    LATER: Final = ("_pins", "memory.names", "memory.tally", "memory.stamps", "memory.barred")
-    """What recordings of older programs do not hold."""
+    SCRATCH: Final = ("_sure", "_last_reported", "_reported")
+    """Not remembered: what reporting works with."""
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: BayesConfig) -> None:
         self._mounts = mounts_array(ring.mounts)
         self._config = config
         self.settings = make_settings(ring, models, config)
-        """What kernels are told."""
-        self.memory = make_state(len(self._mounts), self.settings, config.tracks_max)
+        """What kernels read."""
+        self.memory = Memory(len(self._mounts), config.tracks_max)
         """What they remember."""
-        self._handle = hold(self.memory, self.settings)
         self._pins = Pins()
-        self._library(models)
-        self._sure = np.zeros(max(config.tracks_max, PT), np.int64)
-        self._told = np.full((config.tracks_max, TOLD), np.nan)
+        self._name_models(models)
+        self._sure = np.zeros(max(config.tracks_max, MAX_POLYGONS), np.int64)
+        self._last_reported = zeros(Reported, config.tracks_max)
+        self._reported = records(Reported, self._last_reported)
+        self._forget_reports()
         self._circles: dict[int, DetectedObject] = {}
         self._objects: tuple[DetectedObject, ...] | None = None
         self._left = 0
@@ -91,23 +91,23 @@ class BayesPerception:
     @property
     def counts(self) -> MapCounts:
         """How many segments and tracks there are, the latter established or not."""
-        s = self.memory
-        living = np.minimum(s.fill, s.store.shape[1]).sum()
-        tracks = np.count_nonzero(s.ti[:, ST]) + np.count_nonzero(s.pi[:, ST])
-        return MapCounts(int(living), int(s.g[SEGMENTS]), int(tracks))
+        state = self.memory.state
+        segments = np.minimum(state["buckets"]["count"], BUCKET_CAPACITY).sum()
+        tracks = sum(np.count_nonzero(of["status"] != FREE) for of in (self.memory.circles, self.memory.polygons))
+        return MapCounts(int(segments), int(state["segments_made"][0]), int(tracks))
 
     def observe(self, firing: Firing) -> int:
         """Take in one firing and return how many outline segments it completed."""
         pose = firing.pose
         made, self._circles_pending = observe(
-            self._handle, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), float(firing.robot_s),
-            firing.ranges_m, self._config.fresh_share,
+            self.memory.s, self.memory.tracks, self.settings, self._mounts, float(pose.x), float(pose.y),
+            float(firing.ring_yaw), float(firing.robot_s), firing.ranges_m, self._config.fresh_share,
         )  # fmt: skip
         # Polygons come after the circles, but not where the time was up before it was their turn.
         self._polygons_turn = self._polygons_pending and self._polygons_left > 0 and not self._polygons_turn
         self._left = self._config.quanta_per_firing
         self._polygons_left = self._config.polygon_quanta_per_firing
-        self._polygons_pending = self.settings.polys > 0
+        self._polygons_pending = len(self._outlines) > 0
         if self._pins.count > 0:
             self._pins.renew(self.memory)
         return made
@@ -118,12 +118,16 @@ class BayesPerception:
         if self._circles_pending and self._left > 0 and not (polygons and self._polygons_turn):
             self._left -= 1
             self._objects = None
-            self._circles_pending = quantum(self._handle, self._config.fresh_share)
+            self._circles_pending = quantum(
+                self.memory.s, self.memory.tracks, self.settings, self._config.fresh_share
+            )
             return 1
         if polygons:
             self._polygons_left -= 1
             self._objects = None
-            self._polygons_pending = pquantum(self._handle, self._config.fresh_share)
+            self._polygons_pending = polygon_quantum(
+                self.memory.s, self.memory.tracks, self.settings, self._config.fresh_share
+            )
             return int(self._polygons_pending)
         return 0
 
@@ -134,39 +138,40 @@ class BayesPerception:
         return self._objects
 
     def _sure_objects(self) -> tuple[DetectedObject, ...]:
-        s, p = self.memory, self.settings
-        least = self._config.report_probability
-        n = sure_circles(self._handle, self._told, self._sure)
-        seen = [self._circles[t] if t >= 0 else self._tell_circle(~t) for t in self._sure[:n].tolist()]
-        if p.polys > 0:
-            least = min(least, POLYGON_PROBABILITY)
-            n = sure_polygons(s.pi, s.pf, s.pbn, s.pbins, s.names, len(s.ti), least, self._sure)
+        memory = self.memory
+        n = report_circles(memory.tracks, self._reported, self._sure)
+        seen = [self._circles[t] if t >= 0 else self._report_circle(~t) for t in self._sure[:n].tolist()]
+        if self._outlines:
+            least = min(self._config.report_probability, POLYGON_PROBABILITY)
+            n = sure_polygons(memory.s, least, self._sure)
+            polygons = memory.s[0].polygons
             seen += [
-                polygon(s, p, t, self._outlines[s.pi[t, MODEL]], float(s.pf[t, PPROB]))
-                for t in self._sure[:n].tolist()
+                polygon_object(track, self.settings, self._outlines[track.model], float(track.probability))
+                for track in (polygons[t] for t in self._sure[:n].tolist())
             ]
         return tuple(sorted(seen, key=attrgetter("score"), reverse=True))
 
-    def _tell_circle(self, t: int) -> DetectedObject:
-        s = self.memory
-        told = circle(s, self.settings, t, self._round[s.ti[t, KIND]], float(s.tf[t, PROB]))
-        self._circles[t] = told
-        return told
+    def _report_circle(self, t: int) -> DetectedObject:
+        x, y, xx, xy, yy, hits, probability, kind, number, marks = self._last_reported[t].item()
+        seen = circle_object((x, y, xx, xy, yy, hits, number, marks), self._round[int(kind)], probability)
+        self._circles[t] = seen
+        return seen
 
     def labelled_objects(self) -> tuple[DetectedObject, ...]:
         """Return the objects, then everything else that has a name."""
-        called = self.objects()
-        return (*called, *other_things(self.memory, self.settings, self._config.report_probability, called))
+        named = self.objects()
+        return (*named, *other_objects(self.memory, self.settings, self._config.report_probability, named))
 
     def segment_geometry(self) -> Floats:
         """Return the mapped segments: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""
-        return drawn(listed(self.memory)[2])
+        return drawn(mapped_segments(self.memory))
 
     def segments(self) -> Segments:
         """Return the outline segments in the map with all that is known of them."""
-        numbers, times, rows = listed(self.memory)
-        pinned = np.isin(numbers, self._pins.numbers.astype(np.int64)) if self._pins.count else np.zeros(len(numbers))
-        return Segments(numbers, drawn(rows), times, pinned.astype(np.int64))
+        mapped = mapped_segments(self.memory)
+        numbers, times = mapped["number"].copy(), mapped["time_s"].copy()
+        pinned = np.isin(numbers, self._pins.numbers) if self._pins.count else np.zeros(len(numbers))
+        return Segments(numbers, drawn(mapped), times, pinned.astype(np.int64))
 
     def edit(self, edit: Edit) -> str | None:
         """Do what a person says; return None, or why it cannot be done."""
@@ -175,19 +180,21 @@ class BayesPerception:
 
     def evidence(self, number: int) -> Evidence | None:
         """Return what each reading that an object has kept says of it."""
-        s, p = self.memory, self.settings
-        row = row_of(s, number)
+        memory, p = self.memory, self.settings
+        row = row_of(memory, number)
         if row is None:
             return None
-        if row >= len(s.ti):
-            name = self._outlines[s.pi[row - len(s.ti), MODEL]]
+        t = row - len(memory.circles)
+        if t >= 0:
+            name = self._outlines[memory.polygons["model"][t]]
         else:
-            name = self._round[s.ti[row, KIND]] if s.ti[row, KIND] < p.models else rival_label(s, row)
-        return evidence_of(s, p, row, number, name, rival_labels(p, self._round))
+            kind = memory.circles["kind"][row]
+            name = self._round[kind] if kind < p[0].model_count else rival_label(memory, row)
+        return evidence_of(memory, p, row, number, name, alternative_labels(p, self._round))
 
     def reset(self) -> None:
         """Begin anew, as after the odometry did."""
-        clear(self.memory)
+        self.memory.clear()
         self._pins.clear()
         self._objects = ()
         self._left = 0
@@ -197,25 +204,25 @@ class BayesPerception:
     def apply_settings(self, config: PerceptionConfig) -> None:
         """Go on with other constants; the number of tracks stays."""
         self._config = config.bayes
-        self.settings = tuned(self.settings, config.bayes)
-        self._handle = hold(self.memory, self.settings)
+        apply_config(self.settings, config.bayes)
         self._objects = None
 
     def set_models(self, models: Sequence[ModelConfig]) -> None:
         """Look for further models as well, which come after those from before."""
-        before, self.settings = self.settings, self.settings._replace(**library(models))
-        self.memory = inherit(self.memory, before, self.settings)
-        self._handle = hold(self.memory, self.settings)
-        self._library(models)
-        self._told[:] = np.nan
-        self._objects = None
+        before, self.settings = self.settings, copied(self.settings)
+        apply_library(self.settings, models)
+        migrate(self.memory, before, self.settings)
+        self._name_models(models)
+        self._forget_reports()
 
     def drop_caches(self) -> None:
-        """Drop what was worked out before the memory was put back from a snapshot, and make good what it lacks."""
-        number_heirs(self.memory)
-        self._told[:] = np.nan
+        """Drop what was derived from the memory before it was restored from a snapshot."""
+        self._forget_reports()
+
+    def _forget_reports(self) -> None:
+        self._last_reported["x"] = np.nan
         self._objects = None
 
-    def _library(self, models: Sequence[ModelConfig]) -> None:
+    def _name_models(self, models: Sequence[ModelConfig]) -> None:
         _, self._round = circle_models(models)
         self._outlines = [m.name for m in models if m.arc_radius_m is None]

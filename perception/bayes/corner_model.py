@@ -1,8 +1,8 @@
-"""Two faces and the edge they meet in: what a box's corner looks like, and a drum's closest rival.
+"""Two faces and the edge they meet in: a box's corner, which a drum most resembles.
 
 Seen over a corner a box answers from one face, then from its edge, then from the other face, and the ranges of the
-three together bend like an arc's. Only fitted as what they are do they tell which of the two they came from, so a
-drum has to beat this explanation too.
+three together bend like an arc's. Only a fit of faces and edge distinguishes the two, so a drum has to beat this
+explanation too.
 """
 
 from __future__ import annotations
@@ -10,225 +10,219 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.alternatives import SOFT, mean_bearing
-from perception.bayes.likelihood import loglik
-from perception.bayes.range_fit import fit_line, level_of
-from perception.kernel import Floats, Ints, kernel
+from perception.bayes.alternatives import SOFT, bearing_sum
+from perception.bayes.likelihood import level_of, log_likelihood
+from perception.bayes.parameters import TABLE_BINS, SettingsRecord
+from perception.bayes.range_fit import fit_line
+from perception.bayes.reservoir import copy_reading
+from perception.bayes.state import CornerFit, LineFit, Reading, StateRecord
+from perception.kernel import kernel
+from perception.records import Records
 
-IMPOSSIBLE: Final = -1e9
-"""Evidence (nat) of what cannot be fitted."""
+IMPOSSIBLE_NAT: Final = -1e9
+"""Evidence of what cannot be fitted."""
 
-FEWEST: Final = 8
+READINGS_MIN: Final = 8
 """Readings that two faces need at least …"""
 
-FEWEST_OF_A_FACE: Final = 3
-"""… and that one does: two to fix it and one to ask."""
+FACE_READINGS_MIN: Final = 3
+"""… and that one does: two to fix it and one to test it."""
 
-TURNS: Final = 3
-"""How often readings are dealt out to the faces and both fitted anew."""
+ROUNDS: Final = 3
+"""How often readings are assigned to the faces and both fitted anew."""
 
 STEPS: Final = 3
 """Steps of a face's fit."""
 
 LEEWAY: Final = 0.02
-"""Cosine by which a face's fit may look past the beam's edge, lest a face started askew lose its readings."""
+"""Cosine by which a face's fit may look past the beam's edge, so that a face started askew keeps its readings."""
 
-STRANGER: Final = 2.0
+OUT_OF_BEAM_GATES: Final = 2.0
 """A face out of the beam is a reading's this many gates worse."""
 
-EDGE_LEAD: Final = 0.04
+EDGE_LEAD_GATES: Final = 0.04
 """A reading is the edge's only if that explains it this many gates better than a face."""
 
-OPENING: Final = 0.2
+OPENING_MIN: Final = 0.2
 """|sin| of the angle between the faces from which on they have an edge."""
 
-HIT_PRICE: Final = 0.4
-"""Price of each hit, nat: three surfaces to choose from explain chance readings too."""
+HIT_NAT: Final = 0.4
+"""Price of each hit: three surfaces to choose from explain chance readings too."""
 
-PRICE: Final = 8.0
-"""Price of the two parameters more than a circle has, nat."""
-
-
-@kernel
-def face_error(w: Floats, j: int, cx: float, cy: float, faces: Floats, side: int) -> float:
-    """Return range heard less perpendicular distance to a face, m. `faces`: nx, ny, c of either, c about (cx, cy)."""
-    nx = faces[3 * side]
-    ny = faces[3 * side + 1]
-    return float(w[j, 4] - faces[3 * side + 2] + nx * (w[j, 0] - cx) + ny * (w[j, 1] - cy))
+MODEL_NAT: Final = 8.0
+"""Price of the two parameters more than a circle has."""
 
 
 @kernel
-def chosen(
-    w: Floats, j: int, cx: float, cy: float, faces: Floats, side: int, edge: bool, cos_opt: float, gate: float
+def face_error(q: Reading, cx: float, cy: float, face: LineFit) -> float:
+    """Return the range of a reading less its perpendicular distance to a face about (cx, cy), m."""
+    return q.range_m - face.distance + face.normal_x * (q.x - cx) + face.normal_y * (q.y - cy)
+
+
+@kernel
+def is_of_face(
+    q: Reading, cx: float, cy: float, corner: CornerFit, side: int, has_edge: bool, cos_may: float, gate: float
 ) -> bool:
-    """Say whether this face explains a reading: better than the other does, hardly worse than the edge."""
-    e0 = abs(face_error(w, j, cx, cy, faces, 0))
-    e1 = abs(face_error(w, j, cx, cy, faces, 1))
-    if faces[0] * w[j, 2] + faces[1] * w[j, 3] < cos_opt:
-        e0 += STRANGER * gate
-    if faces[3] * w[j, 2] + faces[4] * w[j, 3] < cos_opt:
-        e1 += STRANGER * gate
+    """Return whether this face explains a reading: better than the other does, hardly worse than the edge.
+
+    Parameters
+    ----------
+    q : Reading
+        The reading.
+    cx, cy : float
+        Origin of the faces, m.
+    corner, side, has_edge
+        The faces, which of them, and whether they meet.
+    cos_may, gate : float
+        As in `Settings`.
+    """
+    first = corner.faces[0]
+    second = corner.faces[1]
+    e0 = abs(face_error(q, cx, cy, first))
+    e1 = abs(face_error(q, cx, cy, second))
+    if first.normal_x * q.axis_x + first.normal_y * q.axis_y < cos_may:
+        e0 += OUT_OF_BEAM_GATES * gate
+    if second.normal_x * q.axis_x + second.normal_y * q.axis_y < cos_may:
+        e1 += OUT_OF_BEAM_GATES * gate
     if (e0 <= e1) != (side == 0):
         return False
-    if not edge:
+    if not has_edge:
         return True
-    at_edge = abs(w[j, 4] - math.hypot(faces[6] - w[j, 0], faces[7] - w[j, 1]))
-    return bool(min(e0, e1) <= at_edge + EDGE_LEAD * gate)
+    at_edge = abs(q.range_m - math.hypot(corner.edge_x - q.x, corner.edge_y - q.y))
+    return bool(min(e0, e1) <= at_edge + EDGE_LEAD_GATES * gate)
 
 
 @kernel
-def meet(cx: float, cy: float, faces: Floats) -> bool:
-    """Write where the faces meet to `faces[6:8]`. False where they are too nearly parallel to meet anywhere."""
-    det = faces[0] * faces[4] - faces[1] * faces[3]
-    if abs(det) <= OPENING:
+def find_edge(cx: float, cy: float, corner: CornerFit) -> bool:
+    """Write where the faces meet; return False where they are too nearly parallel to meet anywhere."""
+    a = corner.faces[0]
+    b = corner.faces[1]
+    det = a.normal_x * b.normal_y - a.normal_y * b.normal_x
+    if abs(det) <= OPENING_MIN:
         return False
-    faces[6] = cx + (faces[2] * faces[4] - faces[5] * faces[1]) / det
-    faces[7] = cy + (faces[0] * faces[5] - faces[3] * faces[2]) / det
+    corner.edge_x = cx + (a.distance * b.normal_y - b.distance * a.normal_y) / det
+    corner.edge_y = cy + (a.normal_x * b.distance - b.normal_x * a.distance) / det
     return True
 
 
 @kernel
 def fit_faces(
-    w: Floats,
-    w2: Floats,
-    n: int,
-    cx: float,
-    cy: float,
-    rho: float,
-    cos_opt: float,
-    gate: float,
-    var0: float,
-    rel2: float,
-    fit: Floats,
-    faces: Floats,
-) -> tuple[bool, bool]:
+    readings: Records[Reading], face_readings: Records[Reading], cx: float, cy: float, radius: float, cos_may: float,
+    gate: float, var0: float, rel2: float, fit: LineFit, corner: CornerFit,
+) -> tuple[bool, bool]:  # fmt: skip
     """Fit two faces and their edge: to readings left and right of the mean bearing, then to those each fits best.
 
     Parameters
     ----------
-    w, w2, n, cx, cy, rho, cos_opt, gate, var0, rel2, fit
-        As for `wedge`.
-    faces : (≥ 8,) float
-        Out: normal x, y and distance from the centre (m) of either face; edge x, y (m), if they have one.
+    readings, cx, cy, radius, cos_may, gate, var0, rel2
+        As for `score_corner`.
+    face_readings, fit
+        Scratch.
+    corner : CornerFit
+        Out: both faces about the centre, and their edge, if they have one.
 
     Returns
     -------
     (bool, bool)
         Whether there are two faces, and whether they have an edge.
     """
-    m, sx, sy = mean_bearing(w, n, cx, cy, rho, gate)
-    if m < FEWEST:
+    count, sx, sy = bearing_sum(readings, cx, cy, radius, gate)
+    if count < READINGS_MIN:
         return False, False
-    edge = False
-    for turn in range(TURNS):
+    has_edge = False
+    for turn in range(ROUNDS):
         for side in range(2):
             k = 0
             ax = 0.0
             ay = 0.0
-            for j in range(n):
-                dx = cx - w[j, 0]
-                dy = cy - w[j, 1]
+            for j in range(len(readings)):
+                q = readings[j]
+                dx = cx - q.x
+                dy = cy - q.y
                 d = math.sqrt(dx * dx + dy * dy)
-                if abs(w[j, 4] - (d - rho)) >= gate or d == 0.0:
+                if abs(q.range_m - (d - radius)) >= gate or d == 0.0:
                     continue
                 if turn == 0:
-                    mine = (sx * dy - sy * dx > 0.0) == (side == 0)
+                    is_own = (sx * dy - sy * dx > 0.0) == (side == 0)
                 else:
-                    mine = chosen(w, j, cx, cy, faces, side, edge, cos_opt, gate)
-                if mine:
-                    for q in range(5):
-                        w2[k, q] = w[j, q]
+                    is_own = is_of_face(q, cx, cy, corner, side, has_edge, cos_may, gate)
+                if is_own:
+                    copy_reading(q, face_readings[k])
                     ax += dx / d
                     ay += dy / d
                     k += 1
-            f = 3 * side
+            face = corner.faces[side]
             if turn == 0:
                 length = math.hypot(ax, ay)
-                if k < FEWEST_OF_A_FACE or length == 0.0:
+                if k < FACE_READINGS_MIN or length == 0.0:
                     return False, False
-                faces[f] = ax / length
-                faces[f + 1] = ay / length
-                faces[f + 2] = -rho
-            if k >= FEWEST_OF_A_FACE:
-                fit_line(w2, k, faces[f], faces[f + 1], cx, cy, faces[f + 2], cos_opt - LEEWAY, gate, SOFT, var0,
-                         rel2, STEPS, fit)  # fmt: skip
-                for q in range(3):
-                    faces[f + q] = fit[q]
-        edge = meet(cx, cy, faces)
-    return True, edge
+                face.normal_x = ax / length
+                face.normal_y = ay / length
+                face.distance = -radius
+            if k >= FACE_READINGS_MIN:
+                fit_line(
+                    face_readings[:k], face.normal_x, face.normal_y, cx, cy, face.distance, cos_may - LEEWAY, gate,
+                    SOFT, var0, rel2, STEPS, fit,
+                )  # fmt: skip
+                face.normal_x = fit.normal_x
+                face.normal_y = fit.normal_y
+                face.distance = fit.distance
+        has_edge = find_edge(cx, cy, corner)
+    return True, has_edge
 
 
 @kernel
-def wedge(
-    w: Floats,
-    w2: Floats,
-    n: int,
-    cx: float,
-    cy: float,
-    rho: float,
-    cos_opt: float,
-    gate: float,
-    var0: float,
-    rel2: float,
-    lev: Ints,
-    per_metre: float,
-    table: Floats,
-    inv_step: Floats,
-    fit: Floats,
-    stats: Floats,
+def score_corner(
+    s: StateRecord, p: SettingsRecord, n: int, cx: float, cy: float, radius: float, var0: float, rel2: float
 ) -> float:
-    """Fit two faces and their edge to a circle's near readings, and weigh what those say of them.
+    """Fit two faces and their edge to a circle's near readings, and score what those say of them.
 
     Each reading counts as the best of what may answer it, and nothing is held against silence: a face may end
     anywhere. It is more flexible than a circle, and pays for that by the hit and once for all.
 
     Parameters
     ----------
-    w : (capacity, 5) float
-        Readings: place x, y (m), unit axis, range (m).
-    w2 : (≥ n, 5) float
-        Scratch.
+    s, p
+        Memory, of which the first `n` readings of the scratch count and `corner_fit` is written; and settings.
     n : int
-        Readings in use.
-    cx, cy, rho : float
+        Readings.
+    cx, cy, radius : float
         The circle, m.
-    cos_opt : float
-        Cosine of the angle off the axis within which a reading may be answered.
-    gate : float
-        How far off the circle's a range may be to take part, m.
     var0, rel2 : float
         Variance of a range r: var0 (m²) + rel2 · r².
-    lev, per_metre, table, inv_step
-        As for `contact.score_circle`.
-    fit : (≥ 3,) float
-        Scratch.
-    stats : (≥ 8,) float
-        Out, where there are two faces: those, as `fit_faces` writes them.
 
     Returns
     -------
     float
-        Log ratio to the background, nat, less the price; `IMPOSSIBLE` where there are not two faces.
+        Log ratio to the background, nat, less the price; `IMPOSSIBLE_NAT` where there are not two faces.
     """
-    found, edge = fit_faces(w, w2, n, cx, cy, rho, cos_opt, gate, var0, rel2, fit, stats)
+    scratch = s[0].scratch
+    readings = scratch.readings[:n]
+    corner = scratch.corner_fit
+    cos_may, gate = p[0].cos_may_answer, p[0].gate_m
+    found, has_edge = fit_faces(
+        readings, scratch.face_readings, cx, cy, radius, cos_may, gate, var0, rel2, scratch.line_fit, corner
+    )
     if not found:
-        return IMPOSSIBLE
+        return IMPOSSIBLE_NAT
     total = 0.0
-    for j in range(n):
-        dx = cx - w[j, 0]
-        dy = cy - w[j, 1]
-        if abs(w[j, 4] - (math.sqrt(dx * dx + dy * dy) - rho)) >= gate:
+    for j in range(len(readings)):
+        q = readings[j]
+        dx = cx - q.x
+        dy = cy - q.y
+        if abs(q.range_m - (math.sqrt(dx * dx + dy * dy) - radius)) >= gate:
             continue
-        k = level_of(lev, w[j, 4], per_metre)
+        level = level_of(p, s[0].noise_level, q.range_m)
         v = 0.0
         for side in range(2):
-            if stats[3 * side] * w[j, 2] + stats[3 * side + 1] * w[j, 3] >= cos_opt:
-                v = max(v, loglik(table, inv_step, k, face_error(w, j, cx, cy, stats, side)))
-        if edge:
-            ex = stats[6] - w[j, 0]
-            ey = stats[7] - w[j, 1]
+            face = corner.faces[side]
+            if face.normal_x * q.axis_x + face.normal_y * q.axis_y >= cos_may:
+                v = max(v, log_likelihood(p, level, face_error(q, cx, cy, face)))
+        if has_edge:
+            ex = corner.edge_x - q.x
+            ey = corner.edge_y - q.y
             d = math.sqrt(ex * ex + ey * ey)
-            if ex * w[j, 2] + ey * w[j, 3] >= cos_opt * d:
-                v = max(v, loglik(table, inv_step, k, w[j, 4] - d))
-        total += v - HIT_PRICE if v > 0.0 else table[k, table.shape[1] - 1]
-    return total - PRICE
+            if ex * q.axis_x + ey * q.axis_y >= cos_may * d:
+                v = max(v, log_likelihood(p, level, q.range_m - d))
+        total += v - HIT_NAT if v > 0.0 else p[0].table[level, TABLE_BINS - 1]
+    return total - MODEL_NAT

@@ -1,7 +1,7 @@
-"""What each reading says of an object, one at a time, for whoever asks why it is believed.
+"""The evidence of each reading for or against an object, for users who ask why it is believed.
 
-Nothing here touches the memory: who looks must not change what is seen, and a replay in which nobody looked would
-differ. What readings say together and not each (drop-outs are dearer where there are many) is left out.
+Nothing here changes the memory: a replay in which the evidence was not asked for must not differ. Evidence of all
+readings together and not of each (drop-outs are dearer where there are many) is left out.
 """
 
 from __future__ import annotations
@@ -9,90 +9,97 @@ from __future__ import annotations
 import numpy as np
 
 from perception.bayes.noise_estimation import noise_variance
-from perception.bayes.occlusion import speaks
-from perception.bayes.polygon_job import ear_of, sides_of
-from perception.bayes.polygon_likelihood import score_poly
-from perception.bayes.range_fit import DISPERSION, FAR, score_circle
-from perception.bayes.range_fit import LLR as SAID
-from perception.bayes.reservoir import flatten
-from perception.bayes.state import (
-    KIND,
-    MODEL,
-    NOISE,
-    PTH,
-    PX,
-    PY,
-    TRHO,
-    TX,
-    TY,
-    WORK,
-    Settings,
-    State,
-)
+from perception.bayes.occlusion import is_relevant
+from perception.bayes.parameters import SettingsRecord
+from perception.bayes.polygon_likelihood import score_polygon
+from perception.bayes.range_fit import FAR, score_circle
+from perception.bayes.reservoir import copy_reservoir
+from perception.bayes.state import READINGS_MAX, CircleTracks, Memory, Reading, Score, StateRecord
 from perception.edits import Arc, Evidence
 from perception.kernel import Floats, kernel
+from perception.records import Records, records, zeros
 
 
 @kernel
-def weigh_circle(s: State, p: Settings, t: int, w: Floats, n: int, stats: Floats, nats: Floats) -> None:
-    """Write to `nats`, shape (≥ n,), what each of `n` readings in `w` says of circle `t`; 0 where it cannot speak."""
-    x = s.tf[t, TX]
-    y = s.tf[t, TY]
-    rho = s.tf[t, TRHO]
-    var0, rel2 = noise_variance(s, p)
-    for j in range(n):
-        nats[j] = 0.0
-        if speaks(s, p, w[j], x, y, rho, t, var0, rel2):
-            score_circle(
-                w[j : j + 1], 1, x, y, rho, p.cos_opt, p.cos_half, p.cos_in, p.gate, p.miss, p.short,
-                p.levels[int(s.g[NOISE])], p.per_metre, p.table, p.inv_step, stats,
-            )  # fmt: skip
-            nats[j] = stats[SAID]
-
-
-@kernel
-def weigh_polygon(s: State, p: Settings, t: int, w: Floats, n: int, stats: Floats, nats: Floats) -> None:
-    """Write the same for polygon `t`."""
-    model = s.pi[t, MODEL]
-    faces = p.faces[model, : sides_of(p, model)]
-    for j in range(n):
-        nats[j] = score_poly(
-            w[j : j + 1], 1, 1, s.pf[t, PX], s.pf[t, PY], s.pf[t, PTH], faces, p.closed[model] > 0, ear_of(p),
-            p.levels[int(s.g[NOISE])], p.table, p.inv_step, stats,
-        )  # fmt: skip
-
-
-def evidence_of(s: State, p: Settings, row: int, number: int, model: str, labels: tuple[str, ...]) -> Evidence:
-    """Return the evidence on the track of a row of `State.names`.
+def circle_evidence(
+    s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int, readings: Records[Reading],
+    score: Records[Score], nats: Floats,
+) -> int:  # fmt: skip
+    """Write what each reading of circle `t` says of it, 0 where it does not bear on it; return how many there are.
 
     Parameters
     ----------
-    s, p
+    s, tracks, p
+        Memory, circles and settings.
+    t : int
+        The track.
+    readings : (READINGS_MAX,) Reading
+        Out.
+    score : (1,) Score
+        Scratch.
+    nats : (READINGS_MAX,) float
+        Out.
+    """
+    track = tracks[t]
+    var0, rel2 = noise_variance(s, p)
+    n = copy_reservoir(track, readings)
+    for j in range(n):
+        nats[j] = 0.0
+        if is_relevant(tracks, p, readings[j], track.x, track.y, track.radius, t, var0, rel2):
+            score_circle(readings[j : j + 1], track.x, track.y, track.radius, p, s[0].noise_level, score[0])
+            nats[j] = score[0].log_likelihood_ratio
+    return n
+
+
+@kernel
+def polygon_evidence(
+    s: StateRecord, p: SettingsRecord, t: int, readings: Records[Reading], score: Records[Score], nats: Floats
+) -> int:
+    """Write the same for polygon `t`; the parameters are those of `circle_evidence`."""
+    track = s[0].polygons[t]
+    outline = p[0].polygons[track.model]
+    sides = outline.sides[: outline.side_count]
+    n = copy_reservoir(track, readings)
+    for j in range(n):
+        nats[j] = score_polygon(
+            readings[j : j + 1], 1, track.x, track.y, track.heading, sides, outline.is_closed > 0, p,
+            s[0].noise_level, score[0],
+        )  # fmt: skip
+    return n
+
+
+def evidence_of(
+    memory: Memory, p: SettingsRecord, row: int, number: int, model: str, labels: tuple[str, ...]
+) -> Evidence:
+    """Return the evidence on a track.
+
+    Parameters
+    ----------
+    memory, p
         Memory and settings.
     row : int
-        Circles first, then polygons.
+        The track: circles first, then polygons.
     number, model
-        What the object is known by and called.
+        The object's number and name.
     labels : tuple of str
-        What the columns of `State.comp` are called.
+        Names of the alternatives of a circle.
     """
-    w, nats, stats = np.empty((WORK, 5)), np.zeros(WORK), np.zeros(DISPERSION + 4)
-    t, rivals = row - len(s.ti), tuple[tuple[str, float], ...]()
+    heard, nats = zeros(Reading, READINGS_MAX), np.zeros(READINGS_MAX)
+    readings, score = records(Reading, heard), records(Score, zeros(Score, 1))
+    t, rivals = row - len(memory.circles), tuple[tuple[str, float], ...]()
     if t < 0:
-        n = flatten(s.bins, s.bn, row, w)
-        weigh_circle(s, p, row, w, n, stats, nats)
-        own = int(s.ti[row, KIND])
-        led = s.comp[row].tolist()
-        rivals = tuple((labels[k], v) for k, v in enumerate(led) if k != own and v != 0.0)
+        n = circle_evidence(memory.s, memory.tracks, p, row, readings, score, nats)
+        own = int(memory.circles["kind"][row])
+        leads = memory.circles["leads"][row, : len(labels)].tolist()
+        rivals = tuple((labels[k], v) for k, v in enumerate(leads) if k != own and v != 0.0)
     else:
-        n = flatten(s.pbins, s.pbn, t, w)
-        weigh_polygon(s, p, t, w, n, stats, nats)
+        n = polygon_evidence(memory.s, p, t, readings, score, nats)
     arcs = tuple(
-        Arc(x, y, float(np.arctan2(uy, ux)), r if r < FAR else None, said)
-        for (x, y, ux, uy, r), said in zip(w[:n].tolist(), nats[:n].tolist(), strict=True)
+        Arc(x, y, float(np.arctan2(uy, ux)), r if r < FAR else None, nat)
+        for (x, y, ux, uy, r), nat in zip(heard[:n].tolist(), nats[:n].tolist(), strict=True)
     )
-    told = nats[:n]
+    said = nats[:n]
     return Evidence(
-        number, model, arcs=arcs, supporting=float(told[told > 0.0].sum()), opposing=float(told[told < 0.0].sum()),
+        number, model, arcs=arcs, supporting=float(said[said > 0.0].sum()), opposing=float(said[said < 0.0].sum()),
         rivals=rivals,
     )  # fmt: skip

@@ -1,15 +1,17 @@
-"""What the Bayesian method's kernels are told: made once from the ring, the model library and the configuration.
+"""The settings record: made from the ring, the model library and the configuration.
 
 The constants were found on random halls with the Denning's ring and hold for other rings as well, because what
-depends on the ring (beam, resolution, reach) and on the models (radius, outline) is taken from there. Lengths that
-depend on neither are about how near things stand to one another in a building; they are metres, at a tenth of a foot.
+depends on the ring (beam, resolution, range) and on the models (radius, outline) is taken from there. Lengths that
+depend on neither are about how near objects stand to one another in a building; they are metres, to a tenth of a
+foot.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -17,18 +19,29 @@ from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import BayesConfig
 from config.units import FOOT_M
-from perception.bayes.likelihood import BINS, LEVELS, build_levels, build_table
-from perception.bayes.state import Settings
-from perception.kernel import Floats, Ints
+from perception.bayes.likelihood import build_levels, build_table
+from perception.bayes.parameters import (
+    CHORDS,
+    CIRCLES_MAX,
+    POLYGONS_MAX,
+    TABLE_LEVELS,
+    NoiseModel,
+    PolygonModel,
+    Settings,
+    SettingsRecord,
+)
+from perception.kernel import Floats
 from perception.object_model import ObjectModel
+from perception.records import array_of, column, records, zeros
 
 RIVALS_M: Final = (0.0, 0.35 * FOOT_M, 2.2 * FOOT_M)
 """Radii that every circle has to beat: an edge or corner, a post, a barrel."""
+MERGE_RADII: Final = 0.9
+"""Two centres nearer than so many radii of the smallest model are one object."""
 RIVAL_APART_M: Final = 0.1 * FOOT_M
 """A rival as near as this to a model's radius is that model."""
 SAME_RADIUS_M: Final = 1e-3
-"""Models of radii as near as this are one circle, and the first of them lends its name."""
-CHORDS: Final = 10
+"""Models of radii as near as this are one circle, named after the first of them."""
 
 MAY_DEG: Final = 0.4
 """A reading this far outside the beam may match: mounts and headings are not known better."""
@@ -37,14 +50,12 @@ MUST_DEG: Final = 1.5
 DENSITY_M: Final = 15.0 * FOOT_M
 """Something else answers from anywhere up to here: the background's density is one over it."""
 OUTLIERS: Final = 0.03
+"""Share of ranges that come from elsewhere."""
 SIGMAS_M: Final = (0.001 * FOOT_M, 0.6 * FOOT_M)
 """Least and greatest noise of the likelihood's table."""
 ABSOLUTE_M: Final = tuple(v * FOOT_M for v in (0.003, 0.012, 0.03, 0.05, 0.08))
 RELATIVE: Final = (0.0, 0.005, 0.01, 0.02)
 """The noises between which the method decides: σ² = absolute² + (relative · range)²."""
-PER_METRE: Final = 2.0 / FOOT_M
-"""Range bins in which a noise is taken as one."""
-RANGE_BINS: Final = 64
 
 
 def polygon_symmetry(vertices: Floats) -> int:
@@ -89,109 +100,123 @@ def least_half_width(corners: Floats) -> float:
     return 0.5 * float((far.max(axis=0) - far.min(axis=0)).min())
 
 
-def _polygons(models: Sequence[ModelConfig]) -> tuple[Floats, Ints, Ints, Ints, Floats, Floats, Floats, Floats]:
-    """Return vertices, how many, closed, symmetry, inner and outer radius, sides and faces of the polygon models."""
-    many, most = max(1, len(models)), max([4, *(len(m.vertices_m) for m in models)])
-    vertices, sides, faces = np.zeros((many, most, 2)), np.zeros((many, most, 4)), np.zeros((many, most, 5))
-    count, closed, symmetry = np.zeros(many, np.int64), np.zeros(many, np.int64), np.ones(many, np.int64)
-    inner, bound = np.zeros(many), np.zeros(many)
-    for i, model in enumerate(models):
-        corners = np.array(model.vertices_m, dtype=np.float64)
-        following = np.roll(corners, -1, axis=0)
-        if model.closed and np.sum(corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0]) < 0.0:
-            corners = np.ascontiguousarray(corners[::-1])  # kernels take the outside to lie right of each side
-        object_sides = ObjectModel.from_config(model.model_copy(update={"vertices_m": corners.tolist()})).sides
-        n, k = len(corners), len(object_sides)
-        vertices[i, :n], sides[i, :k], count[i], closed[i] = corners, object_sides, n, model.closed
-        x, y, direction = object_sides[:, 0], object_sides[:, 1], object_sides[:, 2]
-        tangents = np.column_stack([np.cos(direction), np.sin(direction)])
-        faces[i, :k] = np.column_stack([corners[:k], tangents, object_sides[:, 3]])
-        # The origin may lie on a side, or outside of a hollow outline; then its width tells how large it is.
-        inner[i] = max(np.abs(x * tangents[:, 1] - y * tangents[:, 0]).min(), least_half_width(corners))
-        bound[i] = np.hypot(corners[:, 0], corners[:, 1]).max()
-        symmetry[i] = polygon_symmetry(corners) if model.closed else 1
-    return vertices, count, closed, symmetry, inner, bound, sides, faces
+def _enter_polygon(outline: PolygonModel, model: ModelConfig) -> None:
+    """Write a polygon model's outline, its size and its symmetry to its record, which is zero."""
+    corners = np.array(model.vertices_m, dtype=np.float64)
+    following = np.roll(corners, -1, axis=0)
+    if model.closed and np.sum(corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0]) < 0.0:
+        corners = np.ascontiguousarray(corners[::-1])  # kernels take the outside to lie right of each side
+    sides = ObjectModel.from_config(model.model_copy(update={"vertices_m": corners.tolist()})).sides
+    x, y, direction = sides[:, 0], sides[:, 1], sides[:, 2]
+    tangents = np.column_stack([np.cos(direction), np.sin(direction)])
+    outline.vertex_count, outline.side_count, outline.is_closed = len(corners), len(sides), int(model.closed)
+    outline.relaxation_sides[: len(sides)] = sides
+    for k, corner in enumerate(corners.tolist()):
+        outline.sides[k].x, outline.sides[k].y = corner
+    for k, (tangent, length) in enumerate(zip(tangents.tolist(), sides[:, 3].tolist(), strict=True)):
+        outline.sides[k].tangent_x, outline.sides[k].tangent_y = tangent
+        outline.sides[k].length = length
+    # The origin may lie on a side, or outside of a hollow outline; then its width tells how large it is.
+    nearest = float(np.abs(x * tangents[:, 1] - y * tangents[:, 0]).min())
+    outline.inner_radius_m = max(nearest, least_half_width(corners))
+    outline.outer_radius_m = float(np.hypot(corners[:, 0], corners[:, 1]).max())
+    outline.symmetry = polygon_symmetry(corners) if model.closed else 1
 
 
-def tuned(p: Settings, config: BayesConfig) -> Settings:
-    """Return the kernels' settings with what a running process may change taken from `config`."""
-    return p._replace(
-        attempts=config.attempts_per_firing,
-        report=config.report_probability,
-        report_near=min(config.report_probability, config.report_probability_near),
-    )
+def apply_config(p: SettingsRecord, config: BayesConfig) -> None:
+    """Enter what a running process may change."""
+    p[0].attempts_per_firing = config.attempts_per_firing
+    p[0].report_probability = config.report_probability
+    p[0].report_probability_near = min(config.report_probability, config.report_probability_near)
 
 
-def library(models: Sequence[ModelConfig]) -> dict[str, Any]:
-    """Return what of the kernels' settings depends on the models: round ones by their radius, others by outline."""
+def apply_library(p: SettingsRecord, models: Sequence[ModelConfig]) -> None:
+    """Enter the models: round ones by their radius, others by their outline.
+
+    Raises
+    ------
+    ValueError
+        There are more models than the record holds.
+    """
     known, _ = circle_models(models)
     rivals = [r for r in RIVALS_M if all(abs(r - k) > RIVAL_APART_M for k in known)]
     if not known:
-        rivals = [*rivals[1:], rivals[0]]  # hypotheses need a body to lie behind a segment, and a point is none
-    radii = np.array([*known, *rivals])
+        rivals = [*rivals[1:], rivals[0]]  # hypotheses need a body to lie behind a segment, and a point has none
+    radii = [*known, *rivals]
     outlines = [m for m in models if m.arc_radius_m is None]
-    vertices, count, closed, symmetry, inner, bound, sides, faces = _polygons(outlines)
-    return {
-        "merge": 0.9 * float(radii[0]), "radii": radii, "models": len(known),
-        "sides": np.array([_chords(r) for r in radii]), "polys": len(outlines), "verts": vertices, "nv": count,
-        "closed": closed, "sym": symmetry, "inner": inner, "bound": bound, "psides": sides, "faces": faces,
-    }  # fmt: skip
+    if len(radii) > CIRCLES_MAX or len(outlines) > POLYGONS_MAX:
+        raise ValueError(
+            f"{len(known)} round models and {len(outlines)} polygons are too many: at most "
+            f"{CIRCLES_MAX - len(RIVALS_M)} and {POLYGONS_MAX} can be recognised at a time; leave some out"
+        )
+    for name in ("circles", "polygons"):
+        column(p, name).view(np.uint8)[...] = 0
+    p[0].model_count, p[0].circle_count, p[0].polygon_count = len(known), len(radii), len(outlines)
+    p[0].merge_m = MERGE_RADII * radii[0]
+    for k, radius in enumerate(radii):
+        p[0].circles[k].radius_m = radius
+        p[0].circles[k].chords[...] = _chords(radius)
+    for k, model in enumerate(outlines):
+        _enter_polygon(p[0].polygons[k], model)
 
 
-def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: BayesConfig) -> Settings:
-    """Return the kernels' settings.
+def copied(p: SettingsRecord) -> SettingsRecord:
+    """Return a copy of the settings."""
+    return records(Settings, array_of(p).copy())
+
+
+def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: BayesConfig) -> SettingsRecord:
+    """Return the settings for a ring, a library and a configuration.
 
     Parameters
     ----------
     ring : RingConfig
-        Beam, resolution and reach.
+        Beam, resolution and range.
     models : sequence of ModelConfig
         The library: round ones by their radius, the others by their outline.
     config : BayesConfig
         What a user may set.
+
+    Raises
+    ------
+    ValueError
+        There are more models than the record holds.
     """
+    p = records(Settings, zeros(Settings, 1))
     half_angle = math.radians(ring.beam_half_angle_deg)
     may, must = half_angle + math.radians(MAY_DEG), max(0.5 * half_angle, half_angle - math.radians(MUST_DEG))
-    half_box = 0.5 * ring.resolution_m
-    table, inv_step, sigmas = np.empty((LEVELS, BINS)), np.empty(LEVELS), np.empty(LEVELS)
-    build_table(half_box, *SIGMAS_M, 1.0 / DENSITY_M, OUTLIERS, table, inv_step, sigmas)
-    noises = np.array([(a, b) for a in ABSOLUTE_M for b in RELATIVE])
-    levels = np.empty((len(noises), max(RANGE_BINS, math.ceil(ring.range_max_m * PER_METRE))), np.int64)
-    build_levels(noises, sigmas, levels, PER_METRE)
-    untuned = Settings(
-        half_angle=half_angle,
-        cos_half=math.cos(half_angle),
-        cos_opt=math.cos(may),
-        cos_in=math.cos(must),
-        half_box=half_box,
-        gate=0.5 * FOOT_M,
-        miss=math.log(0.1),
-        short=-1.0,
-        unknown=2.0,
-        unknown_poly=2.9,
-        prior=3.0,
-        spread=0.0015,
-        far=6.0 * FOOT_M,
-        far_price=2.0 / FOOT_M,
-        rough_gate=20.0,
-        range_max=ring.range_max_m,
-        pair_max=12.0 * FOOT_M,
-        spacing=0.2 * FOOT_M,
-        gap=30.0,
-        per_metre=PER_METRE,
-        all_until=80,
-        claim=4.0 * FOOT_M,
-        attempts=0,
-        hyp_sigma=0.7 * FOOT_M,
-        table=table,
-        inv_step=inv_step,
-        noises=noises,
-        levels=levels,
-        inflate=1.1,
-        report=0.0,
-        report_near=0.0,
-        quiet=12,
-        polish=6,
-        **library(models),
-    )
-    return tuned(untuned, config)
+    it = p[0]
+    it.half_angle_rad = half_angle
+    it.cos_half_angle, it.sin_half_angle = math.cos(half_angle), math.sin(half_angle)
+    it.cos_may_answer, it.cos_must_answer = math.cos(may), math.cos(must)
+    it.sin_must_answer = math.sqrt(1.0 - it.cos_must_answer * it.cos_must_answer)
+    it.half_resolution_m, it.range_max_m = 0.5 * ring.resolution_m, ring.range_max_m
+    it.gate_m = 0.5 * FOOT_M
+    it.missed_echo_nat = math.log(0.1)
+    it.short_echo_nat = -1.0
+    it.unknown_nat = 2.0
+    it.unknown_polygon_nat = 2.9
+    it.model_prior_nat = 3.0
+    it.dispersion_min = 0.0015
+    it.far_m = 6.0 * FOOT_M
+    it.far_nat_per_m = 2.0 / FOOT_M
+    it.roughness_gate_nat = 20.0
+    it.pair_range_max_m = 12.0 * FOOT_M
+    it.history_spacing_m = 0.2 * FOOT_M
+    it.pair_gap_s = 30.0
+    it.compare_all_below = 80
+    it.associating_line_m = 4.0 * FOOT_M
+    it.hypothesis_sigma_m = 0.7 * FOOT_M
+    it.idle_firings = 12
+    it.final_refinements = 6
+    sigmas = np.empty(TABLE_LEVELS)
+    build_table(
+        float(it.half_resolution_m), *SIGMAS_M, 1.0 / DENSITY_M, OUTLIERS, column(p, "table")[0],
+        column(p, "table_bins_per_m")[0], sigmas,
+    )  # fmt: skip
+    for noise, (absolute, relative) in zip(it.noises, itertools.product(ABSOLUTE_M, RELATIVE), strict=True):
+        noise.absolute_m, noise.relative = absolute, relative
+    build_levels(records(NoiseModel, column(p, "noises")[0]), sigmas)
+    apply_library(p, models)
+    apply_config(p, config)
+    return p

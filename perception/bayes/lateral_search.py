@@ -1,4 +1,4 @@
-"""Which of several places a young circle is at: where the raw readings count for most, not where a fit began.
+"""Search across the beam for the place of a young circle at which the raw readings count for most.
 
 Seen from one side only, a centre is known well along the beam and badly across it, and each place across has other
 readings in its beam: a fit keeps the readings it began with, and so its mistakes. Which sensors hear a body and which
@@ -12,55 +12,66 @@ from typing import Final
 
 from config.units import FOOT_M
 from perception.bayes.alternatives import score
-from perception.bayes.state import TRHO, TX, TY, Settings, State
+from perception.bayes.parameters import SettingsRecord
+from perception.bayes.state import CircleTrack, StateRecord
 from perception.kernel import kernel
 
-ACROSS: Final = 3
-ACROSS_M: Final = 0.12 * FOOT_M
+PLACES: Final = 3
+STEP_M: Final = 0.12 * FOOT_M
 """So many places on either side, so far apart: half a foot, a beam's edge at two and a half feet."""
-LEAD: Final = 1.0
-"""Another place must lead by this, nat: less is chance."""
+LEAD_NAT: Final = 1.0
+"""Another place must lead by this: less is chance."""
 
 
 @kernel
-def seek(s: State, p: Settings, t: int, n: int) -> bool:
-    """Move track `t`, whose `n` readings lie in `s.w`, across the beam to where they say most; tell whether it moved.
+def search_across(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> bool:
+    """Move a track across the beam to where its readings are likeliest; return whether it moved.
 
     The places lie on an arc about the mean of the sensors that hear it, so that its ranges change as little as
     possible.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    track : CircleTrack
+        Updated.
+    n : int
+        Its readings, the first of the scratch.
     """
-    track = s.tf[t]
+    readings = s[0].scratch.readings
     x = 0.0
     y = 0.0
     heard = 0
     for j in range(n):
-        if abs(s.w[j, 4] - (math.hypot(track[TX] - s.w[j, 0], track[TY] - s.w[j, 1]) - track[TRHO])) < p.gate:
-            x += s.w[j, 0]
-            y += s.w[j, 1]
+        q = readings[j]
+        if abs(q.range_m - (math.hypot(track.x - q.x, track.y - q.y) - track.radius)) < p[0].gate_m:
+            x += q.x
+            y += q.y
             heard += 1
     if heard == 0:
         return False
     x /= heard
     y /= heard
-    dx = track[TX] - x
-    dy = track[TY] - y
+    dx = track.x - x
+    dy = track.y - y
     d = math.hypot(dx, dy)
-    if d <= track[TRHO]:
+    if d <= track.radius:
         return False
-    best = score(s, p, n, track[TX], track[TY], track[TRHO]) + LEAD
+    best = score(s, p, n, track.x, track.y, track.radius) + LEAD_NAT
     at = 0
-    for k in range(-ACROSS, ACROSS + 1):
+    for k in range(-PLACES, PLACES + 1):
         if k != 0:
-            c = math.cos(k * ACROSS_M / d)
-            sn = math.sin(k * ACROSS_M / d)
-            v = score(s, p, n, x + c * dx - sn * dy, y + sn * dx + c * dy, track[TRHO])
+            c = math.cos(k * STEP_M / d)
+            sn = math.sin(k * STEP_M / d)
+            v = score(s, p, n, x + c * dx - sn * dy, y + sn * dx + c * dy, track.radius)
             if v > best:
                 best = v
                 at = k
     if at == 0:
         return False
-    c = math.cos(at * ACROSS_M / d)
-    sn = math.sin(at * ACROSS_M / d)
-    track[TX] = x + c * dx - sn * dy
-    track[TY] = y + sn * dx + c * dy
+    c = math.cos(at * STEP_M / d)
+    sn = math.sin(at * STEP_M / d)
+    track.x = x + c * dx - sn * dy
+    track.y = y + sn * dx + c * dy
     return True

@@ -1,9 +1,9 @@
-"""What one range is worth under an explanation: rounding, noise and outliers, as a table.
+"""Log likelihood ratio of one range error under rounding, noise and outliers, as a table.
 
-A range comes rounded: the truth lies in a box around it, and only the box's edges are softened by noise. Used as such
-a few dozen readings fix a centre several times better than least squares on the same readings, which takes the box
-for a bell. Everything is a log ratio to the background, an echo of something else anywhere in range, so that a sum
-over readings is evidence for or against.
+A range comes rounded: the truth lies in a box around it, and noise softens only the box's edges. Used as such, a few
+dozen readings fix a centre several times better than least squares on the same readings, which takes the box for a
+bell. Every value is a log ratio to the background, an echo of something else anywhere in range, so that a sum over
+readings is evidence for or against.
 """
 
 from __future__ import annotations
@@ -11,18 +11,19 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.kernel import Floats, Ints, kernel
+from perception.bayes.parameters import (
+    NOISES,
+    RANGE_BINS,
+    RANGE_BINS_PER_M,
+    TABLE_BINS,
+    TABLE_LEVELS,
+    NoiseModel,
+    Settings,
+)
+from perception.kernel import Floats, kernel
+from perception.records import Records
 
-LEVELS: Final = 24
-"""Noise levels of the table, spaced geometrically: 32 % apart over .001 to .6 ft, finer than a σ can be told."""
-
-BINS: Final = 129
-"""Bins of |e| of each level, from 0 to half the box + `REACH` σ, interpolated linearly.
-
-The last bin is there twice, so that an error beyond it is cut off and interpolated like any other, without a branch.
-"""
-
-REACH: Final = 6.0
+REACH_SIGMAS: Final = 6.0
 """σ beyond the box where only outliers are left."""
 
 SHARP: Final = 1e-3
@@ -31,23 +32,18 @@ SHARP: Final = 1e-3
 
 @kernel
 def build_table(
-    half_box: float,
-    sigma_lo: float,
-    sigma_hi: float,
-    u0: float,
-    eps: float,
-    table: Floats,
-    inv_step: Floats,
-    sigmas: Floats,
-) -> None:
-    """Tabulate the log likelihood ratio of an error e for each level of noise.
+    half_box: float, sigma_lo: float, sigma_hi: float, density: float, outliers: float, table: Floats,
+    bins_per_m: Floats, sigmas: Floats,
+) -> None:  # fmt: skip
+    """Write the log likelihood ratio of an error e for each level of noise.
 
     With h half the box, σ the noise and Φ the normal distribution, a uniform box convolved with a Gaussian, mixed
     with a share ε of outliers of the background's density u0::
 
         L(e) = log((1 − ε) · [Φ((e + h)/σ) − Φ((e − h)/σ)] / (2 h u0) + ε)
 
-    which for h → 0 becomes the Gaussian's own density. From the last bin but one on L = log ε.
+    which for h → 0 becomes the Gaussian's own density. From the last bin but one on L = log ε. The last bin is there
+    twice, so that an error beyond it is clipped and interpolated like any other, without a branch.
 
     Parameters
     ----------
@@ -55,77 +51,66 @@ def build_table(
         Half the resolution of a range, m.
     sigma_lo, sigma_hi : float
         Least and greatest noise, m.
-    u0 : float
-        Density of the background, 1/m.
-    eps : float
-        Share of outliers.
-    table : (LEVELS, BINS) float
-        Out: L, nat, at |e| = b / inv_step[k] for level k and bin b.
-    inv_step : (LEVELS,) float
+    density : float
+        Density of the background u0, 1/m.
+    outliers : float
+        Share of outliers ε.
+    table : (TABLE_LEVELS, TABLE_BINS) float
+        Out: L, nat, at |e| = b / bins_per_m[k] for level k and bin b.
+    bins_per_m : (TABLE_LEVELS,) float
         Out: bins per metre of each level.
-    sigmas : (LEVELS,) float
+    sigmas : (TABLE_LEVELS,) float
         Out: noise of each level, m.
     """
-    ratio = math.log(sigma_hi / sigma_lo) / (LEVELS - 1)
-    for k in range(LEVELS):
+    ratio = math.log(sigma_hi / sigma_lo) / (TABLE_LEVELS - 1)
+    for k in range(TABLE_LEVELS):
         sigma = sigma_lo * math.exp(ratio * k)
         sigmas[k] = sigma
-        inv_step[k] = (BINS - 2) / (half_box + REACH * sigma)
-        for b in range(BINS - 2):
-            e = b / inv_step[k]
+        bins_per_m[k] = (TABLE_BINS - 2) / (half_box + REACH_SIGMAS * sigma)
+        for b in range(TABLE_BINS - 2):
+            e = b / bins_per_m[k]
             if half_box > SHARP * sigma:
                 root = sigma * math.sqrt(2.0)
                 p = 0.5 * (math.erfc((e - half_box) / root) - math.erfc((e + half_box) / root)) / (2.0 * half_box)
             else:
                 p = math.exp(-0.5 * (e / sigma) ** 2) / (sigma * math.sqrt(2.0 * math.pi))
-            table[k, b] = math.log((1.0 - eps) * max(p, 0.0) / u0 + eps)
-        table[k, BINS - 2] = math.log(eps)
-        table[k, BINS - 1] = math.log(eps)
+            table[k, b] = math.log((1.0 - outliers) * max(p, 0.0) / density + outliers)
+        table[k, TABLE_BINS - 2] = math.log(outliers)
+        table[k, TABLE_BINS - 1] = math.log(outliers)
 
 
 @kernel
-def loglik(table: Floats, inv_step: Floats, k: int, e: float) -> float:
-    """Return the log likelihood ratio of an error at level k: the table, interpolated.
-
-    Parameters
-    ----------
-    table, inv_step
-        From `build_table`.
-    k : int
-        Level of noise.
-    e : float
-        Range heard less range predicted, m.
-
-    Returns
-    -------
-    float
-        Nat.
-    """
-    t = min(abs(e) * inv_step[k], float(table.shape[1] - 2))
+def log_likelihood(p: Records[Settings], level: int, error: float) -> float:
+    """Return the log likelihood ratio (nat) of a range error (m) at a level of noise: the table, interpolated."""
+    t = min(abs(error) * p[0].table_bins_per_m[level], float(TABLE_BINS - 2))
     b = int(t)
-    return float(table[k, b] + (t - b) * (table[k, b + 1] - table[k, b]))
+    row = p[0].table[level]
+    return float(row[b] + (t - b) * (row[b + 1] - row[b]))
 
 
 @kernel
-def build_levels(noises: Floats, sigmas: Floats, levels: Ints, per_metre: float) -> None:
-    """Look up beforehand which level of the table each noise hypothesis means at each range.
+def level_of(p: Records[Settings], noise: int, range_m: float) -> int:
+    """Return the level of the table that a noise hypothesis means at a range (m)."""
+    return int(p[0].noises[noise].levels[min(int(range_m * RANGE_BINS_PER_M), RANGE_BINS - 1)])
+
+
+@kernel
+def build_levels(noises: Records[NoiseModel], sigmas: Floats) -> None:
+    """Write which level of the table each noise hypothesis means at the middle of each range bin.
 
     Parameters
     ----------
-    noises : (h, 2) float
-        Hypotheses: absolute (m) and relative noise; σ² = absolute² + (relative · r)².
-    sigmas : (LEVELS,) float
+    noises : (NOISES,) NoiseModel
+        Hypotheses; their `levels` are written.
+    sigmas : (TABLE_LEVELS,) float
         Noise of each level, m, spaced geometrically.
-    levels : (h, b) int
-        Out: level at the middle of each interval of range.
-    per_metre : float
-        Intervals per metre of range.
     """
-    last = sigmas.shape[0] - 1
+    last = TABLE_LEVELS - 1
     ratio = math.log(sigmas[last] / sigmas[0]) / last
-    for h in range(noises.shape[0]):
-        for b in range(levels.shape[1]):
-            r = (b + 0.5) / per_metre
-            sigma = math.sqrt(noises[h, 0] ** 2 + (noises[h, 1] * r) ** 2)
+    for h in range(NOISES):
+        noise = noises[h]
+        for b in range(RANGE_BINS):
+            r = (b + 0.5) / RANGE_BINS_PER_M
+            sigma = math.sqrt(noise.absolute_m**2 + (noise.relative * r) ** 2)
             k = round(math.log(max(sigma, sigmas[0]) / sigmas[0]) / ratio)
-            levels[h, b] = min(max(k, 0), last)
+            noise.levels[b] = min(max(k, 0), last)

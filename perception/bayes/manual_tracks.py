@@ -1,7 +1,7 @@
-"""Tracks that a person founds or moves: a pose, the readings that bear on it, and refinement as for any other.
+"""Tracks that a user places or moves: a pose, the readings that bear on it, and refinement as for any other.
 
-A hand is a decimetre or two off. The paper's relaxation takes the model onto the outline map first, as it does with a
-hypothesis; from there the raw readings refine it.
+A user's pose is a decimetre or two off. The paper's relaxation moves the model onto the outline map first, as it does
+with a hypothesis; from there the raw readings refine it.
 """
 
 from __future__ import annotations
@@ -9,31 +9,22 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.occlusion import audible
-from perception.bayes.polygon_initiation import begin_polygon_at, relax_polygon
-from perception.bayes.polygon_job import JOB, TRACK, WHO, end_job, sides_of
-from perception.bayes.polygon_readings import collect
-from perception.bayes.reservoir import flatten, gather
-from perception.bayes.state import (
-    C00,
-    C11,
-    KIND,
-    MARK,
-    MODEL,
-    PLACED,
-    PLLR,
-    PX,
-    PY,
-    R00,
-    R11,
-    TRHO,
-    TX,
-    TY,
-    Settings,
-    State,
+from perception.bayes.occlusion import keep_relevant
+from perception.bayes.parameters import SettingsRecord
+from perception.bayes.polygon_initiation import relax_polygon, restart_polygon
+from perception.bayes.polygon_job import REFINEMENT, end_job
+from perception.bayes.polygon_readings import gather_polygon_history
+from perception.bayes.reservoir import copy_reservoir, gather_history
+from perception.bayes.state import PLACED, CircleTrack, CircleTracks, StateRecord
+from perception.bayes.track_initiation import (
+    VARIANCE_MAX_M2,
+    free_track,
+    gather_relevant,
+    relax_onto_map,
+    restart_circle,
+    start_circle,
 )
-from perception.bayes.track_initiation import VARIANCE_MAX_M2, begin_at, begin_track, free_track, relax_onto_map
-from perception.bayes.track_labels import give_number
+from perception.bayes.track_labels import assign_number
 from perception.kernel import kernel
 
 ROUNDS: Final = 3
@@ -44,111 +35,172 @@ STRAYED_RAD: Final = 0.8
 
 
 @kernel
-def settle_circle(s: State, p: Settings, kind: int, x: float, y: float) -> None:
-    """Set `s.pose` to where the map draws a circle from (x, y)."""
-    s.pose[0] = x
-    s.pose[1] = y
-    s.pose[2] = 0.0
+def set_hypothesis(s: StateRecord, x: float, y: float, heading: float) -> None:
+    """Set the scratch's hypothesis to a pose, m, rad."""
+    hypothesis = s[0].scratch.hypothesis
+    hypothesis.x = x
+    hypothesis.y = y
+    hypothesis.heading = heading
+
+
+@kernel
+def settle_circle(s: StateRecord, p: SettingsRecord, kind: int, x: float, y: float) -> None:
+    """Set the scratch's hypothesis to where the map draws a circle from (x, y).
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    kind : int
+        Which circle.
+    x, y : float
+        m.
+    """
+    hypothesis = s[0].scratch.hypothesis
+    set_hypothesis(s, x, y, 0.0)
     for _ in range(ROUNDS):
         relax_onto_map(s, p, kind)
-    if math.hypot(s.pose[0] - x, s.pose[1] - y) > STRAYED_M:
-        s.pose[0] = x
-        s.pose[1] = y
+    if math.hypot(hypothesis.x - x, hypothesis.y - y) > STRAYED_M:
+        hypothesis.x = x
+        hypothesis.y = y
 
 
 @kernel
-def say_placed(s: State, t: int) -> None:
-    """Enter that a person put circle `t` there, and how well a hand knows."""
-    s.tf[t, C00] = VARIANCE_MAX_M2
-    s.tf[t, C11] = VARIANCE_MAX_M2
-    s.tf[t, R00] = math.sqrt(VARIANCE_MAX_M2)
-    s.tf[t, R11] = s.tf[t, R00]
-    s.names[t, MARK] |= PLACED
+def mark_placed(track: CircleTrack) -> None:
+    """Mark a circle as placed by a user, and as uncertain as that is."""
+    track.covariance_xx = VARIANCE_MAX_M2
+    track.covariance_yy = VARIANCE_MAX_M2
+    track.root_xx = math.sqrt(VARIANCE_MAX_M2)
+    track.root_yy = track.root_xx
+    track.marks |= PLACED
 
 
 @kernel
-def place_circle(s: State, p: Settings, kind: int, x: float, y: float, now: float) -> int:
-    """Found a track of circle `kind` about (x, y) on what the sensors remember; return it, −1 without room."""
-    rho = p.radii[kind]
+def place_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: int, x: float, y: float) -> int:
+    """Start a track of a circle about (x, y) on what the sensors remember; return its index, −1 without room.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    kind : int
+        Which circle.
+    x, y : float
+        m.
+    """
+    radius = p[0].circles[kind].radius_m
     settle_circle(s, p, kind, x, y)
-    x = s.pose[0]
-    y = s.pose[1]
-    n = audible(s, p, gather(s, p, x, y, rho, s.w), x, y, rho, -1)
-    t = begin_track(s, kind, rho, x, y, n, now)
+    x = s[0].scratch.hypothesis.x
+    y = s[0].scratch.hypothesis.y
+    n = gather_relevant(s, tracks, p, x, y, radius)
+    t = start_circle(s, tracks, kind, radius, x, y, n)
     if t >= 0:
-        say_placed(s, t)
+        mark_placed(tracks[t])
     return t
 
 
 @kernel
-def move_circle(s: State, p: Settings, t: int, x: float, y: float, now: float) -> None:
-    """Begin track `t` anew about (x, y): on its own readings, or on what the sensors remember where it is far off."""
-    kind = s.ti[t, KIND]
-    rho = s.tf[t, TRHO]
+def move_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int, x: float, y: float) -> None:
+    """Restart track `t` about (x, y): on its own readings, or far off on what the sensors remember.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    t : int
+        The track.
+    x, y : float
+        m.
+    """
+    track = tracks[t]
+    kind = track.kind
+    radius = track.radius
     settle_circle(s, p, kind, x, y)
-    x = s.pose[0]
-    y = s.pose[1]
-    if math.hypot(x - s.tf[t, TX], y - s.tf[t, TY]) < rho + p.gate:
-        n = flatten(s.bins, s.bn, t, s.w)
+    x = s[0].scratch.hypothesis.x
+    y = s[0].scratch.hypothesis.y
+    if math.hypot(x - track.x, y - track.y) < radius + p[0].gate_m:
+        n = copy_reservoir(track, s[0].scratch.readings)
     else:
-        n = gather(s, p, x, y, rho, s.w)
-    begin_at(s, t, kind, rho, x, y, audible(s, p, n, x, y, rho, t), now)
-    say_placed(s, t)
+        n = gather_history(s, p, x, y, radius)
+    restart_circle(s, track, kind, radius, x, y, keep_relevant(s, tracks, p, n, x, y, radius, t))
+    mark_placed(track)
 
 
 @kernel
-def settle_polygon(s: State, p: Settings, model: int, x: float, y: float, theta: float) -> None:
-    """Set `s.pose` to where the map draws a polygon from a pose."""
-    s.pose[0] = x
-    s.pose[1] = y
-    s.pose[2] = theta
+def settle_polygon(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float, heading: float) -> None:
+    """Set the scratch's hypothesis to where the map draws a polygon from a pose.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    model : int
+        Which polygon.
+    x, y, heading : float
+        m, rad.
+    """
+    hypothesis = s[0].scratch.hypothesis
+    set_hypothesis(s, x, y, heading)
     for _ in range(ROUNDS):
-        relax_polygon(s, p, model, sides_of(p, model))
-    if math.hypot(s.pose[0] - x, s.pose[1] - y) > STRAYED_M or abs(s.pose[2] - theta) > STRAYED_RAD:
-        s.pose[0] = x
-        s.pose[1] = y
-        s.pose[2] = theta
+        relax_polygon(s, p, model)
+    if math.hypot(hypothesis.x - x, hypothesis.y - y) > STRAYED_M or abs(hypothesis.heading - heading) > STRAYED_RAD:
+        set_hypothesis(s, x, y, heading)
 
 
 @kernel
-def leave_job(s: State, t: int) -> None:
-    """End the job at hand where it is polygon `t`'s: that is not what it was."""
-    if s.job[JOB] == TRACK and s.job[WHO] == t:
+def leave_job(s: StateRecord, t: int) -> None:
+    """End the job where it refines polygon `t`, which has changed."""
+    if s[0].job.kind == REFINEMENT and s[0].job.track == t:
         end_job(s)
 
 
 @kernel
-def remembered(s: State, p: Settings, model: int, x: float, y: float) -> int:
-    """Copy to `s.w` what the sensors remember that bears on a polygon at (x, y); return how many."""
-    return collect(
-        s.hist, s.hn, x, y, p.bound[model], p.cos_half, math.sin(p.half_angle), p.gate, p.pair_max, s.w
-    )  # fmt: skip
+def place_polygon(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float, heading: float) -> int:
+    """Start a track of a polygon about a pose on what the sensors remember; return its index, −1 without room.
 
-
-@kernel
-def place_polygon(s: State, p: Settings, model: int, x: float, y: float, theta: float) -> int:
-    """Found a track of a polygon about a pose on what the sensors remember; return it, −1 without room."""
-    t = free_track(s.pi, s.pf[:, PLLR], s.names[s.ti.shape[0] :])
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    model : int
+        Which polygon.
+    x, y, heading : float
+        m, rad.
+    """
+    t = free_track(s[0].polygons)
     if t >= 0:
         leave_job(s, t)
-        settle_polygon(s, p, model, x, y, theta)
-        n = remembered(s, p, model, s.pose[0], s.pose[1])
-        begin_polygon_at(s, t, model, s.pose[0], s.pose[1], s.pose[2], s.w, n)
-        row = s.ti.shape[0] + t
-        give_number(s.names, s.tally, row)
-        s.names[row, MARK] = PLACED
+        settle_polygon(s, p, model, x, y, heading)
+        track = s[0].polygons[t]
+        at = s[0].scratch.hypothesis
+        n = gather_polygon_history(s, p, model, at.x, at.y)
+        restart_polygon(track, model, at.x, at.y, at.heading, s[0].scratch.readings[:n])
+        assign_number(s, track)
+        track.marks = PLACED
     return t
 
 
 @kernel
-def move_polygon(s: State, p: Settings, t: int, x: float, y: float, theta: float) -> None:
-    """Begin polygon `t` anew about a pose: on its own readings, or on what the sensors remember."""
+def move_polygon(s: StateRecord, p: SettingsRecord, t: int, x: float, y: float, heading: float) -> None:
+    """Restart polygon `t` about a pose: on its own readings, or far off on what the sensors remember.
+
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    t : int
+        The track.
+    x, y, heading : float
+        m, rad.
+    """
     leave_job(s, t)
-    model = s.pi[t, MODEL]
-    settle_polygon(s, p, model, x, y, theta)
-    if math.hypot(s.pose[0] - s.pf[t, PX], s.pose[1] - s.pf[t, PY]) < p.bound[model] + p.gate:
-        n = flatten(s.pbins, s.pbn, t, s.w)
+    track = s[0].polygons[t]
+    model = track.model
+    settle_polygon(s, p, model, x, y, heading)
+    at = s[0].scratch.hypothesis
+    if math.hypot(at.x - track.x, at.y - track.y) < p[0].polygons[model].outer_radius_m + p[0].gate_m:
+        n = copy_reservoir(track, s[0].scratch.readings)
     else:
-        n = remembered(s, p, model, s.pose[0], s.pose[1])
-    begin_polygon_at(s, t, model, s.pose[0], s.pose[1], s.pose[2], s.w, n)
-    s.names[s.ti.shape[0] + t, MARK] |= PLACED
+        n = gather_polygon_history(s, p, model, at.x, at.y)
+    restart_polygon(track, model, at.x, at.y, at.heading, s[0].scratch.readings[:n])
+    track.marks |= PLACED

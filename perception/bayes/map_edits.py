@@ -13,31 +13,10 @@ from typing import Final
 import numpy as np
 
 from perception.bayes.manual_tracks import leave_job, move_circle, move_polygon, place_circle, place_polygon
+from perception.bayes.parameters import SettingsRecord
 from perception.bayes.pinned_segments import Pins, delete
-from perception.bayes.state import (
-    BARRED,
-    BARS,
-    CONFIRMED,
-    FREE,
-    HK,
-    KIND,
-    LLR,
-    MARK,
-    MODEL,
-    NUMBER,
-    PLLR,
-    PX,
-    PY,
-    ST,
-    TRHO,
-    TX,
-    TY,
-    Settings,
-    State,
-    clear,
-)
-from perception.bayes.track_initiation import EVIDENCE_MIN
-from perception.bayes.track_labels import POLYGON
+from perception.bayes.state import CONFIRMED, FREE, HISTORY, POLYGON, REJECTIONS_MAX, Memory
+from perception.bayes.track_initiation import EVIDENCE_MIN_NAT
 from perception.edits import (
     ClearMap,
     ConfirmObject,
@@ -51,119 +30,134 @@ from perception.edits import (
     no_such_segments,
 )
 
-REJECTED_MAX: Final = 40.0
-"""So much new evidence brings back whatever was rejected, nat: some ten good echoes, four times a birth's."""
+REJECTED_MAX_NAT: Final = 40.0
+"""So much new evidence brings back whatever was rejected: some ten good echoes, four times what starts a track."""
 
 
-def row_of(s: State, number: int) -> int | None:
-    """Return the row of `State.names` of an object, None where there is none."""
-    living = np.concatenate([s.ti[:, ST], s.pi[:, ST]]) != FREE
-    found = np.flatnonzero(living & (s.names[:, NUMBER] == number))
+def row_of(memory: Memory, number: int) -> int | None:
+    """Return the row of an object, circles first, then polygons; None where there is no such number."""
+    status, numbers = (np.concatenate([memory.circles[f], memory.polygons[f]]) for f in ("status", "number"))
+    found = np.flatnonzero((status != FREE) & (numbers == number))
     return int(found[0]) if len(found) else None
 
 
 def edit_memory(
-    s: State, p: Settings, pins: Pins, rounds: Sequence[str], outlines: Sequence[str], edit: Edit
+    memory: Memory, p: SettingsRecord, pins: Pins, rounds: Sequence[str], outlines: Sequence[str], edit: Edit
 ) -> str | None:
-    """Do what a person says; return None, or why it cannot be done.
+    """Apply a user's edit; return None, or why it cannot be done.
 
     Parameters
     ----------
-    s, p, pins
+    memory, p, pins
         Memory, updated, and settings.
     rounds, outlines : sequence of str
         Names of the round models and of the polygons, in the order of their numbers.
     edit : Edit
-        What is to be done.
+        The edit.
     """
     match edit:
         case DeleteSegments(numbers):
-            missing = delete(s, pins, numbers)
+            missing = delete(memory, pins, numbers)
             return no_such_segments(missing) if missing else None
         case PinSegments(numbers, pinned):
-            return _pin(s, pins, numbers, pinned=pinned)
+            return _pin(memory, pins, numbers, pinned=pinned)
         case PlaceModel():
-            return _place(s, p, rounds, outlines, edit)
+            return _place(memory, p, rounds, outlines, edit)
         case ClearMap():
-            clear(s)
+            memory.clear()
             pins.clear()
             return None
-    row = row_of(s, edit.object)
+    row = row_of(memory, edit.object)
     if row is None:
         return no_such_object(edit.object)
+    t = row - len(memory.circles)
     match edit:
         case MoveObject(_, x, y, theta):
-            if row < len(s.ti):
-                move_circle(s, p, row, x, y, heard_last(s))
+            if t < 0:
+                move_circle(memory.s, memory.tracks, p, row, x, y)
             else:
-                move_polygon(s, p, row - len(s.ti), x, y, theta)
+                move_polygon(memory.s, p, t, x, y, theta)
         case ConfirmObject(number):
-            if row < len(s.ti) and s.ti[row, KIND] >= p.models:
+            if t < 0 and memory.circles["kind"][row] >= p[0].model_count:
                 return f"object {number} looks like none of the models: place the one that it is there"
-            s.names[row, MARK] |= CONFIRMED
+            (memory.circles if t < 0 else memory.polygons)["marks"][t if t >= 0 else row] |= CONFIRMED
         case RejectObject():
-            _reject(s, p, row)
+            _reject(memory, p, row)
     return None
 
 
-def heard_last(s: State) -> float:
-    """Return the time of the newest reading, s."""
-    return float(s.hist[:, :, 5].max())
-
-
-def _pin(s: State, pins: Pins, numbers: Sequence[int], *, pinned: bool) -> str | None:
+def _pin(memory: Memory, pins: Pins, numbers: Sequence[int], *, pinned: bool) -> str | None:
     if not pinned:
         missing = pins.remove(numbers)
         return no_such_segments(missing) if missing else None
-    missing, full = pins.add(s, numbers)
+    missing, full = pins.add(memory, numbers)
     if full:
         return f"{len(full)} of these segments cannot be pinned: too many are, there or altogether; the others are"
     return no_such_segments(missing) if missing else None
 
 
 def _place(
-    s: State, p: Settings, rounds: Sequence[str], outlines: Sequence[str], edit: PlaceModel
+    memory: Memory, p: SettingsRecord, rounds: Sequence[str], outlines: Sequence[str], edit: PlaceModel
 ) -> str | None:  # fmt: skip
     if edit.model in outlines:
-        t = place_polygon(s, p, outlines.index(edit.model), edit.x, edit.y, edit.theta)
+        t = place_polygon(memory.s, p, outlines.index(edit.model), edit.x, edit.y, edit.theta)
     elif edit.model in rounds:
-        t = place_circle(s, p, rounds.index(edit.model), edit.x, edit.y, heard_last(s))
+        t = place_circle(memory.s, memory.tracks, p, rounds.index(edit.model), edit.x, edit.y)
     else:
         return f"no model is called {edit.model}: load it first"
     return None if t >= 0 else "as many objects are known as there is room for: reject one first"
 
 
-def _reject(s: State, p: Settings, row: int) -> None:
-    """Let a track go, forget the readings that ended at it, and bar its place to the like of it."""
-    t = row - len(s.ti)
+def _reject(memory: Memory, p: SettingsRecord, row: int) -> None:
+    """Free a track, forget the readings that ended at it, and let nothing like it start in its place."""
+    t = row - len(memory.circles)
+    track = memory.tracks[row] if t < 0 else memory.s[0].polygons[t]
+    x, y, evidence = float(track.x), float(track.y), float(track.log_likelihood_ratio)
     if t < 0:
-        x, y, reach = float(s.tf[row, TX]), float(s.tf[row, TY]), float(s.tf[row, TRHO])
-        what, said = int(s.ti[row, KIND]), float(s.tf[row, LLR])
-        forget_hits(s, p, x, y, reach, reach)
-        reach = max(reach, p.merge)
-        s.ti[row, ST] = FREE
+        what, radius = int(memory.tracks[row].kind), float(memory.tracks[row].radius)
+        forget_hits(memory, p, x, y, radius, radius)
+        radius = max(radius, float(p[0].merge_m))
     else:
-        leave_job(s, t)
-        model = int(s.pi[t, MODEL])
-        x, y, reach = float(s.pf[t, PX]), float(s.pf[t, PY]), float(p.inner[model])
-        what, said = POLYGON + model, float(s.pf[t, PLLR])
-        forget_hits(s, p, x, y, reach, float(p.bound[model]))
-        s.pi[t, ST] = FREE
-    s.names[row, MARK] = 0
-    s.barred[s.tally[BARS] % BARRED] = (x, y, reach, what, min(max(said, EVIDENCE_MIN), REJECTED_MAX))
-    s.tally[BARS] += 1
+        leave_job(memory.s, t)
+        model = int(memory.s[0].polygons[t].model)
+        outline = p[0].polygons[model]
+        what, radius = POLYGON + model, float(outline.inner_radius_m)
+        forget_hits(memory, p, x, y, radius, float(outline.outer_radius_m))
+    track.status = FREE
+    track.marks = 0
+    state = memory.state
+    rejection = memory.s[0].rejections[int(state["rejection_count"][0]) % REJECTIONS_MAX]
+    rejection.x, rejection.y, rejection.radius, rejection.what = x, y, radius, what
+    rejection.evidence_nat = min(max(evidence, EVIDENCE_MIN_NAT), REJECTED_MAX_NAT)
+    state["rejection_count"] += 1
 
 
-def forget_hits(s: State, p: Settings, x: float, y: float, inner: float, outer: float) -> None:
-    """Take the readings out of the sensors' memory that ended between two circles about (x, y), or near either."""
-    for i in range(len(s.hist)):
-        held = min(int(s.hn[i]), HK)
-        rows = s.hist[i, (int(s.hn[i]) - held + np.arange(held)) % HK]
-        dx, dy = x - rows[:, 0], y - rows[:, 1]
+def forget_hits(memory: Memory, p: SettingsRecord, x: float, y: float, inner: float, outer: float) -> None:
+    """Delete the readings from the sensors' histories that ended between two circles about (x, y), or near either.
+
+    Parameters
+    ----------
+    memory, p
+        Memory, updated, and settings.
+    x, y : float
+        Centre, m.
+    inner, outer : float
+        Radii of the circles, m.
+    """
+    half_angle, gate = float(p[0].half_angle_rad), float(p[0].gate_m)
+    sensors = memory.state["sensors"][0]
+    for i in range(int(memory.state["sensor_count"][0])):
+        kept = int(sensors["kept"][i])
+        held = min(kept, HISTORY)
+        order = (kept - held + np.arange(held)) % HISTORY
+        rows, times = sensors["history"][i, order], sensors["times_s"][i, order]
+        dx, dy = x - rows["x"], y - rows["y"]
+        axis_x, axis_y, r = rows["axis_x"], rows["axis_y"], rows["range_m"]
         d = np.hypot(dx, dy)
-        slack = math.sin(p.half_angle) * d + outer
-        in_beam = (dx * rows[:, 2] + dy * rows[:, 3] > 0.0) & (np.abs(dx * rows[:, 3] - dy * rows[:, 2]) < slack)
-        hit = in_beam & (rows[:, 4] > d - outer - p.gate) & (rows[:, 4] < d - inner + p.gate)
-        left = rows[~hit]
-        s.hist[i, : len(left)] = left
-        s.hn[i] = len(left)
+        slack = math.sin(half_angle) * d + outer
+        in_beam = (dx * axis_x + dy * axis_y > 0.0) & (np.abs(dx * axis_y - dy * axis_x) < slack)
+        left = ~(in_beam & (r > d - outer - gate) & (r < d - inner + gate))
+        count = int(np.count_nonzero(left))
+        sensors["history"][i, :count] = rows[left]
+        sensors["times_s"][i, :count] = times[left]
+        sensors["kept"][i] = count

@@ -1,9 +1,9 @@
-"""Which noise the ring has: nobody tells, and everything else depends on it.
+"""Estimation of the ring's noise, on which everything else depends.
 
-Two witnesses. *Roughness* asks no model: of three readings of one sensor in a row the middle one should lie between
-the outer two, whatever they hit. The *residuals* of sure objects tell far more finely, but only as far as the
-objects are right; so roughness decides what is possible, and both together what is likeliest. Residuals alone let a
-false object raise the noise until it fits.
+There are two sources. *Roughness* needs no model: of three readings of one sensor in a row the middle one should lie
+between the outer two, whatever they hit. The *residuals* of sure objects discriminate far more finely, but only as
+far as the objects are right; so roughness decides what is possible, and both together what is likeliest. Residuals
+alone let a false object raise the noise until it fits.
 """
 
 from __future__ import annotations
@@ -12,23 +12,12 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
-from perception.bayes.likelihood import loglik
+from perception.bayes.likelihood import level_of, log_likelihood
+from perception.bayes.parameters import NOISES, Settings
 from perception.bayes.range_fit import FAR
-from perception.bayes.state import (
-    ESTABLISHED,
-    HITS,
-    KIND,
-    NOISE,
-    PROB,
-    REFS,
-    ST,
-    TRHO,
-    TX,
-    TY,
-    Settings,
-    State,
-)  # fmt: skip
+from perception.bayes.state import ESTABLISHED, CircleTrack, Reading, State
 from perception.kernel import Floats, kernel
+from perception.records import Records
 
 TWO_PI: Final = 2.0 * math.pi
 SIGMAS: Final = 3.0
@@ -38,94 +27,115 @@ TRIPLE_M: Final = 1.0 * FOOT_M
 BENT_M2: Final = 1e-4 * FOOT_M * FOOT_M
 """Variance that a curved surface adds."""
 FORGET: Final = 0.997
-"""What remains of the roughness heard so far after each triple: it remembers some three hundred."""
-ELSEWHERE_M: Final = 0.02 / FOOT_M
+"""What remains of the evidence from roughness after each triple: it remembers some three hundred."""
+ELSEWHERE_PER_M: Final = 0.02 / FOOT_M
 """Density of a middle reading that hit something else, 1/m."""
+BELL_SHARE: Final = 0.8
+"""Share of middle readings that hit the same surface."""
 BOX_M2: Final = 1e-6 * FOOT_M * FOOT_M
+"""Least variance of a range, so that perfect ones do not divide by zero."""
 SURE: Final = 0.95
+"""An object votes from this probability on …"""
 READINGS_MIN: Final = 25.0
+"""… and from this many hits on, …"""
 EVERY: Final = 3
-"""Only every third refinement of an object asks it."""
+"""… in every third of its refinements."""
 
 
 @kernel
-def noise_variance(s: State, p: Settings) -> tuple[float, float]:
-    """Return the variance of a range r that is believed in now, as var0 (m²) and rel2: var0 + rel2 · r²."""
-    h = int(s.g[NOISE])
-    return p.noises[h, 0] ** 2 + p.half_box**2 / 3.0 + BOX_M2, p.noises[h, 1] ** 2
+def noise_variance(s: Records[State], p: Records[Settings]) -> tuple[float, float]:
+    """Return the variance of a range r that is assumed now, as var0 (m²) and rel2: var0 + rel2 · r²."""
+    noise = p[0].noises[s[0].noise_level]
+    return noise.absolute_m**2 + p[0].half_resolution_m ** 2 / 3.0 + BOX_M2, noise.relative**2
 
 
 @kernel
-def reach_of(half_box: float, var: float) -> float:
+def tolerance_m(half_box: float, var: float) -> float:
     """Return how far off an explained range is at most, m: rounded by ± `half_box` (m), of variance `var` (m²)."""
     return half_box + SIGMAS * math.sqrt(var)
 
 
 @kernel
-def roughness(
-    a: Floats, b: Floats, c: Floats, now: float, gap: float, half_box: float, noises: Floats, heard: Floats
+def add_roughness(
+    a: Reading, b: Reading, c: Reading, age_s: float, p: Records[Settings], evidence: Floats
 ) -> None:  # fmt: skip
-    """Hear what three readings of one sensor say of each noise.
+    """Add what three readings of one sensor say of each noise.
 
     Parameters
     ----------
-    a, b, c : (6,) float
-        x, y, axis, range, time; the newest first.
-    now, gap, half_box, noises
-        Time (s) and `Settings`.
-    heard : (h,) float
-        `State.ddl`. Updated.
+    a, b, c : Reading
+        The newest first.
+    age_s : float
+        Age of the last.
+    p : (1,) Settings
+        The noises.
+    evidence : (NOISES,) float
+        `State.roughness_nat`. Updated.
     """
-    if b[4] >= FAR or c[4] >= FAR or now - c[5] > gap:
+    if b.range_m >= FAR or c.range_m >= FAR or age_s > p[0].pair_gap_s:
         return
-    ab = math.hypot(a[0] - b[0], a[1] - b[1])
-    bc = math.hypot(b[0] - c[0], b[1] - c[1])
+    ab = math.hypot(a.x - b.x, a.y - b.y)
+    bc = math.hypot(b.x - c.x, b.y - c.y)
     ac = ab + bc
     if ac > TRIPLE_M or ac == 0.0:
         return
     share = bc / ac
-    e = b[4] - share * a[4] - (1.0 - share) * c[4]
+    e = b.range_m - share * a.range_m - (1.0 - share) * c.range_m
     k = 1.0 + share * share + (1.0 - share) ** 2
-    for h in range(noises.shape[0]):
-        var = k * (noises[h, 0] ** 2 + (noises[h, 1] * b[4]) ** 2 + half_box**2 / 3.0) + BENT_M2
-        bell = 0.8 * math.exp(-0.5 * e * e / var) / math.sqrt(TWO_PI * var)
-        heard[h] = heard[h] * FORGET + math.log(bell + ELSEWHERE_M)
+    half_box = p[0].half_resolution_m
+    for h in range(NOISES):
+        noise = p[0].noises[h]
+        var = k * (noise.absolute_m**2 + (noise.relative * b.range_m) ** 2 + half_box**2 / 3.0) + BENT_M2
+        bell = BELL_SHARE * math.exp(-0.5 * e * e / var) / math.sqrt(TWO_PI * var)
+        evidence[h] = evidence[h] * FORGET + math.log(bell + ELSEWHERE_PER_M)
 
 
 @kernel
-def hear_residuals(s: State, p: Settings, t: int, n: int) -> None:
-    """Hear what the residuals of track `t`, whose `n` readings lie in `s.w`, say of each noise, if it is sure."""
-    if s.ti[t, ST] != ESTABLISHED or s.ti[t, REFS] % EVERY != 0 or s.ti[t, KIND] >= p.models:
+def add_residuals(s: Records[State], tracks: Records[CircleTrack], p: Records[Settings], t: int, n: int) -> None:
+    """Enter what the residuals of track `t` say of each noise, if it is sure.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    t : int
+        The track, whose `n` readings are the first of the scratch.
+    n : int
+        Readings.
+    """
+    track = tracks[t]
+    if track.status != ESTABLISHED or track.refinements % EVERY != 0 or track.kind >= p[0].model_count:
         return
-    for h in range(p.noises.shape[0]):
-        s.nll[t, h] = 0.0
-    if s.tf[t, PROB] < SURE or s.tf[t, HITS] < READINGS_MIN:
+    for h in range(NOISES):
+        track.noise_nat[h] = 0.0
+    if track.probability < SURE or track.hits < READINGS_MIN:
         return
     for j in range(n):
-        dx = s.tf[t, TX] - s.w[j, 0]
-        dy = s.tf[t, TY] - s.w[j, 1]
+        q = s[0].scratch.readings[j]
+        dx = track.x - q.x
+        dy = track.y - q.y
         d = math.sqrt(dx * dx + dy * dy)
-        e = s.w[j, 4] - (d - s.tf[t, TRHO])
-        if abs(e) < p.gate and dx * s.w[j, 2] + dy * s.w[j, 3] >= p.cos_half * d:
-            b = min(int(s.w[j, 4] * p.per_metre), p.levels.shape[1] - 1)
-            for h in range(p.noises.shape[0]):
-                s.nll[t, h] += loglik(p.table, p.inv_step, p.levels[h, b], e)
-    for h in range(p.noises.shape[0]):
-        s.ntot[h] = 0.0
-        for k in range(s.ti.shape[0]):
-            if s.ti[k, ST] == ESTABLISHED:
-                s.ntot[h] += s.nll[k, h]
+        e = q.range_m - (d - track.radius)
+        if abs(e) < p[0].gate_m and dx * q.axis_x + dy * q.axis_y >= p[0].cos_half_angle * d:
+            for h in range(NOISES):
+                track.noise_nat[h] += log_likelihood(p, level_of(p, h, q.range_m), e)
+    for h in range(NOISES):
+        s[0].residuals_nat[h] = 0.0
+        for k in range(len(tracks)):
+            if tracks[k].status == ESTABLISHED:
+                s[0].residuals_nat[h] += tracks[k].noise_nat[h]
 
 
 @kernel
-def choose_noise(s: State, p: Settings) -> None:
-    """Believe in the likeliest noise by both witnesses, among those that roughness does not rule out."""
+def choose_noise(s: Records[State], p: Records[Settings]) -> None:
+    """Assume the likeliest noise by both sources, among those that roughness does not rule out."""
+    state = s[0]
     top = -1e300
-    for h in range(p.noises.shape[0]):
-        top = max(top, s.ddl[h])
+    for h in range(NOISES):
+        top = max(top, state.roughness_nat[h])
     best = -1e300
-    for h in range(p.noises.shape[0]):
-        v = s.ddl[h] + s.ntot[h]
-        if s.ddl[h] > top - p.rough_gate and v > best:
+    for h in range(NOISES):
+        v = state.roughness_nat[h] + state.residuals_nat[h]
+        if state.roughness_nat[h] > top - p[0].roughness_gate_nat and v > best:
             best = v
-            s.g[NOISE] = h
+            state.noise_level = h

@@ -1,7 +1,6 @@
-"""One firing, taken in: who explains each reading, who keeps it, and what the unexplained ones propose.
+"""Processing of one firing: association of its readings, reservoirs, segments, noise, and new hypotheses.
 
-This is what runs always, at a cost that depends on the ring and on how many objects there are room for, and on
-nothing that has been before.
+This runs for every firing, at a cost that depends on the ring and on the number of tracks, and not on the past.
 """
 
 from __future__ import annotations
@@ -10,48 +9,39 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
-from perception.bayes.noise_estimation import choose_noise, noise_variance, reach_of, roughness
-from perception.bayes.polygon_association import poly_claims
-from perception.bayes.polygon_initiation import ask_for_polygon
+from perception.bayes.noise_estimation import add_roughness, choose_noise, noise_variance, tolerance_m
+from perception.bayes.parameters import SettingsRecord
+from perception.bayes.polygon_association import associate_polygons
+from perception.bayes.polygon_initiation import request_polygon
 from perception.bayes.range_fit import FAR
-from perception.bayes.reservoir import put
-from perception.bayes.segment_pairs import SEG, map_add, tangent
+from perception.bayes.reservoir import copy_reading, keep_reading
+from perception.bayes.segment_pairs import add_to_map, tangent
 from perception.bayes.state import (
-    DIRTY,
     ESTABLISHED,
     FREE,
-    HERE_X,
-    HERE_Y,
-    HK,
-    KIND,
-    POLISH,
-    QUIET,
-    R00,
-    SEGMENTS,
-    ST,
-    STAMP,
-    STAMP_S,
-    STAMPED,
+    HISTORY,
+    PROPOSED,
     TENTATIVE,
-    TRHO,
-    TX,
-    TY,
-    Settings,
-    State,
-)  # fmt: skip
-from perception.bayes.track_initiation import CELL_M, birth
+    UNEXPLAINED,
+    CircleTracks,
+    PairSegment,
+    Reading,
+    StateRecord,
+)
+from perception.bayes.track_initiation import CELL_M, initiate_circle
 from perception.bayes.track_selection import is_waiting
 from perception.bayes.walls import update_lines
-from perception.kernel import Floats, Ints, kernel
+from perception.kernel import Floats, kernel
+from perception.records import Records
 
 COORDINATE_MAX_M: Final = 0.5 * FAR
-"""A place this far from the odometry's origin is none: ranges as long as this mean silence."""
+"""A place farther than this from the odometry's origin is invalid: ranges as long as this mean silence."""
 STILL_M: Final = 0.05 * FOOT_M
 STILL_COS: Final = 0.9998
-"""A sensor that has moved less than this, turned less than this (1°), and hears what it heard has nothing to tell."""
-CLAIM_ASIDE_M: Final = 0.004 * FOOT_M
-KEEP_ASIDE_M: Final = 0.01 * FOOT_M
-"""How far outside a beam a centre may lie for the reading to be claimed, and kept."""
+"""A sensor that has moved less than this, turned less than this (1°), and hears what it heard says nothing new."""
+ASSOCIATION_MARGIN_M: Final = 0.004 * FOOT_M
+KEEPING_MARGIN_M: Final = 0.01 * FOOT_M
+"""How far outside a beam a centre may lie for the reading to be associated, and kept."""
 BASELINE_M: Final = 0.5 * FOOT_M
 """Shortest baseline of one sensor; the next ones are twice and four times this."""
 BASELINES: Final = 3
@@ -60,21 +50,27 @@ NEIGHBOUR_MIN_M: Final = 0.3 * FOOT_M
 NEIGHBOUR_MAX_M: Final = 1.0 * FOOT_M
 """Baselines of neighbours that did not fire together."""
 MAPPED_MIN_M: Final = 0.2 * FOOT_M
-"""A shorter segment's direction is worth nothing to the relaxation."""
+"""A shorter segment's direction is too poor for the relaxation."""
 TRIES: Final = 2
 """Hypotheses that are worked out in a firing, at most."""
 
 
 @kernel
 def place_readings(
-    s: State, p: Settings, mounts: Floats, px: float, py: float, yaw: float, ranges: Floats
+    s: StateRecord, p: SettingsRecord, mounts: Floats, px: float, py: float, yaw: float, ranges: Floats
 ) -> int:  # fmt: skip
-    """Enter what fired into `s.cur`, in the odometry's frame, and return how many said anything new.
+    """Write what fired, in the odometry's frame, to the scratch, and return how many readings said anything new.
 
-    A pose that is no place and a range that is no distance are left out: entered, they would stay in every sum.
+    An invalid pose or range is left out: entered, it would stay in every sum.
+
+    Parameters
+    ----------
+    s, p, mounts, px, py, yaw, ranges
+        As for `observe`.
     """
     if not (abs(px) < COORDINATE_MAX_M and abs(py) < COORDINATE_MAX_M and math.isfinite(yaw)):
         return 0
+    scratch = s[0].scratch
     c = math.cos(yaw)
     sn = math.sin(yaw)
     m = 0
@@ -82,263 +78,332 @@ def place_readings(
         r = ranges[i]
         if not r >= 0.0:  # nor NaN
             continue
-        if r >= p.range_max:
+        if r >= p[0].range_max_m:
             r = 2.0 * FAR
         x = px + c * mounts[i, 0] - sn * mounts[i, 1]
         y = py + sn * mounts[i, 0] + c * mounts[i, 1]
         ux = math.cos(yaw + mounts[i, 2])
         uy = math.sin(yaw + mounts[i, 2])
-        still = math.hypot(x - s.last[i, 0], y - s.last[i, 1]) < STILL_M
-        if still and abs(r - s.last[i, 4]) <= p.half_box and ux * s.last[i, 2] + uy * s.last[i, 3] > STILL_COS:
+        last = s[0].sensors[i].last
+        is_still = math.hypot(x - last.x, y - last.y) < STILL_M
+        if (
+            is_still
+            and abs(r - last.range_m) <= p[0].half_resolution_m
+            and ux * last.axis_x + uy * last.axis_y > STILL_COS
+        ):
             continue
-        s.cur[m, 0] = x
-        s.cur[m, 1] = y
-        s.cur[m, 2] = ux
-        s.cur[m, 3] = uy
-        s.cur[m, 4] = r
-        for z in range(5):
-            s.last[i, z] = s.cur[m, z]
-        s.cur[m, 5] = float(i)
-        s.owner[m] = -1
+        last.x = x
+        last.y = y
+        last.axis_x = ux
+        last.axis_y = uy
+        last.range_m = r
+        copy_reading(last, scratch.fired[m])
+        scratch.fired_sensors[m] = i
+        scratch.explained_by[m] = UNEXPLAINED
         m += 1
     return m
 
 
 @kernel
-def claim(s: State, p: Settings, m: int) -> None:
-    """Let established objects claim what they explain: the best match wins."""
+def associate_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int) -> None:
+    """Associate the first `m` fired readings with the established circles that explain them best."""
     var0, rel2 = noise_variance(s, p)
     for i in range(m):
-        if s.cur[i, 4] >= FAR:
+        q = s[0].scratch.fired[i]
+        if q.range_m >= FAR:
             continue
         best = FAR
-        for t in range(s.ti.shape[0]):
-            if s.ti[t, ST] != ESTABLISHED or (p.polys > 0 and s.ti[t, KIND] >= p.models):
+        for t in range(len(tracks)):
+            track = tracks[t]
+            if track.status != ESTABLISHED or (p[0].polygon_count > 0 and track.kind >= p[0].model_count):
                 continue
-            dx = s.tf[t, TX] - s.cur[i, 0]
-            dy = s.tf[t, TY] - s.cur[i, 1]
-            dot = dx * s.cur[i, 2] + dy * s.cur[i, 3]
+            dx = track.x - q.x
+            dy = track.y - q.y
+            dot = dx * q.axis_x + dy * q.axis_y
             d = math.sqrt(dx * dx + dy * dy)
-            if dot <= 0.0 or dot < p.cos_opt * d - CLAIM_ASIDE_M:
+            if dot <= 0.0 or dot < p[0].cos_may_answer * d - ASSOCIATION_MARGIN_M:
                 continue
-            e = abs(s.cur[i, 4] - (d - s.tf[t, TRHO]))
-            if e < best and e < reach_of(p.half_box, var0 + rel2 * d * d) + 2.0 * s.tf[t, R00]:
+            e = abs(q.range_m - (d - track.radius))
+            if e < best and e < tolerance_m(p[0].half_resolution_m, var0 + rel2 * d * d) + 2.0 * track.root_xx:
                 best = e
-                s.owner[i] = t
+                s[0].scratch.explained_by[i] = t
 
 
 @kernel
-def bears_on(
-    q: Floats, cx: float, cy: float, rho: float, is_free: bool, is_ours: bool, cos_opt: float, cos_in: float,
-    gate: float, silence_max: float,
+def bears_on_circle(
+    q: Reading, cx: float, cy: float, radius: float, is_free: bool, is_own: bool, p: SettingsRecord
 ) -> bool:  # fmt: skip
-    """Tell whether a reading says anything for or against a circle.
+    """Return whether a reading says anything for or against a circle.
 
     Parameters
     ----------
-    q : (6,) float
-        A row of `State.cur`.
-    cx, cy, rho : float
+    q : Reading
+        The reading.
+    cx, cy, radius : float
         Centre and radius, m.
-    is_free, is_ours : bool
-        Whether nothing else explains it; whether a hit on this circle would be taken to be its own.
-    cos_opt, cos_in, gate, silence_max
-        As in `Settings`; `silence_max` is `pair_max`.
+    is_free, is_own : bool
+        Whether nothing else explains it; whether a hit on this circle would be associated with it.
+    p : (1,) Settings
+        Beam and gate.
     """
-    dx = cx - q[0]
-    dy = cy - q[1]
-    dot = dx * q[2] + dy * q[3]
+    dx = cx - q.x
+    dy = cy - q.y
+    dot = dx * q.axis_x + dy * q.axis_y
     if dot <= 0.0:
         return False
     d = math.sqrt(dx * dx + dy * dy)
-    if dot < cos_opt * d - KEEP_ASIDE_M:
+    if dot < p[0].cos_may_answer * d - KEEPING_MARGIN_M:
         return False
-    e = q[4] - (d - rho)
-    if e < -gate:
-        return is_free and dot >= cos_in * d
-    if e > gate:
-        return dot >= cos_in * d and d <= silence_max
-    return is_ours
+    e = q.range_m - (d - radius)
+    if e < -p[0].gate_m:
+        return is_free and dot >= p[0].cos_must_answer * d
+    if e > p[0].gate_m:
+        return dot >= p[0].cos_must_answer * d and d <= p[0].pair_range_max_m
+    return is_own
 
 
 @kernel
-def keep(s: State, p: Settings, m: int) -> None:
-    """Let every object keep what bears on it."""
-    for t in range(s.ti.shape[0]):
-        if s.ti[t, ST] == FREE:
+def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int) -> None:
+    """Put each of the first `m` fired readings into the reservoirs of the circles that it bears on."""
+    for t in range(len(tracks)):
+        track = tracks[t]
+        if track.status == FREE:
             continue
-        s.ti[t, QUIET] += 1
-        cx = s.tf[t, TX]
-        cy = s.tf[t, TY]
-        rho = s.tf[t, TRHO]
+        track.idle_firings += 1
+        cx = track.x
+        cy = track.y
         for i in range(m):
-            owner = s.owner[i]
-            is_ours = owner == -1 or owner == t or (owner < 0 and s.ti[t, ST] != TENTATIVE)
-            if bears_on(s.cur[i], cx, cy, rho, owner == -1, is_ours, p.cos_opt, p.cos_in, p.gate, p.pair_max):
-                put(s.bins, s.bn, t, cx, cy, s.cur[i])
-                s.ti[t, DIRTY] += 1
-                s.ti[t, QUIET] = 0
-                s.ti[t, POLISH] = p.polish
+            q = s[0].scratch.fired[i]
+            owner = s[0].scratch.explained_by[i]
+            is_own = owner in (UNEXPLAINED, t) or (owner < 0 and track.status != TENTATIVE)
+            if bears_on_circle(q, cx, cy, track.radius, owner == UNEXPLAINED, is_own, p):
+                keep_reading(track, cx, cy, q)
+                track.unseen += 1
+                track.idle_firings = 0
+                track.final_refinements = p[0].final_refinements
 
 
 @kernel
-def pair(i: int, q: Floats, other: Floats, cos_half: float, var: float, segs: Floats, made: int) -> int:
-    """Make a segment of reading `i`, whose row is `q`, and an `other` one; return how many there are then."""
-    if other[4] >= FAR or made >= segs.shape[0]:
+def add_pair(s: StateRecord, p: SettingsRecord, i: int, other: Reading, var: float, made: int) -> int:
+    """Make a segment of fired reading `i` and another one; return how many segments there are then.
+
+    Parameters
+    ----------
+    s, p
+        Memory, whose scratch takes the segment, and settings.
+    i : int
+        The fired reading.
+    other : Reading
+        The other one.
+    var : float
+        Variance of a range, m².
+    made : int
+        Segments so far.
+    """
+    segments = s[0].scratch.segments
+    if other.range_m >= FAR or made >= len(segments):
         return made
-    if not tangent(
-        other[0], other[1], other[2], other[3], other[4], q[0], q[1], q[2], q[3], q[4], cos_half, var, segs[made]
-    ):
+    if not tangent(other, s[0].scratch.fired[i], p[0].cos_half_angle, var, segments[made]):
         return made
-    segs[made, SEG] = float(i)
+    segments[made].reading = i
     return made + 1
 
 
 @kernel
-def pair_in_time(
-    i: int, q: Floats, memory: Floats, kept: int, now: float, gap: float, cos_half: float, var: float, segs: Floats,
-    made: int,
-) -> int:  # fmt: skip
-    """Pair a reading with its own sensor's `memory`, at three baselines: a short one is early, a long one sure."""
+def pair_in_time(s: StateRecord, p: SettingsRecord, i: int, time_s: float, var: float, made: int) -> int:
+    """Pair a reading with its own sensor's history, at three baselines: a short one is early, a long one sure.
+
+    Parameters
+    ----------
+    s, p, i, var, made
+        As for `add_pair`.
+    time_s : float
+        Time of the firing.
+    """
+    q = s[0].scratch.fired[i]
+    sensor = s[0].sensors[s[0].scratch.fired_sensors[i]]
     step = 0
-    for back in range(min(kept, HK)):
-        old = memory[(kept - 1 - back) % HK]
-        if now - old[5] > gap:
+    for back in range(min(sensor.kept, HISTORY)):
+        at = (sensor.kept - 1 - back) % HISTORY
+        old = sensor.history[at]
+        if time_s - sensor.times_s[at] > p[0].pair_gap_s:
             break
-        base = math.hypot(q[0] - old[0], q[1] - old[1])
+        base = math.hypot(q.x - old.x, q.y - old.y)
         if base < BASELINE_M * (1 << step):
             continue
         if base > BASELINE_MAX_M:
             break
         step += 1
-        made = pair(i, q, old, cos_half, var, segs, made)
+        made = add_pair(s, p, i, old, var, made)
         if step == BASELINES:
             break
     return made
 
 
 @kernel
-def pair_in_ring(
-    i: int, cur: Floats, m: int, hist: Floats, hn: Ints, now: float, gap: float, cos_half: float, var: float,
-    segs: Floats, made: int,
-) -> int:  # fmt: skip
-    """Pair a reading with its neighbours' in the ring: of this firing, else their newest."""
-    sensors = hn.shape[0]
+def pair_in_ring(s: StateRecord, p: SettingsRecord, i: int, m: int, time_s: float, var: float, made: int) -> int:
+    """Pair a reading with its neighbours' in the ring: of this firing, else their newest.
+
+    Parameters
+    ----------
+    s, p, i, time_s, var, made
+        As for `pair_in_time`.
+    m : int
+        Fired readings.
+    """
+    fired, sensors = s[0].scratch.fired, s[0].scratch.fired_sensors
+    q = fired[i]
     for side in (-1, 1):
-        neighbour = (int(cur[i, 5]) + side) % sensors
-        if hn[neighbour] == 0:
+        neighbour = (sensors[i] + side) % s[0].sensor_count
+        other = s[0].sensors[neighbour]
+        if other.kept == 0:
             continue
-        fired = False
+        has_fired = False
         for k in (i - 1, i + 1, 0, m - 1):
-            if 0 <= k < m and int(cur[k, 5]) == neighbour:
+            if 0 <= k < m and sensors[k] == neighbour:
                 if side == 1:  # the other one makes the pair from its side
-                    made = pair(i, cur[i], cur[k], cos_half, var, segs, made)
-                fired = True
+                    made = add_pair(s, p, i, fired[k], var, made)
+                has_fired = True
                 break
-        if not fired:
-            old = hist[neighbour, (hn[neighbour] - 1) % HK]
-            base = math.hypot(cur[i, 0] - old[0], cur[i, 1] - old[1])
-            if now - old[5] < gap and NEIGHBOUR_MIN_M < base < NEIGHBOUR_MAX_M:
-                made = pair(i, cur[i], old, cos_half, var, segs, made)
+        if not has_fired:
+            at = (other.kept - 1) % HISTORY
+            old = other.history[at]
+            base = math.hypot(q.x - old.x, q.y - old.y)
+            if time_s - other.times_s[at] < p[0].pair_gap_s and NEIGHBOUR_MIN_M < base < NEIGHBOUR_MAX_M:
+                made = add_pair(s, p, i, old, var, made)
     return made
 
 
 @kernel
-def make_segments(s: State, p: Settings, m: int, now: float) -> int:
-    """Pair this firing's echoes in time and in the ring; return how many segments there are, and map them."""
+def map_segment(s: StateRecord, segment: PairSegment, time_s: float) -> None:
+    """Put a segment into the outline map, under the next number."""
+    s[0].segments_numbered += 1
+    add_to_map(
+        s[0].buckets, CELL_M, segment.x, segment.y, segment.normal_x, segment.normal_y, s[0].segments_numbered, time_s
+    )
+
+
+@kernel
+def make_segments(s: StateRecord, p: SettingsRecord, m: int, time_s: float) -> int:
+    """Pair this firing's echoes in time and in the ring, and map the segments; return how many there are.
+
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    m : int
+        Fired readings.
+    time_s : float
+        Time of the firing.
+    """
     var0, rel2 = noise_variance(s, p)
+    scratch = s[0].scratch
     made = 0
     for i in range(m):
-        r = s.cur[i, 4]
+        r = scratch.fired[i].range_m
         if r < FAR:
             var = var0 + rel2 * r * r
-            sensor = int(s.cur[i, 5])
-            made = pair_in_time(
-                i, s.cur[i], s.hist[sensor], s.hn[sensor], now, p.gap, p.cos_half, var, s.segs, made
-            )  # fmt: skip
-            made = pair_in_ring(i, s.cur, m, s.hist, s.hn, now, p.gap, p.cos_half, var, s.segs, made)
+            made = pair_in_time(s, p, i, time_s, var, made)
+            made = pair_in_ring(s, p, i, m, time_s, var, made)
     for k in range(made):
-        if s.segs[k, 4] > MAPPED_MIN_M:
-            bucket = map_add(s.segs[k], CELL_M, s.tags, s.fill, s.store)
-            at = (s.fill[bucket] - 1) % s.store.shape[1]
-            s.tally[STAMPED] += 1
-            s.stamps[bucket, at, STAMP] = s.tally[STAMPED]
-            s.stamps[bucket, at, STAMP_S] = now
-    s.g[SEGMENTS] += made
+        if scratch.segments[k].length > MAPPED_MIN_M:
+            map_segment(s, scratch.segments[k], time_s)
+    s[0].segments_made += made
     return made
 
 
 @kernel
-def remember(s: State, p: Settings, m: int, now: float) -> None:
-    """Enter this firing into the sensors' memories, spaced out, and hear how rough it is."""
+def update_history(s: StateRecord, p: SettingsRecord, m: int, time_s: float) -> None:
+    """Enter this firing into the sensors' histories, spaced out, and evaluate how rough it is.
+
+    Parameters
+    ----------
+    s, p, m, time_s
+        As for `make_segments`.
+    """
     for i in range(m):
-        sensor = int(s.cur[i, 5])
-        kept = s.hn[sensor]
+        q = s[0].scratch.fired[i]
+        sensor = s[0].sensors[s[0].scratch.fired_sensors[i]]
+        kept = sensor.kept
+        last = (kept - 1) % HISTORY
+        before = (kept - 2) % HISTORY
         if kept > 0:
-            old = s.hist[sensor, (kept - 1) % HK]
-            near = math.hypot(s.cur[i, 0] - old[0], s.cur[i, 1] - old[1]) < p.spacing
-            if near and now - old[5] < p.gap:
+            is_near = math.hypot(q.x - sensor.history[last].x, q.y - sensor.history[last].y) < p[0].history_spacing_m
+            if is_near and time_s - sensor.times_s[last] < p[0].pair_gap_s:
                 continue
-        if kept > 1 and s.cur[i, 4] < FAR:
-            roughness(
-                s.cur[i], s.hist[sensor, (kept - 1) % HK], s.hist[sensor, (kept - 2) % HK], now, p.gap, p.half_box,
-                p.noises, s.ddl,
-            )  # fmt: skip
-        row = s.hist[sensor, kept % HK]
-        for z in range(5):
-            row[z] = s.cur[i, z]
-        row[5] = now
-        s.hn[sensor] += 1
+        if kept > 1 and q.range_m < FAR:
+            add_roughness(
+                q,
+                sensor.history[last],
+                sensor.history[before],
+                time_s - sensor.times_s[before],
+                p,
+                s[0].roughness_nat,
+            )
+        copy_reading(q, sensor.history[kept % HISTORY])
+        sensor.times_s[kept % HISTORY] = time_s
+        sensor.kept += 1
 
 
 @kernel
-def propose(s: State, p: Settings, made: int, now: float) -> None:
-    """Start hypotheses from what nothing explains, the surest segments first."""
+def surest_segment(segments: Records[PairSegment], s: StateRecord, p: SettingsRecord) -> int:
+    """Return the unexplained segment behind which a centre would be known best; −1 where none is good enough."""
+    chosen = -1
+    best = p[0].hypothesis_sigma_m
+    for k in range(len(segments)):
+        i = segments[k].reading
+        r = s[0].scratch.fired[i].range_m
+        if s[0].scratch.explained_by[i] == UNEXPLAINED and r <= p[0].pair_range_max_m:
+            sigma = segments[k].sigma_direction * (r + p[0].circles[0].radius_m)
+            if sigma < best:
+                best = sigma
+                chosen = k
+    return chosen
+
+
+@kernel
+def propose(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, made: int) -> None:
+    """Start hypotheses from unexplained segments, the surest first.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    made : int
+        Segments of this firing.
+    """
+    segments = s[0].scratch.segments[:made]
     tries = 0
-    for _ in range(p.attempts):
-        chosen = -1
-        best = p.hyp_sigma
-        for k in range(made):
-            i = int(s.segs[k, SEG])
-            if s.owner[i] == -1 and s.cur[i, 4] <= p.pair_max:
-                aside = s.segs[k, 6] * (s.cur[i, 4] + p.radii[0])
-                if aside < best:
-                    best = aside
-                    chosen = k
+    for _ in range(p[0].attempts_per_firing):
+        chosen = surest_segment(segments, s, p)
         if chosen < 0:
             return
-        x, y, nx, ny = s.segs[chosen, 0], s.segs[chosen, 1], s.segs[chosen, 2], s.segs[chosen, 3]
-        for kind in range(max(1, p.models)):
-            tries += birth(s, p, kind, x, y, nx, ny, now)
-        for model in range(p.polys):
-            tries += ask_for_polygon(s, model, x, y, nx, ny)
-        s.owner[int(s.segs[chosen, SEG])] = -100
+        at = segments[chosen]
+        x, y, nx, ny = at.x, at.y, at.normal_x, at.normal_y
+        for kind in range(max(1, p[0].model_count)):
+            tries += initiate_circle(s, tracks, p, kind, x, y, nx, ny)
+        for model in range(p[0].polygon_count):
+            tries += request_polygon(s, model, x, y, nx, ny)
+        s[0].scratch.explained_by[at.reading] = PROPOSED
         if tries >= TRIES:
             return
 
 
 @kernel
 def observe(
-    s: State,
-    p: Settings,
-    mounts: Floats,
-    px: float,
-    py: float,
-    yaw: float,
-    now: float,
-    ranges: Floats,
-    threshold: float,
-) -> tuple[int, bool]:
-    """Take in one firing; everything but refinement.
+    s: StateRecord, tracks: CircleTracks, p: SettingsRecord, mounts: Floats, px: float, py: float, yaw: float,
+    time_s: float, ranges: Floats, threshold: float,
+) -> tuple[int, bool]:  # fmt: skip
+    """Process one firing; everything but refinement.
 
     Parameters
     ----------
-    s, p
-        Memory, updated, and settings.
+    s, tracks, p
+        Memory and circles, updated, and settings.
     mounts : (n, 3) float
         x, y (m), direction (rad) of each sensor in the ring's frame.
-    px, py, yaw, now : float
-        Place (m) and direction (rad) of the ring, time (s).
+    px, py, yaw, time_s : float
+        Place (m) and direction (rad) of the ring, and the time.
     ranges : (n,) float
         m; NaN did not fire, inf heard nothing.
     threshold : float
@@ -347,19 +412,20 @@ def observe(
     Returns
     -------
     (int, bool)
-        Outline segments made, and whether an object waits for refinement.
+        Outline segments made, and whether a circle waits for refinement.
     """
-    m = place_readings(s, p, mounts, px, py, yaw, ranges) if math.isfinite(now) else 0
+    m = place_readings(s, p, mounts, px, py, yaw, ranges) if math.isfinite(time_s) else 0
     if m > 0:
-        s.g[HERE_X], s.g[HERE_Y] = px, py
-    claim(s, p, m)
-    if p.polys > 0:
+        s[0].ring_x = px
+        s[0].ring_y = py
+    associate_circles(s, tracks, p, m)
+    if p[0].polygon_count > 0:
         var0, _ = noise_variance(s, p)
-        poly_claims(s, p, m, reach_of(p.half_box, var0))
+        associate_polygons(s, tracks, p, m, tolerance_m(p[0].half_resolution_m, var0))
     update_lines(s, p, m)
-    keep(s, p, m)
-    made = make_segments(s, p, m, now)
-    remember(s, p, m, now)
+    keep_readings(s, tracks, p, m)
+    made = make_segments(s, p, m, time_s)
+    update_history(s, p, m, time_s)
     choose_noise(s, p)
-    propose(s, p, made, now)
-    return made, is_waiting(s, p, threshold)
+    propose(s, tracks, p, made)
+    return made, is_waiting(tracks, p, threshold)

@@ -1,7 +1,7 @@
-"""Which readings bear on an object at all, seeing what else is known to stand there.
+"""Which readings bear on an object, given what else is known to stand there.
 
-Two things that a body cannot help are left out before it is judged. What hides it: a known body between a sensor and
-it swallows the way there and back, though its own surface may look elsewhere and answer nothing, so that silence from
+Two kinds of readings are left out before a body is judged. What is hidden: a known body between a sensor and this one
+swallows the way there and back, though its own surface may face elsewhere and answer nothing, so that silence from
 behind it says nothing. And what another object explains better: a row of drums has one tangent, and a drum is hidden
 by the one before it, so with the echoes of that one in the sum a wall along all of them wins.
 """
@@ -10,80 +10,125 @@ from __future__ import annotations
 
 import math
 
-from perception.bayes.noise_estimation import noise_variance, reach_of
-from perception.bayes.state import ESTABLISHED, KIND, R00, ST, TRHO, TX, TY, Settings, State
-from perception.kernel import Floats, kernel
+from perception.bayes.noise_estimation import noise_variance, tolerance_m
+from perception.bayes.parameters import Settings
+from perception.bayes.reservoir import copy_reading
+from perception.bayes.state import ESTABLISHED, CircleTrack, Reading, State
+from perception.kernel import kernel
+from perception.records import Records
 
 
 @kernel
-def is_hidden(s: State, x: float, y: float, cx: float, cy: float, d: float, rho: float, own: int) -> bool:
-    """Tell whether an established circle, `own` apart, lies on the way from (x, y) to a circle about (cx, cy)."""
-    ux = (cx - x) / d
-    uy = (cy - y) / d
-    for t in range(s.ti.shape[0]):
-        if s.ti[t, ST] != ESTABLISHED or t == own:
-            continue
-        dx = s.tf[t, TX] - x
-        dy = s.tf[t, TY] - y
-        if 0.0 < dx * ux + dy * uy < d - rho and abs(dx * uy - dy * ux) < s.tf[t, TRHO]:
-            return True
-    return False
-
-
-@kernel
-def is_anothers(
-    s: State, p: Settings, q: Floats, cx: float, cy: float, off: float, own: int, var0: float, rel2: float
+def is_hidden(
+    tracks: Records[CircleTrack], x: float, y: float, cx: float, cy: float, d: float, radius: float, own: int
 ) -> bool:
-    """Tell whether an established circle elsewhere explains reading `q`, and better than by `off`."""
-    for t in range(s.ti.shape[0]):
-        if s.ti[t, ST] != ESTABLISHED or t == own or (p.polys > 0 and s.ti[t, KIND] >= p.models):
-            continue
-        if math.hypot(s.tf[t, TX] - cx, s.tf[t, TY] - cy) < p.merge:
-            continue
-        dx = s.tf[t, TX] - q[0]
-        dy = s.tf[t, TY] - q[1]
-        d = math.sqrt(dx * dx + dy * dy)
-        e = abs(q[4] - (d - s.tf[t, TRHO]))
-        tight = reach_of(p.half_box, var0 + rel2 * d * d) + 2.0 * s.tf[t, R00]
-        if dx * q[2] + dy * q[3] >= p.cos_opt * d and e < min(off, tight):
-            return True
-    return False
-
-
-@kernel
-def speaks(
-    s: State, p: Settings, q: Floats, cx: float, cy: float, rho: float, own: int, var0: float, rel2: float
-) -> bool:  # fmt: skip
-    """Tell whether reading `q` can speak of a circle: nothing hides it, and nobody explains the reading better."""
-    d = math.hypot(cx - q[0], cy - q[1])
-    e = q[4] - (d - rho)
-    if e > p.gate:
-        return not (d > rho and is_hidden(s, q[0], q[1], cx, cy, d, rho, own))
-    return not is_anothers(s, p, q, cx, cy, abs(e), own, var0, rel2)
-
-
-@kernel
-def audible(s: State, p: Settings, n: int, cx: float, cy: float, rho: float, own: int) -> int:
-    """Leave out of the `n` readings in `s.w` what cannot speak of a circle; return how many remain.
+    """Return whether an established circle other than `own` lies on the way from (x, y) to a circle about (cx, cy).
 
     Parameters
     ----------
-    s, p
-        Memory, of which `s.w` is packed anew, and settings.
+    tracks : (n,) CircleTrack
+        The circles.
+    x, y : float
+        Where the way begins, m.
+    cx, cy, d, radius : float
+        The circle, and the distance of its centre, m.
+    own : int
+        Its track.
+    """
+    ux = (cx - x) / d
+    uy = (cy - y) / d
+    for t in range(len(tracks)):
+        track = tracks[t]
+        if track.status != ESTABLISHED or t == own:
+            continue
+        dx = track.x - x
+        dy = track.y - y
+        if 0.0 < dx * ux + dy * uy < d - radius and abs(dx * uy - dy * ux) < track.radius:
+            return True
+    return False
+
+
+@kernel
+def is_explained_elsewhere(
+    tracks: Records[CircleTrack], p: Records[Settings], q: Reading, cx: float, cy: float, off: float, own: int,
+    var0: float, rel2: float,
+) -> bool:  # fmt: skip
+    """Return whether an established circle elsewhere explains a reading, and better than by `off`.
+
+    Parameters
+    ----------
+    tracks, p
+        The circles and the settings.
+    q : Reading
+        The reading.
+    cx, cy, off : float
+        The circle's centre, and by how much it misses the reading, m.
+    own : int
+        Its track.
+    var0, rel2 : float
+        From `noise_variance`.
+    """
+    for t in range(len(tracks)):
+        track = tracks[t]
+        if track.status != ESTABLISHED or t == own or (p[0].polygon_count > 0 and track.kind >= p[0].model_count):
+            continue
+        if math.hypot(track.x - cx, track.y - cy) < p[0].merge_m:
+            continue
+        dx = track.x - q.x
+        dy = track.y - q.y
+        d = math.sqrt(dx * dx + dy * dy)
+        e = abs(q.range_m - (d - track.radius))
+        tight = tolerance_m(p[0].half_resolution_m, var0 + rel2 * d * d) + 2.0 * track.root_xx
+        if dx * q.axis_x + dy * q.axis_y >= p[0].cos_may_answer * d and e < min(off, tight):
+            return True
+    return False
+
+
+@kernel
+def is_relevant(
+    tracks: Records[CircleTrack], p: Records[Settings], q: Reading, cx: float, cy: float, radius: float, own: int,
+    var0: float, rel2: float,
+) -> bool:  # fmt: skip
+    """Return whether a reading bears on a circle: nothing hides it, and no other circle explains the reading better.
+
+    Parameters
+    ----------
+    tracks, p, q, cx, cy, own, var0, rel2
+        As for `is_explained_elsewhere`.
+    radius : float
+        The circle's, m.
+    """
+    d = math.hypot(cx - q.x, cy - q.y)
+    e = q.range_m - (d - radius)
+    if e > p[0].gate_m:
+        return not (d > radius and is_hidden(tracks, q.x, q.y, cx, cy, d, radius, own))
+    return not is_explained_elsewhere(tracks, p, q, cx, cy, abs(e), own, var0, rel2)
+
+
+@kernel
+def keep_relevant(
+    s: Records[State], tracks: Records[CircleTrack], p: Records[Settings], n: int, cx: float, cy: float,
+    radius: float, own: int,
+) -> int:  # fmt: skip
+    """Drop from the first `n` readings of the scratch those that do not bear on a circle; return how many remain.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory, whose scratch is packed, circles, and settings.
     n : int
         Readings.
-    cx, cy, rho : float
+    cx, cy, radius : float
         Centre and radius, m.
     own : int
-        The circle's track; −1 where it is none yet.
+        The circle's track; −1 where it has none yet.
     """
     var0, rel2 = noise_variance(s, p)
+    readings = s[0].scratch.readings
     kept = 0
     for j in range(n):
-        q = s.w[j]
-        if speaks(s, p, q, cx, cy, rho, own, var0, rel2):
+        if is_relevant(tracks, p, readings[j], cx, cy, radius, own, var0, rel2):
             if kept != j:
-                for z in range(5):
-                    s.w[kept, z] = q[z]
+                copy_reading(readings[j], readings[kept])
             kept += 1
     return kept

@@ -1,112 +1,131 @@
-"""Pinned segments of the Bayesian method's outline map, and segments taken out of it.
+"""Pinned segments of the Bayesian method's outline map, and segments deleted from it.
 
-The map forgets by being written over: a cell's newest segments push out its oldest, and a bucket whose hash another
-cell wants changes hands. So what is pinned is kept beside the map as well, and put in again whenever it has gone. Not
-all of a bucket may be pinned; the rest goes on as ever.
+The map forgets by overwriting: a cell's newest segments push out its oldest, and a bucket whose hash another cell
+wants changes hands. So what is pinned is kept separately as well, and put in again whenever it has gone. Not all of a
+bucket may be pinned; the rest is used as ever.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from perception.bayes.segment_pairs import map_add
-from perception.bayes.state import STAMP, State
+from perception.bayes.segment_pairs import add_to_map
+from perception.bayes.state import BUCKET_CAPACITY, MappedSegment, Memory, StateRecord
 from perception.bayes.track_initiation import CELL_M
-from perception.kernel import Floats, Ints
+from perception.kernel import Ints, kernel
+from perception.records import zeros
 
-ROOM: Final = 512
+PINS_MAX: Final = 512
 """Segments pinned at a time."""
-FREE_PLACES: Final = 2
+UNPINNED_MIN: Final = 2
 """So many of a bucket are never pinned."""
+
+
+@kernel
+def restore_segment(s: StateRecord, x: float, y: float, nx: float, ny: float, number: int, time_s: float) -> None:
+    """Put a segment into the map again; the parameters are those of `add_to_map`."""
+    add_to_map(s[0].buckets, CELL_M, x, y, nx, ny, number, time_s)
 
 
 class Pins:
     """What is pinned: a copy of each segment."""
 
     def __init__(self) -> None:
-        self.rows = np.zeros((ROOM, 4))
-        """(ROOM, 4): middle x, y (m) and unit normal; the first `count` are valid."""
-        self.stamps = np.zeros((ROOM, 2))
-        """(ROOM, 2): number and time, as in `State.stamps`."""
-        self.buckets = np.zeros(ROOM, np.int64)
+        self.segments = zeros(MappedSegment, PINS_MAX)
+        """The first `count` are valid."""
+        self.buckets = np.zeros(PINS_MAX, np.int64)
+        """The bucket of each."""
         self.count = 0
 
     @property
-    def numbers(self) -> Floats:
+    def numbers(self) -> Ints:
         """The pinned segments' numbers."""
-        return self.stamps[: self.count, STAMP]
+        return self.segments["number"][: self.count]
 
-    def renew(self, s: State) -> None:
+    def renew(self, memory: Memory) -> None:
         """Put into the map what has gone from it."""
-        buckets = self.buckets[: self.count]
-        held = np.arange(s.store.shape[1]) < s.fill[buckets, None]
-        is_there = (held & (s.stamps[buckets, :, STAMP] == self.numbers[:, None])).any(axis=1)
+        buckets = memory.state["buckets"][0][self.buckets[: self.count]]
+        held = np.arange(BUCKET_CAPACITY) < buckets["count"][:, None]
+        is_there = (held & (buckets["segments"]["number"] == self.numbers[:, None])).any(axis=1)
         for k in np.flatnonzero(~is_there):
-            bucket = map_add(self.rows[k], CELL_M, s.tags, s.fill, s.store)
-            s.stamps[bucket, (s.fill[bucket] - 1) % s.store.shape[1]] = self.stamps[k]
+            restore_segment(memory.s, *self.segments[k].item())
 
-    def add(self, s: State, numbers: Collection[int]) -> tuple[set[int], set[int]]:
+    def add(self, memory: Memory, numbers: Collection[int]) -> tuple[set[int], set[int]]:
         """Pin segments; return the numbers that are not in the map, and those for which there is no room."""
-        found = where(s, numbers).tolist()
-        there = {int(s.stamps[k, j, STAMP]) for k, j in found}
-        held, full = set(self.numbers.astype(np.int64).tolist()), set[int]()
+        buckets = memory.state["buckets"][0]
+        found = places_of(memory, numbers).tolist()
+        there = {int(buckets["segments"]["number"][k, j]) for k, j in found}
+        held, full = set(self.numbers.tolist()), set[int]()
         for bucket, j in found:
-            number = int(s.stamps[bucket, j, STAMP])
+            segment = buckets["segments"][bucket, j]
+            number = int(segment["number"])
             if number in held:
                 continue
-            if self.count == ROOM or not self._has_room(s, bucket, s.store[bucket, j]):
+            if self.count == PINS_MAX or not self._has_room(bucket, segment):
                 full.add(number)
                 continue
-            self.rows[self.count] = s.store[bucket, j]
-            self.stamps[self.count] = s.stamps[bucket, j]
+            self.segments[self.count] = segment
             self.buckets[self.count] = bucket
             self.count += 1
         return set(numbers) - there, full
 
     def remove(self, numbers: Collection[int]) -> set[int]:
-        """Let segments go; return the numbers that were not pinned."""
-        stays = ~np.isin(self.numbers, np.array(sorted(numbers), np.float64))
-        missing = set(numbers) - set(self.numbers[~stays].astype(np.int64).tolist())
+        """Release segments; return the numbers that were not pinned."""
+        stays = ~np.isin(self.numbers, np.array(sorted(numbers), np.int64))
+        missing = set(numbers) - set(self.numbers[~stays].tolist())
         left = int(np.count_nonzero(stays))
-        for array in (self.rows, self.stamps, self.buckets):
+        for array in (self.segments, self.buckets):
             array[:left] = array[: self.count][stays]
-            array[left:] = 0
+            array[left:] = np.zeros((), array.dtype)
         self.count = left
         return missing
 
     def clear(self) -> None:
-        """Let all go."""
-        self.rows[:], self.stamps[:], self.buckets[:] = 0.0, 0.0, 0
+        """Release all."""
+        self.segments[:], self.buckets[:] = np.zeros((), self.segments.dtype), 0
         self.count = 0
 
-    def _has_room(self, s: State, bucket: int, row: Floats) -> bool:
-        """Tell whether another segment can be pinned in a bucket: not the last two, and of one cell only."""
-        others = self.rows[: self.count][self.buckets[: self.count] == bucket]
-        same = np.floor(others[:, :2] / CELL_M) == np.floor(row[:2] / CELL_M)
-        return len(others) < s.store.shape[1] - FREE_PLACES and bool(same.all())
+    def _has_room(self, bucket: int, segment: Any) -> bool:  # noqa: ANN401 - numpy's record
+        """Return whether another segment can be pinned in a bucket: not the last two, and of one cell only."""
+        others = self.segments[: self.count][self.buckets[: self.count] == bucket]
+        is_same = (np.floor(others["x"] / CELL_M) == np.floor(segment["x"] / CELL_M)) & (
+            np.floor(others["y"] / CELL_M) == np.floor(segment["y"] / CELL_M)
+        )
+        return len(others) < BUCKET_CAPACITY - UNPINNED_MIN and bool(is_same.all())
 
 
-def where(s: State, numbers: Collection[int]) -> Ints:
+def places_of(memory: Memory, numbers: Collection[int]) -> Ints:
     """Return the places in the map of the segments of these numbers: bucket and which in it, shape (n, 2)."""
-    places = np.argwhere(np.arange(s.store.shape[1]) < s.fill[:, None])
-    wanted = np.array(sorted(numbers), np.float64)
-    return places[np.isin(s.stamps[places[:, 0], places[:, 1], STAMP], wanted)]
+    buckets: NDArray[Any] = memory.state["buckets"][0]
+    places = np.argwhere(np.arange(BUCKET_CAPACITY) < buckets["count"][:, None])
+    wanted = np.array(sorted(numbers), np.int64)
+    return places[np.isin(buckets["segments"]["number"][places[:, 0], places[:, 1]], wanted)]
 
 
-def delete(s: State, pins: Pins, numbers: Collection[int]) -> set[int]:
-    """Take segments out of the map; return the numbers that are not there."""
-    doomed = where(s, numbers)
-    gone = set(s.stamps[doomed[:, 0], doomed[:, 1], STAMP].astype(np.int64).tolist())
-    capacity = s.store.shape[1]
-    for k in np.unique(doomed[:, 0]).tolist():
-        held = min(int(s.fill[k]), capacity)
-        oldest_first = (int(s.fill[k]) - held + np.arange(held)) % capacity
-        left = oldest_first[~np.isin(oldest_first, doomed[doomed[:, 0] == k, 1])]
-        for array in (s.store, s.stamps):
-            array[k, : len(left)] = array[k, left]
-        s.fill[k] = len(left)
+def delete(memory: Memory, pins: Pins, numbers: Collection[int]) -> set[int]:
+    """Delete segments from the map; return the numbers that are not there.
+
+    Parameters
+    ----------
+    memory, pins
+        Updated.
+    numbers : collection of int
+        Which segments.
+    """
+    buckets = memory.state["buckets"][0]
+    deleted = places_of(memory, numbers)
+    gone = set(buckets["segments"]["number"][deleted[:, 0], deleted[:, 1]].tolist())
+    for k in np.unique(deleted[:, 0]).tolist():
+        count = int(buckets["count"][k])
+        held = min(count, BUCKET_CAPACITY)
+        oldest_first = (count - held + np.arange(held)) % BUCKET_CAPACITY
+        left = oldest_first[~np.isin(oldest_first, deleted[deleted[:, 0] == k, 1])]
+        segments = buckets["segments"][k]
+        segments[: len(left)] = segments[left]
+        buckets["count"][k] = len(left)
     pins.remove(gone)
     return set(numbers) - gone

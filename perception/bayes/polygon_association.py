@@ -1,153 +1,162 @@
-"""Whose reading is it: what established polygons claim, and what a polygon leaves to its neighbours."""
+"""Association of readings with polygons: what established ones explain, and what one leaves to its neighbours."""
 
 from __future__ import annotations
 
 import math
 from typing import Final
 
-from perception.bayes.noise_estimation import noise_variance, reach_of
+from perception.bayes.noise_estimation import noise_variance, tolerance_m
+from perception.bayes.parameters import PolygonSide, SettingsRecord
 from perception.bayes.polygon_initiation import WHOLE
-from perception.bayes.polygon_job import HEARD, NEXT, cost, ear_of, sides_of
-from perception.bayes.polygon_likelihood import Ear, predict
-from perception.bayes.polygon_readings import bears
-from perception.bayes.reservoir import put
+from perception.bayes.polygon_job import cost
+from perception.bayes.polygon_likelihood import predict
+from perception.bayes.polygon_readings import bears_on_polygon
+from perception.bayes.reservoir import copy_reading, keep_reading
 from perception.bayes.state import (
-    DIRTY,
     ESTABLISHED,
     FREE,
-    KIND,
-    MODEL,
-    PHITS,
-    PNEAR,
-    POLISH,
-    PTH,
-    PX,
-    PY,
-    QUIET,
-    ST,
-    Settings,
-    State,
+    MAX_POLYGONS,
+    POLYGON,
+    CircleTracks,
+    PolygonTrack,
+    Reading,
+    StateRecord,
 )
-from perception.kernel import Floats, kernel
+from perception.kernel import kernel
+from perception.records import Records
 
-POLYGON: Final = 1000
-"""What polygon t explains belongs to this plus t in `State.owner`."""
 OVERLAP: Final = 1.8
-"""Two bodies whose centres are nearer than this, in inner radii, cannot both be there."""
+"""Two bodies whose centres are nearer than this, in inner radii, cannot both exist."""
 
 
 @kernel
-def miss_of(q: Floats, track: Floats, faces: Floats, closed: bool, ear: Ear) -> float:
+def range_error(
+    q: Reading, track: PolygonTrack, sides: Records[PolygonSide], is_closed: bool, p: SettingsRecord
+) -> float:  # fmt: skip
     """Return by how much a reading misses the nearer of what a body would answer by either rule, m.
 
     Parameters
     ----------
-    q : (≥ 5,) float
-        The reading: place (m), unit axis, range (m).
-    track : (≥ 3,) float
-        A row of `State.pf`: pose, m, rad.
-    faces, closed, ear
-        As for `polygon.predict`.
+    q, track
+        The reading and the body.
+    sides, is_closed, p
+        As for `polygon_likelihood.predict`.
     """
-    dx = q[0] - track[PX]
-    dy = q[1] - track[PY]
-    c = math.cos(track[PTH])
-    sn = math.sin(track[PTH])
+    dx = q.x - track.x
+    dy = q.y - track.y
+    c = math.cos(track.heading)
+    sn = math.sin(track.heading)
     mirror, _, _, cone, _ = predict(
-        c * dx + sn * dy, -sn * dx + c * dy, c * q[2] + sn * q[3], -sn * q[2] + c * q[3], faces, closed, ear
-    )
-    return float(min(abs(q[4] - mirror), abs(q[4] - cone)))
+        c * dx + sn * dy, -sn * dx + c * dy, c * q.axis_x + sn * q.axis_y, -sn * q.axis_x + c * q.axis_y, sides,
+        is_closed, p,
+    )  # fmt: skip
+    return min(abs(q.range_m - mirror), abs(q.range_m - cone))
 
 
 @kernel
-def poly_claims(s: State, p: Settings, m: int, tight: float) -> None:
-    """Let established polygons claim what they explain, and all keep what bears on them.
+def associate_polygons(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int, tight: float) -> None:
+    """Associate fired readings with the established polygons that explain them, and let each keep what bears on it.
 
     Parameters
     ----------
-    s, p
-        Memory, updated, and settings.
+    s, tracks, p
+        Memory, updated, circles and settings.
     m : int
-        Readings in `s.cur`.
+        Fired readings.
     tight : float
         How far off an explained range is at most, m.
     """
-    ear = ear_of(p)
-    for t in range(s.pi.shape[0]):
-        if s.pi[t, ST] == FREE:
+    for t in range(MAX_POLYGONS):
+        track = s[0].polygons[t]
+        if track.status == FREE:
             continue
-        s.pi[t, QUIET] += 1
-        model = s.pi[t, MODEL]
-        x = s.pf[t, PX]
-        y = s.pf[t, PY]
-        bound = p.bound[model]
-        faces = p.faces[model, : sides_of(p, model)]
-        may_claim = s.pi[t, ST] == ESTABLISHED and s.pf[t, PHITS] > WHOLE * s.pf[t, PNEAR]
+        track.idle_firings += 1
+        outline = p[0].polygons[track.model]
+        sides = outline.sides[: outline.side_count]
+        x = track.x
+        y = track.y
+        may_explain = track.status == ESTABLISHED and track.hits > WHOLE * track.near
         for i in range(m):
-            q = s.cur[i]
-            if not bears(q[0], q[1], q[2], q[3], q[4], x, y, bound, ear.cos_half, ear.sin_half, p.gate, p.pair_max):
+            q = s[0].scratch.fired[i]
+            if not bears_on_polygon(q, x, y, outline.outer_radius_m, p):
                 continue
-            owner = s.owner[i]
-            if 0 <= owner < POLYGON and s.ti[owner, KIND] < p.models:
+            owner = s[0].scratch.explained_by[i]
+            if 0 <= owner < POLYGON and tracks[owner].kind < p[0].model_count:
                 continue
-            put(s.pbins, s.pbn, t, x, y, q)
-            s.pi[t, DIRTY] += 1
-            s.pi[t, QUIET] = 0
-            s.pi[t, POLISH] = p.polish
-            if may_claim and miss_of(q, s.pf[t], faces, p.closed[model] > 0, ear) < tight:
-                s.owner[i] = POLYGON + t
+            keep_reading(track, x, y, q)
+            track.unseen += 1
+            track.idle_firings = 0
+            track.final_refinements = p[0].final_refinements
+            if may_explain and range_error(q, track, sides, outline.is_closed > 0, p) < tight:
+                s[0].scratch.explained_by[i] = POLYGON + t
 
 
 @kernel
-def hides(q: Floats, x: float, y: float, inner: float, ux: float, uy: float, u_inner: float) -> bool:
-    """Tell whether a body at (ux, uy) stands between the place of a reading and one at (x, y)."""
-    dx = x - q[0]
-    dy = y - q[1]
-    ex = ux - q[0]
-    ey = uy - q[1]
+def hides(q: Reading, track: PolygonTrack, inner: float, other: PolygonTrack, other_inner: float) -> bool:
+    """Return whether another body stands between the place of a reading and a track's.
+
+    Parameters
+    ----------
+    q, track, other
+        The reading, the track and the other body.
+    inner, other_inner : float
+        Their inner radii, m.
+    """
+    dx = track.x - q.x
+    dy = track.y - q.y
+    ex = other.x - q.x
+    ey = other.y - q.y
     d = math.hypot(dx, dy)
     if d == 0.0:
         return False
     ahead = (dx * ex + dy * ey) / d
     aside = abs(dx * ey - dy * ex) / d
-    return 0.0 < ahead < d and bool(aside < u_inner + 0.5 * inner)
+    return 0.0 < ahead < d and bool(aside < other_inner + 0.5 * inner)
 
 
 @kernel
-def leave_to_next_neighbour(s: State, p: Settings, t: int) -> int:
+def leave_to_next_neighbour(s: StateRecord, p: SettingsRecord, t: int) -> int:
     """Drop from the job's readings what the next established neighbour explains better; return what that cost.
 
     Where bodies all but touch, the echo of one's corner is an outlier to the other, and a dozen are a force; so
-    is the silence of what stands in the shade.
+    is the silence of what the neighbour hides.
+
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    t : int
+        The track.
     """
-    u = s.job[NEXT]
-    s.job[NEXT] += 1
-    n = s.job[HEARD]
-    if u == t or s.pi[u, ST] != ESTABLISHED:
+    job = s[0].job
+    u = job.next_step
+    job.next_step += 1
+    n = job.reading_count
+    own = s[0].polygons[t]
+    other = s[0].polygons[u]
+    if u == t or other.status != ESTABLISHED:
         return 1
-    own = s.pf[t]
-    other = s.pf[u]
-    model = s.pi[t, MODEL]
-    u_model = s.pi[u, MODEL]
-    apart = math.hypot(other[PX] - own[PX], other[PY] - own[PY])
-    if apart > p.bound[model] + p.gate + p.bound[u_model] or apart < OVERLAP * p.inner[model]:
+    outline = p[0].polygons[own.model]
+    other_outline = p[0].polygons[other.model]
+    inner, other_inner = outline.inner_radius_m, other_outline.inner_radius_m
+    apart = math.hypot(other.x - own.x, other.y - own.y)
+    if apart > outline.outer_radius_m + p[0].gate_m + other_outline.outer_radius_m or apart < OVERLAP * inner:
         return 1
     var0, _ = noise_variance(s, p)
-    tight = reach_of(p.half_box, var0)
-    ear = ear_of(p)
-    faces = p.faces[model, : sides_of(p, model)]
-    u_faces = p.faces[u_model, : sides_of(p, u_model)]
+    tight = tolerance_m(p[0].half_resolution_m, var0)
+    sides = outline.sides[: outline.side_count]
+    other_sides = other_outline.sides[: other_outline.side_count]
+    readings = s[0].job_readings
     kept = 0
     for j in range(n):
-        q = s.pw[j]
-        ours = miss_of(q, own, faces, p.closed[model] > 0, ear)
-        theirs = miss_of(q, other, u_faces, p.closed[u_model] > 0, ear)
+        q = readings[j]
+        ours = range_error(q, own, sides, outline.is_closed > 0, p)
+        theirs = range_error(q, other, other_sides, other_outline.is_closed > 0, p)
         if theirs < tight and theirs < ours:
             continue
-        if ours > p.gate and hides(q, own[PX], own[PY], p.inner[model], other[PX], other[PY], p.inner[u_model]):
+        if ours > p[0].gate_m and hides(q, own, inner, other, other_inner):
             continue
-        for z in range(5):
-            s.pw[kept, z] = q[z]
+        copy_reading(q, readings[kept])
         kept += 1
-    s.job[HEARD] = kept
-    return cost(n, 1, faces.shape[0] + u_faces.shape[0])
+    job.reading_count = kept
+    return cost(n, 1, len(sides) + len(other_sides))

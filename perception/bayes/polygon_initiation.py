@@ -1,8 +1,8 @@
 """Hypotheses of polygons: each distinct side of a model laid on a segment that nothing explains.
 
 As for circles the paper's relaxation moves the body onto the outline map, and the raw readings that the sensors
-remember decide. Along a side, contact says little, so each side is tried shifted as well. To propose one takes no
-time; to try it is a job.
+remember decide. Along a side, the readings say little, so each side is tried shifted as well. To request a hypothesis
+takes no time; to try it is a job.
 """
 
 from __future__ import annotations
@@ -11,299 +11,387 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
+from perception.bayes.parameters import SettingsRecord
 from perception.bayes.polygon_job import (
-    BIRTH,
-    FOUND,
-    FOUND_LLR,
-    HEARD,
-    HISS,
-    JOB,
-    NEXT,
-    QUESTIONS,
-    SEGMENT,
-    STAGE,
-    WHO,
+    INITIATION,
+    advance_search,
     end_job,
-    seek,
-    seek_on,
-    sought,
-    weigh_pose,
+    is_search_over,
+    score_pose,
+    start_search,
 )
-from perception.bayes.polygon_likelihood import BEST, THETA, X, Y
-from perception.bayes.polygon_readings import collect
-from perception.bayes.range_fit import HITS as HIT
-from perception.bayes.range_fit import NEAR as NEARBY
-from perception.bayes.reservoir import put
-from perception.bayes.segment_pairs import map_near
+from perception.bayes.polygon_readings import gather_polygon_history
+from perception.bayes.reservoir import copy_reading, keep_reading
+from perception.bayes.segment_pairs import segments_near
 from perception.bayes.state import (
-    CTH,
-    CX,
-    CY,
-    DIRTY,
+    ATTRACTING_MAX,
     ESTABLISHED,
     FREE,
-    MODEL,
-    NOISE,
-    PHITS,
-    PLLR,
-    PNEAR,
-    PTH,
-    PULLING,
-    PX,
-    PY,
-    RIVAL,
-    ST,
+    MAX_POLYGONS,
+    POLYGON,
+    REQUESTS_MAX,
     TENTATIVE,
-    Settings,
-    State,
-)  # fmt: skip
-from perception.bayes.track_initiation import CELL_M, GAMMA, free_track, let_pull
-from perception.bayes.track_labels import POLYGON as POLYGON_BAR
-from perception.bayes.track_labels import give_number, is_barred
-from perception.kernel import Floats, kernel
-from perception.relaxation import relax
+    PolygonTrack,
+    Reading,
+    StateRecord,
+)
+from perception.bayes.track_initiation import CELL_M, enter_attracting, free_track, relax_hypothesis
+from perception.bayes.track_labels import assign_number, is_rejected
+from perception.kernel import kernel
+from perception.records import Records
 
 LAY, TRY, FINE = range(3)
-"""Stages of a birth: a side is laid on the segment, tried, and the best trial is looked at closely."""
-GATHERING: Final = 800
-"""What gathering readings costs, in the job's currency."""
+"""Stages of a hypothesis, values of `PolygonJob.stage`: a side is laid on the segment, tried, and the best trial is
+looked at closely."""
+GATHERING_COST: Final = 800
+"""What gathering readings costs, in the unit of `polygon_job.QUANTUM`."""
 SAME_M: Final = 0.25 * FOOT_M
 SAME_COS: Final = 0.98
-"""A segment this near to another one, and this parallel, asks the same."""
+"""A segment this near to another one, and this parallel, makes the same request."""
 AROUND_M: Final = 0.3 * FOOT_M
-"""Segments up to this far off the farthest vertex may pull."""
+"""Segments up to this far off the farthest vertex may attract the body."""
 RELAXATIONS: Final = 3
 NEGLIGIBLE_M: Final = 0.01 * FOOT_M
 NEGLIGIBLE_RAD: Final = 0.01
+"""Steps of the relaxation at most; it ends with increments below both."""
 SHIFTS: Final = (-0.3, 0.0, 0.3)
 """Where on a side the segment is laid, from its middle, in lengths of the side."""
 READINGS_MIN: Final = 8
+"""A trial needs so many readings."""
 TRIAL_READINGS: Final = 80
-"""A trial weighs this many readings at most: it only has to be likelier than the other trials."""
+"""A trial scores this many readings at most: it only has to be likelier than the other trials."""
 TRIAL_STEP_M: Final = 0.2 * FOOT_M
 TRIAL_ROUNDS: Final = 8
-TRIAL_MIN: Final = 15.0
-"""The best trial must have this much evidence, nat."""
+"""First step and rounds of a trial's search."""
+TRIAL_MIN_NAT: Final = 15.0
+"""The best trial must have this much evidence."""
 FINE_STEP_M: Final = 0.1 * FOOT_M
 FINE_ROUNDS: Final = 10
+"""First step and rounds of the search from the best trial."""
 HITS_MIN: Final = 6.0
+"""A track starts with so many hits."""
 WHOLE: Final = 0.9
-"""A track that explains this share of what is near stands where it is …"""
+"""A track that explains this share of what is near is right where it is …"""
 APART_WHOLE: Final = 1.5
 APART: Final = 0.5
-"""… and nothing like it is begun this near, in inner radii; any other one gives way sooner."""
-CHALLENGE_DIRTY: Final = 8
-"""A challenger is worth so many unseen readings."""
+"""… and nothing like it starts this near, in inner radii; any other one gives way sooner."""
+CHALLENGE_UNSEEN: Final = 8
+"""A challenger counts as so many unseen readings."""
 
 
 @kernel
-def pgather(s: State, p: Settings, model: int, cx: float, cy: float) -> int:
-    """Copy to `s.pw` what the sensors remember that bears on a polygon at (cx, cy); return how many.
+def gather_job_readings(s: StateRecord, p: SettingsRecord, model: int, cx: float, cy: float) -> int:
+    """Copy to the job what the sensors remember that bears on a polygon at (cx, cy); return how many readings.
 
     Where that is more than there is room for, it is thinned out evenly: the sensors lie there one after another.
+    The parameters are those of `gather_polygon_history`.
     """
-    n = collect(
-        s.hist, s.hn, cx, cy, p.bound[model], p.cos_half, math.sin(p.half_angle), p.gate, p.pair_max, s.w
-    )  # fmt: skip
-    kept = min(n, s.pw.shape[0])
+    n = gather_polygon_history(s, p, model, cx, cy)
+    kept = min(n, len(s[0].job_readings))
     for j in range(kept):
-        for z in range(5):
-            s.pw[j, z] = s.w[j * n // kept, z]
-    return int(kept)
+        copy_reading(s[0].scratch.readings[j * n // kept], s[0].job_readings[j])
+    return kept
 
 
 @kernel
-def taken_by(s: State, p: Settings, model: int, x: float, y: float) -> int:
-    """Return which track of the same model stands at (x, y) already, −1 if none does."""
-    for t in range(s.pi.shape[0]):
-        if s.pi[t, ST] != FREE and s.pi[t, MODEL] == model:
-            is_whole = s.pi[t, ST] == ESTABLISHED and s.pf[t, PHITS] > WHOLE * s.pf[t, PNEAR]
-            apart = (APART_WHOLE if is_whole else APART) * p.inner[model]
-            if math.hypot(x - s.pf[t, PX], y - s.pf[t, PY]) < apart:
-                return int(t)
+def occupant(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float) -> int:
+    """Return which track of the same model is at (x, y) already, −1 if none is.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    model : int
+        Which polygon.
+    x, y : float
+        m.
+    """
+    for t in range(MAX_POLYGONS):
+        track = s[0].polygons[t]
+        if track.status != FREE and track.model == model:
+            is_whole = track.status == ESTABLISHED and track.hits > WHOLE * track.near
+            apart = (APART_WHOLE if is_whole else APART) * p[0].polygons[model].inner_radius_m
+            if math.hypot(x - track.x, y - track.y) < apart:
+                return t
     return -1
 
 
 @kernel
-def relax_polygon(s: State, p: Settings, model: int, sides: int) -> None:
-    """Move the hypothesis in `s.pose` by the paper's relaxation (§3.4): the map pulls its first `sides` sides."""
-    near = map_near(s.pose[0], s.pose[1], p.bound[model] + AROUND_M, CELL_M, s.tags, s.fill, s.store, s.near)
-    pulling = min(near, PULLING)
-    for j in range(pulling):
-        let_pull(s.near[j], s.pull[j])
-    relax(
-        p.psides[model, :sides], s.pull, s.all_pull[:pulling], GAMMA, NEGLIGIBLE_M, NEGLIGIBLE_RAD, RELAXATIONS,
-        s.pose,
-    )  # fmt: skip
+def relax_polygon(s: StateRecord, p: SettingsRecord, model: int) -> None:
+    """Move the scratch's hypothesis by the paper's relaxation (§3.4): the map's segments attract its sides."""
+    scratch = s[0].scratch
+    hypothesis = scratch.hypothesis
+    outline = p[0].polygons[model]
+    near = segments_near(
+        s[0].buckets, CELL_M, hypothesis.x, hypothesis.y, outline.outer_radius_m + AROUND_M, scratch.near
+    )
+    attracting = min(near, ATTRACTING_MAX)
+    for j in range(attracting):
+        enter_attracting(scratch.near[j], scratch.attracting[j])
+    relax_hypothesis(
+        s, outline.relaxation_sides[: outline.side_count], attracting, NEGLIGIBLE_M, NEGLIGIBLE_RAD, RELAXATIONS
+    )
 
 
 @kernel
 def lay_side(
-    s: State, p: Settings, model: int, k: int, shift: float, sx: float, sy: float, nx: float, ny: float
+    s: StateRecord, p: SettingsRecord, model: int, k: int, shift: float, x: float, y: float, nx: float, ny: float
 ) -> None:
-    """Set `s.pose` so that side `k`, `shift` lengths off its middle, lies on a segment and looks against (nx, ny)."""
-    k2 = (k + 1) % p.nv[model]
-    tx = p.verts[model, k2, 0] - p.verts[model, k, 0]
-    ty = p.verts[model, k2, 1] - p.verts[model, k, 1]
-    x = 0.5 * (p.verts[model, k, 0] + p.verts[model, k2, 0]) + shift * tx
-    y = 0.5 * (p.verts[model, k, 1] + p.verts[model, k2, 1]) + shift * ty
-    theta = math.atan2(-ny, -nx) - math.atan2(-tx, ty)
-    c = math.cos(theta)
-    sn = math.sin(theta)
-    s.pose[0] = sx - (c * x - sn * y)
-    s.pose[1] = sy - (sn * x + c * y)
-    s.pose[2] = theta
-
-
-@kernel
-def begin_polygon(s: State, model: int, x: float, y: float, theta: float, llr: float) -> None:
-    """Found a tentative track on the job's readings, where there is room."""
-    t = free_track(s.pi, s.pf[:, PLLR], s.names[s.ti.shape[0] :])
-    if t >= 0:
-        begin_polygon_at(s, t, model, x, y, theta, s.pw, s.job[HEARD])
-        s.pf[t, PLLR] = llr
-        give_number(s.names, s.tally, s.ti.shape[0] + t)
-
-
-@kernel
-def begin_polygon_at(
-    s: State, t: int, model: int, x: float, y: float, theta: float, w: Floats, n: int
-) -> None:  # fmt: skip
-    """Make track `t` a tentative one on `n` readings in `w`."""
-    s.pi[t, :] = 0
-    s.pf[t, :] = 0.0
-    s.pbn[t, :] = 0
-    s.pi[t, ST] = TENTATIVE
-    s.pi[t, MODEL] = model
-    s.pi[t, DIRTY] = n
-    s.pf[t, PX] = x
-    s.pf[t, PY] = y
-    s.pf[t, PTH] = theta
-    for j in range(n):
-        put(s.pbins, s.pbn, t, x, y, w[j])
-
-
-@kernel
-def challenge(s: State, t: int, x: float, y: float, theta: float) -> None:
-    """Have track `t` try a pose on its own readings: its place is right, and its pose perhaps is not."""
-    s.pi[t, RIVAL] = 1
-    s.pi[t, DIRTY] += CHALLENGE_DIRTY
-    s.pf[t, CX] = x
-    s.pf[t, CY] = y
-    s.pf[t, CTH] = theta
-
-
-@kernel
-def ask_for_polygon(s: State, model: int, sx: float, sy: float, nx: float, ny: float) -> int:
-    """Note that a polygon shall be tried behind a segment; return 1, or 0 where that has been asked of late.
+    """Set the scratch's hypothesis so that a side lies on a segment and faces against its normal.
 
     Parameters
     ----------
-    s
+    s, p
+        Memory and settings.
+    model, k : int
+        Which polygon, and which of its sides.
+    shift : float
+        How far off the side's middle the segment lies, in lengths of the side.
+    x, y, nx, ny : float
+        The segment's middle (m) and unit normal.
+    """
+    outline = p[0].polygons[model]
+    begin = outline.sides[k]
+    end = outline.sides[(k + 1) % outline.vertex_count]
+    tx = end.x - begin.x
+    ty = end.y - begin.y
+    side_x = 0.5 * (begin.x + end.x) + shift * tx
+    side_y = 0.5 * (begin.y + end.y) + shift * ty
+    heading = math.atan2(-ny, -nx) - math.atan2(-tx, ty)
+    c = math.cos(heading)
+    sn = math.sin(heading)
+    hypothesis = s[0].scratch.hypothesis
+    hypothesis.x = x - (c * side_x - sn * side_y)
+    hypothesis.y = y - (sn * side_x + c * side_y)
+    hypothesis.heading = heading
+
+
+@kernel
+def start_polygon(s: StateRecord, model: int, x: float, y: float, heading: float, evidence_nat: float) -> None:
+    """Start a tentative track on the job's readings, where there is room.
+
+    Parameters
+    ----------
+    s : (1,) State
         Memory, updated.
     model : int
         Which polygon.
-    sx, sy, nx, ny : float
+    x, y, heading : float
+        Its pose, m, rad.
+    evidence_nat : float
+        Its log ratio.
+    """
+    t = free_track(s[0].polygons)
+    if t >= 0:
+        track = s[0].polygons[t]
+        restart_polygon(track, model, x, y, heading, s[0].job_readings[: s[0].job.reading_count])
+        track.log_likelihood_ratio = evidence_nat
+        assign_number(s, track)
+
+
+@kernel
+def reset_polygon(track: PolygonTrack) -> None:
+    """Set a polygon's track to zero, but for its number, its marks and the readings beyond the counts of its bins."""
+    track.status = FREE
+    track.unseen = 0
+    track.reservoir = 0
+    track.refinements = 0
+    track.idle_firings = 0
+    track.final_refinements = 0
+    track.passed_over = 0
+    track.x = 0.0
+    track.y = 0.0
+    track.log_likelihood_ratio = 0.0
+    track.hits = 0.0
+    track.near = 0.0
+    track.probability = 0.0
+    track.model = 0
+    track.has_challenger = 0
+    track.heading = 0.0
+    track.sure_hits = 0.0
+    track.covariance.xx = 0.0
+    track.covariance.yx = 0.0
+    track.covariance.yy = 0.0
+    track.covariance.hx = 0.0
+    track.covariance.hy = 0.0
+    track.covariance.hh = 0.0
+    track.challenger.x = 0.0
+    track.challenger.y = 0.0
+    track.challenger.heading = 0.0
+    for b in range(len(track.bins)):
+        track.bins[b].count = 0
+
+
+@kernel
+def restart_polygon(
+    track: PolygonTrack, model: int, x: float, y: float, heading: float, readings: Records[Reading]
+) -> None:  # fmt: skip
+    """Make a track a tentative one on some readings.
+
+    Parameters
+    ----------
+    track : PolygonTrack
+        Updated, but for its number and its marks.
+    model, x, y, heading
+        Which polygon, and its pose, m, rad.
+    readings : (n,) Reading
+        Raw ranges.
+    """
+    reset_polygon(track)
+    track.status = TENTATIVE
+    track.model = model
+    track.unseen = len(readings)
+    track.x = x
+    track.y = y
+    track.heading = heading
+    for j in range(len(readings)):
+        keep_reading(track, x, y, readings[j])
+
+
+@kernel
+def challenge(s: StateRecord, t: int, x: float, y: float, heading: float) -> None:
+    """Have track `t` try another pose on its own readings: its place is right, and its pose perhaps is not."""
+    track = s[0].polygons[t]
+    track.has_challenger = 1
+    track.unseen += CHALLENGE_UNSEEN
+    track.challenger.x = x
+    track.challenger.y = y
+    track.challenger.heading = heading
+
+
+@kernel
+def request_polygon(s: StateRecord, model: int, x: float, y: float, nx: float, ny: float) -> int:
+    """Note that a polygon shall be tried behind a segment; return 1, or 0 where that was requested recently.
+
+    Parameters
+    ----------
+    s : (1,) State
+        Memory, updated.
+    model : int
+        Which polygon.
+    x, y, nx, ny : float
         The segment's middle (m) and unit normal, away from the sensors.
     """
-    for k in range(min(s.job[QUESTIONS], s.asked.shape[0])):
-        ask = s.asked[k]
-        if ask[0] == model and math.hypot(sx - ask[1], sy - ask[2]) < SAME_M and nx * ask[3] + ny * ask[4] > SAME_COS:
+    job = s[0].job
+    for k in range(min(job.requests_made, REQUESTS_MAX)):
+        it = s[0].requests[k]
+        if (
+            it.model == model
+            and math.hypot(x - it.x, y - it.y) < SAME_M
+            and nx * it.normal_x + ny * it.normal_y > SAME_COS
+        ):
             return 0
-    ask = s.asked[s.job[QUESTIONS] % s.asked.shape[0]]
-    ask[0] = model
-    ask[1] = sx
-    ask[2] = sy
-    ask[3] = nx
-    ask[4] = ny
-    ask[5] = 0.0
-    s.job[QUESTIONS] += 1
+    request = s[0].requests[job.requests_made % REQUESTS_MAX]
+    request.model = model
+    request.x = x
+    request.y = y
+    request.normal_x = nx
+    request.normal_y = ny
+    request.is_done = 0
+    job.requests_made += 1
     return 1
 
 
 @kernel
-def next_birth(s: State) -> bool:
-    """Begin with the newest segment that waits; return whether one did."""
-    for back in range(1, min(s.job[QUESTIONS], s.asked.shape[0]) + 1):
-        ask = s.asked[(s.job[QUESTIONS] - back) % s.asked.shape[0]]
-        if ask[5] == 0.0:
-            ask[5] = 1.0
-            s.job[JOB] = BIRTH
-            s.job[STAGE] = LAY
-            s.job[WHO] = int(ask[0])
-            s.job[NEXT] = 0
-            s.job[HISS] = int(s.g[NOISE])
-            s.work[FOUND_LLR] = -math.inf
-            for z in range(4):
-                s.work[SEGMENT + z] = ask[1 + z]
+def next_request(s: StateRecord) -> bool:
+    """Begin a job with the newest segment that waits; return whether one did."""
+    job = s[0].job
+    for back in range(1, min(job.requests_made, REQUESTS_MAX) + 1):
+        request = s[0].requests[(job.requests_made - back) % REQUESTS_MAX]
+        if request.is_done == 0:
+            request.is_done = 1
+            job.kind = INITIATION
+            job.stage = LAY
+            job.model = request.model
+            job.next_step = 0
+            job.noise_level = s[0].noise_level
+            job.best_nat = -math.inf
+            job.segment_x = request.x
+            job.segment_y = request.y
+            job.segment_normal_x = request.normal_x
+            job.segment_normal_y = request.normal_y
             return True
     return False
 
 
 @kernel
-def ways_to_lie(p: Settings, model: int) -> int:
+def ways_to_lie(p: SettingsRecord, model: int) -> int:
     """Return how many sides of a model can lie on a segment and look different, either face of an open one's."""
-    if p.closed[model] > 0:
-        return max(1, int(p.nv[model] // p.sym[model]))
-    return int(2 * (p.nv[model] - 1))
+    outline = p[0].polygons[model]
+    if outline.is_closed > 0:
+        return max(1, outline.vertex_count // outline.symmetry)
+    return 2 * (outline.vertex_count - 1)
 
 
 @kernel
-def lay_next(s: State, p: Settings) -> int:
-    """Lay the next side on the segment and set out from there, or from the best of all; return what that cost."""
-    model = s.job[WHO]
-    sides = p.nv[model] if p.closed[model] > 0 else p.nv[model] - 1
-    seg = s.work[SEGMENT : SEGMENT + 4]
-    k = s.job[NEXT] // len(SHIFTS)
+def lay_next(s: StateRecord, p: SettingsRecord) -> int:
+    """Lay the next side on the segment and search from there, or from the best trial; return what that cost."""
+    job = s[0].job
+    model = job.model
+    sides = p[0].polygons[model].side_count
+    k = job.next_step // len(SHIFTS)
     if k >= ways_to_lie(p, model):
-        if s.work[FOUND_LLR] < TRIAL_MIN:
+        if job.best_nat < TRIAL_MIN_NAT:
             end_job(s)
             return 1
-        s.job[HEARD] = pgather(s, p, model, s.work[FOUND], s.work[FOUND + 1])
-        seek(s, s.work[FOUND], s.work[FOUND + 1], s.work[FOUND + 2], FINE_STEP_M, FINE_ROUNDS, s.pw.shape[0])
-        s.job[STAGE] = FINE
-        return GATHERING
-    shift = SHIFTS[s.job[NEXT] % len(SHIFTS)]
-    hand = 1.0 if k < sides else -1.0
-    lay_side(s, p, model, k % sides, shift, seg[0], seg[1], hand * seg[2], hand * seg[3])
-    s.job[NEXT] += 1
+        job.reading_count = gather_job_readings(s, p, model, job.best.x, job.best.y)
+        start_search(
+            s, job.best.x, job.best.y, job.best.heading, FINE_STEP_M, FINE_ROUNDS, len(s[0].job_readings)
+        )  # fmt: skip
+        job.stage = FINE
+        return GATHERING_COST
+    shift = SHIFTS[job.next_step % len(SHIFTS)]
+    face = 1.0 if k < sides else -1.0
+    nx, ny = face * job.segment_normal_x, face * job.segment_normal_y
+    lay_side(s, p, model, k % sides, shift, job.segment_x, job.segment_y, nx, ny)
+    job.next_step += 1
     if shift == 0.0:
-        relax_polygon(s, p, model, sides)
-    s.job[HEARD] = pgather(s, p, model, s.pose[0], s.pose[1])
-    if s.job[HEARD] >= READINGS_MIN:
-        seek(s, s.pose[0], s.pose[1], s.pose[2], TRIAL_STEP_M, TRIAL_ROUNDS, TRIAL_READINGS)
-        s.job[STAGE] = TRY
-    return GATHERING
+        relax_polygon(s, p, model)
+    hypothesis = s[0].scratch.hypothesis
+    job.reading_count = gather_job_readings(s, p, model, hypothesis.x, hypothesis.y)
+    if job.reading_count >= READINGS_MIN:
+        start_search(
+            s, hypothesis.x, hypothesis.y, hypothesis.heading, TRIAL_STEP_M, TRIAL_ROUNDS, TRIAL_READINGS
+        )  # fmt: skip
+        job.stage = TRY
+    return GATHERING_COST
 
 
 @kernel
-def try_polygon(s: State, p: Settings, left: int) -> int:
-    """Go on with a birth for what is left of a quantum; return what that cost."""
-    model = s.job[WHO]
-    if s.job[STAGE] == LAY:
-        return int(lay_next(s, p))
-    spent = seek_on(s, p, model, left)
-    if not sought(s):
-        return int(spent)
-    if s.job[STAGE] == TRY:
-        s.job[STAGE] = LAY
-        if s.work[BEST] > s.work[FOUND_LLR]:
-            s.work[FOUND] = s.work[X]
-            s.work[FOUND + 1] = s.work[Y]
-            s.work[FOUND + 2] = s.work[THETA]
-            s.work[FOUND_LLR] = s.work[BEST]
-        return int(spent)
-    x = s.work[X]
-    y = s.work[Y]
-    theta = s.work[THETA]
-    llr = weigh_pose(s, p, model, x, y, theta)
-    enough = llr >= p.unknown * s.stats[NEARBY] and s.stats[HIT] >= HITS_MIN
-    if enough:
-        t = taken_by(s, p, model, x, y)
+def advance_initiation(s: StateRecord, p: SettingsRecord, left: int) -> int:
+    """Continue a hypothesis for the rest of a quantum; return what that cost.
+
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    left : int
+        What is left of the quantum.
+    """
+    job = s[0].job
+    model = job.model
+    if job.stage == LAY:
+        return lay_next(s, p)
+    spent = advance_search(s, p, model, left)
+    if not is_search_over(s):
+        return spent
+    found = job.search
+    if job.stage == TRY:
+        job.stage = LAY
+        if found.log_likelihood_ratio > job.best_nat:
+            job.best.x = found.x
+            job.best.y = found.y
+            job.best.heading = found.heading
+            job.best_nat = found.log_likelihood_ratio
+        return spent
+    evidence = score_pose(s, p, model, found.x, found.y, found.heading)
+    score = s[0].scratch.score
+    if evidence >= p[0].unknown_nat * score.near and score.hits >= HITS_MIN:
+        t = occupant(s, p, model, found.x, found.y)
         if t < 0:
-            if not is_barred(s, x, y, POLYGON_BAR + model, llr):
-                begin_polygon(s, model, x, y, theta, llr)
+            if not is_rejected(s, found.x, found.y, POLYGON + model, evidence):
+                start_polygon(s, model, found.x, found.y, found.heading, evidence)
         else:
-            challenge(s, t, x, y, theta)
+            challenge(s, t, found.x, found.y, found.heading)
     end_job(s)
-    return int(spent)
+    return spent

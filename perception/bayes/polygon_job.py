@@ -1,102 +1,110 @@
-"""One piece of work on polygons at a time, in quanta: what is being done, how far it has come, and what it costs.
+"""One job on polygons at a time, in quanta: what is being done, how far it has come, and what it costs.
 
 To look for a polygon's pose, or for how well it is known, takes thousands of predicted ranges, more than fits
-between two firings. So the work is a job that stops wherever a quantum is spent and goes on from there; its readings
-are copied when it begins, so that all that it compares is weighed on the same ones. Here is what jobs of both kinds
-are made of: the births' and the tracks'.
+between two firings. So the work is a job that stops wherever a quantum is spent and continues from there; its
+readings are copied when it begins, so that all that it compares is scored on the same ones. Here is what hypotheses
+and refinements have in common.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
-from perception.bayes.polygon_likelihood import LEFT, Ear, begin_search, score_poly, search
-from perception.bayes.state import Settings, State
+from perception.bayes.parameters import SettingsRecord
+from perception.bayes.polygon_likelihood import begin_search, continue_search, score_polygon
+from perception.bayes.state import Pose, StateRecord
 from perception.kernel import kernel
 
 QUANTUM: Final = 22_000
-"""What a quantum may cost: sides asked for a range, and what takes as long."""
-A_READING: Final = 3
+"""What a quantum may cost: sides whose range is predicted, and what takes as long."""
+READING_COST: Final = 3
 """What a reading costs, in sides, besides the model's own."""
 
-# Cells of `State.job`: which kind of job, its stage, its track or model, its readings, the step between those that a
-# search weighs, the noise believed when it began, where a stage has come to, lattices laid, births and refinements
-# taken in turn, segments ever asked about; from `SEARCHING` on the counts of the search.
-JOB, STAGE, WHO, HEARD, EVERY, HISS, NEXT, LAID, BY_TURNS, QUESTIONS, SEARCHING = range(11)
-NO_JOB, BIRTH, TRACK = range(3)
-
-# Cells of `State.work`: from 0 on the numbers of the search, then the best pose of several searches and its evidence,
-# the segment (its middle and normal), and the lattice: its middle, its root, the evidence at its middle, its
-# covariance, its mass and moments.
-FOUND: Final = 5
-FOUND_LLR: Final = 8
-SEGMENT: Final = 9
-MIDDLE: Final = 13
-ROOT: Final = 16
-TOP: Final = 22
-COV: Final = 23
-MOMENTS: Final = 29
+NO_JOB, INITIATION, REFINEMENT = range(3)
+"""Values of `PolygonJob.kind`."""
 
 
 @kernel
-def ear_of(p: Settings) -> Ear:
-    """Return what contact is told of the sensors."""
-    return Ear(
-        p.cos_opt, p.cos_in, p.cos_half, math.sin(p.half_angle), math.sqrt(1.0 - p.cos_in * p.cos_in), p.gate, p.miss,
-        p.short, p.per_metre,
+def cost(readings: int, every: int, sides: int) -> int:
+    """Return what it costs to score a pose on every so many of the readings, in the unit of `QUANTUM`."""
+    return (readings + every - 1) // every * (READING_COST + sides)
+
+
+@kernel
+def copy_pose(source: Pose, target: Pose) -> None:
+    """Copy a pose."""
+    target.x = source.x
+    target.y = source.y
+    target.heading = source.heading
+
+
+@kernel
+def start_search(s: StateRecord, x: float, y: float, heading: float, step_m: float, rounds: int, most: int) -> None:
+    """Begin a search from a pose, on at most `most` of the job's readings.
+
+    Parameters
+    ----------
+    s : (1,) State
+        Memory, updated.
+    x, y, heading, step_m, rounds
+        As for `polygon_likelihood.begin_search`.
+    most : int
+        Readings.
+    """
+    job = s[0].job
+    begin_search(job.search, x, y, heading, step_m, rounds)
+    job.reading_step = max(1, (job.reading_count + most - 1) // most)
+
+
+@kernel
+def is_search_over(s: StateRecord) -> bool:
+    """Return whether the job's search is over."""
+    return s[0].job.search.rounds_left == 0
+
+
+@kernel
+def advance_search(s: StateRecord, p: SettingsRecord, model: int, left: int) -> int:
+    """Continue the job's search for the rest of a quantum, one pose at least; return what that cost.
+
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    model : int
+        Which polygon.
+    left : int
+        What is left of the quantum.
+    """
+    job = s[0].job
+    outline = p[0].polygons[model]
+    sides = outline.sides[: outline.side_count]
+    each = max(1, cost(job.reading_count, job.reading_step, len(sides)))
+    poses = continue_search(
+        job.search, max(1, left // each), s[0].job_readings[: job.reading_count], job.reading_step, sides,
+        outline.is_closed > 0, p, job.noise_level, s[0].scratch.score,
+    )  # fmt: skip
+    return poses * each
+
+
+@kernel
+def score_pose(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float, heading: float) -> float:
+    """Return the log ratio (nat) of all the job's readings at a pose; the scratch holds the whole score.
+
+    Parameters
+    ----------
+    s, p, model
+        As for `advance_search`.
+    x, y, heading : float
+        The pose, m, rad.
+    """
+    outline = p[0].polygons[model]
+    return score_polygon(
+        s[0].job_readings[: s[0].job.reading_count], 1, x, y, heading, outline.sides[: outline.side_count],
+        outline.is_closed > 0, p, s[0].job.noise_level, s[0].scratch.score,
     )  # fmt: skip
 
 
 @kernel
-def sides_of(p: Settings, model: int) -> int:
-    """Return how many sides a model has."""
-    return int(p.nv[model] - (0 if p.closed[model] > 0 else 1))
-
-
-@kernel
-def cost(n: int, every: int, sides: int) -> int:
-    """Return what it costs to weigh a pose: `QUANTUM` is in this currency."""
-    return (n + every - 1) // every * (A_READING + sides)
-
-
-@kernel
-def seek(s: State, x: float, y: float, theta: float, step: float, rounds: int, most: int) -> None:
-    """Set out from a pose, on at most `most` of the job's readings."""
-    begin_search(s.work, s.job[SEARCHING:], x, y, theta, step, rounds)
-    s.job[EVERY] = max(1, (s.job[HEARD] + most - 1) // most)
-
-
-@kernel
-def sought(s: State) -> bool:
-    """Tell whether the search is over."""
-    return bool(s.job[SEARCHING + LEFT] == 0)
-
-
-@kernel
-def seek_on(s: State, p: Settings, model: int, left: int) -> int:
-    """Search for what is left of a quantum, one pose at least; return what that cost."""
-    faces = p.faces[model, : sides_of(p, model)]
-    each = max(1, cost(s.job[HEARD], s.job[EVERY], faces.shape[0]))
-    poses = search(
-        s.pw, s.job[HEARD], s.job[EVERY], s.work, s.job[SEARCHING:], max(1, left // each), faces, p.closed[model] > 0,
-        ear_of(p), p.levels[s.job[HISS]], p.table,
-        p.inv_step, s.stats,
-    )  # fmt: skip
-    return int(poses * each)
-
-
-@kernel
-def weigh_pose(s: State, p: Settings, model: int, x: float, y: float, theta: float) -> float:
-    """Return the log ratio at a pose of all the job's readings, nat; `s.stats` tells the rest."""
-    faces = p.faces[model, : sides_of(p, model)]
-    return score_poly(
-        s.pw, s.job[HEARD], 1, x, y, theta, faces, p.closed[model] > 0, ear_of(p), p.levels[s.job[HISS]], p.table,
-        p.inv_step, s.stats,
-    )  # fmt: skip
-
-
-@kernel
-def end_job(s: State) -> None:
-    """Be done with it."""
-    s.job[JOB] = NO_JOB
+def end_job(s: StateRecord) -> None:
+    """End the job."""
+    s[0].job.kind = NO_JOB

@@ -1,58 +1,39 @@
-"""What raw ranges say of a polygon of any form, open or closed, at a pose; and the search for the pose.
+"""Evidence of raw ranges for a polygon of any form, open or closed, at a pose; and the search for the pose.
 
 Smooth sides answer like mirrors, from the foot of the perpendicular and nowhere else; rough ones answer from their
-nearest point in the beam, like a cone. Either rule says of each reading one range, which it should have or may have.
-Nobody tells which rule a body keeps, so it is weighed under both and the two likelihoods are added: the choice is
-paid for once. To choose reading by reading whichever explains it better would be paid for in false precision, for
+nearest point in the beam, like a cone. Either rule predicts one range for each reading, which it should have or may
+have. It is not known which rule a body keeps, so it is scored under both and the two likelihoods are added: the
+choice is paid for once. To choose reading by reading whichever explains it better would give false precision, for
 there is always a pose at which a dozen accidents happen to help.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Final
 
 from config.units import FOOT_M
-from perception.bayes.likelihood import loglik
-from perception.bayes.range_fit import DROP_PRICE, DROP_SHARE, HITS, LLR, NEAR, THROUGHS, level_of
-from perception.kernel import Floats, Ints, kernel
+from perception.bayes.likelihood import level_of, log_likelihood
+from perception.bayes.parameters import PolygonSide, SettingsRecord
+from perception.bayes.range_fit import DROP_NAT, DROP_SHARE
+from perception.bayes.state import PoseSearch, Reading, Score
+from perception.kernel import kernel
+from perception.records import Records
 
-CORNER_PRICE: Final = 0.7
-"""What an answer costs that a mirror may give or not, nat: about log 2. At a side's end or the beam's edge it costs
-nothing: it is all the readings of a sensor that may then be heard, or none, and a price for each would turn the body
-until they must."""
+CORNER_NAT: Final = 0.7
+"""Price of an answer that a mirror may give or not: about log 2. At a side's end or the beam's edge it costs nothing:
+all the readings of a sensor may then be heard, or none, and a price for each would turn the body until they must."""
 
 EDGE_REACH_M: Final = 1.0
-EDGE_PRICE_PER_M: Final = 3.0 / FOOT_M
+EDGE_NAT_PER_M: Final = 3.0 / FOOT_M
 """A convex edge only scatters, 20 to 30 dB below a mirror's echo: an answer from beyond this costs that much more."""
 
-SURE: Final = 4
-"""Column of `stats`, after those of `contact`: hits that had to be."""
-
-NOTHING: Final = 1e18
-"""A range (m) of no answer."""
+NO_ANSWER_M: Final = 1e18
+"""A range that stands for no answer."""
 MARGIN_M: Final = 0.12 * FOOT_M
 """A foot this near the end of its side need not answer: a pose is not known better."""
 GRAZING_COS: Final = 0.05
-"""An edge of the beam that is more parallel to a side than this does not hear it."""
-
-
-class Ear(NamedTuple):
-    """How a sensor hears: its beam, and what its readings are held against."""
-
-    cos_opt: float
-    """Cosines of the angles off the axis up to which a thing may answer, …"""
-    cos_in: float
-    """… must answer, …"""
-    cos_half: float
-    """… and nominally does; and the sines of the last two."""
-    sin_half: float
-    sin_in: float
-    gate: float
-    """As in `Settings`, as are the next three."""
-    miss: float
-    short: float
-    per_metre: float
+"""An edge of the beam that is more parallel to a side than this does not meet it."""
 
 
 ALONG, ACROSS, TURN = range(3)
@@ -62,15 +43,15 @@ TURN_PER_M: Final = 0.7 / FOOT_M
 AXES: Final = 3
 SHRINK: Final = 0.5
 """What a step is multiplied with where no way gains."""
-GAIN_MIN: Final = 1e-6
-"""A step that gains less than this is none, nat."""
+GAIN_MIN_NAT: Final = 1e-6
+"""Smallest score gain that counts as progress."""
 FINEST_M: Final = 0.005 * FOOT_M
 """A search ends with steps shorter than this: a tenth of the resolution, and the plateau is wider."""
 
 
 @kernel
 def predict(
-    sx: float, sy: float, ux: float, uy: float, faces: Floats, closed: bool, ear: Ear
+    sx: float, sy: float, ux: float, uy: float, sides: Records[PolygonSide], is_closed: bool, p: SettingsRecord
 ) -> tuple[float, bool, float, float, bool]:  # fmt: skip
     """Predict what a polygon answers, as a mirror and as a cone.
 
@@ -88,123 +69,128 @@ def predict(
     ----------
     sx, sy, ux, uy : float
         A sensor's place (m) and axis (unit vector) in the polygon's frame.
-    faces : (sides, 5) float
-        From `Settings.faces`: where a side begins x, y (m), its unit direction, its length (m); counter-clockwise.
-    closed : bool
+    sides : (n,) PolygonSide
+        Counter-clockwise.
+    is_closed : bool
         Whether the last side joins the first.
-    ear : Ear
+    p : (1,) Settings
         The beam.
 
     Returns
     -------
     (float, bool, float, float, bool)
-        Range of a mirror (m, `NOTHING` where none), whether it must be heard, what its answer costs (nat); range of a
-        cone, whether it must be heard.
+        Range of a mirror (m, `NO_ANSWER_M` where none), whether it must be heard, what its answer costs (nat); range
+        of a cone, whether it must be heard.
     """
-    foot = NOTHING
+    foot = NO_ANSWER_M
     foot_must = False
-    corner2 = NOTHING * NOTHING
+    corner2 = NO_ANSWER_M * NO_ANSWER_M
     before = 0
     after = 0
-    edge = NOTHING
+    edge = NO_ANSWER_M
     must = False
-    for k in range(faces.shape[0]):
-        tx = faces[k, 2]
-        ty = faces[k, 3]
-        length = faces[k, 4]
-        px = sx - faces[k, 0]
-        py = sy - faces[k, 1]
+    cos_may, cos_must, sin_must = p[0].cos_may_answer, p[0].cos_must_answer, p[0].sin_must_answer
+    cos_half, sin_half = p[0].cos_half_angle, p[0].sin_half_angle
+    for k in range(len(sides)):
+        side = sides[k]
+        tx = side.tangent_x
+        ty = side.tangent_y
+        length = side.length
+        px = sx - side.x
+        py = sy - side.y
         height = px * ty - py * tx
         ahead = uy * tx - ux * ty
         if height < 0.0:
-            if closed:
+            if is_closed:
                 continue
             height = -height
             ahead = -ahead
         along = px * tx + py * ty
         aside = ux * tx + uy * ty
-        if 0.0 <= along <= length and height < foot and ahead >= ear.cos_opt:
+        if 0.0 <= along <= length and height < foot and ahead >= cos_may:
             foot = height
-            foot_must = ahead >= ear.cos_in and MARGIN_M < along < length - MARGIN_M
+            foot_must = ahead >= cos_must and MARGIN_M < along < length - MARGIN_M
         for end in range(2):
             across = end * length - along
             dot = height * ahead + across * aside
             if dot > 0.0:
                 d2 = height * height + across * across
-                if d2 < corner2 and dot * dot >= ear.cos_opt * ear.cos_opt * d2:
+                if d2 < corner2 and dot * dot >= cos_may * cos_may * d2:
                     corner2 = d2
                     before = k - 1 + end
                     after = k + end
-                must = must or dot * dot >= ear.cos_in * ear.cos_in * d2
+                must = must or dot * dot >= cos_must * cos_must * d2
         for hand in (-1.0, 1.0):
-            towards = ahead * ear.cos_half - hand * aside * ear.sin_half
+            towards = ahead * cos_half - hand * aside * sin_half
             if towards > GRAZING_COS:
-                sideways = aside * ear.cos_half + hand * ahead * ear.sin_half
+                sideways = aside * cos_half + hand * ahead * sin_half
                 if 0.0 <= along * towards + height * sideways <= length * towards:
                     edge = min(edge, height / towards)
             if not must:
-                towards = ahead * ear.cos_in - hand * aside * ear.sin_in
+                towards = ahead * cos_must - hand * aside * sin_must
                 if towards > GRAZING_COS:
-                    sideways = aside * ear.cos_in + hand * ahead * ear.sin_in
+                    sideways = aside * cos_must + hand * ahead * sin_must
                     must = 0.0 <= along * towards + height * sideways <= length * towards
     corner = math.sqrt(corner2)
     nearest = min(foot, corner, edge)
-    must = foot_must or (must and nearest < NOTHING)
-    if foot < NOTHING:
+    must = foot_must or (must and nearest < NO_ANSWER_M)
+    if foot < NO_ANSWER_M:
         return foot, foot_must, 0.0, nearest, must
-    price = CORNER_PRICE
-    if closed and EDGE_REACH_M < corner < NOTHING:
-        after %= faces.shape[0]
-        if faces[before, 2] * faces[after, 3] - faces[before, 3] * faces[after, 2] > 0.0:
-            price += EDGE_PRICE_PER_M * (corner - EDGE_REACH_M)
+    price = CORNER_NAT
+    if is_closed and EDGE_REACH_M < corner < NO_ANSWER_M:
+        first = sides[before]
+        second = sides[after % len(sides)]
+        if first.tangent_x * second.tangent_y - first.tangent_y * second.tangent_x > 0.0:
+            price += EDGE_NAT_PER_M * (corner - EDGE_REACH_M)
     return corner, False, price, nearest, must
 
 
 @kernel
-def surplus(throughs: float, hits: float) -> float:
-    """Return what drop-outs beyond `DROP_SHARE` (and one) cost, nat."""
-    return max(0.0, DROP_PRICE * (throughs - DROP_SHARE * (hits + throughs) - 1.0))
+def surplus_nat(throughs: float, hits: float) -> float:
+    """Return the price (nat) of drop-outs beyond `DROP_SHARE` (and one)."""
+    return max(0.0, DROP_NAT * (throughs - DROP_SHARE * (hits + throughs) - 1.0))
 
 
 @kernel
-def score_poly(
-    w: Floats, n: int, every: int, x: float, y: float, theta: float, faces: Floats, closed: bool, ear: Ear,
-    lev: Ints, table: Floats, inv_step: Floats, stats: Floats,
+def score_polygon(
+    readings: Records[Reading], every: int, x: float, y: float, heading: float, sides: Records[PolygonSide],
+    is_closed: bool, p: SettingsRecord, noise: int, score: Score,
 ) -> float:  # fmt: skip
-    """Weigh what readings say of a polygon at a pose: a log ratio to the background.
+    """Score what readings say of a polygon at a pose: a log ratio to the background.
 
     ==========================  ===================================================
     range within the gate       the table's evidence; where it need not be heard never less than nothing
-    beyond, must be heard       `miss`: a drop-out
-    before, must be heard       `short`: something unseen stands in front
+    beyond, must be heard       `missed_echo_nat`: a drop-out
+    before, must be heard       `short_echo_nat`: something unseen stands in front
     else                        nothing
     ==========================  ===================================================
 
     So each reading counts under either rule; of what must be heard, drop-outs beyond `DROP_SHARE` (and
-    one) cost `DROP_PRICE` more each. The evidence is log((exp M + exp C) / 2) of the two sums.
+    one) cost `DROP_NAT` more each. The evidence is log((exp M + exp C) / 2) of the two sums.
 
     Parameters
     ----------
-    w : (capacity, 5) float
-        Readings: place x, y (m), unit axis, range (m).
-    n, every : int
-        Readings in use, and the step from one that is weighed to the next.
-    x, y, theta : float
+    readings : (n,) Reading
+        Raw ranges.
+    every : int
+        Step from one that is scored to the next.
+    x, y, heading : float
         The polygon's pose: m, rad.
-    faces, closed, ear
+    sides, is_closed, p
         As for `predict`.
-    lev, table, inv_step
-        As for `contact.score_circle`.
-    stats : (≥ 5,) float
-        Out: columns `LLR`, `HITS`, `THROUGHS`, `NEAR` of `contact`, and `SURE`; the counts by the likelier rule.
+    noise : int
+        Index of the noise that is assumed.
+    score : Score
+        Out: `log_likelihood_ratio`, `hits`, `misses`, `near` and `sure_hits`; the counts by the likelier rule.
 
     Returns
     -------
     float
-        `stats[LLR]`, nat.
+        The log ratio, nat.
     """
-    c = math.cos(theta)
-    s = math.sin(theta)
+    gate, missed, short = p[0].gate_m, p[0].missed_echo_nat, p[0].short_echo_nat
+    c = math.cos(heading)
+    s = math.sin(heading)
     mirror = 0.0
     cone = 0.0
     mirror_hits = 0.0
@@ -215,18 +201,19 @@ def score_poly(
     cone_throughs = 0.0
     cone_near = 0.0
     cone_sure = 0.0
-    for j in range(0, n, every):
-        dx = w[j, 0] - x
-        dy = w[j, 1] - y
-        r = w[j, 4]
+    for j in range(0, len(readings), every):
+        q = readings[j]
+        dx = q.x - x
+        dy = q.y - y
+        r = q.range_m
         at, must, price, at_cone, must_cone = predict(
-            c * dx + s * dy, -s * dx + c * dy, c * w[j, 2] + s * w[j, 3], -s * w[j, 2] + c * w[j, 3], faces, closed,
-            ear,
+            c * dx + s * dy, -s * dx + c * dy, c * q.axis_x + s * q.axis_y, -s * q.axis_x + c * q.axis_y, sides,
+            is_closed, p,
         )  # fmt: skip
-        k = level_of(lev, r, ear.per_metre)
+        k = level_of(p, noise, r)
         v = 0.0
-        if abs(r - at) < ear.gate:
-            v = loglik(table, inv_step, k, r - at) - price
+        if abs(r - at) < gate:
+            v = log_likelihood(p, k, r - at) - price
             v = v if must else max(v, 0.0)
             mirror_near += 1.0
             if v > 0.0:
@@ -234,20 +221,20 @@ def score_poly(
                 if must:
                     mirror_sure += 1.0
         elif must:
-            v = ear.short
+            v = short
             if r > at:
-                v = ear.miss
+                v = missed
                 mirror_throughs += 1.0
         mirror += v
         if at_cone != at or must_cone != must or price > 0.0:
             v = 0.0
-            if abs(r - at_cone) < ear.gate:
-                v = loglik(table, inv_step, k, r - at_cone)
+            if abs(r - at_cone) < gate:
+                v = log_likelihood(p, k, r - at_cone)
                 v = v if must_cone else max(v, 0.0)
             elif must_cone:
-                v = ear.miss if r > at_cone else ear.short
+                v = missed if r > at_cone else short
         cone += v
-        if abs(r - at_cone) < ear.gate:
+        if abs(r - at_cone) < gate:
             cone_near += 1.0
             if v > 0.0:
                 cone_hits += 1.0
@@ -255,111 +242,109 @@ def score_poly(
                     cone_sure += 1.0
         elif must_cone and r > at_cone:
             cone_throughs += 1.0
-    mirror -= surplus(mirror_throughs, mirror_hits)
-    cone -= surplus(cone_throughs, cone_hits)
+    mirror -= surplus_nat(mirror_throughs, mirror_hits)
+    cone -= surplus_nat(cone_throughs, cone_hits)
     llr = max(mirror, cone) + math.log(0.5 + 0.5 * math.exp(-abs(mirror - cone)))
-    stats[LLR] = llr
-    stats[HITS] = mirror_hits if mirror >= cone else cone_hits
-    stats[THROUGHS] = mirror_throughs if mirror >= cone else cone_throughs
-    stats[NEAR] = mirror_near if mirror >= cone else cone_near
-    stats[SURE] = mirror_sure if mirror >= cone else cone_sure
+    score.log_likelihood_ratio = llr
+    score.hits = mirror_hits if mirror >= cone else cone_hits
+    score.misses = mirror_throughs if mirror >= cone else cone_throughs
+    score.near = mirror_near if mirror >= cone else cone_near
+    score.sure_hits = mirror_sure if mirror >= cone else cone_sure
     return llr
 
 
 @kernel
-def moved(x: float, y: float, theta: float, axis: int, step: float) -> tuple[float, float, float]:
-    """Return a pose moved `ALONG` or `ACROSS` the body by `step` (m), or turned by it (rad)."""
-    if axis == ALONG:
-        return x + step * math.cos(theta), y + step * math.sin(theta), theta
-    if axis == ACROSS:
-        return x - step * math.sin(theta), y + step * math.cos(theta), theta
-    return x, y, theta + step
-
-
-X, Y, THETA, BEST, STEP = range(5)
-"""Cells of a search's numbers: where it is, what the readings say there (nat), how far it steps (m)."""
-AT, LEFT, GAINED = range(3)
-"""Cells of its counts: what it tries next (−1: nothing has been weighed yet), rounds it may still make, whether this
-round gained."""
-
-
-@kernel
-def begin_search(f: Floats, z: Ints, x: float, y: float, theta: float, step: float, rounds: int) -> None:
-    """Set out for a search.
+def moved(x: float, y: float, heading: float, axis: int, step: float) -> tuple[float, float, float]:
+    """Return a pose moved along or across the body, or turned.
 
     Parameters
     ----------
-    f, z : (≥ 5,) float, (≥ 3,) int
-        Out: the search, as above.
-    x, y, theta : float
-        From where, m, rad.
-    step : float
+    x, y, heading : float
+        The pose, m, rad.
+    axis, step
+        `ALONG`, `ACROSS` or `TURN`, and by how much, m or rad.
+    """
+    if axis == ALONG:
+        return x + step * math.cos(heading), y + step * math.sin(heading), heading
+    if axis == ACROSS:
+        return x - step * math.sin(heading), y + step * math.cos(heading), heading
+    return x, y, heading + step
+
+
+@kernel
+def begin_search(
+    search: PoseSearch, x: float, y: float, heading: float, step_m: float, rounds: int
+) -> None:  # fmt: skip
+    """Begin a search for a pose.
+
+    Parameters
+    ----------
+    search : PoseSearch
+        Out.
+    x, y, heading : float
+        Where it starts, m, rad.
+    step_m : float
         First step, m; turns go with it, by `TURN_PER_M`.
     rounds : int
         Rounds at most: the bound on the work.
     """
-    f[X] = x
-    f[Y] = y
-    f[THETA] = theta
-    f[BEST] = 0.0
-    f[STEP] = step
-    z[AT] = -1
-    z[LEFT] = rounds
-    z[GAINED] = 0
+    search.x = x
+    search.y = y
+    search.heading = heading
+    search.log_likelihood_ratio = 0.0
+    search.step_m = step_m
+    search.trial = -1
+    search.rounds_left = rounds
+    search.has_gained = 0
 
 
 @kernel
-def search(
-    w: Floats, n: int, every: int, f: Floats, z: Ints, allowed: int, faces: Floats, closed: bool, ear: Ear,
-    lev: Ints, table: Floats, inv_step: Floats, stats: Floats,
+def continue_search(
+    search: PoseSearch, allowed: int, readings: Records[Reading], every: int, sides: Records[PolygonSide],
+    is_closed: bool, p: SettingsRecord, noise: int, score: Score,
 ) -> int:  # fmt: skip
-    """Go on searching for the pose of greatest likelihood, along the body's own axes.
+    """Continue a search for the pose of greatest likelihood, along the body's own axes; return how many were scored.
 
     The likelihood has steps where sides begin and cease to answer, so nothing is differentiated: each axis is tried
-    both ways, and where none gains the steps shrink. A search stops where it stands when its allowance is spent, and
-    goes on from there; it is over when no round is left.
+    both ways, and where none gains the steps shrink. A search stops where it is when its allowance is spent, and
+    continues from there; it is over when no round is left.
 
     Parameters
     ----------
-    w, n, every
-        As for `score_poly`.
-    f, z
-        The search, from `begin_search`; updated.
+    search : PoseSearch
+        From `begin_search`; updated.
     allowed : int
-        Poses to weigh at most.
-    faces, closed, ear, lev, table, inv_step, stats
-        As for `score_poly`; `stats` is scratch.
-
-    Returns
-    -------
-    int
-        Poses weighed.
+        Poses to score at most.
+    readings, every, sides, is_closed, p, noise, score
+        As for `score_polygon`; `score` is scratch.
     """
-    weighed = 0
-    while weighed < allowed and z[LEFT] > 0:
-        weighed += 1
-        if z[AT] < 0:
-            f[BEST] = score_poly(w, n, every, f[X], f[Y], f[THETA], faces, closed, ear, lev, table, inv_step, stats)
-            z[AT] = 0
+    scored = 0
+    while scored < allowed and search.rounds_left > 0:
+        scored += 1
+        if search.trial < 0:
+            search.log_likelihood_ratio = score_polygon(
+                readings, every, search.x, search.y, search.heading, sides, is_closed, p, noise, score
+            )
+            search.trial = 0
             continue
-        axis = z[AT] // 2
-        step = f[STEP] * (TURN_PER_M if axis == TURN else 1.0) * (1.0 if z[AT] % 2 == 1 else -1.0)
-        x, y, theta = moved(f[X], f[Y], f[THETA], axis, step)
-        v = score_poly(w, n, every, x, y, theta, faces, closed, ear, lev, table, inv_step, stats)
-        z[AT] += 1
-        if v > f[BEST] + GAIN_MIN:
-            f[X] = x
-            f[Y] = y
-            f[THETA] = theta
-            f[BEST] = v
-            z[GAINED] = 1
-            z[AT] = 2 * (axis + 1)
-        if z[AT] == 2 * AXES:
-            z[AT] = 0
-            z[LEFT] -= 1
-            if z[GAINED] == 0:
-                f[STEP] *= SHRINK
-                if f[STEP] < FINEST_M:
-                    z[LEFT] = 0
-            z[GAINED] = 0
-    return weighed
+        axis = search.trial // 2
+        step = search.step_m * (TURN_PER_M if axis == TURN else 1.0) * (1.0 if search.trial % 2 == 1 else -1.0)
+        x, y, heading = moved(search.x, search.y, search.heading, axis, step)
+        v = score_polygon(readings, every, x, y, heading, sides, is_closed, p, noise, score)
+        search.trial += 1
+        if v > search.log_likelihood_ratio + GAIN_MIN_NAT:
+            search.x = x
+            search.y = y
+            search.heading = heading
+            search.log_likelihood_ratio = v
+            search.has_gained = 1
+            search.trial = 2 * (axis + 1)
+        if search.trial == 2 * AXES:
+            search.trial = 0
+            search.rounds_left -= 1
+            if search.has_gained == 0:
+                search.step_m *= SHRINK
+                if search.step_m < FINEST_M:
+                    search.rounds_left = 0
+            search.has_gained = 0
+    return scored

@@ -12,24 +12,11 @@ from typing import Final
 
 import numpy as np
 
-from perception.bayes.polygon_job import (
-    COV,
-    HEARD,
-    HISS,
-    LAID,
-    MIDDLE,
-    MOMENTS,
-    NEXT,
-    ROOT,
-    TOP,
-    cost,
-    ear_of,
-    sides_of,
-    weigh_pose,
-)
-from perception.bayes.polygon_likelihood import Ear, score_poly
-from perception.bayes.state import Settings, State
-from perception.kernel import Floats, Ints, copy_span, kernel
+from perception.bayes.parameters import SettingsRecord
+from perception.bayes.polygon_job import cost, score_pose
+from perception.bayes.polygon_likelihood import score_polygon
+from perception.bayes.state import LatticeMoments, LowerTriangle, Pose, StateRecord
+from perception.kernel import kernel
 
 PITCH: Final = 1.3
 """The lattice's pitch, in expected standard deviations, …"""
@@ -44,8 +31,8 @@ CUT_OFF: Final = PITCH**2 * CUT
 """The same in squared standard deviations: one, but for the tails that are cut off."""
 ATTEMPTS: Final = 5
 """How often a lattice is laid at most: the bound on the work."""
-TOP_LEAD: Final = 40.0
-"""A point better than the middle by more than this, nat, weighs no more."""
+LEAD_MAX_NAT: Final = 40.0
+"""A point better than the middle by more than this weighs no more."""
 OFF_CENTRE: Final = 0.7
 """A mean this many pitches off the middle asks for a new lattice."""
 NARROW: Final = 0.7 * CUT
@@ -53,7 +40,7 @@ WIDE: Final = 1.4 * CUT
 """So do variances beyond these, in squared pitches."""
 THINNEST: Final = 0.1 * CUT
 """Least variance, in squared pitches, that the next lattice believes: less falls between the points."""
-CORRELATED: Final = 0.95
+CORRELATION_SHARE: Final = 0.95
 """Share of a correlation that the next lattice believes, so that it never collapses."""
 PITCH_M: Final = (1e-4, 0.15)
 PITCH_RAD: Final = (1e-4, 0.4)
@@ -70,163 +57,217 @@ def clip(v: float, low: float, high: float) -> float:
 
 
 @kernel
-def lower_root(cov: Floats, root: Floats) -> None:
-    """Write one pitch: `PITCH` lower roots of a covariance, within bounds; both as 00, 10, 11, 20, 21, 22."""
-    root[0] = clip(PITCH * math.sqrt(cov[0]), PITCH_M[0], PITCH_M[1])
-    root[1] = clip(PITCH**2 * cov[1] / root[0], -PITCH_M[1], PITCH_M[1])
-    root[2] = clip(math.sqrt(max(PITCH**2 * cov[2] - root[1] ** 2, 0.0)), PITCH_M[0], PITCH_M[1])
-    root[3] = clip(PITCH**2 * cov[3] / root[0], -PITCH_RAD[1], PITCH_RAD[1])
-    root[4] = clip((PITCH**2 * cov[4] - root[3] * root[1]) / root[2], -PITCH_RAD[1], PITCH_RAD[1])
-    root[5] = clip(math.sqrt(max(PITCH**2 * cov[5] - root[3] ** 2 - root[4] ** 2, 0.0)), PITCH_RAD[0], PITCH_RAD[1])
+def copy_triangle(source: LowerTriangle, target: LowerTriangle) -> None:
+    """Copy a lower triangle."""
+    target.xx = source.xx
+    target.yx = source.yx
+    target.yy = source.yy
+    target.hx = source.hx
+    target.hy = source.hy
+    target.hh = source.hh
 
 
 @kernel
-def weigh_lattice(
-    w: Floats, n: int, faces: Floats, closed: bool, ear: Ear, lev: Ints, table: Floats, inv_step: Floats,
-    stats: Floats, middle: Floats, root: Floats, top: float, begin: int, end: int, moments: Floats,
-) -> None:  # fmt: skip
-    """Add up the likelihood round a pose, over some of the lattice's points.
+def write_pitch(cov: LowerTriangle, root: LowerTriangle) -> None:
+    """Write one pitch of the lattice, `PITCH` lower Cholesky roots of a covariance, within bounds, to `root`."""
+    root.xx = clip(PITCH * math.sqrt(cov.xx), PITCH_M[0], PITCH_M[1])
+    root.yx = clip(PITCH**2 * cov.yx / root.xx, -PITCH_M[1], PITCH_M[1])
+    root.yy = clip(math.sqrt(max(PITCH**2 * cov.yy - root.yx**2, 0.0)), PITCH_M[0], PITCH_M[1])
+    root.hx = clip(PITCH**2 * cov.hx / root.xx, -PITCH_RAD[1], PITCH_RAD[1])
+    root.hy = clip((PITCH**2 * cov.hy - root.hx * root.yx) / root.yy, -PITCH_RAD[1], PITCH_RAD[1])
+    root.hh = clip(math.sqrt(max(PITCH**2 * cov.hh - root.hx**2 - root.hy**2, 0.0)), PITCH_RAD[0], PITCH_RAD[1])
+
+
+@kernel
+def clear_moments(moments: LatticeMoments) -> None:
+    """Set the sums of a lattice to zero."""
+    moments.mass = 0.0
+    moments.a = 0.0
+    moments.b = 0.0
+    moments.c = 0.0
+    moments.aa = 0.0
+    moments.ab = 0.0
+    moments.bb = 0.0
+    moments.ac = 0.0
+    moments.bc = 0.0
+    moments.cc = 0.0
+
+
+@kernel
+def score_lattice(s: StateRecord, p: SettingsRecord, model: int, begin: int, end: int) -> None:
+    """Add the likelihood at some of the lattice's points round the job's middle to its moments.
 
     Parameters
     ----------
-    w, n, faces, closed, ear, lev, table, inv_step, stats
-        As for `polygon.score_poly`; `stats` is scratch.
-    middle : (3,) float
-        The middle: x, y (m), heading (rad).
-    root : (6,) float
-        The frame: lower root, by rows, of one pitch.
-    top : float
-        The log ratio at the middle, nat.
+    s, p
+        Memory, updated, and settings.
+    model : int
+        Which polygon.
     begin, end : int
         Which points: rows of `LATTICE`.
-    moments : (10,) float
-        Updated: mass, sums along the frame's axes, and sums of products 00, 10, 11, 20, 21, 22; in pitches.
     """
+    job = s[0].job
+    middle, root, moments = job.middle, job.root, job.moments
+    outline = p[0].polygons[model]
+    sides = outline.sides[: outline.side_count]
+    readings = s[0].job_readings[: job.reading_count]
     for point in range(begin, end):
         i, j, k = LATTICE[point]
-        x = middle[0] + root[0] * i
-        y = middle[1] + root[1] * i + root[2] * j
-        theta = middle[2] + root[3] * i + root[4] * j + root[5] * k
-        v = score_poly(w, n, 1, x, y, theta, faces, closed, ear, lev, table, inv_step, stats)
-        share = math.exp(min(v - top, TOP_LEAD))
-        moments[0] += share
-        moments[1] += share * i
-        moments[2] += share * j
-        moments[3] += share * k
-        moments[4] += share * i * i
-        moments[5] += share * i * j
-        moments[6] += share * j * j
-        moments[7] += share * i * k
-        moments[8] += share * j * k
-        moments[9] += share * k * k
+        x = middle.x + root.xx * i
+        y = middle.y + root.yx * i + root.yy * j
+        heading = middle.heading + root.hx * i + root.hy * j + root.hh * k
+        v = score_polygon(
+            readings, 1, x, y, heading, sides, outline.is_closed > 0, p, job.noise_level, s[0].scratch.score
+        )  # fmt: skip
+        share = math.exp(min(v - job.middle_nat, LEAD_MAX_NAT))
+        moments.mass += share
+        moments.a += share * i
+        moments.b += share * j
+        moments.c += share * k
+        moments.aa += share * i * i
+        moments.ab += share * i * j
+        moments.bb += share * j * j
+        moments.ac += share * i * k
+        moments.bc += share * j * k
+        moments.cc += share * k * k
 
 
 @kernel
-def centre_moments(moments: Floats) -> None:
+def centre_moments(moments: LatticeMoments) -> None:
     """Divide sums by their mass, and take second moments about the mean."""
-    for z in range(1, 10):
-        moments[z] /= moments[0]
-    a, b, c = moments[1], moments[2], moments[3]
-    moments[4] -= a * a
-    moments[5] -= a * b
-    moments[6] -= b * b
-    moments[7] -= a * c
-    moments[8] -= b * c
-    moments[9] -= c * c
+    mass = moments.mass
+    moments.a /= mass
+    moments.b /= mass
+    moments.c /= mass
+    moments.aa /= mass
+    moments.ab /= mass
+    moments.bb /= mass
+    moments.ac /= mass
+    moments.bc /= mass
+    moments.cc /= mass
+    a, b, c = moments.a, moments.b, moments.c
+    moments.aa -= a * a
+    moments.ab -= a * b
+    moments.bb -= b * b
+    moments.ac -= a * c
+    moments.bc -= b * c
+    moments.cc -= c * c
 
 
 @kernel
-def leave_frame(pose: Floats, root: Floats, moments: Floats, cov: Floats) -> None:
-    """Move a pose to the mean, and write the covariance that the moments are in the frame of `root`."""
-    a, b, c = moments[0], moments[1], moments[2]
-    pose[0] += root[0] * a
-    pose[1] += root[1] * a + root[2] * b
-    pose[2] += root[3] * a + root[4] * b + root[5] * c
-    v00 = max(moments[3], THINNEST) / CUT_OFF
-    v11 = max(moments[5], THINNEST) / CUT_OFF
-    v22 = max(moments[8], THINNEST) / CUT_OFF
-    v10 = CORRELATED * moments[4] / CUT_OFF
-    v20 = CORRELATED * moments[6] / CUT_OFF
-    v21 = CORRELATED * moments[7] / CUT_OFF
+def leave_frame(pose: Pose, root: LowerTriangle, moments: LatticeMoments, cov: LowerTriangle) -> None:
+    """Move a pose to the mean, and write the covariance that the moments are in the frame of `root`.
+
+    Parameters
+    ----------
+    pose : Pose
+        The lattice's middle; updated.
+    root : LowerTriangle
+        One pitch.
+    moments : LatticeMoments
+        About the mean.
+    cov : LowerTriangle
+        Out.
+    """
+    a, b, c = moments.a, moments.b, moments.c
+    pose.x += root.xx * a
+    pose.y += root.yx * a + root.yy * b
+    pose.heading += root.hx * a + root.hy * b + root.hh * c
+    v00 = max(moments.aa, THINNEST) / CUT_OFF
+    v11 = max(moments.bb, THINNEST) / CUT_OFF
+    v22 = max(moments.cc, THINNEST) / CUT_OFF
+    v10 = CORRELATION_SHARE * moments.ab / CUT_OFF
+    v20 = CORRELATION_SHARE * moments.ac / CUT_OFF
+    v21 = CORRELATION_SHARE * moments.bc / CUT_OFF
     # root · v, whose rows times those of root are the covariance's entries
-    l00, l10, l11, l20, l21, l22 = root[0], root[1], root[2], root[3], root[4], root[5]
+    l00, l10, l11, l20, l21, l22 = root.xx, root.yx, root.yy, root.hx, root.hy, root.hh
     m10 = l10 * v00 + l11 * v10
     m11 = l10 * v10 + l11 * v11
     m20 = l20 * v00 + l21 * v10 + l22 * v20
     m21 = l20 * v10 + l21 * v11 + l22 * v21
     m22 = l20 * v20 + l21 * v21 + l22 * v22
-    cov[0] = l00 * v00 * l00
-    cov[1] = m10 * l00
-    cov[2] = m10 * l10 + m11 * l11
-    cov[3] = m20 * l00
-    cov[4] = m20 * l10 + m21 * l11
-    cov[5] = m20 * l20 + m21 * l21 + m22 * l22
+    cov.xx = l00 * v00 * l00
+    cov.yx = m10 * l00
+    cov.yy = m10 * l10 + m11 * l11
+    cov.hx = m20 * l00
+    cov.hy = m20 * l10 + m21 * l11
+    cov.hh = m20 * l20 + m21 * l21 + m22 * l22
 
 
 @kernel
-def lay_lattice(s: State, p: Settings, model: int) -> None:
+def lay_lattice(s: StateRecord, p: SettingsRecord, model: int) -> None:
     """Lay the job's lattice round its middle, as its covariance expects."""
-    middle = s.work[MIDDLE : MIDDLE + 3]
-    lower_root(s.work[COV : COV + 6], s.work[ROOT : ROOT + 6])
-    s.work[TOP] = weigh_pose(s, p, model, middle[0], middle[1], middle[2])
-    s.work[MOMENTS : MOMENTS + 10] = 0.0
-    s.job[NEXT] = 0
+    job = s[0].job
+    write_pitch(job.covariance, job.root)
+    job.middle_nat = score_pose(s, p, model, job.middle.x, job.middle.y, job.middle.heading)
+    clear_moments(job.moments)
+    job.next_step = 0
 
 
 @kernel
-def begin_lattice(s: State, p: Settings, model: int, pose: Floats, cov: Floats) -> None:
-    """Set out for mean and covariance of a polygon's pose.
+def begin_lattice(s: StateRecord, p: SettingsRecord, model: int, t: int) -> None:
+    """Begin to determine mean and covariance of a polygon's pose.
 
     Parameters
     ----------
-    s, p, model
-        As for `polygon_job.weigh_pose`.
-    pose : (3,) float
-        x, y (m), heading (rad): near the best one.
-    cov : (6,) float
-        Covariance as expected: xx, xy, yy, x·heading, y·heading, heading² (m², m·rad, rad²); where xx is 0, nothing
-        is.
+    s, p
+        Memory, updated, and settings.
+    model : int
+        Which polygon.
+    t : int
+        Its track, near the best pose; where its covariance is zero, nothing is expected of the covariance.
     """
-    copy_span(pose, 0, 3, s.work, MIDDLE)
-    copy_span(cov, 0, 6, s.work, COV)
-    if cov[0] <= 0.0:
-        s.work[COV : COV + 6] = 0.0
-        s.work[COV] = FIRST_M**2
-        s.work[COV + 2] = FIRST_M**2
-        s.work[COV + 5] = FIRST_RAD**2
-    s.job[LAID] = 0
+    job = s[0].job
+    track = s[0].polygons[t]
+    job.middle.x = track.x
+    job.middle.y = track.y
+    job.middle.heading = track.heading
+    copy_triangle(track.covariance, job.covariance)
+    if track.covariance.xx <= 0.0:
+        job.covariance.xx = FIRST_M**2
+        job.covariance.yx = 0.0
+        job.covariance.yy = FIRST_M**2
+        job.covariance.hx = 0.0
+        job.covariance.hy = 0.0
+        job.covariance.hh = FIRST_RAD**2
+    job.lattices = 0
     lay_lattice(s, p, model)
 
 
 @kernel
-def lattice_on(s: State, p: Settings, model: int, left: int) -> int:
-    """Weigh for what is left of a quantum, one point at least; return what that cost.
+def advance_lattice(s: StateRecord, p: SettingsRecord, model: int, left: int) -> int:
+    """Score points of the lattice for the rest of a quantum, one at least; return what that cost.
 
-    Where a lattice is weighed and its mass is off the middle, or not about as wide as expected, the frame follows it
-    and the lattice is laid again, `ATTEMPTS` times at most. The job's `LAID` is `ATTEMPTS` when all is done; mean and
-    covariance are then at `MIDDLE` and `COV`.
+    Where a lattice is scored and its mass is off the middle, or not about as wide as expected, the frame follows it
+    and the lattice is laid again, `ATTEMPTS` times at most. The job's `lattices` is `ATTEMPTS` when all is done; mean
+    and covariance are then its `middle` and `covariance`.
+
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    model : int
+        Which polygon.
+    left : int
+        What is left of the quantum.
     """
-    faces = p.faces[model, : sides_of(p, model)]
-    each = max(1, cost(s.job[HEARD], 1, faces.shape[0]))
-    begin = s.job[NEXT]
+    job = s[0].job
+    moments = job.moments
+    each = max(1, cost(job.reading_count, 1, p[0].polygons[model].side_count))
+    begin = job.next_step
     end = min(LATTICE.shape[0], begin + max(1, left // each))
-    middle = s.work[MIDDLE : MIDDLE + 3]
-    root = s.work[ROOT : ROOT + 6]
-    moments = s.work[MOMENTS : MOMENTS + 10]
-    weigh_lattice(
-        s.pw, s.job[HEARD], faces, p.closed[model] > 0, ear_of(p), p.levels[s.job[HISS]], p.table, p.inv_step,
-        s.stats, middle, root, s.work[TOP], begin, end, moments,
-    )  # fmt: skip
-    s.job[NEXT] = end
+    score_lattice(s, p, model, begin, end)
+    job.next_step = end
     if end == LATTICE.shape[0]:
         centre_moments(moments)
-        leave_frame(middle, root, moments[1:], s.work[COV : COV + 6])
-        off = max(abs(moments[1]), abs(moments[2]), abs(moments[3]))
-        narrowest = min(moments[4], moments[6], moments[9])
-        widest = max(moments[4], moments[6], moments[9])
-        s.job[LAID] += 1
+        leave_frame(job.middle, job.root, moments, job.covariance)
+        off = max(abs(moments.a), abs(moments.b), abs(moments.c))
+        narrowest = min(moments.aa, moments.bb, moments.cc)
+        widest = max(moments.aa, moments.bb, moments.cc)
+        job.lattices += 1
         if off < OFF_CENTRE and narrowest > NARROW and widest < WIDE:
-            s.job[LAID] = ATTEMPTS
-        if s.job[LAID] < ATTEMPTS:
+            job.lattices = ATTEMPTS
+        if job.lattices < ATTEMPTS:
             lay_lattice(s, p, model)
-    return int((end - begin) * each)
+    spent: int = (end - begin) * each
+    return spent

@@ -4,56 +4,61 @@ from __future__ import annotations
 
 import math
 
-from perception.bayes.state import HK
-from perception.kernel import Floats, Ints, kernel
+from perception.bayes.parameters import SettingsRecord
+from perception.bayes.reservoir import copy_reading
+from perception.bayes.state import HISTORY, Reading, StateRecord
+from perception.kernel import kernel
 
 
 @kernel
-def bears(
-    qx: float, qy: float, ux: float, uy: float, r: float, cx: float, cy: float, bound: float, cos_half: float,
-    sin_half: float, gate: float, reach: float,
-) -> bool:  # fmt: skip
-    """Tell whether a reading says anything for or against a body within a circle.
+def bears_on_polygon(q: Reading, cx: float, cy: float, bound: float, p: SettingsRecord) -> bool:
+    """Return whether a reading says anything for or against a body within a circle.
 
     Parameters
     ----------
-    qx, qy, ux, uy, r : float
-        The reading: place (m), unit axis, range (m).
+    q : Reading
+        The reading.
     cx, cy, bound : float
         Centre and radius of the circle, m.
-    cos_half, sin_half : float
-        Of half the beam's opening.
-    gate : float
-        A range that ends farther than this before the circle says nothing, m.
-    reach : float
-        Nor does a sensor farther off than this, m.
+    p : (1,) Settings
+        The beam; a range that ends farther than the gate before the circle says nothing, nor does a sensor farther
+        off than `pair_range_max_m`.
     """
-    dx = cx - qx
-    dy = cy - qy
-    dot = dx * ux + dy * uy
+    reach = p[0].pair_range_max_m
+    dx = cx - q.x
+    dy = cy - q.y
+    dot = dx * q.axis_x + dy * q.axis_y
     if dot <= 0.0 or dot > reach:
         return False
     # by how much the centre lies outside the nearer edge of the beam
-    if abs(dx * uy - dy * ux) * cos_half - dot * sin_half > bound:
+    if abs(dx * q.axis_y - dy * q.axis_x) * p[0].cos_half_angle - dot * p[0].sin_half_angle > bound:
         return False
     d = math.sqrt(dx * dx + dy * dy)
-    return d <= reach and r >= d - bound - gate
+    return d <= reach and q.range_m >= d - bound - p[0].gate_m
 
 
 @kernel
-def collect(
-    hist: Floats, hn: Ints, cx: float, cy: float, bound: float, cos_half: float, sin_half: float, gate: float,
-    reach: float, w: Floats,
-) -> int:  # fmt: skip
-    """Copy to `w` what the sensors remember that `bears` on a circle; return how many."""
+def gather_polygon_history(s: StateRecord, p: SettingsRecord, model: int, cx: float, cy: float) -> int:
+    """Copy to the scratch what the sensors remember that bears on a polygon at (cx, cy); return how many readings.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    model : int
+        Which polygon.
+    cx, cy : float
+        m.
+    """
+    readings = s[0].scratch.readings
+    bound = p[0].polygons[model].outer_radius_m
     n = 0
-    for i in range(hist.shape[0]):
-        for k in range(min(hn[i], HK)):
-            h = hist[i, k]
-            if bears(h[0], h[1], h[2], h[3], h[4], cx, cy, bound, cos_half, sin_half, gate, reach):
-                if n >= w.shape[0]:
+    for i in range(s[0].sensor_count):
+        sensor = s[0].sensors[i]
+        for k in range(min(sensor.kept, HISTORY)):
+            if bears_on_polygon(sensor.history[k], cx, cy, bound, p):
+                if n >= len(readings):
                     return n
-                for z in range(5):
-                    w[n, z] = h[z]
+                copy_reading(sensor.history[k], readings[n])
                 n += 1
     return n

@@ -1,8 +1,8 @@
-"""Tracks of polygons: the same life as the circles', with a heading.
+"""Refinement of polygons' tracks, in stages.
 
-A track is refined in stages, as a job that a quantum takes on by a step: its readings are dealt out, its pose is
-looked for, judged, and placed. Its likelihood's top is flat, because ranges are rounded: the pose is the middle of
-the plateau and the plateau's width is what is not known.
+A track is refined as a job that each quantum advances by a step: readings are assigned to it or its neighbours, its
+pose is looked for, judged, and located. Its likelihood is flat at the top, because ranges are rounded: the pose is
+the middle of the plateau and the plateau's width is the uncertainty.
 """
 
 from __future__ import annotations
@@ -10,85 +10,54 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.object_report import POLYGON_PROBABILITY, is_sure_polygon
-from perception.bayes.polygon_alternatives import compare_circles, is_wall
+from perception.bayes.naming import POLYGON_PROBABILITY, is_sure_polygon
+from perception.bayes.parameters import SettingsRecord
+from perception.bayes.polygon_alternatives import compare_circles, is_part_of_wall
 from perception.bayes.polygon_association import OVERLAP, leave_to_next_neighbour
-from perception.bayes.polygon_initiation import next_birth, try_polygon
+from perception.bayes.polygon_initiation import advance_initiation, next_request
 from perception.bayes.polygon_job import (
-    BY_TURNS,
-    COV,
-    FOUND,
-    FOUND_LLR,
-    HEARD,
-    HISS,
-    JOB,
-    LAID,
-    MIDDLE,
-    NEXT,
     NO_JOB,
     QUANTUM,
-    STAGE,
-    TRACK,
-    WHO,
+    REFINEMENT,
+    advance_search,
+    copy_pose,
     cost,
     end_job,
-    seek_on,
-    sides_of,
-    sought,
-    weigh_pose,
+    is_search_over,
+    score_pose,
 )
-from perception.bayes.polygon_likelihood import BEST, SURE
-from perception.bayes.polygon_posterior import ATTEMPTS, begin_lattice, lattice_on
+from perception.bayes.polygon_posterior import ATTEMPTS, advance_lattice, begin_lattice, copy_triangle
 from perception.bayes.pose_restarts import (
-    DEAL,
+    ASSIGN,
     FITTING,
     JUDGE,
-    LOOK_NEAR,
-    LOOK_WIDE,
-    SPREAD,
-    THROW,
-    THROW_GAIN,
-    keep_found,
-    search_first,
-    throw_next,
+    LATTICE,
+    RESTART,
+    RESTART_GAIN_NAT,
+    SEARCH_NEAR,
+    SEARCH_WIDE,
+    begin_pose_search,
+    keep_best,
+    next_restart,
 )
-from perception.bayes.range_fit import HITS as HIT
-from perception.bayes.range_fit import NEAR as NEARBY
-from perception.bayes.reservoir import flatten
+from perception.bayes.reservoir import copy_reservoir
 from perception.bayes.state import (
     CONFIRMED,
-    DIRTY,
     ESTABLISHED,
     FREE,
-    MARK,
-    MODEL,
-    NOISE,
-    NRES,
-    PHITS,
-    PLLR,
-    PNEAR,
-    POLISH,
-    PPROB,
-    PSURE,
-    PTH,
-    PTT,
-    PX,
-    PXX,
-    PY,
-    QUIET,
-    REFS,
-    ST,
+    MAX_POLYGONS,
     TENTATIVE,
-    Settings,
-    State,
+    CircleTracks,
+    PolygonTrack,
+    StateRecord,
 )
-from perception.bayes.track_labels import give_up, outlives
+from perception.bayes.track_labels import drop_track, outlives
 from perception.bayes.track_selection import choose_polygon
-from perception.kernel import copy_span, kernel
+from perception.kernel import kernel
 
-EVIDENCE_MIN: Final = 5.0
-UNKNOWN_LEAD: Final = 8.0
-"""Evidence below the first, or behind an unknown thing's by the second, is the end, nat."""
+EVIDENCE_MIN_NAT: Final = 5.0
+UNKNOWN_LEAD_NAT: Final = 8.0
+"""A track ends with evidence below the first, or behind an unknown object's by the second."""
 ESTABLISH: Final = 0.9
 ESTABLISH_HITS: Final = 10.0
 ESTABLISH_SURE: Final = 3.0
@@ -97,61 +66,69 @@ MANY_SURE: Final = 2.0
 """A track is established by so many hits, and so many that had to be: corners alone fit anywhere."""
 DOUBT: Final = 0.3
 DOUBT_SHARE: Final = 0.75
-"""One less probable, or that explains less of what is near, is in doubt."""
+"""One less probable, or that explains less of what is near, is tentative again."""
 TWIN: Final = 0.4
 """Two bodies whose centres are nearer than this, in inner radii, are one."""
 
 
 @kernel
-def judge(s: State, p: Settings, t: int) -> None:
-    """Establish track `t`, doubt it or end it; what is not placed yet is established once it is."""
-    track = s.pf[t]
-    if track[PLLR] < EVIDENCE_MIN or track[PLLR] < p.unknown_poly * track[PNEAR] - UNKNOWN_LEAD:
-        give_up(s.pi, s.names, t, s.ti.shape[0] + t)
-    elif s.pi[t, ST] == TENTATIVE:
-        is_fitting = track[PHITS] > FITTING * track[PNEAR]
-        sure = ESTABLISH_SURE if track[PHITS] < MANY_HITS else MANY_SURE
-        is_heard = track[PHITS] >= ESTABLISH_HITS and track[PSURE] >= sure
-        if track[PPROB] > ESTABLISH and is_fitting and is_heard:
-            s.job[STAGE] = SPREAD
-            if track[PXX] > 0.0:
-                s.pi[t, ST] = ESTABLISHED
-    elif track[PPROB] < DOUBT or track[PHITS] < DOUBT_SHARE * track[PNEAR]:
-        s.pi[t, ST] = TENTATIVE
+def update_status(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> None:
+    """Establish a track, doubt it or end it; one whose covariance is not known yet is established once it is."""
+    evidence = track.log_likelihood_ratio
+    if evidence < EVIDENCE_MIN_NAT or evidence < p[0].unknown_polygon_nat * track.near - UNKNOWN_LEAD_NAT:
+        drop_track(track)
+    elif track.status == TENTATIVE:
+        is_fitting = track.hits > FITTING * track.near
+        sure = ESTABLISH_SURE if track.hits < MANY_HITS else MANY_SURE
+        is_heard = track.hits >= ESTABLISH_HITS and track.sure_hits >= sure
+        if track.probability > ESTABLISH and is_fitting and is_heard:
+            s[0].job.stage = LATTICE
+            if track.covariance.xx > 0.0:
+                track.status = ESTABLISHED
+    elif track.probability < DOUBT or track.hits < DOUBT_SHARE * track.near:
+        track.status = TENTATIVE
     else:
-        s.job[STAGE] = SPREAD
+        s[0].job.stage = LATTICE
 
 
 @kernel
-def merge_polygons(s: State, p: Settings, t: int) -> None:
-    """Leave one body in a place: twins merge, and of overlapping ones an established and likelier one stands.
+def merge_polygons(s: StateRecord, p: SettingsRecord, t: int) -> None:
+    """Leave one body in a place: twins merge, and of overlapping ones an established and likelier one stays.
 
-    One that a person spoke of stands in any case.
+    One that a user marked stays in any case.
+
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    t : int
+        The track.
     """
-    inner = p.inner[s.pi[t, MODEL]]
-    row = s.ti.shape[0]
-    for k in range(s.pi.shape[0]):
-        if k == t or s.pi[k, ST] == FREE:
+    track = s[0].polygons[t]
+    inner = p[0].polygons[track.model].inner_radius_m
+    for k in range(MAX_POLYGONS):
+        other = s[0].polygons[k]
+        if k == t or other.status == FREE:
             continue
-        d = math.hypot(s.pf[k, PX] - s.pf[t, PX], s.pf[k, PY] - s.pf[t, PY])
+        d = math.hypot(other.x - track.x, other.y - track.y)
         is_twin = d < TWIN * inner
         if not is_twin and d >= OVERLAP * inner:
             continue
-        has_more = s.pf[k, PLLR] > s.pf[t, PLLR]
-        spoken_of = s.names[row + t, MARK] != 0 or s.names[row + k, MARK] != 0
-        if is_twin or spoken_of:
-            has_more = outlives(s.names, row + k, row + t, has_more)
+        has_more = other.log_likelihood_ratio > track.log_likelihood_ratio
+        is_marked = track.marks != 0 or other.marks != 0
+        if is_twin or is_marked:
+            has_more = outlives(other, track, has_more)
         if has_more:
-            if is_twin or spoken_of or s.pi[k, ST] == ESTABLISHED:
-                s.pi[t, ST] = FREE
+            if is_twin or is_marked or other.status == ESTABLISHED:
+                track.status = FREE
                 return
-        elif is_twin or spoken_of or s.pi[t, ST] == ESTABLISHED:
-            s.pi[k, ST] = FREE
+        elif is_twin or is_marked or track.status == ESTABLISHED:
+            other.status = FREE
 
 
 @kernel
-def next_track(s: State, p: Settings, threshold: float) -> bool:
-    """Begin with the polygon whose turn it is; return whether there is one.
+def begin_refinement(s: StateRecord, p: SettingsRecord, threshold: float) -> bool:
+    """Begin a job with the polygon that is next; return whether there is one.
 
     Parameters
     ----------
@@ -163,111 +140,133 @@ def next_track(s: State, p: Settings, threshold: float) -> bool:
     chosen = choose_polygon(s, p, threshold)
     if chosen < 0:
         return False
-    if s.pi[chosen, QUIET] > p.quiet:
-        s.pi[chosen, POLISH] -= 1
-    s.pi[chosen, DIRTY] = 0
-    s.pi[chosen, REFS] += 1
-    s.job[JOB] = TRACK
-    s.job[STAGE] = DEAL
-    s.job[WHO] = chosen
-    s.job[NEXT] = 0
-    s.job[HISS] = int(s.g[NOISE])
-    s.job[HEARD] = flatten(s.pbins, s.pbn, chosen, s.pw)
+    track = s[0].polygons[chosen]
+    if track.idle_firings > p[0].idle_firings:
+        track.final_refinements -= 1
+    track.unseen = 0
+    track.refinements += 1
+    job = s[0].job
+    job.kind = REFINEMENT
+    job.stage = ASSIGN
+    job.track = chosen
+    job.next_step = 0
+    job.noise_level = s[0].noise_level
+    job.reading_count = copy_reservoir(track, s[0].job_readings)
     return True
 
 
 @kernel
-def judge_found(s: State, p: Settings, t: int) -> None:
-    """Enter the pose that was found, with what the readings say there, and what becomes of the track."""
-    track = s.pf[t]
-    model = s.pi[t, MODEL]
-    x, y, theta = s.work[FOUND], s.work[FOUND + 1], s.work[FOUND + 2]
-    track[PLLR] = weigh_pose(s, p, model, x, y, theta)
-    track[PX] = x
-    track[PY] = y
-    track[PTH] = theta
-    track[PHITS] = s.stats[HIT]
-    track[PNEAR] = s.stats[NEARBY]
-    track[PSURE] = s.stats[SURE]
-    row = s.ti.shape[0] + t
-    if is_wall(s, p, t) and give_up(s.pi, s.names, t, row):
+def judge(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
+    """Enter the pose that was found, what the readings say there, and the track's status.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    t : int
+        The track.
+    """
+    track = s[0].polygons[t]
+    found = s[0].job.best
+    track.log_likelihood_ratio = score_pose(s, p, track.model, found.x, found.y, found.heading)
+    score = s[0].scratch.score
+    track.x = found.x
+    track.y = found.y
+    track.heading = found.heading
+    track.hits = score.hits
+    track.near = score.near
+    track.sure_hits = score.sure_hits
+    if is_part_of_wall(s, p, track) and drop_track(track):
         return
-    compare_circles(s, p, t)
-    judge(s, p, t)
-    least = min(p.report, POLYGON_PROBABILITY)
-    if s.names[row, MARK] > CONFIRMED and is_sure_polygon(s.pi, s.pf, s.pbn, s.pbins, least, t):
-        s.names[row, MARK] &= CONFIRMED
-    if s.pi[t, ST] != FREE:
+    compare_circles(s, tracks, p, track)
+    update_status(s, p, track)
+    if track.marks > CONFIRMED and is_sure_polygon(track, min(p[0].report_probability, POLYGON_PROBABILITY)):
+        track.marks &= CONFIRMED
+    if track.status != FREE:
         merge_polygons(s, p, t)
 
 
 @kernel
-def refine_polygon(s: State, p: Settings, left: int) -> int:
-    """Go on with a track for what is left of a quantum; return what that cost.
+def advance_refinement(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, left: int) -> int:
+    """Continue a refinement for the rest of a quantum; return what that cost.
 
-    Its readings are dealt out between it and its neighbours; its pose is looked for, widely and then near by; what
-    the readings say there decides what becomes of it; how well it is known is found last.
-    """
-    t = s.job[WHO]
-    model = s.pi[t, MODEL]
-    stage = s.job[STAGE]
-    if stage == DEAL:
-        if s.job[NEXT] < s.pi.shape[0]:
-            return int(leave_to_next_neighbour(s, p, t))
-        s.pi[t, NRES] = s.job[HEARD]
-        search_first(s, t)
-        return 1
-    if stage in (LOOK_WIDE, THROW, LOOK_NEAR):
-        spent = seek_on(s, p, model, left)
-        if sought(s):
-            if stage == LOOK_NEAR:
-                keep_found(s)
-                s.job[STAGE] = JUDGE
-                return int(spent)
-            if stage == LOOK_WIDE:
-                keep_found(s)
-                copy_span(s.work, FOUND, 3, s.work, MIDDLE)
-                s.job[STAGE] = THROW
-                s.job[NEXT] = 0
-            elif s.work[BEST] > s.work[FOUND_LLR] + THROW_GAIN:
-                keep_found(s)
-            throw_next(s, p, t)
-        return int(spent)
-    if stage == JUDGE:
-        judge_found(s, p, t)
-        if s.pi[t, ST] != FREE and s.job[STAGE] == SPREAD:
-            begin_lattice(s, p, model, s.pf[t, PX : PTH + 1], s.pf[t, PXX : PTT + 1])
-        else:
-            end_job(s)
-        return cost((1 + p.radii.shape[0]) * s.job[HEARD], 1, sides_of(p, model))
-    spent = lattice_on(s, p, model, left)
-    if s.job[LAID] == ATTEMPTS:
-        copy_span(s.work, MIDDLE, 3, s.pf[t], PX)
-        copy_span(s.work, COV, 6, s.pf[t], PXX)
-        s.pi[t, ST] = ESTABLISHED
-        end_job(s)
-    return int(spent)
-
-
-@kernel
-def pquantum(s: State, p: Settings, threshold: float) -> bool:
-    """Go on with the job at hand for a quantum, or else with the next one; return whether there was one.
-
-    Tracks and births take turns where both wait.
+    Readings are divided between the track and its neighbours; its pose is looked for, widely and then near by; what
+    the readings say there decides its status; its covariance is determined last.
 
     Parameters
     ----------
-    s, p, threshold
-        As for `next_track`.
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    left : int
+        What is left of the quantum.
     """
-    if s.job[JOB] == NO_JOB:
-        s.job[BY_TURNS] = 1 - s.job[BY_TURNS]
-        if s.job[BY_TURNS] == 1:
-            if not next_track(s, p, threshold) and not next_birth(s):
+    job = s[0].job
+    t = job.track
+    track = s[0].polygons[t]
+    model = track.model
+    stage = job.stage
+    if stage == ASSIGN:
+        if job.next_step < MAX_POLYGONS:
+            return leave_to_next_neighbour(s, p, t)
+        track.reservoir = job.reading_count
+        begin_pose_search(s, t)
+        return 1
+    if stage in (SEARCH_WIDE, RESTART, SEARCH_NEAR):
+        spent = advance_search(s, p, model, left)
+        if is_search_over(s):
+            if stage == SEARCH_NEAR:
+                keep_best(s)
+                job.stage = JUDGE
+                return spent
+            if stage == SEARCH_WIDE:
+                keep_best(s)
+                copy_pose(job.best, job.middle)
+                job.stage = RESTART
+                job.next_step = 0
+            elif job.search.log_likelihood_ratio > job.best_nat + RESTART_GAIN_NAT:
+                keep_best(s)
+            next_restart(s, p, t)
+        return spent
+    if stage == JUDGE:
+        judge(s, tracks, p, t)
+        if track.status != FREE and job.stage == LATTICE:
+            begin_lattice(s, p, model, t)
+        else:
+            end_job(s)
+        return cost((1 + p[0].circle_count) * job.reading_count, 1, p[0].polygons[model].side_count)
+    spent = advance_lattice(s, p, model, left)
+    if job.lattices == ATTEMPTS:
+        track.x = job.middle.x
+        track.y = job.middle.y
+        track.heading = job.middle.heading
+        copy_triangle(job.covariance, track.covariance)
+        track.status = ESTABLISHED
+        end_job(s)
+    return spent
+
+
+@kernel
+def polygon_quantum(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, threshold: float) -> bool:
+    """Continue the job for a quantum, or else begin the next one; return whether there was one.
+
+    Refinements and hypotheses take turns where both wait.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    threshold : float
+        As for `begin_refinement`.
+    """
+    job = s[0].job
+    if job.kind == NO_JOB:
+        job.refines_next = 1 - job.refines_next
+        if job.refines_next == 1:
+            if not begin_refinement(s, p, threshold) and not next_request(s):
                 return False
-        elif not next_birth(s) and not next_track(s, p, threshold):
+        elif not next_request(s) and not begin_refinement(s, p, threshold):
             return False
     left = QUANTUM
-    while left > 0 and s.job[JOB] != NO_JOB:
-        left -= refine_polygon(s, p, left) if s.job[JOB] == TRACK else try_polygon(s, p, left)
+    while left > 0 and job.kind != NO_JOB:
+        left -= advance_refinement(s, tracks, p, left) if job.kind == REFINEMENT else advance_initiation(s, p, left)
     return True

@@ -1,8 +1,8 @@
-"""One object at a time: where it is, what speaks for it, what else it might be, and whether it stays.
+"""Refinement of one circle: its place, its evidence, its alternatives, and whether it stays.
 
-A quantum of refinement has a bounded cost: a posterior over at most a reservoir of readings, and one rival (all of
-them while little is known). What has converged is chosen less and less, see `selection`, so later passes cost less
-than the first.
+A quantum of refinement has a bounded cost: a posterior over at most a reservoir of readings, and one alternative (all
+of them while little is known). What has converged is chosen less and less, see `track_selection`, so later passes
+cost less than the first.
 """
 
 from __future__ import annotations
@@ -11,307 +11,367 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
-from perception.bayes.alternatives import SOFT, compete_circle, compete_line, score
+from perception.bayes.alternatives import SOFT, fit_other_circle, fit_other_line, score
 from perception.bayes.circle_posterior import posterior_circle
-from perception.bayes.corner_model import wedge
-from perception.bayes.lateral_search import ACROSS_M, seek
-from perception.bayes.noise_estimation import hear_residuals, noise_variance
-from perception.bayes.object_report import call_or_not
-from perception.bayes.occlusion import audible
-from perception.bayes.range_fit import CLOSEST, DISPERSION, HIGH, LOW, THROUGHS, fit_circle
-from perception.bayes.range_fit import HITS as HIT
-from perception.bayes.range_fit import NEAR as NEARBY
-from perception.bayes.reservoir import flatten
+from perception.bayes.corner_model import score_corner
+from perception.bayes.lateral_search import STEP_M, search_across
+from perception.bayes.naming import update_name
+from perception.bayes.noise_estimation import add_residuals, noise_variance
+from perception.bayes.occlusion import keep_relevant
+from perception.bayes.parameters import SettingsRecord
+from perception.bayes.range_fit import fit_circle
+from perception.bayes.reservoir import copy_reservoir
 from perception.bayes.state import (
-    C00,
-    C01,
-    C11,
-    CALLED,
     CONFIRMED,
-    CYC,
-    DIRTY,
     ESTABLISHED,
     FREE,
-    HITS,
-    KIND,
-    LLR,
-    MARK,
-    NEAR,
-    NL,
-    NOISE,
-    NRES,
-    POLISH,
-    PROB,
-    QUIET,
-    R00,
-    R10,
-    R11,
-    REFINEMENTS,
-    REFS,
-    SPAN,
-    ST,
+    MAX_LINES,
     TENTATIVE,
-    THRU,
-    TRHO,
-    TX,
-    TY,
-    UNK,
-    Settings,
-    State,
-)  # fmt: skip
-from perception.bayes.track_initiation import LINE_M, SWITCH, VARIANCE_MAX_M2
-from perception.bayes.track_labels import give_up, is_barred, outlives
-from perception.bayes.track_selection import CERTAIN, UNSURE_ROOT_M, choose, is_waiting
-from perception.bayes.walls import is_wall, new_line, off_and_along, reaches
+    CircleTrack,
+    CircleTracks,
+    StateRecord,
+)
+from perception.bayes.track_initiation import LINE_MIN_M, SWITCH_NAT, VARIANCE_MAX_M2
+from perception.bayes.track_labels import drop_track, is_rejected, outlives
+from perception.bayes.track_selection import CERTAIN, UNSURE_ROOT_M, choose_circle, is_waiting
+from perception.bayes.walls import add_line, is_wall, off_and_along, reaches
 from perception.kernel import kernel
 
 READINGS_MIN: Final = 3
-BASIN: Final = 6.0
+"""A track with fewer readings ends."""
+FIT_STEPS: Final = 2
+FIRST_FIT_STEPS: Final = 3
+"""Steps of the fit that precedes the posterior; of a tentative track."""
+FIT_LEAD: Final = 6.0
 """A robust fit this many σ² off (and the first two refinements) takes the pose over."""
 YOUNG: Final = 2
-LOST: Final = 2.0
-"""A mean this much worse than where it was looked for has left the beams that heard it, nat."""
+LOST_NAT: Final = 2.0
+"""A mean this much worse than where it was looked for has left the beams that heard it."""
 CORRELATION_MAX: Final = 0.9
 ROOT_MIN_M2: Final = 1e-6 * FOOT_M * FOOT_M
+"""Bounds of the covariance that a fit is believed to have."""
 SWITCH_ROOT_M: Final = 0.02 * FOOT_M
 """After a change of kind the pose is looked for this far round at least."""
-SWITCH_DIRTY: Final = 4
+SWITCH_UNSEEN: Final = 4
+"""A change of kind counts as so many unseen readings."""
+ALTERNATIVE_STEPS: Final = 4
+"""Steps of an alternative's fit."""
 LINE_HITS_MIN: Final = 6.0
-THROUGH_SHARE: Final = 0.5
-"""A wedge shares this much of the silences that speak against its rival."""
+"""A line that replaces a circle is kept from so many hits on."""
+MISS_SHARE: Final = 0.5
+"""A corner shares this much of the silences that speak against the circle."""
 WALL_BEYOND_M: Final = 8.0 * FOOT_M
 WALL_BEHIND: Final = -0.85
 WALL_FRONT: Final = 0.7
-IN_WALL: Final = -8.0
-"""A body whose centre lies in a wall, in radii before and behind it, pays this, nat."""
-LINE_PRIOR: Final = 1.0
-"""Walls are commoner than models by this, nat."""
-UNKNOWN_LEAD: Final = 6.0
+IN_WALL_NAT: Final = -8.0
+"""A body whose centre lies in a wall, or in so many radii behind or before it, pays this."""
+LINE_PRIOR_NAT: Final = 1.0
+"""Walls are commoner than models by this."""
+UNKNOWN_LEAD_NAT: Final = 6.0
+"""A track that an unknown object leads by this ends."""
 ESTABLISH: Final = 0.7
 ESTABLISH_HITS: Final = 8.0
 ESTABLISH_ROOT_M: Final = 0.25 * FOOT_M
+"""A track is established from this probability and so many hits on, if it is known as well as this."""
 DOUBT: Final = 0.2
+"""Below this probability it is tentative again."""
 APART: Final = 0.8
 """Two centres nearer than this share of the larger radius are one object: bodies do not overlap."""
-EXP_MAX: Final = 60.0
+EXPONENT_MAX: Final = 60.0
+"""Exponents are clipped to ± this: what lies beyond is negligible in a sum."""
 
 
 @kernel
 def bounded_exp(v: float) -> float:
-    """Return e to the power of `v`, cut off where the rest is nothing."""
-    return math.exp(min(EXP_MAX, max(-EXP_MAX, v)))
+    """Return e to the power of `v`, clipped to ± `EXPONENT_MAX`."""
+    return math.exp(min(EXPONENT_MAX, max(-EXPONENT_MAX, v)))
 
 
 @kernel
-def locate(s: State, p: Settings, t: int, n: int) -> None:
-    """Find the basin by a robust fit, and the pose and its covariance by the posterior over it."""
-    track = s.tf[t]
+def fit_start(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> None:
+    """Move a track to its robust fit where that is far off or the track is young; parameters as for `locate`."""
+    fit = s[0].scratch.circle_fit
     var0, rel2 = noise_variance(s, p)
-    rho = track[TRHO]
-    steps = 3 if s.ti[t, ST] == TENTATIVE else 2
-    if fit_circle(s.w, n, track[TX], track[TY], rho, p.cos_opt, p.gate, SOFT, var0, rel2, steps, s.fit):
-        h00, h01, h11 = s.fit[2], s.fit[3], s.fit[4]
-        det = h00 * h11 - h01 * h01
-        dx = s.fit[0] - track[TX]
-        dy = s.fit[1] - track[TY]
-        if det > 0.0 and (h00 * dx * dx + 2.0 * h01 * dx * dy + h11 * dy * dy > BASIN or s.ti[t, REFS] <= YOUNG):
-            track[TX] = s.fit[0]
-            track[TY] = s.fit[1]
-            c00 = min(h11 / det, VARIANCE_MAX_M2)
-            c11 = min(h00 / det, VARIANCE_MAX_M2)
-            limit = CORRELATION_MAX * math.sqrt(c00 * c11)
-            track[R00] = math.sqrt(c00)
-            track[R10] = min(limit, max(-limit, -h01 / det)) / track[R00]
-            track[R11] = math.sqrt(max(c11 - track[R10] ** 2, ROOT_MIN_M2))
-    if max(track[R00], track[R11]) > UNSURE_ROOT_M and seek(s, p, t, n):
-        track[R00] = max(track[R00], ACROSS_M)
-        track[R11] = max(track[R11], ACROSS_M)
-    x = track[TX]
-    y = track[TY]
-    s.pose[0] = x
-    s.pose[1] = y
-    s.root[0] = track[R00]
-    s.root[1] = track[R10]
-    s.root[2] = track[R11]
-    posterior_circle(
-        s.w, n, rho, p.cos_opt, p.gate, p.levels[int(s.g[NOISE])], p.per_metre, p.table, p.inv_step, s.w2, s.wl,
-        s.pose, s.root, s.cov,
-    )  # fmt: skip
-    track[TX] = s.pose[0]
-    track[TY] = s.pose[1]
-    track[R00] = s.root[0]
-    track[R10] = s.root[1]
-    track[R11] = s.root[2]
-    track[C00] = s.cov[0]
-    track[C01] = s.cov[1]
-    track[C11] = s.cov[2]
-    unsure = max(track[R00], track[R11]) > UNSURE_ROOT_M
-    if unsure and score(s, p, n, x, y, rho) > score(s, p, n, track[TX], track[TY], rho) + LOST:
-        track[TX] = x
-        track[TY] = y
+    steps = FIRST_FIT_STEPS if track.status == TENTATIVE else FIT_STEPS
+    if not fit_circle(
+        s[0].scratch.readings[:n], track.x, track.y, track.radius, p, SOFT, var0, rel2, steps, fit
+    ):  # fmt: skip
+        return
+    h00, h01, h11 = fit.information_xx, fit.information_xy, fit.information_yy
+    det = h00 * h11 - h01 * h01
+    dx = fit.x - track.x
+    dy = fit.y - track.y
+    if det > 0.0 and (h00 * dx * dx + 2.0 * h01 * dx * dy + h11 * dy * dy > FIT_LEAD or track.refinements <= YOUNG):
+        track.x = fit.x
+        track.y = fit.y
+        c00 = min(h11 / det, VARIANCE_MAX_M2)
+        c11 = min(h00 / det, VARIANCE_MAX_M2)
+        limit = CORRELATION_MAX * math.sqrt(c00 * c11)
+        track.root_xx = math.sqrt(c00)
+        track.root_yx = min(limit, max(-limit, -h01 / det)) / track.root_xx
+        track.root_yy = math.sqrt(max(c11 - track.root_yx**2, ROOT_MIN_M2))
 
 
 @kernel
-def weigh(s: State, p: Settings, t: int, n: int) -> float:
-    """Enter what the readings say of the track as it stands; return its prior as a model."""
-    track = s.tf[t]
-    track[LLR] = score(s, p, n, track[TX], track[TY], track[TRHO])
-    track[HITS] = s.stats[HIT]
-    track[THRU] = s.stats[THROUGHS]
-    track[NEAR] = s.stats[NEARBY]
-    track[UNK] = p.unknown * s.stats[NEARBY]
-    track[SPAN] = s.stats[DISPERSION]
-    s.comp[t, s.ti[t, KIND]] = 0.0
-    beyond: float = max(0.0, s.stats[CLOSEST] - p.far)
-    return p.prior - p.far_price * beyond
+def locate(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> None:
+    """Find a track's place by a robust fit and a search across the beam, and its mean and covariance round there.
 
-
-@kernel
-def change_kind(s: State, p: Settings, t: int, k: int, v: float) -> None:
-    """Make the track what explains it better: radius `k`, whose centre is in `s.fit` and whose log ratio is `v`."""
-    track = s.tf[t]
-    track[TX] = s.fit[0]
-    track[TY] = s.fit[1]
-    track[TRHO] = p.radii[k]
-    for z in range(s.comp.shape[1]):
-        s.comp[t, z] += track[LLR] - v
-    s.ti[t, KIND] = k
-    s.comp[t, k] = 0.0
-    track[LLR] = v
-    s.ti[t, REFS] = 0
-    s.ti[t, DIRTY] += SWITCH_DIRTY
-    track[R00] = max(track[R00], SWITCH_ROOT_M)
-    track[R11] = max(track[R11], SWITCH_ROOT_M)
-
-
-@kernel
-def may_become(s: State, t: int, k: int, v: float) -> bool:
-    """Tell whether a person's word leaves the track free to become radius `k` at `s.fit`, for which `v` nat speak."""
-    return s.names[t, MARK] == 0 and not is_barred(s, s.fit[0], s.fit[1], k, v)
-
-
-@kernel
-def ask_rivals(s: State, p: Settings, t: int, n: int, prior: float) -> bool:
-    """Hear the rivals whose turn it is; return whether the track is still an object.
-
-    `s.comp` holds by how much each led when it was asked. (Log ratios of different ages cannot be compared: the
-    readings have changed in between.)
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    track : CircleTrack
+        Updated.
+    n : int
+        Its readings, the first of the scratch.
     """
-    track = s.tf[t]
-    circles = p.radii.shape[0]
+    fit_start(s, p, track, n)
+    if max(track.root_xx, track.root_yy) > UNSURE_ROOT_M and search_across(s, p, track, n):
+        track.root_xx = max(track.root_xx, STEP_M)
+        track.root_yy = max(track.root_yy, STEP_M)
+    x = track.x
+    y = track.y
+    scratch = s[0].scratch
+    posterior = scratch.posterior
+    posterior.x = x
+    posterior.y = y
+    posterior.root_xx = track.root_xx
+    posterior.root_yx = track.root_yx
+    posterior.root_yy = track.root_yy
+    posterior_circle(
+        scratch.readings[:n], track.radius, p, s[0].noise_level, scratch.linear, scratch.cells, posterior
+    )  # fmt: skip
+    track.x = posterior.x
+    track.y = posterior.y
+    track.root_xx = posterior.root_xx
+    track.root_yx = posterior.root_yx
+    track.root_yy = posterior.root_yy
+    track.covariance_xx = posterior.covariance_xx
+    track.covariance_xy = posterior.covariance_xy
+    track.covariance_yy = posterior.covariance_yy
+    unsure = max(track.root_xx, track.root_yy) > UNSURE_ROOT_M
+    if unsure and score(s, p, n, x, y, track.radius) > score(s, p, n, track.x, track.y, track.radius) + LOST_NAT:
+        track.x = x
+        track.y = y
+
+
+@kernel
+def update_score(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> float:
+    """Enter what the readings say of a track where it is; return its log prior as a model, nat.
+
+    The parameters are as for `locate`.
+    """
+    track.log_likelihood_ratio = score(s, p, n, track.x, track.y, track.radius)
+    said = s[0].scratch.score
+    track.hits = said.hits
+    track.misses = said.misses
+    track.near = said.near
+    track.unknown_nat = p[0].unknown_nat * said.near
+    track.dispersion = said.dispersion
+    track.leads[track.kind] = 0.0
+    beyond: float = max(0.0, said.closest - p[0].far_m)
+    return p[0].model_prior_nat - p[0].far_nat_per_m * beyond
+
+
+@kernel
+def change_kind(s: StateRecord, p: SettingsRecord, track: CircleTrack, k: int, evidence_nat: float) -> None:
+    """Make a track the circle that explains it better.
+
+    Parameters
+    ----------
+    s, p
+        Memory, whose scratch holds the other circle's fit, and settings.
+    track : CircleTrack
+        Updated.
+    k : int
+        Index of the other circle.
+    evidence_nat : float
+        Its log ratio.
+    """
+    track.x = s[0].scratch.circle_fit.x
+    track.y = s[0].scratch.circle_fit.y
+    track.radius = p[0].circles[k].radius_m
+    for z in range(p[0].circle_count + 2):
+        track.leads[z] += track.log_likelihood_ratio - evidence_nat
+    track.kind = k
+    track.leads[k] = 0.0
+    track.log_likelihood_ratio = evidence_nat
+    track.refinements = 0
+    track.unseen += SWITCH_UNSEEN
+    track.root_xx = max(track.root_xx, SWITCH_ROOT_M)
+    track.root_yy = max(track.root_yy, SWITCH_ROOT_M)
+
+
+@kernel
+def may_become(s: StateRecord, track: CircleTrack, k: int, evidence_nat: float) -> bool:
+    """Return whether a user's marks leave a track free to become circle `k` at the fit, with this log ratio."""
+    fit = s[0].scratch.circle_fit
+    return track.marks == 0 and not is_rejected(s, fit.x, fit.y, k, evidence_nat)
+
+
+@kernel
+def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int, prior: float) -> bool:
+    """Compare the alternatives that are next; return whether the track is still an object and not a line.
+
+    `leads` holds by how much each led when it was compared. (Log ratios of different ages cannot be compared: the
+    readings have changed in between.)
+
+    Parameters
+    ----------
+    s, p, track, n
+        As for `locate`.
+    prior : float
+        From `update_score`.
+    """
+    line, corner = p[0].circle_count, p[0].circle_count + 1
     var0, rel2 = noise_variance(s, p)
-    turns = circles + 2 if n < p.all_until and track[PROB] < CERTAIN else 1
+    turns = corner + 1 if n < p[0].compare_all_below and track.probability < CERTAIN else 1
     for _ in range(turns):
-        s.ti[t, CYC] = (s.ti[t, CYC] + 1) % (circles + 2)
-        if s.ti[t, CYC] == s.ti[t, KIND]:
-            s.ti[t, CYC] = (s.ti[t, CYC] + 1) % (circles + 2)
-        k = s.ti[t, CYC]
-        own_prior = prior if s.ti[t, KIND] < p.models else 0.0
-        if k < circles:
-            v = compete_circle(s, p, n, track[TX], track[TY], track[TRHO], p.radii[k], 4)
-            s.comp[t, k] = v - track[LLR]
-            if v + (prior if k < p.models else 0.0) > track[LLR] + own_prior + SWITCH and may_become(s, t, k, v):
-                change_kind(s, p, t, k, v)
+        track.alternative = (track.alternative + 1) % (corner + 1)
+        if track.alternative == track.kind:
+            track.alternative = (track.alternative + 1) % (corner + 1)
+        k = track.alternative
+        own_prior = prior if track.kind < p[0].model_count else 0.0
+        if k < line:
+            v = fit_other_circle(
+                s, p, n, track.x, track.y, track.radius, p[0].circles[k].radius_m, ALTERNATIVE_STEPS
+            )  # fmt: skip
+            track.leads[k] = v - track.log_likelihood_ratio
+            leads = v + (prior if k < p[0].model_count else 0.0) > track.log_likelihood_ratio + own_prior + SWITCH_NAT
+            if leads and may_become(s, track, k, v):
+                change_kind(s, p, track, k, v)
                 break
-        elif k == circles:
-            v = compete_line(s, p, n, track[TX], track[TY], track[TRHO], 4)
-            s.comp[t, k] = v - track[LLR]
-            if v > track[LLR] + max(prior, 0.0) + SWITCH:
-                if s.stats[HIT] >= LINE_HITS_MIN and s.stats[HIGH] - s.stats[LOW] > LINE_M:
-                    new_line(
-                        s, s.fit[0], s.fit[1], s.fit[2], track[TX], track[TY],
-                        s.stats[LOW], s.stats[HIGH], s.stats[HIT],
-                    )  # fmt: skip
+        elif k == line:
+            v = fit_other_line(s, p, n, track.x, track.y, track.radius, ALTERNATIVE_STEPS)
+            track.leads[k] = v - track.log_likelihood_ratio
+            if v > track.log_likelihood_ratio + max(prior, 0.0) + SWITCH_NAT:
+                said = s[0].scratch.line_score
+                if said.hits >= LINE_HITS_MIN and said.high - said.low > LINE_MIN_M:
+                    add_line(s, s[0].scratch.line_fit, track.x, track.y, said)
                 return False
         else:
-            v = wedge(
-                s.w, s.w2, n, track[TX], track[TY], track[TRHO], p.cos_opt, p.gate, var0, rel2,
-                p.levels[int(s.g[NOISE])], p.per_metre, p.table, p.inv_step, s.fit, s.stats,
-            )  # fmt: skip
-            s.comp[t, k] = v + THROUGH_SHARE * p.miss * track[THRU] - track[LLR]
+            v = score_corner(s, p, n, track.x, track.y, track.radius, var0, rel2)
+            track.leads[k] = v + MISS_SHARE * p[0].missed_echo_nat * track.misses - track.log_likelihood_ratio
     return True
 
 
 @kernel
-def stands_in_wall(s: State, x: float, y: float, rho: float) -> bool:
-    """Tell whether a body's centre would lie in a known wall or just before or behind it."""
-    for k in range(NL):
-        line = s.lines[k]
+def is_in_wall(s: StateRecord, x: float, y: float, radius: float) -> bool:
+    """Return whether a body's centre would lie in a known wall or just before or behind it."""
+    for k in range(MAX_LINES):
+        line = s[0].lines[k]
         if is_wall(line):
             off, along = off_and_along(line, x, y)
-            if reaches(line, along, WALL_BEYOND_M) and WALL_BEHIND * rho < off < WALL_FRONT * rho:
+            if reaches(line, along, WALL_BEYOND_M) and WALL_BEHIND * radius < off < WALL_FRONT * radius:
                 return True
     return False
 
 
 @kernel
-def probability(s: State, p: Settings, t: int, prior: float) -> float:
-    """Return the share of the track's explanation among all of them: radii, line, wedge, unknown, nothing."""
-    track = s.tf[t]
-    kind = s.ti[t, KIND]
-    circles = p.radii.shape[0]
-    own_prior = prior if kind < p.models else 0.0
-    inside = IN_WALL if kind < p.models and stands_in_wall(s, track[TX], track[TY], track[TRHO]) else 0.0
-    own = track[LLR] + own_prior + inside
-    total = 1.0 + bounded_exp(-own) + bounded_exp(track[UNK] + p.prior - own)
-    for k in range(circles + 2):
-        if k != kind and s.comp[t, k] != 0.0:
-            lead = prior if k < p.models else (p.prior + LINE_PRIOR if k == circles else 0.0)
-            total += bounded_exp(s.comp[t, k] + lead - own_prior - inside)
+def existence_probability(s: StateRecord, p: SettingsRecord, track: CircleTrack, prior: float) -> float:
+    """Return the share of a track's explanation among all of them: radii, line, corner, unknown, nothing.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    track : CircleTrack
+        The track.
+    prior : float
+        From `update_score`.
+    """
+    kind = track.kind
+    line = p[0].circle_count
+    own_prior = prior if kind < p[0].model_count else 0.0
+    in_wall = IN_WALL_NAT if kind < p[0].model_count and is_in_wall(s, track.x, track.y, track.radius) else 0.0
+    own = track.log_likelihood_ratio + own_prior + in_wall
+    total = 1.0 + bounded_exp(-own) + bounded_exp(track.unknown_nat + p[0].model_prior_nat - own)
+    for k in range(line + 2):
+        if k != kind and track.leads[k] != 0.0:
+            lead = prior if k < p[0].model_count else (p[0].model_prior_nat + LINE_PRIOR_NAT if k == line else 0.0)
+            total += bounded_exp(track.leads[k] + lead - own_prior - in_wall)
     return 1.0 / total
 
 
 @kernel
-def refine(s: State, p: Settings, t: int) -> None:
-    """Refine track `t`: pose, evidence, rivals, noise, probability, and what becomes of it."""
-    track = s.tf[t]
-    n = audible(s, p, flatten(s.bins, s.bn, t, s.w), track[TX], track[TY], track[TRHO], t)
-    s.ti[t, NRES] = n
-    s.ti[t, DIRTY] = 0
-    s.ti[t, REFS] += 1
-    s.g[REFINEMENTS] += 1
+def update_status(track: CircleTrack, p: SettingsRecord) -> None:
+    """Establish a track that is probable and well known, or doubt one that is not."""
+    if track.status == TENTATIVE and track.probability > ESTABLISH and track.hits >= ESTABLISH_HITS:
+        if track.dispersion >= p[0].dispersion_min and max(track.root_xx, track.root_yy) < ESTABLISH_ROOT_M:
+            track.status = ESTABLISHED
+    elif track.status == ESTABLISHED and (track.probability < DOUBT or track.dispersion < 0.5 * p[0].dispersion_min):
+        track.status = TENTATIVE
+
+
+@kernel
+def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
+    """Refine track `t`: pose, evidence, alternatives, noise, probability and status.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    t : int
+        The track.
+    """
+    track = tracks[t]
+    n = keep_relevant(
+        s, tracks, p, copy_reservoir(track, s[0].scratch.readings), track.x, track.y, track.radius, t
+    )  # fmt: skip
+    track.reservoir = n
+    track.unseen = 0
+    track.refinements += 1
+    s[0].refinements += 1
     if n < READINGS_MIN:
-        give_up(s.ti, s.names, t, t)
+        drop_track(track)
         return
-    locate(s, p, t, n)
-    prior = weigh(s, p, t, n)
-    if not ask_rivals(s, p, t, n, prior) and give_up(s.ti, s.names, t, t):
+    locate(s, p, track, n)
+    prior = update_score(s, p, track, n)
+    if not compare_alternatives(s, p, track, n, prior) and drop_track(track):
         return
-    hear_residuals(s, p, t, n)
-    track[PROB] = probability(s, p, t, prior)
-    if (track[LLR] < 0.0 or track[LLR] < track[UNK] - UNKNOWN_LEAD) and give_up(s.ti, s.names, t, t):
+    add_residuals(s, tracks, p, t, n)
+    track.probability = existence_probability(s, p, track, prior)
+    evidence = track.log_likelihood_ratio
+    if (evidence < 0.0 or evidence < track.unknown_nat - UNKNOWN_LEAD_NAT) and drop_track(track):
         return
-    placed = max(track[R00], track[R11]) < ESTABLISH_ROOT_M
-    if s.ti[t, ST] == TENTATIVE and track[PROB] > ESTABLISH and track[HITS] >= ESTABLISH_HITS:
-        if track[SPAN] >= p.spread and placed:
-            s.ti[t, ST] = ESTABLISHED
-    elif s.ti[t, ST] == ESTABLISHED and (track[PROB] < DOUBT or track[SPAN] < 0.5 * p.spread):
-        s.ti[t, ST] = TENTATIVE
-    call_or_not(s.ti, s.tf, s.comp, p.models, p.report, p.report_near if prior >= p.prior else p.report, t)
-    if s.ti[t, CALLED] == 1:
-        s.names[t, MARK] &= CONFIRMED
-    merge_duplicates(s, p, t)
+    update_status(track, p)
+    report = p[0].report_probability
+    update_name(track, p, report, p[0].report_probability_near if prior >= p[0].model_prior_nat else report)
+    if track.is_named == 1:
+        track.marks &= CONFIRMED
+    merge_duplicates(tracks, p, t)
 
 
 @kernel
-def merge_duplicates(s: State, p: Settings, t: int) -> None:
-    """Of two tracks in one place let the one with more evidence stay, or the one that a person spoke of."""
-    for k in range(s.ti.shape[0]):
-        if k != t and s.ti[k, ST] != FREE:
-            apart = max(p.merge, APART * max(s.tf[t, TRHO], s.tf[k, TRHO]))
-            if math.hypot(s.tf[k, TX] - s.tf[t, TX], s.tf[k, TY] - s.tf[t, TY]) < apart:
-                if outlives(s.names, k, t, s.tf[k, LLR] > s.tf[t, LLR]):
-                    s.ti[t, ST] = FREE
+def merge_duplicates(tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
+    """Keep, of two tracks in one place, the one with more evidence, or the one that a user marked."""
+    track = tracks[t]
+    for k in range(len(tracks)):
+        other = tracks[k]
+        if k != t and other.status != FREE:
+            apart = max(p[0].merge_m, APART * max(track.radius, other.radius))
+            if math.hypot(other.x - track.x, other.y - track.y) < apart:
+                if outlives(other, track, other.log_likelihood_ratio > track.log_likelihood_ratio):
+                    track.status = FREE
                     return
-                s.ti[k, ST] = FREE
+                other.status = FREE
 
 
 @kernel
-def quantum(s: State, p: Settings, threshold: float) -> bool:
-    """Refine the circle whose turn it is; return whether another one is waiting."""
-    t = choose(s, p, threshold)
+def quantum(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, threshold: float) -> bool:
+    """Refine the circle that is next; return whether another one is waiting.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    threshold : float
+        Unseen evidence for an object's size from which on it waits for refinement.
+    """
+    t = choose_circle(s, tracks, p, threshold)
     if t >= 0:
-        if s.ti[t, QUIET] > p.quiet:
-            s.ti[t, POLISH] -= 1
-        refine(s, p, t)
-    return is_waiting(s, p, threshold)
+        track = tracks[t]
+        if track.idle_firings > p[0].idle_firings:
+            track.final_refinements -= 1
+        refine(s, tracks, p, t)
+    return is_waiting(tracks, p, threshold)

@@ -1,8 +1,8 @@
-"""Which raw readings an object keeps, a circle or a polygon: the newest from each direction.
+"""The raw readings that a track keeps: the newest from each direction.
 
 Hits and silences share the bins, so that the readings that found an object are pushed out by those that find it
-gone, from wherever one looks again; nothing is dropped for its age. What one direction has to say never crowds out
-another, which is what a position needs most.
+gone, from wherever the robot looks again; nothing is dropped for its age. The readings of one direction never crowd
+out another's, which is what a position needs most.
 """
 
 from __future__ import annotations
@@ -11,57 +11,70 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
-from perception.bayes.state import HK, Settings, State
-from perception.kernel import Floats, Ints, kernel
+from perception.bayes.parameters import Settings
+from perception.bayes.state import HISTORY, CircleTrack, PolygonTrack, Reading, State
+from perception.kernel import kernel
+from perception.records import Records
 
 TWO_PI: Final = 2.0 * math.pi
-ASIDE_M: Final = 0.02 * FOOT_M
+BEAM_MARGIN_M: Final = 0.02 * FOOT_M
 """A centre this far outside a beam may still move into it while a hypothesis is fitted."""
+ROOM: Final = 64
+"""Readings that are left free at the end of the scratch."""
 
 
 @kernel
-def put(bins: Floats, bn: Ints, t: int, cx: float, cy: float, q: Floats) -> None:
-    """Keep reading `q` (x, y, axis, range) of track `t`, whose centre is (cx, cy); its direction's oldest makes room.
-
-    `bins` and `bn` are the circles' or the polygons' of `State`: two arrays and not the whole memory: this is an
-    inner loop, and handing over a named tuple of arrays costs more than the work.
-    """
-    b = int((math.atan2(q[1] - cy, q[0] - cx) / TWO_PI + 0.5) * bins.shape[1]) % bins.shape[1]
-    k = bn[t, b] % bins.shape[2]
-    bn[t, b] += 1
-    for z in range(5):
-        bins[t, b, k, z] = q[z]
+def copy_reading(source: Reading, target: Reading) -> None:
+    """Copy a reading."""
+    target.x = source.x
+    target.y = source.y
+    target.axis_x = source.axis_x
+    target.axis_y = source.axis_y
+    target.range_m = source.range_m
 
 
 @kernel
-def flatten(bins: Floats, bn: Ints, t: int, w: Floats) -> int:
-    """Copy all readings of track `t` to `w`, shape (n, 5), and return how many."""
+def keep_reading(track: CircleTrack | PolygonTrack, cx: float, cy: float, reading: Reading) -> None:
+    """Put a reading into a track's reservoir about (cx, cy), m; the oldest of its direction makes room."""
+    bins = track.bins
+    b = int((math.atan2(reading.y - cy, reading.x - cx) / TWO_PI + 0.5) * len(bins)) % len(bins)
+    readings = bins[b].readings
+    copy_reading(reading, readings[bins[b].count % len(readings)])
+    bins[b].count += 1
+
+
+@kernel
+def copy_reservoir(track: CircleTrack | PolygonTrack, readings: Records[Reading]) -> int:
+    """Copy all readings of a track to `readings`, and return how many."""
     n = 0
-    for b in range(bins.shape[1]):
-        for k in range(min(bn[t, b], bins.shape[2])):
-            for q in range(5):
-                w[n, q] = bins[t, b, k, q]
+    for b in range(len(track.bins)):
+        kept = track.bins[b].readings
+        for k in range(min(track.bins[b].count, len(kept))):
+            copy_reading(kept[k], readings[n])
             n += 1
     return n
 
 
 @kernel
-def gather(s: State, p: Settings, cx: float, cy: float, rho: float, w: Floats) -> int:
-    """Copy to `w` what the sensors remember that bears on a circle, hits and silences; return how many."""
+def gather_history(s: Records[State], p: Records[Settings], cx: float, cy: float, radius: float) -> int:
+    """Copy to the scratch what the sensors remember that bears on a circle, hits and silences; return how many."""
+    readings = s[0].scratch.readings
+    cos_may, range_max = p[0].cos_may_answer, p[0].range_max_m
     n = 0
-    for i in range(s.hist.shape[0]):
-        for k in range(min(s.hn[i], HK)):
-            dx = cx - s.hist[i, k, 0]
-            dy = cy - s.hist[i, k, 1]
-            dot = dx * s.hist[i, k, 2] + dy * s.hist[i, k, 3]
+    for i in range(s[0].sensor_count):
+        sensor = s[0].sensors[i]
+        for k in range(min(sensor.kept, HISTORY)):
+            q = sensor.history[k]
+            dx = cx - q.x
+            dy = cy - q.y
+            dot = dx * q.axis_x + dy * q.axis_y
             if dot <= 0.0:
                 continue
             d = math.sqrt(dx * dx + dy * dy)
-            if dot < p.cos_opt * d - ASIDE_M or d - rho > p.range_max:
+            if dot < cos_may * d - BEAM_MARGIN_M or d - radius > range_max:
                 continue
-            if n >= w.shape[0] - 64:
+            if n >= len(readings) - ROOM:
                 return n
-            for q in range(5):
-                w[n, q] = s.hist[i, k, q]
+            copy_reading(q, readings[n])
             n += 1
     return n

@@ -1,32 +1,35 @@
-"""The outline map as others get to see it: in the order of its buckets, copies all of it."""
+"""The outline map as users see it: copies, in the order of its buckets."""
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from perception.bayes.state import STAMP, STAMP_S, State
-from perception.kernel import Floats, Ints
+from perception.bayes.state import BUCKET_CAPACITY, Memory
+from perception.kernel import Floats
 
-DRAWN_M: Final = 0.1
+SHOWN_M: Final = 0.1
 """Length at which a mapped segment is shown; the map keeps its middle and normal."""
 
 
-def listed(s: State) -> tuple[Ints, Floats, Floats]:
-    """Return the numbers, times (s), and middles and normals (n, 4) of the segments in the map."""
-    # Of thousands of buckets a hundred are in use, and this is asked for between two cycles.
-    buckets = np.flatnonzero(s.fill)
-    used = np.arange(s.store.shape[1]) < s.fill[buckets, None]
-    stamps = s.stamps[buckets][used]
-    return stamps[:, STAMP].astype(np.int64), stamps[:, STAMP_S], s.store[buckets][used]
+def mapped_segments(memory: Memory) -> NDArray[Any]:
+    """Return the segments in the map as records of `state.MappedSegment`, shape (n,), a copy."""
+    # Of thousands of buckets a hundred are in use, and this is called between two cycles.
+    buckets = memory.state["buckets"][0]
+    counts = buckets["count"]
+    used = np.flatnonzero(counts)
+    held = np.arange(BUCKET_CAPACITY) < counts[used, None]
+    return buckets["segments"][used][held]  # type: ignore[no-any-return]
 
 
-def drawn(rows: Floats) -> Floats:
-    """Return ends x, y, x, y (m) and normal (rad), shape (n, 5), of middles and normals, shape (n, 4)."""
-    ends = np.empty((len(rows), 5))
-    along_x, along_y = -0.5 * DRAWN_M * rows[:, 3], 0.5 * DRAWN_M * rows[:, 2]
-    ends[:, 0], ends[:, 1] = rows[:, 0] - along_x, rows[:, 1] - along_y
-    ends[:, 2], ends[:, 3] = rows[:, 0] + along_x, rows[:, 1] + along_y
-    np.arctan2(rows[:, 3], rows[:, 2], out=ends[:, 4])
+def drawn(segments: NDArray[Any]) -> Floats:
+    """Return ends x, y, x, y (m) and normal (rad), shape (n, 5), of records with middle and normal, shape (n,)."""
+    ends = np.empty((len(segments), 5))
+    x, y, nx, ny = (segments[name] for name in ("x", "y", "normal_x", "normal_y"))
+    along_x, along_y = -0.5 * SHOWN_M * ny, 0.5 * SHOWN_M * nx
+    ends[:, 0], ends[:, 1] = x - along_x, y - along_y
+    ends[:, 2], ends[:, 3] = x + along_x, y + along_y
+    np.arctan2(ny, nx, out=ends[:, 4])
     return ends

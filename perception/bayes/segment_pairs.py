@@ -1,10 +1,10 @@
 """Outline segments from pairs of readings, each with its uncertainty, and the map that holds them.
 
-A pair may be two readings of one sensor or of neighbours in one firing, at whatever baseline. A short baseline gives
-a segment early and a poor direction, a long one late and a good one; so each carries what it knows, and hypotheses
+A pair may be two readings of one sensor or of neighbours in one firing, at any baseline. A short baseline gives a
+segment early and a poor direction, a long one late and a good one; so each carries its uncertainty, and hypotheses
 start from the surest. The map is a hashed grid of small buckets: a cell's newest segments push out its oldest, and a
 bucket whose hash is wanted by another cell changes hands. Its size and the cost of a look-up do not grow with the
-mission, and what has gone is written over by what is seen instead.
+mission, and what has gone is overwritten by what is seen instead.
 """
 
 from __future__ import annotations
@@ -12,13 +12,12 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.kernel import Floats, Ints, kernel
+from perception.bayes.state import BUCKET_CAPACITY, Bucket, MappedSegment, PairSegment, Reading
+from perception.kernel import kernel
+from perception.records import Records
 
-SEG: Final = 7
-"""Columns of a segment: middle x, y (m), unit normal x, y, length (m), σ along the normal (m), of direction (rad)."""
-
-SHORTEST: Final = 1e-6
-"""A segment's length (m) counts as at least this much where its direction's σ is reckoned."""
+LENGTH_MIN_M: Final = 1e-6
+"""A segment counts as at least this long where the σ of its direction is computed."""
 
 X_PRIME: Final = 73856093
 Y_PRIME: Final = 19349663
@@ -26,21 +25,7 @@ Y_PRIME: Final = 19349663
 
 
 @kernel
-def tangent(
-    x1: float,
-    y1: float,
-    ux1: float,
-    uy1: float,
-    r1: float,
-    x2: float,
-    y2: float,
-    ux2: float,
-    uy2: float,
-    r2: float,
-    cos_half: float,
-    var_r: float,
-    out: Floats,
-) -> bool:
+def tangent(first: Reading, second: Reading, cos_half: float, var_r: float, out: PairSegment) -> bool:
     """Find the line that touches the arcs of two ranges inside both beams, and how well it is known.
 
     McKerrow's construction (1993; paper §3.2, Figure 2): the tangent's normal makes the angle acos((r1 − r2)/L) with
@@ -49,22 +34,22 @@ def tangent(
 
     Parameters
     ----------
-    x1, y1, ux1, uy1, r1 : float
-        First reading: place (m), unit axis, range (m).
-    x2, y2, ux2, uy2, r2 : float
-        Second reading.
+    first, second : Reading
+        The readings.
     cos_half : float
         Cosine of half the beam's opening.
     var_r : float
         Variance of a range, m².
-    out : (SEG,) float
-        Out: the segment, where there is one.
+    out : PairSegment
+        Out: the segment, where there is one, but for `reading`.
 
     Returns
     -------
     bool
         Whether there is a tangent. Where there are two, the one nearer to both axes is taken.
     """
+    x1, y1, r1 = first.x, first.y, first.range_m
+    x2, y2, r2 = second.x, second.y, second.range_m
     base = math.sqrt((x2 - x1) * (x2 - x1) + (y2 - y1) * (y2 - y1))
     if base == 0.0 or abs(r1 - r2) > base:
         return False
@@ -78,8 +63,8 @@ def tangent(
     for side in (-1.0, 1.0):
         ax = ex * cos_open - side * ey * sin_open
         ay = ey * cos_open + side * ex * sin_open
-        off1 = ax * ux1 + ay * uy1
-        off2 = ax * ux2 + ay * uy2
+        off1 = ax * first.axis_x + ay * first.axis_y
+        off2 = ax * second.axis_x + ay * second.axis_y
         if off1 >= cos_half and off2 >= cos_half and off1 + off2 > best:
             best = off1 + off2
             nx = ax
@@ -87,86 +72,90 @@ def tangent(
     if best == -2.0:
         return False
     length = base * sin_open
-    out[0] = 0.5 * (x1 + r1 * nx + x2 + r2 * nx)
-    out[1] = 0.5 * (y1 + r1 * ny + y2 + r2 * ny)
-    out[2] = nx
-    out[3] = ny
-    out[4] = length
-    out[5] = math.sqrt(0.5 * var_r)
-    out[6] = math.sqrt(2.0 * var_r) / max(length, SHORTEST)
+    out.x = 0.5 * (x1 + r1 * nx + x2 + r2 * nx)
+    out.y = 0.5 * (y1 + r1 * ny + y2 + r2 * ny)
+    out.normal_x = nx
+    out.normal_y = ny
+    out.length = length
+    out.sigma_normal = math.sqrt(0.5 * var_r)
+    out.sigma_direction = math.sqrt(2.0 * var_r) / max(length, LENGTH_MIN_M)
     return True
 
 
 @kernel
-def cell_slot(ix: int, iy: int, slots: int) -> int:
-    """Return the bucket of a cell of the grid: its hash among `slots`, a power of two."""
-    return ((ix * X_PRIME) ^ (iy * Y_PRIME)) & (slots - 1)
+def bucket_index(cell_x: int, cell_y: int, buckets: int) -> int:
+    """Return the bucket of a cell of the grid: its hash among `buckets`, a power of two."""
+    return ((cell_x * X_PRIME) ^ (cell_y * Y_PRIME)) & (buckets - 1)
 
 
 @kernel
-def map_add(seg: Floats, cell: float, tags: Ints, fill: Ints, store: Floats) -> int:
-    """Put a segment into its cell's bucket, and return which one that is.
+def add_to_map(
+    buckets: Records[Bucket], cell_m: float, x: float, y: float, nx: float, ny: float, number: int, time_s: float
+) -> int:
+    """Put a segment into its cell's bucket, and return that bucket's index.
 
     A full bucket forgets its oldest segment. A bucket that another cell holds is emptied and taken over.
 
     Parameters
     ----------
-    seg : (≥ 4,) float
-        Middle x, y (m), unit normal x, y.
-    cell : float
+    buckets : (n,) Bucket
+        The map, updated; n is a power of two.
+    cell_m : float
         Side of a cell, m.
-    tags : (slots, 2) int
-        Which cell holds each bucket. Updated.
-    fill : (slots,) int
-        Segments put into each bucket since its cell took it. Updated.
-    store : (slots, capacity, 4) float
-        The buckets. Updated.
+    x, y, nx, ny : float
+        The segment's middle (m) and unit normal.
+    number, time_s
+        What is kept with it.
     """
-    ix = math.floor(seg[0] / cell)
-    iy = math.floor(seg[1] / cell)
-    k = cell_slot(ix, iy, tags.shape[0])
-    if tags[k, 0] != ix or tags[k, 1] != iy:
-        tags[k, 0] = ix
-        tags[k, 1] = iy
-        fill[k] = 0
-    j = fill[k] % store.shape[1]
-    for q in range(4):
-        store[k, j, q] = seg[q]
-    fill[k] += 1
+    cell_x = math.floor(x / cell_m)
+    cell_y = math.floor(y / cell_m)
+    k = bucket_index(cell_x, cell_y, len(buckets))
+    bucket = buckets[k]
+    if bucket.cell_x != cell_x or bucket.cell_y != cell_y:
+        bucket.cell_x = cell_x
+        bucket.cell_y = cell_y
+        bucket.count = 0
+    segment = bucket.segments[bucket.count % BUCKET_CAPACITY]
+    segment.x = x
+    segment.y = y
+    segment.normal_x = nx
+    segment.normal_y = ny
+    segment.number = number
+    segment.time_s = time_s
+    bucket.count += 1
     return k
 
 
 @kernel
-def map_near(
-    x: float, y: float, radius: float, cell: float, tags: Ints, fill: Ints, store: Floats, out: Floats
+def segments_near(
+    buckets: Records[Bucket], cell_m: float, x: float, y: float, radius: float, found: Records[MappedSegment]
 ) -> int:
-    """Copy the segments whose middles lie within `radius` of a point.
+    """Copy the places and normals of the segments whose middles lie within a circle; return how many.
 
     Parameters
     ----------
+    buckets, cell_m
+        As for `add_to_map`.
     x, y, radius : float
-        Metres.
-    cell, tags, fill, store
-        As for `map_add`.
-    out : (m, 4) float
-        Out: middle x, y (m), unit normal x, y. What does not fit is left out.
-
-    Returns
-    -------
-    int
-        How many were copied.
+        The circle, m.
+    found : (m,) MappedSegment
+        Out: middle and normal. What does not fit is left out.
     """
     n = 0
-    for ix in range(math.floor((x - radius) / cell), math.floor((x + radius) / cell) + 1):
-        for iy in range(math.floor((y - radius) / cell), math.floor((y + radius) / cell) + 1):
-            k = cell_slot(ix, iy, tags.shape[0])
-            if tags[k, 0] != ix or tags[k, 1] != iy:
+    for cell_x in range(math.floor((x - radius) / cell_m), math.floor((x + radius) / cell_m) + 1):
+        for cell_y in range(math.floor((y - radius) / cell_m), math.floor((y + radius) / cell_m) + 1):
+            bucket = buckets[bucket_index(cell_x, cell_y, len(buckets))]
+            if bucket.cell_x != cell_x or bucket.cell_y != cell_y:
                 continue
-            for j in range(min(fill[k], store.shape[1])):
-                if n >= out.shape[0]:
+            for j in range(min(bucket.count, BUCKET_CAPACITY)):
+                if n >= len(found):
                     return n
-                if (store[k, j, 0] - x) ** 2 + (store[k, j, 1] - y) ** 2 < radius * radius:
-                    for q in range(4):
-                        out[n, q] = store[k, j, q]
+                segment = bucket.segments[j]
+                if (segment.x - x) ** 2 + (segment.y - y) ** 2 < radius * radius:
+                    out = found[n]
+                    out.x = segment.x
+                    out.y = segment.y
+                    out.normal_x = segment.normal_x
+                    out.normal_y = segment.normal_y
                     n += 1
     return n

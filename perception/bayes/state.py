@@ -1,269 +1,553 @@
-"""The Bayesian method's whole memory: arrays made once, and the settings they are read with, as named tuples.
+"""The Bayesian method's whole memory: records of a fixed layout, made once and never resized.
 
-Compiled kernels take named tuples of arrays as they are, so one argument carries everything that is remembered and
-one everything that was set; nothing here is ever resized. Kernels call them `s` and `p`. Python, to which such a call
-is dear, goes by `perception.bayes.entry`. Lengths are metres.
+Kernels call them `s` (one `State`), `tracks` (circles, as many as the configuration allows) and `p` (one `Settings`
+record of `perception.bayes.parameters`). Lengths are metres, angles radians.
 """
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Annotated, Any, Final, TypeAlias
 
 import numpy as np
 
-from perception.bayes.segment_pairs import SEG
+from config.robot import SENSORS_MAX
+from perception.bayes.parameters import CIRCLES_MAX, NOISES
 from perception.kernel import Floats, Ints
+from perception.records import Record, Records, records, zeros
 
-NT: Final = 48
+MAX_TRACKS: Final = 48
 """Tracks of circles where the configuration says nothing else."""
-NB: Final = 36
+BEARING_BINS: Final = 36
 """Bins of a track's reservoir, by the bearing from the object to the sensor: 10° each."""
-CAP: Final = 20
+BIN_CAPACITY: Final = 20
 """Readings in a bin; the newest takes the place of the oldest."""
-NL: Final = 24
-"""Lines: walls."""
-HK: Final = 28
-"""Readings that are remembered of each sensor, whatever they hit."""
-WORK: Final = NB * CAP + 64
-"""Rows of scratch for one object's readings, with room for the posterior's grid at the end."""
-PULLING: Final = 16
-"""Outline segments that may pull at a hypothesis."""
+MAX_LINES: Final = 24
+HISTORY: Final = 28
+"""Readings kept of each sensor, whatever they hit."""
+READINGS_MAX: Final = BEARING_BINS * BIN_CAPACITY + 64
+"""Readings compared at a time: a reservoir's, and some more of the sensors' histories."""
+ATTRACTING_MAX: Final = 16
+"""Outline segments that may attract a hypothesis."""
 BUCKETS: Final = 4096
 """Buckets of the hashed outline map; a power of two."""
-BUCKET: Final = 8
+BUCKET_CAPACITY: Final = 8
 """Segments in a bucket."""
-PT: Final = 24
+MAX_POLYGONS: Final = 24
 """Tracks of polygons."""
-PB: Final = 24
+POLYGON_BEARING_BINS: Final = 24
 """Bearing bins of a polygon's reservoir."""
-PCAP: Final = 12
+POLYGON_BIN_CAPACITY: Final = 12
 """Readings in such a bin."""
-
-BARRED: Final = 32
-"""Places where a person said that something does not stand."""
-
-ASKED: Final = 32
-"""Segments that wait for a polygon to be tried behind them, and of late did."""
-
-# Columns of `State.tf`, a circle's track: centre, heading (none), radius, lower root of the covariance that the next
-# grid starts from, covariance, log ratio to the background, counts, probability, dispersion of the axes, birth.
-TX, TY, TTH, TRHO, R00, R10, R11, C00, C01, C11, LLR, HITS, THRU, NEAR, PROB, SPAN, BORN, LXX, LXY, LYY, UNK, SEEN = (
-    range(22)
-)
-NTF: Final = 24
-# Columns of `State.ti` and `State.pi`. ST: 0 free, 1 tentative, 2 established. KIND: index into `Settings.radii`.
-# QUIET: firings without evidence; POLISH: refinements still owed once it is quiet; CALLED: 1 while it has its name.
-# RIVAL: of a polygon, whether it has a challenger. PASSED: quanta for others since.
-ST, KIND, DIRTY, CYC, NRES, MODEL, REFS, QUIET, POLISH, CALLED, RIVAL, PASSED = range(12)
-NTI: Final = 12
-# Columns of `State.lines`: normal, distance along it from an origin on the spot, that origin, covariance of angle and
-# distance, extent along the line, log odds of being there still, echoes that it explained (0: free).
-LNX, LNY, LC, LOX, LOY, LP00, LP01, LP11, LLO, LHI, LLOG, LN = range(12)
-# Columns of `State.pf`, a polygon's track: pose, log ratio, counts, probability, must-answer hits, covariance of x, y
-# and heading, pose of a challenger.
-PX, PY, PTH, PLLR, PHITS, PNEAR, PPROB, PSURE, PXX, PXY, PYY, PXT, PYT, PTT, CX, CY, CTH = range(17)
-NPF: Final = 17
-# Cells of `State.g`; HERE is where the ring last fired.
-NOISE, SEGMENTS, BIRTHS, REFINEMENTS, HERE_X, HERE_Y = range(6)
-
-# Columns of `State.names`, a row a track, the circles' first; the latter a sum of the marks below: a person said that
-# it is there, or put it there and the readings do not bear it out by themselves yet.
-NUMBER, MARK = range(2)
-CONFIRMED: Final = 1
-PLACED: Final = 2
-# Columns of `State.stamps`: a mapped segment's number and time.
-STAMP, STAMP_S = range(2)
-# Cells of `State.tally`: numbers given to objects and to segments, which are never cleared, and places barred.
-NUMBERED, STAMPED, BARS = range(3)
+REJECTIONS_MAX: Final = 32
+"""Places where a user rejected an object."""
+REQUESTS_MAX: Final = 32
+"""Segments that wait for a polygon to be tried behind them, or recently did."""
+PAIRS_PER_SENSOR: Final = 8
+"""Outline segments that a reading may make."""
+ALTERNATIVES_MAX: Final = CIRCLES_MAX + 2
+"""Explanations of a circle track: radii, a line, a corner."""
+GRID_CELLS: Final = 49
+"""Cells of the grid on which a circle's posterior is added up."""
 
 FREE, TENTATIVE, ESTABLISHED = range(3)
+"""Values of `Track.status`."""
+CONFIRMED: Final = 1
+PLACED: Final = 2
+"""Bits of `Track.marks`: a user confirmed the object; or placed it, and the readings do not bear it out yet."""
+
+UNEXPLAINED: Final = -1
+ON_LINE: Final = -2
+PROPOSED: Final = -100
+POLYGON: Final = 1000
+"""Values of `Scratch.explained_by`: nothing; this minus k line k; a hypothesis was tried; this plus k polygon k.
+Other values are circle tracks."""
 
 START_NOISE: Final = 9
-"""Index of the noise believed until something is known: σ = 0.03 ft, 0.5 %."""
+"""Index of the noise assumed at the start: σ = 0.03 ft, 0.5 %."""
+START_NOISE_NAT: Final = 6.0
+"""Evidence for it at the start."""
 
 
-class Settings(NamedTuple):
-    """Everything that kernels are told and never change; see `perception.bayes.kernel_settings`."""
+class Reading(Record):
+    """A raw range in the odometry frame."""
 
-    half_angle: float
-    cos_half: float
-    cos_opt: float
-    """Cosine of a little more than the beam: such readings may match and never cost."""
-    cos_in: float
-    """Cosine of a little less than the beam: such readings must hit."""
-    half_box: float
-    """Half the resolution: a range is rounded by at most this."""
-    gate: float
-    """A range this near to what is predicted is an attempt at it."""
-    miss: float
-    """Log probability of a reading that should have hit and went through."""
-    short: float
-    """Log probability of something unseen in front."""
-    unknown: float
-    """What an unknown thing earns for each near reading, nat."""
-    unknown_poly: float
-    prior: float
-    """Log prior of a known model over every other explanation."""
-    spread: float
-    """Least dispersion of the axes that heard an object."""
-    far: float
-    """Seen only from beyond this, a thing is less and less likely a model."""
-    far_price: float
-    """By so much for each metre, nat."""
-    rough_gate: float
-    """Noises less likely than the best by this, by roughness, are ruled out, nat."""
-    range_max: float
-    pair_max: float
-    """Segments farther than this start no hypotheses, and silence from farther says nothing."""
-    spacing: float
-    """A sensor's memory takes a reading only from this far off the last."""
-    gap: float
-    """Readings further apart than this are no pair, s."""
-    per_metre: float
-    """Range bins of `levels` a metre."""
-    merge: float
-    """Two centres nearer than this are one object."""
-    all_until: int
-    """With fewer readings than this every rival is asked at every refinement."""
-    claim: float
-    """A line shorter than this explains nothing away."""
-    attempts: int
-    """Segments looked at for hypotheses, a firing."""
-    hyp_sigma: float
-    """A segment starts a hypothesis only where the centre behind it would be surer than this."""
-    radii: Floats
-    """(k,) radii in competition; the first `models` are models, ascending."""
-    models: int
-    sides: Floats
-    """(k, m, 4) chords of each circle, for the relaxation."""
-    table: Floats
-    inv_step: Floats
-    noises: Floats
-    levels: Ints
-    polys: int
-    verts: Floats
-    """(M, V, 2) vertices of the polygon models."""
-    nv: Ints
-    closed: Ints
-    sym: Ints
-    """Order of each polygon's rotational symmetry."""
-    inner: Floats
-    """Distance of the nearest side from the origin, and at least half the outline's least width."""
-    bound: Floats
-    """Distance of the farthest vertex from the origin."""
-    psides: Floats
-    """(M, V, 4) sides for the relaxation."""
-    faces: Floats
-    """(M, V, 5) the same for contact: where each begins, its unit direction, its length."""
-    inflate: float
-    """What the posterior's covariance is multiplied with when it is reported."""
-    report: float
-    """A model is called by its name from this probability on."""
-    report_near: float
-    """The same where it was heard from within `far`."""
-    quiet: int
-    """Firings without evidence after which what is left is worked off."""
-    polish: int
-    """Refinements then."""
+    x: float
+    """The sensor's place, m."""
+    y: float
+    axis_x: float
+    """Its axis, a unit vector."""
+    axis_y: float
+    range_m: float
+    """At least `range_fit.FAR` where nothing was heard."""
 
 
-class State(NamedTuple):
-    """Everything that is remembered. `w`, `w2`, `wl` and all below `near` are scratch."""
+class Pose(Record):
+    """A pose: m, rad."""
 
-    hist: Floats
-    """(S, HK, 6) each sensor's memory: x, y, axis x, axis y, range, time."""
-    hn: Ints
-    """(S,) readings ever kept."""
-    tags: Ints
-    """(slots, 2) which cell of the plane a bucket of the outline map holds."""
-    fill: Ints
-    store: Floats
-    """(slots, bucket, 4) a segment's middle and normal."""
-    ti: Ints
-    tf: Floats
-    comp: Floats
-    """(NT, k + 2) by how much each rival leads, nat: radii, line, wedge."""
-    ddl: Floats
-    """(NH,) what roughness says of each noise."""
-    ntot: Floats
-    """(NH,) what the objects say."""
-    nll: Floats
-    """(NT, NH) and each of them."""
-    bins: Floats
-    """(NT, NB, CAP, 5) the reservoirs: raw readings."""
-    bn: Ints
-    lines: Floats
-    g: Floats
-    w: Floats
-    """(WORK, 5)"""
-    w2: Floats
-    wl: Ints
-    cur: Floats
-    """(S, 6) this firing: x, y, axis x, axis y, range, sensor."""
-    owner: Ints
-    """(S,) what explains each: −1 nothing, −2−k line k, t a track, 1000+t a polygon."""
-    fit: Floats
-    stats: Floats
-    segs: Floats
-    """(8 S, SEG + 1) this firing's segments, and the reading each came from."""
-    near: Floats
-    """(32, 4) segments near a place."""
-    pi: Ints
-    pf: Floats
-    pbins: Floats
-    pbn: Ints
-    stats2: Floats
-    pose: Floats
-    root: Floats
-    cov: Floats
-    pull: Floats
-    """(PULLING, 5) segments as the relaxation wants them: ends and normal."""
-    all_pull: Ints
-    """(PULLING,) 0, 1, 2, …"""
-    last: Floats
-    """(S, 5) each sensor's last reading that said anything new."""
-    job: Ints
-    """(24,) what is being done about which polygon, and how far that has come; see `polygon_job`."""
-    work: Floats
-    """(56,) the numbers of that job."""
-    pw: Floats
-    """(PT's reservoir, 5) its readings."""
-    asked: Floats
-    """(ASKED, 6) where polygons shall be tried: model, segment's middle and normal, whether it has been tried."""
-    names: Ints
-    """(NT + PT, 2) number and marks of each track."""
-    tally: Ints
-    stamps: Floats
-    """(slots, bucket, 2) of each segment in `store`."""
-    barred: Floats
-    """(BARRED, 5) what does not stand where: x, y, how far around (m), what, and how much must speak for it (nat)."""
+    x: float
+    y: float
+    heading: float
 
 
-def make_state(sensors: int, p: Settings, tracks: int = NT, slots: int = BUCKETS) -> State:
-    """Return an empty memory for a ring of `sensors`."""
-    z, n = np.zeros, np.int64
-    rivals, noises = len(p.radii) + 2, len(p.noises)
-    s = State(
-        hist=z((sensors, HK, 6)), hn=z(sensors, n), tags=z((slots, 2), n), fill=z(slots, n),
-        store=z((slots, BUCKET, 4)), ti=z((tracks, NTI), n), tf=z((tracks, NTF)), comp=z((tracks, rivals)),
-        ddl=z(noises), ntot=z(noises), nll=z((tracks, noises)), bins=z((tracks, NB, CAP, 5)), bn=z((tracks, NB), n),
-        lines=z((NL, 12)), g=z(8), w=z((WORK, 5)), w2=z((WORK, 5)), wl=z(WORK, n), cur=z((sensors, 6)),
-        owner=z(sensors, n), fit=z(12), stats=z(12), segs=z((8 * sensors, SEG + 1)), near=z((32, 4)),
-        pi=z((PT, NTI), n), pf=z((PT, NPF)), pbins=z((PT, PB, PCAP, 5)), pbn=z((PT, PB), n), stats2=z(12),
-        pose=z(3), root=z(3), cov=z(3), pull=z((PULLING, 5)), all_pull=np.arange(PULLING), last=z((sensors, 5)),
-        job=z(24, n), work=z(56), pw=z((PB * PCAP, 5)), asked=z((ASKED, 6)), names=z((tracks + PT, 2), n),
-        tally=z(4, n), stamps=z((slots, BUCKET, 2)), barred=z((BARRED, 5)),
-    )  # fmt: skip
-    clear(s)
-    return s
+class LowerTriangle(Record):
+    """The lower triangle of a 3 × 3 matrix over x, y and heading h."""
+
+    xx: float
+    yx: float
+    yy: float
+    hx: float
+    hy: float
+    hh: float
 
 
-def clear(s: State) -> None:
-    """Forget everything but which numbers have been given."""
-    for name in s._fields:
-        if name not in {"all_pull", "tally"}:
-            getattr(s, name)[...] = 0
-    s.tally[BARS] = 0
-    s.last[...] = np.nan
-    s.g[NOISE] = START_NOISE
-    s.ddl[START_NOISE] = 6.0
+class Sensor(Record):
+    """What is remembered of one sensor."""
+
+    history: Annotated[Records[Reading], HISTORY]
+    """A ring buffer of spaced readings, whatever they hit."""
+    times_s: Annotated[Floats, HISTORY]
+    kept: int
+    """Readings ever put there."""
+    last: Reading
+    """The last reading that said anything new."""
+
+
+class MappedSegment(Record):
+    """An outline segment in the map."""
+
+    x: float
+    """Its middle, m."""
+    y: float
+    normal_x: float
+    """Unit normal, away from the sensors."""
+    normal_y: float
+    number: int
+    time_s: float
+
+
+class Bucket(Record):
+    """The segments of one cell of the map."""
+
+    cell_x: int
+    cell_y: int
+    count: int
+    """Segments put in since the cell took the bucket."""
+    segments: Annotated[Records[MappedSegment], BUCKET_CAPACITY]
+
+
+class Line(Record):
+    """A wall, or a line that may become one; its normal and distance refer to an origin on the spot."""
+
+    normal_x: float
+    normal_y: float
+    distance: float
+    """From the origin along the normal, m."""
+    origin_x: float
+    origin_y: float
+    variance_angle: float
+    """rad²"""
+    covariance: float
+    """m·rad"""
+    variance_distance: float
+    """m²"""
+    low: float
+    """Extent along the line, m."""
+    high: float
+    log_odds: float
+    """Log odds that it is still there."""
+    echoes: float
+    """Echoes that it explained; 0 where the place is free."""
+
+
+class CircleBin(Record):
+    """The readings that a circle keeps of one direction."""
+
+    count: int
+    """Readings ever put in."""
+    readings: Annotated[Records[Reading], BIN_CAPACITY]
+
+
+class PolygonBin(Record):
+    """The readings that a polygon keeps of one direction."""
+
+    count: int
+    readings: Annotated[Records[Reading], POLYGON_BIN_CAPACITY]
+
+
+class Track(Record):
+    """What tracks of circles and of polygons have in common."""
+
+    status: int
+    """`FREE`, `TENTATIVE` or `ESTABLISHED`."""
+    unseen: int
+    """Readings that refinement has not seen."""
+    reservoir: int
+    """Readings that bore on it at the last refinement."""
+    refinements: int
+    idle_firings: int
+    """Firings without new evidence."""
+    final_refinements: int
+    """Refinements still due once it is idle."""
+    passed_over: int
+    """Quanta that went to other tracks since its last one."""
+    number: int
+    """What a user knows it by."""
+    marks: int
+    """Sum of `CONFIRMED` and `PLACED`."""
+    x: float
+    y: float
+    log_likelihood_ratio: float
+    """Evidence against the background, nat."""
+    hits: float
+    near: float
+    """Readings within the gate."""
+    probability: float
+    """Existence probability: this explanation against all others."""
+
+
+class CircleTrack(Track):
+    """A round object, or what looks like one."""
+
+    kind: int
+    """Index of its radius in `Settings.circles`."""
+    alternative: int
+    """Index of the alternative that was compared last."""
+    is_named: int
+    """1 while it is reported as a model."""
+    radius: float
+    root_xx: float
+    """Lower Cholesky root of the covariance from which the next grid starts, m."""
+    root_yx: float
+    root_yy: float
+    covariance_xx: float
+    """m²"""
+    covariance_xy: float
+    covariance_yy: float
+    misses: float
+    """Readings that should have hit and passed through."""
+    dispersion: float
+    """How unlike the axes are that heard it."""
+    unknown_nat: float
+    """Evidence of an unknown object in its place."""
+    leads: Annotated[Floats, ALTERNATIVES_MAX]
+    """By how much each alternative leads, nat: the radii, then a line, then a corner; 0 where it was not compared."""
+    noise_nat: Annotated[Floats, NOISES]
+    """What its residuals say of each noise."""
+    bins: Annotated[Records[CircleBin], BEARING_BINS]
+    """The readings it keeps, by bearing."""
+
+
+class PolygonTrack(Track):
+    """An object of polygonal outline."""
+
+    model: int
+    """Index in `Settings.polygons`."""
+    has_challenger: int
+    """1 while another pose is to be tried."""
+    heading: float
+    sure_hits: float
+    """Hits that had to be."""
+    covariance: LowerTriangle
+    """Of the pose; all zero until it is known."""
+    challenger: Pose
+    bins: Annotated[Records[PolygonBin], POLYGON_BEARING_BINS]
+
+
+class Rejection(Record):
+    """A place where a user rejected an object."""
+
+    x: float
+    y: float
+    radius: float
+    """Nothing of the kind starts within this, m, …"""
+    what: int
+    """Index of a circle, or `POLYGON` plus that of a polygon model."""
+    evidence_nat: float
+    """… before so much evidence speaks for it."""
+
+
+class PolygonRequest(Record):
+    """A segment behind which a polygon shall be tried."""
+
+    model: int
+    x: float
+    y: float
+    normal_x: float
+    normal_y: float
+    is_done: int
+
+
+class PoseSearch(Record):
+    """A search for the pose of greatest likelihood; see `polygon_likelihood.search`."""
+
+    x: float
+    y: float
+    heading: float
+    log_likelihood_ratio: float
+    """At that pose, nat."""
+    step_m: float
+    trial: int
+    """What it tries next; −1 while nothing has been scored."""
+    rounds_left: int
+    has_gained: int
+    """1 where this round gained."""
+
+
+class LatticeMoments(Record):
+    """Mass, first and second moments of a likelihood on a lattice, in pitches along the frame's axes a, b, c."""
+
+    mass: float
+    a: float
+    b: float
+    c: float
+    aa: float
+    ab: float
+    bb: float
+    ac: float
+    bc: float
+    cc: float
+
+
+class PolygonJob(Record):
+    """A piece of work on polygons, and how far it has come; see `perception.bayes.polygon_job`."""
+
+    kind: int
+    stage: int
+    track: int
+    """The track that is refined, or …"""
+    model: int
+    """… the model that is tried."""
+    reading_count: int
+    reading_step: int
+    """Step between the readings that a search scores."""
+    noise_level: int
+    """Noise assumed when the job began."""
+    next_step: int
+    """Where a stage has come to."""
+    lattices: int
+    """Lattices laid."""
+    refines_next: int
+    """Turn of refinements (1) and of new hypotheses (0)."""
+    requests_made: int
+    search: PoseSearch
+    best: Pose
+    """Best pose of several searches."""
+    best_nat: float
+    """Its log likelihood ratio."""
+    segment_x: float
+    """The segment behind which a hypothesis is tried."""
+    segment_y: float
+    segment_normal_x: float
+    segment_normal_y: float
+    middle: Pose
+    """Middle of the lattice, or of the restarts."""
+    middle_nat: float
+    """Log likelihood ratio there."""
+    root: LowerTriangle
+    """The lattice's frame: lower root of one pitch."""
+    covariance: LowerTriangle
+    moments: LatticeMoments
+
+
+class PairSegment(Record):
+    """An outline segment from a pair of readings."""
+
+    x: float
+    """Its middle, m."""
+    y: float
+    normal_x: float
+    normal_y: float
+    length: float
+    sigma_normal: float
+    """Standard deviation along the normal, m."""
+    sigma_direction: float
+    """Standard deviation of the direction, rad."""
+    reading: int
+    """Index of the fired reading it came from."""
+
+
+class LinearReading(Record):
+    """A reading's error near a circle, and how it changes along the axes of the posterior's frame."""
+
+    error: float
+    """m"""
+    slope_a: float
+    """Fall of the error per unit of the first axis, m."""
+    slope_b: float
+    bins_per_m: float
+    level: int
+    """Row of `Settings.table`."""
+
+
+class Score(Record):
+    """What readings say of a circle or a polygon."""
+
+    log_likelihood_ratio: float
+    hits: float
+    misses: float
+    """Readings that should have hit and passed through."""
+    near: float
+    """Readings within the gate."""
+    shorts: float
+    """Readings that ended before it."""
+    closest: float
+    """Least range of a hit, m."""
+    dispersion: float
+    """How unlike the axes are that heard it."""
+    sure_hits: float
+    """Hits that had to be; of a polygon only."""
+
+
+class LineScore(Record):
+    """What readings say of a line."""
+
+    log_likelihood_ratio: float
+    hits: float
+    misses: float
+    low: float
+    """Extent of the hits along the line, m."""
+    high: float
+
+
+class CircleFit(Record):
+    """A fitted centre and its information."""
+
+    x: float
+    y: float
+    information_xx: float
+    """1/m²"""
+    information_xy: float
+    information_yy: float
+
+
+class LineFit(Record):
+    """A fitted line: unit normal and distance from the fit's origin."""
+
+    normal_x: float
+    normal_y: float
+    distance: float
+
+
+class CornerFit(Record):
+    """Two faces and the edge in which they meet, if they do."""
+
+    faces: Annotated[Records[LineFit], 2]
+    edge_x: float
+    edge_y: float
+
+
+class CirclePosterior(Record):
+    """Mean, lower Cholesky root of the expected covariance, and covariance of a circle's centre; m, m²."""
+
+    x: float
+    y: float
+    root_xx: float
+    root_yx: float
+    root_yy: float
+    covariance_xx: float
+    covariance_xy: float
+    covariance_yy: float
+
+
+class Scratch(Record):
+    """What kernels write anew before each use."""
+
+    fired: Annotated[Records[Reading], SENSORS_MAX]
+    """The readings of this firing."""
+    fired_sensors: Annotated[Ints, SENSORS_MAX]
+    explained_by: Annotated[Ints, SENSORS_MAX]
+    """What explains each; see `UNEXPLAINED`."""
+    segments: Annotated[Records[PairSegment], PAIRS_PER_SENSOR * SENSORS_MAX]
+    """The segments of this firing."""
+    readings: Annotated[Records[Reading], READINGS_MAX]
+    """The readings of one object."""
+    face_readings: Annotated[Records[Reading], READINGS_MAX]
+    linear: Annotated[Records[LinearReading], READINGS_MAX]
+    cells: Annotated[Floats, GRID_CELLS]
+    """Log likelihood of each cell of a posterior's grid, nat."""
+    near: Annotated[Records[MappedSegment], 32]
+    """Segments near a place."""
+    attracting: Annotated[Floats, ATTRACTING_MAX, 5]
+    """Segments as `perception.relaxation` takes them: ends x, y, x, y (m) and normal (rad)."""
+    attracting_rows: Annotated[Ints, ATTRACTING_MAX]
+    """0, 1, 2, …"""
+    pose: Annotated[Floats, 3]
+    """x, y (m), heading (rad), as `perception.relaxation` takes a pose."""
+    hypothesis: Pose
+    score: Score
+    line_score: LineScore
+    circle_fit: CircleFit
+    line_fit: LineFit
+    corner_fit: CornerFit
+    posterior: CirclePosterior
+
+
+class State(Record):
+    """Everything that is remembered but the tracks of circles."""
+
+    sensor_count: int
+    noise_level: int
+    """Index of the noise that is assumed, in `Settings.noises`."""
+    segments_made: int
+    refinements: int
+    ring_x: float
+    """Where the ring last fired, m."""
+    ring_y: float
+    objects_numbered: int
+    """Numbers given to objects, which are never given again."""
+    segments_numbered: int
+    """The same for segments."""
+    rejection_count: int
+    roughness_nat: Annotated[Floats, NOISES]
+    """What the roughness of the readings says of each noise."""
+    residuals_nat: Annotated[Floats, NOISES]
+    """What the residuals of all objects say of each noise."""
+    sensors: Annotated[Records[Sensor], SENSORS_MAX]
+    buckets: Annotated[Records[Bucket], BUCKETS]
+    """The outline map."""
+    lines: Annotated[Records[Line], MAX_LINES]
+    polygons: Annotated[Records[PolygonTrack], MAX_POLYGONS]
+    rejections: Annotated[Records[Rejection], REJECTIONS_MAX]
+    requests: Annotated[Records[PolygonRequest], REQUESTS_MAX]
+    job: PolygonJob
+    job_readings: Annotated[Records[Reading], POLYGON_BEARING_BINS * POLYGON_BIN_CAPACITY]
+    scratch: Scratch
+
+
+StateRecord: TypeAlias = Records[State]
+"""The memory as kernels take it: one record."""
+CircleTracks: TypeAlias = Records[CircleTrack]
+AnyTrack: TypeAlias = CircleTrack | PolygonTrack
+
+
+class Memory:
+    """The arrays of all that is remembered, as numpy and as kernels take them."""
+
+    SCRATCH: Final = ("s", "tracks")
+    """The same memory once more."""
+
+    def __init__(self, sensors: int, tracks: int = MAX_TRACKS) -> None:
+        self.state = zeros(State, 1)
+        self.circles = zeros(CircleTrack, tracks)
+        self.s = records(State, self.state)
+        self.tracks = records(CircleTrack, self.circles)
+        self.state["sensor_count"] = sensors
+        self.clear()
+
+    @property
+    def polygons(self) -> np.ndarray[Any, Any]:
+        """The tracks of polygons as numpy takes them, shape (MAX_POLYGONS,)."""
+        return self.state["polygons"][0]  # type: ignore[no-any-return]
+
+    def clear(self) -> None:
+        """Forget everything but which numbers have been given."""
+        kept = {name: self.state[name].copy() for name in ("sensor_count", "objects_numbered", "segments_numbered")}
+        for array in (self.state, self.circles):
+            array.view(np.uint8)[...] = 0
+        for name, value in kept.items():
+            self.state[name] = value
+        for field in Reading.DTYPE.names or ():
+            self.state["sensors"]["last"][field] = np.nan
+        self.state["noise_level"] = START_NOISE
+        self.state["roughness_nat"][0, START_NOISE] = START_NOISE_NAT
+        self.state["scratch"]["attracting_rows"] = np.arange(ATTRACTING_MAX)

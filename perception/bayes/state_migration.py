@@ -1,73 +1,58 @@
-"""The memory under other circumstances: with further models, or from a recording that knew less.
+"""Migration of the memory when models are added.
 
 Further models are further explanations. What is remembered of raw readings, walls and places stays as it is; what is
-indexed by explanation moves to where the explanation is now, and asks the new ones in its turn.
+indexed by explanation moves to the explanation's new index, and is compared with the new ones in its turn.
 """
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
-from perception.bayes.state import (
-    CYC,
-    DIRTY,
-    FREE,
-    KIND,
-    NUMBER,
-    NUMBERED,
-    REFS,
-    ST,
-    STAMP,
-    STAMP_S,
-    STAMPED,
-    TRHO,
-    Settings,
-    State,
-)
-from perception.bayes.track_labels import POLYGON
+from perception.bayes.parameters import SettingsRecord
+from perception.bayes.state import FREE, POLYGON, REJECTIONS_MAX, Memory
+from perception.kernel import Floats
+from perception.records import column
 
-SAME_M = 1e-9
-NEWS = 4
-"""A track whose radius has become a model's own counts so many readings as unseen, so that it is looked at."""
+SAME_M: Final = 1e-9
+"""Radii nearer than this are one."""
+CHANGED_UNSEEN: Final = 4
+"""A track whose radius becomes a model's own counts so many readings as unseen, so that it is refined."""
 
 
-def inherit(s: State, before: Settings, after: Settings) -> State:
-    """Return the memory for settings with further models; its arrays are those of `s` but for one.
+def radii_of(p: SettingsRecord) -> Floats:
+    """Return the radii (m) in competition, shape (n,)."""
+    return column(p, "circles")["radius_m"][0, : p[0].circle_count]
+
+
+def migrate(memory: Memory, before: SettingsRecord, after: SettingsRecord) -> None:
+    """Move what is indexed by explanation to the indices of other settings.
 
     Parameters
     ----------
-    s : State
-        Updated: radii have other numbers.
-    before, after : Settings
+    memory : Memory
+        Updated.
+    before, after : (1,) Settings
         Of the models in `after` the polygons of `before` are the first.
     """
-    heir = np.abs(after.radii[None] - before.radii[:, None]).argmin(axis=1)
-    circles = len(after.radii)
-    comp = np.zeros((len(s.comp), circles + 2))
-    for k, to in enumerate(heir.tolist()):
-        comp[:, to] = s.comp[:, k]
-    comp[:, circles:] = s.comp[:, -2:]
-    taken_over = np.abs(after.radii[heir] - before.radii) > SAME_M
-    for t in np.flatnonzero(s.ti[:, ST] != FREE).tolist():
-        kind = int(s.ti[t, KIND])
-        s.ti[t, KIND], s.ti[t, CYC] = heir[kind], 0
-        if taken_over[kind]:  # a rival as near as this to a model is that model
-            s.tf[t, TRHO] = after.radii[heir[kind]]
-            s.ti[t, REFS], s.ti[t, DIRTY] = 0, s.ti[t, DIRTY] + NEWS
-        comp[t, heir[kind]] = 0.0
-    round_bars = s.barred[:, 3] < POLYGON
-    s.barred[round_bars, 3] = heir[s.barred[round_bars, 3].astype(np.int64)]
-    return s._replace(comp=comp)
-
-
-def number_heirs(s: State) -> None:
-    """Give numbers to what a recording of an older program had without: in the order in which it lies there."""
-    if s.tally[NUMBERED] == 0:
-        rows = np.flatnonzero(np.concatenate([s.ti[:, ST], s.pi[:, ST]]) != FREE)
-        s.names[rows, NUMBER] = 1 + np.arange(len(rows))
-        s.tally[NUMBERED] = len(rows)
-    if s.tally[STAMPED] == 0:
-        used = np.argwhere(np.arange(s.store.shape[1]) < s.fill[:, None])
-        s.stamps[used[:, 0], used[:, 1], STAMP] = 1 + np.arange(len(used))
-        s.stamps[used[:, 0], used[:, 1], STAMP_S] = np.nan
-        s.tally[STAMPED] = len(used)
+    old, new = radii_of(before), radii_of(after)
+    index = np.abs(new[None] - old[:, None]).argmin(axis=1)
+    circles, rejections = memory.circles, memory.state["rejections"][0]
+    leads = np.zeros_like(circles["leads"])
+    for k, to in enumerate(index.tolist()):
+        leads[:, to] = circles["leads"][:, k]
+    leads[:, len(new) : len(new) + 2] = circles["leads"][:, len(old) : len(old) + 2]
+    is_changed = np.abs(new[index] - old) > SAME_M
+    for t in np.flatnonzero(circles["status"] != FREE).tolist():
+        kind = int(circles["kind"][t])
+        circles["kind"][t], circles["alternative"][t] = index[kind], 0
+        if is_changed[kind]:  # a rival as near as this to a model is that model
+            circles["radius"][t] = new[index[kind]]
+            circles["refinements"][t] = 0
+            circles["unseen"][t] += CHANGED_UNSEEN
+        leads[t, index[kind]] = 0.0
+    circles["leads"] = leads
+    for k in range(REJECTIONS_MAX):
+        if rejections["what"][k] < POLYGON:
+            rejections["what"][k] = index[rejections["what"][k]]

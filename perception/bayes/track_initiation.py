@@ -1,8 +1,8 @@
-"""Hypotheses: where a segment that nothing explains says that a model's body would be.
+"""Circle hypotheses: where an unexplained segment suggests a model's body.
 
-Not from clusters of segments, as the paper has it: a cluster joins drums that stand a foot apart and splits one seen
+The paper starts them from clusters of segments; a cluster joins drums that stand a foot apart and splits one seen
 from two sides. The paper's relaxation then moves the body onto the outline map, as there; whether it is an object is
-for the raw readings to say, against every rival.
+decided by the raw readings, against every alternative.
 """
 
 from __future__ import annotations
@@ -11,228 +11,331 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
-from perception.bayes.alternatives import SOFT, compete_circle, compete_line, score
+from perception.bayes.alternatives import SOFT, fit_other_circle, fit_other_line, score
 from perception.bayes.noise_estimation import noise_variance
-from perception.bayes.occlusion import audible
-from perception.bayes.range_fit import HIGH, LOW, fit_circle
-from perception.bayes.range_fit import HITS as HIT
-from perception.bayes.range_fit import NEAR as NEARBY
-from perception.bayes.reservoir import gather, put
-from perception.bayes.segment_pairs import map_near
+from perception.bayes.occlusion import keep_relevant
+from perception.bayes.parameters import SettingsRecord
+from perception.bayes.range_fit import fit_circle
+from perception.bayes.reservoir import gather_history, keep_reading
+from perception.bayes.segment_pairs import segments_near
 from perception.bayes.state import (
-    BIRTHS,
-    BORN,
-    C00,
-    C11,
-    DIRTY,
+    ATTRACTING_MAX,
     FREE,
-    KIND,
-    LLR,
-    MARK,
-    PULLING,
-    R00,
-    R11,
-    ST,
     TENTATIVE,
-    TRHO,
-    TX,
-    TY,
-    Settings,
-    State,
-)  # fmt: skip
-from perception.bayes.track_labels import give_number, is_barred
-from perception.bayes.walls import new_line
-from perception.kernel import Floats, Ints, kernel
+    AnyTrack,
+    CircleTrack,
+    CircleTracks,
+    MappedSegment,
+    StateRecord,
+)
+from perception.bayes.track_labels import assign_number, is_rejected
+from perception.bayes.walls import add_line
+from perception.kernel import Floats, kernel
+from perception.records import Records
 from perception.relaxation import relax
 
 CELL_M: Final = 1.0 * FOOT_M
 """A cell of the outline map."""
 AROUND_M: Final = 0.4 * FOOT_M
-"""Segments up to this far off the body may pull."""
+"""Segments up to this far off the body may attract it."""
 FACING: Final = 0.6
-"""A segment pulls where the body's centre lies at least this share of its radius behind it."""
-PULLING_MIN: Final = 3
+"""A segment attracts where the body's centre lies at least this share of its radius behind it."""
+ATTRACTING_MIN: Final = 3
+"""Fewer segments than this do not move a hypothesis."""
 GAMMA: Final = 2.0
 """The paper's γ."""
 STEPS: Final = 4
+"""Steps of the relaxation, and of each fit."""
 NEGLIGIBLE_M: Final = 0.005 * FOOT_M
 NEGLIGIBLE_RAD: Final = 0.005
+"""A relaxation ends with increments below both."""
 FIRST_SOFT: Final = 16.0
+"""Robustness of the first fit; see `alternatives.SOFT`."""
 READINGS_MIN: Final = 5
-EVIDENCE_MIN: Final = 10.0
-SWITCH: Final = 6.0
-"""Another explanation must lead by this, nat."""
-RIVAL_OVER_UNKNOWN: Final = 3.0
+EVIDENCE_MIN_NAT: Final = 10.0
+"""A track starts with so many readings and this evidence."""
+SWITCH_NAT: Final = 6.0
+"""Another explanation must lead by this."""
+RIVAL_OVER_UNKNOWN_NAT: Final = 3.0
+"""A rival must lead an unknown object by this."""
 LINE_HITS_MIN: Final = 8.0
-LINE_M: Final = 0.8 * FOOT_M
+LINE_MIN_M: Final = 0.8 * FOOT_M
 """A line is kept from this length and so many hits on."""
 VARIANCE_MAX_M2: Final = 0.2 * FOOT_M * FOOT_M
+"""Greatest variance of a centre that a fit is believed to have."""
 
 
 @kernel
-def free_track(of: Ints, evidence: Floats, names: Ints) -> int:
-    """Return a free track, else the tentative one with the least evidence that no person spoke of, else −1.
-
-    Parameters
-    ----------
-    of : (n, ≥ 1) int
-        `State.ti` or `State.pi`.
-    evidence : (n,) float
-        Log ratio of each to the background, nat.
-    names : (≥ n, 2) int
-        Its rows of `State.names`.
-    """
+def free_track(tracks: Records[AnyTrack]) -> int:
+    """Return a free track, else the unmarked tentative one with the least evidence, else −1."""
     worst = math.inf
     slot = -1
-    for t in range(of.shape[0]):
-        if of[t, ST] == FREE:
+    for t in range(len(tracks)):
+        track = tracks[t]
+        if track.status == FREE:
             return t
-        if of[t, ST] == TENTATIVE and evidence[t] < worst and names[t, MARK] == 0:
-            worst = evidence[t]
+        if track.status == TENTATIVE and track.log_likelihood_ratio < worst and track.marks == 0:
+            worst = track.log_likelihood_ratio
             slot = t
     return slot
 
 
 @kernel
-def let_pull(mapped: Floats, pull: Floats) -> None:
-    """Enter a row of `State.near` as one of `State.pull`: a mapped segment has a middle and a normal, and no ends."""
-    pull[0] = mapped[0]
-    pull[1] = mapped[1]
-    pull[2] = mapped[0]
-    pull[3] = mapped[1]
-    pull[4] = math.atan2(mapped[3], mapped[2])
+def enter_attracting(segment: MappedSegment, row: Floats) -> None:
+    """Write a mapped segment as the relaxation takes it, (5,) float: it has a middle and a normal, and no ends."""
+    row[0] = segment.x
+    row[1] = segment.y
+    row[2] = segment.x
+    row[3] = segment.y
+    row[4] = math.atan2(segment.normal_y, segment.normal_x)
 
 
 @kernel
-def is_known(s: State, p: Settings, x: float, y: float, shift: float, nx: float, ny: float) -> bool:
-    """Tell whether a track explains the surface of a body at (x, y).
+def is_known(tracks: CircleTracks, p: SettingsRecord, x: float, y: float, shift: float, nx: float, ny: float) -> bool:
+    """Return whether a track explains the surface of a body at (x, y).
 
-    A track of radius ρ is compared at the centre that a body of radius `shift` with the same surface would have.
+    Parameters
+    ----------
+    tracks, p
+        The circles and the settings.
+    x, y : float
+        The body's centre, m.
+    shift : float
+        A track of radius ρ is compared at the centre that a body of this radius with the same surface would have;
+        where negative, at its own.
+    nx, ny : float
+        Normal of the surface.
     """
-    for t in range(s.ti.shape[0]):
-        if s.ti[t, ST] != FREE:
-            k = shift - s.tf[t, TRHO] if shift >= 0.0 else 0.0
-            if math.hypot(x - k * nx - s.tf[t, TX], y - k * ny - s.tf[t, TY]) < p.merge:
+    for t in range(len(tracks)):
+        track = tracks[t]
+        if track.status != FREE:
+            k = shift - track.radius if shift >= 0.0 else 0.0
+            if math.hypot(x - k * nx - track.x, y - k * ny - track.y) < p[0].merge_m:
                 return True
     return False
 
 
 @kernel
-def relax_onto_map(s: State, p: Settings, kind: int) -> None:
-    """Move the hypothesis in `s.pose` by the paper's relaxation (§3.4) onto the segments that face it."""
-    rho = p.radii[kind]
-    m = map_near(s.pose[0], s.pose[1], rho + AROUND_M, CELL_M, s.tags, s.fill, s.store, s.near)
-    q = 0
-    for j in range(m):
-        deep = s.near[j, 2] * (s.pose[0] - s.near[j, 0]) + s.near[j, 3] * (s.pose[1] - s.near[j, 1])
-        if deep > FACING * rho:
-            let_pull(s.near[j], s.pull[q])
-            q += 1
-            if q == PULLING:
-                break
-    if q >= PULLING_MIN:
-        relax(p.sides[kind], s.pull, s.all_pull[:q], GAMMA, NEGLIGIBLE_M, NEGLIGIBLE_RAD, STEPS, s.pose)
+def relax_hypothesis(
+    s: StateRecord, sides: Floats, attracting: int, negligible_m: float, negligible_rad: float, steps: int
+) -> None:  # fmt: skip
+    """Move the scratch's hypothesis by the paper's relaxation (§3.4).
+
+    Parameters
+    ----------
+    s : (1,) State
+        Memory, updated.
+    sides : (n, 4) float
+        The model's sides, as `perception.relaxation` takes them.
+    attracting : int
+        How many of the scratch's attracting segments there are.
+    negligible_m, negligible_rad, steps
+        As for `perception.relaxation.relax`.
+    """
+    scratch = s[0].scratch
+    hypothesis = scratch.hypothesis
+    pose = scratch.pose[:]
+    pose[0] = hypothesis.x
+    pose[1] = hypothesis.y
+    pose[2] = hypothesis.heading
+    relax(
+        sides, scratch.attracting[:], scratch.attracting_rows[:attracting], GAMMA, negligible_m, negligible_rad,
+        steps, pose,
+    )  # fmt: skip
+    hypothesis.x = pose[0]
+    hypothesis.y = pose[1]
+    hypothesis.heading = pose[2]
 
 
 @kernel
-def begin_track(s: State, kind: int, rho: float, x: float, y: float, n: int, now: float) -> int:
-    """Found a tentative track on the `n` readings in `s.w` and return it, −1 where there is no room."""
-    t = free_track(s.ti, s.tf[:, LLR], s.names)
+def relax_onto_map(s: StateRecord, p: SettingsRecord, kind: int) -> None:
+    """Move a circle, the scratch's hypothesis, by the relaxation onto the mapped segments that face it."""
+    scratch = s[0].scratch
+    x, y = scratch.hypothesis.x, scratch.hypothesis.y
+    radius = p[0].circles[kind].radius_m
+    near = segments_near(s[0].buckets, CELL_M, x, y, radius + AROUND_M, scratch.near)
+    attracting = 0
+    for j in range(near):
+        segment = scratch.near[j]
+        deep = segment.normal_x * (x - segment.x) + segment.normal_y * (y - segment.y)
+        if deep > FACING * radius:
+            enter_attracting(segment, scratch.attracting[attracting])
+            attracting += 1
+            if attracting == ATTRACTING_MAX:
+                break
+    if attracting >= ATTRACTING_MIN:
+        relax_hypothesis(s, p[0].circles[kind].chords[:], attracting, NEGLIGIBLE_M, NEGLIGIBLE_RAD, STEPS)
+
+
+@kernel
+def reset_circle(track: CircleTrack) -> None:
+    """Set a circle's track to zero, but for its number, its marks and the readings beyond the counts of its bins."""
+    track.status = FREE
+    track.unseen = 0
+    track.reservoir = 0
+    track.refinements = 0
+    track.idle_firings = 0
+    track.final_refinements = 0
+    track.passed_over = 0
+    track.x = 0.0
+    track.y = 0.0
+    track.log_likelihood_ratio = 0.0
+    track.hits = 0.0
+    track.near = 0.0
+    track.probability = 0.0
+    track.kind = 0
+    track.alternative = 0
+    track.is_named = 0
+    track.radius = 0.0
+    track.root_xx = 0.0
+    track.root_yx = 0.0
+    track.root_yy = 0.0
+    track.covariance_xx = 0.0
+    track.covariance_xy = 0.0
+    track.covariance_yy = 0.0
+    track.misses = 0.0
+    track.dispersion = 0.0
+    track.unknown_nat = 0.0
+    track.leads[:] = 0.0
+    track.noise_nat[:] = 0.0
+    for b in range(len(track.bins)):
+        track.bins[b].count = 0
+
+
+@kernel
+def restart_circle(
+    s: StateRecord, track: CircleTrack, kind: int, radius: float, x: float, y: float, n: int
+) -> None:  # fmt: skip
+    """Make a track a tentative one on the first `n` readings of the scratch.
+
+    Parameters
+    ----------
+    s : (1,) State
+        Memory.
+    track : CircleTrack
+        Updated, but for its number and its marks.
+    kind, radius, x, y
+        Index of the circle, its radius and its centre, m.
+    n : int
+        Readings.
+    """
+    reset_circle(track)
+    track.status = TENTATIVE
+    track.kind = kind
+    track.unseen = n
+    track.x = x
+    track.y = y
+    track.radius = radius
+    for j in range(n):
+        keep_reading(track, x, y, s[0].scratch.readings[j])
+
+
+@kernel
+def start_circle(
+    s: StateRecord, tracks: CircleTracks, kind: int, radius: float, x: float, y: float, n: int
+) -> int:  # fmt: skip
+    """Start a tentative track and return its index, −1 where there is no room; the parameters are as above."""
+    t = free_track(tracks)
     if t < 0:
         return -1
-    begin_at(s, t, kind, rho, x, y, n, now)
-    give_number(s.names, s.tally, t)
-    s.g[BIRTHS] += 1
+    restart_circle(s, tracks[t], kind, radius, x, y, n)
+    assign_number(s, tracks[t])
     return t
 
 
 @kernel
-def begin_at(s: State, t: int, kind: int, rho: float, x: float, y: float, n: int, now: float) -> None:
-    """Make track `t` a tentative one on the `n` readings in `s.w`."""
-    s.ti[t, :] = 0
-    s.tf[t, :] = 0.0
-    s.comp[t, :] = 0.0
-    s.nll[t, :] = 0.0
-    s.bn[t, :] = 0
-    s.ti[t, ST] = TENTATIVE
-    s.ti[t, KIND] = kind
-    s.ti[t, DIRTY] = n
-    s.tf[t, TX] = x
-    s.tf[t, TY] = y
-    s.tf[t, TRHO] = rho
-    s.tf[t, BORN] = now
-    for j in range(n):
-        put(s.bins, s.bn, t, x, y, s.w[j])
-
-
-@kernel
-def birth(s: State, p: Settings, kind: int, sx: float, sy: float, nx: float, ny: float, now: float) -> int:
-    """Try the body of circle `kind` behind a segment; return 1 if that took work, whatever came of it.
+def gather_relevant(
+    s: StateRecord, tracks: CircleTracks, p: SettingsRecord, x: float, y: float, radius: float
+) -> int:  # fmt: skip
+    """Copy to the scratch what the sensors remember that bears on a new circle; return how many readings.
 
     Parameters
     ----------
-    s, p
-        Memory, updated, and settings.
-    kind : int
-        Index into `p.radii`.
-    sx, sy, nx, ny : float
-        The segment's middle (m) and unit normal, away from the sensors.
-    now : float
-        s.
+    s, tracks, p
+        Memory, circles and settings.
+    x, y, radius : float
+        The circle, m.
     """
-    rho = p.radii[kind]
-    s.pose[0] = sx + rho * nx
-    s.pose[1] = sy + rho * ny
-    s.pose[2] = 0.0
-    if is_known(s, p, s.pose[0], s.pose[1], rho, nx, ny):
+    return keep_relevant(s, tracks, p, gather_history(s, p, x, y, radius), x, y, radius, -1)
+
+
+@kernel
+def initiate_circle(
+    s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: int, x: float, y: float, nx: float, ny: float
+) -> int:  # fmt: skip
+    """Try a circle behind a segment, and start a track where the readings bear it out; return 1 if that took work.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    kind : int
+        Index of the circle.
+    x, y, nx, ny : float
+        The segment's middle (m) and unit normal, away from the sensors.
+    """
+    scratch = s[0].scratch
+    fit = scratch.circle_fit
+    radius = p[0].circles[kind].radius_m
+    hypothesis = scratch.hypothesis
+    hypothesis.x = x + radius * nx
+    hypothesis.y = y + radius * ny
+    hypothesis.heading = 0.0
+    if is_known(tracks, p, hypothesis.x, hypothesis.y, radius, nx, ny):
         return 0
     relax_onto_map(s, p, kind)
-    n = audible(s, p, gather(s, p, s.pose[0], s.pose[1], rho, s.w), s.pose[0], s.pose[1], rho, -1)
+    n = gather_relevant(s, tracks, p, hypothesis.x, hypothesis.y, radius)
     if n < READINGS_MIN:
         return 0
     var0, rel2 = noise_variance(s, p)
     if not fit_circle(
-        s.w, n, s.pose[0], s.pose[1], rho, p.cos_opt, p.gate, FIRST_SOFT, var0, rel2, STEPS, s.fit
-    ):  # fmt: skip
+        scratch.readings[:n], hypothesis.x, hypothesis.y, radius, p, FIRST_SOFT, var0, rel2, STEPS, fit
+    ):
         return 0
-    n = audible(s, p, gather(s, p, s.fit[0], s.fit[1], rho, s.w), s.fit[0], s.fit[1], rho, -1)
-    if not fit_circle(s.w, n, s.fit[0], s.fit[1], rho, p.cos_opt, p.gate, SOFT, var0, rel2, STEPS, s.fit):
+    n = gather_relevant(s, tracks, p, fit.x, fit.y, radius)
+    if not fit_circle(scratch.readings[:n], fit.x, fit.y, radius, p, SOFT, var0, rel2, STEPS, fit):
         return 0
-    x, y, h00, h01, h11 = s.fit[0], s.fit[1], s.fit[2], s.fit[3], s.fit[4]
-    llr = score(s, p, n, x, y, rho)
-    near = s.stats[NEARBY]
-    if s.stats[HIT] < READINGS_MIN or llr < EVIDENCE_MIN:
+    x, y = fit.x, fit.y
+    h00, h01, h11 = fit.information_xx, fit.information_xy, fit.information_yy
+    llr = score(s, p, n, x, y, radius)
+    near = scratch.score.near
+    if scratch.score.hits < READINGS_MIN or llr < EVIDENCE_MIN_NAT:
         return 1
-    own = llr + (p.prior if kind < p.models else 0.0)
-    if compete_line(s, p, n, x, y, rho, STEPS) > own + SWITCH:
-        if s.stats[HIT] >= LINE_HITS_MIN and s.stats[HIGH] - s.stats[LOW] > LINE_M:
-            new_line(s, s.fit[0], s.fit[1], s.fit[2], x, y, s.stats[LOW], s.stats[HIGH], s.stats[HIT])
+    prior = p[0].model_prior_nat
+    own = llr + (prior if kind < p[0].model_count else 0.0)
+    if fit_other_line(s, p, n, x, y, radius, STEPS) > own + SWITCH_NAT:
+        line = scratch.line_score
+        if line.hits >= LINE_HITS_MIN and line.high - line.low > LINE_MIN_M:
+            add_line(s, scratch.line_fit, x, y, line)
         return 1
     chosen = kind
     best = own
-    bx = x
-    by = y
-    for k in range(p.radii.shape[0]):
+    best_x = x
+    best_y = y
+    for k in range(p[0].circle_count):
         if k != kind:
-            v = compete_circle(s, p, n, x, y, rho, p.radii[k], STEPS) + (p.prior if k < p.models else 0.0)
-            if v > best + SWITCH:
+            v = fit_other_circle(s, p, n, x, y, radius, p[0].circles[k].radius_m, STEPS) + (
+                prior if k < p[0].model_count else 0.0
+            )
+            if v > best + SWITCH_NAT:
                 best = v
                 chosen = k
-                bx = s.fit[0]
-                by = s.fit[1]
-    if chosen == kind and llr < p.unknown * near:
+                best_x = fit.x
+                best_y = fit.y
+    if chosen == kind and llr < p[0].unknown_nat * near:
         return 1
-    if chosen != kind and best < p.unknown * near + RIVAL_OVER_UNKNOWN:
+    if chosen != kind and best < p[0].unknown_nat * near + RIVAL_OVER_UNKNOWN_NAT:
         return 1
-    if is_known(s, p, bx, by, -1.0, nx, ny) or is_barred(s, bx, by, chosen, best):
+    if is_known(tracks, p, best_x, best_y, -1.0, nx, ny) or is_rejected(s, best_x, best_y, chosen, best):
         return 1
-    t = begin_track(s, chosen, p.radii[chosen], bx, by, n, now)
+    t = start_circle(s, tracks, chosen, p[0].circles[chosen].radius_m, best_x, best_y, n)
     if t < 0:
         return 1
     det = h00 * h11 - h01 * h01
-    s.tf[t, LLR] = llr
-    s.tf[t, C00] = min(h11 / det, VARIANCE_MAX_M2) if det > 0.0 else VARIANCE_MAX_M2
-    s.tf[t, C11] = min(h00 / det, VARIANCE_MAX_M2) if det > 0.0 else VARIANCE_MAX_M2
-    s.tf[t, R00] = math.sqrt(s.tf[t, C00])
-    s.tf[t, R11] = math.sqrt(s.tf[t, C11])
+    track = tracks[t]
+    track.log_likelihood_ratio = llr
+    track.covariance_xx = min(h11 / det, VARIANCE_MAX_M2) if det > 0.0 else VARIANCE_MAX_M2
+    track.covariance_yy = min(h00 / det, VARIANCE_MAX_M2) if det > 0.0 else VARIANCE_MAX_M2
+    track.root_xx = math.sqrt(track.covariance_xx)
+    track.root_yy = math.sqrt(track.covariance_yy)
     return 1

@@ -1,81 +1,75 @@
-"""Names of tracks, and what a person said of them or of a place.
+"""Numbers of tracks, and what a user confirmed, placed or rejected.
 
-A track gets its number when it is born and keeps it; a person's word on it lasts until it is taken back, however
-little the readings say: the track gives way to no other explanation, and to none that stands in its place. Where a
-person said that something does not stand, it is not born again before so much new speaks for it as did when it was
-rejected.
+A track gets its number when it starts and keeps it; a user's mark on it lasts until it is withdrawn, however little
+the readings say: the track yields to no alternative explanation, and to no other track in its place. Where a user
+rejected an object, none like it starts before the new evidence exceeds that of the rejected one.
 """
 
 from __future__ import annotations
 
 import math
 
-from perception.bayes.state import BARRED, BARS, FREE, MARK, NUMBER, NUMBERED, ST, TENTATIVE, State
-from perception.kernel import Ints, kernel
-
-POLYGON = 1000
-"""What is barred is the radius of this index; from here on the polygon."""
+from perception.bayes.state import FREE, REJECTIONS_MAX, TENTATIVE, AnyTrack, StateRecord
+from perception.kernel import kernel
 
 
 @kernel
-def give_number(names: Ints, tally: Ints, row: int) -> None:
-    """Give a new track its number."""
-    tally[NUMBERED] += 1
-    names[row, NUMBER] = tally[NUMBERED]
-    names[row, MARK] = 0
+def assign_number(s: StateRecord, track: AnyTrack) -> None:
+    """Give a new track the next number, and no marks."""
+    s[0].objects_numbered += 1
+    track.number = s[0].objects_numbered
+    track.marks = 0
 
 
 @kernel
-def give_up(tracks: Ints, names: Ints, t: int, row: int) -> bool:
-    """End a track, or make it tentative where a person's word holds it; return whether it has ended.
-
-    Parameters
-    ----------
-    tracks : (n, ≥ 1) int
-        `State.ti` or `State.pi`. Updated.
-    names : (m, 2) int
-        `State.names`.
-    t, row : int
-        The track in either.
-    """
-    if names[row, MARK] == 0:
-        tracks[t, ST] = FREE
+def drop_track(track: AnyTrack) -> bool:
+    """Free a track, or make it tentative where a user marked it; return whether it was freed."""
+    if track.marks == 0:
+        track.status = FREE
         return True
-    tracks[t, ST] = TENTATIVE
+    track.status = TENTATIVE
     return False
 
 
 @kernel
-def outlives(names: Ints, row: int, other: int, has_more: bool) -> bool:
-    """Tell which of two tracks in one place stays, and have it take the older number: the one of `row` or the other.
+def outlives(track: AnyTrack, other: AnyTrack, has_more: bool) -> bool:
+    """Return whether the first of two tracks in one place stays, and give the one that stays the older number.
 
     Parameters
     ----------
-    names : (m, 2) int
-        `State.names`. Updated.
-    row, other : int
-        The tracks there.
+    track, other
+        The tracks, updated. One that a user marked stays, and keeps its number.
     has_more : bool
-        Whether more speaks for the first.
-
-    Returns
-    -------
-    bool
-        Whether the first stays. One that a person spoke of does, and keeps its number.
+        Whether the first has more evidence.
     """
-    if (names[row, MARK] != 0) != (names[other, MARK] != 0):
-        return bool(names[row, MARK] != 0)
-    if names[row, MARK] == 0:
-        older = min(names[row, NUMBER], names[other, NUMBER])
-        names[row if has_more else other, NUMBER] = older
+    if (track.marks != 0) != (other.marks != 0):
+        return track.marks != 0
+    if track.marks == 0:
+        older = min(track.number, other.number)
+        if has_more:
+            track.number = older
+        else:
+            other.number = older
     return has_more
 
 
 @kernel
-def is_barred(s: State, x: float, y: float, what: int, llr: float) -> bool:
-    """Tell whether a person's word keeps something from being born at (x, y) for which `llr` nat speak."""
-    for k in range(min(s.tally[BARS], BARRED)):
-        bar = s.barred[k]
-        if bar[3] == what and llr < bar[4] and math.hypot(x - bar[0], y - bar[1]) < bar[2]:
+def is_rejected(s: StateRecord, x: float, y: float, what: int, evidence_nat: float) -> bool:
+    """Return whether a user rejected such an object at (x, y), and the evidence is too little to start it again.
+
+    Parameters
+    ----------
+    s : (1,) State
+        Memory.
+    x, y : float
+        m.
+    what : int
+        Index of a circle, or `POLYGON` plus that of a polygon model.
+    evidence_nat : float
+        Evidence for it.
+    """
+    for k in range(min(s[0].rejection_count, REJECTIONS_MAX)):
+        it = s[0].rejections[k]
+        if it.what == what and evidence_nat < it.evidence_nat and math.hypot(x - it.x, y - it.y) < it.radius:
             return True
     return False

@@ -1,9 +1,9 @@
-"""Which object a quantum of refinement goes to: the one that gains most by it, and in the end every one.
+"""Selection of the track that the next quantum of refinement goes to.
 
-Worth is unseen evidence for an object's size, more where its place is unsure; among those worth a quantum the nearer
-to the robot goes first, as it is what the robot meets next. A budget that is spent in every cycle would leave some
-waiting for ever: whoever was passed over too often goes before all others, longest wait first, so that nobody waits
-for more than `PATIENCE` quanta and one for each other object.
+The value of a quantum is the unseen evidence for an object's size, more where its place is unsure; among those above
+the threshold the nearer to the robot goes first, as the robot meets it next. A budget that is spent in every cycle
+would leave some waiting for ever: a track that was passed over too often goes before all others, longest wait first,
+so that none waits for more than `PATIENCE` quanta and one for each other track.
 """
 
 from __future__ import annotations
@@ -12,121 +12,123 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
-from perception.bayes.state import (
-    DIRTY,
-    FREE,
-    HERE_X,
-    HERE_Y,
-    NRES,
-    PASSED,
-    POLISH,
-    PROB,
-    QUIET,
-    R00,
-    R11,
-    ST,
-    TX,
-    TY,
-    Settings,
-    State,
-)
-from perception.kernel import Ints, kernel
+from perception.bayes.parameters import SettingsRecord
+from perception.bayes.state import FREE, MAX_POLYGONS, AnyTrack, CircleTrack, CircleTracks, StateRecord
+from perception.kernel import kernel
 
-UNSURE: Final = 4.0
+UNSURE_FACTOR: Final = 4.0
 UNSURE_ROOT_M: Final = 0.03 * FOOT_M
-"""Evidence counts so many times where an object's place is less sure than this, maybe altogether wrong."""
+"""Evidence counts so many times where an object's place is less sure than this, maybe altogether wrong, …"""
 CERTAIN: Final = 0.95
-"""Or where its name is less sure than this."""
+"""… or where it is less probable than this."""
 SIZE: Final = 8.0
-"""A small object's readings are taken for so many more."""
-OWED: Final = 1e-6
-"""By so much what is worked off to the end is above the threshold by itself."""
+"""Readings added to an object's own, so that a small one is not refined at every reading."""
+FINAL_VALUE: Final = 1e-6
+"""By so much a final refinement is above the threshold."""
 PATIENCE: Final = 60
-"""Quanta that may go to others; then an object goes before all that are not passed over as often."""
+"""Quanta that may go to others; then a track goes before all that are not passed over as often."""
 OVERDUE: Final = 1e9
+"""Priority of such a track."""
 
 
 @kernel
-def news(track: Ints, quiet: int, threshold: float, weight: float) -> float:
-    """Return what is unseen of a track for its size, `weight` times; `track` is a row of `State.ti` or `State.pi`.
+def unseen_evidence(track: AnyTrack, idle_firings: int, threshold: float, weight: float) -> float:
+    """Return the unseen readings of a track for its size, `weight` times.
 
-    A track that has had no evidence for a while is worked off to the end: whatever is unseen, and a few rounds more.
+    A track without evidence for a while is refined to the end: whatever is unseen, and a few rounds more.
+
+    Parameters
+    ----------
+    track
+        A circle or a polygon.
+    idle_firings : int
+        From how many firings without evidence on.
+    threshold : float
+        Value from which on a track waits for refinement.
+    weight : float
+        Factor.
     """
-    v: float = weight * (track[DIRTY] / (track[NRES] + SIZE))
-    if track[QUIET] > quiet and track[POLISH] > 0:
-        v += threshold + OWED
+    v: float = weight * (track.unseen / (track.reservoir + SIZE))
+    if track.idle_firings > idle_firings and track.final_refinements > 0:
+        v += threshold + FINAL_VALUE
     return v
 
 
 @kernel
-def worth(s: State, p: Settings, t: int, threshold: float) -> float:
-    """Return what a quantum is worth to circle `t`; it waits for one where that is above `threshold`."""
-    if s.ti[t, ST] == FREE:
+def circle_value(track: CircleTrack, p: SettingsRecord, threshold: float) -> float:
+    """Return the value of a quantum for a circle; the track waits for one where that is above `threshold`."""
+    if track.status == FREE:
         return 0.0
-    is_unsure = max(s.tf[t, R00], s.tf[t, R11]) > UNSURE_ROOT_M or s.tf[t, PROB] < CERTAIN
-    return news(s.ti[t], p.quiet, threshold, UNSURE if is_unsure else 1.0)
+    is_unsure = max(track.root_xx, track.root_yy) > UNSURE_ROOT_M or track.probability < CERTAIN
+    return unseen_evidence(track, p[0].idle_firings, threshold, UNSURE_FACTOR if is_unsure else 1.0)
 
 
 @kernel
-def worth_polygon(s: State, p: Settings, t: int, threshold: float) -> float:
-    """Return the same for polygon `t`."""
-    return 0.0 if s.pi[t, ST] == FREE else news(s.pi[t], p.quiet, threshold, 1.0)
+def priority(s: StateRecord, p: SettingsRecord, value: float, track: CircleTrack) -> float:
+    """Return the priority of a circle for which a quantum has this value: the greatest is next.
 
-
-@kernel
-def rank(s: State, p: Settings, v: float, x: float, y: float, passed: int) -> float:
-    """Return the place in the row of something of worth `v` at (x, y), passed over so often: the largest is next.
-
-    At the end of the ring's reach it counts half as much as beside the robot.
+    At the end of the ring's range a track counts half as much as next to the robot.
     """
-    if passed > PATIENCE:
-        return OVERDUE + passed
-    return v * p.range_max / (p.range_max + math.hypot(x - s.g[HERE_X], y - s.g[HERE_Y]))
+    if track.passed_over > PATIENCE:
+        return OVERDUE + track.passed_over
+    return value * p[0].range_max_m / (p[0].range_max_m + math.hypot(track.x - s[0].ring_x, track.y - s[0].ring_y))
 
 
 @kernel
-def is_waiting(s: State, p: Settings, threshold: float) -> bool:
-    """Tell whether a circle waits for a quantum."""
+def is_waiting(tracks: CircleTracks, p: SettingsRecord, threshold: float) -> bool:
+    """Return whether a circle waits for a quantum."""
     most = 0.0
-    for t in range(s.ti.shape[0]):
-        most = max(most, worth(s, p, t, threshold))
-    return bool(most > threshold)
+    for t in range(len(tracks)):
+        most = max(most, circle_value(tracks[t], p, threshold))
+    return most > threshold
 
 
 @kernel
-def choose(s: State, p: Settings, threshold: float) -> int:
-    """Return the circle whose turn it is, −1 where none waits; the others that wait have been passed over."""
+def choose_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, threshold: float) -> int:
+    """Return the circle that is next, −1 where none waits; the others that wait have been passed over.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory, circles (updated) and settings.
+    threshold : float
+        Value from which on a track waits for refinement.
+    """
     best = -1.0
     chosen = -1
-    for t in range(s.ti.shape[0]):
-        v = worth(s, p, t, threshold)
+    for t in range(len(tracks)):
+        track = tracks[t]
+        v = circle_value(track, p, threshold)
         if v > threshold:
-            v = rank(s, p, v, s.tf[t, TX], s.tf[t, TY], s.ti[t, PASSED])
-            s.ti[t, PASSED] += 1
+            v = priority(s, p, v, track)
+            track.passed_over += 1
             if v > best:
                 best = v
                 chosen = t
     if chosen >= 0:
-        s.ti[chosen, PASSED] = 0
+        tracks[chosen].passed_over = 0
     return chosen
 
 
 @kernel
-def choose_polygon(s: State, p: Settings, threshold: float) -> int:
-    """Return the polygon whose turn it is, as `choose` does the circle, but near or far alike.
+def choose_polygon(s: StateRecord, p: SettingsRecord, threshold: float) -> int:
+    """Return the polygon that is next, as `choose_circle` does the circle, but near or far alike.
 
     Polygons that face each other across the way share readings: where the nearer went first, one was found twice.
     """
     best = -1.0
     chosen = -1
-    for t in range(s.pi.shape[0]):
-        v = worth_polygon(s, p, t, threshold)
+    for t in range(MAX_POLYGONS):
+        track = s[0].polygons[t]
+        v = 0.0
+        if track.status != FREE:
+            v = unseen_evidence(track, p[0].idle_firings, threshold, 1.0)
         if v > threshold:
-            v = OVERDUE + s.pi[t, PASSED] if s.pi[t, PASSED] > PATIENCE else v
-            s.pi[t, PASSED] += 1
+            v = OVERDUE + track.passed_over if track.passed_over > PATIENCE else v
+            track.passed_over += 1
             if v > best:
                 best = v
                 chosen = t
     if chosen >= 0:
-        s.pi[chosen, PASSED] = 0
+        s[0].polygons[chosen].passed_over = 0
     return chosen

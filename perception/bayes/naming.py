@@ -1,0 +1,198 @@
+"""Naming of tracks: which are sure enough to be reported as a model.
+
+A model's name is given late and for good: the model must be probable, well located, and clearly better than an
+unknown object, which would explain any handful of echoes a little.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from config.units import FOOT_M
+from perception.bayes.parameters import SettingsRecord
+from perception.bayes.range_fit import FAR
+from perception.bayes.state import (
+    ESTABLISHED,
+    FREE,
+    MAX_POLYGONS,
+    POLYGON_BIN_CAPACITY,
+    CircleTrack,
+    CircleTracks,
+    PolygonTrack,
+    StateRecord,
+)
+from perception.kernel import Ints, kernel
+from perception.records import Record, Records
+
+OVER_UNKNOWN: Final = 1.25
+OVER_UNKNOWN_ALONE: Final = 1.1
+"""Evidence over that of an unknown object, as a factor; less where every alternative is far behind."""
+ALONE_NAT: Final = -20.0
+"""The best alternative is far behind at this lead."""
+NO_WALL_NAT: Final = -4.0
+"""A wall this far behind is out of the question. Walls are the most frequent of all alternatives."""
+DISPERSION_MIN: Final = 0.008
+"""Dispersion of the axes from which on an object has been seen from two sides: what lies straight ahead has not."""
+KEPT: Final = 0.5
+"""A name once given is kept while it is likelier than everything else together."""
+SIGMA_MAX_M: Final = 0.17 * FOOT_M
+"""A named circle is known at least as well as this along either axis."""
+POLYGON_PROBABILITY: Final = 0.9
+POLYGON_NEAR_M: Final = 6.5 * FOOT_M
+POLYGON_DISPERSION: Final = 0.02
+"""A polygon is seen from near and from more than one direction: one face, square on from afar, may be any wall's."""
+POLYGON_SIGMA_MAX_M: Final = 0.2 * FOOT_M
+POLYGON_HITS: Final = 20.0
+POLYGON_HITS_SWEPT: Final = 12.0
+POLYGON_SWEPT: Final = 80
+"""It answers so often; or less often, where so many readings bear on it, silences and all, and it explains them."""
+
+
+class Reported(Record):
+    """What a circle was last reported as."""
+
+    x: float
+    y: float
+    covariance_xx: float
+    covariance_xy: float
+    covariance_yy: float
+    hits: float
+    probability: float
+    kind: float
+    number: float
+    marks: float
+
+
+@kernel
+def update_name(track: CircleTrack, p: SettingsRecord, sure: float, least: float) -> None:
+    """Name a track after a model once that is sure, and withdraw the name once it is not even likely any more.
+
+    A name that came and went with every alternative's turn would be useless to steer by.
+
+    Parameters
+    ----------
+    track : CircleTrack
+        Updated.
+    p : (1,) Settings
+        Which circles are models.
+    sure, least : float
+        Probability from which on a name is given; and from which on where a wall is out of the question.
+    """
+    line = p[0].circle_count
+    if track.leads[line] == 0.0 or track.leads[line] > NO_WALL_NAT:
+        least = sure
+    if track.status != ESTABLISHED or track.kind >= p[0].model_count or track.probability < min(least, KEPT):
+        track.is_named = 0
+        return
+    best = -1e300
+    for k in range(line + 2):
+        if k != track.kind:
+            best = max(best, track.leads[k])
+    over = OVER_UNKNOWN_ALONE if best < ALONE_NAT else OVER_UNKNOWN
+    is_vague = max(track.covariance_xx, track.covariance_yy) >= SIGMA_MAX_M**2
+    if track.log_likelihood_ratio <= over * track.unknown_nat or track.dispersion < DISPERSION_MIN or is_vague:
+        track.is_named = 0
+    elif track.probability >= least:
+        track.is_named = 1
+
+
+@kernel
+def report_circles(tracks: CircleTracks, reported: Records[Reported], sure: Ints) -> int:
+    """Write the circles that are objects to `sure`, those that changed as ~t, and return how many there are.
+
+    They are objects because the readings say so, or because a user does.
+
+    Parameters
+    ----------
+    tracks : (n,) CircleTrack
+        The circles.
+    reported : (n,) Reported
+        What each was last reported as; updated.
+    sure : (≥ n,) int
+        Out.
+    """
+    n = 0
+    for t in range(len(tracks)):
+        track = tracks[t]
+        is_named = track.status == ESTABLISHED and track.is_named == 1
+        if is_named or (track.status != FREE and track.marks != 0):
+            sure[n] = ~t if update_reported(track, reported[t]) else t
+            n += 1
+    return n
+
+
+@kernel
+def update_reported(track: CircleTrack, last: Reported) -> bool:
+    """Enter what a circle is reported as, and return whether that changed."""
+    is_same = (
+        last.x == track.x
+        and last.y == track.y
+        and last.covariance_xx == track.covariance_xx
+        and last.covariance_xy == track.covariance_xy
+        and last.covariance_yy == track.covariance_yy
+        and last.hits == track.hits
+        and last.probability == track.probability
+        and last.kind == track.kind
+        and last.number == track.number
+        and last.marks == track.marks
+    )
+    last.x = track.x
+    last.y = track.y
+    last.covariance_xx = track.covariance_xx
+    last.covariance_xy = track.covariance_xy
+    last.covariance_yy = track.covariance_yy
+    last.hits = track.hits
+    last.probability = track.probability
+    last.kind = float(track.kind)
+    last.number = float(track.number)
+    last.marks = float(track.marks)
+    return not is_same
+
+
+@kernel
+def is_sure_polygon(track: PolygonTrack, least: float) -> bool:
+    """Return whether a polygon is sure by its readings, with at least this probability."""
+    largest = max(track.covariance.xx, track.covariance.yy)
+    if track.status != ESTABLISHED or track.probability < least or largest > POLYGON_SIGMA_MAX_M**2:
+        return False
+    swept = 0
+    nearest = FAR
+    heard = 0
+    x = 0.0
+    y = 0.0
+    for b in range(len(track.bins)):
+        kept = track.bins[b]
+        swept += min(kept.count, POLYGON_BIN_CAPACITY)
+        for k in range(min(kept.count, POLYGON_BIN_CAPACITY)):
+            q = kept.readings[k]
+            if q.range_m < FAR:
+                nearest = min(nearest, q.range_m)
+                x += q.axis_x
+                y += q.axis_y
+                heard += 1
+    if track.hits < (POLYGON_HITS_SWEPT if swept >= POLYGON_SWEPT else POLYGON_HITS):
+        return False
+    return heard > 0 and nearest <= POLYGON_NEAR_M and 1.0 - math.hypot(x, y) / heard > POLYGON_DISPERSION
+
+
+@kernel
+def sure_polygons(s: StateRecord, least: float, out: Ints) -> int:
+    """Write the polygons that are sure, or that a user marked, to `out` and return how many there are.
+
+    Parameters
+    ----------
+    s : (1,) State
+        Memory.
+    least : float
+        Least probability.
+    out : (≥ MAX_POLYGONS,) int
+        Out.
+    """
+    n = 0
+    for t in range(MAX_POLYGONS):
+        track = s[0].polygons[t]
+        if (track.status != FREE and track.marks != 0) or is_sure_polygon(track, least):
+            out[n] = t
+            n += 1
+    return n
