@@ -136,9 +136,7 @@ def rival_label(memory: Memory, t: int) -> str:
 def alternative_labels(p: SettingsRecord, rounds: Sequence[str]) -> tuple[str, ...]:
     """Return what the alternatives of a circle are called: the round models, their rivals, a line and a corner."""
     settings = p[0]
-    rivals = [
-        round_label(float(it.radius_m)) for it in settings.circles[settings.model_count : settings.circle_count]
-    ]
+    rivals = settings.circles[settings.model_count : settings.circle_count]
     return (*rounds, *(round_label(float(it.radius_m)) for it in rivals), "wall", "corner")
 
 

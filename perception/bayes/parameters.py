@@ -1,8 +1,8 @@
 """The settings record, which kernels read and never change.
 
 It has the same layout for every ring, library and configuration. A kernel is compiled for a layout, so nothing is
-compiled when a model is added on the way. What varies in number has a capacity, and `perception.bayes.kernel_settings`
-refuses what exceeds it.
+compiled when a model is added on the way. What varies in number has a capacity, and `kernel_settings` refuses what
+exceeds it.
 """
 
 from __future__ import annotations

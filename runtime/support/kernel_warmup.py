@@ -146,16 +146,16 @@ def compile_in_parallel(part: str) -> Iterator[None]:
 def compile_refinement(part: str) -> None:
     """Compile the refinement of a part by a call on an empty state, which does nothing."""
     from config.load import load_settings
-    from perception.bayes.entry import hold, pquantum, quantum
     from perception.bayes.kernel_settings import make_settings
-    from perception.bayes.state import make_state
+    from perception.bayes.polygon_tracks import polygon_quantum
+    from perception.bayes.refine import quantum
+    from perception.bayes.state import Memory
 
     settings = load_settings(None)
     bayes = settings.perception.bayes
-    kernel_settings = make_settings(settings.ring, settings.models, bayes)
-    handle = hold(make_state(len(settings.ring.mounts), kernel_settings, bayes.tracks_max), kernel_settings)
-    refine = {BAYES: quantum, POLYGONS: pquantum}[part]
-    refine(handle, bayes.fresh_share)
+    memory = Memory(len(settings.ring.mounts), bayes.tracks_max)
+    refine = {BAYES: quantum, POLYGONS: polygon_quantum}[part]
+    refine(memory.s, memory.tracks, make_settings(settings.ring, settings.models, bayes), bayes.fresh_share)
 
 
 def compile_part(part: str) -> None:
