@@ -115,16 +115,16 @@ def test_evidence_agrees_with_the_objects_and_changes_nothing(seen: Perception) 
 def test_evidence_for_an_object_that_is_not_a_model(reached_drums: Perception) -> None:
     """A track that resembles a post is labelled as one and cannot be confirmed as a model."""
     from perception.bayes.bayes_method import BayesPerception
-    from perception.bayes.state import ESTABLISHED, KIND, ST
+    from perception.bayes.state import ESTABLISHED
 
     seen = reached_drums
     method = seen.method
     assert isinstance(method, BayesPerception)
-    s, p = method.memory, method.settings
-    t = int(np.flatnonzero(s.ti[:, ST] == ESTABLISHED)[0])
-    s.ti[t, KIND] = p.models
-    s.tf[t, 3] = p.radii[p.models]
-    number = int(s.names[t, 0])
+    circles, settings = method.memory.circles, method.settings[0]
+    t = int(np.flatnonzero(circles["status"] == ESTABLISHED)[0])
+    circles["kind"][t] = settings.model_count
+    circles["radius"][t] = settings.circles[settings.model_count].radius_m
+    number = int(circles["number"][t])
     evidence = seen.evidence(number)
     assert evidence is not None
     assert evidence.model in {"post", "barrel", "edge", "inside corner"}

@@ -9,23 +9,13 @@ import numpy as np
 
 from config.load import load_settings
 from perception.bayes.kernel_settings import make_settings
+from perception.bayes.parameters import RANGE_BINS_PER_M, Settings, SettingsRecord
 from perception.bayes.range_fit import FAR
-from perception.bayes.state import (
-    KIND,
-    LLR,
-    NL,
-    NOISE,
-    R00,
-    R11,
-    ST,
-    TRHO,
-    TX,
-    TY,
-    State,
-    make_state,
-)  # fmt: skip
+from perception.bayes.state import MAX_LINES, Memory, Reading
+from perception.kernel import Floats
+from perception.records import Records, array_of, records, zeros
 from perception.sensor_mounts import mounts_array
-from tests import naive_bayes as naive_full
+from tests import naive_bayes
 from tests.naive_tracks import Line
 
 SETTINGS = load_settings("hallway", ["perception.method=bayes"])
@@ -38,28 +28,62 @@ SENSORS = len(MOUNTS)
 
 P = make_settings(SETTINGS.ring, SETTINGS.models, SETTINGS.perception.bayes)
 
-COSINES = (P.cos_opt, P.cos_half, P.cos_in)
+S = P[0]
+
+RADII = np.array([circle.radius_m for circle in S.circles[: S.circle_count]])
+
+NOISES = np.array([(noise.absolute_m, noise.relative) for noise in S.noises])
+
+COSINES = (S.cos_may_answer, S.cos_half_angle, S.cos_must_answer)
 
 TRACKS = 8
 
-RIVALS = len(P.radii) + 2
+ALTERNATIVES = len(RADII) + 2
 
 
-def noises() -> list[naive_full.Noise]:
-    return [naive_full.Noise(P.table, P.inv_step, levels, P.per_metre) for levels in P.levels]
+def noises() -> list[naive_bayes.Noise]:
+    table, bins_per_m = array_of(P)["table"][0], array_of(P)["table_bins_per_m"][0]
+    return [naive_bayes.Noise(table, bins_per_m, noise.levels, RANGE_BINS_PER_M) for noise in S.noises]
 
 
-def sigma(s: State) -> tuple[float, float]:
-    absolute, relative = P.noises[int(s.g[NOISE])]
+def changed(p: SettingsRecord, **values: float) -> SettingsRecord:
+    """Return a copy of settings with other values."""
+    array = array_of(p).copy()
+    for name, value in values.items():
+        array[name] = value
+    return records(Settings, array)
+
+
+def sigma(memory: Memory) -> tuple[float, float]:
+    absolute, relative = NOISES[memory.s[0].noise_level]
     return float(absolute), float(relative)
+
+
+def readings_of(rows: Floats) -> Records[Reading]:
+    """Return readings as kernels take them, from rows of place, axis and range."""
+    array = zeros(Reading, len(rows))
+    numbers(array)[...] = np.asarray(rows).reshape(len(rows), 5)
+    return records(Reading, array)
+
+
+def numbers(array: Any) -> Floats:
+    """Return records that hold nothing but floats as rows of floats: a view."""
+    array = np.asarray(array)
+    return np.ndarray((len(array), array.itemsize // 8), np.float64, array, 0, (array.strides[0], 8))
+
+
+def enter_readings(memory: Memory, rows: Floats) -> None:
+    """Put readings to the beginning of the scratch."""
+    numbers(memory.state["scratch"]["readings"][0])[: len(rows)] = rows
+
+
+def scratch_readings(memory: Memory, n: int) -> Floats:
+    """Return the first readings of the scratch as rows."""
+    return numbers(memory.state["scratch"]["readings"][0])[:n]
 
 
 def pair(v: np.ndarray) -> tuple[float, float]:
     return float(v[0]), float(v[1])
-
-
-def quintuple(q: np.ndarray) -> tuple[float, float, float, float, float]:
-    return float(q[0]), float(q[1]), float(q[2]), float(q[3]), float(q[4])
 
 
 def unit(angle: Any) -> np.ndarray:
@@ -77,28 +101,39 @@ def around(rng: np.random.Generator, n: int, centre: np.ndarray, rho: float) -> 
     return np.column_stack([centre - d[:, None] * unit(bearing), unit(axis), r])
 
 
-def shared() -> State:
-    return make_state(SENSORS, P, TRACKS, 64)
+def shared() -> Memory:
+    return Memory(SENSORS, TRACKS)
 
 
-def random_track(rng: np.random.Generator, s: State, t: int, state: int | None = None) -> None:
-    s.ti[t, ST] = rng.integers(3) if state is None else state
-    s.ti[t, KIND] = k = int(rng.integers(len(P.radii)))
-    s.tf[t, [TX, TY]] = rng.uniform(-0.8, 0.8, 2)
-    s.tf[t, TRHO] = P.radii[k]
-    s.tf[t, [R00, R11]] = rng.uniform(0, 0.02, 2)
-    s.tf[t, LLR] = rng.normal(20, 20)
+def random_track(rng: np.random.Generator, memory: Memory, t: int, state: int | None = None) -> None:
+    track = memory.tracks[t]
+    track.status = int(rng.integers(3)) if state is None else state
+    track.kind = k = int(rng.integers(len(RADII)))
+    track.x, track.y = rng.uniform(-0.8, 0.8, 2)
+    track.radius = RADII[k]
+    track.root_xx, track.root_yy = rng.uniform(0, 0.02, 2)
+    track.log_likelihood_ratio = rng.normal(20, 20)
 
 
-def random_lines(rng: np.random.Generator, s: State, many: int) -> dict[int, Line]:
+def place_of(memory: Memory, t: int) -> Floats:
+    """Return a track's centre, m."""
+    return np.array([memory.circles["x"][t], memory.circles["y"][t]])
+
+
+def line_rows(memory: Memory) -> Floats:
+    """Return the lines as rows, as `naive_tracks.Line.row` writes them: a view."""
+    return numbers(memory.state["lines"][0])
+
+
+def random_lines(rng: np.random.Generator, memory: Memory, many: int) -> dict[int, Line]:
     """Lines in some of the rows of the memory, as tall as they may be wrong."""
-    s.lines[...] = 0.0
+    line_rows(memory)[...] = 0.0
     lines = {}
-    for k in sorted(rng.choice(NL, many, replace=False).tolist()):
+    for k in sorted(rng.choice(MAX_LINES, many, replace=False).tolist()):
         root = np.array([[rng.uniform(0.001, 0.1), 0.0], [rng.normal(0, 0.01), rng.uniform(0.001, 0.05)]])
         lines[k] = Line(
             unit(rng.uniform(-math.pi, math.pi)), rng.uniform(-0.2, 2), rng.uniform(-1, 1, 2), root @ root.T,
             -rng.uniform(0, 2), rng.uniform(0, 2), rng.uniform(0, 6), float(rng.integers(1, 30)),
         )  # fmt: skip
-        s.lines[k] = lines[k].row()
+        line_rows(memory)[k] = lines[k].row()
     return lines

@@ -7,15 +7,26 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes.likelihood import BINS, LEVELS, build_levels, build_table, loglik
-from tests import naive_bayes as naive_full
+from perception.bayes.likelihood import build_levels, build_table, level_of, log_likelihood
+from perception.bayes.parameters import (
+    NOISES,
+    RANGE_BINS,
+    RANGE_BINS_PER_M,
+    TABLE_BINS,
+    TABLE_LEVELS,
+    NoiseModel,
+    Settings,
+)
+from perception.records import records, zeros
+from tests import naive_bayes
 
 U0 = 1 / 4.5
 EPS = 0.03
+RELATIVE = (0.0, 0.005, 0.01, 0.02)
 
 
 def table_of(half_box: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    table, inv_step, sigmas = np.empty((LEVELS, BINS)), np.empty(LEVELS), np.empty(LEVELS)
+    table, inv_step, sigmas = np.empty((TABLE_LEVELS, TABLE_BINS)), np.empty(TABLE_LEVELS), np.empty(TABLE_LEVELS)
     build_table(half_box, 0.0003, 0.18, U0, EPS, table, inv_step, sigmas)
     return table, inv_step, sigmas
 
@@ -24,9 +35,9 @@ def table_of(half_box: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def test_each_entry_is_the_formula(half_box: float) -> None:
     table, inv_step, sigmas = table_of(half_box)
     assert sigmas[[0, -1]] == pytest.approx([0.0003, 0.18], rel=1e-12)
-    for k in range(LEVELS):
-        for b in range(BINS - 2):
-            expected = naive_full.log_ratio(b / inv_step[k], half_box, sigmas[k], U0, EPS)
+    for k in range(TABLE_LEVELS):
+        for b in range(TABLE_BINS - 2):
+            expected = naive_bayes.log_ratio(b / inv_step[k], half_box, sigmas[k], U0, EPS)
             assert table[k, b] == pytest.approx(expected, abs=2e-12)
         assert table[k, -1] == math.log(EPS)
 
@@ -34,20 +45,22 @@ def test_each_entry_is_the_formula(half_box: float) -> None:
 @pytest.mark.parametrize("half_box", [0.0, 0.01524])
 def test_between_entries_it_is_interpolated_and_even(half_box: float) -> None:
     table, inv_step, _ = table_of(half_box)
-    rng = np.random.default_rng(1)
+    settings = zeros(Settings, 1)
+    settings["table"], settings["table_bins_per_m"] = table, inv_step
+    p, rng = records(Settings, settings), np.random.default_rng(1)
     for _ in range(3000):
-        k = int(rng.integers(LEVELS))
-        e = rng.normal() * BINS / inv_step[k] / 2
-        expected = np.interp(abs(e) * inv_step[k], np.arange(BINS), table[k])
-        assert loglik(table, inv_step, k, e) == pytest.approx(expected, abs=1e-12)
-        assert loglik(table, inv_step, k, -e) == loglik(table, inv_step, k, e)
-    assert loglik(table, inv_step, 0, 1e6) == math.log(EPS)
+        k = int(rng.integers(TABLE_LEVELS))
+        e = rng.normal() * TABLE_BINS / inv_step[k] / 2
+        expected = np.interp(abs(e) * inv_step[k], np.arange(TABLE_BINS), table[k])
+        assert log_likelihood(p, k, e) == pytest.approx(expected, abs=1e-12)
+        assert log_likelihood(p, k, -e) == log_likelihood(p, k, e)
+    assert log_likelihood(p, 0, 1e6) == math.log(EPS)
 
 
 def test_the_density_adds_up_to_one() -> None:
     table, inv_step, sigmas = table_of(0.01524)
-    for k in range(LEVELS):
-        e = np.arange(BINS) / inv_step[k]
+    for k in range(TABLE_LEVELS):
+        e = np.arange(TABLE_BINS) / inv_step[k]
         density = (np.exp(table[k]) - EPS) * U0 / (1 - EPS)
         total = 2 * ((density[1:] + density[:-1]) / 2 * np.diff(e)).sum()
         assert total == pytest.approx(1.0, abs=0.01), sigmas[k]
@@ -55,10 +68,18 @@ def test_the_density_adds_up_to_one() -> None:
 
 def test_levels_are_the_nearest_on_a_logarithmic_scale() -> None:
     _, _, sigmas = table_of(0.01524)
-    noises = np.array([(a, b) for a in (0.0001, 0.001, 0.0037, 0.024, 0.5) for b in (0.0, 0.005, 0.02)])
-    levels = np.empty((len(noises), 64), np.int64)
-    build_levels(noises, sigmas, levels, 6.5)
-    for h, (absolute, relative) in enumerate(noises):
-        for b in range(64):
-            sigma = math.hypot(absolute, relative * (b + 0.5) / 6.5)
-            assert levels[h, b] == naive_full.nearest_level(sigma, sigmas)
+    settings, wanted = (
+        zeros(Settings, 1),
+        np.array([(a, b) for a in (0.0001, 0.001, 0.0037, 0.024, 0.5) for b in RELATIVE]),
+    )
+    noises = settings["noises"][0]
+    noises["absolute_m"], noises["relative"] = wanted.T
+    build_levels(records(NoiseModel, noises), sigmas)
+    p = records(Settings, settings)
+    for h, (absolute, relative) in enumerate(wanted):
+        for b in range(RANGE_BINS):
+            r = (b + 0.5) / RANGE_BINS_PER_M
+            level = naive_bayes.nearest_level(math.hypot(absolute, relative * r), sigmas)
+            assert level_of(p, h, r) == level
+        assert level_of(p, h, 1e6) == level
+    assert len(wanted) == NOISES

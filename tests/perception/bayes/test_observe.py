@@ -7,66 +7,77 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from perception.bayes import noise_estimation as noise_choice
-from perception.bayes import observe, reservoir
+from perception.bayes import noise_estimation, observe, reservoir
 from perception.bayes.range_fit import FAR
 from perception.bayes.segment_pairs import tangent
 from perception.bayes.state import (
-    CAP,
-    DIRTY,
+    BEARING_BINS,
+    BIN_CAPACITY,
     ESTABLISHED,
     FREE,
-    HK,
-    NB,
-    NOISE,
-    POLISH,
-    QUIET,
-    R00,
-    ST,
-    TRHO,
-    TX,
-    TY,
-)  # fmt: skip
+    HISTORY,
+    Memory,
+    PairSegment,
+)
+from perception.kernel import Floats
+from perception.records import records, zeros
 from tests import naive_tracks
 from tests.naive_tracks import rows
 from tests.perception.tracks import (
     MOUNTS,
+    NOISES,
+    RADII,
     SENSORS,
     TRACKS,
     P,
+    S,
     around,
+    numbers,
     pair,
-    quintuple,
+    place_of,
     random_track,
+    readings_of,
+    scratch_readings,
     shared,
     sigma,
     unit,
 )
 
 
+def history(memory: Memory, i: int) -> Floats:
+    """Return a sensor's history as rows: a view."""
+    return numbers(memory.state["sensors"]["history"][0, i])
+
+
+def kept_by(memory: Memory, t: int) -> Floats:
+    """Return the readings that a circle keeps, as rows."""
+    n = reservoir.copy_reservoir(memory.tracks[t], memory.s[0].scratch.readings)
+    return scratch_readings(memory, n)
+
+
 def test_a_reservoir_keeps_the_newest_of_each_direction() -> None:
-    rng, s = np.random.default_rng(1), shared()
+    rng, memory = np.random.default_rng(1), shared()
     for t in range(TRACKS):
-        want, centre = naive_tracks.Reservoir(NB, CAP), rng.uniform(-1, 1, 2)
+        want, centre = naive_tracks.Reservoir(BEARING_BINS, BIN_CAPACITY), rng.uniform(-1, 1, 2)
         for q in around(rng, int(rng.choice([0, 5, 600, 1500])), centre, 0.3):
-            reservoir.put(s.bins, s.bn, t, *pair(centre), q)
+            reservoir.keep_reading(memory.tracks[t], *pair(centre), readings_of(q[None])[0])
             want.put(centre, q)
-        n = reservoir.flatten(s.bins, s.bn, t, s.w)
-        assert rows(s.w[:n]) == rows(q for kept in want.kept for q in kept)
+        assert rows(kept_by(memory, t)) == rows(q for kept in want.kept for q in kept)
 
 
 def test_what_sensors_remember_of_a_circle_is_gathered() -> None:
-    rng, s, total = np.random.default_rng(2), shared(), 0
+    rng, memory, total = np.random.default_rng(2), shared(), 0
     for _ in range(300):
-        centre, rho = rng.uniform(-1, 1, 2), float(rng.choice(P.radii))
-        memory = []
+        centre, rho = rng.uniform(-1, 1, 2), float(rng.choice(RADII))
+        remembered: list[Floats] = []
         for i in range(SENSORS):
-            s.hn[i] = int(rng.integers(0, 2 * HK))
-            s.hist[i, :, :5] = around(rng, HK, centre + rng.normal(0, 0.1, 2), rho)
-            memory += list(s.hist[i, : min(s.hn[i], HK)])
-        n = reservoir.gather(s, P, *pair(centre), rho, s.w)
-        want = naive_tracks.gather(memory, centre, rho, P.cos_opt, P.range_max)
-        assert rows(s.w[:n]) == want[:n]
+            count = int(rng.integers(0, 2 * HISTORY))
+            memory.s[0].sensors[i].kept = count
+            history(memory, i)[...] = around(rng, HISTORY, centre + rng.normal(0, 0.1, 2), rho)
+            remembered += list(history(memory, i)[: min(count, HISTORY)].copy())
+        n = reservoir.gather_history(memory.s, P, *pair(centre), rho)
+        want = naive_tracks.gather(remembered, centre, rho, S.cos_may_answer, S.range_max_m)
+        assert rows(scratch_readings(memory, n)) == want[:n]
         total += n
     assert total > 10_000
 
@@ -87,82 +98,93 @@ def drive(rng: np.random.Generator, firings: int) -> Iterator[tuple[tuple[float,
 
 
 def test_readings_are_placed_paired_and_remembered() -> None:
-    rng, s = np.random.default_rng(9), shared()
+    rng, memory = np.random.default_rng(9), shared()
+    scratch, sensors = memory.state["scratch"], memory.state["sensors"][0]
     last: dict[int, np.ndarray] = {}
     memories: list[list[np.ndarray]] = [[] for _ in range(SENSORS)]
     entered = segments = 0
+    segment = zeros(PairSegment, 1)
     for pose, now, ranges in drive(rng, 500):
-        m = observe.place_readings(s, P, MOUNTS, *pose, ranges)
-        want = naive_tracks.place_readings(last, MOUNTS, pose, ranges, P.range_max, P.half_box)
+        m = observe.place_readings(memory.s, P, MOUNTS, *pose, ranges)
+        want = naive_tracks.place_readings(last, MOUNTS, pose, ranges, S.range_max_m, S.half_resolution_m)
         assert m == len(want)
-        cur = s.cur[:m].copy()
+        cur = np.column_stack([numbers(scratch["fired"][0])[:m], scratch["fired_sensors"][0, :m]])
         assert cur == pytest.approx(np.array(want).reshape(m, 6), rel=1e-12, abs=1e-12)
-        assert (s.owner[:m] == -1).all()
+        assert (scratch["explained_by"][0, :m] == -1).all()
         entered += m
-        s.g[NOISE] = rng.integers(len(P.noises))
-        var0, rel2 = noise_choice.noise_variance(s, P)
-        made = observe.make_segments(s, P, m, now)
-        expected, out = [], np.zeros(7)
+        memory.s[0].noise_level = int(rng.integers(len(NOISES)))
+        var0, rel2 = noise_estimation.noise_variance(memory.s, P)
+        made = observe.make_segments(memory.s, P, m, now)
+        expected = []
         for i in range(m):
             if cur[i, 4] < FAR:
-                for old in naive_tracks.partners(i, cur, memories, now, P.gap):
+                for old in naive_tracks.partners(i, cur, memories, now, S.pair_gap_s):
                     var = var0 + rel2 * float(cur[i, 4]) ** 2
-                    if tangent(*quintuple(old), *quintuple(cur[i]), P.cos_half, var, out):
-                        expected.append([*out, i])
+                    a, b = readings_of(np.array([old[:5], cur[i, :5]]))
+                    if tangent(a, b, float(S.cos_half_angle), var, records(PairSegment, segment)[0]):
+                        expected.append((*segment[0].item()[:7], i))
         assert made == len(expected)
-        assert s.segs[:made] == pytest.approx(np.array(expected).reshape(made, 8), rel=1e-12, abs=1e-12)
+        got = scratch["segments"][0, :made]
+        told = np.array([row[:7] for row in got.tolist()]).reshape(made, 7)
+        assert told == pytest.approx(np.array([e[:7] for e in expected]).reshape(made, 7), rel=1e-12, abs=1e-12)
+        assert got["reading"].tolist() == [e[7] for e in expected]
         segments += made
-        observe.remember(s, P, m, now)
+        observe.update_history(memory.s, P, m, now)
         for q in cur:
             sensor = int(q[5])
-            memories[sensor] = naive_tracks.remembered(memories[sensor], q, now, P.spacing, P.gap, HK)
+            memories[sensor] = naive_tracks.remembered(
+                memories[sensor], q, now, S.history_spacing_m, S.pair_gap_s, HISTORY
+            )  # fmt: skip
         for i in range(SENSORS):
-            assert rows(s.hist[i, : min(s.hn[i], HK)]) == rows(memories[i])
+            held = min(int(sensors["kept"][i]), HISTORY)
+            mine = np.column_stack([history(memory, i)[:held], sensors["times_s"][i, :held]])
+            assert rows(mine) == rows(memories[i])
     assert entered > 1500
     assert segments > 300
 
 
-def test_readings_are_claimed_by_the_best_and_kept_by_all_they_bear_on() -> None:
-    rng, s = np.random.default_rng(10), shared()
-    claimed = kept = 0
+def test_readings_go_to_the_best_circle_and_are_kept_by_all_they_bear_on() -> None:
+    rng, memory = np.random.default_rng(10), shared()
+    circles, scratch = memory.circles, memory.state["scratch"]
+    fired, explained_by = numbers(scratch["fired"][0])[:SENSORS], scratch["explained_by"][0, :SENSORS]
+    taken = kept = 0
     for _ in range(400):
-        s.ti[...], s.tf[...], s.bn[...] = 0, 0.0, 0
-        s.g[NOISE] = rng.integers(len(P.noises))
+        circles.view(np.uint8)[...] = 0
+        memory.s[0].noise_level = int(rng.integers(len(NOISES)))
         for t in range(TRACKS):
-            random_track(rng, s, t)
-            s.ti[t, [QUIET, DIRTY]] = 7, 2
+            random_track(rng, memory, t)
+        circles["idle_firings"], circles["unseen"] = 7, 2
         t = int(rng.integers(TRACKS))
-        s.cur[:, :5] = around(rng, SENSORS, s.tf[t, [TX, TY]], float(s.tf[t, TRHO]))
-        s.cur[:, 5] = np.arange(SENSORS)
-        s.owner[...] = -1
-        observe.claim(s, P, SENSORS)
+        fired[...] = around(rng, SENSORS, place_of(memory, t), float(circles["radius"][t]))
+        explained_by[...] = -1
+        observe.associate_circles(memory.s, memory.tracks, P, SENSORS)
         sure = [
-            (k, s.tf[k, [TX, TY]], float(s.tf[k, TRHO]), float(s.tf[k, R00]))
-            for k in np.flatnonzero(s.ti[:, ST] == ESTABLISHED).tolist()
+            (k, place_of(memory, k), float(circles["radius"][k]), float(circles["root_xx"][k]))
+            for k in np.flatnonzero(circles["status"] == ESTABLISHED).tolist()
         ]
-        owner = [naive_tracks.claimed_by(q, sure, P.cos_opt, P.half_box, sigma(s)) for q in s.cur]
-        assert s.owner.tolist() == owner
-        claimed += sum(o >= 0 for o in owner)
-        s.owner[rng.random(SENSORS) < 0.2] = -5  # a wall's
-        observe.keep(s, P, SENSORS)
+        owner = [
+            naive_tracks.claimed_by(q, sure, S.cos_may_answer, S.half_resolution_m, sigma(memory)) for q in fired
+        ]
+        assert explained_by.tolist() == owner
+        taken += sum(o >= 0 for o in owner)
+        explained_by[rng.random(SENSORS) < 0.2] = -5  # a wall's
+        observe.keep_readings(memory.s, memory.tracks, P, SENSORS)
         for k in range(TRACKS):
-            state = s.ti[k, ST]
+            status, centre, radius = circles["status"][k], place_of(memory, k), float(circles["radius"][k])
             want = [
-                q[:5] for q, o in zip(s.cur, s.owner.tolist(), strict=True)
-                if state != FREE and naive_tracks.bears_on(
-                    q, s.tf[k, [TX, TY]], float(s.tf[k, TRHO]), o == -1,
-                    o in (-1, k) or (o < 0 and state == ESTABLISHED), P.cos_opt, P.cos_in, P.gate, P.pair_max,
+                q for q, o in zip(fired.copy(), explained_by.tolist(), strict=True)
+                if status != FREE and naive_tracks.bears_on(
+                    q, centre, radius, o == -1, o in (-1, k) or (o < 0 and status == ESTABLISHED),
+                    S.cos_may_answer, S.cos_must_answer, S.gate_m, S.pair_range_max_m,
                 )
             ]  # fmt: skip
-            bins, n = naive_tracks.Reservoir(NB, CAP), len(want)
+            bins, n = naive_tracks.Reservoir(BEARING_BINS, BIN_CAPACITY), len(want)
             for q in want:
-                bins.put(s.tf[k, [TX, TY]], q)
-            count = reservoir.flatten(s.bins, s.bn, k, s.w)
-            assert rows(s.w[:count]) == rows(q for room in bins.kept for q in room)
-            assert s.ti[k, DIRTY] == 2 + n
-            assert s.ti[k, QUIET] == (0 if n else 7 + (state != FREE))
-            assert s.ti[k, POLISH] == (P.polish if n else 0)
-            s.ti[k, POLISH] = 0
+                bins.put(centre, q)
+            assert rows(kept_by(memory, k)) == rows(q for room in bins.kept for q in room)
+            assert circles["unseen"][k] == 2 + n
+            assert circles["idle_firings"][k] == (0 if n else 7 + (status != FREE))
+            assert circles["final_refinements"][k] == (S.final_refinements if n else 0)
             kept += n
-    assert claimed > 1000
+    assert taken > 1000
     assert kept > 3000

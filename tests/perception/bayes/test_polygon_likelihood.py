@@ -10,60 +10,53 @@ import pytest
 
 from config.load import load_model, load_settings
 from perception.bayes.kernel_settings import make_settings
-from perception.bayes.likelihood import loglik
+from perception.bayes.likelihood import level_of, log_likelihood
 from perception.bayes.object_report import polygon_covariance
-from perception.bayes.polygon_job import COV, HEARD, HISS, LAID, MIDDLE, ear_of, sides_of
-from perception.bayes.polygon_likelihood import (
-    BEST,
-    LEFT,
-    NOTHING,
-    SURE,
-    THETA,
-    X,
-    Y,
-    begin_search,
-    predict,
-    score_poly,
-    search,
-)
+from perception.bayes.parameters import PolygonSide
+from perception.bayes.polygon_likelihood import NO_ANSWER_M, begin_search, continue_search, predict, score_polygon
 from perception.bayes.polygon_posterior import (
     ATTEMPTS,
-    CORRELATED,
+    CORRELATION_SHARE,
     CUT_OFF,
     LATTICE,
     PITCH,
     THINNEST,
+    advance_lattice,
     begin_lattice,
     centre_moments,
-    lattice_on,
+    copy_triangle,
     leave_frame,
-    lower_root,
-    weigh_lattice,
+    score_lattice,
+    write_pitch,
 )
-from perception.bayes.range_fit import FAR, HITS, LLR, NEAR, THROUGHS, level_of
-from perception.bayes.state import NPF, PTT, PXX, State, make_state
-from perception.kernel import Floats, Ints
+from perception.bayes.range_fit import FAR
+from perception.bayes.state import Memory, PoseSearch, Score
+from perception.kernel import Floats
+from perception.records import Records, records, zeros
 from tests import naive_polygon
 from tests.naive_polygon import Rule
+from tests.perception.tracks import numbers, readings_of
 
 SETTINGS = load_settings("hallway", models=("semicircle", "box"))
 P = make_settings(SETTINGS.ring, SETTINGS.models, SETTINGS.perception.bayes)
-MAY, IN, HALF = math.acos(P.cos_opt), math.acos(P.cos_in), P.half_angle
+S = P[0]
+MAY, IN, HALF = math.acos(S.cos_may_answer), math.acos(S.cos_must_answer), S.half_angle_rad
 NOISE_M = 0.03 * 0.3048
 BOXES = 300
 CLOSED = True
 BOX = np.array(load_model("box").vertices_m)
-EAR = ear_of(P)
-FACES = P.faces[0, : sides_of(P, 0)]
+SIDES = S.polygons[0].sides[: S.polygons[0].side_count]
 LEVEL = 9
-"""The noise that is believed: σ = 0.03 ft, 0.5 %."""
+"""The noise that is assumed: σ = 0.03 ft, 0.5 %."""
 
 
-def faces_between(outline: Floats, closed: bool) -> Floats:
+def sides_between(outline: Floats, closed: bool) -> Records[PolygonSide]:
     along = np.roll(outline, -1, axis=0) - outline
     length = np.hypot(along[:, 0], along[:, 1])
-    faces: Floats = np.column_stack([outline, along / length[:, None], length])
-    return faces if closed else np.ascontiguousarray(faces[:-1])
+    sides: Floats = np.column_stack([outline, along / length[:, None], length])
+    array = zeros(PolygonSide, len(outline) - (not closed))
+    numbers(array)[...] = sides[: len(array)]
+    return records(PolygonSide, array)
 
 
 def random_outline(rng: np.random.Generator) -> Floats:
@@ -98,10 +91,15 @@ def heard(rng: np.random.Generator, pose: Floats, n: int, noise_m: float, rule: 
     return np.array(rows)
 
 
-def score(w: Floats, pose: Floats, stats: Floats, level: Ints = P.levels[LEVEL], every: int = 1) -> float:
-    return score_poly(
-        w, len(w), every, pose[0], pose[1], pose[2], FACES, CLOSED, EAR, level, P.table, P.inv_step, stats
-    )  # fmt: skip
+def score(w: Floats, pose: Floats, every: int = 1) -> tuple[float, Score]:
+    """Return the evidence of readings at a pose, and all that the score says."""
+    said = records(Score, zeros(Score, 1))[0]
+    x, y, heading = pose.tolist()
+    return score_polygon(readings_of(w), every, x, y, heading, SIDES, CLOSED, P, LEVEL, said), said
+
+
+def evidence(w: Floats, pose: Floats) -> float:
+    return score(w, pose)[0]
 
 
 def test_a_prediction_equals_its_oracle() -> None:
@@ -115,10 +113,10 @@ def test_a_prediction_equals_its_oracle() -> None:
         axis = complex(math.cos(axis_angle), math.sin(axis_angle))
         mirror, cone = rules(sensor, axis, np.zeros(3), outline, closed)
         at, must, price, at_cone, must_cone = predict(
-            sensor.real, sensor.imag, axis.real, axis.imag, faces_between(outline, closed), closed, EAR
+            sensor.real, sensor.imag, axis.real, axis.imag, sides_between(outline, closed), closed, P
         )  # fmt: skip
         for expected, told, told_must in ((mirror, at, must), (cone, at_cone, must_cone)):
-            assert told == pytest.approx(NOTHING if expected.expected is None else expected.expected, abs=1e-12)
+            assert told == pytest.approx(NO_ANSWER_M if expected.expected is None else expected.expected, abs=1e-12)
             assert told_must == expected.must
         assert price == pytest.approx(mirror.price, abs=1e-9)
         differ = cone.expected is not None and cone.expected != mirror.expected
@@ -138,19 +136,19 @@ def test_a_score_equals_its_oracle() -> None:
         readings = []
         for x, y, ux, uy, r in w:
             mirror, cone = rules(complex(x, y), complex(ux, uy), pose, BOX, closed=True)
-            level = level_of(P.levels[LEVEL], r, P.per_metre)
-            evidence = [
-                0.0 if told.expected is None else loglik(P.table, P.inv_step, level, r - told.expected)
+            level = level_of(P, LEVEL, r)
+            nats = [
+                0.0 if told.expected is None else log_likelihood(P, level, r - told.expected)
                 for told in (mirror, cone)
             ]
-            readings.append((r, (mirror, cone), (evidence[0], evidence[1])))
-        expected, sums = naive_polygon.score(readings, P.gate, P.miss, P.short)
-        stats = np.zeros(12)
-        assert score(w, pose, stats) == pytest.approx(expected, abs=1e-9)
-        assert stats[LLR] == pytest.approx(expected, abs=1e-9)
+            readings.append((r, (mirror, cone), (nats[0], nats[1])))
+        expected, sums = naive_polygon.score(readings, S.gate_m, S.missed_echo_nat, S.short_echo_nat)
+        found, said = score(w, pose)
+        assert found == pytest.approx(expected, abs=1e-9)
+        assert said.log_likelihood_ratio == found
         likelier = max(sums, key=lambda s: s["llr"])
         counts = (likelier["hits"], likelier["throughs"], likelier["near"], likelier["sure"])
-        assert tuple(stats[[HITS, THROUGHS, NEAR, SURE]]) == counts
+        assert (said.hits, said.misses, said.near, said.sure_hits) == counts
         seen += counts
     assert seen.min() > 150
 
@@ -164,7 +162,7 @@ def test_the_truth_is_worth_more_than_a_pose_beside_it() -> None:
             continue
         direction = rng.uniform(-math.pi, math.pi)
         beside = truth + 0.1 * np.array([math.cos(direction), math.sin(direction), 0.0])
-        assert score(w, truth, np.zeros(12)) > score(w, beside, np.zeros(12))
+        assert evidence(w, truth) > evidence(w, beside)
 
 
 @pytest.mark.compiled
@@ -178,21 +176,20 @@ def test_a_search_never_loses_and_finds_the_pose_however_often_it_is_interrupted
         start = truth + np.array([*rng.normal(0.0, 0.03, 2), rng.normal(0.0, 0.05)])
         found = []
         for allowed in (1_000, int(rng.integers(1, 10))):
-            f, z, stats, weighed, calls = np.zeros(5), np.zeros(3, np.int64), np.zeros(12), 0, 0
-            begin_search(f, z, start[0], start[1], start[2], 0.05, 40)
-            while z[LEFT] > 0:
-                once = search(
-                    w, len(w), 1, f, z, allowed, FACES, CLOSED, EAR, P.levels[LEVEL], P.table, P.inv_step, stats
-                )  # fmt: skip
+            search, said = records(PoseSearch, zeros(PoseSearch, 1))[0], records(Score, zeros(Score, 1))[0]
+            scored = calls = 0
+            begin_search(search, float(start[0]), float(start[1]), float(start[2]), 0.05, 40)
+            while search.rounds_left > 0:
+                once = continue_search(search, allowed, readings_of(w), 1, SIDES, CLOSED, P, LEVEL, said)
                 assert 0 < once <= allowed
-                weighed, calls = weighed + once, calls + 1
-            assert weighed <= 1 + 6 * 40
-            assert calls == math.ceil(weighed / allowed)
-            found.append((*f, weighed))
+                scored, calls = scored + once, calls + 1
+            assert scored <= 1 + 6 * 40
+            assert calls == math.ceil(scored / allowed)
+            found.append((search.x, search.y, search.heading, search.log_likelihood_ratio, search.step_m, scored))
         assert found[0] == found[1]
-        pose, after = np.array([f[X], f[Y], f[THETA]]), f[BEST]
-        assert after >= score(w, start, np.zeros(12))
-        assert after == pytest.approx(score(w, pose, np.zeros(12)), abs=1e-9)
+        pose, after = np.array([search.x, search.y, search.heading]), search.log_likelihood_ratio
+        assert after >= evidence(w, start)
+        assert after == pytest.approx(evidence(w, pose), abs=1e-9)
         offs.append((math.hypot(pose[0] - truth[0], pose[1] - truth[1]), abs(pose[2] - truth[2])))
     assert np.median([d for d, _ in offs]) < 0.01
     assert np.quantile([d for d, _ in offs], 0.9) < 0.03
@@ -204,9 +201,10 @@ def test_every_other_reading_is_every_other_reading() -> None:
     truth = np.array([0.3, -0.2, 0.4])
     w = heard(rng, truth, 41, 0.01)
     for every in (1, 2, 3, 50):
-        told, wanted = np.zeros(12), np.zeros(12)
-        assert score(w, truth, told, every=every) == score(np.ascontiguousarray(w[::every]), truth, wanted)
-        assert told.tolist() == wanted.tolist()
+        told, wanted = score(w, truth, every), score(np.ascontiguousarray(w[::every]), truth)
+        assert told[0] == wanted[0]
+        for name in ("log_likelihood_ratio", "hits", "misses", "near", "sure_hits"):
+            assert getattr(told[1], name) == getattr(wanted[1], name)
 
 
 def test_the_moments_of_a_lattice_equal_numpys() -> None:
@@ -215,51 +213,57 @@ def test_the_moments_of_a_lattice_equal_numpys() -> None:
     assert LATTICE.tolist() == [list(z) for z in ball]
     normal = np.exp(-0.5 * PITCH**2 * np.sum(np.square(ball), axis=1))
     assert pytest.approx(PITCH**2 * np.average(LATTICE[:, 0] ** 2, weights=normal)) == CUT_OFF
+    memory = Memory(24)
+    job, state = memory.s[0].job, memory.state["job"]
+    covariance_of, root_of = numbers(state["covariance"])[0], numbers(state["root"])[0]
     for _ in range(10):
         truth = np.array([rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-math.pi, math.pi)])
         w = heard(rng, truth, 40, 0.01)
         pose = truth + rng.normal(0.0, 0.002, 3)
         lower = np.tril(rng.normal(0.0, 0.001, (3, 3)) + np.diag([0.004, 0.004, 0.01]))
         covariance = lower @ lower.T
-        cov = covariance[np.tril_indices(3)]
-        root, sums = np.zeros(6), np.zeros(10)
-        lower_root(cov, root)
-        assert root == pytest.approx(PITCH * np.linalg.cholesky(covariance)[np.tril_indices(3)], abs=1e-12)
-        level = P.levels[LEVEL]
-        top = score(w, pose, np.zeros(12), level)
+        enter_job(memory, w, LEVEL)
+        covariance_of[...] = covariance[np.tril_indices(3)]
+        write_pitch(job.covariance, job.root)
+        assert root_of == pytest.approx(PITCH * np.linalg.cholesky(covariance)[np.tril_indices(3)], abs=1e-12)
+        numbers(state["middle"])[0], job.middle_nat = pose, evidence(w, pose)
+        state["moments"].view(np.uint8)[...] = 0
         half = int(rng.integers(0, len(ball)))
         for begin, end in ((0, half), (half, len(ball))):
-            weigh_lattice(
-                w, len(w), FACES, CLOSED, EAR, level, P.table, P.inv_step, np.zeros(12), pose, root, top, begin, end,
-                sums,
-            )  # fmt: skip
-        centre_moments(sums)
-        moments = sums[1:]
+            score_lattice(memory.s, P, 0, begin, end)
+        centre_moments(job.moments)
         lower = np.zeros((3, 3))
-        lower[np.tril_indices(3)] = root
+        lower[np.tril_indices(3)] = root_of
         points = np.array(ball, dtype=np.float64)
-        weights = np.exp([min(40.0, score(w, pose + lower @ z, np.zeros(12), level) - top) for z in points])
+        weights = np.exp([min(40.0, evidence(w, pose + lower @ z) - job.middle_nat) for z in points])
         mean = np.average(points, axis=0, weights=weights)
         spread = np.cov(points.T, aweights=weights, ddof=0)
+        moments = numbers(state["moments"])[0, 1:]
         assert moments == pytest.approx([*mean, *spread[np.tril_indices(3)]], abs=1e-9)
-        before = pose.copy()
-        leave_frame(pose, root, moments, cov)
-        assert pose == pytest.approx(before + lower @ mean, abs=1e-12)
-        shrunk = CORRELATED * spread + (1.0 - CORRELATED) * np.diag(np.diag(spread))
+        leave_frame(job.middle, job.root, job.moments, job.covariance)
+        assert numbers(state["middle"])[0] == pytest.approx(pose + lower @ mean, abs=1e-12)
+        shrunk = CORRELATION_SHARE * spread + (1.0 - CORRELATION_SHARE) * np.diag(np.diag(spread))
         np.fill_diagonal(shrunk, np.maximum(np.diag(spread), THINNEST))
-        assert cov == pytest.approx((lower @ shrunk @ lower.T / CUT_OFF)[np.tril_indices(3)], abs=1e-15)
+        assert covariance_of == pytest.approx((lower @ shrunk @ lower.T / CUT_OFF)[np.tril_indices(3)], abs=1e-15)
 
 
-def spread_of(state: State, w: Floats, pose: Floats, left: int) -> tuple[Floats, Floats]:
+def enter_job(memory: Memory, w: Floats, noise: int) -> None:
+    """Give the job readings and a noise."""
+    numbers(memory.state["job_readings"][0])[: len(w)] = w
+    memory.s[0].job.reading_count, memory.s[0].job.noise_level = len(w), noise
+
+
+def spread_of(memory: Memory, w: Floats, pose: Floats, left: int, noise: int = LEVEL) -> tuple[Floats, Floats]:
     """Mean and covariance, worked out `left` at a time."""
-    state.pw[: len(w)] = w
-    state.job[HEARD] = len(w)
-    begin_lattice(state, P, 0, pose, np.zeros(6))
-    while state.job[LAID] < ATTEMPTS:
-        lattice_on(state, P, 0, left)
-    track = np.zeros(NPF)
-    track[PXX : PTT + 1] = state.work[COV : COV + 6]
-    return state.work[MIDDLE : MIDDLE + 3].copy(), polygon_covariance(track)
+    enter_job(memory, w, noise)
+    memory.polygons.view(np.uint8)[...] = 0
+    track, job = memory.s[0].polygons[0], memory.s[0].job
+    track.x, track.y, track.heading = pose.tolist()
+    begin_lattice(memory.s, P, 0, 0)
+    while job.lattices < ATTEMPTS:
+        advance_lattice(memory.s, P, 0, left)
+    copy_triangle(job.covariance, track.covariance)
+    return np.array([job.middle.x, job.middle.y, job.middle.heading]), polygon_covariance(track)
 
 
 @pytest.mark.compiled
@@ -270,9 +274,8 @@ def test_the_covariance_is_honest(rule: int) -> None:
     Or a little more: what is reported allows for neighbours, and here are none.
     """
     rng = np.random.default_rng(6)
-    state = make_state(24, P)
-    state.job[HISS] = P.noises.tolist().index([NOISE_M, 0.0])
-    level = P.levels[state.job[HISS]]
+    memory = Memory(24)
+    noise = [(it.absolute_m, it.relative) for it in S.noises].index((NOISE_M, 0.0))
     place, whole = [], []
     for _ in range(BOXES):
         truth = np.array([rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-math.pi, math.pi)])
@@ -281,10 +284,10 @@ def test_the_covariance_is_honest(rule: int) -> None:
         stray = rng.uniform(size=120) < 0.01
         w[stray, 4] = rng.uniform(0.2, 4.5, int(stray.sum()))
         pose = truth + np.array([*rng.normal(0.0, 0.01, 2), rng.normal(0.0, 0.02)])
-        f, z = np.zeros(5), np.zeros(3, np.int64)
-        begin_search(f, z, pose[0], pose[1], pose[2], 0.03, 20)
-        search(w, 120, 1, f, z, 1_000, FACES, CLOSED, EAR, level, P.table, P.inv_step, np.zeros(12))
-        mean, c = spread_of(state, w, f[:3], 1_000_000)
+        search, said = records(PoseSearch, zeros(PoseSearch, 1))[0], records(Score, zeros(Score, 1))[0]
+        begin_search(search, float(pose[0]), float(pose[1]), float(pose[2]), 0.03, 20)
+        continue_search(search, 1_000, readings_of(w), 1, SIDES, CLOSED, P, noise, said)
+        mean, c = spread_of(memory, w, np.array([search.x, search.y, search.heading]), 1_000_000, noise)
         assert np.linalg.eigvalsh(c).min() > 0.0
         e = mean - truth
         place.append(e[:2] @ np.linalg.solve(c[:2, :2], e[:2]) < 5.991)
@@ -295,10 +298,9 @@ def test_the_covariance_is_honest(rule: int) -> None:
 
 def test_a_lattice_is_the_same_however_often_it_is_interrupted() -> None:
     rng = np.random.default_rng(7)
-    state = make_state(24, P)
-    state.job[HISS] = LEVEL
+    memory = Memory(24)
     for left in (1, 3_000, 20_000):
         w = heard(rng, np.zeros(3), 60, NOISE_M)
-        whole, interrupted = (spread_of(state, w, np.zeros(3), many) for many in (10_000_000, left))
+        whole, interrupted = (spread_of(memory, w, np.zeros(3), many) for many in (10_000_000, left))
         assert np.array_equal(whole[0], interrupted[0])
         assert np.array_equal(whole[1], interrupted[1])

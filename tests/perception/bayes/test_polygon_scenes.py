@@ -12,7 +12,6 @@ from config.load import load_settings
 from config.world import AcousticsConfig, BoxConfig, StartConfig, WorldConfig
 from perception.bayes.bayes_method import BayesPerception
 from perception.bayes.object_report import polygon_covariance
-from perception.bayes.state import PX, PY
 from perception.kernel import Floats
 from perception.pipeline import Perception
 from runtime.simulation.open_loop import HallOutcome, angle_error, match_objects, perceive, run_scene
@@ -41,14 +40,14 @@ def anyhow(seed: int, acoustics: AcousticsConfig) -> Hall:
 def squares(perception: Perception, world: WorldConfig) -> Iterator[tuple[float, float]]:
     """Squared errors of the boxes found, in units of the covariance: of the place, and of the whole pose."""
     assert isinstance(perception.method, BayesPerception)
-    tracks = perception.method.memory.pf
+    memory = perception.method.memory
     rows = match_objects(world, perception.objects(), SETTINGS.models)[1]
     for box, row in zip(world.box, rows, strict=True):
         estimate = row["estimate"]
         if estimate is None:
             continue
-        away = np.hypot(tracks[:, PX] - estimate[0], tracks[:, PY] - estimate[1])
-        covariance = polygon_covariance(tracks[int(np.argmin(away))])
+        away = np.hypot(memory.polygons["x"] - estimate[0], memory.polygons["y"] - estimate[1])
+        covariance = polygon_covariance(memory.s[0].polygons[int(np.argmin(away))])
         seen = next(o for o in perception.objects() if (o.x, o.y) == estimate)
         assert seen.covariance == (covariance[0, 0], covariance[0, 1], covariance[1, 1])
         turn = (seen.theta - math.radians(box.angle_deg) + 0.25 * math.pi) % (0.5 * math.pi) - 0.25 * math.pi

@@ -4,16 +4,33 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import pytest
 
-from perception.bayes import range_fit as contact
+from perception.bayes import range_fit
 from perception.bayes.circle_posterior import posterior_circle
-from perception.bayes.corner_model import IMPOSSIBLE, wedge
-from perception.bayes.likelihood import BINS, LEVELS, build_levels, build_table
-from tests import naive_bayes as naive_full
+from perception.bayes.corner_model import IMPOSSIBLE_NAT, score_corner
+from perception.bayes.likelihood import build_levels, build_table
+from perception.bayes.parameters import RANGE_BINS_PER_M, TABLE_LEVELS, NoiseModel, SettingsRecord
+from perception.bayes.state import (
+    CircleFit,
+    CirclePosterior,
+    LinearReading,
+    LineFit,
+    LineScore,
+    Memory,
+    Reading,
+    Score,
+)
+from perception.kernel import Floats
+from perception.records import Record, Records, array_of, records, zeros
+from tests import naive_bayes
+from tests.perception.tracks import P as SHIPPED
+from tests.perception.tracks import changed, enter_readings, numbers, readings_of
+
+R = TypeVar("R", bound=Record)
 
 HALF_BOX = 0.01524
 GATE = 0.1524
@@ -33,26 +50,48 @@ class Case(NamedTuple):
     rho: float
     var0: float
     rel2: float
-    noise: naive_full.Noise
+    noise: naive_bayes.Noise
+    p: SettingsRecord
+    level: int
 
     @property
     def used(self) -> np.ndarray:
         return self.w[: self.n]
 
     @property
-    def tables(self) -> tuple[np.ndarray, float, np.ndarray, np.ndarray]:
-        """What kernels are told of the noise."""
-        return self.noise.levels, self.noise.per_metre, self.noise.table, self.noise.inv_step
+    def readings(self) -> Records[Reading]:
+        return readings_of(self.used)
 
     @property
     def place(self) -> tuple[float, float]:
         return pair(self.centre)
 
 
-def score_circle(case: Case, w: np.ndarray, x: float, y: float, stats: np.ndarray) -> None:
-    contact.score_circle(
-        w, case.n, x, y, case.rho, OPT, HALF, IN, GATE, MISS, SHORT, *case.tables, stats
-    )  # fmt: skip
+def one(record: type[R]) -> tuple[Records[R], Floats]:
+    """Return a record as kernels take it, and its fields as an array: a view."""
+    array = zeros(record, 1)
+    return records(record, array), numbers(array)[0]
+
+
+def score_circle(case: Case, readings: Records[Reading], x: float, y: float) -> Floats:
+    """Return the fields of the score: evidence, hits, misses, near, shorts, closest, dispersion, sure hits."""
+    score, fields = one(Score)
+    range_fit.score_circle(readings, x, y, case.rho, case.p, case.level, score[0])
+    return fields
+
+
+def noisy_settings(noises: Floats) -> tuple[SettingsRecord, Floats]:
+    """Return settings with these noises, and the noise of each level."""
+    p, sigmas = changed(
+        SHIPPED, half_resolution_m=HALF_BOX, gate_m=GATE, missed_echo_nat=MISS, short_echo_nat=SHORT,
+        cos_may_answer=OPT, cos_half_angle=HALF, cos_must_answer=IN,
+    ), np.empty(TABLE_LEVELS)  # fmt: skip
+    array = array_of(p)
+    build_table(HALF_BOX, 0.0003, 0.18, 1 / 4.5, 0.03, array["table"][0], array["table_bins_per_m"][0], sigmas)
+    models = array["noises"][0]
+    models["absolute_m"][: len(noises)], models["relative"][: len(noises)] = noises.T
+    build_levels(records(NoiseModel, models), sigmas)
+    return p, sigmas
 
 
 def cases(
@@ -60,11 +99,10 @@ def cases(
 ) -> Iterator[Case]:
     """Readings of a circle, of a box's corner or of a wall, rounded and noisy, with outliers and silence."""
     rng = np.random.default_rng(seed)
-    table, inv_step, sigmas = np.empty((LEVELS, BINS)), np.empty(LEVELS), np.empty(LEVELS)
-    build_table(HALF_BOX, 0.0003, 0.18, 1 / 4.5, 0.03, table, inv_step, sigmas)
     noises = np.array([(a, b) for a in (0.001, 0.01, 0.025) for b in (0.0, 0.01)])
-    levels = np.empty((len(noises), 64), np.int64)
-    build_levels(noises, sigmas, levels, 6.5)
+    p, _ = noisy_settings(noises)
+    array = array_of(p)
+    table, bins_per_m, levels = array["table"][0], array["table_bins_per_m"][0], array["noises"]["levels"][0]
     for i in range(count):
         kind = kinds[i % len(kinds)]
         h = int(rng.integers(len(noises)))
@@ -84,7 +122,7 @@ def cases(
                 r = max(0.05, d * math.cos(bearing - middle) - rho)
             r = round((r + rng.normal() * 0.01) / (2 * HALF_BOX)) * 2 * HALF_BOX + 0.0041
             chance = rng.random()
-            r = rng.uniform(0.15, 4.5) if chance < 0.1 else contact.FAR if chance < 0.15 else max(r, 0.02)
+            r = rng.uniform(0.15, 4.5) if chance < 0.1 else range_fit.FAR if chance < 0.15 else max(r, 0.02)
             w[j] = (
                 *(centre - d * np.array([math.cos(bearing), math.sin(bearing)])),
                 math.cos(axis),
@@ -92,8 +130,8 @@ def cases(
                 r,
             )
         var0 = noises[h, 0] ** 2 + HALF_BOX**2 / 3 + 1e-7
-        noise = naive_full.Noise(table, inv_step, levels[h], 6.5)
-        yield Case(w, n, centre + rng.normal(0, 0.03, 2), rho, float(var0), float(noises[h, 1] ** 2), noise)
+        noise = naive_bayes.Noise(table, bins_per_m, levels[h], RANGE_BINS_PER_M)
+        yield Case(w, n, centre + rng.normal(0, 0.03, 2), rho, float(var0), float(noises[h, 1] ** 2), noise, p, h)
 
 
 def first_normal(case: Case) -> np.ndarray:
@@ -104,22 +142,22 @@ def first_normal(case: Case) -> np.ndarray:
 def test_a_circles_score_equals_its_oracle() -> None:
     hits = 0.0
     for case in cases(2000, 1):
-        stats = np.zeros(9)
-        score_circle(case, case.w, *case.place, stats)
-        want = naive_full.score_circle(case.used, case.centre, case.rho, COSINES, GATE, MISS, SHORT, case.noise)
-        order = (contact.LLR, contact.HITS, contact.THROUGHS, contact.NEAR, contact.SHORTS, contact.CLOSEST)
+        fields = score_circle(case, case.readings, *case.place)
+        want = naive_bayes.score_circle(case.used, case.centre, case.rho, COSINES, GATE, MISS, SHORT, case.noise)
         names = ("llr", "hits", "throughs", "near", "shorts", "closest")
-        assert stats[list(order)] == pytest.approx([want[name] for name in names], rel=1e-12, abs=1e-11)
-        assert stats[contact.DISPERSION] == pytest.approx(want["dispersion"], abs=1e-12)
-        hits += stats[contact.HITS]
+        assert fields[:6] == pytest.approx([want[name] for name in names], rel=1e-12, abs=1e-11)
+        assert fields[6] == pytest.approx(want["dispersion"], abs=1e-12)
+        hits += fields[1]
     assert hits > 10_000
 
 
 def test_a_circles_fit_equals_its_oracle() -> None:
     for case in cases(2000, 2):
-        out = np.zeros(5)
-        assert contact.fit_circle(case.w, case.n, *case.place, case.rho, OPT, GATE, 9.0, case.var0, case.rel2, 4, out)
-        p, info = naive_full.fit_circle(
+        fit, out = one(CircleFit)
+        assert range_fit.fit_circle(
+            case.readings, *case.place, case.rho, case.p, 9.0, case.var0, case.rel2, 4, fit[0]
+        )  # fmt: skip
+        p, info = naive_bayes.fit_circle(
             case.used, case.centre, case.rho, OPT, GATE, 9.0, case.var0, case.rel2, 4
         )  # fmt: skip
         assert out[:2] == pytest.approx(p, abs=1e-10)
@@ -128,41 +166,45 @@ def test_a_circles_fit_equals_its_oracle() -> None:
 
 def test_a_lines_fit_and_score_equal_their_oracles() -> None:
     for case in cases(2000, 3):
-        n0, out, stats = first_normal(case), np.zeros(3), np.zeros(6)
-        contact.fit_line(
-            case.w, case.n, *pair(n0), *case.place, -case.rho, OPT, GATE, 9.0, case.var0, case.rel2, 4, out
+        n0, (fit, out), (score, fields) = first_normal(case), one(LineFit), one(LineScore)
+        range_fit.fit_line(
+            case.readings, *pair(n0), *case.place, -case.rho, OPT, GATE, 9.0, case.var0, case.rel2, 4, fit[0]
         )
-        n, c = naive_full.fit_line(case.used, n0, case.centre, -case.rho, OPT, GATE, 9.0, case.var0, case.rel2, 4)
+        n, c = naive_bayes.fit_line(case.used, n0, case.centre, -case.rho, OPT, GATE, 9.0, case.var0, case.rel2, 4)
         # a lone reading leaves the turn to the damping alone: hence not 1e-12
         assert out == pytest.approx([*n, c], abs=1e-6)
-        (nx, ny), (x, y) = pair(out), case.place
-        contact.score_line(
-            case.w, case.n, nx, ny, x, y, out[2], OPT, HALF, IN, GATE, MISS, *case.tables, stats
-        )  # fmt: skip
-        llr, hits, throughs, low, high = naive_full.score_line(
-            case.used, out[:2], case.centre, float(out[2]), COSINES, GATE, MISS, case.noise, contact.FAR
+        range_fit.score_line(case.readings, fit[0], *case.place, case.p, case.level, score[0])
+        want = naive_bayes.score_line(
+            case.used, out[:2], case.centre, float(out[2]), COSINES, GATE, MISS, case.noise, range_fit.FAR
         )
-        assert stats[[0, 1, 2, 4, 5]] == pytest.approx([llr, hits, throughs, low, high], rel=1e-12, abs=1e-11)
+        assert fields == pytest.approx(want, rel=1e-12, abs=1e-11)
+
+
+def circle_posterior(case: Case, readings: Records[Reading], start: tuple[float, ...]) -> Floats:
+    """Return centre, root and covariance, each as xx, yx, yy, from a centre and a root."""
+    posterior, fields = one(CirclePosterior)
+    fields[:5] = start
+    linear = records(LinearReading, zeros(LinearReading, len(readings)))
+    posterior_circle(readings, case.rho, case.p, case.level, linear, np.zeros(49), posterior[0])
+    return fields
 
 
 def test_the_posterior_equals_its_oracle() -> None:
-    work, wlev = np.zeros((160, 5)), np.zeros(160, np.int64)
     for case in cases(150, 4):
-        pose, root, cov = case.centre.copy(), np.array([0.01, 0.003, 0.015]), np.zeros(3)
-        p, frame, spread = naive_full.posterior_circle(
-            case.used, case.rho, OPT, GATE, case.noise, pose, np.array([[0.01, 0.0], [0.003, 0.015]])
+        p, frame, spread = naive_bayes.posterior_circle(
+            case.used, case.rho, OPT, GATE, case.noise, case.centre.copy(), np.array([[0.01, 0.0], [0.003, 0.015]])
         )
-        posterior_circle(case.w, case.n, case.rho, OPT, GATE, *case.tables, work, wlev, pose, root, cov)
-        assert pose == pytest.approx(p, abs=1e-10)
-        assert root == pytest.approx([frame[0, 0], frame[1, 0], frame[1, 1]], abs=1e-9)
-        assert cov == pytest.approx([spread[0, 0], spread[0, 1], spread[1, 1]], abs=1e-10)
+        fields = circle_posterior(case, case.readings, (*case.place, 0.01, 0.003, 0.015))
+        assert fields[:2] == pytest.approx(p, abs=1e-10)
+        assert fields[2:5] == pytest.approx([frame[0, 0], frame[1, 0], frame[1, 1]], abs=1e-9)
+        assert fields[5:] == pytest.approx([spread[0, 0], spread[0, 1], spread[1, 1]], abs=1e-10)
 
 
 def test_the_posterior_beats_least_squares_where_ranges_are_only_rounded() -> None:
     """Sixty rounded, otherwise perfect ranges all round a drum: the box's posterior against the fit on the same."""
-    case = next(cases(1, 5))
+    p, _ = noisy_settings(np.array([[0.0, 0.0]]))
+    case = next(cases(1, 5))._replace(rho=0.3, p=p, level=0)
     rng = np.random.default_rng(5)
-    work, wlev = np.zeros((160, 5)), np.zeros(160, np.int64)
     exact, fitted = [], []
     for _ in range(60):
         w = np.zeros((60, 5))
@@ -170,29 +212,23 @@ def test_the_posterior_beats_least_squares_where_ranges_are_only_rounded() -> No
             b, d = rng.uniform(0, 2 * math.pi), rng.uniform(0.5, 3)
             u = np.array([math.cos(b), math.sin(b)])
             w[j] = (*(-d * u), *u, round((d - 0.3) / (2 * HALF_BOX)) * 2 * HALF_BOX)
-        pose, root, cov, out = np.array([0.01, -0.01]), np.array([0.003, 0.0, 0.003]), np.zeros(3), np.zeros(5)
-        levels = np.zeros(64, np.int64)
-        posterior_circle(
-            w, 60, 0.3, OPT, GATE, levels, 6.5, case.noise.table, case.noise.inv_step, work, wlev, pose, root, cov
-        )
-        contact.fit_circle(w, 60, 0.01, -0.01, 0.3, OPT, GATE, 9.0, HALF_BOX**2 / 3, 0.0, 8, out)
-        exact.append(math.hypot(*pose))
+        fit, out = one(CircleFit)
+        pose = circle_posterior(case, readings_of(w), (0.01, -0.01, 0.003, 0.0, 0.003))
+        range_fit.fit_circle(readings_of(w), 0.01, -0.01, 0.3, p, 9.0, HALF_BOX**2 / 3, 0.0, 8, fit[0])
+        exact.append(math.hypot(*pose[:2]))
         fitted.append(math.hypot(*out[:2]))
     assert np.mean(exact) < 0.6 * np.mean(fitted)
 
 
-def test_the_wedge_equals_its_oracle() -> None:
-    found = 0
+def test_a_corners_score_equals_its_oracle() -> None:
+    found, memory = 0, Memory(4, 1)
     for case in cases(700, 6, ("circle", "edge"), least=12):
-        fit, stats = np.zeros(3), np.zeros(8)
-        x, y = case.place
-        got = wedge(
-            case.w, np.zeros_like(case.w), case.n, x, y, case.rho, OPT, GATE, case.var0, case.rel2,
-            *case.tables, fit, stats,
-        )  # fmt: skip
-        want = naive_full.wedge(case.used, case.centre, case.rho, OPT, GATE, case.var0, case.rel2, case.noise)
+        enter_readings(memory, case.used)
+        memory.s[0].noise_level = case.level
+        got = score_corner(memory.s, case.p, case.n, *case.place, case.rho, case.var0, case.rel2)
+        want = naive_bayes.wedge(case.used, case.centre, case.rho, OPT, GATE, case.var0, case.rel2, case.noise)
         if want is None:
-            assert got == IMPOSSIBLE
+            assert got == IMPOSSIBLE_NAT
         else:
             found += 1
             assert got == pytest.approx(want, abs=1e-6)
@@ -201,11 +237,11 @@ def test_the_wedge_equals_its_oracle() -> None:
 
 def test_readings_of_nothing_fit_nothing() -> None:
     case = next(cases(1, 7))
-    silent = case.w.copy()
-    silent[:, 4] = contact.FAR
-    out, stats = np.zeros(5), np.zeros(9)
-    assert contact.fit_circle(silent, case.n, 0.2, 0.3, 0.3, OPT, GATE, 9.0, case.var0, case.rel2, 4, out)
+    silent = case.used.copy()
+    silent[:, 4] = range_fit.FAR
+    fit, out = one(CircleFit)
+    assert range_fit.fit_circle(readings_of(silent), 0.2, 0.3, 0.3, case.p, 9.0, case.var0, case.rel2, 4, fit[0])
     assert out[:2] == pytest.approx([0.2, 0.3], abs=1e-12)
-    score_circle(case._replace(rho=0.3), silent, 0.2, 0.3, stats)
-    assert stats[contact.HITS] == 0
-    assert stats[contact.LLR] <= 0
+    fields = score_circle(case._replace(rho=0.3), readings_of(silent), 0.2, 0.3)
+    assert fields[1] == 0
+    assert fields[0] <= 0

@@ -3,218 +3,237 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from drivers.messages import Firing, Pose
-from perception.bayes import alternatives as rivals
-from perception.bayes import noise_estimation as noise_choice
-from perception.bayes import refine, reservoir
-from perception.bayes import track_initiation as births
+from perception.bayes import alternatives, noise_estimation, refine, reservoir, track_initiation
 from perception.bayes.bayes_method import BayesPerception
 from perception.bayes.range_fit import FAR
-from perception.bayes.state import (
-    BORN,
-    CONFIRMED,
-    CYC,
-    DIRTY,
-    ESTABLISHED,
-    FREE,
-    HITS,
-    KIND,
-    LLR,
-    MARK,
-    NEAR,
-    NOISE,
-    NRES,
-    NUMBER,
-    PLACED,
-    POLISH,
-    PROB,
-    QUIET,
-    R00,
-    R11,
-    REFINEMENTS,
-    REFS,
-    SPAN,
-    ST,
-    TENTATIVE,
-    TRHO,
-    TX,
-    TY,
-    UNK,
-)  # fmt: skip
-from tests import naive_bayes as naive_full
-from tests import naive_tracks
+from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE, CircleTrack, Memory
+from perception.kernel import Floats
+from perception.records import records, zeros
+from tests import naive_bayes, naive_tracks
 from tests.naive_tracks import FT
 from tests.perception.tracks import (
+    ALTERNATIVES,
     BOXES,
     COSINES,
-    RIVALS,
+    NOISES,
+    RADII,
     SENSORS,
     SETTINGS,
     TRACKS,
     P,
+    S,
     around,
+    enter_readings,
     noises,
+    numbers,
     pair,
+    place_of,
     random_lines,
     random_track,
+    readings_of,
     shared,
     sigma,
     unit,
 )
 
 
-def test_rivals_are_fitted_and_scored_on_the_same_readings() -> None:
+def fitted(memory: Memory, name: str) -> Floats:
+    """Return the fields of a fit in the scratch."""
+    fields: Floats = numbers(memory.state["scratch"][name])[0]
+    return fields
+
+
+def places(memory: Memory) -> Floats:
+    """Return the centres of all circles, shape (n, 2), m."""
+    centres: Floats = np.column_stack([memory.circles["x"], memory.circles["y"]])
+    return centres
+
+
+def test_alternatives_are_fitted_and_scored_on_the_same_readings() -> None:
     """Scores are held at the kernel's own fit, to 1e-11; fits to what rounding leaves of them.
 
     A circle's agree to 1e-10 m. A line's may hang on one reading, and then only the 1e-9 that keeps the information
     from being singular holds it: 1e-16 / 1e-9 of rounding in each of the steps.
     """
-    rng, s, asked = np.random.default_rng(3), shared(), 0
+    rng, memory, compared = np.random.default_rng(3), shared(), 0
+    s, hopeless = memory.s, alternatives.HOPELESS_NAT
     for _ in range(1000):
-        s.g[NOISE] = h = int(rng.integers(len(P.noises)))
-        rho, rho2 = (float(v) for v in rng.choice(P.radii, 2))
+        s[0].noise_level = h = int(rng.integers(len(NOISES)))
+        rho, rho2 = (float(v) for v in rng.choice(RADII, 2))
         place, n = rng.uniform(-1, 1, 2), int(rng.integers(0, 60))
         w = around(rng, n, place, rho)
-        s.w[:n] = w
+        enter_readings(memory, w)
         centre = place + rng.normal(0, 0.02, 2)
-        absolute, relative = sigma(s)
-        var0, rel2 = absolute**2 + P.half_box**2 / 3 + 1e-6 * FT**2, relative**2
-        assert noise_choice.noise_variance(s, P) == pytest.approx((var0, rel2), rel=1e-13)
-        aim = naive_tracks.towards(w, centre, rho, P.gate)
-        assert rivals.towards(s, P, n, *pair(centre), rho) == pytest.approx(aim, abs=1e-12)
-        v = rivals.compete_circle(s, P, n, *pair(centre), rho, rho2, 4)
+        absolute, relative = sigma(memory)
+        var0, rel2 = absolute**2 + S.half_resolution_m**2 / 3 + 1e-6 * FT**2, relative**2
+        assert noise_estimation.noise_variance(s, P) == pytest.approx((var0, rel2), rel=1e-13)
+        aim = naive_tracks.towards(w, centre, rho, S.gate_m)
+        bearing = alternatives.mean_bearing(readings_of(w), *pair(centre), rho, float(S.gate_m))
+        assert bearing == pytest.approx(aim, abs=1e-12)
+        v = alternatives.fit_other_circle(s, P, n, *pair(centre), rho, rho2, 4)
         if not aim.any():
-            assert v == rivals.HOPELESS == rivals.compete_line(s, P, n, *pair(centre), rho, 4)
+            assert v == hopeless == alternatives.fit_other_line(s, P, n, *pair(centre), rho, 4)
             continue
-        asked += 1
-        if v != rivals.HOPELESS:
-            found, _ = naive_full.fit_circle(
-                w, centre + (rho2 - rho) * aim, rho2, P.cos_opt, P.gate, 9.0, var0, rel2, 4
+        compared += 1
+        if v != hopeless:
+            found, _ = naive_bayes.fit_circle(
+                w, centre + (rho2 - rho) * aim, rho2, S.cos_may_answer, S.gate_m, 9.0, var0, rel2, 4
             )  # fmt: skip
-            assert s.fit[:2] == pytest.approx(found, abs=1e-10)
-            score = naive_full.score_circle(w, s.fit[:2], rho2, COSINES, P.gate, P.miss, P.short, noises()[h])
+            fit = fitted(memory, "circle_fit")[:2]
+            assert fit == pytest.approx(found, abs=1e-10)
+            score = naive_bayes.score_circle(
+                w, fit, rho2, COSINES, S.gate_m, S.missed_echo_nat, S.short_echo_nat, noises()[h]
+            )
             assert v == pytest.approx(score["llr"], rel=1e-12, abs=1e-11)
-        v = rivals.compete_line(s, P, n, *pair(centre), rho, 4)
-        normal, c = naive_full.fit_line(w, aim, centre, -rho, P.cos_opt, P.gate, 9.0, var0, rel2, 4)
-        assert s.fit[:3] == pytest.approx([*normal, c], abs=1e-6)
-        want = naive_full.score_line(
-            w, s.fit[:2], centre, float(s.fit[2]), COSINES, P.gate, P.miss, noises()[h], FAR
+        v = alternatives.fit_other_line(s, P, n, *pair(centre), rho, 4)
+        normal, c = naive_bayes.fit_line(
+            w, aim, centre, -rho, S.cos_may_answer, S.gate_m, 9.0, var0, rel2, 4
+        )  # fmt: skip
+        line = fitted(memory, "line_fit")
+        assert line == pytest.approx([*normal, c], abs=1e-6)
+        want = naive_bayes.score_line(
+            w, line[:2], centre, float(line[2]), COSINES, S.gate_m, S.missed_echo_nat, noises()[h], FAR
         )  # fmt: skip
         assert v == pytest.approx(want[0], rel=1e-12, abs=1e-11)
-    assert asked > 800
+    assert compared > 800
 
 
-def test_of_two_tracks_in_one_place_the_one_with_more_evidence_stays_or_that_a_person_spoke_of() -> None:
-    rng, s, merged = np.random.default_rng(11), shared(), 0
-    names = s.names[:TRACKS]
+def test_of_two_tracks_in_one_place_the_one_with_more_evidence_stays_or_that_a_user_marked() -> None:
+    rng, memory, merged = np.random.default_rng(11), shared(), 0
+    circles = memory.circles
     for _ in range(3000):
         for k in range(TRACKS):
-            random_track(rng, s, k)
-        names[:, NUMBER] = rng.permutation(TRACKS) + 1
-        names[:, MARK] = rng.choice([0, CONFIRMED, PLACED], TRACKS, p=[0.8, 0.1, 0.1])
+            random_track(rng, memory, k)
+        circles["number"] = rng.permutation(TRACKS) + 1
+        circles["marks"] = rng.choice([0, CONFIRMED, PLACED], TRACKS, p=[0.8, 0.1, 0.1])
         t = int(rng.integers(TRACKS))
-        s.ti[t, ST] = TENTATIVE
-        live = s.ti[:, ST] != FREE
-        want, numbers = naive_tracks.after_merging(
-            t, live, s.tf[:, [TX, TY]], s.tf[:, TRHO], s.tf[:, LLR], P.merge, names[:, MARK], names[:, NUMBER]
-        )
-        refine.merge_duplicates(s, P, t)
-        assert ((s.ti[:, ST] != FREE) == want).all()
-        assert (names[want, NUMBER] == numbers[want]).all()
+        circles["status"][t] = TENTATIVE
+        live = circles["status"] != FREE
+        want, older = naive_tracks.after_merging(
+            t, live, places(memory), circles["radius"], circles["log_likelihood_ratio"], S.merge_m, circles["marks"],
+            circles["number"],
+        )  # fmt: skip
+        refine.merge_duplicates(memory.tracks, P, t)
+        assert ((circles["status"] != FREE) == want).all()
+        assert (circles["number"][want] == older[want]).all()
         merged += int((live != want).sum())
     assert merged > 500
 
 
 def test_the_next_free_track() -> None:
-    rng, s = np.random.default_rng(12), shared()
+    rng, memory = np.random.default_rng(12), shared()
+    circles = memory.circles
     for _ in range(1000):
         for k in range(TRACKS):
-            random_track(rng, s, k, int(rng.choice([FREE, TENTATIVE, ESTABLISHED], p=[0.08, 0.32, 0.6])))
-        i, f = s.ti, s.tf
-        s.names[:TRACKS, MARK] = rng.choice([0, PLACED], TRACKS, p=[0.7, 0.3])
-        free = np.flatnonzero(i[:, ST] == FREE)
-        tentative = np.flatnonzero((i[:, ST] == TENTATIVE) & (s.names[:TRACKS, MARK] == 0))
-        weakest = int(tentative[np.argmin(f[tentative, LLR])]) if len(tentative) else -1
-        assert births.free_track(s.ti, s.tf[:, LLR], s.names) == (free[0] if len(free) else weakest)
+            random_track(rng, memory, k, int(rng.choice([FREE, TENTATIVE, ESTABLISHED], p=[0.08, 0.32, 0.6])))
+        circles["marks"] = rng.choice([0, PLACED], TRACKS, p=[0.7, 0.3])
+        free = np.flatnonzero(circles["status"] == FREE)
+        tentative = np.flatnonzero((circles["status"] == TENTATIVE) & (circles["marks"] == 0))
+        evidence = circles["log_likelihood_ratio"][tentative]
+        weakest = int(tentative[np.argmin(evidence)]) if len(tentative) else -1
+        assert track_initiation.free_track(memory.tracks) == (free[0] if len(free) else weakest)
+
+
+def test_a_reset_track_keeps_only_its_number_its_marks_and_readings_beyond_the_counts() -> None:
+    array = zeros(CircleTrack, 2)
+    array.view(np.int64)[...] = np.arange(1, 1 + array.nbytes // 8)
+    before = array.copy()
+    track_initiation.reset_circle(records(CircleTrack, array)[0])
+    kept = {"number", "marks", "bins"}
+    assert not any(array[0][name].any() for name in CircleTrack.DTYPE.names or () if name not in kept)
+    assert all(array[0][name] == before[0][name] for name in ("number", "marks"))
+    assert not array[0]["bins"]["count"].any()
+    assert array[1] == before[1]
 
 
 def test_a_segment_of_a_known_body_is_known() -> None:
-    rng, s, known = np.random.default_rng(13), shared(), 0
+    rng, memory, known = np.random.default_rng(13), shared(), 0
+    circles = memory.circles
     for _ in range(3000):
         for k in range(TRACKS):
-            random_track(rng, s, k)
-        normal, rho, surface = unit(rng.uniform(0, 7)), float(rng.choice(P.radii)), rng.uniform(-1, 1, 2)
-        live = s.ti[:, ST] != FREE
+            random_track(rng, memory, k)
+        normal, rho, surface = unit(rng.uniform(0, 7)), float(rng.choice(RADII)), rng.uniform(-1, 1, 2)
+        live = circles["status"] != FREE
         place = surface + rho * normal
-        behind = surface + s.tf[:, TRHO, None] * normal
-        want = (live & (np.hypot(*(behind - s.tf[:, [TX, TY]]).T) < P.merge)).any()
-        assert births.is_known(s, P, *pair(place), rho, *pair(normal)) == want
-        here = (live & (np.hypot(*(place - s.tf[:, [TX, TY]]).T) < P.merge)).any()
-        assert births.is_known(s, P, *pair(place), -1.0, *pair(normal)) == here
+        behind = surface + circles["radius"][:, None] * normal
+        want = (live & (np.hypot(*(behind - places(memory)).T) < S.merge_m)).any()
+        assert track_initiation.is_known(memory.tracks, P, *pair(place), rho, *pair(normal)) == want
+        here = (live & (np.hypot(*(place - places(memory)).T) < S.merge_m)).any()
+        assert track_initiation.is_known(memory.tracks, P, *pair(place), -1.0, *pair(normal)) == here
         known += int(want)
     assert 300 < known < 2700
 
 
 def test_probability_is_a_share_among_all_explanations() -> None:
-    rng, s, inside = np.random.default_rng(14), shared(), 0
+    rng, memory, inside = np.random.default_rng(14), shared(), 0
+    track = memory.tracks[0]
     for _ in range(2000):
-        lines = random_lines(rng, s, 5)
-        random_track(rng, s, 0)
-        s.tf[0, UNK] = rng.uniform(0, 30)
-        s.comp[0] = np.where(rng.random(RIVALS) < 0.3, 0.0, rng.normal(-10, 15, RIVALS))
-        prior, kind = rng.normal(2, 2), int(s.ti[0, KIND])
-        place, rho = s.tf[0, [TX, TY]], float(s.tf[0, TRHO])
-        in_wall = naive_tracks.stands_in_wall(lines.values(), place, rho)
-        assert refine.stands_in_wall(s, *pair(place), rho) == in_wall
-        inside += in_wall
-        leads = {k: float(v) for k, v in enumerate(s.comp[0]) if k != kind and v != 0.0}
-        want = naive_tracks.probability(
-            float(s.tf[0, LLR]), kind < P.models, prior, P.prior, float(s.tf[0, UNK]), leads, P.models, len(P.radii),
-            in_wall,
+        lines = random_lines(rng, memory, 5)
+        random_track(rng, memory, 0)
+        track.unknown_nat = rng.uniform(0, 30)
+        track.leads[:ALTERNATIVES] = np.where(
+            rng.random(ALTERNATIVES) < 0.3, 0.0, rng.normal(-10, 15, ALTERNATIVES)
         )  # fmt: skip
-        assert refine.probability(s, P, 0, prior) == pytest.approx(want, rel=1e-12, abs=1e-12)
+        prior, kind = rng.normal(2, 2), track.kind
+        place, rho = place_of(memory, 0), float(track.radius)
+        in_wall = naive_tracks.stands_in_wall(lines.values(), place, rho)
+        assert refine.is_in_wall(memory.s, *pair(place), rho) == in_wall
+        inside += in_wall
+        leads = {k: float(v) for k, v in enumerate(track.leads) if k != kind and v != 0.0}
+        want = naive_tracks.probability(
+            float(track.log_likelihood_ratio), bool(kind < S.model_count), prior, S.model_prior_nat,
+            float(track.unknown_nat), leads, S.model_count, len(RADII), in_wall,
+        )  # fmt: skip
+        assert refine.existence_probability(memory.s, P, track, prior) == pytest.approx(want, rel=1e-12, abs=1e-12)
     assert inside > 30
 
 
-def test_a_refinement_keeps_its_books_and_decides_by_what_it_found() -> None:
-    rng, s = np.random.default_rng(15), shared()
-    fates = {FREE: 0, TENTATIVE: 0, ESTABLISHED: 0}
+def test_a_refinement_counts_and_decides_by_what_it_found() -> None:
+    rng, memory = np.random.default_rng(15), shared()
+    track, state = memory.tracks[0], memory.state
+    outcomes = {FREE: 0, TENTATIVE: 0, ESTABLISHED: 0}
     for turn in range(300):
-        s.ti[...], s.tf[...], s.bn[...], s.comp[...], s.lines[...] = 0, 0.0, 0, 0.0, 0.0
-        random_track(rng, s, 0, int(rng.choice([TENTATIVE, ESTABLISHED])))
-        s.tf[0, [R00, R11]] = 0.01
-        s.ti[0, REFS] = refs = int(rng.integers(9))
-        readings = around(rng, int(rng.choice([2, 10, 40, 120])), s.tf[0, [TX, TY]], float(s.tf[0, TRHO]))
-        for q in readings:
-            reservoir.put(s.bins, s.bn, 0, float(s.tf[0, TX]), float(s.tf[0, TY]), q)
-        n, before, quiet = reservoir.flatten(s.bins, s.bn, 0, s.w), int(s.ti[0, ST]), bool(turn % 2)
-        s.ti[0, [DIRTY, QUIET, POLISH]] = 100, P.quiet + quiet, 3
-        s.tf[0, PROB] = -1.0
-        count = s.g[REFINEMENTS]
-        refine.quantum(s, P, 0.08)
-        assert s.g[REFINEMENTS] == count + 1
-        assert s.ti[0, POLISH] == 3 - quiet
-        assert s.ti[0, NRES] == n
-        assert s.ti[0, REFS] in (0, refs + 1)  # begun anew as another kind
-        assert s.ti[0, DIRTY] == (refine.SWITCH_DIRTY if s.ti[0, REFS] == 0 else 0)
-        assert 0 <= s.ti[0, CYC] < RIVALS
-        after = int(s.ti[0, ST])
-        if s.tf[0, PROB] < 0.0:  # too few readings, or a line
-            line = n >= 3 and s.comp[0, len(P.radii)] > births.SWITCH
+        memory.circles.view(np.uint8)[...] = 0
+        state["lines"].view(np.uint8)[...] = 0
+        random_track(rng, memory, 0, int(rng.choice([TENTATIVE, ESTABLISHED])))
+        track.root_xx = track.root_yy = 0.01
+        track.refinements = count = int(rng.integers(9))
+        w = around(rng, int(rng.choice([2, 10, 40, 120])), place_of(memory, 0), float(track.radius))
+        for q in readings_of(w):
+            reservoir.keep_reading(track, float(track.x), float(track.y), q)
+        n = reservoir.copy_reservoir(track, memory.s[0].scratch.readings)
+        before, is_idle = int(track.status), bool(turn % 2)
+        track.unseen, track.idle_firings, track.final_refinements = 100, S.idle_firings + is_idle, 3
+        track.probability = -1.0
+        done = int(state["refinements"][0])
+        refine.quantum(memory.s, memory.tracks, P, 0.08)
+        assert state["refinements"][0] == done + 1
+        assert track.final_refinements == 3 - is_idle
+        assert track.reservoir == n
+        assert track.refinements in (0, count + 1)  # restarted as another kind
+        assert track.unseen == (refine.SWITCH_UNSEEN if track.refinements == 0 else 0)
+        assert 0 <= track.alternative < ALTERNATIVES
+        after = int(track.status)
+        if track.probability < 0.0:  # too few readings, or a line
+            is_line = n >= 3 and track.leads[len(RADII)] > track_initiation.SWITCH_NAT
             assert after == FREE
-            assert n < 3 or line
+            assert n < 3 or is_line
         else:
-            f = s.tf[0]
-            assert f[UNK] == P.unknown * f[NEAR]
+            assert track.unknown_nat == S.unknown_nat * track.near
             assert after == naive_tracks.fate(
-                before, f[LLR], f[UNK], f[PROB], f[HITS], f[SPAN], max(f[R00], f[R11]), P.spread
+                before, track.log_likelihood_ratio, track.unknown_nat, track.probability, track.hits,
+                track.dispersion, max(track.root_xx, track.root_yy), S.dispersion_min,
             )  # fmt: skip
-        fates[after] += 1
-    assert min(fates.values()) > 10
+        outcomes[after] += 1
+    assert min(outcomes.values()) > 10
 
 
 def garbage(rng: np.random.Generator) -> Firing:
@@ -229,12 +248,20 @@ def garbage(rng: np.random.Generator) -> Firing:
     return Firing(now * 10.0, Pose(x, y, heading), heading, ranges)
 
 
+def leaves(array: NDArray[Any]) -> Iterator[NDArray[Any]]:
+    """Yield the numbers of an array of records, field by field."""
+    if array.dtype.names is None:
+        yield array
+    for name in array.dtype.names or ():
+        yield from leaves(array[name])
+
+
 @pytest.mark.parametrize("tracks", [1, 48])
 def test_garbage_is_survived(tracks: int) -> None:
     config = SETTINGS.perception.bayes.model_copy(update={"tracks_max": tracks})
     for seed, settings in enumerate((SETTINGS, BOXES)):
         rng, perception = np.random.default_rng(seed), BayesPerception(SETTINGS.ring, settings.models, config)
-        s = perception.memory
+        memory = perception.memory
         for _ in range(60):
             perception.observe(garbage(rng))
             while perception.can_refine:
@@ -242,10 +269,16 @@ def test_garbage_is_survived(tracks: int) -> None:
             for seen in perception.labelled_objects():
                 assert np.isfinite([seen.x, seen.y, seen.theta, seen.sigma, seen.score]).all()
                 assert 0.0 <= (seen.probability or 0.0) <= 1.0
-        for name in ("ti", "tf", "comp", "lines", "g", "ddl", "ntot", "nll", "bins", "hist", "pf", "pbins", "store"):
-            assert np.isfinite(getattr(s, name)).all(), name
-        assert set(np.unique(s.ti[:, ST])) | set(np.unique(s.pi[:, ST])) <= {FREE, TENTATIVE, ESTABLISHED}
-        assert s.ti.shape[0] == tracks
-        assert ((s.ti[:, KIND] >= 0) & (s.ti[:, KIND] < len(perception.settings.radii))).all()
-        assert 0 <= s.g[NOISE] < len(P.noises)
-        assert (s.tf[:, BORN] < math.inf).all()
+        state, circles, polygons = memory.state, memory.circles, memory.polygons
+        for array in (circles, polygons, state["lines"], state["roughness_nat"], state["residuals_nat"]):
+            assert all(np.isfinite(leaf).all() for leaf in leaves(array))
+        for array in (state["sensors"]["history"], state["buckets"]["segments"]):
+            assert all(np.isfinite(leaf).all() for leaf in leaves(array))
+        assert set(np.unique(circles["status"])) | set(np.unique(polygons["status"])) <= {
+            FREE,
+            TENTATIVE,
+            ESTABLISHED,
+        }
+        assert len(circles) == tracks
+        assert ((circles["kind"] >= 0) & (circles["kind"] < perception.settings[0].circle_count)).all()
+        assert 0 <= state["noise_level"][0] < len(NOISES)

@@ -7,8 +7,23 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes.segment_pairs import SEG, map_add, map_near, tangent
-from tests import naive_bayes as naive_full
+from perception.bayes.segment_pairs import add_to_map, segments_near, tangent
+from perception.bayes.state import Bucket, MappedSegment, PairSegment
+from perception.kernel import Floats
+from perception.records import records, zeros
+from tests import naive_bayes
+from tests.perception.tracks import numbers, readings_of
+
+FIELDS = 7
+"""Fields of a pair's segment but for its reading: middle, normal, length and both standard deviations."""
+
+
+def tangent_of(first: tuple[float, ...], second: tuple[float, ...], cos_half: float, var: float) -> Floats | None:
+    """Return the segment of two readings (place, axis, range) as an array, None where there is none."""
+    segment = zeros(PairSegment, 1)
+    a, b = readings_of(np.array([first, second]))
+    found = tangent(a, b, cos_half, var, records(PairSegment, segment)[0])
+    return numbers(segment)[0, :FIELDS] if found else None
 
 
 def test_tangents_equal_their_oracle() -> None:
@@ -18,14 +33,11 @@ def test_tangents_equal_their_oracle() -> None:
     for _ in range(6000):
         a = np.array([*rng.normal(size=2), rng.uniform(-math.pi, math.pi), rng.uniform(0.2, 4)])
         b = np.array([*(a[:2] + rng.normal(size=2) * 0.4), a[2] + rng.normal() * 0.1, a[3] + rng.normal() * 0.15])
-        out = np.full(SEG, np.nan)
-        got = tangent(
-            a[0], a[1], math.cos(a[2]), math.sin(a[2]), a[3], b[0], b[1], math.cos(b[2]), math.sin(b[2]), b[3],
-            math.cos(half), 0.0004, out,
-        )  # fmt: skip
-        expected = naive_full.tangent(a, b, half)
-        assert got == (expected is not None)
-        if expected is None:
+        rows = [(q[0], q[1], math.cos(q[2]), math.sin(q[2]), q[3]) for q in (a, b)]
+        out = tangent_of(rows[0], rows[1], math.cos(half), 0.0004)
+        expected = naive_bayes.tangent(a, b, half)
+        assert (out is not None) == (expected is not None)
+        if expected is None or out is None:
             continue
         found += 1
         middle, alpha = expected
@@ -41,44 +53,52 @@ def test_tangents_equal_their_oracle() -> None:
 def test_a_segments_uncertainty_is_what_errors_of_its_ranges_make_of_it() -> None:
     rng = np.random.default_rng(3)
     sigma = 0.001
-    seen, first = [], np.empty(SEG)
-    assert tangent(0.0, 0.0, 1.0, 0.0, 2.0, 0.0, 0.3, 1.0, 0.0, 2.0, 0.9, sigma**2, first)
+    seen, first = [], tangent_of((0.0, 0.0, 1.0, 0.0, 2.0), (0.0, 0.3, 1.0, 0.0, 2.0), 0.9, sigma**2)
+    assert first is not None
     for _ in range(4000):
-        out = np.empty(SEG)
         r = 2.0 + rng.normal(size=2) * sigma
-        assert tangent(0.0, 0.0, 1.0, 0.0, r[0], 0.0, 0.3, 1.0, 0.0, r[1], 0.9, sigma**2, out)
+        out = tangent_of((0.0, 0.0, 1.0, 0.0, r[0]), (0.0, 0.3, 1.0, 0.0, r[1]), 0.9, sigma**2)
+        assert out is not None
         seen.append((float(out[:2] @ first[2:4]), math.atan2(out[3], out[2])))
     assert np.std(seen, axis=0) == pytest.approx(first[5:7], rel=0.05)
 
 
 def test_no_tangent_of_one_place_nor_of_impossible_ranges() -> None:
-    out = np.empty(SEG)
-    assert not tangent(0.0, 0.0, 1.0, 0.0, 2.0, 0.0, 0.0, 1.0, 0.0, 2.0, -1.0, 0.01, out)
-    assert not tangent(0.0, 0.0, 1.0, 0.0, 2.0, 0.0, 0.3, 1.0, 0.0, 2.4, -1.0, 0.01, out)
+    first = (0.0, 0.0, 1.0, 0.0, 2.0)
+    assert tangent_of(first, (0.0, 0.0, 1.0, 0.0, 2.0), -1.0, 0.01) is None
+    assert tangent_of(first, (0.0, 0.3, 1.0, 0.0, 2.4), -1.0, 0.01) is None
 
 
 @pytest.mark.parametrize("slots", [8, 64, 4096])
 def test_the_map_equals_its_oracle(slots: int) -> None:
     rng = np.random.default_rng(slots)
     cell = 0.3
-    tags, fill = np.zeros((slots, 2), np.int64), np.zeros(slots, np.int64)
-    store, out = np.zeros((slots, 8, 4)), np.empty((2000, 4))
-    oracle = naive_full.Buckets(slots, 8, cell)
+    buckets, out = records(Bucket, zeros(Bucket, slots)), zeros(MappedSegment, 2000)
+    found = records(MappedSegment, out)
+    oracle = naive_bayes.Buckets(slots, 8, cell)
     copied = 0
     for _ in range(2000):
-        segment = rng.normal(size=SEG)
-        map_add(segment, cell, tags, fill, store)
+        segment = rng.normal(size=FIELDS)
+        px, py, nx, ny = segment[:4].tolist()
+        add_to_map(buckets, cell, px, py, nx, ny, 0, 0.0)
         oracle.add(segment)
         x, y = rng.normal(size=2)
-        n = map_near(x, y, 0.4, cell, tags, fill, store, out)
-        assert sorted(tuple(float(v) for v in row) for row in out[:n]) == oracle.near(x, y, 0.4)
+        n = segments_near(buckets, cell, x, y, 0.4, found)
+        assert sorted(tuple(float(v) for v in row) for row in numbers(out)[:n, :4]) == oracle.near(x, y, 0.4)
         copied += n
     assert copied > 100
 
 
 def test_what_does_not_fit_is_left_out() -> None:
-    tags, fill, store = np.zeros((8, 2), np.int64), np.zeros(8, np.int64), np.zeros((8, 8, 4))
+    buckets = records(Bucket, zeros(Bucket, 8))
     for _ in range(20):
-        map_add(np.array([0.1, 0.1, 1.0, 0.0]), 1.0, tags, fill, store)
-    assert map_near(0.1, 0.1, 0.5, 1.0, tags, fill, store, np.empty((32, 4))) == 8
-    assert map_near(0.1, 0.1, 0.5, 1.0, tags, fill, store, np.empty((3, 4))) == 3
+        add_to_map(buckets, 1.0, 0.1, 0.1, 1.0, 0.0, 0, 0.0)
+    for room, count in ((32, 8), (3, 3)):
+        assert segments_near(buckets, 1.0, 0.1, 0.1, 0.5, records(MappedSegment, zeros(MappedSegment, room))) == count
+
+
+def test_a_segment_keeps_its_number_and_time() -> None:
+    array = zeros(Bucket, 8)
+    k = add_to_map(records(Bucket, array), 1.0, 0.1, 0.2, 0.6, 0.8, 7, 3.5)
+    assert array["segments"][k, 0].item() == (0.1, 0.2, 0.6, 0.8, 7, 3.5)
+    assert array["count"][k] == 1

@@ -9,17 +9,18 @@ import pytest
 
 from perception.bayes import walls
 from perception.bayes.range_fit import FAR
-from perception.bayes.state import (
-    LN,
-    NL,
-    NOISE,
-)  # fmt: skip
+from perception.bayes.state import MAX_LINES, LineFit, LineScore
+from perception.records import records, zeros
 from tests import naive_tracks
 from tests.naive_tracks import FT
 from tests.perception.tracks import (
     COSINES,
+    NOISES,
     SENSORS,
     P,
+    S,
+    line_rows,
+    numbers,
     pair,
     random_lines,
     shared,
@@ -29,70 +30,75 @@ from tests.perception.tracks import (
 
 
 def test_a_line_follows_an_echo_as_a_kalman_filter() -> None:
-    rng, s = np.random.default_rng(4), shared()
+    rng, memory = np.random.default_rng(4), shared()
     for _ in range(3000):
-        ((k, line),) = random_lines(rng, s, 1).items()
+        ((k, line),) = random_lines(rng, memory, 1).items()
         place = line.origin + rng.uniform(-3, 3, 2)
         e, var = rng.normal(0, 0.05), rng.uniform(1e-6, 1e-3)
-        walls.follow(s.lines[k], *pair(place - line.origin), e, var)
+        walls.correct_line(memory.s[0].lines[k], *pair(place - line.origin), e, var)
         line.follow(place, e, var)
-        assert s.lines[k] == pytest.approx(line.row(), rel=1e-12, abs=1e-12)
+        assert line_rows(memory)[k] == pytest.approx(line.row(), rel=1e-12, abs=1e-12)
 
 
-def test_lines_claim_what_they_explain_and_give_way() -> None:
-    rng, s = np.random.default_rng(5), shared()
-    claimed = lost = grown = 0
+def test_lines_take_what_they_explain_and_give_way() -> None:
+    rng, memory = np.random.default_rng(5), shared()
+    taken = lost = grown = 0
     for _ in range(400):
-        s.g[NOISE] = int(rng.integers(len(P.noises)))
-        lines = random_lines(rng, s, 4)
+        memory.s[0].noise_level = int(rng.integers(len(NOISES)))
+        lines = random_lines(rng, memory, 4)
         cur = np.zeros((SENSORS, 6))
         for i in range(SENSORS):
             line = lines[int(rng.choice(list(lines)))]
             d, foot = rng.uniform(0.1, 3), rng.uniform(line.low - 0.2, line.high + 0.2)
             alpha = rng.normal(0, 0.2)
-            edge = max(0.0, abs(alpha) - P.half_angle)
+            edge = max(0.0, abs(alpha) - S.half_angle_rad)
             place = line.origin + (line.c - d) * line.normal + foot * line.along
             r = rng.choice([d / math.cos(edge) + rng.normal(0, 0.01), 2 * FAR, rng.uniform(0, 4)])
             cur[i] = *place, *unit(math.atan2(line.normal[1], line.normal[0]) + alpha), max(r, 0.0), i
-        s.cur[...] = cur
-        s.owner[...] = np.where(rng.random(SENSORS) < 0.8, -1, 3)
-        owner = s.owner.tolist()
-        walls.update_lines(s, P, SENSORS)
+        scratch = memory.state["scratch"]
+        numbers(scratch["fired"][0])[:SENSORS] = cur[:, :5]
+        scratch["explained_by"][0, :SENSORS] = np.where(rng.random(SENSORS) < 0.8, -1, 3)
+        owner = scratch["explained_by"][0, :SENSORS].tolist()
+        walls.update_lines(memory.s, P, SENSORS)
         for k, line in lines.items():
             length = line.high - line.low
             kept = naive_tracks.update_line(
-                line, k, cur, owner, sigma(s), P.half_box, P.half_angle, COSINES, P.gate, P.claim
+                line, k, cur, owner, sigma(memory), S.half_resolution_m, S.half_angle_rad, COSINES, S.gate_m,
+                S.associating_line_m,
             )  # fmt: skip
             if kept is None:
-                assert s.lines[k, LN] == 0.0
+                assert memory.state["lines"]["echoes"][0, k] == 0.0
                 lost += 1
             else:
-                assert s.lines[k] == pytest.approx(kept.row(), rel=1e-11, abs=1e-11)
+                assert line_rows(memory)[k] == pytest.approx(kept.row(), rel=1e-11, abs=1e-11)
                 grown += kept.high - kept.low > length
-        assert s.owner.tolist() == owner
-        claimed += sum(o < -1 for o in owner)
-    assert min(claimed, lost, grown) > 30
+        assert scratch["explained_by"][0, :SENSORS].tolist() == owner
+        taken += sum(o < -1 for o in owner)
+    assert min(taken, lost, grown) > 30
 
 
 def test_a_new_line_is_known_or_takes_the_least_credible_place() -> None:
-    rng, s, known = np.random.default_rng(6), shared(), 0
+    rng, memory, known = np.random.default_rng(6), shared(), 0
+    fit, score = zeros(LineFit, 1), zeros(LineScore, 1)
     for _ in range(1500):
-        lines = random_lines(rng, s, int(rng.choice([0, 10, NL - 1, NL])))
+        lines = random_lines(rng, memory, int(rng.choice([0, 10, MAX_LINES - 1, MAX_LINES])))
         ((_, new),) = random_lines(rng, shared(), 1).items()
         if lines and rng.random() < 0.5:
             like = lines[int(rng.choice(list(lines)))]
             turned = math.atan2(like.normal[1], like.normal[0]) + rng.normal(0, 0.15)
             new.normal, new.origin = unit(turned), like.origin + rng.normal(0, 0.1, 2)
             new.c = like.c + rng.normal(0, 0.1)
-        before = s.lines.copy()
-        walls.new_line(s, *pair(new.normal), new.c, *pair(new.origin), new.low, new.high, new.echoes)
+        before = line_rows(memory).copy()
+        fit[0] = (*new.normal, new.c)
+        score[0] = (0.0, new.echoes, 0.0, new.low, new.high)
+        walls.add_line(memory.s, records(LineFit, fit)[0], *pair(new.origin), records(LineScore, score)[0])
         if any(naive_tracks.same_line(line, new) for line in lines.values()):
-            assert (s.lines == before).all()
+            assert (line_rows(memory) == before).all()
             known += 1
             continue
-        free = [k for k in range(NL) if k not in lines]
+        free = [k for k in range(MAX_LINES) if k not in lines]
         k = free[0] if free else min(lines, key=lambda k: lines[k].log)
         new.cov, new.log = np.diag([0.02, 0.01 * FT**2]), 3.0
-        assert s.lines[k] == pytest.approx(new.row(), rel=1e-15)
-        assert (np.delete(s.lines, k, 0) == np.delete(before, k, 0)).all()
+        assert line_rows(memory)[k] == pytest.approx(new.row(), rel=1e-15)
+        assert (np.delete(line_rows(memory), k, 0) == np.delete(before, k, 0)).all()
     assert known > 100

@@ -19,7 +19,7 @@ from rich.console import Console
 import runtime.support.kernel_cache as kernels
 from config.load import load_settings
 from config.settings import Settings
-from perception.bayes import entry
+from perception.bayes import polygon_tracks, refine
 from runtime.support import kernel_warmup as warming
 
 ROOT = Path(__file__).parents[3]
@@ -194,11 +194,11 @@ def test_a_helper_takes_what_comes_last(
 def test_a_helper_compiles_the_refinement_of_either_kind(monkeypatch: pytest.MonkeyPatch) -> None:
     """On an empty memory that compiles and does nothing."""
     asked = []
-    for name in ("quantum", "pquantum"):
-        monkeypatch.setattr(entry, name, lambda _handle, _share, name=name: asked.append(name))
+    for module, name in ((refine, "quantum"), (polygon_tracks, "polygon_quantum")):
+        monkeypatch.setattr(module, name, lambda _s, _tracks, _p, _share, name=name: asked.append(name))
     warming.compile_refinement(kernels.BAYES)
     warming.compile_refinement(kernels.POLYGONS)
-    assert asked == ["quantum", "pquantum"]
+    assert asked == ["quantum", "polygon_quantum"]
 
 
 def test_a_helper_that_hangs_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
