@@ -13,9 +13,10 @@ from perception.bayes.kernel_settings import apply_library, copied, make_setting
 from perception.bayes.map_edits import edit_memory
 from perception.bayes.pinned_segments import Pins, delete, places_of
 from perception.bayes.segment_list import mapped_segments
-from perception.bayes.segment_pairs import add_to_map
+from perception.bayes.segment_pairs import add_to_map, bucket_index
 from perception.bayes.state import (
     BUCKET_CAPACITY,
+    BUCKETS,
     CONFIRMED,
     ESTABLISHED,
     FREE,
@@ -198,12 +199,19 @@ def test_what_each_reading_says_of_a_circle_equals_its_oracle() -> None:
     assert said > 2000
 
 
+def cells_of_eight_buckets() -> np.ndarray:
+    """Return cells of the map that share eight buckets, shape (n, 2)."""
+    cells = np.stack(np.meshgrid(np.arange(-200, 200), np.arange(-200, 200)), axis=-1).reshape(-1, 2)
+    buckets = [bucket_index(x, y, BUCKETS) for x, y in cells.tolist()]
+    return cells[np.array(buckets) < 8]
+
+
 def test_a_bucket_is_left_in_its_order_and_pins_come_back() -> None:
     """Against a list: which of a bucket's segments are there, oldest first, and which a pin brings back."""
     rng, memory, pins, total = np.random.default_rng(5), Memory(4, TRACKS), Pins(), 0
     buckets = memory.state["buckets"][0]
     kept: dict[int, tuple[float, ...]] = {}
-    places = rng.uniform(-1.0, 1.0, (12, 2))  # few cells, so that buckets overflow
+    cells = cells_of_eight_buckets()[rng.permutation(300)[:49]]  # so that cells take buckets from one another
     for _ in range(2000):
         turn = rng.random()
         present = list(listed(memory))
@@ -211,7 +219,7 @@ def test_a_bucket_is_left_in_its_order_and_pins_come_back() -> None:
         some = tuple(int(n) for n in rng.choice(present, min(2, len(present)), replace=False)) if present else ()
         if turn < 0.7:
             total += 1
-            place = places[rng.integers(len(places))] + rng.uniform(-0.01, 0.01, 2)
+            place = (cells[rng.integers(len(cells))] + rng.uniform(0.1, 0.9, 2)) * CELL_M
             add_segment(memory, np.array([*place, 1.0, 0.0]), total)
             pins.renew(memory)
         elif turn < 0.8:
@@ -239,7 +247,7 @@ def test_a_bucket_is_left_in_its_order_and_pins_come_back() -> None:
             fresh = [n for n in buckets["segments"]["number"][k, order].tolist() if n not in kept]
             assert fresh == sorted(fresh), "a bucket's oldest is the first to go"
     assert total > 1000
-    assert buckets["count"].max() > 4 * BUCKET_CAPACITY
+    assert np.count_nonzero(buckets["count"]) <= 8
     pins.clear()
     assert pins.count == 0
 
