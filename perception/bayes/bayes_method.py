@@ -1,6 +1,6 @@
-"""The Bayesian method behind perception's door: firings in, objects out.
+"""The Bayesian method as perception calls it: firings in, objects out.
 
-What is remembered and what is done with it is in the kernels; here is when they are called. Each call does a bounded
+The memory and the work on it are in the kernels; this module decides when they are called. Each call does a bounded
 piece of work: a firing a bounded number of quanta, a quantum one object.
 """
 
@@ -174,7 +174,7 @@ class BayesPerception:
         return Segments(numbers, drawn(mapped), times, pinned.astype(np.int64))
 
     def edit(self, edit: Edit) -> str | None:
-        """Do what a person says; return None, or why it cannot be done."""
+        """Apply a user's edit; return None, or why it cannot be done."""
         self._objects = None
         return edit_memory(self.memory, self.settings, self._pins, self._round, self._outlines, edit)
 
