@@ -1,1 +1,1 @@
-"""Echoes to objects: the paper's four steps and what goes beyond them. Pure: no clock, no I/O, no logging."""
+"""Perception: objects from echoes, by the paper's four steps or by a Bayesian method. Pure: no clock, I/O or log."""

@@ -1,4 +1,4 @@
-"""Edits of the map by the operator, and the evidence for an object that the operator sees.
+"""Edits of the map by the operator, and the evidence for an object that is shown to the operator.
 
 An edit is an input of a cycle, like an echo: plain numbers and names, recorded with the other inputs so that a replay
 repeats it. `kind` names the edit in a recording and on the wire.
@@ -143,7 +143,15 @@ class Evidence:
 
 
 def invalid_pose(x: float, y: float, theta: float) -> str | None:
-    """Return why a pose entered by the operator (m, rad) is invalid, None if it is valid."""
+    """Return why a pose entered by the operator (m, rad) is invalid, None if it is valid.
+
+    Parameters
+    ----------
+    x, y : float
+        Position in the odometry's frame, m; may be NaN or infinite, which is invalid.
+    theta : float
+        Heading, rad; it need not be wrapped.
+    """
     if abs(x) <= COORDINATE_MAX_M and abs(y) <= COORDINATE_MAX_M and abs(theta) <= COORDINATE_MAX_M:
         return None
     return (

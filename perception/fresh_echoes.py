@@ -1,7 +1,7 @@
 """The last echo of each sensor as a point in the odometry's frame: the obstacles that the schemas avoid.
 
-A sensor that fires again replaces only its own echo; if it hears nothing, its echo is removed. So a reading at
-maximum range leaves no obstacle behind, and neighbours do not erase each other's echoes.
+A new reading of a sensor replaces only that sensor's echo; a reading without an echo removes it. So a reading at
+maximum range leaves no obstacle, and neighbours do not erase each other's echoes.
 """
 
 from __future__ import annotations

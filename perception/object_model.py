@@ -1,4 +1,4 @@
-"""An object model in the form that kernels take: the sides of its outline (paper §3.4)."""
+"""An object model as an array of the sides of its outline, as the kernels take it (paper §3.4)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What behaviours see of perception. Behaviours import nothing of this program but this module and `config`."""
+"""The percept: the input of the behaviours, which import only this module and `config` of this program."""
 
 from __future__ import annotations
 

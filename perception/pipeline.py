@@ -1,4 +1,4 @@
-"""Perception as an anytime stage: a part that always runs, and refinement in quanta of bounded work.
+"""Perception as an anytime algorithm: a part that always runs, and refinement in quanta of bounded work.
 
 `observe` takes one firing. `refine` does one quantum; the caller decides how many it can afford, and the rest
 continues in the next cycle from where it stopped. A method recognises the objects: the paper's or the Bayesian one.

@@ -1,4 +1,4 @@
-"""The sensors' mounts as the array that kernels take."""
+"""The mounts of the ring's sensors as an array, as the kernels take them."""
 
 from __future__ import annotations
 

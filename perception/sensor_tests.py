@@ -128,7 +128,19 @@ class RingMemory(Record):
 def find_set(
     ranges: Floats, sets: NDArray[np.uint8], sensors: Records[SensorMemory], ring: Records[RingMemory]
 ) -> int:
-    """Return the index of the set of sensors that fired; enter a new set, over the oldest where all are in use."""
+    """Return the index of the set of sensors that fired; enter a new set, over the oldest where all are in use.
+
+    Parameters
+    ----------
+    ranges : (n,) float
+        Readings of the firing, m: NaN for a sensor that did not fire, inf for one without an echo.
+    sets : (sets, n) uint8
+        Known sets, one a row: 1 for each sensor of the set. A new set overwrites a row.
+    sensors : (n,) records
+        What is remembered of each sensor. Crosstalk counts of an overwritten set are cleared.
+    ring : (1,) records
+        What is remembered of the ring. The number of sets and the regularity are updated.
+    """
     seen = ring[0].sets_seen
     k: int
     for k in range(min(seen, sets.shape[0])):
@@ -154,7 +166,21 @@ def find_set(
 def begin_run(
     i: int, r: float, x: float, y: float, yaw: float, neighbours: Ints, sensors: Records[SensorMemory]
 ) -> None:
-    """Begin a run of readings equal to `r` for sensor `i` at the ring's pose (m, rad)."""
+    """Begin a run of readings equal to `r` for sensor `i` at the ring's pose (m, rad).
+
+    Parameters
+    ----------
+    i : int
+        Index of the sensor.
+    r : float
+        The reading that the run repeats, m; inf for a run without echoes.
+    x, y, yaw : float
+        Pose of the ring now, in the odometry's frame, m and rad.
+    neighbours : (n, 2) int
+        Indices of each sensor's left and right neighbour; −1 where it has none.
+    sensors : (n,) records
+        What is remembered of each sensor. The run of sensor `i` is overwritten.
+    """
     c = sensors[i]
     c.run_m, c.run_x, c.run_y, c.run_yaw, c.run_length = r, x, y, yaw, 1
     for side in range(2):
@@ -168,7 +194,18 @@ def neighbour_counts(
 ) -> tuple[float, float, float]:
     """Return the lesser of both neighbours' changes, leaps and near echoes since sensor `i`'s run began.
 
-    Zero for a sensor without two neighbours. With `skip_deaf`, a neighbour that hears nothing now is left out.
+    All three are zero for a sensor without two neighbours.
+
+    Parameters
+    ----------
+    i : int
+        Index of the sensor.
+    neighbours : (n, 2) int
+        Indices of each sensor's left and right neighbour; −1 where it has none.
+    sensors : (n,) records
+        What is remembered of each sensor.
+    skip_deaf : bool
+        Leave out a neighbour whose last reading was without an echo.
     """
     changes = leaps = near_echoes = math.inf
     for side in range(2):
@@ -238,7 +275,19 @@ def is_stuck(
 
 @kernel
 def is_silent(i: int, x: float, y: float, neighbours: Ints, sensors: Records[SensorMemory]) -> bool:
-    """Return whether a healthy sensor would have heard an echo by now."""
+    """Return whether a healthy sensor would have heard an echo by now.
+
+    Parameters
+    ----------
+    i : int
+        Index of the sensor.
+    x, y : float
+        Place of the ring now, in the odometry's frame, m.
+    neighbours : (n, 2) int
+        Indices of each sensor's left and right neighbour; −1 where it has none.
+    sensors : (n,) records
+        What is remembered of each sensor.
+    """
     c = sensors[i]
     if math.hypot(x - c.run_x, y - c.run_y) < SILENT_MIN_M or c.run_length < PASSED_READINGS_MIN:
         return False
@@ -276,7 +325,19 @@ def count_short_readings(c: SensorMemory, r: float, fired_set: int) -> None:
 
 @kernel
 def is_doubtful(c: SensorMemory, r: float, x: float, y: float, fired_set: int) -> bool:
-    """Return whether a reading is shorter than the last one in another set by more than the base has moved since."""
+    """Return whether a reading is shorter than the last one in another set by more than the base has moved since.
+
+    Parameters
+    ----------
+    c : SensorMemory
+        The sensor, before the reading is entered.
+    r : float
+        The new reading, m.
+    x, y : float
+        Place of the ring now, in the odometry's frame, m.
+    fired_set : int
+        Index of the set that the reading was fired in.
+    """
     if c.readings < 1 or c.last_set == fired_set:
         return False
     moved = math.hypot(x - c.last_x, y - c.last_y)

@@ -1,1 +1,1 @@
-"""What the emulated robots of all families share: acoustics, body, faults, transports, control of time."""
+"""Parts common to the emulated robots of all families: acoustics, body, faults, transports, control of time."""

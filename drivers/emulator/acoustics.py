@@ -1,4 +1,4 @@
-"""Where the first echo of each sensor comes from: exact geometry, compiled; nothing is sampled.
+"""The first echo of each sensor, computed by exact geometry in compiled kernels, without sampling.
 
 There are two models of the beam. `cone`: the nearest surface point inside the beam's sector. `specular`: at a
 wavelength of 7 mm smooth surfaces are mirrors. A surface then answers only from the point whose normal looks back at

@@ -1,4 +1,4 @@
-"""Which faults are active: the fault script as a schedule that the emulated robot queries."""
+"""The schedule of a fault script: the faults that are active at a time, and the next change."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class FaultSchedule:
 
     @property
     def next_us(self) -> int | None:
-        """When the next fault starts or ends, µs; None if no more do."""
+        """Time at which the next fault starts or ends, µs; None if there are no more changes."""
         return self._edges[0][0] if self._edges else None
 
     def due(self, now_us: int) -> Iterator[tuple[bool, Fault]]:
@@ -44,7 +44,7 @@ class FaultSchedule:
 
     def has(self, kind: type[Fault]) -> bool:
         """Return whether a fault of this kind is active."""
-        # Called at every event; mostly there is none.
+        # Called at every event; in most calls no fault is active.
         return bool(self._active) and any(isinstance(fault, kind) for fault in self._active)
 
     def all(self, kind: type[F]) -> list[F]:
@@ -53,6 +53,16 @@ class FaultSchedule:
 
 
 def flip_bits(data: bytes, rate: float, rng: np.random.Generator) -> bytes:
-    """Return `data` with each bit flipped with probability `rate`."""
+    """Return `data` with each bit flipped with probability `rate`.
+
+    Parameters
+    ----------
+    data : bytes
+        Bytes on the line; not changed.
+    rate : float
+        Probability that a bit flips, 0 to 1.
+    rng : numpy.random.Generator
+        Source of the random numbers; eight are drawn for each byte, whatever the rate.
+    """
     flips = rng.random(8 * len(data)) < rate
     return (np.frombuffer(data, dtype=np.uint8) ^ np.packbits(flips)).tobytes()

@@ -1,4 +1,4 @@
-"""The fault script: what goes wrong with the robot or its line, and when.
+"""The fault script: the kinds of faults of the robot and its line, and a reader for the file that schedules them.
 
 ```toml
 [[fault]]

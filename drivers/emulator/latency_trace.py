@@ -1,4 +1,4 @@
-"""The latency trace: when whole echoes left for the host, and when whole drive commands came back.
+"""The latency trace: the times at which complete echoes were sent and complete drive commands were received.
 
 Both times are read from one clock in one process, on the robot's side of the line. The time between them is therefore
 what the host took: its kernel, its event loop, its cycle. An echo's time is just before its last byte is written, a

@@ -1,7 +1,7 @@
 """A driver and an emulated robot connected in memory, in virtual time.
 
-Time passes as the caller says, in short steps, so that commands and answers alternate as they would on a real line.
-Nothing here waits, and the same seed gives the same run.
+The caller advances time in short steps, so that commands and answers alternate as on a real line. No call blocks,
+and the same seed gives the same run.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """The emulator as a program: an emulated robot on a pseudo-terminal, in real time.
 
-A pty differs from a serial line, and this module makes up for that: bytes that the host does not read in time are
-lost instead of waiting, and a line without a host is not an error. That bytes leave at the line's speed is up to the
-robot's transmitter.
+A pty differs from a serial line, and this module corrects that: bytes that the host does not read in time are lost
+instead of being kept, and a line without a host is not an error. The robot's transmitter limits the line's speed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What an emulated robot of any family offers to the transports: a sans-I/O object that speaks its protocol."""
+"""The interface between an emulated robot of any family and the transports: a sans-I/O object with its protocol."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class TimeScaleFollower:
             except ValueError as error:
                 self._out += f"{REFUSED} {error}\n".encode()
         if len(self._rest) > MESSAGE_MAX:
-            # It will be refused at its end, if that ever comes; until then its length is all that matters.
+            # Too long: refused when its end arrives, if ever. Until then only the excess length matters.
             self._rest = self._rest[: MESSAGE_MAX + 1]
 
     def acknowledge(self, run_s: float) -> bytes:

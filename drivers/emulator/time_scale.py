@@ -1,9 +1,9 @@
-"""How fast the run's time passes, in a form that two processes evaluate alike.
+"""The time scale: the speed of the run's time, in a form that two processes evaluate identically.
 
 The emulator and the program that drives it must pause, step and speed up together: otherwise the emulator's silence
 raises an alarm, or its robot moves on while the run is paused. Both processes read the host's monotonic clock, so it
-is enough that they agree on how the run's time follows from it. A `TimeScale` says that in four numbers; a process
-that has them knows the run's time without asking the other.
+is enough that they agree on how the run's time follows from it. A `TimeScale` defines that by four numbers, from
+which each process computes the run's time without asking the other.
 """
 
 from __future__ import annotations

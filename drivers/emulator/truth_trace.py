@@ -1,4 +1,4 @@
-"""The truth trace: the true states of the emulated robot as a CSV file, to compare with what the program reported.
+"""The truth trace: the true states of the emulated robot as a CSV file, for comparison with the program's reports.
 
 Rows are flushed as they are written, so that a test can read them while the emulator runs and after it was killed.
 """

@@ -191,7 +191,7 @@ class Candidates:
                 self._place(j, clusters, outline, before)
 
     def find(self, number: int) -> tuple[int, int] | None:
-        """Return cluster and model of the candidate of this number, None if there is none."""
+        """Return cluster and model of the candidate with this number, None if it does not exist."""
         found = np.argwhere(self.rows["number"][: self._count] == number)
         return (int(found[0, 0]), int(found[0, 1])) if len(found) else None
 

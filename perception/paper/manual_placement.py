@@ -195,7 +195,15 @@ class Rejections:
         self.total += 1
 
     def newest_excluded(self, x: float, y: float, model: int) -> int:
-        """Return the newest segment that does not count for a model at (x, y), m; 0 if all segments count."""
+        """Return the newest segment that does not count for a model at (x, y), m; 0 if all segments count.
+
+        Parameters
+        ----------
+        x, y : float
+            Position of the model in the odometry's frame, m.
+        model : int
+            Index of the model.
+        """
         newest = 0
         for row in self.rows[: min(self.total, PLACEMENTS_MAX)]:
             if row["model"] == model and math.hypot(row["x"] - x, row["y"] - y) < row["reach"]:
