@@ -47,9 +47,22 @@ class DriverFamily(Protocol):
     def make_device(
         self, config: RobotConfig, world: WorldConfig, seed: int, *, faults: Sequence[Fault], clock_start_us: int
     ) -> RobotDevice:
-        """Return an emulated robot; see `make_device` of this module for the parameters.
+        """Return an emulated robot that answers the driver of `config`.
 
         A family without an emulator raises `DriverError`.
+
+        Parameters
+        ----------
+        config
+            The robot.
+        world
+            What surrounds the robot, and where in it the robot starts.
+        seed
+            Seed of all random numbers: the same seed and input give the same output.
+        faults
+            What goes wrong with the robot or its line, and when; may be empty.
+        clock_start_us
+            First reading of the robot's own clock, µs.
         """
 
 

@@ -177,7 +177,7 @@ def begin_run(
     x, y, yaw : float
         Pose of the ring now, in the odometry's frame, m and rad.
     neighbours : (n, 2) int
-        Indices of each sensor's left and right neighbour; −1 where it has none.
+        Indices of each sensor's left and right neighbour; −1 for both without two.
     sensors : (n,) records
         What is remembered of each sensor. The run of sensor `i` is overwritten.
     """
@@ -201,7 +201,7 @@ def neighbour_counts(
     i : int
         Index of the sensor.
     neighbours : (n, 2) int
-        Indices of each sensor's left and right neighbour; −1 where it has none.
+        Indices of each sensor's left and right neighbour; −1 for both without two.
     sensors : (n,) records
         What is remembered of each sensor.
     skip_deaf : bool
@@ -284,7 +284,7 @@ def is_silent(i: int, x: float, y: float, neighbours: Ints, sensors: Records[Sen
     x, y : float
         Place of the ring now, in the odometry's frame, m.
     neighbours : (n, 2) int
-        Indices of each sensor's left and right neighbour; −1 where it has none.
+        Indices of each sensor's left and right neighbour; −1 for both without two.
     sensors : (n,) records
         What is remembered of each sensor.
     """

@@ -45,6 +45,21 @@ def experiment(
         Repeat with this many seeds, starting at 0.
     out
         Folder for recording, figures and report of the run with seed 0.
+    world
+        World file to drive in instead of the experiment's own hall.
+    model
+        Object models to recognise; empty for those of the experiment.
+    json
+        File for a summary (JSON); None for no file.
+    units
+        Units of the printed tables.
+    sets
+        Single settings, each `path=value`, that override the experiment's.
+
+    Raises
+    ------
+    UserError
+        The options exclude one another, or there are no seeds.
     """
     from runtime.cli.commands.experiment import run_experiment, run_scenes
 

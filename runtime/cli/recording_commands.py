@@ -76,6 +76,21 @@ def replay(
         End this many seconds after the first recorded cycle.
     speed
         Show the run this many times as fast as it was; by default it is replayed as fast as possible.
+    robot
+        Robot file for a ring log; a recording contains its robot.
+    model
+        Object models to recognise in a ring log; a recording contains its models.
+    json
+        File for a summary (JSON); None for no file.
+    units
+        Units of the printed tables.
+    sets
+        Single settings, each `path=value`, that differ from the recorded or default ones.
+
+    Raises
+    ------
+    UserError
+        An option that applies to recordings only is given with a ring log.
     """
     from pathlib import Path
 
@@ -131,6 +146,14 @@ def figures(
         Folder for the figures: SVG, PDF and PNG; the animation as GIF, and as MP4 if ffmpeg is installed.
     still
         Leave out the animation.
+    file
+        Recording or ring log of the run.
+    options
+        Settings that a recording contains and a ring log does not.
+    units
+        Units of the axes.
+    sets
+        Single settings, each `path=value`, that override the others.
     """
     from runtime.cli.commands.figures import draw_figures
 
@@ -152,6 +175,14 @@ def report(
     ----------
     out
         Page to write; by default NAME.html in the folder of FILE.
+    file
+        Recording or ring log of the run.
+    options
+        Settings that a recording contains and a ring log does not.
+    units
+        Units of lengths on the page.
+    sets
+        Single settings, each `path=value`, that override the others.
     """
     from runtime.cli.commands.report import write_report
 
@@ -176,6 +207,12 @@ def export(
         recording as a ring log (ringlog). Formats with * need the extra `export`.
     out
         Folder for tables, new folder for a bag, otherwise the file to write.
+    file
+        Recording or ring log of the run.
+    options
+        Settings that a recording contains and a ring log does not.
+    sets
+        Single settings, each `path=value`, that override the others.
     """
     from runtime.cli.commands.export import export_run
 

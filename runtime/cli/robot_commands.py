@@ -56,6 +56,14 @@ def run(
         Emulated robot: write its true poses to this file (CSV).
     faults
         Emulated robot: fault script.
+    config
+        Run file, or the name of a shipped one; None for the default settings.
+    json
+        File for a summary at the end of the run (JSON); None for no file.
+    units
+        Units of the printed tables.
+    sets
+        Single settings, each `path=value`, that override the files'.
     """
     from runtime.cli.commands.run import EmulatorOptions, run_robot
 
@@ -103,6 +111,14 @@ def emulate(
         The time reached is reported on standard output: at NUMBER RUN_S.
     config
         Run file that names robot and world.
+    world
+        World file, or the name of a shipped one; None for that of the run file.
+    robot
+        Robot file, or the name of a shipped one; None for that of the run file.
+    sets
+        Single settings, each `path=value`, that override the files'.
+    end_with_parent
+        End when the process that started the emulator has ended; for use by `run`.
     """
     from runtime.cli.commands.emulate import emulate_robot
 
@@ -136,6 +152,10 @@ def service(
         Serial port of the robot, unless the run file names one.
     user
         User that runs it; by default one that systemd creates.
+    config
+        Run file, or the name of a shipped one; None for the default settings.
+    sets
+        Single settings, each `path=value`, that the service passes to `run`.
     """
     from runtime.cli.commands.service import print_service
 

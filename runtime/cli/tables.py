@@ -119,7 +119,17 @@ def objects_table(objects: list[ObjectRow], units: Units) -> Table:
 
 
 def budget_table(rows: Sequence[BudgetRow], unit: str, units: Units) -> Table:
-    """Return when the answers came under each budget, and what they were in the end."""
+    """Return when the answers came under each budget, and what they were in the end.
+
+    Parameters
+    ----------
+    rows : sequence of BudgetRow
+        The results, one budget each; lengths in metres.
+    unit : str
+        Unit of the budgets for the heading, e.g. ms.
+    units : {"m", "ft"}
+        Units of the printed lengths.
+    """
     title = "a hall of 40 drums: when the answers come, and what they are in the end"
     caption = "first: until a drum was reported; way: the robot's until each was; mean, max: error"
     table = Table(title=title, title_justify="left", caption=caption, caption_justify="left")

@@ -30,7 +30,17 @@ ARCS_MAX: Final = 4000
 
 
 def draw_world(axes: Axes, timeline: Timeline, frame: Frame) -> list[Line2D]:
-    """Draw the true world if it is known."""
+    """Draw the true world if it is known.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where to draw, in the unit of `frame`.
+    timeline : Timeline
+        The run; without a known world nothing is drawn.
+    frame : Frame
+        The coordinates of the figure: its place in the world and the unit of its axes.
+    """
     if timeline.world is None:
         return []
     closed, lines = world_outlines(timeline.world)
@@ -78,7 +88,17 @@ def draw_path(axes: Axes, poses: Sequence[Pose], frame: Frame, radius_m: float) 
 
 
 def draw_bookmarks(axes: Axes, bookmarks: Sequence[BookmarkEntry], frame: Frame) -> list[Line2D]:
-    """Draw the number of each bookmark at the robot's position at that moment."""
+    """Draw the number of each bookmark at the robot's position at that moment.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where to draw, in the unit of `frame`.
+    bookmarks : sequence of BookmarkEntry
+        All bookmarks of the run, numbered from 1; one without a pose is not drawn.
+    frame : Frame
+        The coordinates of the figure: its place in the world and the unit of its axes.
+    """
     style: Any = {"marker": "D", "markersize": 5, "linestyle": "", "color": PAPER, "markeredgecolor": INK}
     placed = [(number, mark.pose) for number, mark in enumerate(bookmarks, 1) if mark.pose is not None]
     for number, pose in placed:

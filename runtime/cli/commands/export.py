@@ -65,7 +65,17 @@ def export_run(source: TimelineSource, to: ExportFormat, out: str) -> int:
 
 
 def write_timeline(timeline: Timeline, to: ExportFormat, target: Path) -> list[Path]:
-    """Write a run in a format and return the files; the package of a format is imported only here."""
+    """Write a run in a format and return the files; the package of a format is imported only here.
+
+    Parameters
+    ----------
+    timeline : Timeline
+        The run.
+    to : str
+        The format: csv, parquet, foxglove, or otherwise a ROS 2 bag.
+    target : Path
+        Folder for tables, new folder for a bag, otherwise the file to write.
+    """
     if to == "csv":
         from runtime.analysis.export.csv_tables import write_csv
 

@@ -59,7 +59,7 @@ def print_service(config: str | None, sets: Sequence[str], *, port: str | None, 
     Raises
     ------
     UserError
-        There is no port, or a name cannot stand in a unit file.
+        No port is given, or a name contains characters that a unit file cannot hold.
     """
     settings = load_settings(config, sets)
     port = port or settings.link.port
@@ -95,7 +95,17 @@ def systemd_unit(command: Sequence[str], port: str, user: str | None) -> str:
 
 
 def service_command(config: str | None, sets: Sequence[str], port: str) -> list[str]:
-    """Return the command that the service runs; it never contains --arm."""
+    """Return the command that the service runs; it never contains --arm.
+
+    Parameters
+    ----------
+    config : str, optional
+        Run file, or the name of a shipped one; None for the default settings.
+    sets : sequence of str
+        Single settings, each `path=value`, passed on as `--set`.
+    port : str
+        Serial port of the robot.
+    """
     installed = Path(sys.executable).with_name("echolocate")
     program = [str(installed)] if installed.exists() else [sys.executable, "-m", "runtime.cli"]
     # A file must be found from any folder; a shipped run is found by its name.

@@ -45,14 +45,34 @@ class Plan:
         return self._cell
 
     def mark(self, x: float, y: float, character: str, style: str) -> None:
-        """Draw a character at a point, m; points outside are ignored."""
+        """Draw a character at a point, m; points outside are ignored.
+
+        Parameters
+        ----------
+        x, y : float
+            The point, m.
+        character : str
+            One character; it replaces an earlier one in the same cell.
+        style : str
+            Style of the character, as rich names it.
+        """
         column = math.floor((x - self._left) / self._cell)
         row = math.floor((self._top - y) / (self._cell * CELL_ASPECT))
         if 0 <= column < self._columns and 0 <= row < self._rows:
             self._cells[row, column] = (character, style)
 
     def circle(self, x: float, y: float, radius: float, character: str, style: str) -> None:
-        """Draw a circle of characters around a point, m."""
+        """Draw a circle of characters around a point, m.
+
+        Parameters
+        ----------
+        x, y, radius : float
+            Centre and radius, m.
+        character : str
+            The character of which the circle consists.
+        style : str
+            Style of the characters, as rich names it.
+        """
         steps = max(8, math.ceil(4.0 * math.pi * radius / self._cell))
         for k in range(steps):
             angle = 2.0 * math.pi * k / steps

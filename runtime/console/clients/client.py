@@ -28,7 +28,17 @@ class Frame(Protocol):
         """The frame's number in its source."""
 
     def encode(self, *, follows: bool, dropped: int, controls: bool) -> bytes:
-        """Return the message for one client; segments as changes if it `follows` the client's previous frame."""
+        """Return the frame as a message for one client.
+
+        Parameters
+        ----------
+        follows : bool
+            Whether the client received the previous frame of this source: segments are then sent as changes.
+        dropped : int
+            Frames that were not sent to this client because it was too slow.
+        controls : bool
+            Whether this client has control of the robot.
+        """
 
 
 class Transport(Protocol):
