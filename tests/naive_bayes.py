@@ -242,7 +242,7 @@ def posterior_circle(
     return p, frame, cov
 
 
-def wedge(
+def corner(
     w: Array, centre: Array, rho: float, opt: float, gate: float, var0: float, rel2: float, noise: Noise
 ) -> float | None:
     """Return the evidence of two faces and their edge for a circle's near readings, less the price."""

@@ -125,20 +125,20 @@ def same_line(known: Line, new: Line) -> bool:
 
 def update_line(
     line: Line, k: int, cur: Array, owner: list[int], sigma: tuple[float, float], half_box: float, half_angle: float,
-    cosines: tuple[float, float, float], gate: float, claim: float,
+    cosines: tuple[float, float, float], gate: float, length_min: float,
 ) -> Line | None:  # fmt: skip
-    """Let line k hear readings, claim them and follow; None where it is given up."""
+    """Return line k after it has followed the readings it explains; None if it is dropped."""
     opt, half, inside = cosines
     for i, q in enumerate(cur):
         cos, d, r = float(line.normal @ q[2:4]), line.off(q[:2]), float(q[4])
         if cos < 0.8 or d <= 0:
             continue
-        foot, claims = line.foot(q[:2]), line.high - line.low > claim
+        foot, takes_over = line.foot(q[:2]), line.high - line.low > length_min
         pure = sigma[0] ** 2 + 1e-6 * FT**2 + (sigma[1] * d) ** 2
         tight = half_box + 0.02 * FT + 3 * math.sqrt(pure)
         if cos >= opt:
             if abs(r - d) < tight and line.low - 0.5 * FT < foot < line.high + 0.5 * FT:
-                if owner[i] == -1 and claims:
+                if owner[i] == -1 and takes_over:
                     owner[i] = -2 - k
                 line.low, line.high = min(line.low, foot), max(line.high, foot)
                 line.log, line.echoes = min(line.log + 0.5, 6.0), line.echoes + 1
@@ -153,7 +153,7 @@ def update_line(
             edge = math.copysign(abs(axis) - half_angle, axis)  # the beam's edge nearer to the normal
             at = foot + d * math.tan(edge)
             if abs(r - d / math.cos(edge)) < tight + 0.05 * FT and line.low - 0.7 * FT < at < line.high + 0.7 * FT:
-                if owner[i] == -1 and claims:
+                if owner[i] == -1 and takes_over:
                     owner[i] = -2 - k
                 if cos >= half - 0.1:
                     line.low, line.high = min(line.low, at), max(line.high, at)

@@ -92,7 +92,7 @@ async def test_a_recording_is_opened_scrubbed_played_and_left(server: FakeServer
     await page.locator("#banner-playback").get_by_role("button", name="Back to the live run").click()
     await server.wait("close_recording")
     await expect(page.locator("#banner-playback")).to_have_count(0)
-    await expect(page.locator("#player")).to_be_hidden()
+    await expect(page.locator("#playback")).to_be_hidden()
     await opened.says("#robot-name", "denning")
 
 

@@ -82,7 +82,7 @@ export class Drive {
     byId("give-control").disabled = !controller;
     setAttribute(byId("pad"), "aria-disabled", this.teleoperation.refusalReason() !== null);
     const others = clients - 1;
-    setText(byId("role-text"), `${controller ? "You control; " : "You watch; "}${others > 0 ? `${others} other${others > 1 ? "s" : ""} connected.` : "nobody else is connected."}`);
+    setText(byId("role-text"), `${controller ? "You control; " : "You watch; "}${others > 0 ? `${others} other${others > 1 ? "s" : ""} connected.` : "no other client is connected."}`);
     setText(byId("drive-request-text"), driveRequestText(drive_request, this.units));
     setAttribute(byId("drive-request-legs"), "aria-pressed", drive_request?.kind === "legs");
     setAttribute(byId("drive-request-goal"), "aria-pressed", drive_request?.kind === "goal");

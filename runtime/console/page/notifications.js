@@ -17,7 +17,7 @@ export class Notifications {
     });
   }
 
-  // A banner stays until it is removed; showing the same text again changes nothing.
+  // A banner stays until it is removed; the same text again changes nothing.
   banner(name, text, { bad = false, buttons = [] } = {}) {
     const key = `${text}|${bad}|${buttons.map(([label]) => label)}`;
     const shown = this.#shown.get(name);

@@ -1,5 +1,5 @@
-// The ring as it stands: a wedge a sensor, as long as its range. A rim without a wedge: heard nothing; a cross: not to
-// be trusted; nothing: never fired. The outline is bold while it fires.
+// The ring with a sector for each sensor, as long as its range. An empty rim: no echo; a cross: not trusted; nothing:
+// never fired. The outline is bold while the sensor fires.
 
 import { setText } from "./dom.js";
 import { fitted } from "./theme.js";

@@ -85,7 +85,7 @@ export class Time {
 
   #discard() {
     this.#file = this.#liveSession = null;
-    byId("player").hidden = true;
+    byId("playback").hidden = true;
   }
 
   async #list(refused = () => {}) {
@@ -113,7 +113,7 @@ export class Time {
     const data = await this.#ask({ type: "open_recording", file });
     if (data === undefined) return;
     this.#file = file;
-    byId("player").hidden = false;
+    byId("playback").hidden = false;
     byId("scrub").max = String(data?.duration_s ?? 1);
     const places = [...(data?.bookmarks ?? []).map(([s, text]) => [s, `✎ ${text}`]),
       ...(data?.modes ?? []).map(([s, mode, reason]) => [s, `${mode.replace("_", " ")}${reason ? `: ${reason}` : ""}`])];

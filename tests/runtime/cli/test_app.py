@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[3]
 HEADER = "t,x,y,theta," + ",".join(f"r{i:02d}" for i in range(24))
 ROW = ",".join(["1"] * 24)
 LOG_LINE = re.compile(r"^\S+Z \[(info|warning) *\] ")
-"""What a headless run says on its way to the complaint."""
+"""Log output of a headless run before its error message."""
 
 
 @pytest.fixture(autouse=True)
@@ -44,7 +44,7 @@ def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def errors(captured: str) -> list[str]:
-    """Return the lines of stderr that are no log lines; each is a complaint."""
+    """Return the error messages on stderr: all lines that are not log lines."""
     assert "Traceback" not in captured
     lines = [line for line in captured.splitlines() if not LOG_LINE.match(line)]
     for line in lines:
@@ -169,7 +169,7 @@ def test_help(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert captured.err == ""
 
 
-def test_help_tells_every_option_of_the_public_surface(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_describes_every_option_of_the_public_surface(capsys: pytest.CaptureFixture[str]) -> None:
     surface = {
         "run": ["--port", "--arm", "--seconds", "--headless", "--record", "--json", "--set"],
         "emulate": ["--world", "--link", "--faults", "--seed"],

@@ -58,7 +58,7 @@ def test_table_2(units: Units, truth: str, estimate: str, error: str) -> None:
     assert all(f"({units})" in line for line in lines if "truth" in line)
 
 
-def test_verdict() -> None:
+def test_result_line() -> None:
     assert outcome_line(OUTCOME, "ft") == (
         "1 of 2 drums found, 1 false, mean error 0.200 ft, max 0.200 ft; 79 times real time; "
         "a cycle takes 0.10 ms, p99 0.31 ms"

@@ -78,7 +78,8 @@ def test_off_and_on_again(tmp_path: Path) -> None:
 
     recorder = switched(
         path,
-        {1: opened, 60: off, 100: lambda r: r.set_enabled(on=True), 101: opened, 102: lambda r: r.set_enabled(on=True)},
+        {1: opened, 60: off, 100: lambda r: r.set_enabled(on=True), 101: opened,
+         102: lambda r: r.set_enabled(on=True)},
         8.0, on=True,
     )  # fmt: skip
     assert (recorder.status.files, recorder.status.dropped, recorder.status.last_error) == (2, 0, None)

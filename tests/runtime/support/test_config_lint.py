@@ -1,4 +1,4 @@
-"""Settings that are allowed and unwise: the advice names the setting, the value and the reason."""
+"""Valid but unwise settings: the warning names the setting, the value and the reason."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from config.load import load_settings
 from runtime.support.config_lint import lint_settings
 
 
-def test_the_shipped_runs_need_no_advice() -> None:
+def test_the_shipped_runs_need_no_warning() -> None:
     for name in ("hallway", "irregular"):
         assert lint_settings(load_settings(name)) == []
 

@@ -69,7 +69,7 @@ def test_no_lock_is_left_over(tmp_path: Path, record_property: Callable[[str, ob
         first.send_signal(signal.SIGKILL)
         first.communicate()
         assert is_free(path)
-    record_property("measured", f"{KILLS} holders killed: the file was refused while each lived and free after")
+    record_property("measured", f"{KILLS} holders killed: the file was locked while each was alive, free afterwards")
 
 
 def test_a_file_that_was_replaced_is_another_file(tmp_path: Path) -> None:

@@ -77,10 +77,10 @@ class Watched:
                 observer(record, state)
             while True:
                 try:
-                    told = manager.recv(4096)
+                    datagram = manager.recv(4096)
                 except BlockingIOError:
                     break
-                self.fed += [record.cycle] * (told == b"WATCHDOG=1")
+                self.fed += [record.cycle] * (datagram == b"WATCHDOG=1")
             if record.cycle == PLANT:
                 assert record.mode.mode is Mode.DRIVE
                 self.plant(process, loop)
@@ -110,12 +110,12 @@ class Watched:
                 self.flags = robot.truth.flags
         return summary
 
-    def stands_because(self, summary: RunSummary, culprit: str) -> None:
-        """Assert that the robot stood within two cycles and was told why, and that nothing fed its deadman."""
+    def assert_stopped_because(self, summary: RunSummary, cause: str) -> None:
+        """Assert that the robot stood within two cycles and reported the reason, and that nothing fed its deadman."""
         stopped = next(cycle for cycle, mode in self.modes.items() if cycle >= PLANT and mode is Mode.SAFE_STOP)
         assert stopped <= PLANT + WITHIN
-        assert any(culprit in reason for reason in summary["stop_reasons"]), summary["stop_reasons"]
-        reason = next(reason for reason in summary["stop_reasons"] if culprit in reason)
+        assert any(cause in reason for reason in summary["stop_reasons"]), summary["stop_reasons"]
+        reason = next(reason for reason in summary["stop_reasons"] if cause in reason)
         assert "likely through a program error: see the log" in reason
         if self.arm_at is None:
             assert all(self.modes[cycle] is Mode.SAFE_STOP for cycle in range(stopped, LAST))
@@ -142,7 +142,7 @@ def test_a_task_that_is_killed(monkeypatch: pytest.MonkeyPatch, measured: Callab
     run = Watched(plant, monkeypatch, arm_at=PLANT + 20)
     summary = run.run()
     assert names == {"link"}, "a task that no test kills"
-    run.stands_because(summary, "the part `link` of this program has ended (it ended without an error)")
+    run.assert_stopped_because(summary, "the part `link` of this program has ended (it ended without an error)")
     assert all(run.modes[cycle] is Mode.SAFE_STOP for cycle in range(PLANT + WITHIN, LAST))
     assert run.flags & Flags.DEADMAN, "its line is closed: it has stopped by itself"
     assert max(run.fed) <= PLANT + WITHIN < LAST - 20, "and so will the watchdog ring"
@@ -159,12 +159,12 @@ def test_a_task_that_raises(monkeypatch: pytest.MonkeyPatch) -> None:
 
     run = Watched(plant, monkeypatch)
     summary = run.run()
-    run.stands_because(
+    run.assert_stopped_because(
         summary, "the part `planner` of this program has ended (ZeroDivisionError: planted, test_health"
     )
 
 
-def test_a_task_that_nobody_waits_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_task_that_is_not_awaited(monkeypatch: pytest.MonkeyPatch) -> None:
     async def broken() -> None:
         raise ZeroDivisionError("planted")
 
@@ -173,7 +173,7 @@ def test_a_task_that_nobody_waits_for(monkeypatch: pytest.MonkeyPatch) -> None:
 
     run = Watched(plant, monkeypatch)
     summary = run.run()
-    run.stands_because(summary, "task `stray` (ZeroDivisionError: planted")
+    run.assert_stopped_because(summary, "task `stray` (ZeroDivisionError: planted")
 
 
 def test_a_callback_that_raises_is_over_and_may_be_armed_after(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -185,7 +185,7 @@ def test_a_callback_that_raises_is_over_and_may_be_armed_after(monkeypatch: pyte
 
     run = Watched(plant, monkeypatch, arm_at=PLANT + 20)
     summary = run.run()
-    run.stands_because(summary, "callback `fall_over` (ZeroDivisionError: planted")
+    run.assert_stopped_because(summary, "callback `fall_over` (ZeroDivisionError: planted")
     assert run.modes[LAST] is Mode.DRIVE
     assert max(run.fed) >= LAST - 10
 
@@ -229,7 +229,7 @@ def test_a_thread_that_raises(monkeypatch: pytest.MonkeyPatch) -> None:
 
     run = Watched(plant, monkeypatch)
     summary = run.run(lambda process: process.health.watch("planner", worker.probe))
-    run.stands_because(summary, "the part `planner` of this program has ended (ZeroDivisionError: planted")
+    run.assert_stopped_because(summary, "the part `planner` of this program has ended (ZeroDivisionError: planted")
     assert max(run.fed) <= PLANT + WITHIN
 
 
@@ -255,7 +255,7 @@ def test_the_recorders_thread(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
 
         run = Watched(plant, monkeypatch, observers=(recorder.on_cycle,))
         summary = run.run(lambda process: process.health.watch("recorder", recorder.probe))
-    run.stands_because(summary, "the part `recorder` of this program has ended (ZeroDivisionError: planted")
+    run.assert_stopped_because(summary, "the part `recorder` of this program has ended (ZeroDivisionError: planted")
 
 
 def test_the_views_thread(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -279,7 +279,7 @@ def test_the_views_thread(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> No
             run = Watched(plant, monkeypatch)
             summary = run.run(lambda process: process.health.watch("view", view.probe))
         assert sys.getswitchinterval() == interval_s
-    run.stands_because(summary, "the part `view` of this program has ended (ZeroDivisionError: planted")
+    run.assert_stopped_because(summary, "the part `view` of this program has ended (ZeroDivisionError: planted")
 
 
 def test_the_logs_thread(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -296,7 +296,7 @@ def test_the_logs_thread(monkeypatch: pytest.MonkeyPatch) -> None:
 
         run = Watched(plant, monkeypatch)
         summary = run.run(lambda process: process.health.watch("log", standing.probe))
-    run.stands_because(summary, "the part `log` of this program has ended (ZeroDivisionError: planted")
+    run.assert_stopped_because(summary, "the part `log` of this program has ended (ZeroDivisionError: planted")
 
 
 def test_the_reload_that_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -317,7 +317,7 @@ def test_the_reload_that_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
 
     reloaders: list[Reloader] = []
     run = Watched(plant, monkeypatch)
-    run.stands_because(run.run(prepare), "the part `reload` of this program has ended")
+    run.assert_stopped_because(run.run(prepare), "the part `reload` of this program has ended")
 
 
 def _drop(*_: object) -> dict[str, object]:

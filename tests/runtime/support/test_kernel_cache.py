@@ -243,7 +243,7 @@ assert set(needed_parts(further)) <= set(needed_parts(settings))
 encoder = FrameEncoder(settings)
 
 def by_hand(cycle, state):
-    # every half second one thing after the other, also with a model that came late
+    # every half second one action after the other, also with a model that came late
     perception, arm = state.perception, Request.ARM if state.mode.mode is Mode.READY else None
     if cycle % 10 or state.odometry is None:
         return OperatorInput(arm)

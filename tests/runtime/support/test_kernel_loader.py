@@ -17,7 +17,7 @@ from structlog.testing import LogCapture
 from config.load import load_settings
 from config.settings import Settings
 from runtime.support import kernel_cache as kernels
-from runtime.support import kernel_loader as readying
+from runtime.support import kernel_loader
 from runtime.support.kernel_cache import POLYGONS
 from runtime.support.kernel_loader import KernelLoader
 from tests.hil.running import ROOT
@@ -39,8 +39,8 @@ class Kernels:
         self.log = LogCapture()
         monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
         monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
-        monkeypatch.setattr(readying, "warm_up", self._load)
-        monkeypatch.setattr(readying, "compiled_signatures", lambda: 7 * len(self.loaded))
+        monkeypatch.setattr(kernel_loader, "warm_up", self._load)
+        monkeypatch.setattr(kernel_loader, "compiled_signatures", lambda: 7 * len(self.loaded))
         self.ready = KernelLoader(structlog.wrap_logger(None, processors=[self.log]), self._compile)
 
     async def _compile(self, part: str) -> None:
@@ -56,59 +56,59 @@ class Kernels:
 
 
 @pytest.fixture
-def aside(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Kernels:
+def kernels_stub(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Kernels:
     return Kernels(monkeypatch, tmp_path)
 
 
-async def test_what_was_never_compiled_is_compiled_once_and_loaded_by_a_thread(aside: Kernels) -> None:
-    assert set(await asyncio.gather(aside.ready(ROUND, BOXES), aside.ready(ROUND, BOXES))) == {None}
-    assert aside.compiled == [POLYGONS]
-    assert aside.loaded == [(POLYGONS,), (POLYGONS,)], "each caller loads them: it costs little"
-    assert threading.get_ident() not in aside.threads
-    assert aside.ready.loaded == 14
-    assert [entry["event"] for entry in aside.log.entries] == [
+async def test_what_was_never_compiled_is_compiled_once_and_loaded_by_a_thread(kernels_stub: Kernels) -> None:
+    assert set(await asyncio.gather(kernels_stub.ready(ROUND, BOXES), kernels_stub.ready(ROUND, BOXES))) == {None}
+    assert kernels_stub.compiled == [POLYGONS]
+    assert kernels_stub.loaded == [(POLYGONS,), (POLYGONS,)], "each caller loads them: it costs little"
+    assert threading.get_ident() not in kernels_stub.threads
+    assert kernels_stub.ready.loaded == 14
+    assert [entry["event"] for entry in kernels_stub.log.entries] == [
         "compiling the kernels for polygons, once; the change takes effect afterwards"
     ]
 
 
-async def test_what_is_ready_is_left_alone(aside: Kernels, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_what_is_ready_is_left_alone(kernels_stub: Kernels, monkeypatch: pytest.MonkeyPatch) -> None:
     for running, proposed in ((ROUND, ROUND), (ROUND, DRUMS), (BOXES, BOXES), (BOXES, ROUND)):
-        assert await aside.ready(running, proposed) is None
+        assert await kernels_stub.ready(running, proposed) is None
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
-    assert await aside.ready(ROUND, BOXES) is None
-    assert (aside.compiled, aside.loaded, aside.ready.loaded) == ([], [], 0)
+    assert await kernels_stub.ready(ROUND, BOXES) is None
+    assert (kernels_stub.compiled, kernels_stub.loaded, kernels_stub.ready.loaded) == ([], [], 0)
 
 
-async def test_what_cannot_be_compiled_is_refused_with_a_way_out(aside: Kernels) -> None:
-    aside.fails = True
-    told = await aside.ready(ROUND, BOXES)
-    assert told is not None
-    assert "start with such a model" in told
-    assert aside.loaded == []
+async def test_what_cannot_be_compiled_is_refused_with_a_way_out(kernels_stub: Kernels) -> None:
+    kernels_stub.fails = True
+    refusal = await kernels_stub.ready(ROUND, BOXES)
+    assert refusal is not None
+    assert "start with such a model" in refusal
+    assert kernels_stub.loaded == []
 
 
 STANDS = "import pathlib, sys, time; pathlib.Path(sys.argv[1]).touch(); time.sleep(600)"
 
 
 async def test_a_run_that_ends_does_not_wait_for_a_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    begun, started = tmp_path / "begun", list[asyncio.subprocess.Process]()
+    started_file, processes = tmp_path / "started", list[asyncio.subprocess.Process]()
     spawn = asyncio.create_subprocess_exec
 
     async def slow(*_command: str, **options: object) -> asyncio.subprocess.Process:
-        started.append(await spawn(sys.executable, "-c", STANDS, str(begun), **options))  # type: ignore[arg-type]
-        return started[0]
+        processes.append(await spawn(sys.executable, "-c", STANDS, str(started_file), **options))  # type: ignore[arg-type]
+        return processes[0]
 
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(asyncio, "create_subprocess_exec", slow)
     ready = asyncio.create_task(_ready(structlog.wrap_logger(None, processors=[LogCapture()])))
     async with asyncio.timeout(60.0):
-        while not begun.exists():
+        while not started_file.exists():
             await asyncio.sleep(0.01)
     ready.cancel()
     with pytest.raises(asyncio.CancelledError):
         await ready
-    assert started[0].returncode is not None, "it would outlive the run"
+    assert processes[0].returncode is not None, "it would outlive the run"
 
 
 async def _ready(log: structlog.typing.FilteringBoundLogger) -> None:

@@ -21,13 +21,13 @@ def test_each_line_of_the_file_is_json(tmp_path: Path, capsys: pytest.CaptureFix
     path = tmp_path / "logs" / "run.jsonl"
     with open_log(LogConfig(file=str(path)), terminal=True) as log:
         log.info("mode", mode="DRIVE", reason='two\nlines and "quotes"', cycle=3)
-        log.warning("odd", thing=Path("a/b"), number=float("nan"))
+        log.warning("odd", path=Path("a/b"), number=float("nan"))
     first, second = lines(path)
     assert first.pop("timestamp")
     assert first == {
         "event": "mode", "level": "info", "mode": "DRIVE", "reason": "two\nlines and \"quotes\"", "cycle": 3,
     }  # fmt: skip
-    assert (second["event"], second["level"], second["thing"], second["number"]) == ("odd", "warning", "a/b", None)
+    assert (second["event"], second["level"], second["path"], second["number"]) == ("odd", "warning", "a/b", None)
     shown = capsys.readouterr()
     assert shown.out == ""
     assert "mode" in shown.err

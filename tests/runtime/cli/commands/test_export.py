@@ -155,10 +155,10 @@ def test_rosbag2(hall_run: Path, timeline: Timeline, tmp_path: Path, capsys: pyt
     assert kinds["/odom"] == "nav_msgs/msg/Odometry"
     assert kinds["/markers"] == "visualization_msgs/msg/MarkerArray"
     sensor = int(timeline.echoes[-1, 1])
-    told = newest[f"/sonar/s{sensor:02d}"]
-    assert told.range == pytest.approx(timeline.echoes[-1, 5])
-    assert told.header.frame_id == f"sonar_{sensor:02d}"
-    assert told.field_of_view == pytest.approx(math.radians(24.0))
+    published = newest[f"/sonar/s{sensor:02d}"]
+    assert published.range == pytest.approx(timeline.echoes[-1, 5])
+    assert published.header.frame_id == f"sonar_{sensor:02d}"
+    assert published.field_of_view == pytest.approx(math.radians(24.0))
     odometry = timeline.odometry[-1][1]
     assert newest["/odom"].pose.pose.position.x == odometry.pose.x
     assert newest["/odom"].twist.twist.linear.x == odometry.twist.v

@@ -1,4 +1,4 @@
-"""What a run leaves behind, where the disk is in trouble: nothing waits, memory is bounded, what is lost is told."""
+"""The recording of a run when the disk fails: nothing waits, memory is bounded, and losses are reported."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_a_ring_log_on_a_disk_that_stands_still_fills_no_memory(
     assert (written, written + writer.status.dropped) == (writer.status.messages, count)
 
 
-def test_a_full_disk_under_a_ring_log_is_told_and_counted(tmp_path: Path) -> None:
+def test_a_full_disk_under_a_ring_log_is_reported_and_counted(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.symlink_to("/dev/full")
     with open_run_recording(SETTINGS, str(path), no_record=False, emulated=True) as recording:
@@ -71,7 +71,7 @@ def test_a_full_disk_under_a_ring_log_is_told_and_counted(tmp_path: Path) -> Non
     assert caught.value.exit_code == FAILED
 
 
-def test_a_ring_log_that_is_whole_is_no_complaint(tmp_path: Path) -> None:
+def test_a_complete_ring_log_raises_no_error(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     with open_run_recording(SETTINGS, str(path), no_record=False, emulated=True) as recording:
         put = recording.observers(None, None).on_firing  # type: ignore[arg-type]

@@ -45,7 +45,7 @@ async def settle() -> None:
         await asyncio.sleep(0)
 
 
-async def test_keys_hold_time_one_thing_after_the_other() -> None:
+async def test_keys_control_time_one_after_the_other() -> None:
     control = Control()
     keys = TimeKeys(control, get_logger())
     for key in ("p", "s", "s", "p", "x", "p"):
