@@ -1,1 +1,1 @@
-"""Percepts to velocity: one motor schema a file, and the arbiter that sums them. Pure."""
+"""Behaviours: motor schemas, one a file, and the arbiter that sums them to a velocity. Pure functions."""

@@ -1,7 +1,7 @@
 """The error base class for everything a user can cause, and the exit codes of every command.
 
-A user error ends as one clear line on stderr and an exit code, never as a traceback. It lives here because every
-package may import `config`.
+A user error is shown as one clear line on stderr and an exit code, never as a traceback. It is defined here because
+every package may import `config`.
 """
 
 from __future__ import annotations

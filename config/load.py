@@ -1,4 +1,4 @@
-"""From files, names and `--set` to settings that hold, or to a ConfigError that says what does not.
+"""Loading of settings from files, names and `--set`: returns valid settings or raises a ConfigError.
 
 Layers, the lower first: the robot file, the run file, single settings from the command line. The world and the
 models are files of their own; the run file names them.

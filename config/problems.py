@@ -1,4 +1,4 @@
-"""Error messages for what pydantic found: file, dotted path, value, allowed values, the nearest known name."""
+"""Error messages for pydantic's validation errors: file, dotted path, value, allowed values, nearest known name."""
 
 from __future__ import annotations
 

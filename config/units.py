@@ -1,4 +1,4 @@
-"""The one unit besides metres and radians: the paper, the Denning and many constants were measured in feet."""
+"""The foot in metres: the paper, the Denning and many constants were measured in feet."""
 
 from __future__ import annotations
 

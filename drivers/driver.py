@@ -2,7 +2,7 @@
 
 The runtime moves bytes between a line and a driver, and gives the driver the time. A driver never waits, reads a
 clock or opens a port. So the same driver runs on a serial port, on the emulator's pty, and in virtual time in memory.
-`drivers.registry` says how a package adds a driver.
+`drivers.registry` describes how a package adds a driver.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from drivers.messages import Firing, Identity, LinkCounts, Odometry, Pose, Twist
 
 
 class DriverError(UserError):
-    """The robot file names a driver, or asks of it, what is not available: what happened and what would work."""
+    """The robot file names a driver or a feature that is not available; the text says what is."""
 
     exit_code = WRONG_CALL
 
@@ -54,10 +54,10 @@ class RobotDriver(Protocol):
 
     The runtime calls `line_opened` once the line is open and `line_closed` once it is lost. In between it calls
     `receive` when bytes arrive, `tick` at least once a cycle, and `outgoing` after anything that may have given the
-    driver something to send. Lines come and go; the driver lives as long as the run.
+    driver something to send. A run may open several lines one after the other; it has one driver.
 
-    All times are readings of the run's clock, `run_s`, in seconds. They never decrease, and stand still while an
-    emulated run is paused. No method blocks, and none raises because of what the robot sends.
+    All times are readings of the run's clock, `run_s`, in seconds. They never decrease, and do not advance while
+    an emulated run is paused. No method blocks, and none raises because of what the robot sends.
     """
 
     @property

@@ -1,7 +1,7 @@
-"""Which sensors fire together, and when: a pure schedule for any robot.
+"""The firing pattern: a schedule of the sets of sensors that fire together, for any robot.
 
 Sensors that fire together must not hear each other's echoes, and a firing must not start before the window of the
-last one has closed. The first is up to the user's choice of sets, the second is checked here.
+last one has closed. The user ensures the first by the choice of sets; this module checks the second.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""One serial line, opened again after each loss; it never blocks the loop, and always reports why it was lost.
+"""A serial line that is reopened after each loss, never blocks the loop, and reports why it was lost.
 
 The only importer of `serial_asyncio`, because that library needs care: its write buffer is unbounded, an exception in
 a data handler leaves the port open but no longer read, and its `close()` never returns if the peer has stalled. So

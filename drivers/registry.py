@@ -1,6 +1,6 @@
-"""Which robot drivers exist: the shipped ones, and those that installed packages add.
+"""The registry of robot drivers: the shipped ones, and those that installed packages add.
 
-This is the only place that knows them. A package adds a driver with an entry point of the group
+No other module names them. A package adds a driver with an entry point of the group
 `echolocate.drivers`, whose name is what a robot file gives as `[robot] driver`::
 
     [project.entry-points."echolocate.drivers"]

@@ -1,4 +1,4 @@
-"""Open a serial port, and explain in one line why it cannot be opened.
+"""Opening of a serial port, with a one-line error that names the cause if that fails.
 
 Opening blocks, without limit on a lost USB adapter or a driver that waits for a modem line. So `link` does it in a
 thread.

@@ -1,4 +1,4 @@
-"""When, whether and wiring: the cycle, its modes, its records, and the command."""
+"""The running program: the perception-action cycle, its modes, recordings, the console and the command line."""
 
 from typing import Final
 

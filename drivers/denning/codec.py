@@ -1,7 +1,7 @@
 """Frames to bytes and back: byte stuffing (COBS), checksum and field layout; without I/O.
 
-The decoder is total: whatever bytes it gets, it raises nothing, keeps no more of them than one frame, resynchronises
-at the next zero byte, and counts what it could not use.
+The decoder is total: for any bytes it raises no exception, keeps at most one incomplete frame, resynchronises at the
+next zero byte, and counts the frames it could not decode.
 """
 
 from __future__ import annotations

@@ -127,7 +127,7 @@ class DenningDevice:
 
     @property
     def flags(self) -> Flags:
-        """The base's status; BUMPER and MOTOR_FAULT say why it is latched and are cleared with the latch."""
+        """The base's status; BUMPER and MOTOR_FAULT give the cause of the latch and are cleared with it."""
         return self._flags
 
     @property

@@ -1,4 +1,4 @@
-"""Messages for what can be wrong with the robot on the line: what happened, likely cause, next action."""
+"""Messages about faults of the robot and its line: what happened, likely cause, next action."""
 
 from __future__ import annotations
 

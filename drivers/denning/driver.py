@@ -1,8 +1,7 @@
 """The driver of a robot that speaks the ring-and-base protocol: handshake, commands, supervision.
 
-It has no I/O and no clock: bytes and times come in, bytes and messages go out. Retries of commands are in
-`pending_command`, the pose of a firing in `pose_stamping`, timeouts in `timeouts`, the words for what can go wrong in
-`diagnostics`.
+It has no I/O and no clock: bytes and times are its inputs, bytes and messages its outputs. Retries of commands are in
+`pending_command`, the pose of a firing in `pose_stamping`, timeouts in `timeouts`, error messages in `diagnostics`.
 """
 
 from __future__ import annotations
@@ -397,7 +396,7 @@ class DenningDriver:
             return  # until it has identified itself, its clock and odometry may be those of before a restart
         sample = self._stamper.odometry(odom, self._run_s)
         if isinstance(sample, Jump):
-            # Perhaps it restarted, and its clock, its odometry and its pattern are gone: identify it again.
+            # It may have restarted and lost its clock, odometry and pattern: identify it again.
             self._jump = sample
             self._abandon()
             self._start_handshake()
@@ -406,5 +405,5 @@ class DenningDriver:
         self._odometry = sample
         self._drive_acks.acknowledged(odom.last_drive_seq)
         if sample.flags & Flags.LATCHED:
-            self._drive_acks.forget()  # while latched the robot obeys none, and says so
+            self._drive_acks.forget()  # while latched, the robot refuses every DRIVE with a NAK
         self._firings.extend(self._stamper.firings())

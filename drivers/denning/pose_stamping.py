@@ -1,4 +1,4 @@
-"""Odometry and echoes to firings: each firing gets the pose at which it was fired, not that of its arrival.
+"""Firings from echoes and odometry: each firing gets the pose at which it was fired, not that of its arrival.
 
 An echo arrives when its window has closed. Usually the odometry after its firing has arrived by then; if not, the
 echo waits for it.
@@ -55,7 +55,7 @@ class PoseStamper:
     sensors
         Number of sensors in the ring.
     body
-        The base's limits, which tell a motion from a jump.
+        The base's limits, which distinguish a motion from a jump.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class PoseStamper:
         self._window = tenths_ft
 
     def notes(self) -> tuple[str, ...]:
-        """Return what an operator should know about the odometry, and forget it."""
+        """Return the messages about the odometry for the operator, and remove them."""
         notes = tuple(self._notes)
         self._notes.clear()
         return notes

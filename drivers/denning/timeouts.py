@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 
 _KEPT = 128
-"""DRIVEs remembered: half of the 256 sequence numbers, so that no number stands for two of them."""
+"""DRIVEs remembered: half of the 256 sequence numbers, so that each number identifies one of them."""
 
 
 class CommandAckMonitor:

@@ -1,6 +1,6 @@
-"""The same echoes with other settings: what would have been recognised, and where the robot would have stopped.
+"""Comparison of a run with a replay of its echoes under other settings: objects recognised, places of stops.
 
-The robot's path is the recorded one. Only what the program perceives in the echoes and what it would command is new.
+The robot's path is the recorded one. Only the results of perception and the commands are computed anew.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Building a timeline from a replay: echoes, the path, and snapshots at even intervals.
+"""Construction of a timeline from a replay: echoes, the path, and snapshots at even intervals.
 
 The paper's figures show outline segments and clusters whatever method recognised the objects, so the paper's front
 end processes the same firings here. Memory is bounded: the snapshots of a long run are farther apart.

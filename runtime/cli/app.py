@@ -1,4 +1,4 @@
-"""The command `echolocate`: its commands, and how each call ends.
+"""The application `echolocate`: its commands, and the exit code of each call.
 
 Commands import what they need when they are called: help and wrong calls answer at once, and numba is imported after
 its cache folder is set.

@@ -63,7 +63,7 @@ class Console:
     limits : Limits, optional
         What clients may cost.
     clock : callable
-        The host's clock: monotonic, s; it goes on while the run is paused.
+        The host's clock: monotonic, s; it continues while the run is paused.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What the console needs from the rest of the run, as protocols: the robot's process, recording and replay.
+"""Protocols of what the console needs from the rest of the run: the robot's process, recording and replay.
 
 Recording and replay are optional: commands that need a part which this run does not have are refused.
 """
@@ -77,7 +77,7 @@ class RecordingControl(Protocol):
 
     @property
     def now(self) -> RecordingStatus | None:
-        """The recording in progress, None if there is none."""
+        """The recording in progress, None while nothing is recorded."""
 
     async def record(self, *, on: bool) -> str | None:
         """Start or stop recording."""

@@ -1,4 +1,4 @@
-"""What an operator should know of sensors and odometry while the robot drives, each fact once."""
+"""Alerts to the operator about sensors and odometry while the robot drives; each is sent once."""
 
 from __future__ import annotations
 

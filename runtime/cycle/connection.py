@@ -1,4 +1,4 @@
-"""How a run begins and ends on its line: the robot has answered before the first cycle, and stands after the last."""
+"""Connecting before the first cycle, until the robot answers, and halting it after the last one."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from drivers.messages import Flags
 from runtime.cycle.step import STANDSTILL
 
 CONNECT_MAX_S: Final = 5.0
-"""Time in which the robot must have answered; one that has not needs help, s."""
+"""Longest wait for the robot's first answer, s; beyond it the run ends with an error."""
 
 HALT_MAX_S: Final = 0.5
-"""Longest wait at the end of a run until the base confirms that it stands, s."""
+"""Longest wait at the end of a run until the base confirms that it has stopped, s."""
 
 POLL_S: Final = 0.005
 """Period of the line's exchanges while no cycle runs, s."""
@@ -29,10 +29,10 @@ class Connection(NamedTuple):
     driver: RobotDriver
     send: Callable[[], None]
     clock: Callable[[], float]
-    """The run's."""
+    """The run's clock, s."""
 
     async def connect(self, is_stopping: Callable[[], bool]) -> None:
-        """Open the port and wait until the robot is ready, or until the run is to stop.
+        """Open the port and wait until the robot is ready, or until the run is ending.
 
         Raises
         ------
@@ -56,7 +56,7 @@ class Connection(NamedTuple):
             await asyncio.sleep(POLL_S)
 
     async def halt(self) -> bool:
-        """Halt the base and wait until it stands still; return whether it has confirmed that."""
+        """Halt the base and wait until it has stopped; return whether it has confirmed that."""
         self.driver.halt()
         deadline_run_s = self.clock() + HALT_MAX_S
         while self.link.is_open and self.clock() < deadline_run_s:

@@ -1,6 +1,6 @@
-"""What the robot is to drive: the configured legs, a goal, or an operator's velocity; and which schemas answer it.
+"""Drive requests: the configured legs, a goal, or an operator's velocity; and the schemas that each one uses.
 
-A drive request moves nothing by itself: it is looked at in DRIVE only. Leaving DRIVE drops a goal and an operator's
+A drive request alone moves nothing: it takes effect in DRIVE only. Leaving DRIVE drops a goal and an operator's
 velocity, so that the robot does not resume them after a re-arm. Without a request the robot follows the configured
 legs.
 """
@@ -29,7 +29,7 @@ STANDSTILL: Final = Twist(0.0, 0.0)
 COORDINATE_MAX_M: Final = 10_000.0
 """Largest coordinate of a goal, m: one beyond it is taken for a typing error."""
 SUM: Final = "sum"
-"""Name of the sum of all responses, where a schema's name would stand."""
+"""Name of the sum of all responses, in place of a schema's name."""
 
 NO_CONTROL: Final = "no velocity arrives from an operator: teleoperate, set a goal, or resume the legs"
 LEG_DONE: Final = "the leg is done"
@@ -53,10 +53,10 @@ class DriveResult:
     vectors: tuple[Response, ...]
     """The schemas' responses and, last, their sum under the name `SUM`."""
     drive_request: DriveRequest
-    """The request as it stands now: a goal may be reached, a velocity expired."""
+    """The request after the cycle: a goal may have been reached, a velocity may have expired."""
     leg: Leg
     hold_reason: str | None = None
-    """Why the robot stands though it may drive, for the operator."""
+    """Why the robot does not move although it may drive, for the operator."""
 
 
 def validate(drive_request: DriveRequest) -> str | None:
@@ -90,7 +90,7 @@ def drive(
     Parameters
     ----------
     drive_request : DriveRequest
-        What the robot is to drive.
+        The motion requested of the robot.
     requested_run_s, run_s : float
         When that was requested, and now, by the run's clock.
     leg : Leg

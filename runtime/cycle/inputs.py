@@ -1,4 +1,4 @@
-"""What one cycle takes in: all that arrived from the robot, the operator and the process since the last one."""
+"""The inputs of one cycle: all that arrived from the robot, the operator and the process since the last one."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Request(Enum):
     ARM = "arm"
     HALT = "halt"
     DISARM = "disarm"
-    """From DRIVE back to READY: the robot stands, without the base's latch, and waits to be armed."""
+    """From DRIVE back to READY: the robot stops, without the base's latch, and waits to be armed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Inputs:
     fault: str | None = None
     """Which part of the program has failed; None while all work."""
     drive_request: DriveRequest | None = None
-    """What the robot is to drive from now on; None leaves the request in force."""
+    """The new drive request; None keeps the one in force."""
     edits: tuple[Edit, ...] = ()
     """The operator's edits of the map, in this order."""
     host_s: float | None = None

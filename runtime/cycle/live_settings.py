@@ -1,7 +1,7 @@
 """The settings in force while the robot runs: one store, changed as a whole or not at all.
 
-A changed file (SIGHUP), the console's parameters and undo all go through it; the process takes the newest settings at
-the beginning of each cycle, and subscribers learn of every change.
+A changed file (SIGHUP), the console's parameters and undo all use it. The process takes the newest settings at the
+beginning of each cycle, and subscribers are notified of every change.
 """
 
 from __future__ import annotations

@@ -58,7 +58,7 @@ class ModeState:
     """When the mode was entered, by the run's clock."""
     reason: str | None = None
     arming_run_s: float | None = None
-    """When the arming under way began, by the run's clock; None while there is none."""
+    """When the robot began to be armed, by the run's clock; None while it is not being armed."""
 
     def enter(self, mode: Mode, run_s: float, reason: str | None = None) -> ModeState:
         """Return the state of having just entered `mode`.
@@ -116,7 +116,7 @@ def advance(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> Mod
 
 
 def why_stop(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> str | None:
-    """Return the reason why driving must end, None where there is none.
+    """Return the reason why driving must end, None if it may continue.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """The robot's main process: one asyncio loop that gathers inputs, runs the step, and carries out what it decides.
 
-All that waits, reads a clock or uses a port is here, in `runtime.timing` and in drivers/; all that decides is in
-`runtime.cycle.step` and in what that calls.
+This module, `runtime.timing` and drivers/ contain everything that waits, reads a clock or uses a port. All decisions
+are made in `runtime.cycle.step` and in the functions that it calls.
 """
 
 from __future__ import annotations
@@ -228,7 +228,7 @@ class RobotProcess:
                     self._cycle(now)
                     slack_s = scheduler.end(self._clock())
                     self._memory.cycle_done(slack_s)
-                except Exception as error:  # noqa: BLE001 - whatever it is, the robot must stand still first
+                except Exception as error:  # noqa: BLE001 - whatever it is, the robot must stop first
                     self._fail(error)
                     return
 
@@ -361,7 +361,7 @@ class RobotProcess:
             self._log.warning("line lost", reason=reason)
 
     async def _shut_down(self, link_task: asyncio.Task[None]) -> None:
-        """Halt the base and wait until it stands still; then close the line."""
+        """Halt the base and wait until it has stopped; then close the line."""
         self._stop.set()
         self._clock.release()
         self.health.begin_shutdown()

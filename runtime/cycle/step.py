@@ -1,8 +1,8 @@
-"""One perception-action cycle: the pure heart of the program.
+"""One perception-action cycle as a pure function of its inputs.
 
-`step` gets every input as an argument and reaches the world through three callables only: one carries out the
-command, one says whether refinement may go on, one is called at the end of each phase. The same inputs and the same
-answers give the same record again, to the bit: that is what a replay relies on.
+`step` gets every input as an argument and has effects through three callables only: one carries out the command, one
+returns whether refinement may continue, one is called at the end of each phase. The same inputs and the same results
+of the callables give the same record, bit for bit; replay relies on that.
 """
 
 from __future__ import annotations
@@ -84,9 +84,9 @@ class State:
     requested_run_s: float = 0.0
     """When the operator requested that, by the run's clock."""
     vectors: tuple[Response, ...] = ()
-    """The schemas' responses in the last cycle, and their sum; empty where no schema was asked."""
+    """The schemas' responses in the last cycle, and their sum; empty if no schema was called."""
     hold_reason: str | None = None
-    """Why the robot stands though it may drive; None where it does not."""
+    """Why the robot does not move although it may drive; None if it moves."""
 
 
 @dataclass(frozen=True, slots=True)

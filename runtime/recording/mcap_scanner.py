@@ -144,7 +144,7 @@ class McapScanner:
         return None if at + RECORD_HEADER + length > len(self._data) else (code, length)
 
     def _find_chunk(self, at: int) -> tuple[list[RawMessage] | None, int]:
-        """Return the next whole chunk from `at` on and the byte after it; the end of the file if there is none."""
+        """Return the next whole chunk from `at` on and the byte after it; without one, None and the file's end."""
         data, start_search = bytes(self._data[at:]), 0
         while (found := data.find(ZSTD, start_search)) >= 0:
             start_search = found + 1

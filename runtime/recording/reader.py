@@ -1,4 +1,4 @@
-"""An open recording: what the run was, and its messages one by one, even if the file is damaged or cut off."""
+"""An open recording: the description of the run, and its messages, also if the file is damaged or cut off."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
-"""The control loop's side of a recording: everything that happens is queued as it is, and the loop goes on.
+"""The recorder: the control loop's side of a recording, which queues each cycle's data for the writer's thread.
 
-Queueing is an append. Only from time to time the loop does more: once a second a copy of the map, half a second later
-the objects, and rarely, as a keyframe, a copy of the whole state. All of it happens after the command has
-been sent.
+Queueing is an append. Copies are made less often: the map once a second, the objects half a second later, and the
+whole state, as a keyframe, rarely. The cycle's command is sent before any of this.
 """
 
 from __future__ import annotations
@@ -91,7 +90,7 @@ class Recorder:
     target : RecordingTarget
         Where the recording is written.
     clock : RunClock or callable
-        The run's clock, which knows the host's; any other monotonic clock (s) stands for both.
+        The run's clock, which also reads the host's; any other monotonic clock (s) serves as both.
     queue_max : int
         Items that may wait; what does not fit is dropped and counted.
     emulated : bool

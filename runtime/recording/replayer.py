@@ -1,7 +1,7 @@
-"""The one iterator over a recording that runs the step again on the recorded inputs.
+"""The replayer: an iterator over a recording that runs the step again on the recorded inputs.
 
-The same inputs and the same refinement decisions give the same records, bit for bit. Refinement is limited by a clock
-in a run and by a count here: it goes on while fewer quanta are done than were done in the run. Verification,
+The same inputs and the same refinement decisions give the same records, bit for bit. A run limits
+refinement by a clock, a replay by a count: it continues until as many quanta are done as in the run. Verification,
 comparison, the timeline and the console's playback all consume this iterator.
 """
 

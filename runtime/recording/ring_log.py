@@ -1,6 +1,6 @@
-"""The ring log: firings as CSV, which any robot's owner can write with a script and open in a spreadsheet.
+"""The ring log: firings as CSV, which a script can write and a spreadsheet can open.
 
-Anybody may have written such a file, so reading checks everything. Each error is one line: the place (file, row as a
+Such a file may come from any source, so reading checks everything. Each error is one line: the place (file, row as a
 text editor counts it, column), what was found there, what is allowed, and what to do.
 """
 

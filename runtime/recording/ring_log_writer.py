@@ -1,6 +1,6 @@
 """A ring log of a running robot: firings are queued and a thread writes them, so that no cycle waits for the disk.
 
-What a slow disk does not take in time is dropped and counted. A file that fails is closed as it is.
+Firings that a slow disk cannot accept in time are dropped and counted. A file that fails is closed as it is.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from runtime.recording.writer import CLOSE_MAX_S, RecorderStatus
 from runtime.support.background_writer import BackgroundWriter
 
 QUEUE_MAX: Final = 4096
-"""Firings that may wait: three minutes of a disk that stands still."""
+"""Firings that may wait: three minutes of a stalled disk."""
 
 
 class RingLogWriter:

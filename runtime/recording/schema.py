@@ -54,7 +54,7 @@ class TimedPayload(Payload):
     """Content with a time of the run."""
 
     run_s: float
-    """Time by the run's clock, s. It stands still while a run is paused; log times do not."""
+    """Time by the run's clock, s. It stops while a run is paused; log times do not."""
 
 
 class SettingsChange(TimedPayload):

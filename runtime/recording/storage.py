@@ -1,4 +1,4 @@
-"""Where recordings are stored: in a file named by the user, or in a folder from which the oldest are deleted."""
+"""The storage of recordings: a file named by the user, or a folder from which the oldest are deleted."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class RecordingTarget(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class SingleFile:
-    """A file named by the user. After a disk error the recording goes on in `NAME-2.mcap` and so on next to it."""
+    """A file named by the user. After a disk error, recording continues in `NAME-2.mcap` and so on next to it."""
 
     first: Path
 
@@ -114,7 +114,7 @@ class RecordingFile(NamedTuple):
 
 
 def list_recordings(folder: Path) -> list[RecordingFile]:
-    """Return the recordings in a folder, newest first; none if there is no such folder. Waits for the disk."""
+    """Return the recordings in a folder, newest first; empty if the folder does not exist. Blocks on the disk."""
     found = []
     with contextlib.suppress(OSError):
         for path in folder.glob(f"*{SUFFIX}"):

@@ -77,7 +77,7 @@ def verify_recording(
     Parameters
     ----------
     recording : Recording
-        May be damaged: after a gap the replay goes on at the next keyframe.
+        May be damaged: after a gap the replay continues at the next keyframe.
     since_s, until_s : float
         Which part to replay, in s of the run's clock after the first cycle; it starts at the last keyframe before.
     on_step : callable, optional

@@ -1,7 +1,7 @@
 """The writing side of a recording, on a thread: encodes what the control loop has handed over and writes it to disk.
 
-Any trouble with the disk stays here. A full disk, a read-only folder, an fsync that takes seconds: it is counted and
-reported, the file is closed as it is, and a new one is tried after a while.
+Disk errors do not reach the control loop. A full disk, a read-only folder or a slow fsync is counted and reported;
+the file is closed as it is, and a new one is tried after a while.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from runtime.recording.storage import RecordingTarget
 from runtime.support.background_writer import BackgroundWriter
 
 QUEUE_MAX: Final = 8192
-"""Items that may wait: about a minute and a half of a disk that stands still."""
+"""Items that may wait: about a minute and a half of a stalled disk."""
 POLL_S: Final = 0.05
 """Interval at which the thread looks for items."""
 FLUSH_S: Final = 0.6

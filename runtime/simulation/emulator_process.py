@@ -23,7 +23,7 @@ START_MAX_S: Final = 60.0
 """Longest wait for the emulator, which may have to compile its kernels first."""
 
 END_MAX_S: Final = 2.0
-"""Longest wait for the emulator to end by itself."""
+"""Longest wait for the emulator to end without being killed, s."""
 
 
 class EmulatorHandle(NamedTuple):

@@ -1,4 +1,4 @@
-"""How far before passing a drum its position is reliably known, so that the robot can still act upon it.
+"""First fixes: how far before passing a drum its position is reliably known, so that the robot can still react.
 
 The first fix is the first reading from which on, to the end of the drive, the drum is always reported to within a
 quarter of a foot. A correct report that is withdrawn later does not count.

@@ -1,1 +1,1 @@
-"""What all of runtime uses: log, health, background writer, child processes, file locks, the kernel cache."""
+"""Services that all of runtime uses: log, health, background writer, child processes, locks, kernel cache."""

@@ -15,7 +15,7 @@ from runtime.support.health import Worker
 Item = TypeVar("Item")
 
 CAPACITY: Final = 4096
-"""Items that may wait: at 20 a second, three minutes of a disk that stands still."""
+"""Items that may wait: at 20 a second, three minutes of a stalled disk."""
 CLOSE_MAX_S: Final = 2.0
 """Longest wait for the queue to be written when the writer is closed."""
 BATCH: Final = 256

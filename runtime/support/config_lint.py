@@ -1,4 +1,4 @@
-"""Warnings about settings that are valid each by itself and unwise in combination."""
+"""Warnings about settings that are each valid but unsuitable in combination."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""The health of the process: every task and thread has a name, and one call says whether all of them still run.
+"""The health of the process: every task and thread has a name, and one call returns whether all of them still run.
 
-A part that has ended is a fault, whatever ended it. A part that only takes long is not a fault: a thread may wait
-for a disk or a terminal for any time. The cycle checks for faults before it decides anything, so with a part missing
-the robot halts. Only the cycle feeds the deadman and the watchdog.
+A part that has ended is a fault, whatever the cause. A slow part is not a fault: a thread may wait for a disk or a
+terminal for any time. The cycle checks for faults before it makes any decision, so if a part is missing the robot
+halts. Only the cycle feeds the deadman and the watchdog.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Run every kernel once, part by part: this compiles a kernel that was never compiled, and loads one that was.
 
-Two processes that compile the same kernel do the same work twice. So the second process takes what the first one
-comes to last: `python -m runtime.support.kernel_warmup bayes` compiles the refinement of circles, `… polygons` that
-of polygons, and `… polygons whole` everything that polygons need, for a robot that is driving.
+Two processes that compile the same kernel do the same work twice. So the second process begins with what the first
+one compiles last: `python -m runtime.support.kernel_warmup bayes` compiles the refinement of circles, `… polygons`
+that of polygons, and `… polygons whole` everything that polygons need, for a robot that is driving.
 """
 
 from __future__ import annotations

@@ -146,7 +146,7 @@ def open_log(
 def file_writer(name: str, fd: int) -> BackgroundWriter[bytes]:
     """Return a writer of lines into an open file, which it closes at the end.
 
-    A line that says how many are missing stands where lines were lost; a line cut off by a full disk is ended first.
+    Lost lines are replaced by one line with their number; a line cut off by a full disk is ended first.
     """
     is_cut = False
 

@@ -1,1 +1,1 @@
-"""When a cycle runs, what it costs, and what delayed it: clocks, timers, pacing and measurements."""
+"""Timing of cycles: clocks, timers, pacing, and measurement of costs and delays."""

@@ -1,7 +1,7 @@
-"""Four clocks read at once: their differences tell work from waiting, and waiting from being suspended.
+"""Samples of four clocks: their differences distinguish work, waiting, and suspension by the system.
 
-Elapsed time without CPU time is time in which this thread did not run. A thread that gave up the processor by itself
-(it slept, waited for a lock or a disk) has one more voluntary context switch; one that the system suspended has not.
+Elapsed time without CPU time is time in which this thread did not run. A thread that gave up the processor itself (it
+slept, waited for a lock or a disk) has one more voluntary context switch; one that the system suspended has not.
 """
 
 from __future__ import annotations

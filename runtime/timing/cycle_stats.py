@@ -1,4 +1,4 @@
-"""How long cycles took, how late they began and what delayed them, in memory that never grows."""
+"""Statistics of cycles in bounded memory: their durations, their lateness, and the causes of delays."""
 
 from __future__ import annotations
 

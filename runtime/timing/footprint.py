@@ -1,4 +1,4 @@
-"""What the process uses of its machine: start-up time, memory, CPU time, and kernels compiled too late.
+"""The resources that the process uses: start-up time, memory, CPU time, and kernels compiled too late.
 
 Measured from the first cycle to the end of the run; the result goes into the run's summary.
 """

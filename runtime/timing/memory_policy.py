@@ -1,4 +1,4 @@
-"""The memory policy: while the robot drives, only the young generation is collected, and only between two cycles.
+"""The policy of garbage collection: while the robot drives, only the young generation is collected, between cycles.
 
 A full collection visits every object, which takes longer than a cycle may. So all objects alive when the drive begins
 are excluded (`gc.freeze`), automatic collection is off, and the few young objects are collected when a cycle has just

@@ -1,9 +1,10 @@
-"""When the next cycle is due: with the ring's next echo while echoes come, on a grid of its own while none do.
+"""The pacer: schedules the next cycle with the ring's next echo, or on a fixed grid while no echoes arrive.
 
-On a timer that does not know the ring, each echo waits for half a period on average. So while echoes come, an echo
-begins the cycle; which one, the period decides. Two bounds always hold: cycles are never closer to each other than
-half a step before their time (no burst), and there is a deadline behind every awaited echo (commands reach the base
-before its deadman trips). A pacer reads no clock: all its times are the run's, and it can be tested in virtual time.
+With a timer independent of the ring, each echo would wait for half a period on average. So while echoes arrive, an
+echo begins the cycle; the period determines which one. Two bounds always hold: cycles are never closer to each other
+than half a step before their time (no burst), and there is a deadline behind every awaited echo (commands reach the
+base before its deadman trips). A pacer reads no clock: all its times are the run's, and it can be tested in virtual
+time.
 """
 
 from __future__ import annotations

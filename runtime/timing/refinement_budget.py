@@ -1,4 +1,4 @@
-"""How much refinement a cycle may do in virtual time: a number of quanta, or an amount of CPU time.
+"""The refinement budget of a cycle in virtual time: a number of quanta, or an amount of CPU time.
 
 Counted quanta make a run repeatable to the bit. CPU time is what a budget means without the other programs that share
 the machine; it is measured, so that a run under it is not repeatable.

@@ -1,8 +1,8 @@
 """The clock of a run: the host's, or one that can be paused and scaled together with an emulated robot's time.
 
-Deadlines, timeouts, the base's deadman and the schedule of cycles are all measured by the run's clock. So while it
-stands still nothing is late, nothing times out and no cycle begins; and when it goes on, no part of the run can tell
-that it stood. Only work is measured by the host's clock: a budget belongs to the machine.
+Deadlines, timeouts, the base's deadman and the schedule of cycles are all measured by the run's clock. So while it is
+paused nothing is late, nothing times out and no cycle begins, and a pause does not affect any part of the run. Only
+work is measured by the host's clock, because a budget is a property of the machine.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import Final
 from drivers.emulator.time_scale import REAL_TIME, TimeScale
 
 LEASE_S: Final = 0.002
-"""How far time goes on past the next cycle's deadline where it is scaled, s.
+"""How far scaled time may pass the next cycle's deadline before that cycle has started, s.
 
-It goes no farther until that cycle has started, so that no cycle misses its deadline, however slow the machine is.
+This limit prevents a cycle from missing its deadline, however slow the machine is.
 """
 
 LEASE_MIN_S: Final = 0.0005
@@ -63,7 +63,7 @@ class RunClock:
         """Go on in real time until the end of the run."""
 
     def on_change(self, call: Callable[[], None]) -> None:
-        """Have `call` called whenever the answer of `expect` changes other than by the passing of time."""
+        """Register a callback for changes of the result of `expect` other than by the passing of time."""
 
 
 def run_clock(clock: Callable[[], float]) -> RunClock:
@@ -86,7 +86,7 @@ class ScaledClock(RunClock):
     time_scale
         The one in force.
     factor
-        How fast time goes, or will when it goes on.
+        Speed of time relative to real time, now or after the pause.
     """
 
     def __init__(
@@ -139,17 +139,17 @@ class ScaledClock(RunClock):
             self.resume()
 
     def on_change(self, call: Callable[[], None]) -> None:
-        """Have `call` called whenever the answer of `expect` changes other than by the passing of time."""
+        """Register a callback for changes of the result of `expect` other than by the passing of time."""
         self._calls.append(call)
 
     @property
     def is_paused(self) -> bool:
-        """Whether time goes on only step by step."""
+        """Whether time is paused, except for single steps."""
         return self._cycles_left is not None
 
     @property
     def is_still(self) -> bool:
-        """Whether run and emulator stand at the same time, and no cycle is to come."""
+        """Whether run and emulator have stopped at the same time, and no cycle is pending."""
         return self._cycles_left == 0 and self._acknowledged_run_s >= self.time_scale.until_s
 
     @property
@@ -189,7 +189,7 @@ class ScaledClock(RunClock):
             return
         self._limit_run_s = self._acknowledged_run_s = run_s
         if run_s > self.time_scale.until_s:
-            # The time scale reached the emulator too late; so both stand where the emulator stands.
+            # The time scale reached the emulator too late, so both stop at the emulator's time.
             self.time_scale = self.time_scale._replace(until_s=run_s)
         self._notify()
 

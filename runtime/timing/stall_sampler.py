@@ -1,4 +1,4 @@
-"""What is running when a cycle is overdue: one sample of the stack, taken only for cycles that are late.
+"""The stall sampler: takes one sample of the stack when a cycle is overdue, to show what delays it.
 
 asyncio's own search for slow callbacks needs its debug mode, which slows every callback. Here an interval timer is
 set once a cycle to a moment at which the next cycle should long have started, and set again before it fires while

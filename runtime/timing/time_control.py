@@ -43,23 +43,23 @@ class TimeControl(Protocol):
 
     @property
     def speed(self) -> float:
-        """How fast time goes while it is not paused: 1 is real time."""
+        """Speed of time while it is not paused: 1 is real time."""
 
     async def pause(self) -> str | None:
         """Pause the time of robot and run."""
 
     async def resume(self) -> str | None:
-        """Let time go on after a pause."""
+        """Resume time after a pause."""
 
     async def single_step(self) -> str | None:
-        """Let time go on for exactly one cycle; pause first where it is not paused."""
+        """Advance time by exactly one cycle; pause first if it is not paused."""
 
     async def set_speed(self, factor: float) -> str | None:
-        """Set how fast time goes, now or when it goes on."""
+        """Set the speed of time, now or after the pause; 1 is real time."""
 
 
 class NoTimeControl:
-    """Stands in for a control with a real robot, whose time goes its own way."""
+    """The time control of a run with a real robot, whose time cannot be controlled."""
 
     is_paused = False
     speed = 1.0
@@ -110,7 +110,7 @@ class EmulatorTimeControl:
 
     @property
     def speed(self) -> float:
-        """How fast time goes while it is not paused: 1 is real time."""
+        """Speed of time while it is not paused: 1 is real time."""
         return self.clock.factor
 
     async def pause(self) -> str | None:
@@ -119,12 +119,12 @@ class EmulatorTimeControl:
             return await self._pause()
 
     async def resume(self) -> str | None:
-        """Let time go on after a pause."""
+        """Resume time after a pause."""
         async with self._lock:
             return await self._resume() if self.is_paused else self._problem
 
     async def single_step(self) -> str | None:
-        """Let time go on for exactly one cycle; pause first where it is not paused."""
+        """Advance time by exactly one cycle; pause first if it is not paused."""
         async with self._lock:
             if (problem := await self._pause()) is not None:
                 return problem
@@ -133,7 +133,7 @@ class EmulatorTimeControl:
             return await self._wait(lambda: self.clock.is_still, ahead_s)
 
     async def set_speed(self, factor: float) -> str | None:
-        """Set how fast time goes, now or when it goes on."""
+        """Set the speed of time, now or after the pause; 1 is real time."""
         if not FACTOR_MIN <= factor <= FACTOR_MAX:
             return f"the speed must be from {FACTOR_MIN:g} to {FACTOR_MAX:g} times real time, not {factor:g}"
         async with self._lock:

@@ -1,6 +1,6 @@
-"""Where a run's time goes, and what delayed a cycle that is late.
+"""The timing monitor: measures how a run spends its time, and names what delayed a late cycle.
 
-All that this program does between two cycles is measured as a span with a name: a phase of the cycle, or one of its
+All work of this program between two cycles is measured as a span with a name: a phase of the cycle, or one of its
 callbacks. A cycle was delayed by the span that overlaps most of its lateness, unless the system suspended that span
 for most of its time. Where no span overlaps, either a callback without a name had the thread, or the cause lies
 outside.
@@ -46,7 +46,7 @@ class Span(NamedTuple):
         return self.end.host_s - self.begin.host_s
 
     def suspended_by(self) -> str | None:
-        """Return what kept it from running for most of its time, None where it was slow by itself."""
+        """Return what prevented it from running for most of its time, None if its own work took that long."""
         if self.end.waits == self.begin.waits:
             return _suspended_by(self.begin, self.end)
         return _other_threads(self.begin, self.end, self.took_s)
@@ -193,7 +193,7 @@ class TimingMonitor:
 
     @property
     def main_cause(self) -> str:
-        """The most frequent cause of the overruns in a row; empty where there are none."""
+        """The most frequent cause of the overruns in a row; empty without overruns."""
         return max(self._causes_in_a_row, key=lambda name: self._causes_in_a_row[name], default="")
 
     def last_cycle(self) -> LastCycle:
@@ -226,7 +226,7 @@ class TimingMonitor:
         if len(self._spans) == SPANS_MAX:
             del self._spans[0]
         self._spans.append(span)
-        # By the run's clock, which stands still during a long cycle where time is paused or scaled.
+        # By the run's clock, which stops during a long cycle if time is paused or scaled.
         self._busy_s += span.end.run_s - span.begin.run_s
         self._last = span.end
 

@@ -117,7 +117,7 @@ class Waker:
     Parameters
     ----------
     clock : callable
-        The clock of the deadlines, s; the run's may stand still before one.
+        The clock of the deadlines, s; the run's clock may be paused before one.
     make_timer : callable, optional
         Makes the timer for a callback, in the loop of the first sleep; by default a timerfd where there is one.
     """

@@ -1,4 +1,4 @@
-"""What exports for 3D viewers share: quaternions, colours, and the scan of each firing."""
+"""Functions common to exports for 3D viewers: quaternions, colours, and the scan of each firing."""
 
 from __future__ import annotations
 

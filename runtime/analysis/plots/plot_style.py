@@ -1,4 +1,4 @@
-"""The style of figures: Okabe-Ito colours, which everybody can distinguish, and never only colour as difference."""
+"""The style of figures: Okabe-Ito colours, safe for colour-blind readers; colour is never the only difference."""
 
 from __future__ import annotations
 

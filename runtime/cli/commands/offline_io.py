@@ -1,4 +1,4 @@
-"""What the commands on finished runs share: reading a file with a progress bar, and checking where to write."""
+"""Functions common to the commands on finished runs: reading a file with a progress bar, checking the output path."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run records: by default a recording in the folder of recordings, on request a ring log.
+"""The recorder of a run: by default it writes into the folder of recordings, on request a file or a ring log.
 
 Every run has a recorder, even if it is switched off: the operator may switch it on during the run.
 """
@@ -85,7 +85,7 @@ class RunRecording:
 
     @property
     def now(self) -> RecordingStatus | None:
-        """The recording being written; None if there is none."""
+        """The recording being written; None while nothing is recorded."""
         from runtime.console.frames.frame_encoder import RecordingStatus
 
         status = self._recorder.status

@@ -1,1 +1,1 @@
-"""Connected browsers: their send queues, the hub that knows them all, and control of the robot."""
+"""Connected browsers: their send queues, the hub that lists them, and control of the robot."""

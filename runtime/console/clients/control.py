@@ -1,7 +1,7 @@
 """Control of the robot: held by one client at a time, handed over on request, released when its connection ends.
 
-The first client with the token gets control; later ones watch and may request it. A holder who is asked and then does
-nothing for a while loses control, so that a page left open somewhere cannot keep everyone else out. HALT needs no
+The first client with the token gets control; later ones watch and may request it. A holder who is asked and does not
+react for a while loses control, so that an abandoned page does not block other clients. HALT needs no
 control.
 """
 

@@ -1,1 +1,1 @@
-"""Commands of operators: one registry of what a page may ask for, and what is done about each request."""
+"""Commands of operators: the registry of the commands that a page may send, and their handlers."""

@@ -1,4 +1,4 @@
-"""What a console command consists of, and what its handler is given."""
+"""The parts of a console command, and the arguments of its handler."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The one exception of a console command: why it was not carried out, worded for the operator."""
+"""The exception of a console command that was not carried out, with the reason as text for the operator."""
 
 from __future__ import annotations
 

@@ -20,11 +20,11 @@ from config.reload import Difference
 from config.settings import Settings
 
 KINDS: Final = ((bool, "bool"), (int, "int"), (float, "float"), (str, "text"))
-"""Plain types and their names on the wire; bool stands before int, of which it is a subclass."""
+"""Plain types and their names on the wire; bool precedes int, of which it is a subclass."""
 UNITS: Final = MappingProxyType({
     "_m_s": "m/s", "_rad_s": "rad/s", "_per_s": "1/s", "_deg": "°", "_rad": "rad", "_hz": "Hz", "_m": "m", "_s": "s"
 })  # fmt: skip
-"""Units by the ending of a name; a longer ending stands before its own endings."""
+"""Units by the ending of a name; a longer ending precedes its own endings."""
 
 
 class Parameter(TypedDict):
@@ -97,7 +97,7 @@ def _options(annotation: Any) -> tuple[Any, ...]:  # noqa: ANN401 - an annotatio
 
 
 def _bounds(field: FieldInfo) -> tuple[float | None, float | None]:
-    """Return a field's lower and upper bound, None where there is none."""
+    """Return a field's lower and upper bound, None where it is unbounded."""
     low: float | None = None
     high: float | None = None
     for bound in field.metadata:

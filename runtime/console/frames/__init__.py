@@ -1,1 +1,1 @@
-"""What the page is sent: session information at first, then one frame after each cycle."""
+"""The data that the page receives: session information first, then one frame after each cycle."""

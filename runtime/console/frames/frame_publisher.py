@@ -1,4 +1,4 @@
-"""When frames are encoded: after cycles, at a bounded rate, and only while clients are connected.
+"""The frame publisher: encodes frames after cycles, at a bounded rate, and only while clients are connected.
 
 During a cycle the publisher only stores a reference to the record. The frame is encoded in a callback of its own
 after the cycle, measured under its own name in the timing table.

@@ -1,4 +1,4 @@
-"""Session information: what the page is sent first about the robot, its models and an emulator's true world."""
+"""Session information: the first message to the page, with the robot, its models and an emulator's true world."""
 
 from __future__ import annotations
 

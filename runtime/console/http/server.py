@@ -151,7 +151,7 @@ class Server:
         except web.HTTPException as error:
             # aiohttp rejects a malformed websocket handshake this way.
             response = self._refuse(request, HTTPStatus(error.status), "a malformed request")
-        except Exception as error:  # noqa: BLE001 - reported as a fault of the program; the server goes on
+        except Exception as error:  # noqa: BLE001 - reported as a fault of the program; the server continues
             self._context.on_fault("the console", error)
             response = web.Response(status=500, text="the console failed: see the log")
         if not isinstance(response, web.WebSocketResponse):

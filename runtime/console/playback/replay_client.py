@@ -142,7 +142,7 @@ class ReplayClient:
     program : str
         The module of the worker process: it calls `replay_worker.run_worker`.
     current : callable
-        Returns the file of the recording in progress, None if there is none.
+        Returns the file of the recording in progress, None while nothing is recorded.
     units : {"m", "ft"}
         Of the report.
     """
