@@ -37,7 +37,7 @@ class LineState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """What a driver received since it was last asked."""
+    """What a driver received since the last call of `take_received`."""
 
     firings: tuple[Firing, ...]
     """Oldest first; their times only grow, unless the robot restarted."""
@@ -46,7 +46,7 @@ class Received:
     rebooted: bool
     """The robot restarted: its clock and odometry began again at zero. Nothing here is from before the restart."""
     notes: tuple[str, ...] = ()
-    """What an operator should know: what happened, likely cause, next action; one line each."""
+    """Messages for the operator, one line each: what happened, likely cause, next action."""
 
 
 class RobotDriver(Protocol):
@@ -145,4 +145,4 @@ class RobotDriver(Protocol):
         """
 
     def take_received(self) -> Received:
-        """Return what was received since the last call, and forget it."""
+        """Return what was received since the last call, and remove it."""

@@ -20,7 +20,7 @@ class OdometryHistory:
 
     @property
     def newest(self) -> Odometry | None:
-        """The newest sample, None if there is none."""
+        """The newest sample, None if the history is empty."""
         return self._samples[-1] if self._samples else None
 
     def add(self, sample: Odometry) -> None:
@@ -29,7 +29,7 @@ class OdometryHistory:
             self._samples.append(sample)
 
     def clear(self) -> None:
-        """Forget all samples."""
+        """Remove all samples."""
         self._samples.clear()
 
     def at(self, robot_s: float, gap_max_s: float) -> tuple[Pose, float] | None:

@@ -249,7 +249,7 @@ class Decoder:
         return list(self._rejected)
 
     def take_rejected(self) -> list[tuple[int, NakCode]]:
-        """Return `rejected`, and forget it."""
+        """Return `rejected`, and clear it."""
         taken = self.rejected
         self._rejected.clear()
         return taken

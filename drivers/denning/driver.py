@@ -1,8 +1,4 @@
-"""The driver of a robot that speaks the ring-and-base protocol: handshake, commands, supervision.
-
-It has no I/O and no clock: bytes and times are its inputs, bytes and messages its outputs. Retries of commands are in
-`pending_command`, the pose of a firing in `pose_stamping`, timeouts in `timeouts`, error messages in `diagnostics`.
-"""
+"""The driver for the ring-and-base protocol: handshake, commands, supervision; without I/O and without a clock."""
 
 from __future__ import annotations
 
@@ -24,10 +20,9 @@ from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose
 _HELLO_PERIOD_S = 0.5
 """Time between HELLOs to a robot that does not answer or is the wrong one, s: seldom enough not to disturb it."""
 _UNACKNOWLEDGED_SHARE = 0.75
-"""If DRIVEs stay unacknowledged for this share of the longest silence, the robot is not receiving. Less than 1,
-because DRIVEs are sent only once a cycle."""
+"""DRIVEs unacknowledged for this share of the longest silence are not received; below 1, as cycles take time."""
 _MISSED_STEPS_MAX = 2
-"""Firings that the ring may miss, beyond the longest silence, before the robot is asked who it is."""
+"""Firings that the ring may miss, beyond the longest silence, before the robot must identify itself again."""
 _SETTLING_STEPS = 3
 """Steps after a new pattern was accepted until the last echo of the previous one has arrived."""
 _FIRINGS_MAX = 1024
@@ -171,9 +166,7 @@ class DenningDriver:
                 self._stamper.set_window(self._pattern.window)
 
     def drive(self, twist: Twist) -> None:
-        """Request a velocity, clamped to the body's limits; it replaces one that has not been sent yet.
-
-        It is sent only in state READY and while no HALT is unacknowledged.
+        """Request a velocity, clamped to the body's limits; sent only in state READY and while no HALT is pending.
 
         Raises
         ------
@@ -200,8 +193,6 @@ class DenningDriver:
     def set_firing(self, ring: RingConfig) -> None:
         """Change the firing pattern to that of `ring`; does nothing if it is the current one.
 
-        Until the robot accepts the new pattern, echoes of the previous one are used: an echo names its own sensors.
-
         Raises
         ------
         drivers.firing_pattern.FiringError
@@ -210,7 +201,7 @@ class DenningDriver:
         pattern = wire_pattern(ring)
         if pattern == self._pattern:
             return
-        # Until the new pattern is in use, echoes may belong to either of the two.
+        # Until the robot uses the new pattern, echoes may belong to either; an echo names its own sensors.
         self._stamper.set_window(max(self._pattern.window, pattern.window))
         self._settling_s = _SETTLING_STEPS * 1e-3 * max(self._pattern.step_period_ms, pattern.step_period_ms)
         self._pattern = pattern
@@ -238,7 +229,7 @@ class DenningDriver:
             out += encode(Drive(seq, v, w))
             self._drive = None
         if writable and self._must_identify:
-            # Not a pending command: no answer is fine, because other timeouts notice a robot that is gone.
+            # Not a pending command: it needs no answer, because other timeouts detect a lost robot.
             self._must_identify = False
             out += encode(Hello(self._next_seq()))
         if out and self._flush_first:
@@ -248,7 +239,7 @@ class DenningDriver:
         return bytes(out)
 
     def take_received(self) -> Received:
-        """Return what was received since the last call, and forget it."""
+        """Return what was received since the last call, and remove it."""
         received = Received(tuple(self._firings), self._odometry, self._rebooted, self._stamper.notes())
         self._firings.clear()
         self._odometry = None
@@ -256,12 +247,12 @@ class DenningDriver:
         return received
 
     def _check_timeouts(self) -> None:
-        """Notice a robot that is silent, one that does not receive, and a ring that does not fire."""
+        """Detect a robot that is silent, one that does not receive, and a ring that does not fire."""
         silence_max_s = self._config.link.silence_max_s
         silent_s = self._run_s - self._odometry_s
         unacknowledged_s = self._drive_acks.unacknowledged_s(self._odometry_s)
         if silent_s > silence_max_s:
-            # A single echo may well follow the last odometry before the robot falls silent.
+            # A single echo may follow the last odometry before the robot falls silent.
             others = self._last_frame_s - self._odometry_s > 0.5 * silence_max_s
             bad = self._decoder.bad - self._bad_at_odometry
             self._go_down(diagnostics.silence(silent_s, others=others, bad=bad))
@@ -365,9 +356,8 @@ class DenningDriver:
             self._echo_timeout.restart(self._run_s, self._decoder.bad)
             self._pattern_acked_s = self._run_s
             if "HALT" in self._commands:
-                self._queue(
-                    "HALT"
-                )  # a robot that answers other commands must answer this one within the usual number of tries
+                # A robot that answers other commands must answer this one within the usual number of tries.
+                self._queue("HALT")
         if self._state is LineState.READY:
             self._problem = None
 

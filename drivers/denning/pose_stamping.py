@@ -104,7 +104,7 @@ class PoseStamper:
         self._gap_max_s = max(_GAP_PERIODS * period_s, _GAP_MIN_S)
 
     def restart(self) -> None:
-        """Forget everything: the robot's clock and odometry restarted at zero."""
+        """Discard all state: the robot's clock and odometry restarted at zero."""
         self._clock.restart()
         self._last_firing_us = None
         self._last, self._steady = None, 0
@@ -112,7 +112,7 @@ class PoseStamper:
         self.break_off()
 
     def break_off(self) -> None:
-        """Forget poses and waiting echoes, but not the clock: later odometry does not continue the earlier one."""
+        """Discard poses and waiting echoes, but not the clock: later odometry does not continue the earlier one."""
         self._history.clear()
         self._clock.trust_next()
         self.drop_held()
@@ -188,7 +188,7 @@ class PoseStamper:
         self._held.append(echo)
 
     def firings(self) -> list[Firing]:
-        """Return the waiting echoes whose pose is known now, in the order of their firing, and forget them."""
+        """Return the waiting echoes whose pose is known now, in the order of their firing, and remove them."""
         ready: list[Firing] = []
         newest = self._history.newest
         while self._held and newest is not None:

@@ -54,10 +54,10 @@ class RobotClock:
         return None if self._t_us is None else _nearest(t_us, self._t_us)
 
     def trust_next(self) -> None:
-        """Accept the next reading however far ahead it is: the robot was asked and did not restart."""
+        """Accept the next reading however far ahead it is: the robot has confirmed that it did not restart."""
         self._trusting = True
 
     def restart(self) -> None:
-        """Forget everything: the counter restarted at zero."""
+        """Discard all readings: the counter restarted at zero."""
         self._t_us = None
         self._trusting = False

@@ -23,7 +23,7 @@ from runtime.timing.refinement_budget import within_quanta_per_cycle
 
 @dataclass(slots=True)
 class RunOutcome:
-    """What came of a run."""
+    """The outcome of a run: what was recognised and where the robot stopped."""
 
     objects: list[ObjectRow] = field(default_factory=list)
     errors_m: list[float | None] | None = None

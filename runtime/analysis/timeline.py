@@ -35,7 +35,7 @@ class Cluster:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunSnapshot:
-    """What was known at one moment."""
+    """What perception and odometry had found at one moment."""
 
     t_s: float
     pose: Pose

@@ -53,7 +53,7 @@ class TimelineBuilder:
         return self._pose
 
     def restart(self, t_s: float) -> None:
-        """Drop everything so far, as the program does when the robot and its odometry restart."""
+        """Discard everything so far, as a run does when the robot and its odometry restart."""
         self._timeline.notes.append(f"the robot restarted after {t_s:.1f} s; nothing before that is shown")
         self._rows, self._row_count, self._segments, self._pose = [], 0, {}, None
         self._timeline.snapshots, self._timeline.odometry = [], []

@@ -8,7 +8,7 @@ from perception.sensor_report import SensorReport
 
 
 class Alerts:
-    """Finds what is new from cycle to cycle."""
+    """Detects new facts from cycle to cycle."""
 
     def __init__(self) -> None:
         self._changes = 0

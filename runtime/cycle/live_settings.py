@@ -46,11 +46,11 @@ class LiveSettings:
         return self._current
 
     def subscribe(self, call: Callable[[Settings], None]) -> None:
-        """Have `call` called with the new settings after every change."""
+        """Register a callback that gets the new settings after every change."""
         self._subscribers.append(call)
 
     def check(self, propose: Callable[[], Settings]) -> ReloadResult:
-        """Return what would come of a change: its differences, or the problems for which it is refused.
+        """Return the effect of a change: its differences, or the problems for which it is refused.
 
         `propose` returns the new settings as a whole and raises ConfigError where they are invalid. Changes nothing,
         so that it may run in a thread.
@@ -58,7 +58,7 @@ class LiveSettings:
         return reload(self._current, propose)
 
     def apply(self, settings: Settings, *, can_undo: bool) -> tuple[Difference, ...]:
-        """Put settings in force that `check` has let through; return what changed.
+        """Put settings in force that `check` has accepted; return what changed.
 
         Parameters
         ----------
@@ -72,7 +72,7 @@ class LiveSettings:
             return ()
         history = [*self._history, self._current] if can_undo else []
         if settings.models != self._current.models:
-            # A model cannot be removed while the robot runs: undo takes back the other changes only.
+            # A model cannot be removed while the robot runs: undo reverts the other changes only.
             history = [before.model_copy(update={"models": settings.models}) for before in history]
             history = history[:-1] if history and history[-1] == settings else history
         self._history = history[-UNDO_MAX:]
@@ -80,7 +80,7 @@ class LiveSettings:
         return changed
 
     def undo(self) -> tuple[Difference, ...]:
-        """Take the last change back and return what changed; empty where there is nothing to undo."""
+        """Undo the last change and return what changed; empty if there is no change to undo."""
         if not self._history:
             return ()
         before = self._history.pop()

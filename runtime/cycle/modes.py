@@ -51,7 +51,7 @@ class Mode(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ModeState:
-    """A mode with its reason, and how far an arming has come."""
+    """A mode with its reason, and the progress of arming."""
 
     mode: Mode = Mode.CONNECTING
     entered_run_s: float = 0.0
@@ -155,7 +155,7 @@ def why_stop(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> st
 
 
 def _advance_arming(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> ModeState:
-    """Return the mode of a robot in READY or SAFE_STOP on a working line, by how far its arming has come."""
+    """Return the mode of a robot in READY or SAFE_STOP on a working line, by the progress of arming."""
     run_s = inputs.run_s
     if inputs.request is Request.ARM and state.arming_run_s is None:
         return replace(state, arming_run_s=run_s)

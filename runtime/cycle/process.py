@@ -257,7 +257,7 @@ class RobotProcess:
             self._observers.on_settings(self._settings)
 
     def _gather(self, now: ClockSample) -> Inputs:
-        """Return what the robot sent and what the operator asked for since the last cycle."""
+        """Return what the robot sent and the operator requested since the last cycle."""
         if self._arm_when_ready and self._state.mode.mode is Mode.READY:
             self._arm_when_ready = False
             self.request(Request.ARM)
@@ -332,7 +332,7 @@ class RobotProcess:
                 self._halt()
 
     def _send(self) -> None:
-        """Send what the driver has ready."""
+        """Send the bytes that the driver has to send."""
         if self._link.is_open and (data := self._driver.outgoing(writable=self._link.writable)):
             is_sent = self._link.send(data)
             if is_sent and self._observers.on_bytes is not None:

@@ -60,7 +60,7 @@ class Reloader:
             await asyncio.gather(self._task, return_exceptions=True)
 
     def probe(self) -> str | None:
-        """Return how an attempt ended that should have gone on, None otherwise; see `runtime.support.health`."""
+        """Return how an attempt ended unexpectedly, None otherwise; see `runtime.support.health`."""
         return "it was ended from outside" if self._task is not None and self._task.cancelled() else None
 
     def cancel(self) -> None:
@@ -89,7 +89,7 @@ class Reloader:
         if problem is not None:
             return ReloadResult(before, problems=(problem,))
         if live.current is not before and not result.problems:
-            # Changed from the console meanwhile; the files win, if they may follow on that as well.
+            # Changed from the console meanwhile; the files take precedence if that change is possible too.
             return live.check(lambda: result.settings)
         return result
 

@@ -68,7 +68,7 @@ class Refused:
 
 @dataclass(slots=True)
 class State:
-    """Everything that a cycle leaves to the next one."""
+    """The state that a cycle passes to the next one."""
 
     perception: Perception
     mode: ModeState = field(default_factory=ModeState)
@@ -91,7 +91,7 @@ class State:
 
 @dataclass(frozen=True, slots=True)
 class CycleRecord:
-    """What a cycle took in, what it decided, and what it counted."""
+    """The inputs of a cycle, its decisions, and its counts."""
 
     cycle: int
     inputs: Inputs

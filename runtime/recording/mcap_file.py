@@ -22,7 +22,7 @@ INDEX: Final = IndexType.CHUNK | IndexType.ATTACHMENT | IndexType.METADATA
 
 
 class McapFile:
-    """An open MCAP file. Every method raises OSError if the disk refuses.
+    """An open MCAP file. Every method raises OSError if the disk fails.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class McapFile:
         self._writer.flush()
 
     def sync(self) -> None:
-        """Wait until the disk has everything that was flushed: then it survives a power cut."""
+        """Wait until all flushed data are on the disk: then they survive a power cut."""
         os.fsync(self._file.fileno())
 
     def finish(self) -> None:

@@ -42,7 +42,7 @@ END_BYTES: Final = RECORD_HEADER + 20 + len(MCAP0_MAGIC)
 
 @dataclass(frozen=True, slots=True)
 class CorruptRegion:
-    """A place in a file that is not as it was written."""
+    """A region of a file that differs from what was written."""
 
     offset: int
     """Byte in the file."""

@@ -42,7 +42,7 @@ class Recording:
     path : Path
         The file.
     info : RunInfo
-        What the run was.
+        Description of the run.
     settings : Settings
         The run's settings at the start of the file.
     """

@@ -205,7 +205,7 @@ class Recorder:
             self._put(QueuedItem(OBJECTS, host_s, run_s, objects))
 
     def on_bytes(self, direction: str, host_s: float, data: bytes) -> None:
-        """Record bytes that have just come or gone over the serial line.
+        """Record bytes that were just received or sent over the serial line.
 
         Parameters
         ----------

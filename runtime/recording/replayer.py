@@ -47,7 +47,7 @@ class KeyframePosition(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Checkpoint:
-    """The whole state of a replay after a cycle, from which another one can go on."""
+    """The whole state of a replay after a cycle, from which another replay can continue."""
 
     cycle: int
     chunk_offset: int
@@ -219,7 +219,7 @@ def keyframe_cycle(message: RawMessage) -> int:
 
 
 class KeyframeFinder:
-    """Collects the positions of keyframes while a recording's messages go by.
+    """Collects the positions of keyframes from a recording's messages.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Perception over a ring log, firing by firing, as if the robot were driving now."""
+"""Perception over a ring log, firing by firing, as in a live run."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class FiringReplayer:
             yield firing
 
     def summary(self) -> ReplaySummary:
-        """Return what was perceived so far, and what it took."""
+        """Return the results of perception so far, and the time they took."""
         counts = self.perception.counts
         return {
             "objects": [object_row(seen) for seen in self.perception.objects()],

@@ -85,7 +85,7 @@ class ModeChange(TimedPayload):
 
 
 class SerialBytes(TimedPayload):
-    """Pieces of data that came or went over the serial line; `run_s` is the time of the first piece."""
+    """Pieces of data received or sent over the serial line; `run_s` is the time of the first piece."""
 
     after_us: list[int]
     """Delay of each piece after the first one, µs."""

@@ -45,7 +45,7 @@ class SingleFile:
         return self.first if part == 1 else self.first.with_stem(f"{self.first.stem}-{part}")
 
     def enforce_limits(self, current: Path) -> None:
-        """Delete nothing: files named by the user are the user's."""
+        """Delete nothing: files that the user named are never deleted."""
 
     def is_part_full(self, part_bytes: int) -> bool:  # noqa: ARG002 - a file named by the user is not split
         """Return False."""

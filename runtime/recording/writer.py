@@ -128,7 +128,7 @@ class RecordingWriter:
     Attributes
     ----------
     wants_keyframe : bool
-        A keyframe is needed for the replay to go on: a new file, or something is missing.
+        A keyframe is needed to continue a replay: the file is new, or messages are missing.
     """
 
     def __init__(
@@ -296,7 +296,7 @@ class RecordingWriter:
                 self._add(item.topic, item.content, log_ns)
 
     def _enter_pieces(self) -> None:
-        """Write what went over the serial line since the last time."""
+        """Write the serial line's data since the last call."""
         for topic, pieces in self._pieces.items():
             first = pieces[0][0]
             payload = SerialBytes.model_construct(

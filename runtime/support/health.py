@@ -79,7 +79,7 @@ class Health:
         self._probes[name] = probe
 
     def watch_task(self, name: str, task: asyncio.Task[None]) -> None:
-        """Treat the end of this task as a fault from now on."""
+        """Treat the end of this task as a fault."""
 
         def done(task: asyncio.Task[None]) -> None:
             error = None if task.cancelled() else task.exception()

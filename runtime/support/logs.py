@@ -188,7 +188,7 @@ def terminal_writer(name: str, stream: TextIO) -> BackgroundWriter[bytes]:
 
 
 def _open_file(config: LogConfig) -> tuple[int | None, str | None]:
-    """Return the descriptor of the log file, or None and why the default file cannot be written."""
+    """Return the descriptor of the log file, or None and the reason why the default file cannot be written."""
     path = Path(config.file).expanduser() if config.file else user_state_path("echolocate") / "echolocate.jsonl"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 @contextlib.contextmanager
 def progress(console: Console, what: str, total: int | None = None) -> Iterator[Callable[[], None]]:
-    """Show a progress bar on a terminal while the block runs; yield what to call after each step.
+    """Show a progress bar on a terminal while the block runs; yield the function to call after each step.
 
     Parameters
     ----------

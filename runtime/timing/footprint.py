@@ -19,7 +19,7 @@ _START_FIELD: Final = 19
 
 
 class FootprintRow(TypedDict):
-    """What a run used of its machine; None where this system does not report it."""
+    """The resources that a run used; None where this system does not report them."""
 
     start_s: float | None
     """From the start of the process until the robot was ready for the first cycle."""

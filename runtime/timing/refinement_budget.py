@@ -15,12 +15,12 @@ QUANTA_PER_CYCLE: Final = 50
 
 
 def within_quanta_per_cycle(done: int) -> bool:
-    """Return whether refinement may go on after `done` quanta of a cycle."""
+    """Return whether refinement may continue after `done` quanta of a cycle."""
     return done < QUANTA_PER_CYCLE
 
 
 class RefinementBudget(Protocol):
-    """Decides, quantum by quantum, whether refinement may go on."""
+    """Decides, quantum by quantum, whether refinement may continue."""
 
     def begin(self) -> None:
         """Begin a cycle."""

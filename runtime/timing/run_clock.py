@@ -60,7 +60,7 @@ class RunClock:
         """Count the beginning of a cycle."""
 
     def release(self) -> None:
-        """Go on in real time until the end of the run."""
+        """Continue in real time until the end of the run."""
 
     def on_change(self, call: Callable[[], None]) -> None:
         """Register a callback for changes of the result of `expect` other than by the passing of time."""
@@ -110,7 +110,7 @@ class ScaledClock(RunClock):
         return self.at(self.host())
 
     def at(self, host_s: float) -> float:
-        """Return the run's time at the present moment `host_s` of the host's clock; it never goes back."""
+        """Return the run's time at the present moment `host_s` of the host's clock; it never decreases."""
         self._latest_run_s = max(self._latest_run_s, min(self.time_scale.run_at(host_s), self._limit_run_s))
         return self._latest_run_s
 
@@ -133,7 +133,7 @@ class ScaledClock(RunClock):
             self._notify()
 
     def release(self) -> None:
-        """Go on in real time until the end of the run, whether the emulator follows or not."""
+        """Continue in real time until the end of the run, whether or not the emulator follows."""
         self.factor = 1.0
         if self._cycles_left is not None or not self.time_scale.is_real_time:
             self.resume()
@@ -167,14 +167,14 @@ class ScaledClock(RunClock):
         self._change(self.time_scale._replace(until_s=until_s))
 
     def step(self) -> None:
-        """Let paused time go on until the next cycle is due, and let that one begin."""
+        """Resume paused time until the next cycle is due, and allow that cycle."""
         self._cycles_left = 1
         run_s = self()
         self._limit_run_s, self._acknowledged_run_s = run_s, -math.inf
         self._change(TimeScale(self.host(), run_s, self.factor, max(run_s, self._due_s or run_s)))
 
     def resume(self) -> None:
-        """Let paused time go on."""
+        """Resume paused time."""
         self._cycles_left = None
         host_s = self.host()
         run_s = self.at(host_s)
@@ -194,7 +194,7 @@ class ScaledClock(RunClock):
         self._notify()
 
     def _extend(self, due_s: float) -> None:
-        """Let scaled time go on past the next cycle's deadline, from here on where it had to wait."""
+        """Extend scaled time past the next cycle's deadline, from now on if it had to wait."""
         scale = self.time_scale
         beyond_s, least_s = (LEASE_S, LEASE_MIN_S) if self._cycles_left is None else (0.0, 0.0)
         if scale.is_real_time or due_s + beyond_s <= scale.until_s + least_s:

@@ -157,7 +157,7 @@ class EmulatorTimeControl:
         self._changed.set()
 
     def emulator_ended(self) -> None:
-        """Fail all pending requests, and let time go on without the emulator."""
+        """Fail all pending requests, and continue in real time without the emulator."""
         self._problem = ENDED
         self.clock.release()
         self._changed.set()
@@ -177,7 +177,7 @@ class EmulatorTimeControl:
         return await self._wait(lambda: self._acknowledged >= number)
 
     async def _wait(self, done: Callable[[], bool], ahead_s: float = 0.0) -> str | None:
-        """Wait until the emulator has followed; release time where it does not, so that the run finds the fault."""
+        """Wait until the emulator has followed; otherwise release time, so that the run detects the fault."""
         try:
             async with asyncio.timeout(ANSWER_MAX_S + ahead_s):
                 while self._problem is None and not done():

@@ -32,7 +32,7 @@ class _TimerSpec(ctypes.Structure):
 
 
 class Timer(Protocol):
-    """Calls back once after a delay; setting it again cancels the earlier call."""
+    """A timer that calls back once after a delay; setting it again cancels the earlier call."""
 
     def set(self, delay_s: float) -> None:
         """Call back after `delay_s`."""

@@ -1,4 +1,4 @@
-"""A run as an animation: what was known at each moment.
+"""The animation of a run: the state of its map and objects over time.
 
 Frames are drawn one by one. Pillow makes a GIF of them and ffmpeg, if it is installed, an MP4.
 """

@@ -1,7 +1,7 @@
 """One client: a slot for the newest frame, a short queue for messages, and one task that sends both.
 
 The cycle never waits for a client. A frame that has not been sent is replaced by the next one, the queue is bounded,
-and a client that takes nothing for a while is disconnected.
+and a client that stops receiving is disconnected after a while.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from runtime.console.http.client_limits import Limits, TokenBucket
 
 
 class Frame(Protocol):
-    """One moment of a run or of a recording, as it is shown."""
+    """The state of a run or a recording at one moment, for display."""
 
     @property
     def source(self) -> object:
@@ -45,7 +45,7 @@ class Transport(Protocol):
     """The connection of a client."""
 
     def send(self, data: bytes) -> Awaitable[None]:
-        """Send a message, and wait for as long as the peer takes nothing."""
+        """Send a message, and wait until the peer accepts it."""
 
     def abort(self) -> None:
         """Drop the connection."""
@@ -154,7 +154,7 @@ class Client:
             self.send_encoded(data)
 
     def is_stalled(self, host_s: float) -> bool:
-        """Return whether the client has taken nothing for longer than the limits allow."""
+        """Return whether the client has received no data for longer than the limits allow."""
         since_s = self._sending_since_s
         return since_s is not None and host_s - since_s > self._limits.stall_s
 

@@ -1,4 +1,4 @@
-"""All clients of a run: who is connected, who has control, and what is sent to all of them."""
+"""The client hub: all connected clients of a run, control of the robot, and messages to all clients."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class ClientHub:
         return client
 
     def leave(self, client: Client) -> None:
-        """Remove a client that is gone."""
+        """Remove a disconnected client."""
         if self.clients.pop(client.number, None) is not None:
             self.control.leave(client)
 
@@ -116,7 +116,7 @@ class ClientHub:
             self._begin_session(client, session)
 
     def disconnect_stalled(self, host_s: float) -> list[Client]:
-        """Disconnect and return the clients that take nothing any more; hand control over if a request is due."""
+        """Disconnect and return the clients that no longer receive; hand control over if a request is due."""
         stalled = [client for client in self.clients.values() if client.is_stalled(host_s)]
         for client in stalled:
             client.disconnect()

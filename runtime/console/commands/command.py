@@ -21,7 +21,7 @@ ANSWERED_LATER: Final = object()
 
 
 class Permission(Enum):
-    """What a client needs in order to give a command."""
+    """The permission that a command requires of a client."""
 
     TOKEN = "token"  # noqa: S105 - the name of a permission, no secret
     """The run's token."""

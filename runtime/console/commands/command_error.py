@@ -6,7 +6,7 @@ from config.errors import UserError
 
 
 class CommandError(UserError):
-    """A command was not carried out; the client gets the text in its answer, and nothing else ends.
+    """A command was not carried out; the client gets the text in its answer, and the connection stays open.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Handlers of the commands that are carried out at once or by the next cycle.
 
-Everything that moves the robot or changes its map becomes an input of the next cycle. Only HALT goes out at once.
+A command that moves the robot or changes its map becomes an input of the next cycle. Only HALT is sent at once.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def set_parameter(call: Call, change: SetParameter) -> list[dict[str, Any]]:
 
 
 def undo_parameter(call: Call, _: NoArguments) -> dict[str, Any] | list[dict[str, Any]]:
-    """Take the last change of settings back; return the value that changed, or the values."""
+    """Undo the last change of settings; return the values that changed."""
     rows = _changed_values(call.context.tuning.undo())
     return rows[0] if len(rows) == 1 else rows
 

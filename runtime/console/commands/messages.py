@@ -51,7 +51,7 @@ BOUNDS: Final[Mapping[str, Any]] = MappingProxyType({
 
 @dataclass(frozen=True, slots=True)
 class NoArguments:
-    """The command's name says it all."""
+    """The arguments of a command that has none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +144,7 @@ class Message(NamedTuple):
 
 
 class MalformedMessage(UserError):  # noqa: N818 - names the message, which the caller answers
-    """A message that is no command of the console.
+    """A message that is not a command of the console.
 
     Parameters
     ----------

@@ -55,7 +55,7 @@ class FramePublisher:
     Attributes
     ----------
     failure
-        The error that ended the frames; None while they go on.
+        The error that ended the frames; None while they continue.
     """
 
     def __init__(

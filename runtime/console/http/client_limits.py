@@ -17,7 +17,7 @@ LOG_LINES_BURST: Final = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one client may do, and all of them together."""
+    """The limits of one client, and of all clients together."""
 
     clients: int = 16
     """Pages open at a time."""
@@ -34,7 +34,7 @@ class Limits:
 
 
 class TokenBucket:
-    """Limits a rate: so many events a second on average, and so many at once.
+    """Limits a rate of events, on average and in a burst.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class TokenBucket:
         self._updated_s: float | None = None
 
     def take(self, host_s: float) -> bool:
-        """Take a token and return True; return False if there is none."""
+        """Take a token and return True; return False if no token is left."""
         if self._updated_s is not None:
             added = self._rate_per_s * max(0.0, host_s - self._updated_s)
             self._tokens = min(self._burst, self._tokens + added)

@@ -43,7 +43,7 @@ WRONG_TOKEN: Final = "a wrong token, or none"  # noqa: S105 - a text
 
 @dataclass(frozen=True, slots=True)
 class ServerContext:
-    """What the server serves, and whom it calls."""
+    """The content that the server serves, and its callbacks."""
 
     auth: Auth
     hub: ClientHub
