@@ -1,7 +1,7 @@
 """Loading of settings from files, names and `--set`: returns valid settings or raises a ConfigError.
 
 Layers, the lower first: the robot file, the run file, single settings from the command line. The world and the
-models are files of their own; the run file names them.
+models are separate files that the run file names.
 """
 
 from __future__ import annotations

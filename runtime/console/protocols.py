@@ -24,7 +24,7 @@ class Robot(Protocol):
     """The robot's process, as far as commands act on it."""
 
     def request(self, request: Request) -> None:
-        """Pass a change of mode to the next cycle; HALT goes out at once."""
+        """Pass a change of mode to the next cycle; HALT is sent at once."""
 
     def drive_request(self, drive_request: DriveRequest) -> None:
         """Pass a drive request to the next cycle; the newest counts."""
@@ -52,7 +52,7 @@ class Run(Robot, Protocol):
 
     @property
     def name(self) -> str | None:
-        """What the robot calls itself, None until it has answered."""
+        """The robot's name as it reports it, None until it has answered."""
 
 
 class Viewer(Protocol):
@@ -60,7 +60,7 @@ class Viewer(Protocol):
 
     @property
     def is_gone(self) -> bool:
-        """Whether it has left."""
+        """Whether it has disconnected."""
 
     def switch(self, *, live: bool) -> None:
         """Show the run itself from now on, or only the frames given to `show`."""
@@ -108,10 +108,10 @@ class ReplayControl(Protocol):
         """Show the client the run itself again."""
 
     def leave(self, viewer: Viewer) -> None:
-        """End what is shown to a client that is gone."""
+        """End the recording shown to a disconnected client."""
 
     async def report(self) -> bytes:
         """Return the report of the run so far, as an HTML page."""
 
     async def close(self) -> None:
-        """End everything that is shown."""
+        """End all recordings that are shown."""

@@ -60,7 +60,7 @@ class DriveResult:
 
 
 def validate(drive_request: DriveRequest) -> str | None:
-    """Return why a drive request is invalid, None where it is valid."""
+    """Return why a drive request is invalid, None if it is valid."""
     match drive_request:
         case Goal(x, y):
             if not (abs(x) <= COORDINATE_MAX_M and abs(y) <= COORDINATE_MAX_M):

@@ -17,7 +17,7 @@ UNDO_MAX: Final = 100
 
 PrepareSettings: TypeAlias = Callable[[Settings, Settings], Awaitable[str | None]]
 """Prepares this process for a change from the first settings to the second (`runtime.support.kernel_loader`);
-returns why that is impossible, None where the change can be applied."""
+returns why that is impossible, None if the change can be applied."""
 
 
 class LiveSettings:

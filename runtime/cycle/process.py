@@ -155,7 +155,7 @@ class RobotProcess:
         return True
 
     def evidence(self, number: int) -> Evidence | None:
-        """Return the evidence for and against an object, None where there is no such object."""
+        """Return the evidence for and against an object, None if it does not exist."""
         return self._state.perception.evidence(number)
 
     @property

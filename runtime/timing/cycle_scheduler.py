@@ -79,7 +79,7 @@ class CycleScheduler:
         self._waker.wake()
 
     async def wait(self) -> ClockSample | None:
-        """Sleep until the next cycle is due and return the clocks; None where `wake` ended the sleep before."""
+        """Sleep until the next cycle is due and return the clocks; None if `wake` ended the sleep early."""
         pacer = self._started()
         await self._waker.until(pacer.deadline_s)
         return None if self._clock.expect(pacer.deadline_s) > 0.0 else self._read()

@@ -259,7 +259,7 @@ class TimingMonitor:
 
 
 def _suspended_by(begin: ClockSample, end: ClockSample) -> str | None:
-    """Return what had the time between two samples, None where this thread had most of it."""
+    """Return what used the time between two samples, None if this thread used most of it."""
     took_s = end.host_s - begin.host_s
     if end.thread_s - begin.thread_s > MOST * took_s:
         return None

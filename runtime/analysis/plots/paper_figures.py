@@ -62,7 +62,7 @@ class Canvas:
 
 
 def paper_figures(timeline: Timeline) -> tuple[int, int, int, int] | None:
-    """Return the numbers of the paper's figures of the same scene; None if there are none."""
+    """Return the numbers of the paper's figures of the same scene; None if the paper does not show it."""
     for name, first in (("hallway", 6), ("irregular", 10)):
         if timeline.world is not None and timeline.world == load_world(name):
             return (first, first + 1, first + 2, first + 3)

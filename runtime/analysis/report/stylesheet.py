@@ -1,4 +1,4 @@
-"""The style of the page: light, dark, printed, and on a phone."""
+"""The stylesheet of the report page: for light and dark screens, print, and phones."""
 
 from __future__ import annotations
 

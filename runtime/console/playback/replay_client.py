@@ -244,7 +244,7 @@ class ReplayClient:
         viewer.switch(live=True)
 
     def leave(self, viewer: Viewer) -> None:
-        """End the worker of a client that is gone."""
+        """End the worker of a disconnected client."""
         task = asyncio.get_running_loop().create_task(self._close(viewer), name="replay close")
         self._closing.add(task)
         task.add_done_callback(self._closing.discard)

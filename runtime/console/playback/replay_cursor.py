@@ -46,7 +46,7 @@ class _Index:
 
 
 class ReplayCursor:
-    """Replays a recording from anywhere to anywhere.
+    """Replays a recording between any two positions.
 
     Parameters
     ----------

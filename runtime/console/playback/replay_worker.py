@@ -1,7 +1,7 @@
-"""The worker process that replays a recording for one client: commands come in as lines, frames go out.
+"""The worker process that replays a recording for one client: it reads commands as lines and writes frames.
 
-The robot's process starts it at low priority. A seek is done cycle by cycle,
-and the next command is read between any two cycles, so dragging a slider costs one seek, not one for each position.
+The robot's process starts it at low priority. A seek is done cycle by cycle, and the next command is read between any
+two cycles, so dragging a slider costs one seek, not one for each position.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ ANSWER, FRAME = b"a", b"f"
 
 
 class PlaybackPosition(NamedTuple):
-    """Where in the recording a frame is from."""
+    """The position of a frame in the recording."""
 
     s: float
     """After the first cycle."""
@@ -72,7 +72,7 @@ class MakeFrameMaker(Protocol):
 
 
 class ReplayWorker:
-    """Plays a recording as commands ask.
+    """Plays a recording under the control of commands.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class ReplayWorker:
         self._shown_s = -math.inf
 
     def execute(self, command: dict[str, Any]) -> None:
-        """Begin what a command asks for: seek to `s`, play at `speed` (0 pauses), or step by so many `cycles`.
+        """Begin to execute a command: seek to `s`, play at `speed` (0 pauses), or step by so many `cycles`.
 
         Raises
         ------
