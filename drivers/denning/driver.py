@@ -8,8 +8,8 @@ from collections import deque
 from config.robot import RingConfig, RobotConfig
 from drivers.denning import diagnostics
 from drivers.denning.codec import Decoder, encode
-from drivers.denning.frames import Ack, Drive, Echo, Frame, Halt, Hello, Ident, Nak, NakCode, Odom, Pattern, Release
-from drivers.denning.pending_command import PendingCommand
+from drivers.denning.frames import Ack, Drive, Echo, Frame, Hello, Ident, Nak, NakCode, Odom
+from drivers.denning.pending_command import PendingCommand, pending_command
 from drivers.denning.pose_stamping import PoseStamper
 from drivers.denning.robot_clock import Jump
 from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout
@@ -17,8 +17,6 @@ from drivers.denning.wire_units import identity_of, to_wire, wire_pattern
 from drivers.driver import LineState, Received
 from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
 
-_HELLO_PERIOD_S = 0.5
-"""Time between HELLOs to a robot that does not answer or is the wrong one, s: seldom enough not to disturb it."""
 _UNACKNOWLEDGED_SHARE = 0.75
 """DRIVEs unacknowledged for this share of the longest silence are not received; below 1, as cycles take time."""
 _MISSED_STEPS_MAX = 2
@@ -268,19 +266,8 @@ class DenningDriver:
 
     def _queue(self, name: str) -> None:
         """Queue a command; with the usual number of tries, or without limit if the robot does not answer anyway."""
-        link = self._config.link
         without_limit = self._state in (LineState.DOWN, LineState.CLOSED)
-        tries = None if without_limit else link.tries
-        match name:
-            case "HALT":
-                command = PendingCommand(Halt, link.reply_timeout_s, tries)
-            case "RELEASE":
-                command = PendingCommand(Release, link.reply_timeout_s, tries)
-            case "HELLO":
-                command = PendingCommand(Hello, _HELLO_PERIOD_S if without_limit else link.reply_timeout_s, tries)
-            case _:
-                command = PendingCommand(lambda seq: Pattern(seq, *self._pattern), link.reply_timeout_s, tries)
-        self._commands[name] = command
+        self._commands[name] = pending_command(name, self._pattern, self._config.link, without_limit=without_limit)
 
     def _start_handshake(self) -> None:
         self._state = LineState.HANDSHAKE

@@ -6,8 +6,12 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from drivers.denning.frames import HostFrame
+from config.robot import LinkConfig
+from drivers.denning.frames import Halt, Hello, HostFrame, Pattern, Release
+from drivers.denning.wire_units import WirePattern
 
+_HELLO_PERIOD_S = 0.5
+"""Time between HELLOs to a robot that does not answer or is the wrong one, s: seldom enough not to disturb it."""
 _SEQS_KEPT = 8
 """Tries whose late answers still count; far fewer than the 256 after which sequence numbers repeat."""
 
@@ -55,3 +59,30 @@ class PendingCommand:
             return True
         self.due = True
         return False
+
+
+def pending_command(name: str, pattern: WirePattern, link: LinkConfig, *, without_limit: bool) -> PendingCommand:
+    """Return the command of a name, not yet sent.
+
+    Parameters
+    ----------
+    name : str
+        HALT, RELEASE, HELLO or PATTERN.
+    pattern : WirePattern
+        The firing pattern that PATTERN sets.
+    link : LinkConfig
+        Gives the time between tries and their number.
+    without_limit : bool
+        Never give up; for a robot that does not answer anyway.
+    """
+    tries_max = None if without_limit else link.tries
+    match name:
+        case "HALT":
+            return PendingCommand(Halt, link.reply_timeout_s, tries_max)
+        case "RELEASE":
+            return PendingCommand(Release, link.reply_timeout_s, tries_max)
+        case "HELLO":
+            every_s = _HELLO_PERIOD_S if without_limit else link.reply_timeout_s
+            return PendingCommand(Hello, every_s, tries_max)
+        case _:
+            return PendingCommand(lambda seq: Pattern(seq, *pattern), link.reply_timeout_s, tries_max)
