@@ -275,7 +275,7 @@ class ConsoleConfig(Strict):
 class Settings(RobotConfig):
     """All settings of one run: the robot's sections first, then models, world, perception and behaviours."""
 
-    models: TomlList[ModelConfig] = Field(min_length=1)
+    models: TomlList[ModelConfig] = Field(min_length=1, max_length=60)
     """The objects to recognise."""
     world: WorldConfig | None = None
     """The world of the emulator, which runs if no port is given."""

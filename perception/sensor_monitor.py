@@ -30,17 +30,10 @@ from config.robot import RingConfig
 from drivers.messages import Firing
 from perception.kernel import Floats, Ints
 from perception.records import records, zeros
+from perception.sensor_memory import SETS_MAX, RingMemory, SensorMemory
 from perception.sensor_mounts import mounts_array
 from perception.sensor_report import SensorReport, describe_fault
-from perception.sensor_tests import (
-    FAULTS_CHANGED,
-    LESS_POSSIBLE,
-    LESS_TRUSTED,
-    SETS_MAX,
-    RingMemory,
-    SensorMemory,
-    check_firing,
-)
+from perception.sensor_tests import FAULTS_CHANGED, LESS_POSSIBLE, LESS_TRUSTED, check_firing
 
 NEIGHBOUR_MAX_RAD: Final = math.radians(31.0)
 """Largest angle between neighbours' axes, two places of a ring of 24 and some slack; beyond it sensors see different

@@ -7,20 +7,20 @@ evidence: the path of the base, the neighbours' readings in the meantime, and th
 from __future__ import annotations
 
 import math
-from typing import Annotated, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from perception.kernel import Floats, Ints, kernel
-from perception.records import Record, Records
+from perception.records import Records
+from perception.sensor_crosstalk import count_short_readings, is_doubtful
+from perception.sensor_memory import RingMemory, SensorMemory
 from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK
 
 # The thresholds below were tuned on the simulated halls of tests/perception/test_sensor_monitor.py: no healthy sensor
 # is masked in any hall, and every faulty one is found.
 
-SETS_MAX: Final = 32
-"""Sets of sensors that fire together that are distinguished; a firing pattern has at most 24."""
 APPROACH_MIN_M: Final = 1.0
 """Stuck: the base has come at least this much nearer to the reflecting surface, wherever in the beam it is, m."""
 EQUAL_READINGS_MIN: Final = 20
@@ -40,88 +40,18 @@ NEAR_ECHO_SHARE: Final = 0.5
 """Silent: near echoes of either neighbour for each firing without an echo."""
 LEAP_M: Final = 0.3
 """A change of the reading by more than this is a leap, m."""
-SHORT_M: Final = 0.15
-"""Crosstalk: a reading is short if it is below those before and after it by this, m, …"""
-SHORT_SHARE: Final = 0.05
-"""… and by this share of them."""
 REGULARITY_GAIN: Final = 0.05
 """Weight of the newest firing in the regularity of the firing pattern."""
 REGULARITY_MIN: Final = 0.8
 """Below this regularity the sets do not recur, and crosstalk is not tested."""
-SHORT_READINGS_MAX: Final = 8.0
-"""Short readings that are crosstalk; each other reading subtracts two."""
 RECOVERY_READINGS: Final = 5
 """Consecutive readings away from the stuck value that clear a stuck sensor."""
+
 MISSED_FIRINGS_MAX: Final = 72
 """Firings of the ring without a reading that make a sensor failing: three rounds of the longest pattern."""
 
 FAULTS_CHANGED, LESS_TRUSTED, LESS_POSSIBLE = 1, 2, 4
 """Bits of `check_firing`'s result: a fault began or ended; readings are not trusted; readings are masked."""
-
-
-class NeighbourCounts(Record):
-    """A sensor's running counts, against which its neighbours are compared."""
-
-    changes: int
-    """Changes of the reading beyond the tolerance."""
-    leaps: int
-    """Changes of the reading by more than `LEAP_M`."""
-    near_echoes: int
-    """Echoes nearer than the near limit."""
-
-
-class SensorMemory(Record):
-    """What is remembered of one sensor."""
-
-    readings: int
-    """Readings since the start or the last reset."""
-    last_m: float
-    """The last reading, m."""
-    before_last_m: float
-    last_set: int
-    """The set it fired in at the last reading."""
-    before_last_set: int
-    last_x: float
-    """Place of the ring at the last reading, m."""
-    last_y: float
-    counts: NeighbourCounts
-    missed: int
-    """Firings of the ring since the last reading."""
-    run_m: float
-    """The run of equal readings: its value, m."""
-    run_firing: int
-    """The firing of the ring in which it began."""
-    run_length: int
-    """Its readings."""
-    run_x: float
-    """Pose of the ring when it began, m and rad."""
-    run_y: float
-    run_yaw: float
-    run_neighbours: Annotated[Records[NeighbourCounts], 2]
-    """The neighbours' counts when it began."""
-    stuck_m: float
-    """The value it is stuck at, m."""
-    off_stuck: int
-    """Consecutive readings away from that value."""
-    faults: int
-    """Fault bits of `perception.sensor_report`."""
-    short_readings: Annotated[Floats, SETS_MAX]
-    """For each set, short readings less those that were not."""
-    is_crossed: Annotated[Ints, SETS_MAX]
-    """For each set, 1 where the sensor is masked for crosstalk."""
-
-
-class RingMemory(Record):
-    """What is remembered of the ring as a whole."""
-
-    firings: int
-    sets_seen: int
-    """Different sets met so far; a set that was replaced and recurs counts again."""
-    x: float
-    """Place of the last firing, m."""
-    y: float
-    regularity: float
-    """Recent share of firings whose set was known."""
 
 
 @kernel
@@ -293,55 +223,6 @@ def is_silent(i: int, x: float, y: float, neighbours: Ints, sensors: Records[Sen
         return False
     _, _, near_echoes = neighbour_counts(i, neighbours, sensors, False)  # noqa: FBT003 - kernels take no keywords
     return bool(near_echoes >= NEAR_ECHO_SHARE * c.run_length)
-
-
-@kernel
-def count_short_readings(c: SensorMemory, r: float, fired_set: int) -> None:
-    """Compare the last reading with `r` and with the one before it, if those were fired in other sets.
-
-    Borenstein & Koren 1995 (EERUF): a true echo does not depend on which other sensors fired.
-
-    Parameters
-    ----------
-    c : SensorMemory
-        The sensor. Its counts of short readings and its crosstalk flags are updated.
-    r : float
-        The new reading, m.
-    fired_set : int
-        The set it was fired in.
-    """
-    middle = c.last_set
-    if c.readings < 2 or middle in (fired_set, c.before_last_set):
-        return
-    if c.last_m < min(r, c.before_last_m) * (1.0 - SHORT_SHARE) - SHORT_M:
-        c.short_readings[middle] = min(c.short_readings[middle] + 1.0, 2.0 * SHORT_READINGS_MAX)
-    else:
-        c.short_readings[middle] = max(c.short_readings[middle] - 2.0, 0.0)
-    if c.short_readings[middle] >= SHORT_READINGS_MAX:
-        c.is_crossed[middle] = 1
-    elif c.short_readings[middle] == 0.0:
-        c.is_crossed[middle] = 0
-
-
-@kernel
-def is_doubtful(c: SensorMemory, r: float, x: float, y: float, fired_set: int) -> bool:
-    """Return whether a reading is shorter than the last one in another set by more than the base has moved since.
-
-    Parameters
-    ----------
-    c : SensorMemory
-        The sensor, before the reading is entered.
-    r : float
-        The new reading, m.
-    x, y : float
-        Place of the ring now, in the odometry's frame, m.
-    fired_set : int
-        Index of the set that the reading was fired in.
-    """
-    if c.readings < 1 or c.last_set == fired_set:
-        return False
-    moved = math.hypot(x - c.last_x, y - c.last_y)
-    return bool(r < c.last_m * (1.0 - SHORT_SHARE) - SHORT_M - moved)
 
 
 @kernel

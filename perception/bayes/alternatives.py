@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.elements import Reading
 from perception.bayes.noise_estimation import noise_variance
 from perception.bayes.parameters import SettingsRecord
 from perception.bayes.range_fit import fit_circle, fit_line, score_circle, score_line
-from perception.bayes.state import Reading, StateRecord
+from perception.bayes.state import StateRecord
 from perception.kernel import kernel
 from perception.records import Records
 

@@ -16,6 +16,7 @@ from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import BayesConfig, PerceptionConfig
 from drivers.messages import Firing
+from perception.bayes.elements import BUCKET_CAPACITY, MAX_POLYGONS
 from perception.bayes.evidence import evidence_of
 from perception.bayes.kernel_settings import apply_config, apply_library, circle_models, copied, make_settings
 from perception.bayes.map_edits import edit_memory, row_of
@@ -32,7 +33,7 @@ from perception.bayes.pinned_segments import Pins
 from perception.bayes.polygon_tracks import polygon_quantum
 from perception.bayes.refine import quantum
 from perception.bayes.segment_list import drawn, mapped_segments
-from perception.bayes.state import BUCKET_CAPACITY, FREE, MAX_POLYGONS, Memory
+from perception.bayes.state import FREE, Memory
 from perception.bayes.state_migration import migrate
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import Edit, Evidence, Segments

@@ -14,9 +14,10 @@ from typing import Final
 
 import numpy as np
 
+from perception.bayes.elements import GRID_CELLS, Reading
 from perception.bayes.likelihood import level_of
 from perception.bayes.parameters import TABLE_BINS, SettingsRecord
-from perception.bayes.state import GRID_CELLS, CirclePosterior, LinearReading, Reading
+from perception.bayes.scratch import CirclePosterior, LinearReading
 from perception.kernel import Floats, kernel
 from perception.records import Records
 

@@ -11,11 +11,13 @@ import math
 from typing import Final
 
 from perception.bayes.alternatives import SOFT, bearing_sum
+from perception.bayes.elements import Reading
 from perception.bayes.likelihood import level_of, log_likelihood
 from perception.bayes.parameters import TABLE_BINS, SettingsRecord
 from perception.bayes.range_fit import fit_line
 from perception.bayes.reservoir import copy_reading
-from perception.bayes.state import CornerFit, LineFit, Reading, StateRecord
+from perception.bayes.scratch import CornerFit, LineFit
+from perception.bayes.state import StateRecord
 from perception.kernel import kernel
 from perception.records import Records
 

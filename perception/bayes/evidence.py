@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from perception.bayes.elements import READINGS_MAX, Reading
 from perception.bayes.noise_estimation import noise_variance
 from perception.bayes.occlusion import is_relevant
 from perception.bayes.parameters import SettingsRecord
 from perception.bayes.polygon_likelihood import score_polygon
 from perception.bayes.range_fit import FAR, score_circle
 from perception.bayes.reservoir import copy_reservoir
-from perception.bayes.state import READINGS_MAX, CircleTracks, Memory, Reading, Score, StateRecord
+from perception.bayes.scratch import Score
+from perception.bayes.state import CircleTracks, Memory, StateRecord
 from perception.edits import Arc, Evidence
 from perception.kernel import Floats, kernel
 from perception.records import Records, records, zeros

@@ -116,7 +116,7 @@ def _enter_polygon(outline: PolygonModel, model: ModelConfig) -> None:
     for k, (tangent, length) in enumerate(zip(tangents.tolist(), sides[:, 3].tolist(), strict=True)):
         outline.sides[k].tangent_x, outline.sides[k].tangent_y = tangent
         outline.sides[k].length = length
-    # The origin may lie on a side, or outside of a hollow outline; then its width tells how large it is.
+    # The origin may lie on a side, or outside of a hollow outline; then its width gives its size.
     nearest = float(np.abs(x * tangents[:, 1] - y * tangents[:, 0]).min())
     outline.inner_radius_m = max(nearest, least_half_width(corners))
     outline.outer_radius_m = float(np.hypot(corners[:, 0], corners[:, 1]).max())

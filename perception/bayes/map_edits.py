@@ -12,10 +12,12 @@ from typing import Final
 
 import numpy as np
 
+from perception.bayes.elements import HISTORY, REJECTIONS_MAX
 from perception.bayes.manual_tracks import leave_job, move_circle, move_polygon, place_circle, place_polygon
 from perception.bayes.parameters import SettingsRecord
 from perception.bayes.pinned_segments import Pins, delete
-from perception.bayes.state import CONFIRMED, FREE, HISTORY, POLYGON, REJECTIONS_MAX, Memory
+from perception.bayes.scratch import POLYGON
+from perception.bayes.state import CONFIRMED, FREE, Memory
 from perception.bayes.track_initiation import EVIDENCE_MIN_NAT
 from perception.edits import (
     ClearMap,

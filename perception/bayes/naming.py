@@ -10,18 +10,10 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
+from perception.bayes.elements import MAX_POLYGONS, POLYGON_BIN_CAPACITY
 from perception.bayes.parameters import SettingsRecord
 from perception.bayes.range_fit import FAR
-from perception.bayes.state import (
-    ESTABLISHED,
-    FREE,
-    MAX_POLYGONS,
-    POLYGON_BIN_CAPACITY,
-    CircleTrack,
-    CircleTracks,
-    PolygonTrack,
-    StateRecord,
-)
+from perception.bayes.state import ESTABLISHED, FREE, CircleTrack, CircleTracks, PolygonTrack, StateRecord
 from perception.kernel import Ints, kernel
 from perception.records import Record, Records
 

@@ -12,10 +12,11 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
+from perception.bayes.elements import Reading
 from perception.bayes.likelihood import level_of, log_likelihood
 from perception.bayes.parameters import NOISES, Settings
 from perception.bayes.range_fit import FAR
-from perception.bayes.state import ESTABLISHED, CircleTrack, Reading, State
+from perception.bayes.state import ESTABLISHED, CircleTrack, State
 from perception.kernel import Floats, kernel
 from perception.records import Records
 

@@ -9,26 +9,17 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
+from perception.bayes.elements import HISTORY, Reading
 from perception.bayes.noise_estimation import add_roughness, choose_noise, noise_variance, tolerance_m
+from perception.bayes.pairing import make_segments
 from perception.bayes.parameters import SettingsRecord
 from perception.bayes.polygon_association import associate_polygons
 from perception.bayes.polygon_initiation import request_polygon
 from perception.bayes.range_fit import FAR
 from perception.bayes.reservoir import copy_reading, keep_reading
-from perception.bayes.segment_pairs import add_to_map, tangent
-from perception.bayes.state import (
-    ESTABLISHED,
-    FREE,
-    HISTORY,
-    PROPOSED,
-    TENTATIVE,
-    UNEXPLAINED,
-    CircleTracks,
-    PairSegment,
-    Reading,
-    StateRecord,
-)
-from perception.bayes.track_initiation import CELL_M, initiate_circle
+from perception.bayes.scratch import PROPOSED, UNEXPLAINED, PairSegment
+from perception.bayes.state import ESTABLISHED, FREE, TENTATIVE, CircleTracks, StateRecord
+from perception.bayes.track_initiation import initiate_circle
 from perception.bayes.track_selection import is_waiting
 from perception.bayes.walls import update_lines
 from perception.kernel import Floats, kernel
@@ -36,21 +27,13 @@ from perception.records import Records
 
 COORDINATE_MAX_M: Final = 0.5 * FAR
 """A place farther than this from the odometry's origin is invalid: ranges as long as this mean silence."""
+
 STILL_M: Final = 0.05 * FOOT_M
 STILL_COS: Final = 0.9998
 """A sensor that has moved less than this, turned less than this (1°), and hears what it heard says nothing new."""
 ASSOCIATION_MARGIN_M: Final = 0.004 * FOOT_M
 KEEPING_MARGIN_M: Final = 0.01 * FOOT_M
 """How far outside a beam a centre may lie for the reading to be associated, and kept."""
-BASELINE_M: Final = 0.5 * FOOT_M
-"""Shortest baseline of one sensor; the next ones are twice and four times this."""
-BASELINES: Final = 3
-BASELINE_MAX_M: Final = 2.6 * FOOT_M
-NEIGHBOUR_MIN_M: Final = 0.3 * FOOT_M
-NEIGHBOUR_MAX_M: Final = 1.0 * FOOT_M
-"""Baselines of neighbours that did not fire together."""
-MAPPED_MIN_M: Final = 0.2 * FOOT_M
-"""A shorter segment's direction is too poor for the relaxation."""
 TRIES: Final = 2
 """Hypotheses that are worked out in a firing, at most."""
 
@@ -181,135 +164,6 @@ def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
                 track.unseen += 1
                 track.idle_firings = 0
                 track.final_refinements = p[0].final_refinements
-
-
-@kernel
-def add_pair(s: StateRecord, p: SettingsRecord, i: int, other: Reading, var: float, made: int) -> int:
-    """Make a segment of fired reading `i` and another one; return how many segments there are then.
-
-    Parameters
-    ----------
-    s, p
-        Memory, whose scratch takes the segment, and settings.
-    i : int
-        The fired reading.
-    other : Reading
-        The other one.
-    var : float
-        Variance of a range, m².
-    made : int
-        Segments so far.
-    """
-    segments = s[0].scratch.segments
-    if other.range_m >= FAR or made >= len(segments):
-        return made
-    if not tangent(other, s[0].scratch.fired[i], p[0].cos_half_angle, var, segments[made]):
-        return made
-    segments[made].reading = i
-    return made + 1
-
-
-@kernel
-def pair_in_time(s: StateRecord, p: SettingsRecord, i: int, time_s: float, var: float, made: int) -> int:
-    """Pair a reading with its own sensor's history, at three baselines: a short one is early, a long one sure.
-
-    Parameters
-    ----------
-    s, p, i, var, made
-        As for `add_pair`.
-    time_s : float
-        Time of the firing.
-    """
-    q = s[0].scratch.fired[i]
-    sensor = s[0].sensors[s[0].scratch.fired_sensors[i]]
-    step = 0
-    for back in range(min(sensor.kept, HISTORY)):
-        at = (sensor.kept - 1 - back) % HISTORY
-        old = sensor.history[at]
-        if time_s - sensor.times_s[at] > p[0].pair_gap_s:
-            break
-        base = math.hypot(q.x - old.x, q.y - old.y)
-        if base < BASELINE_M * (1 << step):
-            continue
-        if base > BASELINE_MAX_M:
-            break
-        step += 1
-        made = add_pair(s, p, i, old, var, made)
-        if step == BASELINES:
-            break
-    return made
-
-
-@kernel
-def pair_in_ring(s: StateRecord, p: SettingsRecord, i: int, m: int, time_s: float, var: float, made: int) -> int:
-    """Pair a reading with its neighbours' in the ring: of this firing, else their newest.
-
-    Parameters
-    ----------
-    s, p, i, time_s, var, made
-        As for `pair_in_time`.
-    m : int
-        Fired readings.
-    """
-    fired, sensors = s[0].scratch.fired, s[0].scratch.fired_sensors
-    q = fired[i]
-    for side in (-1, 1):
-        neighbour = (sensors[i] + side) % s[0].sensor_count
-        other = s[0].sensors[neighbour]
-        if other.kept == 0:
-            continue
-        has_fired = False
-        for k in (i - 1, i + 1, 0, m - 1):
-            if 0 <= k < m and sensors[k] == neighbour:
-                if side == 1:  # the other one makes the pair from its side
-                    made = add_pair(s, p, i, fired[k], var, made)
-                has_fired = True
-                break
-        if not has_fired:
-            at = (other.kept - 1) % HISTORY
-            old = other.history[at]
-            base = math.hypot(q.x - old.x, q.y - old.y)
-            if time_s - other.times_s[at] < p[0].pair_gap_s and NEIGHBOUR_MIN_M < base < NEIGHBOUR_MAX_M:
-                made = add_pair(s, p, i, old, var, made)
-    return made
-
-
-@kernel
-def map_segment(s: StateRecord, segment: PairSegment, time_s: float) -> None:
-    """Put a segment into the outline map, under the next number."""
-    s[0].segments_numbered += 1
-    add_to_map(
-        s[0].buckets, CELL_M, segment.x, segment.y, segment.normal_x, segment.normal_y, s[0].segments_numbered, time_s
-    )
-
-
-@kernel
-def make_segments(s: StateRecord, p: SettingsRecord, m: int, time_s: float) -> int:
-    """Pair this firing's echoes in time and in the ring, and map the segments; return how many there are.
-
-    Parameters
-    ----------
-    s, p
-        Memory, updated, and settings.
-    m : int
-        Fired readings.
-    time_s : float
-        Time of the firing.
-    """
-    var0, rel2 = noise_variance(s, p)
-    scratch = s[0].scratch
-    made = 0
-    for i in range(m):
-        r = scratch.fired[i].range_m
-        if r < FAR:
-            var = var0 + rel2 * r * r
-            made = pair_in_time(s, p, i, time_s, var, made)
-            made = pair_in_ring(s, p, i, m, time_s, var, made)
-    for k in range(made):
-        if scratch.segments[k].length > MAPPED_MIN_M:
-            map_segment(s, scratch.segments[k], time_s)
-    s[0].segments_made += made
-    return made
 
 
 @kernel

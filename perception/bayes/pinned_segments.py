@@ -13,8 +13,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from perception.bayes.elements import BUCKET_CAPACITY, MappedSegment
 from perception.bayes.segment_pairs import add_to_map
-from perception.bayes.state import BUCKET_CAPACITY, MappedSegment, Memory, StateRecord
+from perception.bayes.state import Memory, StateRecord
 from perception.bayes.track_initiation import CELL_M
 from perception.kernel import Ints, kernel
 from perception.records import zeros

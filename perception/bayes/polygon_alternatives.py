@@ -7,20 +7,12 @@ from typing import Final
 
 from config.units import FOOT_M
 from perception.bayes.alternatives import SOFT
+from perception.bayes.elements import MAX_LINES, Reading
 from perception.bayes.noise_estimation import noise_variance, tolerance_m
 from perception.bayes.parameters import SettingsRecord
 from perception.bayes.range_fit import fit_circle, score_circle
 from perception.bayes.refine import bounded_exp
-from perception.bayes.state import (
-    ESTABLISHED,
-    FREE,
-    MAX_LINES,
-    CircleTracks,
-    Line,
-    PolygonTrack,
-    Reading,
-    StateRecord,
-)
+from perception.bayes.state import ESTABLISHED, FREE, CircleTracks, Line, PolygonTrack, StateRecord
 from perception.bayes.walls import off_and_along, reaches
 from perception.kernel import kernel
 from perception.records import Records
@@ -71,7 +63,7 @@ def count_on_line(readings: Records[Reading], line: Line, cos_may: float, tight:
 
 @kernel
 def is_part_of_wall(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> bool:
-    """Return whether a track is a stretch of a wall: lies in one that explains the job's readings as well."""
+    """Return whether a track is a part of a wall: lies in one that explains the job's readings as well."""
     inner = p[0].polygons[track.model].inner_radius_m
     readings = s[0].job_readings[: s[0].job.reading_count]
     var0, rel2 = noise_variance(s, p)

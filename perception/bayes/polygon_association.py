@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.elements import MAX_POLYGONS, Reading
 from perception.bayes.noise_estimation import noise_variance, tolerance_m
 from perception.bayes.parameters import PolygonSide, SettingsRecord
 from perception.bayes.polygon_initiation import WHOLE
@@ -12,16 +13,8 @@ from perception.bayes.polygon_job import cost
 from perception.bayes.polygon_likelihood import predict
 from perception.bayes.polygon_readings import bears_on_polygon
 from perception.bayes.reservoir import copy_reading, keep_reading
-from perception.bayes.state import (
-    ESTABLISHED,
-    FREE,
-    MAX_POLYGONS,
-    POLYGON,
-    CircleTracks,
-    PolygonTrack,
-    Reading,
-    StateRecord,
-)
+from perception.bayes.scratch import POLYGON
+from perception.bayes.state import ESTABLISHED, FREE, CircleTracks, PolygonTrack, StateRecord
 from perception.kernel import kernel
 from perception.records import Records
 
@@ -110,8 +103,8 @@ def hides(q: Reading, track: PolygonTrack, inner: float, other: PolygonTrack, ot
     if d == 0.0:
         return False
     ahead = (dx * ex + dy * ey) / d
-    aside = abs(dx * ey - dy * ex) / d
-    return 0.0 < ahead < d and bool(aside < other_inner + 0.5 * inner)
+    across_m = abs(dx * ey - dy * ex) / d
+    return 0.0 < ahead < d and bool(across_m < other_inner + 0.5 * inner)
 
 
 @kernel

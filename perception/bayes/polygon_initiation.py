@@ -11,6 +11,7 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
+from perception.bayes.elements import ATTRACTING_MAX, MAX_POLYGONS, REQUESTS_MAX, Reading
 from perception.bayes.parameters import SettingsRecord
 from perception.bayes.polygon_job import (
     INITIATION,
@@ -22,19 +23,9 @@ from perception.bayes.polygon_job import (
 )
 from perception.bayes.polygon_readings import gather_polygon_history
 from perception.bayes.reservoir import copy_reading, keep_reading
+from perception.bayes.scratch import POLYGON
 from perception.bayes.segment_pairs import segments_near
-from perception.bayes.state import (
-    ATTRACTING_MAX,
-    ESTABLISHED,
-    FREE,
-    MAX_POLYGONS,
-    POLYGON,
-    REQUESTS_MAX,
-    TENTATIVE,
-    PolygonTrack,
-    Reading,
-    StateRecord,
-)
+from perception.bayes.state import ESTABLISHED, FREE, TENTATIVE, PolygonTrack, StateRecord
 from perception.bayes.track_initiation import CELL_M, enter_attracting, free_track, relax_hypothesis
 from perception.bayes.track_labels import assign_number, is_rejected
 from perception.kernel import kernel
@@ -43,8 +34,8 @@ from perception.records import Records
 LAY, TRY, FINE = range(3)
 """Stages of a hypothesis, values of `PolygonJob.stage`: a side is laid on the segment, tried, and the best trial is
 looked at closely."""
-GATHERING_COST: Final = 800
-"""What gathering readings costs, in the unit of `polygon_job.QUANTUM`."""
+COLLECTING_COST: Final = 800
+"""The cost of collecting readings, in the unit of `polygon_job.QUANTUM`."""
 SAME_M: Final = 0.25 * FOOT_M
 SAME_COS: Final = 0.98
 """A segment this near to another one, and this parallel, makes the same request."""
@@ -339,7 +330,7 @@ def lay_next(s: StateRecord, p: SettingsRecord) -> int:
             s, job.best.x, job.best.y, job.best.heading, FINE_STEP_M, FINE_ROUNDS, len(s[0].job_readings)
         )  # fmt: skip
         job.stage = FINE
-        return GATHERING_COST
+        return COLLECTING_COST
     shift = SHIFTS[job.next_step % len(SHIFTS)]
     face = 1.0 if k < sides else -1.0
     nx, ny = face * job.segment_normal_x, face * job.segment_normal_y
@@ -354,7 +345,7 @@ def lay_next(s: StateRecord, p: SettingsRecord) -> int:
             s, hypothesis.x, hypothesis.y, hypothesis.heading, TRIAL_STEP_M, TRIAL_ROUNDS, TRIAL_READINGS
         )  # fmt: skip
         job.stage = TRY
-    return GATHERING_COST
+    return COLLECTING_COST
 
 
 @kernel

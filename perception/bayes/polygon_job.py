@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from typing import Final
 
+from perception.bayes.elements import Pose
 from perception.bayes.parameters import SettingsRecord
 from perception.bayes.polygon_likelihood import begin_search, continue_search, score_polygon
-from perception.bayes.state import Pose, StateRecord
+from perception.bayes.state import StateRecord
 from perception.kernel import kernel
 
 QUANTUM: Final = 22_000

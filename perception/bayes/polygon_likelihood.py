@@ -4,7 +4,7 @@ Smooth sides answer like mirrors, from the foot of the perpendicular and nowhere
 nearest point in the beam, like a cone. Either rule predicts one range for each reading, which it should have or may
 have. It is not known which rule a body keeps, so it is scored under both and the two likelihoods are added: the
 choice is paid for once. To choose reading by reading whichever explains it better would give false precision, for
-there is always a pose at which a dozen accidents happen to help.
+there is always a pose at which a dozen chance agreements help.
 """
 
 from __future__ import annotations
@@ -13,10 +13,12 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
+from perception.bayes.elements import Reading
 from perception.bayes.likelihood import level_of, log_likelihood
 from perception.bayes.parameters import PolygonSide, SettingsRecord
 from perception.bayes.range_fit import DROP_NAT, DROP_SHARE
-from perception.bayes.state import PoseSearch, Reading, Score
+from perception.bayes.scratch import Score
+from perception.bayes.state import PoseSearch
 from perception.kernel import kernel
 from perception.records import Records
 
@@ -106,13 +108,13 @@ def predict(
             height = -height
             ahead = -ahead
         along = px * tx + py * ty
-        aside = ux * tx + uy * ty
+        lateral = ux * tx + uy * ty
         if 0.0 <= along <= length and height < foot and ahead >= cos_may:
             foot = height
             foot_must = ahead >= cos_must and MARGIN_M < along < length - MARGIN_M
         for end in range(2):
             across = end * length - along
-            dot = height * ahead + across * aside
+            dot = height * ahead + across * lateral
             if dot > 0.0:
                 d2 = height * height + across * across
                 if d2 < corner2 and dot * dot >= cos_may * cos_may * d2:
@@ -121,15 +123,15 @@ def predict(
                     after = k + end
                 must = must or dot * dot >= cos_must * cos_must * d2
         for hand in (-1.0, 1.0):
-            towards = ahead * cos_half - hand * aside * sin_half
+            towards = ahead * cos_half - hand * lateral * sin_half
             if towards > GRAZING_COS:
-                sideways = aside * cos_half + hand * ahead * sin_half
+                sideways = lateral * cos_half + hand * ahead * sin_half
                 if 0.0 <= along * towards + height * sideways <= length * towards:
                     edge = min(edge, height / towards)
             if not must:
-                towards = ahead * cos_must - hand * aside * sin_must
+                towards = ahead * cos_must - hand * lateral * sin_must
                 if towards > GRAZING_COS:
-                    sideways = aside * cos_must + hand * ahead * sin_must
+                    sideways = lateral * cos_must + hand * ahead * sin_must
                     must = 0.0 <= along * towards + height * sideways <= length * towards
     corner = math.sqrt(corner2)
     nearest = min(foot, corner, edge)
@@ -306,7 +308,7 @@ def continue_search(
     """Continue a search for the pose of greatest likelihood, along the body's own axes; return how many were scored.
 
     The likelihood has steps where sides begin and cease to answer, so nothing is differentiated: each axis is tried
-    both ways, and where none gains the steps shrink. A search stops where it is when its allowance is spent, and
+    both ways, and where none gains the steps shrink. A search stops where it is when its budget is spent, and
     continues from there; it is over when no round is left.
 
     Parameters

@@ -12,10 +12,11 @@ from typing import Final
 
 import numpy as np
 
+from perception.bayes.elements import LowerTriangle, Pose
 from perception.bayes.parameters import SettingsRecord
 from perception.bayes.polygon_job import cost, score_pose
 from perception.bayes.polygon_likelihood import score_polygon
-from perception.bayes.state import LatticeMoments, LowerTriangle, Pose, StateRecord
+from perception.bayes.state import LatticeMoments, StateRecord
 from perception.kernel import kernel
 
 PITCH: Final = 1.3

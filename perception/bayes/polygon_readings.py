@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
+from perception.bayes.elements import HISTORY, Reading
 from perception.bayes.parameters import SettingsRecord
 from perception.bayes.reservoir import copy_reading
-from perception.bayes.state import HISTORY, Reading, StateRecord
+from perception.bayes.state import StateRecord
 from perception.kernel import kernel
 
 

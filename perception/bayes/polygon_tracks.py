@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.elements import MAX_POLYGONS
 from perception.bayes.naming import POLYGON_PROBABILITY, is_sure_polygon
 from perception.bayes.parameters import SettingsRecord
 from perception.bayes.polygon_alternatives import compare_circles, is_part_of_wall
@@ -41,16 +42,7 @@ from perception.bayes.pose_restarts import (
     next_restart,
 )
 from perception.bayes.reservoir import copy_reservoir
-from perception.bayes.state import (
-    CONFIRMED,
-    ESTABLISHED,
-    FREE,
-    MAX_POLYGONS,
-    TENTATIVE,
-    CircleTracks,
-    PolygonTrack,
-    StateRecord,
-)
+from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, TENTATIVE, CircleTracks, PolygonTrack, StateRecord
 from perception.bayes.track_labels import drop_track, outlives
 from perception.bayes.track_selection import choose_polygon
 from perception.kernel import kernel

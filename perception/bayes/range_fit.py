@@ -11,9 +11,10 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.bayes.elements import Reading
 from perception.bayes.likelihood import level_of, log_likelihood
 from perception.bayes.parameters import Settings
-from perception.bayes.state import CircleFit, LineFit, LineScore, Reading, Score
+from perception.bayes.scratch import CircleFit, LineFit, LineScore, Score
 from perception.kernel import kernel
 from perception.records import Records
 

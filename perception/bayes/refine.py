@@ -14,6 +14,7 @@ from config.units import FOOT_M
 from perception.bayes.alternatives import SOFT, fit_other_circle, fit_other_line, score
 from perception.bayes.circle_posterior import posterior_circle
 from perception.bayes.corner_model import score_corner
+from perception.bayes.elements import MAX_LINES
 from perception.bayes.lateral_search import STEP_M, search_across
 from perception.bayes.naming import update_name
 from perception.bayes.noise_estimation import add_residuals, noise_variance
@@ -21,16 +22,7 @@ from perception.bayes.occlusion import keep_relevant
 from perception.bayes.parameters import SettingsRecord
 from perception.bayes.range_fit import fit_circle
 from perception.bayes.reservoir import copy_reservoir
-from perception.bayes.state import (
-    CONFIRMED,
-    ESTABLISHED,
-    FREE,
-    MAX_LINES,
-    TENTATIVE,
-    CircleTrack,
-    CircleTracks,
-    StateRecord,
-)
+from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, TENTATIVE, CircleTrack, CircleTracks, StateRecord
 from perception.bayes.track_initiation import LINE_MIN_M, SWITCH_NAT, VARIANCE_MAX_M2
 from perception.bayes.track_labels import drop_track, is_rejected, outlives
 from perception.bayes.track_selection import CERTAIN, UNSURE_ROOT_M, choose_circle, is_waiting

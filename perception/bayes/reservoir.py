@@ -11,8 +11,9 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
+from perception.bayes.elements import HISTORY, Reading
 from perception.bayes.parameters import Settings
-from perception.bayes.state import HISTORY, CircleTrack, PolygonTrack, Reading, State
+from perception.bayes.state import CircleTrack, PolygonTrack, State
 from perception.kernel import kernel
 from perception.records import Records
 

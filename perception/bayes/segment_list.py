@@ -7,7 +7,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.bayes.state import BUCKET_CAPACITY, Memory
+from perception.bayes.elements import BUCKET_CAPACITY
+from perception.bayes.state import Memory
 from perception.kernel import Floats
 
 SHOWN_M: Final = 0.1

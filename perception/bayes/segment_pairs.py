@@ -12,7 +12,9 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.state import BUCKET_CAPACITY, Bucket, MappedSegment, PairSegment, Reading
+from perception.bayes.elements import BUCKET_CAPACITY, MappedSegment, Reading
+from perception.bayes.scratch import PairSegment
+from perception.bayes.state import Bucket
 from perception.kernel import kernel
 from perception.records import Records
 

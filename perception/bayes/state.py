@@ -11,93 +11,40 @@ from typing import Annotated, Any, Final, TypeAlias
 import numpy as np
 
 from config.robot import SENSORS_MAX
-from perception.bayes.parameters import CIRCLES_MAX, NOISES
-from perception.kernel import Floats, Ints
+from perception.bayes.elements import (
+    ALTERNATIVES_MAX,
+    ATTRACTING_MAX,
+    BEARING_BINS,
+    BIN_CAPACITY,
+    BUCKET_CAPACITY,
+    BUCKETS,
+    HISTORY,
+    MAX_LINES,
+    MAX_POLYGONS,
+    MAX_TRACKS,
+    POLYGON_BEARING_BINS,
+    POLYGON_BIN_CAPACITY,
+    REJECTIONS_MAX,
+    REQUESTS_MAX,
+    LowerTriangle,
+    MappedSegment,
+    Pose,
+    Reading,
+)
+from perception.bayes.parameters import NOISES
+from perception.bayes.scratch import Scratch
+from perception.kernel import Floats
 from perception.records import Record, Records, records, zeros
-
-MAX_TRACKS: Final = 48
-"""Tracks of circles where the configuration says nothing else."""
-BEARING_BINS: Final = 36
-"""Bins of a track's reservoir, by the bearing from the object to the sensor: 10° each."""
-BIN_CAPACITY: Final = 20
-"""Readings in a bin; the newest takes the place of the oldest."""
-MAX_LINES: Final = 24
-HISTORY: Final = 28
-"""Readings kept of each sensor, whatever they hit."""
-READINGS_MAX: Final = BEARING_BINS * BIN_CAPACITY + 64
-"""Readings compared at a time: a reservoir's, and some more of the sensors' histories."""
-ATTRACTING_MAX: Final = 16
-"""Outline segments that may attract a hypothesis."""
-BUCKETS: Final = 4096
-"""Buckets of the hashed outline map; a power of two."""
-BUCKET_CAPACITY: Final = 8
-"""Segments in a bucket."""
-MAX_POLYGONS: Final = 24
-"""Tracks of polygons."""
-POLYGON_BEARING_BINS: Final = 24
-"""Bearing bins of a polygon's reservoir."""
-POLYGON_BIN_CAPACITY: Final = 12
-"""Readings in such a bin."""
-REJECTIONS_MAX: Final = 32
-"""Places where a user rejected an object."""
-REQUESTS_MAX: Final = 32
-"""Segments that wait for a polygon to be tried behind them, or recently did."""
-PAIRS_PER_SENSOR: Final = 8
-"""Outline segments that a reading may make."""
-ALTERNATIVES_MAX: Final = CIRCLES_MAX + 2
-"""Explanations of a circle track: radii, a line, a corner."""
-GRID_CELLS: Final = 49
-"""Cells of the grid on which a circle's posterior is added up."""
 
 FREE, TENTATIVE, ESTABLISHED = range(3)
 """Values of `Track.status`."""
 CONFIRMED: Final = 1
 PLACED: Final = 2
 """Bits of `Track.marks`: a user confirmed the object; or placed it, and the readings do not bear it out yet."""
-
-UNEXPLAINED: Final = -1
-ON_LINE: Final = -2
-PROPOSED: Final = -100
-POLYGON: Final = 1000
-"""Values of `Scratch.explained_by`: nothing; this minus k line k; a hypothesis was tried; this plus k polygon k.
-Other values are circle tracks."""
-
 START_NOISE: Final = 9
 """Index of the noise assumed at the start: σ = 0.03 ft, 0.5 %."""
 START_NOISE_NAT: Final = 6.0
 """Evidence for it at the start."""
-
-
-class Reading(Record):
-    """A raw range in the odometry frame."""
-
-    x: float
-    """The sensor's place, m."""
-    y: float
-    axis_x: float
-    """Its axis, a unit vector."""
-    axis_y: float
-    range_m: float
-    """At least `range_fit.FAR` where nothing was heard."""
-
-
-class Pose(Record):
-    """A pose: m, rad."""
-
-    x: float
-    y: float
-    heading: float
-
-
-class LowerTriangle(Record):
-    """The lower triangle of a 3 × 3 matrix over x, y and heading h."""
-
-    xx: float
-    yx: float
-    yy: float
-    hx: float
-    hy: float
-    hh: float
 
 
 class Sensor(Record):
@@ -110,19 +57,6 @@ class Sensor(Record):
     """Readings ever put there."""
     last: Reading
     """The last reading that said anything new."""
-
-
-class MappedSegment(Record):
-    """An outline segment in the map."""
-
-    x: float
-    """Its middle, m."""
-    y: float
-    normal_x: float
-    """Unit normal, away from the sensors."""
-    normal_y: float
-    number: int
-    time_s: float
 
 
 class Bucket(Record):
@@ -347,139 +281,6 @@ class PolygonJob(Record):
     """The lattice's frame: lower root of one pitch."""
     covariance: LowerTriangle
     moments: LatticeMoments
-
-
-class PairSegment(Record):
-    """An outline segment from a pair of readings."""
-
-    x: float
-    """Its middle, m."""
-    y: float
-    normal_x: float
-    normal_y: float
-    length: float
-    sigma_normal: float
-    """Standard deviation along the normal, m."""
-    sigma_direction: float
-    """Standard deviation of the direction, rad."""
-    reading: int
-    """Index of the fired reading it came from."""
-
-
-class LinearReading(Record):
-    """A reading's error near a circle, and how it changes along the axes of the posterior's frame."""
-
-    error: float
-    """m"""
-    slope_a: float
-    """Fall of the error per unit of the first axis, m."""
-    slope_b: float
-    bins_per_m: float
-    level: int
-    """Row of `Settings.table`."""
-
-
-class Score(Record):
-    """What readings say of a circle or a polygon."""
-
-    log_likelihood_ratio: float
-    hits: float
-    misses: float
-    """Readings that should have hit and passed through."""
-    near: float
-    """Readings within the gate."""
-    shorts: float
-    """Readings that ended before it."""
-    closest: float
-    """Least range of a hit, m."""
-    dispersion: float
-    """How unlike the axes are that heard it."""
-    sure_hits: float
-    """Hits that had to be; of a polygon only."""
-
-
-class LineScore(Record):
-    """What readings say of a line."""
-
-    log_likelihood_ratio: float
-    hits: float
-    misses: float
-    low: float
-    """Extent of the hits along the line, m."""
-    high: float
-
-
-class CircleFit(Record):
-    """A fitted centre and its information."""
-
-    x: float
-    y: float
-    information_xx: float
-    """1/m²"""
-    information_xy: float
-    information_yy: float
-
-
-class LineFit(Record):
-    """A fitted line: unit normal and distance from the fit's origin."""
-
-    normal_x: float
-    normal_y: float
-    distance: float
-
-
-class CornerFit(Record):
-    """Two faces and the edge in which they meet, if they do."""
-
-    faces: Annotated[Records[LineFit], 2]
-    edge_x: float
-    edge_y: float
-
-
-class CirclePosterior(Record):
-    """Mean, lower Cholesky root of the expected covariance, and covariance of a circle's centre; m, m²."""
-
-    x: float
-    y: float
-    root_xx: float
-    root_yx: float
-    root_yy: float
-    covariance_xx: float
-    covariance_xy: float
-    covariance_yy: float
-
-
-class Scratch(Record):
-    """What kernels write anew before each use."""
-
-    fired: Annotated[Records[Reading], SENSORS_MAX]
-    """The readings of this firing."""
-    fired_sensors: Annotated[Ints, SENSORS_MAX]
-    explained_by: Annotated[Ints, SENSORS_MAX]
-    """What explains each; see `UNEXPLAINED`."""
-    segments: Annotated[Records[PairSegment], PAIRS_PER_SENSOR * SENSORS_MAX]
-    """The segments of this firing."""
-    readings: Annotated[Records[Reading], READINGS_MAX]
-    """The readings of one object."""
-    face_readings: Annotated[Records[Reading], READINGS_MAX]
-    linear: Annotated[Records[LinearReading], READINGS_MAX]
-    cells: Annotated[Floats, GRID_CELLS]
-    """Log likelihood of each cell of a posterior's grid, nat."""
-    near: Annotated[Records[MappedSegment], 32]
-    """Segments near a place."""
-    attracting: Annotated[Floats, ATTRACTING_MAX, 5]
-    """Segments as `perception.relaxation` takes them: ends x, y, x, y (m) and normal (rad)."""
-    attracting_rows: Annotated[Ints, ATTRACTING_MAX]
-    """0, 1, 2, …"""
-    pose: Annotated[Floats, 3]
-    """x, y (m), heading (rad), as `perception.relaxation` takes a pose."""
-    hypothesis: Pose
-    score: Score
-    line_score: LineScore
-    circle_fit: CircleFit
-    line_fit: LineFit
-    corner_fit: CornerFit
-    posterior: CirclePosterior
 
 
 class State(Record):

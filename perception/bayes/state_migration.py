@@ -10,8 +10,10 @@ from typing import Final
 
 import numpy as np
 
+from perception.bayes.elements import REJECTIONS_MAX
 from perception.bayes.parameters import SettingsRecord
-from perception.bayes.state import FREE, POLYGON, REJECTIONS_MAX, Memory
+from perception.bayes.scratch import POLYGON
+from perception.bayes.state import FREE, Memory
 from perception.kernel import Floats
 from perception.records import column
 

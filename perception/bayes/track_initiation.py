@@ -12,22 +12,14 @@ from typing import Final
 
 from config.units import FOOT_M
 from perception.bayes.alternatives import SOFT, fit_other_circle, fit_other_line, score
+from perception.bayes.elements import ATTRACTING_MAX, MappedSegment
 from perception.bayes.noise_estimation import noise_variance
 from perception.bayes.occlusion import keep_relevant
 from perception.bayes.parameters import SettingsRecord
 from perception.bayes.range_fit import fit_circle
 from perception.bayes.reservoir import gather_history, keep_reading
 from perception.bayes.segment_pairs import segments_near
-from perception.bayes.state import (
-    ATTRACTING_MAX,
-    FREE,
-    TENTATIVE,
-    AnyTrack,
-    CircleTrack,
-    CircleTracks,
-    MappedSegment,
-    StateRecord,
-)
+from perception.bayes.state import FREE, TENTATIVE, AnyTrack, CircleTrack, CircleTracks, StateRecord
 from perception.bayes.track_labels import assign_number, is_rejected
 from perception.bayes.walls import add_line
 from perception.kernel import Floats, kernel

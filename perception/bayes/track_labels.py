@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 
-from perception.bayes.state import FREE, REJECTIONS_MAX, TENTATIVE, AnyTrack, StateRecord
+from perception.bayes.elements import REJECTIONS_MAX
+from perception.bayes.state import FREE, TENTATIVE, AnyTrack, StateRecord
 from perception.kernel import kernel
 
 

@@ -3,7 +3,7 @@
 The value of a quantum is the unseen evidence for an object's size, more where its place is unsure; among those above
 the threshold the nearer to the robot goes first, as the robot meets it next. A budget that is spent in every cycle
 would leave some waiting for ever: a track that was passed over too often goes before all others, longest wait first,
-so that none waits for more than `PATIENCE` quanta and one for each other track.
+so that none waits for more than `PASSES_MAX` quanta and one for each other track.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
+from perception.bayes.elements import MAX_POLYGONS
 from perception.bayes.parameters import SettingsRecord
-from perception.bayes.state import FREE, MAX_POLYGONS, AnyTrack, CircleTrack, CircleTracks, StateRecord
+from perception.bayes.state import FREE, AnyTrack, CircleTrack, CircleTracks, StateRecord
 from perception.kernel import kernel
 
 UNSURE_FACTOR: Final = 4.0
@@ -25,7 +26,7 @@ SIZE: Final = 8.0
 """Readings added to an object's own, so that a small one is not refined at every reading."""
 FINAL_VALUE: Final = 1e-6
 """By so much a final refinement is above the threshold."""
-PATIENCE: Final = 60
+PASSES_MAX: Final = 60
 """Quanta that may go to others; then a track goes before all that are not passed over as often."""
 OVERDUE: Final = 1e9
 """Priority of such a track."""
@@ -69,7 +70,7 @@ def priority(s: StateRecord, p: SettingsRecord, value: float, track: CircleTrack
 
     At the end of the ring's range a track counts half as much as next to the robot.
     """
-    if track.passed_over > PATIENCE:
+    if track.passed_over > PASSES_MAX:
         return OVERDUE + track.passed_over
     return value * p[0].range_max_m / (p[0].range_max_m + math.hypot(track.x - s[0].ring_x, track.y - s[0].ring_y))
 
@@ -124,7 +125,7 @@ def choose_polygon(s: StateRecord, p: SettingsRecord, threshold: float) -> int:
         if track.status != FREE:
             v = unseen_evidence(track, p[0].idle_firings, threshold, 1.0)
         if v > threshold:
-            v = OVERDUE + track.passed_over if track.passed_over > PATIENCE else v
+            v = OVERDUE + track.passed_over if track.passed_over > PASSES_MAX else v
             track.passed_over += 1
             if v > best:
                 best = v

@@ -1,6 +1,6 @@
 """Walls: lines that follow the echoes they explain, and give way to ranges that go through them.
 
-Long walls cause false round objects: each stretch of one, seen alone, might be a large drum's side. So walls are
+Long walls cause false round objects: each part of one, seen alone, might be a large drum's side. So walls are
 recognised as early as possible and take their echoes. A short line takes none: every drum has a tangent, and drums
 were found metres late when tangents could explain echoes first.
 """
@@ -11,10 +11,12 @@ import math
 from typing import Final
 
 from config.units import FOOT_M
+from perception.bayes.elements import MAX_LINES
 from perception.bayes.noise_estimation import SIGMAS, noise_variance
 from perception.bayes.parameters import SettingsRecord
 from perception.bayes.range_fit import FAR
-from perception.bayes.state import MAX_LINES, ON_LINE, UNEXPLAINED, Line, LineFit, LineScore, StateRecord
+from perception.bayes.scratch import ON_LINE, UNEXPLAINED, LineFit, LineScore
+from perception.bayes.state import Line, StateRecord
 from perception.kernel import kernel
 
 SAME_COS: Final = 0.98

@@ -8,25 +8,15 @@ import numpy as np
 import pytest
 
 from perception.bayes import manual_tracks, polygon_job, polygon_tracks, refine, track_labels
+from perception.bayes.elements import BUCKET_CAPACITY, BUCKETS, READINGS_MAX, REJECTIONS_MAX
 from perception.bayes.evidence import circle_evidence
 from perception.bayes.kernel_settings import apply_library, copied, make_settings
 from perception.bayes.map_edits import edit_memory
 from perception.bayes.pinned_segments import Pins, delete, places_of
+from perception.bayes.scratch import Score
 from perception.bayes.segment_list import mapped_segments
 from perception.bayes.segment_pairs import add_to_map, bucket_index
-from perception.bayes.state import (
-    BUCKET_CAPACITY,
-    BUCKETS,
-    CONFIRMED,
-    ESTABLISHED,
-    FREE,
-    PLACED,
-    READINGS_MAX,
-    REJECTIONS_MAX,
-    TENTATIVE,
-    Memory,
-    Score,
-)
+from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE, Memory
 from perception.bayes.state_migration import migrate, radii_of
 from perception.bayes.track_initiation import CELL_M
 from perception.edits import PinSegments

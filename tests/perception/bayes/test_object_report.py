@@ -8,15 +8,8 @@ import numpy as np
 import pytest
 
 from perception.bayes import naming, object_report, walls
-from perception.bayes.state import (
-    CONFIRMED,
-    ESTABLISHED,
-    FREE,
-    MAX_POLYGONS,
-    PLACED,
-    POLYGON_BIN_CAPACITY,
-    TENTATIVE,
-)
+from perception.bayes.elements import MAX_POLYGONS, POLYGON_BIN_CAPACITY
+from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE
 from perception.records import records, zeros
 from tests import naive_tracks
 from tests.naive_tracks import FT

@@ -7,18 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from perception.bayes import noise_estimation, observe, reservoir
+from perception.bayes import noise_estimation, observe, pairing, reservoir
+from perception.bayes.elements import BEARING_BINS, BIN_CAPACITY, HISTORY
 from perception.bayes.range_fit import FAR
+from perception.bayes.scratch import PairSegment
 from perception.bayes.segment_pairs import tangent
-from perception.bayes.state import (
-    BEARING_BINS,
-    BIN_CAPACITY,
-    ESTABLISHED,
-    FREE,
-    HISTORY,
-    Memory,
-    PairSegment,
-)
+from perception.bayes.state import ESTABLISHED, FREE, Memory
 from perception.kernel import Floats
 from perception.records import records, zeros
 from tests import naive_tracks
@@ -114,7 +108,7 @@ def test_readings_are_placed_paired_and_remembered() -> None:
         entered += m
         memory.s[0].noise_level = int(rng.integers(len(NOISES)))
         var0, rel2 = noise_estimation.noise_variance(memory.s, P)
-        made = observe.make_segments(memory.s, P, m, now)
+        made = pairing.make_segments(memory.s, P, m, now)
         expected = []
         for i in range(m):
             if cur[i, 4] < FAR:
@@ -125,8 +119,8 @@ def test_readings_are_placed_paired_and_remembered() -> None:
                         expected.append((*segment[0].item()[:7], i))
         assert made == len(expected)
         got = scratch["segments"][0, :made]
-        told = np.array([row[:7] for row in got.tolist()]).reshape(made, 7)
-        assert told == pytest.approx(np.array([e[:7] for e in expected]).reshape(made, 7), rel=1e-12, abs=1e-12)
+        actual = np.array([row[:7] for row in got.tolist()]).reshape(made, 7)
+        assert actual == pytest.approx(np.array([e[:7] for e in expected]).reshape(made, 7), rel=1e-12, abs=1e-12)
         assert got["reading"].tolist() == [e[7] for e in expected]
         segments += made
         observe.update_history(memory.s, P, m, now)

@@ -9,11 +9,12 @@ import pytest
 
 from config.load import load_settings
 from perception.bayes.bayes_method import BayesPerception
+from perception.bayes.elements import POLYGON_BEARING_BINS, POLYGON_BIN_CAPACITY
 from perception.bayes.kernel_settings import make_settings
-from perception.bayes.polygon_initiation import GATHERING_COST, advance_initiation, next_request
+from perception.bayes.polygon_initiation import COLLECTING_COST, advance_initiation, next_request
 from perception.bayes.polygon_job import INITIATION, NO_JOB, QUANTUM, REFINEMENT, cost
 from perception.bayes.polygon_tracks import advance_refinement, begin_refinement, polygon_quantum
-from perception.bayes.state import FREE, POLYGON_BEARING_BINS, POLYGON_BIN_CAPACITY, Memory
+from perception.bayes.state import FREE, Memory
 from perception.pipeline import Perception
 from runtime.simulation.open_loop import perceive
 from runtime.simulation.scenes import halls, readings
@@ -27,7 +28,7 @@ THRESHOLD = SETTINGS.perception.bayes.fresh_share
 RESERVOIR = POLYGON_BEARING_BINS * POLYGON_BIN_CAPACITY
 POSE_MAX = cost(RESERVOIR, 1, 4)
 """What scoring one pose costs at most."""
-STEP_MAX = 2 * POSE_MAX + (P[0].circle_count + 1) * POSE_MAX + GATHERING_COST
+STEP_MAX = 2 * POSE_MAX + (P[0].circle_count + 1) * POSE_MAX + COLLECTING_COST
 """No step that cannot be cut costs more."""
 
 

@@ -30,7 +30,8 @@ from perception.bayes.polygon_posterior import (
     write_pitch,
 )
 from perception.bayes.range_fit import FAR
-from perception.bayes.state import Memory, PoseSearch, Score
+from perception.bayes.scratch import Score
+from perception.bayes.state import Memory, PoseSearch
 from perception.kernel import Floats
 from perception.records import Records, records, zeros
 from tests import naive_polygon
@@ -83,10 +84,10 @@ def heard(rng: np.random.Generator, pose: Floats, n: int, noise_m: float, rule: 
         sensor = complex(pose[0], pose[1]) + away * complex(math.cos(bearing), math.sin(bearing))
         axis_angle = bearing + math.pi + rng.uniform(-0.5, 0.5)
         axis = complex(math.cos(axis_angle), math.sin(axis_angle))
-        told = rules(sensor, axis, pose, BOX, closed=True)[rule]
+        actual = rules(sensor, axis, pose, BOX, closed=True)[rule]
         r = FAR * 2.0
-        if told.expected is not None and told.price == 0.0:
-            r = round((told.expected + rng.normal(0.0, noise_m)) / 0.03048) * 0.03048
+        if actual.expected is not None and actual.price == 0.0:
+            r = round((actual.expected + rng.normal(0.0, noise_m)) / 0.03048) * 0.03048
         rows.append((sensor.real, sensor.imag, axis.real, axis.imag, r))
     return np.array(rows)
 
@@ -115,9 +116,9 @@ def test_a_prediction_equals_its_oracle() -> None:
         at, must, price, at_cone, must_cone = predict(
             sensor.real, sensor.imag, axis.real, axis.imag, sides_between(outline, closed), closed, P
         )  # fmt: skip
-        for expected, told, told_must in ((mirror, at, must), (cone, at_cone, must_cone)):
-            assert told == pytest.approx(NO_ANSWER_M if expected.expected is None else expected.expected, abs=1e-12)
-            assert told_must == expected.must
+        for expected, actual, actual_must in ((mirror, at, must), (cone, at_cone, must_cone)):
+            assert actual == pytest.approx(NO_ANSWER_M if expected.expected is None else expected.expected, abs=1e-12)
+            assert actual_must == expected.must
         assert price == pytest.approx(mirror.price, abs=1e-9)
         differ = cone.expected is not None and cone.expected != mirror.expected
         seen += (mirror.must, cone.must and not mirror.must, mirror.price > 0.0, differ, cone.expected is None)
@@ -138,8 +139,8 @@ def test_a_score_equals_its_oracle() -> None:
             mirror, cone = rules(complex(x, y), complex(ux, uy), pose, BOX, closed=True)
             level = level_of(P, LEVEL, r)
             nats = [
-                0.0 if told.expected is None else log_likelihood(P, level, r - told.expected)
-                for told in (mirror, cone)
+                0.0 if actual.expected is None else log_likelihood(P, level, r - actual.expected)
+                for actual in (mirror, cone)
             ]
             readings.append((r, (mirror, cone), (nats[0], nats[1])))
         expected, sums = naive_polygon.score(readings, S.gate_m, S.missed_echo_nat, S.short_echo_nat)
@@ -201,10 +202,10 @@ def test_every_other_reading_is_every_other_reading() -> None:
     truth = np.array([0.3, -0.2, 0.4])
     w = heard(rng, truth, 41, 0.01)
     for every in (1, 2, 3, 50):
-        told, wanted = score(w, truth, every), score(np.ascontiguousarray(w[::every]), truth)
-        assert told[0] == wanted[0]
+        actual, wanted = score(w, truth, every), score(np.ascontiguousarray(w[::every]), truth)
+        assert actual[0] == wanted[0]
         for name in ("log_likelihood_ratio", "hits", "misses", "near", "sure_hits"):
-            assert getattr(told[1], name) == getattr(wanted[1], name)
+            assert getattr(actual[1], name) == getattr(wanted[1], name)
 
 
 def test_the_moments_of_a_lattice_equal_numpys() -> None:

@@ -61,7 +61,7 @@ def squares(perception: Perception, world: WorldConfig) -> Iterator[tuple[float,
 
 def test_boxes_that_stand_anyhow_are_found_and_the_covariance_is_honest() -> None:
     """95 % ± 3 %, and three binomial standard deviations more: 96 boxes are few."""
-    told = []
+    actual = []
     wanted = false = 0
     for seed in range(8):
         for model in ("cone", "specular"):
@@ -72,13 +72,13 @@ def test_boxes_that_stand_anyhow_are_found_and_the_covariance_is_honest() -> Non
             perception = Perception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
             for firing in readings(SETTINGS.ring, hall, seed):
                 perceive(perception, firing)
-            told += list(squares(perception, hall.world))
+            actual += list(squares(perception, hall.world))
             wanted += len(hall.world.box)
             false += match_objects(hall.world, perception.objects(), SETTINGS.models)[2]
-    assert len(told) >= 0.93 * wanted
+    assert len(actual) >= 0.93 * wanted
     assert false <= 2
-    slack = 3.0 * math.sqrt(0.95 * 0.05 / len(told))
-    place, whole = np.mean(np.array(told) < (5.991, 7.815), axis=0)
+    slack = 3.0 * math.sqrt(0.95 * 0.05 / len(actual))
+    place, whole = np.mean(np.array(actual) < (5.991, 7.815), axis=0)
     assert 0.92 - slack <= place <= 0.98 + slack
     assert 0.92 - slack <= whole <= 0.98 + slack
 

@@ -1,6 +1,6 @@
 """Polygons of other forms than the box: hollow, without symmetry, oblong and open, found from a drive past them.
 
-They stand so that what tells their headings apart is heard from the way: of a mirror nothing else is.
+They are placed so that the sides that distinguish their headings echo towards the path; for a mirror only those do.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ def test_drums_are_found_and_nothing_else(outcomes: list[HallOutcome]) -> None:
 
 def test_the_covariance_is_honest(outcomes: list[HallOutcome]) -> None:
     """95 % ± 3 %, and three binomial standard deviations more: 128 drums are few."""
-    inside = [told for outcome in outcomes for told in outcome.inside]
+    inside = [actual for outcome in outcomes for actual in outcome.inside]
     slack = 3.0 * math.sqrt(0.95 * 0.05 / len(inside))
     assert len(inside) > 100
     assert 0.92 - slack <= np.mean(inside) <= 0.98 + slack

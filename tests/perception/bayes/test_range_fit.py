@@ -1,4 +1,4 @@
-"""Scores, fits, posterior and wedge against their oracles on random readings of circles, edges and walls."""
+"""Scores, fits, posterior and corner against their oracles on random readings of circles, edges and walls."""
 
 from __future__ import annotations
 
@@ -12,18 +12,11 @@ import pytest
 from perception.bayes import range_fit
 from perception.bayes.circle_posterior import posterior_circle
 from perception.bayes.corner_model import IMPOSSIBLE_NAT, score_corner
+from perception.bayes.elements import Reading
 from perception.bayes.likelihood import build_levels, build_table
 from perception.bayes.parameters import RANGE_BINS_PER_M, TABLE_LEVELS, NoiseModel, SettingsRecord
-from perception.bayes.state import (
-    CircleFit,
-    CirclePosterior,
-    LinearReading,
-    LineFit,
-    LineScore,
-    Memory,
-    Reading,
-    Score,
-)
+from perception.bayes.scratch import CircleFit, CirclePosterior, LinearReading, LineFit, LineScore, Score
+from perception.bayes.state import Memory
 from perception.kernel import Floats
 from perception.records import Record, Records, array_of, records, zeros
 from tests import naive_bayes
@@ -226,7 +219,7 @@ def test_a_corners_score_equals_its_oracle() -> None:
         enter_readings(memory, case.used)
         memory.s[0].noise_level = case.level
         got = score_corner(memory.s, case.p, case.n, *case.place, case.rho, case.var0, case.rel2)
-        want = naive_bayes.wedge(case.used, case.centre, case.rho, OPT, GATE, case.var0, case.rel2, case.noise)
+        want = naive_bayes.corner(case.used, case.centre, case.rho, OPT, GATE, case.var0, case.rel2, case.noise)
         if want is None:
             assert got == IMPOSSIBLE_NAT
         else:

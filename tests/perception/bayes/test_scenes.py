@@ -85,13 +85,13 @@ def test_the_first_sure_fix_is_four_feet_before_passing(
     scene: SceneName, seeds: tuple[int, ...], least: float, middle: float, share: float
 ) -> None:
     fixes = [fix for seed in seeds for o in run_scene(SETTINGS, scene, seed) for fix in o.fixes]
-    told = summarise_fixes(fixes)
+    summary = summarise_fixes(fixes)
     assert len(fixes) >= 6
-    assert told is not None
-    assert told["least"] is not None
-    assert told["least"] >= least * FT - 1e-9
-    assert told["median"] >= middle * FT - 1e-9
-    assert told["share"] >= share
+    assert summary is not None
+    assert summary["least"] is not None
+    assert summary["least"] >= least * FT - 1e-9
+    assert summary["median"] >= middle * FT - 1e-9
+    assert summary["share"] >= share
 
 
 def without(world: WorldConfig, i: int) -> WorldConfig:
@@ -172,19 +172,19 @@ def test_everything_has_a_name() -> None:
     perception = Perception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
     for firing in readings(SETTINGS.ring, hall, 0):
         perceive(perception, firing)
-    names = [thing.model for thing in perception.labelled_objects()]
+    names = [found.model for found in perception.labelled_objects()]
     assert names.count("semicircle") == 6
     assert names.count("wall") >= 2
     assert set(names) <= {"semicircle", "wall", "inside corner", "edge", "post", "barrel", "unknown"}
-    for thing in perception.labelled_objects():
-        assert thing.probability is not None
-        assert 0.0 <= thing.probability <= 1.0
-        assert thing.covariance is not None
-        xx, xy, yy = thing.covariance
-        assert thing.sigma == pytest.approx(math.sqrt(np.linalg.eigvalsh([[xx, xy], [xy, yy]])[1]))
+    for found in perception.labelled_objects():
+        assert found.probability is not None
+        assert 0.0 <= found.probability <= 1.0
+        assert found.covariance is not None
+        xx, xy, yy = found.covariance
+        assert found.sigma == pytest.approx(math.sqrt(np.linalg.eigvalsh([[xx, xy], [xy, yy]])[1]))
 
 
-def test_circles_of_several_radii_are_told_apart() -> None:
+def test_circles_of_several_radii_are_distinguished() -> None:
     models = load_settings("hallway", models=("semicircle", "drum")).models
     small = models[0].model_copy(update={"name": "keg", "arc_radius_m": 0.2})
     drums = tuple(

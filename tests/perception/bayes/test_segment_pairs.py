@@ -7,8 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from perception.bayes.elements import MappedSegment
+from perception.bayes.scratch import PairSegment
 from perception.bayes.segment_pairs import add_to_map, segments_near, tangent
-from perception.bayes.state import Bucket, MappedSegment, PairSegment
+from perception.bayes.state import Bucket
 from perception.kernel import Floats
 from perception.records import records, zeros
 from tests import naive_bayes

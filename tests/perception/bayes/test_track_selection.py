@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from config.load import load_settings
 from perception.bayes import track_selection as selection
 from perception.bayes.bayes_method import BayesPerception
+from perception.bayes.elements import MAX_POLYGONS
 from perception.bayes.kernel_settings import make_settings
-from perception.bayes.state import ESTABLISHED, FREE, MAX_POLYGONS, TENTATIVE, Memory
+from perception.bayes.state import ESTABLISHED, FREE, TENTATIVE, Memory
 from runtime.simulation.scenes import halls, readings
 from tests import naive_tracks
 
@@ -19,7 +20,7 @@ SETTINGS = load_settings("hallway", models=("semicircle", "box"))
 P = make_settings(SETTINGS.ring, SETTINGS.models, SETTINGS.perception.bayes)
 TRACKS = 8
 THRESHOLD = 0.08
-WAIT_MAX = selection.PATIENCE + TRACKS + 1
+WAIT_MAX = selection.PASSES_MAX + TRACKS + 1
 
 
 def shared() -> Memory:
@@ -47,7 +48,7 @@ def test_the_rule_against_its_oracle() -> None:
         is_waiting = rng.integers(2)
         circles["unseen"], circles["reservoir"] = counts[0] * is_waiting, counts[1]
         circles["idle_firings"], circles["final_refinements"] = counts[2], counts[3] * is_waiting
-        circles["passed_over"] = rng.integers(selection.PATIENCE + 4, size=TRACKS) * rng.integers(2)
+        circles["passed_over"] = rng.integers(selection.PASSES_MAX + 4, size=TRACKS) * rng.integers(2)
         circles["x"], circles["y"] = rng.normal(0, 4, (2, TRACKS))
         circles["root_xx"], circles["root_yy"] = rng.uniform(0, 0.02, (2, TRACKS))
         circles["probability"] = rng.uniform(0.9, 1.0, TRACKS)
@@ -65,7 +66,7 @@ def test_the_rule_against_its_oracle() -> None:
         expected = passed + waits
         if want >= 0:
             expected[want] = 0
-            overdue += int(passed[want] > selection.PATIENCE)
+            overdue += int(passed[want] > selection.PASSES_MAX)
         assert (circles["passed_over"] == expected).all()
         none += want < 0
     assert none > 10
@@ -83,21 +84,21 @@ def test_new_evidence_doubt_and_nearness_each_decide_where_all_else_is_alike() -
     assert choose(for_nearness) == 6
 
 
-def test_polygons_are_chosen_by_evidence_and_patience_alone() -> None:
+def test_polygons_are_chosen_by_evidence_and_waiting_time_alone() -> None:
     memory = shared()
     polygons = memory.polygons
     assert len(polygons) == MAX_POLYGONS
     polygons["status"][:TRACKS], polygons["reservoir"][:TRACKS], polygons["unseen"][:TRACKS] = ESTABLISHED, 100, 10
     polygons["unseen"][2] += 1
     assert selection.choose_polygon(memory.s, P, THRESHOLD) == 2
-    polygons["passed_over"][7] = selection.PATIENCE + 1
+    polygons["passed_over"][7] = selection.PASSES_MAX + 1
     assert selection.choose_polygon(memory.s, P, THRESHOLD) == 7
     polygons["unseen"] = 0
     assert selection.choose_polygon(memory.s, P, THRESHOLD) == -1
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 30.0))
-def test_with_one_quantum_a_cycle_nobody_waits_longer_than_the_bound(seed: int, far_m: float) -> None:
+def test_with_one_quantum_a_cycle_no_track_waits_longer_than_the_bound(seed: int, far_m: float) -> None:
     """One object is far away and gets no more evidence; the others are near and get plenty in every cycle."""
     rng, memory = np.random.default_rng(seed), alike(shared())
     memory.circles["x"][0], unseen = far_m, memory.circles["unseen"]
@@ -138,7 +139,7 @@ def test_in_a_hall_with_one_quantum_a_firing_every_track_gets_its_turn() -> None
         tracks = (perception.memory.circles, perception.memory.polygons)
         longest = max(longest, *(int(of["passed_over"].max()) for of in tracks))
     assert cut > 100, "one quantum was enough: nothing was put to the test"
-    assert 3 < longest <= selection.PATIENCE + SETTINGS.perception.bayes.tracks_max + 1
+    assert 3 < longest <= selection.PASSES_MAX + SETTINGS.perception.bayes.tracks_max + 1
 
 
 def test_neither_circles_nor_polygons_keep_the_others_from_their_turn() -> None:

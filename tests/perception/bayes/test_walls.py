@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from perception.bayes import walls
+from perception.bayes.elements import MAX_LINES
 from perception.bayes.range_fit import FAR
-from perception.bayes.state import MAX_LINES, LineFit, LineScore
+from perception.bayes.scratch import LineFit, LineScore
 from perception.records import records, zeros
 from tests import naive_tracks
 from tests.naive_tracks import FT

@@ -1,0 +1,91 @@
+"""Capacities of the Bayesian method's memory, and the small records that the others are made of.
+
+Lengths are metres, angles radians.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from perception.bayes.parameters import CIRCLES_MAX
+from perception.records import Record
+
+MAX_TRACKS: Final = 48
+"""Tracks of circles where the configuration says nothing else."""
+BEARING_BINS: Final = 36
+"""Bins of a track's reservoir, by the bearing from the object to the sensor: 10° each."""
+
+BIN_CAPACITY: Final = 20
+"""Readings in a bin; the newest takes the place of the oldest."""
+MAX_LINES: Final = 24
+HISTORY: Final = 28
+"""Readings kept of each sensor, whatever they hit."""
+READINGS_MAX: Final = BEARING_BINS * BIN_CAPACITY + 64
+"""Readings compared at a time: a reservoir's, and some more of the sensors' histories."""
+ATTRACTING_MAX: Final = 16
+"""Outline segments that may attract a hypothesis."""
+BUCKETS: Final = 4096
+"""Buckets of the hashed outline map; a power of two."""
+BUCKET_CAPACITY: Final = 8
+"""Segments in a bucket."""
+MAX_POLYGONS: Final = 24
+"""Tracks of polygons."""
+POLYGON_BEARING_BINS: Final = 24
+"""Bearing bins of a polygon's reservoir."""
+POLYGON_BIN_CAPACITY: Final = 12
+"""Readings in such a bin."""
+REJECTIONS_MAX: Final = 32
+"""Places where a user rejected an object."""
+REQUESTS_MAX: Final = 32
+"""Segments that wait for a polygon to be tried behind them, or recently did."""
+PAIRS_PER_SENSOR: Final = 8
+"""Outline segments that a reading may make."""
+ALTERNATIVES_MAX: Final = CIRCLES_MAX + 2
+"""Explanations of a circle track: radii, a line, a corner."""
+GRID_CELLS: Final = 49
+"""Cells of the grid on which a circle's posterior is added up."""
+
+
+class Reading(Record):
+    """A raw range in the odometry frame."""
+
+    x: float
+    """The sensor's place, m."""
+    y: float
+    axis_x: float
+    """Its axis, a unit vector."""
+    axis_y: float
+    range_m: float
+    """At least `range_fit.FAR` where nothing was heard."""
+
+
+class Pose(Record):
+    """A pose: m, rad."""
+
+    x: float
+    y: float
+    heading: float
+
+
+class LowerTriangle(Record):
+    """The lower triangle of a 3 × 3 matrix over x, y and heading h."""
+
+    xx: float
+    yx: float
+    yy: float
+    hx: float
+    hy: float
+    hh: float
+
+
+class MappedSegment(Record):
+    """An outline segment in the map."""
+
+    x: float
+    """Its middle, m."""
+    y: float
+    normal_x: float
+    """Unit normal, away from the sensors."""
+    normal_y: float
+    number: int
+    time_s: float

@@ -1,0 +1,159 @@
+"""Outline segments of a firing: unexplained readings paired with earlier ones and with their neighbours in the ring.
+
+Paper §3.2, after McKerrow; each segment comes with its uncertainty.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from config.units import FOOT_M
+from perception.bayes.elements import HISTORY, Reading
+from perception.bayes.noise_estimation import noise_variance
+from perception.bayes.parameters import SettingsRecord
+from perception.bayes.range_fit import FAR
+from perception.bayes.scratch import PairSegment
+from perception.bayes.segment_pairs import add_to_map, tangent
+from perception.bayes.state import StateRecord
+from perception.bayes.track_initiation import CELL_M
+from perception.kernel import kernel
+
+BASELINE_M: Final = 0.5 * FOOT_M
+"""Shortest baseline of one sensor; the next ones are twice and four times this."""
+BASELINES: Final = 3
+BASELINE_MAX_M: Final = 2.6 * FOOT_M
+NEIGHBOUR_MIN_M: Final = 0.3 * FOOT_M
+NEIGHBOUR_MAX_M: Final = 1.0 * FOOT_M
+"""Baselines of neighbours that did not fire together."""
+MAPPED_MIN_M: Final = 0.2 * FOOT_M
+"""A shorter segment's direction is too poor for the relaxation."""
+
+
+@kernel
+def add_pair(s: StateRecord, p: SettingsRecord, i: int, other: Reading, var: float, made: int) -> int:
+    """Make a segment of fired reading `i` and another one; return how many segments there are then.
+
+    Parameters
+    ----------
+    s, p
+        Memory, whose scratch takes the segment, and settings.
+    i : int
+        The fired reading.
+    other : Reading
+        The other one.
+    var : float
+        Variance of a range, m².
+    made : int
+        Segments so far.
+    """
+    segments = s[0].scratch.segments
+    if other.range_m >= FAR or made >= len(segments):
+        return made
+    if not tangent(other, s[0].scratch.fired[i], p[0].cos_half_angle, var, segments[made]):
+        return made
+    segments[made].reading = i
+    return made + 1
+
+
+@kernel
+def pair_in_time(s: StateRecord, p: SettingsRecord, i: int, time_s: float, var: float, made: int) -> int:
+    """Pair a reading with its own sensor's history, at three baselines: a short one is early, a long one sure.
+
+    Parameters
+    ----------
+    s, p, i, var, made
+        As for `add_pair`.
+    time_s : float
+        Time of the firing.
+    """
+    q = s[0].scratch.fired[i]
+    sensor = s[0].sensors[s[0].scratch.fired_sensors[i]]
+    step = 0
+    for back in range(min(sensor.kept, HISTORY)):
+        at = (sensor.kept - 1 - back) % HISTORY
+        old = sensor.history[at]
+        if time_s - sensor.times_s[at] > p[0].pair_gap_s:
+            break
+        base = math.hypot(q.x - old.x, q.y - old.y)
+        if base < BASELINE_M * (1 << step):
+            continue
+        if base > BASELINE_MAX_M:
+            break
+        step += 1
+        made = add_pair(s, p, i, old, var, made)
+        if step == BASELINES:
+            break
+    return made
+
+
+@kernel
+def pair_in_ring(s: StateRecord, p: SettingsRecord, i: int, m: int, time_s: float, var: float, made: int) -> int:
+    """Pair a reading with its neighbours' in the ring: of this firing, else their newest.
+
+    Parameters
+    ----------
+    s, p, i, time_s, var, made
+        As for `pair_in_time`.
+    m : int
+        Fired readings.
+    """
+    fired, sensors = s[0].scratch.fired, s[0].scratch.fired_sensors
+    q = fired[i]
+    for side in (-1, 1):
+        neighbour = (sensors[i] + side) % s[0].sensor_count
+        other = s[0].sensors[neighbour]
+        if other.kept == 0:
+            continue
+        has_fired = False
+        for k in (i - 1, i + 1, 0, m - 1):
+            if 0 <= k < m and sensors[k] == neighbour:
+                if side == 1:  # the other one makes the pair from its side
+                    made = add_pair(s, p, i, fired[k], var, made)
+                has_fired = True
+                break
+        if not has_fired:
+            at = (other.kept - 1) % HISTORY
+            old = other.history[at]
+            base = math.hypot(q.x - old.x, q.y - old.y)
+            if time_s - other.times_s[at] < p[0].pair_gap_s and NEIGHBOUR_MIN_M < base < NEIGHBOUR_MAX_M:
+                made = add_pair(s, p, i, old, var, made)
+    return made
+
+
+@kernel
+def map_segment(s: StateRecord, segment: PairSegment, time_s: float) -> None:
+    """Put a segment into the outline map, under the next number."""
+    s[0].segments_numbered += 1
+    add_to_map(
+        s[0].buckets, CELL_M, segment.x, segment.y, segment.normal_x, segment.normal_y, s[0].segments_numbered, time_s
+    )
+
+
+@kernel
+def make_segments(s: StateRecord, p: SettingsRecord, m: int, time_s: float) -> int:
+    """Pair this firing's echoes in time and in the ring, and map the segments; return how many there are.
+
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    m : int
+        Fired readings.
+    time_s : float
+        Time of the firing.
+    """
+    var0, rel2 = noise_variance(s, p)
+    scratch = s[0].scratch
+    made = 0
+    for i in range(m):
+        r = scratch.fired[i].range_m
+        if r < FAR:
+            var = var0 + rel2 * r * r
+            made = pair_in_time(s, p, i, time_s, var, made)
+            made = pair_in_ring(s, p, i, m, time_s, var, made)
+    for k in range(made):
+        if scratch.segments[k].length > MAPPED_MIN_M:
+            map_segment(s, scratch.segments[k], time_s)
+    s[0].segments_made += made
+    return made

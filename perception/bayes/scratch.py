@@ -1,0 +1,158 @@
+"""Records that kernels write anew before each use: segments, scores and fits of one firing or one object."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+from config.robot import SENSORS_MAX
+from perception.bayes.elements import (
+    ATTRACTING_MAX,
+    GRID_CELLS,
+    PAIRS_PER_SENSOR,
+    READINGS_MAX,
+    MappedSegment,
+    Pose,
+    Reading,
+)
+from perception.kernel import Floats, Ints
+from perception.records import Record, Records
+
+UNEXPLAINED: Final = -1
+ON_LINE: Final = -2
+PROPOSED: Final = -100
+POLYGON: Final = 1000
+"""Values of `Scratch.explained_by`: nothing; this minus k line k; a hypothesis was tried; this plus k polygon k.
+Other values are circle tracks."""
+
+
+class PairSegment(Record):
+    """An outline segment from a pair of readings."""
+
+    x: float
+    """Its middle, m."""
+    y: float
+    normal_x: float
+    normal_y: float
+    length: float
+    sigma_normal: float
+    """Standard deviation along the normal, m."""
+    sigma_direction: float
+    """Standard deviation of the direction, rad."""
+    reading: int
+    """Index of the fired reading it came from."""
+
+
+class LinearReading(Record):
+    """A reading's error near a circle, and how it changes along the axes of the posterior's frame."""
+
+    error: float
+    """m"""
+    slope_a: float
+    """Fall of the error per unit of the first axis, m."""
+    slope_b: float
+    bins_per_m: float
+    level: int
+    """Row of `Settings.table`."""
+
+
+class Score(Record):
+    """What readings say of a circle or a polygon."""
+
+    log_likelihood_ratio: float
+    hits: float
+    misses: float
+    """Readings that should have hit and passed through."""
+    near: float
+    """Readings within the gate."""
+    shorts: float
+    """Readings that ended before it."""
+    closest: float
+    """Least range of a hit, m."""
+    dispersion: float
+    """How unlike the axes are that heard it."""
+    sure_hits: float
+    """Hits that had to be; of a polygon only."""
+
+
+class LineScore(Record):
+    """What readings say of a line."""
+
+    log_likelihood_ratio: float
+    hits: float
+    misses: float
+    low: float
+    """Extent of the hits along the line, m."""
+    high: float
+
+
+class CircleFit(Record):
+    """A fitted centre and its information."""
+
+    x: float
+    y: float
+    information_xx: float
+    """1/m²"""
+    information_xy: float
+    information_yy: float
+
+
+class LineFit(Record):
+    """A fitted line: unit normal and distance from the fit's origin."""
+
+    normal_x: float
+    normal_y: float
+    distance: float
+
+
+class CornerFit(Record):
+    """Two faces and the edge in which they meet, if they do."""
+
+    faces: Annotated[Records[LineFit], 2]
+    edge_x: float
+    edge_y: float
+
+
+class CirclePosterior(Record):
+    """Mean, lower Cholesky root of the expected covariance, and covariance of a circle's centre; m, m²."""
+
+    x: float
+    y: float
+    root_xx: float
+    root_yx: float
+    root_yy: float
+    covariance_xx: float
+    covariance_xy: float
+    covariance_yy: float
+
+
+class Scratch(Record):
+    """What kernels write anew before each use."""
+
+    fired: Annotated[Records[Reading], SENSORS_MAX]
+    """The readings of this firing."""
+    fired_sensors: Annotated[Ints, SENSORS_MAX]
+    explained_by: Annotated[Ints, SENSORS_MAX]
+    """What explains each; see `UNEXPLAINED`."""
+    segments: Annotated[Records[PairSegment], PAIRS_PER_SENSOR * SENSORS_MAX]
+    """The segments of this firing."""
+    readings: Annotated[Records[Reading], READINGS_MAX]
+    """The readings of one object."""
+    face_readings: Annotated[Records[Reading], READINGS_MAX]
+    linear: Annotated[Records[LinearReading], READINGS_MAX]
+    cells: Annotated[Floats, GRID_CELLS]
+    """Log likelihood of each cell of a posterior's grid, nat."""
+    near: Annotated[Records[MappedSegment], 32]
+    """Segments near a place."""
+    attracting: Annotated[Floats, ATTRACTING_MAX, 5]
+    """Segments as `perception.relaxation` takes them: ends x, y, x, y (m) and normal (rad)."""
+    attracting_rows: Annotated[Ints, ATTRACTING_MAX]
+    """0, 1, 2, …"""
+    pose: Annotated[Floats, 3]
+    """x, y (m), heading (rad), as `perception.relaxation` takes a pose."""
+    hypothesis: Pose
+    score: Score
+    line_score: LineScore
+    circle_fit: CircleFit
+    line_fit: LineFit
+    corner_fit: CornerFit
+    posterior: CirclePosterior
