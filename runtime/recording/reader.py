@@ -201,7 +201,7 @@ def open_recording(path: Path) -> Iterator[Recording]:
     Raises
     ------
     RecordingError
-        The file is no recording, has another format version, or nothing in it can be read. Also raised if the body
+        The file is not a recording, has another format version, or nothing in it can be read. Also raised if the body
         of the `with` statement decodes a message that is invalid in this version.
     """
     with map_file(path) as data:
@@ -238,7 +238,5 @@ def _first_error(error: ValidationError) -> str:
 
 def _why_unreadable(scanner: McapScanner) -> str:
     if not scanner.is_mcap:
-        return (
-            "is no recording (MCAP), and nothing in it can be read as one; `echolocate run --record FILE` makes one"
-        )
+        return "is not a recording (MCAP), and nothing in it can be read as one; `echolocate run --record FILE` makes one"
     return "holds no readable message: it was cut off before the first one, or is damaged"

@@ -41,7 +41,7 @@ def recover(source: Path, target: Path) -> Recovered:
     Raises
     ------
     RecordingError
-        The source is no recording, or nothing in it can be read.
+        The source is not a recording, or nothing in it can be read.
     OSError
         The target cannot be written; it does not exist then.
     """

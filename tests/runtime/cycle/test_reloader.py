@@ -134,7 +134,7 @@ def test_perception_continues_with_other_settings(method: str) -> None:
     perception.apply_settings(other)
     if method == "bayes":
         assert inner.memory is remembered
-        assert inner.settings.attempts == 7
+        assert inner.settings[0].attempts_per_firing == 7
         assert inner._config.report_probability == 0.5
     else:
         assert inner.outline.segments is remembered

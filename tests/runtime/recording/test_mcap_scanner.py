@@ -138,7 +138,7 @@ def test_recovered_it_is_whole_again(run: Path, tmp_path: Path, capsys: pytest.C
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(data[: int(0.7 * len(data))])
     assert run_command(["recover", str(cut)]) == DONE
-    assert "had not been closed" in capsys.readouterr().out
+    assert "was not closed" in capsys.readouterr().out
     restored = tmp_path / "cut-recovered.mcap"
     before, after = entries_of(cut), entries_of(restored)
     assert before == after

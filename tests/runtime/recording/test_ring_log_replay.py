@@ -103,11 +103,11 @@ def test_a_memory_that_differs_is_named(run: Path, tmp_path: Path) -> None:
     where = [i for i, entry in enumerate(entries) if entry.topic == KEYFRAME][2]
     frame = decode(Keyframe, entries[where].data)
     memory = perception_snapshot(frame)
-    name = next(name for name in memory if name.endswith("hist"))
+    name = next(name for name in memory if name.endswith("memory.state"))
     from runtime.recording.schema import keyframe, state_fields
 
     changed = memory[name].copy()
-    changed.flat[0] = changed.flat[0] + 1e-9
+    changed["sensors"]["history"]["range_m"][0, 0, 0] += 1e-9
     altered = keyframe(frame.cycle, frame.run_s, state_fields(frame), {**memory, name: changed})
     entries[where] = entries[where]._replace(data=encode(altered))
     rewrite(entries, tmp_path / "x.mcap")

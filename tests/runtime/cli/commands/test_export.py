@@ -236,9 +236,9 @@ def test_a_missing_extra_is_one_line(
     assert package in err
 
 
-def test_a_ring_log_is_one_already(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_ring_log_needs_no_conversion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = tmp_path / "log.csv"
     log.write_text("t,x,y,theta,r00\n0,0,0,0,1\n", encoding="utf-8")
     assert run_command(["export", str(log), "--to", "ringlog", "--out", str(tmp_path / "x.csv")]) == WRONG_CALL
-    assert "one already" in capsys.readouterr().err
+    assert "a ring log needs no conversion" in capsys.readouterr().err
     assert run_command(["export", str(log), "--to", "csv", "--out", str(log)]) == WRONG_CALL
