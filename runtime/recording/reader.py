@@ -238,5 +238,5 @@ def _first_error(error: ValidationError) -> str:
 
 def _why_unreadable(scanner: McapScanner) -> str:
     if not scanner.is_mcap:
-        return "is not a recording (MCAP), and nothing in it can be read as one; `echolocate run --record FILE` makes one"
+        return "is not a recording (MCAP), and nothing in it can be read; `echolocate run --record FILE` makes one"
     return "holds no readable message: it was cut off before the first one, or is damaged"
