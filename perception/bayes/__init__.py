@@ -1,8 +1,8 @@
-"""The `bayes` method: raw ranges, scored under every explanation, as they come.
+"""The `bayes` method: Bayesian comparison of explanations on the raw ranges.
 
-The paper clusters segments and relaxes a model onto them. That finds a pose to a tenth of a foot and cannot decide
-whether the object is a drum at all. Here segments only *propose* a body and relaxation only finds where to start; the
-decision follows from the raw ranges alone:
+The paper clusters segments and relaxes a model onto them. That locates a pose to a tenth of a foot, but cannot decide
+whether the object is a drum at all. Here segments only *propose* a body, and relaxation only finds a start; the raw
+ranges alone decide:
 
 =====================  ==============================================================================================
 `state`, `parameters`  the memory and the settings, as records with named fields
@@ -13,10 +13,10 @@ decision follows from the raw ranges alone:
 `corner_model`         two faces and their edge: a box's corner, the drum's closest rival
 `polygon_likelihood`   polygon: predicted range, evidence, search for the pose
 `polygon_posterior`    mean and covariance of a polygon's pose
-`polygon_job`          work in quanta: what takes longer than one continues in the next
+`polygon_job`          work in quanta: a longer job continues in the next quantum
 =====================  ==============================================================================================
 
-Ranges and poses are in the odometry frame; a range ≥ `range_fit.FAR` means that nothing was heard. Evidence is in
-nats: the log of how much likelier the readings are under an explanation than if something else, anywhere in range,
-had answered. Kernels are pure and allocate nothing.
+Ranges and poses are in the odometry frame; a range ≥ `range_fit.FAR` means no echo. Evidence is in nats:
+the log ratio of the readings' likelihood under an explanation to that of an echo from something else, anywhere in
+range. Kernels are pure and allocate nothing.
 """

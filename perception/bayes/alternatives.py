@@ -1,7 +1,7 @@
-"""Other explanations of the readings an object was made from, each fitted with its own best pose.
+"""Alternative explanations of the readings of a circle track, each fitted with its own best pose.
 
-Two explanations can be compared only on the same readings; one that was fitted to others would win or lose by
-readings it was not scored on.
+Explanations can be compared only on the same readings. One that was fitted to other readings would win or lose by
+readings that it was not scored on.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ from perception.kernel import kernel
 from perception.records import Records
 
 SOFT: Final = 9.0
-"""Robustness of the fits: how many σ² a residual may have before it counts for a quarter."""
+"""Robustness of the fits: squared residual, in σ², at which the weight has fallen to a quarter."""
 HOPELESS_NAT: Final = -1e9
-"""Evidence of what cannot be fitted."""
+"""Evidence (nat) of an explanation that cannot be fitted."""
 
 
 @kernel
 def bearing_sum(
     readings: Records[Reading], cx: float, cy: float, radius: float, gate: float
 ) -> tuple[int, float, float]:
-    """Return how many readings end near a circle, and the sum of their unit bearings to its centre.
+    """Return the number of readings that end near a circle, and the sum of their unit bearings to its centre.
 
     Parameters
     ----------
     readings : (n,) Reading
         Raw ranges.
     cx, cy, radius, gate : float
-        The circle, and how near to it a reading has to end, m.
+        The circle, and the greatest distance of a reading's end from it, m.
     """
     count = 0
     sx = 0.0
@@ -55,9 +55,12 @@ def bearing_sum(
 def mean_bearing(
     readings: Records[Reading], cx: float, cy: float, radius: float, gate: float
 ) -> tuple[float, float]:  # fmt: skip
-    """Return the mean direction from the sensors that hear a circle to its centre; zeros where none does.
+    """Return the mean unit direction from the sensors that hear a circle to its centre; zeros without such a sensor.
 
-    The parameters are those of `bearing_sum`.
+    Parameters
+    ----------
+    readings, cx, cy, radius, gate
+        As for `bearing_sum`.
     """
     _, x, y = bearing_sum(readings, cx, cy, radius, gate)
     m = math.hypot(x, y)
@@ -68,7 +71,7 @@ def mean_bearing(
 
 @kernel
 def score(s: StateRecord, p: SettingsRecord, n: int, x: float, y: float, radius: float) -> float:
-    """Return the log ratio (nat) of a circle on the first `n` readings of the scratch, whose `score` is written.
+    """Return the log ratio (nat) of a circle on the first `n` readings of the scratch; write the scratch's `score`.
 
     Parameters
     ----------
@@ -88,7 +91,7 @@ def score(s: StateRecord, p: SettingsRecord, n: int, x: float, y: float, radius:
 def fit_other_circle(
     s: StateRecord, p: SettingsRecord, n: int, cx: float, cy: float, radius: float, other: float, steps: int
 ) -> float:
-    """Return the log ratio (nat) of a circle of another radius on the same surface; scratch holds its `circle_fit`.
+    """Return the log ratio (nat) of a circle of another radius on the same surface; write the scratch's `circle_fit`.
 
     Parameters
     ----------
@@ -119,7 +122,7 @@ def fit_other_circle(
 def fit_other_line(
     s: StateRecord, p: SettingsRecord, n: int, cx: float, cy: float, radius: float, steps: int
 ) -> float:  # fmt: skip
-    """Return the log ratio (nat) of a line along the same surface; scratch holds its `line_fit` about the centre.
+    """Return the log ratio (nat) of a line along the same surface; write the scratch's `line_fit` about the centre.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""The Bayesian method as perception calls it: firings in, objects out.
+"""The Bayesian method's interface to perception: firings in, objects out.
 
-The memory and the work on it are in the kernels; this module decides when they are called. Each call does a bounded
-piece of work: a firing a bounded number of quanta, a quantum one object.
+The kernels hold the memory and the computation; this module decides when to call them. Each call does a bounded
+amount of work: a firing takes a bounded number of quanta, a quantum refines one object.
 """
 
 from __future__ import annotations
@@ -43,28 +43,28 @@ from perception.sensor_mounts import mounts_array
 
 
 class BayesPerception:
-    """Echoes to objects, by raw ranges and all explanations at once.
+    """Detection of objects from echoes by comparing all explanations on the raw ranges.
 
     Parameters
     ----------
     ring : RingConfig
         The sensors.
     models : sequence of ModelConfig
-        What is looked for: circles by their radius, open and closed polygons by their outline.
+        The models to detect: circles by their radius, open and closed polygons by their outline.
     config : BayesConfig
-        What a user may set.
+        The settings that a user may change.
     """
 
     SCRATCH: Final = ("_sure", "_last_reported", "_reported")
-    """Not remembered: what reporting works with."""
+    """Attributes that reporting derives; they are not in a snapshot."""
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: BayesConfig) -> None:
         self._mounts = mounts_array(ring.mounts)
         self._config = config
         self.settings = make_settings(ring, models, config)
-        """What kernels read."""
+        """The settings that kernels read."""
         self.memory = Memory(len(self._mounts), config.tracks_max)
-        """What they remember."""
+        """The memory that kernels read and write."""
         self._pins = Pins()
         self._name_models(models)
         self._sure = np.zeros(max(config.tracks_max, MAX_POLYGONS), np.int64)
@@ -81,7 +81,7 @@ class BayesPerception:
 
     @property
     def can_refine(self) -> bool:
-        """Whether `refine` has anything to improve before the next firing."""
+        """Whether `refine` can improve anything before the next firing."""
         return (self._circles_pending and self._left > 0) or (self._polygons_pending and self._polygons_left > 0)
 
     @property
@@ -91,20 +91,20 @@ class BayesPerception:
 
     @property
     def counts(self) -> MapCounts:
-        """How many segments and tracks there are, the latter established or not."""
+        """The numbers of segments and tracks, tentative tracks included."""
         state = self.memory.state
         segments = np.minimum(state["buckets"]["count"], BUCKET_CAPACITY).sum()
         tracks = sum(np.count_nonzero(of["status"] != FREE) for of in (self.memory.circles, self.memory.polygons))
         return MapCounts(int(segments), int(state["segments_made"][0]), int(tracks))
 
     def observe(self, firing: Firing) -> int:
-        """Take in one firing and return how many outline segments it completed."""
+        """Process one firing; return the number of outline segments that it completed."""
         pose = firing.pose
         made, self._circles_pending = observe(
             self.memory.s, self.memory.tracks, self.settings, self._mounts, float(pose.x), float(pose.y),
             float(firing.ring_yaw), float(firing.robot_s), firing.ranges_m, self._config.fresh_share,
         )  # fmt: skip
-        # Polygons come after the circles, but not where the time was up before it was their turn.
+        # Polygons come after the circles, unless the time ran out before.
         self._polygons_turn = self._polygons_pending and self._polygons_left > 0 and not self._polygons_turn
         self._left = self._config.quanta_per_firing
         self._polygons_left = self._config.polygon_quanta_per_firing
@@ -133,7 +133,7 @@ class BayesPerception:
         return 0
 
     def objects(self) -> tuple[DetectedObject, ...]:
-        """Return the models that are sure, best first; only refinement changes them."""
+        """Return the models that are reported, best first; only refinement changes them."""
         if self._objects is None:
             self._objects = self._sure_objects()
         return self._objects
@@ -159,7 +159,7 @@ class BayesPerception:
         return seen
 
     def labelled_objects(self) -> tuple[DetectedObject, ...]:
-        """Return the objects, then everything else that has a name."""
+        """Return the reported models, then all other objects that have a label."""
         named = self.objects()
         return (*named, *other_objects(self.memory, self.settings, self._config.report_probability, named))
 
@@ -168,19 +168,19 @@ class BayesPerception:
         return drawn(mapped_segments(self.memory))
 
     def segments(self) -> Segments:
-        """Return the outline segments in the map with all that is known of them."""
+        """Return the outline segments in the map with all their attributes."""
         mapped = mapped_segments(self.memory)
         numbers, times = mapped["number"].copy(), mapped["time_s"].copy()
         pinned = np.isin(numbers, self._pins.numbers) if self._pins.count else np.zeros(len(numbers))
         return Segments(numbers, drawn(mapped), times, pinned.astype(np.int64))
 
     def edit(self, edit: Edit) -> str | None:
-        """Apply a user's edit; return None, or why it cannot be done."""
+        """Apply a user's edit; return None, or the reason why it cannot be done."""
         self._objects = None
         return edit_memory(self.memory, self.settings, self._pins, self._round, self._outlines, edit)
 
     def evidence(self, number: int) -> Evidence | None:
-        """Return what each reading that an object has kept says of it."""
+        """Return the evidence of each reading kept for an object; None for an unknown number."""
         memory, p = self.memory, self.settings
         row = row_of(memory, number)
         if row is None:
@@ -194,7 +194,7 @@ class BayesPerception:
         return evidence_of(memory, p, row, number, name, alternative_labels(p, self._round))
 
     def reset(self) -> None:
-        """Begin anew, as after the odometry did."""
+        """Clear the memory, as after a reset of the odometry."""
         self.memory.clear()
         self._pins.clear()
         self._objects = ()
@@ -203,13 +203,13 @@ class BayesPerception:
         self._circles_pending = self._polygons_pending = self._polygons_turn = False
 
     def apply_settings(self, config: PerceptionConfig) -> None:
-        """Go on with other constants; the number of tracks stays."""
+        """Replace the constants of a running process; the number of tracks does not change."""
         self._config = config.bayes
         apply_config(self.settings, config.bayes)
         self._objects = None
 
     def set_models(self, models: Sequence[ModelConfig]) -> None:
-        """Look for further models as well, which come after those from before."""
+        """Add models to the library, after the present ones."""
         before, self.settings = self.settings, copied(self.settings)
         apply_library(self.settings, models)
         migrate(self.memory, before, self.settings)
@@ -217,7 +217,7 @@ class BayesPerception:
         self._forget_reports()
 
     def drop_caches(self) -> None:
-        """Drop what was derived from the memory before it was restored from a snapshot."""
+        """Drop what was derived from the memory, after the memory was restored from a snapshot."""
         self._forget_reports()
 
     def _forget_reports(self) -> None:

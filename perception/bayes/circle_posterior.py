@@ -1,10 +1,10 @@
 """Posterior of a circle's centre: mean and covariance of the exact likelihood.
 
-Rounded ranges without noise leave a polygon of equally likely centres, and noisy ones a bell. Least squares takes the
-first for the second and stays two to four times worse than the polygon's middle. So the posterior is added up as it
-is, on a small grid laid where the last one found its mass: a track starts warm, and 49 cells are enough whatever the
-shape. The pitch is one expected standard deviation, in the frame of the covariance's Cholesky root, so that a centre
-known well along the beam and badly across it is sampled alike in both.
+Rounded ranges without noise leave a polygon of equally likely centres; noisy ones leave a bell. Least squares assumes
+the bell in both cases, and its error is two to four times that of the polygon's middle. So the posterior is summed
+numerically on a small grid, laid where the last grid found its mass; with this warm start 49 cells suffice for any
+shape. The pitch is one expected standard deviation in the frame of the covariance's Cholesky root, so that a centre
+known well along the beam and badly across it is sampled equally in both directions.
 """
 
 from __future__ import annotations
@@ -25,29 +25,29 @@ SIDE: Final = 7
 """Cells along a side of the grid (SIDE² is `GRID_CELLS`); odd, so that one lies on the mean."""
 
 ATTEMPTS: Final = 4
-"""How often a grid is laid at most: the bound on the work."""
+"""Greatest number of grids laid in one call: the bound on the work."""
 
 NEGLIGIBLE_NAT: Final = 30.0
-"""A cell this many nats below the best one weighs nothing."""
+"""A cell this many nats below the best one is ignored."""
 
 OFF_CENTRE: Final = 1.2
-"""A mean this many pitches off the grid's middle asks for a new grid."""
+"""The grid is laid again when the mean is this many pitches off its middle."""
 
 NARROW: Final = 0.3
 WIDE: Final = 2.2
 """Variances, in squared pitches, beyond which the grid is too coarse or too small: 1 is as expected."""
 
 THINNEST: Final = 0.06
-"""Least variance, in squared pitches, that the next grid believes: less falls between the cells."""
+"""Least variance, in squared pitches, that the next grid assumes: a narrower peak falls between the cells."""
 
 CORRELATION_MAX: Final = 0.95
-"""Greatest correlation the next grid believes."""
+"""Greatest correlation that the next grid assumes."""
 
 GROWTH: Final = 2.0
-"""Where the best cell lies on the rim the covariance is taken this much greater."""
+"""Factor on the covariance where the best cell lies on the rim."""
 
 SIGMA_MIN_GATES: Final = 2e-4
-"""Least σ of the frame, in gates; its greatest is one gate, beyond which no reading takes part."""
+"""Least σ of the frame, in gates; its greatest is one gate, beyond which no reading counts."""
 
 
 @kernel
@@ -55,7 +55,7 @@ def linearise(
     readings: Records[Reading], radius: float, p: SettingsRecord, noise: int, posterior: CirclePosterior,
     linear: Records[LinearReading],
 ) -> int:  # fmt: skip
-    """Write each reading's error and its slope along the axes of the frame; return how many readings take part.
+    """Write each reading's error and slope along the frame's axes; return the number of readings that count.
 
     Parameters
     ----------
@@ -90,7 +90,19 @@ def linearise(
 
 @kernel
 def interpolated(row: Floats, last: float, t: float) -> float:
-    """Return a level's log likelihood ratio at bin `t`, as `likelihood.loglik`: the method spends its time here."""
+    """Return a level's log likelihood ratio (nat) at a fractional bin, interpolated linearly as in `likelihood`.
+
+    This is the method's innermost loop.
+
+    Parameters
+    ----------
+    row : (bins,) float
+        A row of `Settings.table`, nat.
+    last : float
+        Greatest bin to interpolate from; a larger `t` is clipped to it.
+    t : float
+        Error in bins, ≥ 0.
+    """
     t = min(t, last)
     b = np.uintp(int(t))  # an unsigned index is not checked for counting from the end
     return float(row[b] + (t - int(t)) * (row[np.uintp(int(t) + 1)] - row[b]))
@@ -98,7 +110,7 @@ def interpolated(row: Floats, last: float, t: float) -> float:
 
 @kernel
 def score_cells(linear: Records[LinearReading], table: Floats, cells: Floats) -> tuple[int, float]:
-    """Add up the log likelihood of each cell of the grid; return the best cell and its log likelihood (nat).
+    """Sum the log likelihood in each cell of the grid; return the best cell and its log likelihood (nat).
 
     Parameters
     ----------
@@ -113,7 +125,7 @@ def score_cells(linear: Records[LinearReading], table: Floats, cells: Floats) ->
     for i in range(SIDE):
         a = float(i - SIDE // 2)
         s0 = s1 = s2 = s3 = s4 = s5 = s6 = 0.0
-        for j in range(len(linear)):  # seven sums at a time: one alone would wait for each addition before the next
+        for j in range(len(linear)):  # seven independent sums at a time: a single one waits for each addition
             q = linear[j]
             e, across, step, row = q.error - a * q.slope_a, q.slope_b, q.bins_per_m, table[q.level]
             s0 += interpolated(row, last, abs(e + 3.0 * across) * step)
@@ -137,7 +149,7 @@ def score_cells(linear: Records[LinearReading], table: Floats, cells: Floats) ->
 
 @kernel
 def moments(best: float, cells: Floats) -> tuple[float, float, float, float, float]:
-    """Return mean and covariance of the grid's mass in pitches: a, b, aa, ab, bb.
+    """Return mean and covariance of the grid's mass, in pitches: a, b, aa, ab, bb.
 
     Parameters
     ----------
@@ -174,7 +186,7 @@ def moments(best: float, cells: Floats) -> tuple[float, float, float, float, flo
 def move_frame(
     ma: float, mb: float, saa: float, sab: float, sbb: float, growth: float, gate: float, posterior: CirclePosterior
 ) -> None:
-    """Let the frame follow the mass: R ← chol(R F Rᵀ), F the moments' covariance within what a grid can resolve.
+    """Move the frame to the mass: R ← chol(R F Rᵀ), F the moments' covariance limited to what a grid resolves.
 
     Parameters
     ----------
@@ -215,11 +227,11 @@ def posterior_circle(
     readings: Records[Reading], radius: float, p: SettingsRecord, noise: int, linear: Records[LinearReading],
     cells: Floats, posterior: CirclePosterior,
 ) -> float:  # fmt: skip
-    """Find mean and covariance of a circle's centre under the exact likelihood of the raw ranges.
+    """Write mean and covariance of a circle's centre under the raw ranges' likelihood; return the greatest one (nat).
 
-    The ranges are linearised about the centre; their log likelihood is added up on a 7 × 7 grid in the frame of
-    the root. Where the mass lies on the rim, off the middle, or is not about one pitch wide, the frame follows it and
-    the grid is laid again, four times at most. A polygon (noise → 0) and a bell are the same code.
+    The ranges are linearised about the centre; their log likelihood is summed on a 7 × 7 grid in the frame of the
+    root. Where the mass lies on the rim, off the middle, or is not about one pitch wide, the frame moves to it and the
+    grid is laid again, four times at most. The same code covers a polygon (noise → 0) and a bell.
 
     Parameters
     ----------
@@ -236,7 +248,7 @@ def posterior_circle(
     cells : (GRID_CELLS,) float
         Scratch.
     posterior : CirclePosterior
-        Centre and root of the expected covariance: where to start; out, those found, with the covariance.
+        In: start of the centre and root of the expected covariance. Out: the posterior's, with the covariance.
 
     Returns
     -------

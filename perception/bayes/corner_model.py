@@ -1,8 +1,7 @@
-"""Two faces and the edge they meet in: a box's corner, which a drum most resembles.
+"""Corner of a box: two faces and the edge where they meet, the shape most similar to a drum.
 
-Seen over a corner a box answers from one face, then from its edge, then from the other face, and the ranges of the
-three together bend like an arc's. Only a fit of faces and edge distinguishes the two, so a drum has to beat this
-explanation too.
+Over a corner a box answers from one face, then from its edge, then from the other face; together the ranges bend like
+those of an arc. Only a fit of faces and edge distinguishes the two, so a drum must exceed this explanation too.
 """
 
 from __future__ import annotations
@@ -22,42 +21,52 @@ from perception.kernel import kernel
 from perception.records import Records
 
 IMPOSSIBLE_NAT: Final = -1e9
-"""Evidence of what cannot be fitted."""
+"""Evidence (nat) of a corner that cannot be fitted."""
 
 READINGS_MIN: Final = 8
-"""Readings that two faces need at least …"""
+"""Least number of readings of two faces …"""
 
 FACE_READINGS_MIN: Final = 3
-"""… and that one does: two to fix it and one to test it."""
+"""… and of one face: two to fix it and one to test it."""
 
 ROUNDS: Final = 3
-"""How often readings are assigned to the faces and both fitted anew."""
+"""Rounds of assigning readings to the faces and fitting both."""
 
 STEPS: Final = 3
 """Steps of a face's fit."""
 
 LEEWAY: Final = 0.02
-"""Cosine by which a face's fit may look past the beam's edge, so that a face started askew keeps its readings."""
+"""Cosine by which a face's fit extends the beam, so that a face started at a wrong angle keeps its readings."""
 
 OUT_OF_BEAM_GATES: Final = 2.0
-"""A face out of the beam is a reading's this many gates worse."""
+"""Error added, in gates, where a face lies outside the beam."""
 
 EDGE_LEAD_GATES: Final = 0.04
-"""A reading is the edge's only if that explains it this many gates better than a face."""
+"""A reading is assigned to the edge only if the edge explains it this many gates better than a face."""
 
 OPENING_MIN: Final = 0.2
-"""|sin| of the angle between the faces from which on they have an edge."""
+"""Least |sin| of the angle between the faces at which they have an edge."""
 
 HIT_NAT: Final = 0.4
-"""Price of each hit: three surfaces to choose from explain chance readings too."""
+"""Price of each hit: a choice of three surfaces also explains chance readings."""
 
 MODEL_NAT: Final = 8.0
-"""Price of the two parameters more than a circle has."""
+"""Price of the two parameters that a circle does not have."""
 
 
 @kernel
 def face_error(q: Reading, cx: float, cy: float, face: LineFit) -> float:
-    """Return the range of a reading less its perpendicular distance to a face about (cx, cy), m."""
+    """Return the range of a reading less its perpendicular distance to a face, m.
+
+    Parameters
+    ----------
+    q : Reading
+        The reading.
+    cx, cy : float
+        Origin of the face's line, m.
+    face : LineFit
+        Unit normal and distance of the face from the origin.
+    """
     return q.range_m - face.distance + face.normal_x * (q.x - cx) + face.normal_y * (q.y - cy)
 
 
@@ -65,7 +74,7 @@ def face_error(q: Reading, cx: float, cy: float, face: LineFit) -> float:
 def is_of_face(
     q: Reading, cx: float, cy: float, corner: CornerFit, side: int, has_edge: bool, cos_may: float, gate: float
 ) -> bool:
-    """Return whether this face explains a reading: better than the other does, hardly worse than the edge.
+    """Return whether a face explains a reading: better than the other face, and hardly worse than the edge.
 
     Parameters
     ----------
@@ -96,7 +105,15 @@ def is_of_face(
 
 @kernel
 def find_edge(cx: float, cy: float, corner: CornerFit) -> bool:
-    """Write where the faces meet; return False where they are too nearly parallel to meet anywhere."""
+    """Write the point where two faces meet; return False where the faces are too nearly parallel.
+
+    Parameters
+    ----------
+    cx, cy : float
+        Origin of the faces' lines, m.
+    corner : CornerFit
+        The faces; their edge is written.
+    """
     a = corner.faces[0]
     b = corner.faces[1]
     det = a.normal_x * b.normal_y - a.normal_y * b.normal_x
@@ -112,7 +129,7 @@ def fit_faces(
     readings: Records[Reading], face_readings: Records[Reading], cx: float, cy: float, radius: float, cos_may: float,
     gate: float, var0: float, rel2: float, fit: LineFit, corner: CornerFit,
 ) -> tuple[bool, bool]:  # fmt: skip
-    """Fit two faces and their edge: to readings left and right of the mean bearing, then to those each fits best.
+    """Fit two faces and their edge, at first to the readings left and right of the mean bearing.
 
     Parameters
     ----------
@@ -177,10 +194,10 @@ def fit_faces(
 def score_corner(
     s: StateRecord, p: SettingsRecord, n: int, cx: float, cy: float, radius: float, var0: float, rel2: float
 ) -> float:
-    """Fit two faces and their edge to a circle's near readings, and score what those say of them.
+    """Return the log ratio (nat) of a corner fitted to a circle's near readings.
 
-    Each reading counts as the best of what may answer it, and nothing is held against silence: a face may end
-    anywhere. It is more flexible than a circle, and pays for that by the hit and once for all.
+    Each reading counts by the surface that explains it best. Silence is not evidence against it, because a face may
+    end anywhere. A corner is more flexible than a circle, so each hit has a price, and so has the model.
 
     Parameters
     ----------

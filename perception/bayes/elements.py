@@ -1,4 +1,4 @@
-"""Capacities of the Bayesian method's memory, and the small records that the others are made of.
+"""Capacities of the Bayesian method's memory, and the small records that the other records contain.
 
 Lengths are metres, angles radians.
 """
@@ -11,15 +11,15 @@ from perception.bayes.parameters import CIRCLES_MAX
 from perception.records import Record
 
 MAX_TRACKS: Final = 48
-"""Tracks of circles where the configuration says nothing else."""
+"""Default number of circle tracks."""
 BEARING_BINS: Final = 36
 """Bins of a track's reservoir, by the bearing from the object to the sensor: 10° each."""
 
 BIN_CAPACITY: Final = 20
-"""Readings in a bin; the newest takes the place of the oldest."""
+"""Readings in a bin; the newest replaces the oldest."""
 MAX_LINES: Final = 24
 HISTORY: Final = 28
-"""Readings kept of each sensor, whatever they hit."""
+"""Readings kept of each sensor, hits and silences of any object."""
 READINGS_MAX: Final = BEARING_BINS * BIN_CAPACITY + 64
 """Readings compared at a time: a reservoir's, and some more of the sensors' histories."""
 ATTRACTING_MAX: Final = 16
@@ -37,30 +37,30 @@ POLYGON_BIN_CAPACITY: Final = 12
 REJECTIONS_MAX: Final = 32
 """Places where a user rejected an object."""
 REQUESTS_MAX: Final = 32
-"""Segments that wait for a polygon to be tried behind them, or recently did."""
+"""Requests for polygon hypotheses, waiting or recent."""
 PAIRS_PER_SENSOR: Final = 8
-"""Outline segments that a reading may make."""
+"""Greatest number of outline segments from one reading."""
 ALTERNATIVES_MAX: Final = CIRCLES_MAX + 2
 """Explanations of a circle track: radii, a line, a corner."""
 GRID_CELLS: Final = 49
-"""Cells of the grid on which a circle's posterior is added up."""
+"""Cells of the grid on which a circle's posterior is summed."""
 
 
 class Reading(Record):
     """A raw range in the odometry frame."""
 
     x: float
-    """The sensor's place, m."""
+    """The sensor's position, m."""
     y: float
     axis_x: float
     """Its axis, a unit vector."""
     axis_y: float
     range_m: float
-    """At least `range_fit.FAR` where nothing was heard."""
+    """Range, m; at least `range_fit.FAR` without an echo."""
 
 
 class Pose(Record):
-    """A pose: m, rad."""
+    """A pose: position (m) and heading (rad)."""
 
     x: float
     y: float

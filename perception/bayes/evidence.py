@@ -1,7 +1,7 @@
-"""The evidence of each reading for or against an object, for users who ask why it is believed.
+"""Evidence of each reading for or against an object, for display to users.
 
-Nothing here changes the memory: a replay in which the evidence was not asked for must not differ. Evidence of all
-readings together and not of each (drop-outs are dearer where there are many) is left out.
+Nothing here changes the memory, because a replay in which no user requested the evidence must not differ. Terms that
+belong to all readings together (the price of many drop-outs) are left out.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def circle_evidence(
     s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int, readings: Records[Reading],
     score: Records[Score], nats: Floats,
 ) -> int:  # fmt: skip
-    """Write what each reading of circle `t` says of it, 0 where it does not bear on it; return how many there are.
+    """Write the evidence of each reading for circle `t`, 0 where it does not bear on it; return how many there are.
 
     Parameters
     ----------
@@ -36,11 +36,11 @@ def circle_evidence(
     t : int
         The track.
     readings : (READINGS_MAX,) Reading
-        Out.
+        Out: the readings.
     score : (1,) Score
         Scratch.
     nats : (READINGS_MAX,) float
-        Out.
+        Out: the evidence of each, nat.
     """
     track = tracks[t]
     var0, rel2 = noise_variance(s, p)
@@ -57,7 +57,13 @@ def circle_evidence(
 def polygon_evidence(
     s: StateRecord, p: SettingsRecord, t: int, readings: Records[Reading], score: Records[Score], nats: Floats
 ) -> int:
-    """Write the same for polygon `t`; the parameters are those of `circle_evidence`."""
+    """Write the evidence of each reading for polygon `t`, 0 where it does not bear on it; return how many there are.
+
+    Parameters
+    ----------
+    s, p, t, readings, score, nats
+        As for `circle_evidence`.
+    """
     track = s[0].polygons[t]
     outline = p[0].polygons[track.model]
     sides = outline.sides[: outline.side_count]
@@ -73,7 +79,7 @@ def polygon_evidence(
 def evidence_of(
     memory: Memory, p: SettingsRecord, row: int, number: int, model: str, labels: tuple[str, ...]
 ) -> Evidence:
-    """Return the evidence on a track.
+    """Return the evidence of each reading kept for a track.
 
     Parameters
     ----------

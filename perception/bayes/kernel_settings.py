@@ -1,9 +1,8 @@
-"""The settings record: made from the ring, the model library and the configuration.
+"""Construction of the settings record from the ring, the model library and the configuration.
 
-The constants were found on random halls with the Denning's ring and hold for other rings as well, because what
-depends on the ring (beam, resolution, range) and on the models (radius, outline) is taken from there. Lengths that
-depend on neither are about how near objects stand to one another in a building; they are metres, to a tenth of a
-foot.
+The constants were tuned on random halls with the Denning's ring. They hold for other rings as well, because values
+that depend on the ring (beam, resolution, range) or on the models (radius, outline) are computed from these. Lengths
+that depend on neither reflect the spacing of objects in a building; they are in metres, to a tenth of a foot.
 """
 
 from __future__ import annotations
@@ -35,31 +34,31 @@ from perception.object_model import ObjectModel
 from perception.records import array_of, column, records, zeros
 
 RIVALS_M: Final = (0.0, 0.35 * FOOT_M, 2.2 * FOOT_M)
-"""Radii that every circle has to beat: an edge or corner, a post, a barrel."""
+"""Radii that compete with every model: an edge or corner, a post, a barrel."""
 MERGE_RADII: Final = 0.9
-"""Two centres nearer than so many radii of the smallest model are one object."""
+"""Two centres nearer than this many radii of the smallest model are one object."""
 RIVAL_APART_M: Final = 0.1 * FOOT_M
 """A rival as near as this to a model's radius is that model."""
 SAME_RADIUS_M: Final = 1e-3
 """Models of radii as near as this are one circle, named after the first of them."""
 
 MAY_DEG: Final = 0.4
-"""A reading this far outside the beam may match: mounts and headings are not known better."""
+"""A reading this far outside the beam may match: the accuracy of mounts and headings."""
 MUST_DEG: Final = 1.5
 """A reading must hit only this far inside it: sensitivity fades towards the edge."""
 DENSITY_M: Final = 15.0 * FOOT_M
-"""Something else answers from anywhere up to here: the background's density is one over it."""
+"""Range over which echoes of the background are uniform; its density is the inverse."""
 OUTLIERS: Final = 0.03
-"""Share of ranges that come from elsewhere."""
+"""Share of outliers: ranges from another object."""
 SIGMAS_M: Final = (0.001 * FOOT_M, 0.6 * FOOT_M)
 """Least and greatest noise of the likelihood's table."""
 ABSOLUTE_M: Final = tuple(v * FOOT_M for v in (0.003, 0.012, 0.03, 0.05, 0.08))
 RELATIVE: Final = (0.0, 0.005, 0.01, 0.02)
-"""The noises between which the method decides: σ² = absolute² + (relative · range)²."""
+"""Absolute and relative noises of the hypotheses: σ² = absolute² + (relative · range)²."""
 
 
 def polygon_symmetry(vertices: Floats) -> int:
-    """Return how often a closed outline looks alike in a turn about the origin; vertices of shape (n, 2), m."""
+    """Return the order of a closed outline's rotational symmetry about the origin; vertices of shape (n, 2), m."""
     n = len(vertices)
     size = float(np.hypot(vertices[:, 0], vertices[:, 1]).max())
     for order in range(n, 1, -1):
@@ -92,7 +91,7 @@ def _chords(radius: float) -> Floats:
 
 
 def least_half_width(corners: Floats) -> float:
-    """Return half the width of an outline in the direction in which it is narrowest; vertices of shape (n, 2), m."""
+    """Return half of an outline's least width, m; vertices of shape (n, 2), m."""
     along = corners[:, None] - corners[None]
     across = np.column_stack([-along[..., 1].ravel(), along[..., 0].ravel()])
     length = np.hypot(across[:, 0], across[:, 1])
@@ -101,11 +100,11 @@ def least_half_width(corners: Floats) -> float:
 
 
 def _enter_polygon(outline: PolygonModel, model: ModelConfig) -> None:
-    """Write a polygon model's outline, its size and its symmetry to its record, which is zero."""
+    """Write a polygon model's outline, size and symmetry to its record, which must be zero."""
     corners = np.array(model.vertices_m, dtype=np.float64)
     following = np.roll(corners, -1, axis=0)
     if model.closed and np.sum(corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0]) < 0.0:
-        corners = np.ascontiguousarray(corners[::-1])  # kernels take the outside to lie right of each side
+        corners = np.ascontiguousarray(corners[::-1])  # kernels expect the outside on the right of each side
     sides = ObjectModel.from_config(model.model_copy(update={"vertices_m": corners.tolist()})).sides
     x, y, direction = sides[:, 0], sides[:, 1], sides[:, 2]
     tangents = np.column_stack([np.cos(direction), np.sin(direction)])
@@ -116,7 +115,7 @@ def _enter_polygon(outline: PolygonModel, model: ModelConfig) -> None:
     for k, (tangent, length) in enumerate(zip(tangents.tolist(), sides[:, 3].tolist(), strict=True)):
         outline.sides[k].tangent_x, outline.sides[k].tangent_y = tangent
         outline.sides[k].length = length
-    # The origin may lie on a side, or outside of a hollow outline; then its width gives its size.
+    # The origin may lie on a side, or outside of a hollow outline; then the width gives the size.
     nearest = float(np.abs(x * tangents[:, 1] - y * tangents[:, 0]).min())
     outline.inner_radius_m = max(nearest, least_half_width(corners))
     outline.outer_radius_m = float(np.hypot(corners[:, 0], corners[:, 1]).max())
@@ -124,14 +123,14 @@ def _enter_polygon(outline: PolygonModel, model: ModelConfig) -> None:
 
 
 def apply_config(p: SettingsRecord, config: BayesConfig) -> None:
-    """Enter what a running process may change."""
+    """Write the settings that may change in a running process."""
     p[0].attempts_per_firing = config.attempts_per_firing
     p[0].report_probability = config.report_probability
     p[0].report_probability_near = min(config.report_probability, config.report_probability_near)
 
 
 def apply_library(p: SettingsRecord, models: Sequence[ModelConfig]) -> None:
-    """Enter the models: round ones by their radius, others by their outline.
+    """Write the models: round ones by their radius, others by their outline.
 
     Raises
     ------
@@ -141,7 +140,7 @@ def apply_library(p: SettingsRecord, models: Sequence[ModelConfig]) -> None:
     known, _ = circle_models(models)
     rivals = [r for r in RIVALS_M if all(abs(r - k) > RIVAL_APART_M for k in known)]
     if not known:
-        rivals = [*rivals[1:], rivals[0]]  # hypotheses need a body to lie behind a segment, and a point has none
+        rivals = [*rivals[1:], rivals[0]]  # hypotheses need a body behind a segment, and a point has no extent
     radii = [*known, *rivals]
     outlines = [m for m in models if m.arc_radius_m is None]
     if len(radii) > CIRCLES_MAX or len(outlines) > POLYGONS_MAX:
@@ -175,7 +174,7 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: Bayes
     models : sequence of ModelConfig
         The library: round ones by their radius, the others by their outline.
     config : BayesConfig
-        What a user may set.
+        The settings that a user may change.
 
     Raises
     ------

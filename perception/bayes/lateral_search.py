@@ -1,8 +1,9 @@
-"""Search across the beam for the place of a young circle at which the raw readings count for most.
+"""Search across the beam for the position of a young circle track.
 
-Seen from one side only, a centre is known well along the beam and badly across it, and each place across has other
-readings in its beam: a fit keeps the readings it began with, and so its mistakes. Which sensors hear a body and which
-do not places it better across than all their ranges do; so a few places across are scored as they are.
+Observed from one side only, a centre is well determined along the beam and badly across it, and at each position
+across the beam other readings count. A fit keeps the readings it started with, and so its errors. Which sensors hear
+a body and which do not locates it better across the beam than their ranges do; so a few positions are scored
+directly.
 """
 
 from __future__ import annotations
@@ -18,17 +19,17 @@ from perception.kernel import kernel
 
 PLACES: Final = 3
 STEP_M: Final = 0.12 * FOOT_M
-"""So many places on either side, so far apart: half a foot, a beam's edge at two and a half feet."""
+"""Positions on either side, and their spacing: together half a foot, a beam's edge at two and a half feet."""
 LEAD_NAT: Final = 1.0
-"""Another place must lead by this: less is chance."""
+"""Evidence by which another position must lead; a smaller lead is chance."""
 
 
 @kernel
 def search_across(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> bool:
-    """Move a track across the beam to where its readings are likeliest; return whether it moved.
+    """Move a track across the beam to the position of greatest likelihood; return whether it moved.
 
-    The places lie on an arc about the mean of the sensors that hear it, so that its ranges change as little as
-    possible.
+    The positions lie on an arc about the mean of the sensors that hear the track, so that its ranges change as little
+    as possible.
 
     Parameters
     ----------
@@ -37,7 +38,7 @@ def search_across(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int)
     track : CircleTrack
         Updated.
     n : int
-        Its readings, the first of the scratch.
+        Number of its readings, the first of the scratch.
     """
     readings = s[0].scratch.readings
     x = 0.0

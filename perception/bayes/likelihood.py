@@ -1,9 +1,9 @@
 """Log likelihood ratio of one range error under rounding, noise and outliers, as a table.
 
-A range comes rounded: the truth lies in a box around it, and noise softens only the box's edges. Used as such, a few
-dozen readings fix a centre several times better than least squares on the same readings, which takes the box for a
-bell. Every value is a log ratio to the background, an echo of something else anywhere in range, so that a sum over
-readings is evidence for or against.
+A range is rounded: the true value lies in a box around it, and noise blurs only the box's edges. With this likelihood
+a few dozen readings locate a centre several times better than least squares, which assumes a bell. Every value is a
+log ratio to the background (an echo of something else anywhere in range), so that a sum over readings is evidence for
+or against.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from perception.kernel import Floats, kernel
 from perception.records import Records
 
 REACH_SIGMAS: Final = 6.0
-"""σ beyond the box where only outliers are left."""
+"""Distance beyond the box, in σ, at which only outliers remain."""
 
 SHARP: Final = 1e-3
-"""Below this share of σ half the box is no box: the difference of two error functions would only lose digits."""
+"""Least half box, as a share of σ: below it the difference of two error functions only loses digits."""
 
 
 @kernel
@@ -35,15 +35,15 @@ def build_table(
     half_box: float, sigma_lo: float, sigma_hi: float, density: float, outliers: float, table: Floats,
     bins_per_m: Floats, sigmas: Floats,
 ) -> None:  # fmt: skip
-    """Write the log likelihood ratio of an error e for each level of noise.
+    """Write the table: the log likelihood ratio of an error e for each level of noise.
 
     With h half the box, σ the noise and Φ the normal distribution, a uniform box convolved with a Gaussian, mixed
     with a share ε of outliers of the background's density u0::
 
         L(e) = log((1 − ε) · [Φ((e + h)/σ) − Φ((e − h)/σ)] / (2 h u0) + ε)
 
-    which for h → 0 becomes the Gaussian's own density. From the last bin but one on L = log ε. The last bin is there
-    twice, so that an error beyond it is clipped and interpolated like any other, without a branch.
+    which for h → 0 becomes the Gaussian's own density. From the last bin but one on L = log ε. The last bin is
+    stored twice, so that an error beyond it is clipped and interpolated without a branch.
 
     Parameters
     ----------
@@ -81,7 +81,17 @@ def build_table(
 
 @kernel
 def log_likelihood(p: Records[Settings], level: int, error: float) -> float:
-    """Return the log likelihood ratio (nat) of a range error (m) at a level of noise: the table, interpolated."""
+    """Return the log likelihood ratio (nat) of a range error at a noise level, interpolated in the table.
+
+    Parameters
+    ----------
+    p : (1,) Settings
+        The table.
+    level : int
+        Noise level: the table's row.
+    error : float
+        Measured range less predicted range, m.
+    """
     t = min(abs(error) * p[0].table_bins_per_m[level], float(TABLE_BINS - 2))
     b = int(t)
     row = p[0].table[level]
@@ -90,13 +100,23 @@ def log_likelihood(p: Records[Settings], level: int, error: float) -> float:
 
 @kernel
 def level_of(p: Records[Settings], noise: int, range_m: float) -> int:
-    """Return the level of the table that a noise hypothesis means at a range (m)."""
+    """Return the table's noise level for a noise hypothesis at a range.
+
+    Parameters
+    ----------
+    p : (1,) Settings
+        The noise hypotheses.
+    noise : int
+        Index of the hypothesis.
+    range_m : float
+        Range, m.
+    """
     return int(p[0].noises[noise].levels[min(int(range_m * RANGE_BINS_PER_M), RANGE_BINS - 1)])
 
 
 @kernel
 def build_levels(noises: Records[NoiseModel], sigmas: Floats) -> None:
-    """Write which level of the table each noise hypothesis means at the middle of each range bin.
+    """Write each noise hypothesis' table level at the middle of each range bin.
 
     Parameters
     ----------

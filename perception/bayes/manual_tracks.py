@@ -1,7 +1,7 @@
-"""Tracks that a user places or moves: a pose, the readings that bear on it, and refinement as for any other.
+"""Tracks that a user places or moves, refined like any other track.
 
-A user's pose is a decimetre or two off. The paper's relaxation moves the model onto the outline map first, as it does
-with a hypothesis; from there the raw readings refine it.
+A user's pose is wrong by a decimetre or two. As for a hypothesis, the paper's relaxation (§3.4) first moves the model
+onto the outline map; then the raw readings refine it.
 """
 
 from __future__ import annotations
@@ -28,15 +28,23 @@ from perception.bayes.track_labels import assign_number
 from perception.kernel import kernel
 
 ROUNDS: Final = 3
-"""How often a model is relaxed onto the map, a few steps each."""
+"""Relaxations of a model onto the map, a few steps each."""
 STRAYED_M: Final = 0.5
 STRAYED_RAD: Final = 0.8
-"""A relaxation that goes farther than this has found something else."""
+"""Greatest displacement of a relaxation: one that moves farther has found something else."""
 
 
 @kernel
 def set_hypothesis(s: StateRecord, x: float, y: float, heading: float) -> None:
-    """Set the scratch's hypothesis to a pose, m, rad."""
+    """Set the scratch's hypothesis to a pose.
+
+    Parameters
+    ----------
+    s : (1,) State
+        Memory; its scratch is updated.
+    x, y, heading : float
+        The pose, m, rad.
+    """
     hypothesis = s[0].scratch.hypothesis
     hypothesis.x = x
     hypothesis.y = y
@@ -45,7 +53,7 @@ def set_hypothesis(s: StateRecord, x: float, y: float, heading: float) -> None:
 
 @kernel
 def settle_circle(s: StateRecord, p: SettingsRecord, kind: int, x: float, y: float) -> None:
-    """Set the scratch's hypothesis to where the map draws a circle from (x, y).
+    """Set the scratch's hypothesis to a circle relaxed onto the map from (x, y).
 
     Parameters
     ----------
@@ -67,7 +75,7 @@ def settle_circle(s: StateRecord, p: SettingsRecord, kind: int, x: float, y: flo
 
 @kernel
 def mark_placed(track: CircleTrack) -> None:
-    """Mark a circle as placed by a user, and as uncertain as that is."""
+    """Mark a circle as placed by a user, and set its covariance to that of a user's position."""
     track.covariance_xx = VARIANCE_MAX_M2
     track.covariance_yy = VARIANCE_MAX_M2
     track.root_xx = math.sqrt(VARIANCE_MAX_M2)
@@ -77,7 +85,7 @@ def mark_placed(track: CircleTrack) -> None:
 
 @kernel
 def place_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: int, x: float, y: float) -> int:
-    """Start a track of a circle about (x, y) on what the sensors remember; return its index, −1 without room.
+    """Start a circle track about (x, y) on the remembered readings; return its index, −1 without a free track.
 
     Parameters
     ----------
@@ -101,7 +109,7 @@ def place_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: 
 
 @kernel
 def move_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int, x: float, y: float) -> None:
-    """Restart track `t` about (x, y): on its own readings, or far off on what the sensors remember.
+    """Restart circle track `t` about (x, y), on its own readings if near, else on the remembered ones.
 
     Parameters
     ----------
@@ -128,7 +136,7 @@ def move_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int,
 
 @kernel
 def settle_polygon(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float, heading: float) -> None:
-    """Set the scratch's hypothesis to where the map draws a polygon from a pose.
+    """Set the scratch's hypothesis to a polygon relaxed onto the map from a pose.
 
     Parameters
     ----------
@@ -149,14 +157,14 @@ def settle_polygon(s: StateRecord, p: SettingsRecord, model: int, x: float, y: f
 
 @kernel
 def leave_job(s: StateRecord, t: int) -> None:
-    """End the job where it refines polygon `t`, which has changed."""
+    """End the job if it refines polygon `t`, which has changed."""
     if s[0].job.kind == REFINEMENT and s[0].job.track == t:
         end_job(s)
 
 
 @kernel
 def place_polygon(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float, heading: float) -> int:
-    """Start a track of a polygon about a pose on what the sensors remember; return its index, −1 without room.
+    """Start a polygon track about a pose on the remembered readings; return its index, −1 without a free track.
 
     Parameters
     ----------
@@ -182,7 +190,7 @@ def place_polygon(s: StateRecord, p: SettingsRecord, model: int, x: float, y: fl
 
 @kernel
 def move_polygon(s: StateRecord, p: SettingsRecord, t: int, x: float, y: float, heading: float) -> None:
-    """Restart polygon `t` about a pose: on its own readings, or far off on what the sensors remember.
+    """Restart polygon track `t` about a pose, on its own readings if near, else on the remembered ones.
 
     Parameters
     ----------

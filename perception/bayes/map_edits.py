@@ -1,7 +1,7 @@
-"""What a person does to the Bayesian method's memory.
+"""User edits of the Bayesian method's memory.
 
-Edits are rare and come one by one: what needs no kernel is done here in plain arrays, once, and nothing of it is on
-the way of an echo.
+Edits are rare and come one at a time. What needs no kernel is done here in plain arrays; the processing of a firing
+does not depend on it.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ from perception.edits import (
 )
 
 REJECTED_MAX_NAT: Final = 40.0
-"""So much new evidence brings back whatever was rejected: some ten good echoes, four times what starts a track."""
+"""New evidence that always lifts a rejection: about ten good echoes, four times what starts a track."""
 
 
 def row_of(memory: Memory, number: int) -> int | None:
-    """Return the row of an object, circles first, then polygons; None where there is no such number."""
+    """Return the row of an object, circles first, then polygons; None for an unknown number."""
     status, numbers = (np.concatenate([memory.circles[f], memory.polygons[f]]) for f in ("status", "number"))
     found = np.flatnonzero((status != FREE) & (numbers == number))
     return int(found[0]) if len(found) else None
@@ -46,7 +46,7 @@ def row_of(memory: Memory, number: int) -> int | None:
 def edit_memory(
     memory: Memory, p: SettingsRecord, pins: Pins, rounds: Sequence[str], outlines: Sequence[str], edit: Edit
 ) -> str | None:
-    """Apply a user's edit; return None, or why it cannot be done.
+    """Apply a user's edit; return None, or the reason why it cannot be done.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def _place(
 
 
 def _reject(memory: Memory, p: SettingsRecord, row: int) -> None:
-    """Free a track, forget the readings that ended at it, and let nothing like it start in its place."""
+    """Free a track, forget the readings that ended at it, and prevent a like one from starting in its place."""
     t = row - len(memory.circles)
     track = memory.tracks[row] if t < 0 else memory.s[0].polygons[t]
     x, y, evidence = float(track.x), float(track.y), float(track.log_likelihood_ratio)
@@ -135,7 +135,7 @@ def _reject(memory: Memory, p: SettingsRecord, row: int) -> None:
 
 
 def forget_hits(memory: Memory, p: SettingsRecord, x: float, y: float, inner: float, outer: float) -> None:
-    """Delete the readings from the sensors' histories that ended between two circles about (x, y), or near either.
+    """Delete the remembered readings that ended between two circles about (x, y), or near either circle.
 
     Parameters
     ----------

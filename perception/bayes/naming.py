@@ -1,7 +1,7 @@
-"""Naming of tracks: which are sure enough to be reported as a model.
+"""Selection of the tracks that are reported as models.
 
-A model's name is given late and for good: the model must be probable, well located, and clearly better than an
-unknown object, which would explain any handful of echoes a little.
+A model is named late, and then stays named: it must be probable, well located, and clearly better than an unknown
+object, which explains any few echoes to some degree.
 """
 
 from __future__ import annotations
@@ -19,30 +19,30 @@ from perception.records import Record, Records
 
 OVER_UNKNOWN: Final = 1.25
 OVER_UNKNOWN_ALONE: Final = 1.1
-"""Evidence over that of an unknown object, as a factor; less where every alternative is far behind."""
+"""Least ratio of the evidence to that of an unknown object; less where every alternative is far behind."""
 ALONE_NAT: Final = -20.0
-"""The best alternative is far behind at this lead."""
+"""Lead of the best alternative at which it counts as far behind."""
 NO_WALL_NAT: Final = -4.0
-"""A wall this far behind is out of the question. Walls are the most frequent of all alternatives."""
+"""Lead of a wall at which it is excluded. Walls are the most frequent alternative."""
 DISPERSION_MIN: Final = 0.008
-"""Dispersion of the axes from which on an object has been seen from two sides: what lies straight ahead has not."""
+"""Least dispersion of the axes of an object seen from two sides; an object straight ahead has less."""
 KEPT: Final = 0.5
-"""A name once given is kept while it is likelier than everything else together."""
+"""Least probability at which a name is kept: likelier than everything else together."""
 SIGMA_MAX_M: Final = 0.17 * FOOT_M
-"""A named circle is known at least as well as this along either axis."""
+"""Greatest standard deviation of a named circle along either axis."""
 POLYGON_PROBABILITY: Final = 0.9
 POLYGON_NEAR_M: Final = 6.5 * FOOT_M
 POLYGON_DISPERSION: Final = 0.02
-"""A polygon is seen from near and from more than one direction: one face, square on from afar, may be any wall's."""
+"""Least dispersion of a polygon's axes: a single face seen square on from afar may belong to any wall."""
 POLYGON_SIGMA_MAX_M: Final = 0.2 * FOOT_M
 POLYGON_HITS: Final = 20.0
 POLYGON_HITS_SWEPT: Final = 12.0
 POLYGON_SWEPT: Final = 80
-"""It answers so often; or less often, where so many readings bear on it, silences and all, and it explains them."""
+"""Least hits of a polygon; fewer suffice where this many readings, silences included, bear on it and fit it."""
 
 
 class Reported(Record):
-    """What a circle was last reported as."""
+    """The values with which a circle was last reported."""
 
     x: float
     y: float
@@ -58,9 +58,9 @@ class Reported(Record):
 
 @kernel
 def update_name(track: CircleTrack, p: SettingsRecord, sure: float, least: float) -> None:
-    """Name a track after a model once that is sure, and withdraw the name once it is not even likely any more.
+    """Name a track after a model once that is sure; withdraw the name once it is no longer likely.
 
-    A name that came and went with every alternative's turn would be useless to steer by.
+    Without this hysteresis a name would come and go with each comparison, and could not be used for steering.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def update_name(track: CircleTrack, p: SettingsRecord, sure: float, least: float
     p : (1,) Settings
         Which circles are models.
     sure, least : float
-        Probability from which on a name is given; and from which on where a wall is out of the question.
+        Least probability to give a name, and the same where a wall is excluded.
     """
     line = p[0].circle_count
     if track.leads[line] == 0.0 or track.leads[line] > NO_WALL_NAT:
@@ -91,9 +91,9 @@ def update_name(track: CircleTrack, p: SettingsRecord, sure: float, least: float
 
 @kernel
 def report_circles(tracks: CircleTracks, reported: Records[Reported], sure: Ints) -> int:
-    """Write the circles that are objects to `sure`, those that changed as ~t, and return how many there are.
+    """Write the circles that are objects to `sure`, changed ones as ~t; return the number of circles written.
 
-    They are objects because the readings say so, or because a user does.
+    A circle is an object by its readings or by a user's mark.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def report_circles(tracks: CircleTracks, reported: Records[Reported], sure: Ints
 
 @kernel
 def update_reported(track: CircleTrack, last: Reported) -> bool:
-    """Enter what a circle is reported as, and return whether that changed."""
+    """Update a circle's reported values; return whether they changed."""
     is_same = (
         last.x == track.x
         and last.y == track.y
@@ -144,7 +144,7 @@ def update_reported(track: CircleTrack, last: Reported) -> bool:
 
 @kernel
 def is_sure_polygon(track: PolygonTrack, least: float) -> bool:
-    """Return whether a polygon is sure by its readings, with at least this probability."""
+    """Return whether a polygon's readings make it sure, with at least this probability."""
     largest = max(track.covariance.xx, track.covariance.yy)
     if track.status != ESTABLISHED or track.probability < least or largest > POLYGON_SIGMA_MAX_M**2:
         return False
@@ -170,7 +170,7 @@ def is_sure_polygon(track: PolygonTrack, least: float) -> bool:
 
 @kernel
 def sure_polygons(s: StateRecord, least: float, out: Ints) -> int:
-    """Write the polygons that are sure, or that a user marked, to `out` and return how many there are.
+    """Write the polygons that are sure, or marked by a user, to `out`; return the number of them.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
-"""Estimation of the ring's noise, on which everything else depends.
+"""Estimation of the ring's range noise.
 
-There are two sources. *Roughness* needs no model: of three readings of one sensor in a row the middle one should lie
-between the outer two, whatever they hit. The *residuals* of sure objects discriminate far more finely, but only as
-far as the objects are right; so roughness decides what is possible, and both together what is likeliest. Residuals
-alone let a false object raise the noise until it fits.
+There are two sources. *Roughness* needs no model: of three consecutive readings of one sensor the middle one should lie
+between the outer two, on any surface. The *residuals* of sure objects discriminate far better, but only if the objects
+are correct. So roughness decides which noises are possible, and both sources which one is likeliest. With residuals
+alone a false object could raise the noise until it fits.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from perception.records import Records
 
 TWO_PI: Final = 2.0 * math.pi
 SIGMAS: Final = 3.0
-"""A range this many σ and half its rounding off what is expected is explained."""
+"""Greatest error of an explained range, in σ, beyond half its rounding."""
 TRIPLE_M: Final = 1.0 * FOOT_M
-"""Three places farther apart than this hardly see one surface."""
+"""Greatest distance between the positions of a triple: farther apart they rarely see one surface."""
 BENT_M2: Final = 1e-4 * FOOT_M * FOOT_M
 """Variance that a curved surface adds."""
 FORGET: Final = 0.997
-"""What remains of the evidence from roughness after each triple: it remembers some three hundred."""
+"""Factor on the evidence from roughness after each triple: a memory of about three hundred triples."""
 ELSEWHERE_PER_M: Final = 0.02 / FOOT_M
 """Density of a middle reading that hit something else, 1/m."""
 BELL_SHARE: Final = 0.8
@@ -36,7 +36,7 @@ BELL_SHARE: Final = 0.8
 BOX_M2: Final = 1e-6 * FOOT_M * FOOT_M
 """Least variance of a range, so that perfect ones do not divide by zero."""
 SURE: Final = 0.95
-"""An object votes from this probability on …"""
+"""An object's residuals count from this probability on …"""
 READINGS_MIN: Final = 25.0
 """… and from this many hits on, …"""
 EVERY: Final = 3
@@ -45,14 +45,14 @@ EVERY: Final = 3
 
 @kernel
 def noise_variance(s: Records[State], p: Records[Settings]) -> tuple[float, float]:
-    """Return the variance of a range r that is assumed now, as var0 (m²) and rel2: var0 + rel2 · r²."""
+    """Return the assumed variance of a range r as (var0, rel2): var0 (m²) + rel2 · r²."""
     noise = p[0].noises[s[0].noise_level]
     return noise.absolute_m**2 + p[0].half_resolution_m ** 2 / 3.0 + BOX_M2, noise.relative**2
 
 
 @kernel
 def tolerance_m(half_box: float, var: float) -> float:
-    """Return how far off an explained range is at most, m: rounded by ± `half_box` (m), of variance `var` (m²)."""
+    """Return the greatest error of an explained range, m, for rounding ± `half_box` (m) and variance `var` (m²)."""
     return half_box + SIGMAS * math.sqrt(var)
 
 
@@ -60,14 +60,14 @@ def tolerance_m(half_box: float, var: float) -> float:
 def add_roughness(
     a: Reading, b: Reading, c: Reading, age_s: float, p: Records[Settings], evidence: Floats
 ) -> None:  # fmt: skip
-    """Add what three readings of one sensor say of each noise.
+    """Add the evidence of three readings of one sensor for each noise.
 
     Parameters
     ----------
     a, b, c : Reading
         The newest first.
     age_s : float
-        Age of the last.
+        Age of the oldest, s.
     p : (1,) Settings
         The noises.
     evidence : (NOISES,) float
@@ -93,7 +93,7 @@ def add_roughness(
 
 @kernel
 def add_residuals(s: Records[State], tracks: Records[CircleTrack], p: Records[Settings], t: int, n: int) -> None:
-    """Enter what the residuals of track `t` say of each noise, if it is sure.
+    """Update each noise's evidence from the residuals of track `t`, if the track is sure.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def add_residuals(s: Records[State], tracks: Records[CircleTrack], p: Records[Se
 
 @kernel
 def choose_noise(s: Records[State], p: Records[Settings]) -> None:
-    """Assume the likeliest noise by both sources, among those that roughness does not rule out."""
+    """Select the likeliest noise by both sources, among those that roughness does not exclude."""
     state = s[0]
     top = -1e300
     for h in range(NOISES):

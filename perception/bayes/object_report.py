@@ -1,4 +1,4 @@
-"""Tracks as objects: models by their name, and everything else by a name that says what is known of it."""
+"""Conversion of tracks to reported objects: models by name, all others by a descriptive label."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from perception.detected_object import DetectedObject
 from perception.kernel import Floats
 
 PLACED_SIGMA_M: Final = 0.15
-"""Standard deviation of a place that a user gave, m."""
+"""Standard deviation of a position that a user gave, m."""
 CIRCLE_INFLATION: Final = 1.1
 """Factor on a circle's covariance when it is reported."""
 POLYGON_INFLATION: Final = 1.15
-"""Factor on a polygon's covariance when it is reported: its neighbours' influence on it is not in the noise."""
+"""Factor on a polygon's reported covariance: the noise does not include the influence of its neighbours."""
 POLYGON_TURN: Final = math.radians(MAY_DEG)
-"""Its heading is not known better than the beam's edges are, rad: an echo at an edge turns a body."""
+"""Least standard deviation of its heading, rad: that of the beam's edges, since an echo at an edge turns a body."""
 CORNER_M: Final = 1.0 * FOOT_M
-"""A point this near to a long wall's line is a corner of the room, not an edge of an object."""
+"""A point this near to a wall's line is a corner of the room, not an edge of an object."""
 POST_M: Final = 1.0 * FOOT_M
 """A round rival thinner than this is a post, a thicker one a barrel."""
 UNKNOWN_HITS: Final = 5.0
-"""An object without a name is reported from so many hits on."""
+"""Least hits of an unnamed object that is reported."""
 
 CIRCLE_FIELDS: Final = (
     "x", "y", "covariance_xx", "covariance_xy", "covariance_yy", "hits", "number", "marks",
@@ -39,13 +39,29 @@ Row = tuple[float, ...]
 
 
 def worst_sigma(xx: float, xy: float, yy: float) -> float:
-    """Return the standard deviation along the worst axis of a covariance."""
+    """Return the standard deviation along a covariance's longest axis, m: the root of the greatest eigenvalue.
+
+    Parameters
+    ----------
+    xx, xy, yy : float
+        The covariance, m².
+    """
     middle = 0.5 * (xx + yy)
     return math.sqrt(max(0.0, middle + math.hypot(0.5 * (xx - yy), xy)))
 
 
 def circle_object(row: Row, label: str, probability: float) -> DetectedObject:
-    """Return a circle as an object, without heading, from its values of `CIRCLE_FIELDS`."""
+    """Return a circle track as a reported object, which has no heading.
+
+    Parameters
+    ----------
+    row : record
+        The track's values of `CIRCLE_FIELDS`.
+    label : str
+        The name it is reported by.
+    probability : float
+        The probability it is reported with.
+    """
     x, y, xx, xy, yy, hits, number, marks = row
     xx, xy, yy = CIRCLE_INFLATION * xx, CIRCLE_INFLATION * xy, CIRCLE_INFLATION * yy
     return DetectedObject(
@@ -55,7 +71,7 @@ def circle_object(row: Row, label: str, probability: float) -> DetectedObject:
 
 
 def label_fields(number: int, marks: int) -> tuple[int | None, bool, bool]:
-    """Return a track's number, whether a user confirmed it, and whether one placed it."""
+    """Return a track's number, whether a user confirmed it, and whether a user placed it."""
     return number or None, bool(marks & CONFIRMED), bool(marks & PLACED)
 
 
@@ -71,20 +87,20 @@ def polygon_covariance(track: PolygonTrack) -> Floats:
 
 
 def polygon_object(track: PolygonTrack, p: SettingsRecord, label: str, probability: float) -> DetectedObject:
-    """Return a polygon as an object; of the headings at which it looks alike the least one from −π on.
+    """Return a polygon track as a reported object; of its equivalent headings the least one from −π on.
 
     Parameters
     ----------
     track, p
         The track and the settings.
     label, probability
-        What it is reported as.
+        The name and probability it is reported with.
     """
     heading = float(track.heading)
     covariance = polygon_covariance(track)
     xx, xy, yy = float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1])
     period = 2.0 * math.pi / int(p[0].polygons[track.model].symmetry)
-    is_located = xx > 0.0  # else only a user's word places it so far
+    is_located = xx > 0.0  # else only a user's placement gives its position so far
     return DetectedObject(
         label, float(track.x), float(track.y), (heading + 0.5 * period) % period - 0.5 * period,
         worst_sigma(xx, xy, yy) if is_located else PLACED_SIGMA_M, int(track.hits), probability, probability,
@@ -93,13 +109,13 @@ def polygon_object(track: PolygonTrack, p: SettingsRecord, label: str, probabili
 
 
 def known_walls(memory: Memory) -> NDArray[Any]:
-    """Return the lines that are walls, as records of `state.Line`."""
+    """Return the lines that count as walls, as records of `state.Line`."""
     lines = memory.state["lines"][0]
     return lines[(lines["echoes"] > ECHOES_MIN) & (lines["high"] - lines["low"] > WALL_MIN_M)]  # type: ignore[no-any-return]
 
 
 def wall_object(line: Row) -> DetectedObject:
-    """Return a line as an object, from its fields: the middle of what was seen of it, and its direction."""
+    """Return a line as a reported object: the middle of its extent, and its direction."""
     nx, ny, distance, ox, oy, angle_variance, _, distance_variance, low, high, log_odds, echoes = line
     middle = 0.5 * (low + high)
     across, length = distance_variance + angle_variance * middle**2, high - low
@@ -114,12 +130,12 @@ def wall_object(line: Row) -> DetectedObject:
 
 
 def round_label(radius: float) -> str:
-    """Return what a round object of this radius (m) is called that is no model."""
+    """Return the label of a round object of this radius (m) that is not a model."""
     return "edge" if radius == 0.0 else "post" if radius < POST_M else "barrel"
 
 
 def rival_label(memory: Memory, t: int) -> str:
-    """Return what circle `t`, which is no model, is called."""
+    """Return the label of circle `t`, which is not a model."""
     x, y, radius = (float(memory.circles[name][t]) for name in ("x", "y", "radius"))
     if radius > 0.0:
         return round_label(radius)
@@ -134,7 +150,7 @@ def rival_label(memory: Memory, t: int) -> str:
 
 
 def alternative_labels(p: SettingsRecord, rounds: Sequence[str]) -> tuple[str, ...]:
-    """Return what the alternatives of a circle are called: the round models, their rivals, a line and a corner."""
+    """Return the labels of a circle's alternatives: the round models, their rivals, a line and a corner."""
     settings = p[0]
     rivals = settings.circles[settings.model_count : settings.circle_count]
     return (*rounds, *(round_label(float(it.radius_m)) for it in rivals), "wall", "corner")
@@ -143,14 +159,14 @@ def alternative_labels(p: SettingsRecord, rounds: Sequence[str]) -> tuple[str, .
 def other_objects(
     memory: Memory, p: SettingsRecord, least: float, named: Sequence[DetectedObject]
 ) -> list[DetectedObject]:
-    """Return what has no model's name: walls, corners, edges, posts, barrels, and what is unknown.
+    """Return the objects without a model's name: walls, corners, edges, posts, barrels, and unknown objects.
 
     Parameters
     ----------
     memory, p
         Memory and settings.
     least : float
-        A rival is called what it is from this probability on.
+        Least probability at which a rival gets its own label.
     named : sequence of DetectedObject
         The models.
     """

@@ -1,6 +1,6 @@
-"""Processing of one firing: association of its readings, reservoirs, segments, noise, and new hypotheses.
+"""Processing of one firing: association, reservoirs, segments, noise estimation, and new hypotheses.
 
-This runs for every firing, at a cost that depends on the ring and on the number of tracks, and not on the past.
+This runs for every firing. Its cost depends on the ring and on the number of tracks, not on the length of the run.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from perception.kernel import Floats, kernel
 from perception.records import Records
 
 COORDINATE_MAX_M: Final = 0.5 * FAR
-"""A place farther than this from the odometry's origin is invalid: ranges as long as this mean silence."""
+"""A position farther than this from the odometry's origin is invalid: ranges this long mean silence."""
 
 STILL_M: Final = 0.05 * FOOT_M
 STILL_COS: Final = 0.9998
-"""A sensor that has moved less than this, turned less than this (1°), and hears what it heard says nothing new."""
+"""A reading is redundant if the sensor moved less than this, turned less than this (1°), and its range is the same."""
 ASSOCIATION_MARGIN_M: Final = 0.004 * FOOT_M
 KEEPING_MARGIN_M: Final = 0.01 * FOOT_M
-"""How far outside a beam a centre may lie for the reading to be associated, and kept."""
+"""Distance outside a beam at which a centre may lie for the reading to be associated and kept."""
 TRIES: Final = 2
-"""Hypotheses that are worked out in a firing, at most."""
+"""Greatest number of hypotheses computed per firing."""
 
 
 @kernel
 def place_readings(
     s: StateRecord, p: SettingsRecord, mounts: Floats, px: float, py: float, yaw: float, ranges: Floats
 ) -> int:  # fmt: skip
-    """Write what fired, in the odometry's frame, to the scratch, and return how many readings said anything new.
+    """Write the fired readings to the scratch in the odometry frame; return the number of those that are not redundant.
 
-    An invalid pose or range is left out: entered, it would stay in every sum.
+    An invalid pose or range is left out, because it would corrupt every sum.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def place_readings(
     m = 0
     for i in range(ranges.shape[0]):
         r = ranges[i]
-        if not r >= 0.0:  # nor NaN
+        if not r >= 0.0:  # also true for NaN
             continue
         if r >= p[0].range_max_m:
             r = 2.0 * FAR
@@ -89,7 +89,15 @@ def place_readings(
 
 @kernel
 def associate_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int) -> None:
-    """Associate the first `m` fired readings with the established circles that explain them best."""
+    """Associate fired readings with the established circles that explain them best.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    m : int
+        Number of fired readings, the first of the scratch.
+    """
     var0, rel2 = noise_variance(s, p)
     for i in range(m):
         q = s[0].scratch.fired[i]
@@ -116,7 +124,7 @@ def associate_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m
 def bears_on_circle(
     q: Reading, cx: float, cy: float, radius: float, is_free: bool, is_own: bool, p: SettingsRecord
 ) -> bool:  # fmt: skip
-    """Return whether a reading says anything for or against a circle.
+    """Return whether a reading is evidence for or against a circle.
 
     Parameters
     ----------
@@ -125,7 +133,7 @@ def bears_on_circle(
     cx, cy, radius : float
         Centre and radius, m.
     is_free, is_own : bool
-        Whether nothing else explains it; whether a hit on this circle would be associated with it.
+        Whether no other object explains it; whether a hit on this circle would be associated with it.
     p : (1,) Settings
         Beam and gate.
     """
@@ -147,7 +155,15 @@ def bears_on_circle(
 
 @kernel
 def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int) -> None:
-    """Put each of the first `m` fired readings into the reservoirs of the circles that it bears on."""
+    """Put each fired reading into the reservoirs of the circles that it bears on.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory, circles (updated) and settings.
+    m : int
+        Number of fired readings, the first of the scratch.
+    """
     for t in range(len(tracks)):
         track = tracks[t]
         if track.status == FREE:
@@ -168,7 +184,7 @@ def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
 
 @kernel
 def update_history(s: StateRecord, p: SettingsRecord, m: int, time_s: float) -> None:
-    """Enter this firing into the sensors' histories, spaced out, and evaluate how rough it is.
+    """Add the firing to the sensors' histories, at their spacing, and update the noise from its roughness.
 
     Parameters
     ----------
@@ -201,7 +217,15 @@ def update_history(s: StateRecord, p: SettingsRecord, m: int, time_s: float) -> 
 
 @kernel
 def surest_segment(segments: Records[PairSegment], s: StateRecord, p: SettingsRecord) -> int:
-    """Return the unexplained segment behind which a centre would be known best; −1 where none is good enough."""
+    """Return the index of the unexplained segment that locates a centre behind it best; −1 where none is good enough.
+
+    Parameters
+    ----------
+    segments : (n,) PairSegment
+        Segments of this firing.
+    s, p
+        Memory and settings.
+    """
     chosen = -1
     best = p[0].hypothesis_sigma_m
     for k in range(len(segments)):
@@ -248,7 +272,7 @@ def observe(
     s: StateRecord, tracks: CircleTracks, p: SettingsRecord, mounts: Floats, px: float, py: float, yaw: float,
     time_s: float, ranges: Floats, threshold: float,
 ) -> tuple[int, bool]:  # fmt: skip
-    """Process one firing; everything but refinement.
+    """Process one firing, without refinement; return the segments made, and whether a circle waits for refinement.
 
     Parameters
     ----------
@@ -257,9 +281,9 @@ def observe(
     mounts : (n, 3) float
         x, y (m), direction (rad) of each sensor in the ring's frame.
     px, py, yaw, time_s : float
-        Place (m) and direction (rad) of the ring, and the time.
+        Position (m) and direction (rad) of the ring, and the time (s).
     ranges : (n,) float
-        m; NaN did not fire, inf heard nothing.
+        Ranges, m; NaN: the sensor did not fire, inf: no echo.
     threshold : float
         Unseen evidence for an object's size from which on it waits for refinement.
 

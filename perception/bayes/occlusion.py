@@ -1,9 +1,9 @@
-"""Which readings bear on an object, given what else is known to stand there.
+"""Selection of the readings that bear on an object, given the other known objects.
 
-Two kinds of readings are left out before a body is judged. What is hidden: a known body between a sensor and this one
-swallows the way there and back, though its own surface may face elsewhere and answer nothing, so that silence from
-behind it says nothing. And what another object explains better: a row of drums has one tangent, and a drum is hidden
-by the one before it, so with the echoes of that one in the sum a wall along all of them wins.
+Two kinds of readings are left out before a body is scored. Hidden ones: a known body between the sensor and this one
+blocks the sound, although its own surface may face elsewhere and return no echo; so silence from behind it is not
+evidence. And readings that another object explains better: drums in a row have a common tangent, and each is hidden by
+the one before it; with the other drums' echoes in the sum, a wall along all of them would win.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from perception.records import Records
 def is_hidden(
     tracks: Records[CircleTrack], x: float, y: float, cx: float, cy: float, d: float, radius: float, own: int
 ) -> bool:
-    """Return whether an established circle other than `own` lies on the way from (x, y) to a circle about (cx, cy).
+    """Return whether an established circle other than `own` lies between (x, y) and a circle about (cx, cy).
 
     Parameters
     ----------
     tracks : (n,) CircleTrack
         The circles.
     x, y : float
-        Where the way begins, m.
+        The sensor's position, m.
     cx, cy, d, radius : float
         The circle, and the distance of its centre, m.
     own : int
@@ -54,7 +54,7 @@ def is_explained_elsewhere(
     tracks: Records[CircleTrack], p: Records[Settings], q: Reading, cx: float, cy: float, off: float, own: int,
     var0: float, rel2: float,
 ) -> bool:  # fmt: skip
-    """Return whether an established circle elsewhere explains a reading, and better than by `off`.
+    """Return whether another established circle explains a reading, with an error smaller than `off`.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def is_explained_elsewhere(
     q : Reading
         The reading.
     cx, cy, off : float
-        The circle's centre, and by how much it misses the reading, m.
+        The circle's centre, and its error for the reading, m.
     own : int
         Its track.
     var0, rel2 : float
@@ -90,7 +90,7 @@ def is_relevant(
     tracks: Records[CircleTrack], p: Records[Settings], q: Reading, cx: float, cy: float, radius: float, own: int,
     var0: float, rel2: float,
 ) -> bool:  # fmt: skip
-    """Return whether a reading bears on a circle: nothing hides it, and no other circle explains the reading better.
+    """Return whether a reading bears on a circle: it is not hidden, and no other circle explains it better.
 
     Parameters
     ----------
@@ -111,14 +111,14 @@ def keep_relevant(
     s: Records[State], tracks: Records[CircleTrack], p: Records[Settings], n: int, cx: float, cy: float,
     radius: float, own: int,
 ) -> int:  # fmt: skip
-    """Drop from the first `n` readings of the scratch those that do not bear on a circle; return how many remain.
+    """Drop the readings of the scratch that do not bear on a circle; return the number of those kept.
 
     Parameters
     ----------
     s, tracks, p
         Memory, whose scratch is packed, circles, and settings.
     n : int
-        Readings.
+        Number of readings, the first of the scratch.
     cx, cy, radius : float
         Centre and radius, m.
     own : int

@@ -1,4 +1,4 @@
-"""Outline segments of a firing: unexplained readings paired with earlier ones and with their neighbours in the ring.
+"""Pairing of unexplained readings into outline segments: with earlier readings and with neighbours in the ring.
 
 Paper §3.2, after McKerrow; each segment comes with its uncertainty.
 """
@@ -20,19 +20,19 @@ from perception.bayes.track_initiation import CELL_M
 from perception.kernel import kernel
 
 BASELINE_M: Final = 0.5 * FOOT_M
-"""Shortest baseline of one sensor; the next ones are twice and four times this."""
+"""Shortest baseline of one sensor; the longer ones are twice and four times this."""
 BASELINES: Final = 3
 BASELINE_MAX_M: Final = 2.6 * FOOT_M
 NEIGHBOUR_MIN_M: Final = 0.3 * FOOT_M
 NEIGHBOUR_MAX_M: Final = 1.0 * FOOT_M
-"""Baselines of neighbours that did not fire together."""
+"""Range of baselines of neighbours that did not fire together."""
 MAPPED_MIN_M: Final = 0.2 * FOOT_M
-"""A shorter segment's direction is too poor for the relaxation."""
+"""Least length of a mapped segment: a shorter one's direction is too uncertain for the relaxation."""
 
 
 @kernel
 def add_pair(s: StateRecord, p: SettingsRecord, i: int, other: Reading, var: float, made: int) -> int:
-    """Make a segment of fired reading `i` and another one; return how many segments there are then.
+    """Make a segment of fired reading `i` and another reading; return the new number of segments.
 
     Parameters
     ----------
@@ -58,7 +58,9 @@ def add_pair(s: StateRecord, p: SettingsRecord, i: int, other: Reading, var: flo
 
 @kernel
 def pair_in_time(s: StateRecord, p: SettingsRecord, i: int, time_s: float, var: float, made: int) -> int:
-    """Pair a reading with its own sensor's history, at three baselines: a short one is early, a long one sure.
+    """Pair a reading with its own sensor's history at three baselines; return the new number of segments.
+
+    A short baseline gives a segment early, a long one gives a certain direction.
 
     Parameters
     ----------
@@ -89,7 +91,7 @@ def pair_in_time(s: StateRecord, p: SettingsRecord, i: int, time_s: float, var: 
 
 @kernel
 def pair_in_ring(s: StateRecord, p: SettingsRecord, i: int, m: int, time_s: float, var: float, made: int) -> int:
-    """Pair a reading with its neighbours' in the ring: of this firing, else their newest.
+    """Pair a reading with its ring neighbours' (of this firing, else the newest); return the new number of segments.
 
     Parameters
     ----------
@@ -108,7 +110,7 @@ def pair_in_ring(s: StateRecord, p: SettingsRecord, i: int, m: int, time_s: floa
         has_fired = False
         for k in (i - 1, i + 1, 0, m - 1):
             if 0 <= k < m and sensors[k] == neighbour:
-                if side == 1:  # the other one makes the pair from its side
+                if side == 1:  # the neighbour makes this pair in its own turn
                     made = add_pair(s, p, i, fired[k], var, made)
                 has_fired = True
                 break
@@ -123,7 +125,17 @@ def pair_in_ring(s: StateRecord, p: SettingsRecord, i: int, m: int, time_s: floa
 
 @kernel
 def map_segment(s: StateRecord, segment: PairSegment, time_s: float) -> None:
-    """Put a segment into the outline map, under the next number."""
+    """Put a segment into the outline map under the next segment number.
+
+    Parameters
+    ----------
+    s : (1,) State
+        Memory, updated.
+    segment : PairSegment
+        The segment.
+    time_s : float
+        Time of the firing, s.
+    """
     s[0].segments_numbered += 1
     add_to_map(
         s[0].buckets, CELL_M, segment.x, segment.y, segment.normal_x, segment.normal_y, s[0].segments_numbered, time_s
@@ -132,7 +144,7 @@ def map_segment(s: StateRecord, segment: PairSegment, time_s: float) -> None:
 
 @kernel
 def make_segments(s: StateRecord, p: SettingsRecord, m: int, time_s: float) -> int:
-    """Pair this firing's echoes in time and in the ring, and map the segments; return how many there are.
+    """Pair the firing's echoes in time and in the ring, and map the segments; return the number of segments.
 
     Parameters
     ----------

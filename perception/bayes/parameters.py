@@ -1,8 +1,7 @@
 """The settings record, which kernels read and never change.
 
-It has the same layout for every ring, library and configuration. A kernel is compiled for a layout, so nothing is
-compiled when a model is added on the way. What varies in number has a capacity, and `kernel_settings` refuses what
-exceeds it.
+It has the same layout for every ring, library and configuration. A kernel is compiled for a layout, so adding a model
+at run time compiles nothing. Lists of variable length have a capacity, and `kernel_settings` refuses what exceeds it.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from perception.kernel import Floats, Ints
 from perception.records import Record, Records
 
 CIRCLES_MAX: Final = 64
-"""Radii in competition: the round models and their rivals."""
+"""Greatest number of radii: round models and their rivals."""
 POLYGONS_MAX: Final = 64
 """Polygon models."""
 VERTICES_MAX: Final = 64
@@ -23,7 +22,7 @@ VERTICES_MAX: Final = 64
 CHORDS: Final = 10
 """Chords by which a circle is relaxed onto the map."""
 TABLE_LEVELS: Final = 24
-"""Noise levels of the table, spaced geometrically: 32 % apart over .001 to .6 ft, finer than a σ is known."""
+"""Noise levels of the table, spaced geometrically: 32 % apart over .001 to .6 ft, finer than the accuracy of σ."""
 TABLE_BINS: Final = 129
 """Bins of an error in the table; see `perception.bayes.likelihood`."""
 NOISES: Final = 20
@@ -31,7 +30,7 @@ NOISES: Final = 20
 RANGE_MAX_M: Final = 100.0
 """Longest range of any ring; `config.robot` allows no longer one."""
 RANGE_BINS_PER_M: Final = 2.0 / FOOT_M
-"""Range bins in which a noise is taken as one level, 1/m."""
+"""Range bins per metre; within a bin a noise hypothesis has one level."""
 RANGE_BINS: Final = math.ceil(RANGE_MAX_M * RANGE_BINS_PER_M)
 
 
@@ -56,7 +55,7 @@ class PolygonSide(Record):
     """A side of a polygon in its own frame; of an open outline's last vertex only x and y are set."""
 
     x: float
-    """Where it begins, m."""
+    """Its start, m."""
     y: float
     tangent_x: float
     """Unit direction; a closed outline runs counter-clockwise."""
@@ -84,16 +83,16 @@ class PolygonModel(Record):
 
 
 class Settings(Record):
-    """What the method works with; `perception.bayes.kernel_settings` says where each value comes from."""
+    """The method's settings; `perception.bayes.kernel_settings` gives the source of each value."""
 
     half_angle_rad: float
     """Half the beam's opening."""
     cos_half_angle: float
     sin_half_angle: float
     cos_may_answer: float
-    """Cosine of a little more than half the opening: a reading may match up to there, and costs nothing beyond it."""
+    """Cosine of a little more than half the opening: a reading may match up to this angle, and counts nothing beyond."""
     cos_must_answer: float
-    """Cosine of a little less: within it a reading must hit."""
+    """Cosine of a little less than half the opening: within this angle a reading must hit."""
     sin_must_answer: float
     half_resolution_m: float
     """A range is rounded by at most this."""
@@ -111,42 +110,42 @@ class Settings(Record):
     model_prior_nat: float
     """Log prior of a known model over every other explanation."""
     dispersion_min: float
-    """Least dispersion of the axes that heard an object."""
+    """Least dispersion of the axes of the sensors that heard an object."""
     far_m: float
-    """An object heard only from beyond this is less and less likely a model."""
+    """Distance beyond which an object's prior as a model falls, if it was heard only from there."""
     far_nat_per_m: float
     roughness_gate_nat: float
     """Noises less likely than the best by this, by roughness, are ruled out."""
     pair_range_max_m: float
-    """Segments farther than this start no hypotheses, and silence from farther says nothing."""
+    """Segments farther than this start no hypotheses, and silence from farther is not evidence."""
     history_spacing_m: float
-    """A sensor's history takes a reading only from this far off the last."""
+    """Least distance between consecutive readings of a sensor's history."""
     pair_gap_s: float
     """Readings further apart in time than this make no segment."""
     merge_m: float
     """Two centres nearer than this are one object."""
     compare_all_below: int
-    """With fewer readings than this every alternative is compared at every refinement."""
+    """With fewer readings than this each refinement compares all alternatives."""
     associating_line_m: float
-    """A line shorter than this takes no readings from other explanations."""
+    """Least length of a line that takes readings from other explanations."""
     attempts_per_firing: int
-    """Segments looked at for hypotheses, a firing."""
+    """Segments examined for hypotheses per firing."""
     hypothesis_sigma_m: float
-    """A segment starts a hypothesis only where the centre behind it would be better known than this."""
+    """Greatest standard deviation of the centre behind a segment that starts a hypothesis."""
     report_probability: float
     """A model is reported by name from this probability on."""
     report_probability_near: float
     """The same where it was heard from within `far_m`."""
     idle_firings: int
-    """Firings without new evidence after which the rest is refined."""
+    """Firings without new evidence after which a track gets its final refinements."""
     final_refinements: int
-    """Refinements then."""
+    """Number of final refinements of an idle track."""
     table: Annotated[Floats, TABLE_LEVELS, TABLE_BINS]
     """Log likelihood ratios (nat) by noise level and error; see `perception.bayes.likelihood.build_table`."""
     table_bins_per_m: Annotated[Floats, TABLE_LEVELS]
     noises: Annotated[Records[NoiseModel], NOISES]
     model_count: int
-    """The first so many circles are models, in ascending order; the others are rivals."""
+    """Number of models: the first circles, in ascending order; the others are rivals."""
     circle_count: int
     circles: Annotated[Records[CircleModel], CIRCLES_MAX]
     polygon_count: int

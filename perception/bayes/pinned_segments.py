@@ -1,8 +1,8 @@
-"""Pinned segments of the Bayesian method's outline map, and segments deleted from it.
+"""Pinned segments of the outline map, and deletion of segments from it.
 
-The map forgets by overwriting: a cell's newest segments push out its oldest, and a bucket whose hash another cell
-wants changes hands. So what is pinned is kept separately as well, and put in again whenever it has gone. Not all of a
-bucket may be pinned; the rest is used as ever.
+The map forgets by overwriting: a cell's newest segments replace its oldest, and another cell of the same hash takes
+a bucket over. So pinned segments are also kept separately, and are restored when they were overwritten. A few places
+of each bucket are never pinned, so that the map can still take new segments.
 """
 
 from __future__ import annotations
@@ -21,25 +21,33 @@ from perception.kernel import Ints, kernel
 from perception.records import zeros
 
 PINS_MAX: Final = 512
-"""Segments pinned at a time."""
+"""Greatest number of pinned segments."""
 UNPINNED_MIN: Final = 2
-"""So many of a bucket are never pinned."""
+"""Places of a bucket that are never pinned."""
 
 
 @kernel
 def restore_segment(s: StateRecord, x: float, y: float, nx: float, ny: float, number: int, time_s: float) -> None:
-    """Put a segment into the map again; the parameters are those of `add_to_map`."""
+    """Put a pinned segment back into the outline map.
+
+    Parameters
+    ----------
+    s : (1,) State
+        Memory, updated.
+    x, y, nx, ny, number, time_s
+        As for `segment_pairs.add_to_map`.
+    """
     add_to_map(s[0].buckets, CELL_M, x, y, nx, ny, number, time_s)
 
 
 class Pins:
-    """What is pinned: a copy of each segment."""
+    """The pinned segments: a copy of each."""
 
     def __init__(self) -> None:
         self.segments = zeros(MappedSegment, PINS_MAX)
         """The first `count` are valid."""
         self.buckets = np.zeros(PINS_MAX, np.int64)
-        """The bucket of each."""
+        """Index of the bucket of each."""
         self.count = 0
 
     @property
@@ -48,7 +56,7 @@ class Pins:
         return self.segments["number"][: self.count]
 
     def renew(self, memory: Memory) -> None:
-        """Put into the map what has gone from it."""
+        """Restore the pinned segments that were overwritten in the map."""
         buckets = memory.state["buckets"][0][self.buckets[: self.count]]
         held = np.arange(BUCKET_CAPACITY) < buckets["count"][:, None]
         is_there = (held & (buckets["segments"]["number"] == self.numbers[:, None])).any(axis=1)
@@ -56,7 +64,7 @@ class Pins:
             restore_segment(memory.s, *self.segments[k].item())
 
     def add(self, memory: Memory, numbers: Collection[int]) -> tuple[set[int], set[int]]:
-        """Pin segments; return the numbers that are not in the map, and those for which there is no room."""
+        """Pin segments; return the numbers that are not in the map, and those that do not fit."""
         buckets = memory.state["buckets"][0]
         found = places_of(memory, numbers).tolist()
         there = {int(buckets["segments"]["number"][k, j]) for k, j in found}
@@ -86,7 +94,7 @@ class Pins:
         return missing
 
     def clear(self) -> None:
-        """Release all."""
+        """Release all segments."""
         self.segments[:], self.buckets[:] = np.zeros((), self.segments.dtype), 0
         self.count = 0
 
@@ -100,7 +108,7 @@ class Pins:
 
 
 def places_of(memory: Memory, numbers: Collection[int]) -> Ints:
-    """Return the places in the map of the segments of these numbers: bucket and which in it, shape (n, 2)."""
+    """Return bucket and place in the bucket of the segments of these numbers, shape (n, 2)."""
     buckets: NDArray[Any] = memory.state["buckets"][0]
     places = np.argwhere(np.arange(BUCKET_CAPACITY) < buckets["count"][:, None])
     wanted = np.array(sorted(numbers), np.int64)
@@ -108,14 +116,14 @@ def places_of(memory: Memory, numbers: Collection[int]) -> Ints:
 
 
 def delete(memory: Memory, pins: Pins, numbers: Collection[int]) -> set[int]:
-    """Delete segments from the map; return the numbers that are not there.
+    """Delete segments from the map; return the numbers that are not in it.
 
     Parameters
     ----------
     memory, pins
         Updated.
     numbers : collection of int
-        Which segments.
+        The segments' numbers.
     """
     buckets = memory.state["buckets"][0]
     deleted = places_of(memory, numbers)

@@ -63,7 +63,15 @@ def count_on_line(readings: Records[Reading], line: Line, cos_may: float, tight:
 
 @kernel
 def is_part_of_wall(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> bool:
-    """Return whether a track is a part of a wall: lies in one that explains the job's readings as well."""
+    """Return whether a polygon's track is part of a wall: it lies on a line that explains the job's readings as well.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    track : PolygonTrack
+        The track.
+    """
     inner = p[0].polygons[track.model].inner_radius_m
     readings = s[0].job_readings[: s[0].job.reading_count]
     var0, rel2 = noise_variance(s, p)
@@ -80,10 +88,17 @@ def is_part_of_wall(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> b
 
 @kernel
 def best_circle(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> float:
-    """Return the log ratio of the circle that best explains the job's readings, prior and all; nat.
+    """Return the log ratio (nat, prior included) of the circle that best explains the job's readings.
 
-    An edge, a post or a drum heard from a few places looks like a body's corner, and the circle that stood there may
-    have given way; so it is scored on the very readings that speak for the body.
+    An edge, a post or a drum seen from a few places looks like a polygon's corner, and the circle track in that place
+    may have ended. So circles are scored on the same readings that support the polygon.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    track : PolygonTrack
+        The polygon in whose place circles are fitted.
     """
     scratch = s[0].scratch
     readings = s[0].job_readings[: s[0].job.reading_count]

@@ -72,10 +72,14 @@ CHALLENGE_UNSEEN: Final = 8
 
 @kernel
 def gather_job_readings(s: StateRecord, p: SettingsRecord, model: int, cx: float, cy: float) -> int:
-    """Copy to the job what the sensors remember that bears on a polygon at (cx, cy); return how many readings.
+    """Copy the remembered readings that bear on a polygon at (cx, cy) to the job; return their number.
 
-    Where that is more than there is room for, it is thinned out evenly: the sensors lie there one after another.
-    The parameters are those of `gather_polygon_history`.
+    Readings beyond the job's capacity are dropped at even spacing, because one sensor's readings follow another's.
+
+    Parameters
+    ----------
+    s, p, model, cx, cy
+        As for `gather_polygon_history`.
     """
     n = gather_polygon_history(s, p, model, cx, cy)
     kept = min(n, len(s[0].job_readings))
@@ -86,14 +90,12 @@ def gather_job_readings(s: StateRecord, p: SettingsRecord, model: int, cx: float
 
 @kernel
 def occupant(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float) -> int:
-    """Return which track of the same model is at (x, y) already, −1 if none is.
+    """Return the index of the track of the same model that stands at (x, y); −1 without one.
 
     Parameters
     ----------
-    s, p
-        Memory and settings.
-    model : int
-        Which polygon.
+    s, p, model
+        Memory, settings, and index of the polygon.
     x, y : float
         m.
     """
@@ -109,7 +111,13 @@ def occupant(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float) 
 
 @kernel
 def relax_polygon(s: StateRecord, p: SettingsRecord, model: int) -> None:
-    """Move the scratch's hypothesis by the paper's relaxation (§3.4): the map's segments attract its sides."""
+    """Move the scratch's hypothesis by the paper's relaxation (§3.4): the map's segments attract its sides.
+
+    Parameters
+    ----------
+    s, p, model
+        Memory (updated), settings, and index of the polygon.
+    """
     scratch = s[0].scratch
     hypothesis = scratch.hypothesis
     outline = p[0].polygons[model]
@@ -159,14 +167,12 @@ def lay_side(
 
 @kernel
 def start_polygon(s: StateRecord, model: int, x: float, y: float, heading: float, evidence_nat: float) -> None:
-    """Start a tentative track on the job's readings, where there is room.
+    """Start a tentative track on the job's readings, if a track is free.
 
     Parameters
     ----------
-    s : (1,) State
-        Memory, updated.
-    model : int
-        Which polygon.
+    s, model
+        Memory (updated), and index of the polygon.
     x, y, heading : float
         Its pose, m, rad.
     evidence_nat : float
@@ -241,7 +247,13 @@ def restart_polygon(
 
 @kernel
 def challenge(s: StateRecord, t: int, x: float, y: float, heading: float) -> None:
-    """Have track `t` try another pose on its own readings: its place is right, and its pose perhaps is not."""
+    """Give a track another pose to try on its own readings: its place is right, but its pose may be wrong.
+
+    Parameters
+    ----------
+    s, t, x, y, heading
+        Memory (updated), the track, and the other pose, m, rad.
+    """
     track = s[0].polygons[t]
     track.has_challenger = 1
     track.unseen += CHALLENGE_UNSEEN
@@ -252,14 +264,12 @@ def challenge(s: StateRecord, t: int, x: float, y: float, heading: float) -> Non
 
 @kernel
 def request_polygon(s: StateRecord, model: int, x: float, y: float, nx: float, ny: float) -> int:
-    """Note that a polygon shall be tried behind a segment; return 1, or 0 where that was requested recently.
+    """Queue a polygon hypothesis behind a segment; return 1, or 0 where the same was requested recently.
 
     Parameters
     ----------
-    s : (1,) State
-        Memory, updated.
-    model : int
-        Which polygon.
+    s, model
+        Memory (updated), and index of the polygon.
     x, y, nx, ny : float
         The segment's middle (m) and unit normal, away from the sensors.
     """
@@ -350,14 +360,12 @@ def lay_next(s: StateRecord, p: SettingsRecord) -> int:
 
 @kernel
 def advance_initiation(s: StateRecord, p: SettingsRecord, left: int) -> int:
-    """Continue a hypothesis for the rest of a quantum; return what that cost.
+    """Continue a hypothesis for the rest of a quantum; return the cost.
 
     Parameters
     ----------
-    s, p
-        Memory, updated, and settings.
-    left : int
-        What is left of the quantum.
+    s, p, left
+        Memory (updated), settings, and what is left of the quantum.
     """
     job = s[0].job
     model = job.model

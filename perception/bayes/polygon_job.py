@@ -27,7 +27,17 @@ NO_JOB, INITIATION, REFINEMENT = range(3)
 
 @kernel
 def cost(readings: int, every: int, sides: int) -> int:
-    """Return what it costs to score a pose on every so many of the readings, in the unit of `QUANTUM`."""
+    """Return the cost of scoring one pose, in the unit of `QUANTUM`.
+
+    Parameters
+    ----------
+    readings : int
+        Number of readings.
+    every : int
+        Step from one scored reading to the next.
+    sides : int
+        Number of the model's sides.
+    """
     return (readings + every - 1) // every * (READING_COST + sides)
 
 

@@ -53,7 +53,15 @@ FIRST_RAD: Final = 0.02
 
 @kernel
 def clip(v: float, low: float, high: float) -> float:
-    """Return `v`, or the bound it is beyond."""
+    """Return a value limited to an interval.
+
+    Parameters
+    ----------
+    v : float
+        The value.
+    low, high : float
+        The interval's bounds.
+    """
     return min(max(v, low), high)
 
 
@@ -197,7 +205,15 @@ def leave_frame(pose: Pose, root: LowerTriangle, moments: LatticeMoments, cov: L
 
 @kernel
 def lay_lattice(s: StateRecord, p: SettingsRecord, model: int) -> None:
-    """Lay the job's lattice round its middle, as its covariance expects."""
+    """Lay the job's lattice round its middle, with the pitch of its expected covariance.
+
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    model : int
+        Index of the polygon.
+    """
     job = s[0].job
     write_pitch(job.covariance, job.root)
     job.middle_nat = score_pose(s, p, model, job.middle.x, job.middle.y, job.middle.heading)

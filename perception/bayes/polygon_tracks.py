@@ -65,7 +65,17 @@ TWIN: Final = 0.4
 
 @kernel
 def update_status(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> None:
-    """Establish a track, doubt it or end it; one whose covariance is not known yet is established once it is."""
+    """Establish a track, make it tentative again, or end it.
+
+    A track is established only after its covariance has been determined.
+
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    track : PolygonTrack
+        Updated.
+    """
     evidence = track.log_likelihood_ratio
     if evidence < EVIDENCE_MIN_NAT or evidence < p[0].unknown_polygon_nat * track.near - UNKNOWN_LEAD_NAT:
         drop_track(track)

@@ -81,7 +81,13 @@ def bounded_exp(v: float) -> float:
 
 @kernel
 def fit_start(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> None:
-    """Move a track to its robust fit where that is far off or the track is young; parameters as for `locate`."""
+    """Move a track to its robust fit where the two lie far apart or the track is young.
+
+    Parameters
+    ----------
+    s, p, track, n
+        As for `locate`.
+    """
     fit = s[0].scratch.circle_fit
     var0, rel2 = noise_variance(s, p)
     steps = FIRST_FIT_STEPS if track.status == TENTATIVE else FIT_STEPS
@@ -149,9 +155,12 @@ def locate(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> Non
 
 @kernel
 def update_score(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> float:
-    """Enter what the readings say of a track where it is; return its log prior as a model, nat.
+    """Update a track's evidence from its readings; return its log prior as a model, nat.
 
-    The parameters are as for `locate`.
+    Parameters
+    ----------
+    s, p, track, n
+        As for `locate`.
     """
     track.log_likelihood_ratio = score(s, p, n, track.x, track.y, track.radius)
     said = s[0].scratch.score
@@ -196,7 +205,13 @@ def change_kind(s: StateRecord, p: SettingsRecord, track: CircleTrack, k: int, e
 
 @kernel
 def may_become(s: StateRecord, track: CircleTrack, k: int, evidence_nat: float) -> bool:
-    """Return whether a user's marks leave a track free to become circle `k` at the fit, with this log ratio."""
+    """Return whether a track may become another circle: neither a user's mark nor a rejection prevents it.
+
+    Parameters
+    ----------
+    s, track, k, evidence_nat
+        As for `change_kind`; nothing is updated.
+    """
     fit = s[0].scratch.circle_fit
     return track.marks == 0 and not is_rejected(s, fit.x, fit.y, k, evidence_nat)
 
@@ -249,7 +264,13 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
 
 @kernel
 def is_in_wall(s: StateRecord, x: float, y: float, radius: float) -> bool:
-    """Return whether a body's centre would lie in a known wall or just before or behind it."""
+    """Return whether a circle's centre lies in a known wall, or just before or behind it.
+
+    Parameters
+    ----------
+    s, x, y, radius
+        Memory, and the circle, m.
+    """
     for k in range(MAX_LINES):
         line = s[0].lines[k]
         if is_wall(line):
@@ -336,7 +357,13 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
 
 @kernel
 def merge_duplicates(tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
-    """Keep, of two tracks in one place, the one with more evidence, or the one that a user marked."""
+    """Merge a track with others in the same place: keep the one with more evidence, or the one that a user marked.
+
+    Parameters
+    ----------
+    tracks, p, t
+        Circles (updated), settings, and index of the track.
+    """
     track = tracks[t]
     for k in range(len(tracks)):
         other = tracks[k]

@@ -36,7 +36,17 @@ def copy_reading(source: Reading, target: Reading) -> None:
 
 @kernel
 def keep_reading(track: CircleTrack | PolygonTrack, cx: float, cy: float, reading: Reading) -> None:
-    """Put a reading into a track's reservoir about (cx, cy), m; the oldest of its direction makes room."""
+    """Put a reading into a track's reservoir; it replaces the oldest reading of a full bearing bin.
+
+    Parameters
+    ----------
+    track : CircleTrack or PolygonTrack
+        Updated.
+    cx, cy : float
+        The object's centre, m.
+    reading : Reading
+        Copied.
+    """
     bins = track.bins
     b = int((math.atan2(reading.y - cy, reading.x - cx) / TWO_PI + 0.5) * len(bins)) % len(bins)
     readings = bins[b].readings
@@ -58,7 +68,15 @@ def copy_reservoir(track: CircleTrack | PolygonTrack, readings: Records[Reading]
 
 @kernel
 def gather_history(s: Records[State], p: Records[Settings], cx: float, cy: float, radius: float) -> int:
-    """Copy to the scratch what the sensors remember that bears on a circle, hits and silences; return how many."""
+    """Copy the remembered readings that bear on a circle, hits and silences, to the scratch; return their number.
+
+    Parameters
+    ----------
+    s, p
+        Memory, whose scratch is updated, and settings.
+    cx, cy, radius : float
+        The circle, m.
+    """
     readings = s[0].scratch.readings
     cos_may, range_max = p[0].cos_may_answer, p[0].range_max_m
     n = 0

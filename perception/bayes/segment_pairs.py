@@ -86,7 +86,15 @@ def tangent(first: Reading, second: Reading, cos_half: float, var_r: float, out:
 
 @kernel
 def bucket_index(cell_x: int, cell_y: int, buckets: int) -> int:
-    """Return the bucket of a cell of the grid: its hash among `buckets`, a power of two."""
+    """Return the index of a grid cell's bucket: the cell's spatial hash (Teschner et al. 2003, §3).
+
+    Parameters
+    ----------
+    cell_x, cell_y : int
+        Indices of the cell.
+    buckets : int
+        Number of buckets, a power of two.
+    """
     return ((cell_x * X_PRIME) ^ (cell_y * Y_PRIME)) & (buckets - 1)
 
 

@@ -141,7 +141,15 @@ def relax_hypothesis(
 
 @kernel
 def relax_onto_map(s: StateRecord, p: SettingsRecord, kind: int) -> None:
-    """Move a circle, the scratch's hypothesis, by the relaxation onto the mapped segments that face it."""
+    """Move the scratch's hypothesis of a circle by relaxation (paper §3.4) onto the mapped segments that face it.
+
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    kind : int
+        Index of the circle.
+    """
     scratch = s[0].scratch
     x, y = scratch.hypothesis.x, scratch.hypothesis.y
     radius = p[0].circles[kind].radius_m
@@ -226,7 +234,15 @@ def restart_circle(
 def start_circle(
     s: StateRecord, tracks: CircleTracks, kind: int, radius: float, x: float, y: float, n: int
 ) -> int:  # fmt: skip
-    """Start a tentative track and return its index, −1 where there is no room; the parameters are as above."""
+    """Start a tentative track on the first `n` readings of the scratch; return its index, or −1 without a free track.
+
+    Parameters
+    ----------
+    s, tracks
+        Memory and circles, updated.
+    kind, radius, x, y, n
+        As for `restart_circle`.
+    """
     t = free_track(tracks)
     if t < 0:
         return -1

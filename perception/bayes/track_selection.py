@@ -57,7 +57,17 @@ def unseen_evidence(track: AnyTrack, idle_firings: int, threshold: float, weight
 
 @kernel
 def circle_value(track: CircleTrack, p: SettingsRecord, threshold: float) -> float:
-    """Return the value of a quantum for a circle; the track waits for one where that is above `threshold`."""
+    """Return the value of a quantum for a circle; above `threshold` the circle waits for refinement.
+
+    Parameters
+    ----------
+    track : CircleTrack
+        The circle.
+    p : (1,) Settings
+        Settings.
+    threshold : float
+        Value from which on a track waits for refinement.
+    """
     if track.status == FREE:
         return 0.0
     is_unsure = max(track.root_xx, track.root_yy) > UNSURE_ROOT_M or track.probability < CERTAIN
@@ -66,9 +76,18 @@ def circle_value(track: CircleTrack, p: SettingsRecord, threshold: float) -> flo
 
 @kernel
 def priority(s: StateRecord, p: SettingsRecord, value: float, track: CircleTrack) -> float:
-    """Return the priority of a circle for which a quantum has this value: the greatest is next.
+    """Return the priority of a circle; the circle of greatest priority is refined next.
 
     At the end of the ring's range a track counts half as much as next to the robot.
+
+    Parameters
+    ----------
+    s, p
+        Memory and settings.
+    value : float
+        From `circle_value`.
+    track : CircleTrack
+        The circle.
     """
     if track.passed_over > PASSES_MAX:
         return OVERDUE + track.passed_over
@@ -77,7 +96,15 @@ def priority(s: StateRecord, p: SettingsRecord, value: float, track: CircleTrack
 
 @kernel
 def is_waiting(tracks: CircleTracks, p: SettingsRecord, threshold: float) -> bool:
-    """Return whether a circle waits for a quantum."""
+    """Return whether a circle waits for refinement.
+
+    Parameters
+    ----------
+    tracks, p
+        Circles and settings.
+    threshold : float
+        Value from which on a track waits for refinement.
+    """
     most = 0.0
     for t in range(len(tracks)):
         most = max(most, circle_value(tracks[t], p, threshold))
@@ -113,9 +140,16 @@ def choose_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, thres
 
 @kernel
 def choose_polygon(s: StateRecord, p: SettingsRecord, threshold: float) -> int:
-    """Return the polygon that is next, as `choose_circle` does the circle, but near or far alike.
+    """Return the polygon to refine next, or −1; the choice is that of `choose_circle` without regard to distance.
 
-    Polygons that face each other across the way share readings: where the nearer went first, one was found twice.
+    Polygons that face each other across a passage share readings: with the nearer one first, one was found twice.
+
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    threshold : float
+        Value from which on a track waits for refinement.
     """
     best = -1.0
     chosen = -1

@@ -55,7 +55,15 @@ ECHO_LOG_ODDS: Final = 0.5
 
 @kernel
 def off_and_along(line: Line, x: float, y: float) -> tuple[float, float]:
-    """Return how far a place lies before a line, and where along the line its foot is, m."""
+    """Return a point's distance before a line, and the position of its foot along the line, m.
+
+    Parameters
+    ----------
+    line : Line
+        The line.
+    x, y : float
+        The point, m.
+    """
     dx = x - line.origin_x
     dy = y - line.origin_y
     return line.distance - line.normal_x * dx - line.normal_y * dy, -line.normal_y * dx + line.normal_x * dy
@@ -63,7 +71,17 @@ def off_and_along(line: Line, x: float, y: float) -> tuple[float, float]:
 
 @kernel
 def reaches(line: Line, along: float, beyond: float) -> bool:
-    """Return whether a foot lies between the ends of a line, or `beyond` them at most (m)."""
+    """Return whether a position along a line lies between its ends, or at most `beyond` outside them.
+
+    Parameters
+    ----------
+    line : Line
+        The line.
+    along : float
+        Position along the line, m.
+    beyond : float
+        Distance allowed beyond either end, m.
+    """
     return bool(line.low - beyond < along < line.high + beyond)
 
 
