@@ -227,7 +227,7 @@ def posterior_circle(
     readings: Records[Reading], radius: float, p: SettingsRecord, noise: int, linear: Records[LinearReading],
     cells: Floats, posterior: CirclePosterior,
 ) -> float:  # fmt: skip
-    """Write mean and covariance of a circle's centre under the raw ranges' likelihood; return the greatest one (nat).
+    """Write mean and covariance of a circle's centre under the ranges' likelihood; return the greatest one (nat).
 
     The ranges are linearised about the centre; their log likelihood is summed on a 7 × 7 grid in the frame of the
     root. Where the mass lies on the rim, off the middle, or is not about one pitch wide, the frame moves to it and the

@@ -1,8 +1,8 @@
 """Estimation of the ring's range noise.
 
-There are two sources. *Roughness* needs no model: of three consecutive readings of one sensor the middle one should lie
-between the outer two, on any surface. The *residuals* of sure objects discriminate far better, but only if the objects
-are correct. So roughness decides which noises are possible, and both sources which one is likeliest. With residuals
+There are two sources. *Roughness* needs no model: of three consecutive readings of one sensor the middle one should
+lie between the outer two, on any surface. The *residuals* of sure objects discriminate far better, but only if the
+objects are correct. So roughness decides which noises are possible, and both sources which one is likeliest. With residuals
 alone a false object could raise the noise until it fits.
 """
 

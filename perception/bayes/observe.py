@@ -30,7 +30,7 @@ COORDINATE_MAX_M: Final = 0.5 * FAR
 
 STILL_M: Final = 0.05 * FOOT_M
 STILL_COS: Final = 0.9998
-"""A reading is redundant if the sensor moved less than this, turned less than this (1°), and its range is the same."""
+"""A reading is redundant if its sensor moved and turned less than this (1°) and its range is the same."""
 ASSOCIATION_MARGIN_M: Final = 0.004 * FOOT_M
 KEEPING_MARGIN_M: Final = 0.01 * FOOT_M
 """Distance outside a beam at which a centre may lie for the reading to be associated and kept."""
@@ -42,7 +42,7 @@ TRIES: Final = 2
 def place_readings(
     s: StateRecord, p: SettingsRecord, mounts: Floats, px: float, py: float, yaw: float, ranges: Floats
 ) -> int:  # fmt: skip
-    """Write the fired readings to the scratch in the odometry frame; return the number of those that are not redundant.
+    """Write the fired readings to the scratch in the odometry frame; return how many of them are not redundant.
 
     An invalid pose or range is left out, because it would corrupt every sum.
 

@@ -2,8 +2,8 @@
 
 Two kinds of readings are left out before a body is scored. Hidden ones: a known body between the sensor and this one
 blocks the sound, although its own surface may face elsewhere and return no echo; so silence from behind it is not
-evidence. And readings that another object explains better: drums in a row have a common tangent, and each is hidden by
-the one before it; with the other drums' echoes in the sum, a wall along all of them would win.
+evidence. And readings that another object explains better: drums in a row have a common tangent, and each is hidden
+by the one before it; with the other drums' echoes in the sum, a wall along all of them would win.
 """
 
 from __future__ import annotations

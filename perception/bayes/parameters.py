@@ -90,7 +90,7 @@ class Settings(Record):
     cos_half_angle: float
     sin_half_angle: float
     cos_may_answer: float
-    """Cosine of a little more than half the opening: a reading may match up to this angle, and counts nothing beyond."""
+    """Cosine of a little more than half the opening: beyond this angle a reading does not count."""
     cos_must_answer: float
     """Cosine of a little less than half the opening: within this angle a reading must hit."""
     sin_must_answer: float

@@ -1,4 +1,4 @@
-"""What else a polygon's readings may come from: a wall, a round object, an unknown one."""
+"""Alternative explanations of a polygon's readings: a wall, a round object, an unknown object."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ from perception.kernel import kernel
 from perception.records import Records
 
 WALL_ECHOES_MIN: Final = 12.0
-"""A line with fewer echoes replaces no body."""
+"""Least echoes of a line that replaces a body."""
 WALL_SIZE: Final = 3.0
-"""A wall is longer than so many inner radii."""
+"""Least length of a wall, in inner radii."""
 WALL_BEHIND: Final = -1.15
 WALL_FRONT: Final = 0.7
-"""A body whose centre is so many inner radii behind a wall's face, or before it, is the wall, …"""
+"""A body whose centre is this many inner radii behind a wall's face, or before it, is the wall, …"""
 WALL_SHARE: Final = 0.6
-"""… if the wall explains so many of its readings for each of its hits. (Bodies in a row have a line in common.)"""
+"""… if the wall explains this many readings per hit of the body. (Bodies in a row have a line in common.)"""
 WALL_BEYOND_M: Final = 2.0 * FOOT_M
-"""So far beyond the ends of a line a body may still be a part of it."""
+"""Distance beyond the ends of a line at which a body may still be a part of it."""
 CIRCLE_NEAR_M: Final = 0.3 * FOOT_M
 """Circles whose centres lie no farther than this off the farthest vertex stand in the same place."""
 LEAD_NAT: Final = 6.0
-"""An established polygon that leads a circle in its place by this removes it."""
+"""Lead at which an established polygon removes a circle in its place."""
 FIT_STEPS: Final = 4
 """Steps of a circle's fit."""
 
 
 @kernel
 def count_on_line(readings: Records[Reading], line: Line, cos_may: float, tight: float) -> int:
-    """Return how many readings a line explains.
+    """Return the number of readings that a line explains.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def count_on_line(readings: Records[Reading], line: Line, cos_may: float, tight:
     cos_may : float
         As in `Settings`.
     tight : float
-        How far off an explained range is at most, m.
+        Greatest error of an explained range, m.
     """
     explained = 0
     for j in range(len(readings)):
@@ -136,7 +136,7 @@ def best_circle(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> float
 
 @kernel
 def compare_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, track: PolygonTrack) -> None:
-    """Enter the probability of a polygon against nothing, an unknown object and the circles in its place.
+    """Update a polygon's probability against nothing, an unknown object and the circles in its place.
 
     Circles that are far less likely than an established polygon are removed.
 

@@ -1,4 +1,4 @@
-"""Association of readings with polygons: what established ones explain, and what one leaves to its neighbours."""
+"""Association of readings with polygons, and division of readings between neighbouring polygons."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ OVERLAP: Final = 1.8
 def range_error(
     q: Reading, track: PolygonTrack, sides: Records[PolygonSide], is_closed: bool, p: SettingsRecord
 ) -> float:  # fmt: skip
-    """Return by how much a reading misses the nearer of what a body would answer by either rule, m.
+    """Return a reading's least absolute error against the polygon's mirror and cone predictions, m.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def range_error(
 
 @kernel
 def associate_polygons(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int, tight: float) -> None:
-    """Associate fired readings with the established polygons that explain them, and let each keep what bears on it.
+    """Associate fired readings with the established polygons that explain them, and fill the polygons' reservoirs.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def associate_polygons(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, 
     m : int
         Fired readings.
     tight : float
-        How far off an explained range is at most, m.
+        Greatest error of an explained range, m.
     """
     for t in range(MAX_POLYGONS):
         track = s[0].polygons[t]
@@ -86,7 +86,7 @@ def associate_polygons(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, 
 
 @kernel
 def hides(q: Reading, track: PolygonTrack, inner: float, other: PolygonTrack, other_inner: float) -> bool:
-    """Return whether another body stands between the place of a reading and a track's.
+    """Return whether another body stands between a reading's sensor and a track.
 
     Parameters
     ----------
@@ -109,10 +109,10 @@ def hides(q: Reading, track: PolygonTrack, inner: float, other: PolygonTrack, ot
 
 @kernel
 def leave_to_next_neighbour(s: StateRecord, p: SettingsRecord, t: int) -> int:
-    """Drop from the job's readings what the next established neighbour explains better; return what that cost.
+    """Drop the job's readings that the next established neighbour explains better; return the cost.
 
-    Where bodies all but touch, the echo of one's corner is an outlier to the other, and a dozen are a force; so
-    is the silence of what the neighbour hides.
+    Where bodies almost touch, the echoes of one body's corner are outliers to the other and bias its pose; so does
+    silence from what the neighbour hides.
 
     Parameters
     ----------

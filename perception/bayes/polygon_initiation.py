@@ -1,8 +1,8 @@
-"""Hypotheses of polygons: each distinct side of a model laid on a segment that nothing explains.
+"""Polygon hypotheses: each distinct side of a model laid on an unexplained segment.
 
-As for circles the paper's relaxation moves the body onto the outline map, and the raw readings that the sensors
-remember decide. Along a side, the readings say little, so each side is tried shifted as well. To request a hypothesis
-takes no time; to try it is a job.
+As for circles, the paper's relaxation (§3.4) moves the body onto the outline map, and the remembered raw readings
+decide. Readings determine a position along a side badly, so each side is also tried shifted. A request takes no time;
+a trial is a job.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from perception.records import Records
 
 LAY, TRY, FINE = range(3)
 """Stages of a hypothesis, values of `PolygonJob.stage`: a side is laid on the segment, tried, and the best trial is
-looked at closely."""
+refined."""
 COLLECTING_COST: Final = 800
 """The cost of collecting readings, in the unit of `polygon_job.QUANTUM`."""
 SAME_M: Final = 0.25 * FOOT_M
@@ -44,30 +44,30 @@ AROUND_M: Final = 0.3 * FOOT_M
 RELAXATIONS: Final = 3
 NEGLIGIBLE_M: Final = 0.01 * FOOT_M
 NEGLIGIBLE_RAD: Final = 0.01
-"""Steps of the relaxation at most; it ends with increments below both."""
+"""Greatest number of relaxation steps; the relaxation ends with increments below both limits."""
 SHIFTS: Final = (-0.3, 0.0, 0.3)
 """Where on a side the segment is laid, from its middle, in lengths of the side."""
 READINGS_MIN: Final = 8
-"""A trial needs so many readings."""
+"""Least readings of a trial."""
 TRIAL_READINGS: Final = 80
-"""A trial scores this many readings at most: it only has to be likelier than the other trials."""
+"""Greatest number of readings that a trial scores: it is only compared with the other trials."""
 TRIAL_STEP_M: Final = 0.2 * FOOT_M
 TRIAL_ROUNDS: Final = 8
 """First step and rounds of a trial's search."""
 TRIAL_MIN_NAT: Final = 15.0
-"""The best trial must have this much evidence."""
+"""Least evidence of the best trial."""
 FINE_STEP_M: Final = 0.1 * FOOT_M
 FINE_ROUNDS: Final = 10
 """First step and rounds of the search from the best trial."""
 HITS_MIN: Final = 6.0
-"""A track starts with so many hits."""
+"""Least hits of a new track."""
 WHOLE: Final = 0.9
-"""A track that explains this share of what is near is right where it is …"""
+"""A track that explains this share of its near readings keeps its place …"""
 APART_WHOLE: Final = 1.5
 APART: Final = 0.5
-"""… and nothing like it starts this near, in inner radii; any other one gives way sooner."""
+"""… and no like track starts this near, in inner radii; for any other track the distance is less."""
 CHALLENGE_UNSEEN: Final = 8
-"""A challenger counts as so many unseen readings."""
+"""Unseen readings that a challenger counts as."""
 
 
 @kernel
@@ -145,7 +145,7 @@ def lay_side(
     model, k : int
         Which polygon, and which of its sides.
     shift : float
-        How far off the side's middle the segment lies, in lengths of the side.
+        Offset of the segment from the side's middle, in lengths of the side.
     x, y, nx, ny : float
         The segment's middle (m) and unit normal.
     """
@@ -188,7 +188,7 @@ def start_polygon(s: StateRecord, model: int, x: float, y: float, heading: float
 
 @kernel
 def reset_polygon(track: PolygonTrack) -> None:
-    """Set a polygon's track to zero, but for its number, its marks and the readings beyond the counts of its bins."""
+    """Set a polygon track to zero, except its number, its marks and the readings beyond the counts of its bins."""
     track.status = FREE
     track.unseen = 0
     track.reservoir = 0
@@ -223,12 +223,12 @@ def reset_polygon(track: PolygonTrack) -> None:
 def restart_polygon(
     track: PolygonTrack, model: int, x: float, y: float, heading: float, readings: Records[Reading]
 ) -> None:  # fmt: skip
-    """Make a track a tentative one on some readings.
+    """Set a track to a tentative one on the given readings.
 
     Parameters
     ----------
     track : PolygonTrack
-        Updated, but for its number and its marks.
+        Updated, except its number and its marks.
     model, x, y, heading
         Which polygon, and its pose, m, rad.
     readings : (n,) Reading
@@ -295,7 +295,7 @@ def request_polygon(s: StateRecord, model: int, x: float, y: float, nx: float, n
 
 @kernel
 def next_request(s: StateRecord) -> bool:
-    """Begin a job with the newest segment that waits; return whether one did."""
+    """Begin a job for the newest waiting request; return whether there was one."""
     job = s[0].job
     for back in range(1, min(job.requests_made, REQUESTS_MAX) + 1):
         request = s[0].requests[(job.requests_made - back) % REQUESTS_MAX]
@@ -317,7 +317,7 @@ def next_request(s: StateRecord) -> bool:
 
 @kernel
 def ways_to_lie(p: SettingsRecord, model: int) -> int:
-    """Return how many sides of a model can lie on a segment and look different, either face of an open one's."""
+    """Return how many distinct ways a model has to lie on a segment: its sides, and both faces of an open outline."""
     outline = p[0].polygons[model]
     if outline.is_closed > 0:
         return max(1, outline.vertex_count // outline.symmetry)
@@ -326,7 +326,7 @@ def ways_to_lie(p: SettingsRecord, model: int) -> int:
 
 @kernel
 def lay_next(s: StateRecord, p: SettingsRecord) -> int:
-    """Lay the next side on the segment and search from there, or from the best trial; return what that cost."""
+    """Lay the next side on the segment and start a search there, or from the best trial; return the cost."""
     job = s[0].job
     model = job.model
     sides = p[0].polygons[model].side_count

@@ -1,9 +1,9 @@
-"""One job on polygons at a time, in quanta: what is being done, how far it has come, and what it costs.
+"""The polygon job: its stage, its progress, and its cost in quanta.
 
-To look for a polygon's pose, or for how well it is known, takes thousands of predicted ranges, more than fits
-between two firings. So the work is a job that stops wherever a quantum is spent and continues from there; its
-readings are copied when it begins, so that all that it compares is scored on the same ones. Here is what hypotheses
-and refinements have in common.
+A search for a polygon's pose, or for its covariance, takes thousands of predicted ranges, more than fit between two
+firings. So the work is one job that stops when a quantum is spent and continues in the next. Its readings are copied
+when it begins, so that all poses are scored on the same readings. This module holds what hypotheses and refinements
+have in common.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from perception.bayes.state import StateRecord
 from perception.kernel import kernel
 
 QUANTUM: Final = 22_000
-"""What a quantum may cost: sides whose range is predicted, and what takes as long."""
+"""Cost of a quantum, in predicted ranges of one side, or what takes as long."""
 READING_COST: Final = 3
-"""What a reading costs, in sides, besides the model's own."""
+"""Cost of a reading, in sides, besides the model's own sides."""
 
 NO_JOB, INITIATION, REFINEMENT = range(3)
 """Values of `PolygonJob.kind`."""
@@ -51,7 +51,7 @@ def copy_pose(source: Pose, target: Pose) -> None:
 
 @kernel
 def start_search(s: StateRecord, x: float, y: float, heading: float, step_m: float, rounds: int, most: int) -> None:
-    """Begin a search from a pose, on at most `most` of the job's readings.
+    """Begin a pose search on at most `most` of the job's readings.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def is_search_over(s: StateRecord) -> bool:
 
 @kernel
 def advance_search(s: StateRecord, p: SettingsRecord, model: int, left: int) -> int:
-    """Continue the job's search for the rest of a quantum, one pose at least; return what that cost.
+    """Continue the job's search for the rest of a quantum, at least one pose; return the cost.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def advance_search(s: StateRecord, p: SettingsRecord, model: int, left: int) -> 
 
 @kernel
 def score_pose(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float, heading: float) -> float:
-    """Return the log ratio (nat) of all the job's readings at a pose; the scratch holds the whole score.
+    """Return the log ratio (nat) of all the job's readings at a pose; write the scratch's score.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
-"""Evidence of raw ranges for a polygon of any form, open or closed, at a pose; and the search for the pose.
+"""Evidence of raw ranges for a polygon, open or closed, at a pose; and the search for the pose.
 
-Smooth sides answer like mirrors, from the foot of the perpendicular and nowhere else; rough ones answer from their
-nearest point in the beam, like a cone. Either rule predicts one range for each reading, which it should have or may
-have. It is not known which rule a body keeps, so it is scored under both and the two likelihoods are added: the
-choice is paid for once. To choose reading by reading whichever explains it better would give false precision, for
-there is always a pose at which a dozen chance agreements help.
+Smooth sides reflect like mirrors, only from the foot of the perpendicular; rough ones answer from their nearest point
+in the beam (cone rule). Either rule predicts one range for each reading, and whether the echo must be heard. Which
+rule a body obeys is unknown, so it is scored under both and the two likelihoods are added: the choice is paid for
+once. Choosing the better rule for each reading would give false precision, because some pose always gains from a dozen
+chance agreements.
 """
 
 from __future__ import annotations
@@ -28,34 +28,34 @@ all the readings of a sensor may then be heard, or none, and a price for each wo
 
 EDGE_REACH_M: Final = 1.0
 EDGE_NAT_PER_M: Final = 3.0 / FOOT_M
-"""A convex edge only scatters, 20 to 30 dB below a mirror's echo: an answer from beyond this costs that much more."""
+"""A convex edge scatters 20 to 30 dB below a mirror's echo: an echo from beyond this costs that much more per metre."""
 
 NO_ANSWER_M: Final = 1e18
 """A range that stands for no answer."""
 MARGIN_M: Final = 0.12 * FOOT_M
-"""A foot this near the end of its side need not answer: a pose is not known better."""
+"""A foot this near the end of its side need not answer: the accuracy of a pose."""
 GRAZING_COS: Final = 0.05
 """An edge of the beam that is more parallel to a side than this does not meet it."""
 
 
 ALONG, ACROSS, TURN = range(3)
-"""What a pose may do: move along the body's own axes, turn."""
+"""Axes of a search: along and across the body, and turn."""
 TURN_PER_M: Final = 0.7 / FOOT_M
-"""A search turns by this for each metre that it moves, rad/m: what moves the side of a body of 1.4 ft as far."""
+"""Ratio of a search's turn to its shift, rad/m: it moves the side of a body of 1.4 ft as far as the shift."""
 AXES: Final = 3
 SHRINK: Final = 0.5
-"""What a step is multiplied with where no way gains."""
+"""Factor on the steps when no move gains."""
 GAIN_MIN_NAT: Final = 1e-6
 """Smallest score gain that counts as progress."""
 FINEST_M: Final = 0.005 * FOOT_M
-"""A search ends with steps shorter than this: a tenth of the resolution, and the plateau is wider."""
+"""Step below which a search ends: a tenth of the resolution, narrower than the likelihood's plateau."""
 
 
 @kernel
 def predict(
     sx: float, sy: float, ux: float, uy: float, sides: Records[PolygonSide], is_closed: bool, p: SettingsRecord
 ) -> tuple[float, bool, float, float, bool]:  # fmt: skip
-    """Predict what a polygon answers, as a mirror and as a cone.
+    """Return a polygon's predicted ranges, as a mirror and as a cone, and whether each must be heard.
 
     =======  ========================================================  ===========================================
     rule     range                                                     must be heard
@@ -65,7 +65,7 @@ def predict(
     cone     nearest point in the beam: foot, corner or beam's edge    something lies well in the beam
     =======  ========================================================  ===========================================
 
-    Sides that a closed outline turns its inside to do not answer; a side of an open one answers to both its faces.
+    Sides of a closed outline answer only on their outside; a side of an open outline answers on both faces.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def score_polygon(
     readings: Records[Reading], every: int, x: float, y: float, heading: float, sides: Records[PolygonSide],
     is_closed: bool, p: SettingsRecord, noise: int, score: Score,
 ) -> float:  # fmt: skip
-    """Score what readings say of a polygon at a pose: a log ratio to the background.
+    """Return the log ratio (nat) of readings for a polygon at a pose to the background.
 
     ==========================  ===================================================
     range within the gate       the table's evidence; where it need not be heard never less than nothing
@@ -175,13 +175,13 @@ def score_polygon(
     readings : (n,) Reading
         Raw ranges.
     every : int
-        Step from one that is scored to the next.
+        Step from one scored reading to the next.
     x, y, heading : float
         The polygon's pose: m, rad.
     sides, is_closed, p
         As for `predict`.
     noise : int
-        Index of the noise that is assumed.
+        Index of the assumed noise.
     score : Score
         Out: `log_likelihood_ratio`, `hits`, `misses`, `near` and `sure_hits`; the counts by the likelier rule.
 
@@ -277,7 +277,7 @@ def moved(x: float, y: float, heading: float, axis: int, step: float) -> tuple[f
 def begin_search(
     search: PoseSearch, x: float, y: float, heading: float, step_m: float, rounds: int
 ) -> None:  # fmt: skip
-    """Begin a search for a pose.
+    """Initialise a pose search.
 
     Parameters
     ----------
@@ -305,11 +305,11 @@ def continue_search(
     search: PoseSearch, allowed: int, readings: Records[Reading], every: int, sides: Records[PolygonSide],
     is_closed: bool, p: SettingsRecord, noise: int, score: Score,
 ) -> int:  # fmt: skip
-    """Continue a search for the pose of greatest likelihood, along the body's own axes; return how many were scored.
+    """Continue a search for the pose of greatest likelihood; return the number of poses scored.
 
-    The likelihood has steps where sides begin and cease to answer, so nothing is differentiated: each axis is tried
-    both ways, and where none gains the steps shrink. A search stops where it is when its budget is spent, and
-    continues from there; it is over when no round is left.
+    The likelihood has steps where sides begin and cease to answer, so no derivative is used: a coordinate search tries
+    each of the body's axes both ways, and shrinks the steps when none gains. A search stops when its budget is spent
+    and continues from there; it is over when no round is left.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Where a polygon stands and which way it faces, and how well that is known: mean and covariance of the likelihood.
+"""Posterior of a polygon's pose: mean and covariance of the exact likelihood.
 
-As for circles (`posterior`), in three dimensions: the evidence is added up as it is, corners, silences and all, on a
-lattice in the frame of the expected covariance's Cholesky root. A slope or a curvature at the best pose would not
-do: the evidence is flat on top, and beyond a side's end it falls like a cliff.
+As for circles (`circle_posterior`), in three dimensions: the likelihood, corners and silences included, is summed on a
+lattice in the frame of the expected covariance's Cholesky root. Derivatives at the best pose would not do: the
+evidence is flat on top, and drops abruptly beyond a side's end.
 """
 
 from __future__ import annotations
@@ -27,28 +27,28 @@ _CELLS: Final = np.stack(np.meshgrid(*3 * [np.arange(-3, 4)], indexing="ij"), ax
 LATTICE: Final = np.ascontiguousarray(_CELLS[(_CELLS**2).sum(axis=1) <= REACH2]).astype(np.int64)
 _NORMAL: Final = np.exp(-0.5 * PITCH**2 * (LATTICE**2).sum(axis=1))
 CUT: Final = float((_NORMAL * LATTICE[:, 0] ** 2).sum() / _NORMAL.sum())
-"""Variance that such a lattice gives a normal distribution as wide as expected, in squared pitches."""
+"""Variance of a normal distribution of the expected width, summed on the lattice, in squared pitches."""
 CUT_OFF: Final = PITCH**2 * CUT
 """The same in squared standard deviations: one, but for the tails that are cut off."""
 ATTEMPTS: Final = 5
-"""How often a lattice is laid at most: the bound on the work."""
+"""Greatest number of lattices laid for a track: the bound on the work."""
 LEAD_MAX_NAT: Final = 40.0
-"""A point better than the middle by more than this weighs no more."""
+"""Greatest lead of a point over the middle that counts."""
 OFF_CENTRE: Final = 0.7
-"""A mean this many pitches off the middle asks for a new lattice."""
+"""The lattice is laid again when the mean is this many pitches off its middle, …"""
 NARROW: Final = 0.7 * CUT
 WIDE: Final = 1.4 * CUT
-"""So do variances beyond these, in squared pitches."""
+"""… or a variance lies outside these, in squared pitches."""
 THINNEST: Final = 0.1 * CUT
-"""Least variance, in squared pitches, that the next lattice believes: less falls between the points."""
+"""Least variance, in squared pitches, that the next lattice assumes: a narrower peak falls between the points."""
 CORRELATION_SHARE: Final = 0.95
-"""Share of a correlation that the next lattice believes, so that it never collapses."""
+"""Share of a correlation that the next lattice assumes, so that it never collapses."""
 PITCH_M: Final = (1e-4, 0.15)
 PITCH_RAD: Final = (1e-4, 0.4)
 """Least and greatest pitch."""
 FIRST_M: Final = 0.01
 FIRST_RAD: Final = 0.02
-"""What a track's first lattice expects."""
+"""Standard deviations assumed for a track's first lattice."""
 
 
 @kernel
@@ -104,7 +104,7 @@ def clear_moments(moments: LatticeMoments) -> None:
 
 @kernel
 def score_lattice(s: StateRecord, p: SettingsRecord, model: int, begin: int, end: int) -> None:
-    """Add the likelihood at some of the lattice's points round the job's middle to its moments.
+    """Add the likelihood at some of the lattice's points to the job's moments.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def score_lattice(s: StateRecord, p: SettingsRecord, model: int, begin: int, end
     model : int
         Which polygon.
     begin, end : int
-        Which points: rows of `LATTICE`.
+        First point and end of the points: rows of `LATTICE`.
     """
     job = s[0].job
     middle, root, moments = job.middle, job.root, job.moments
@@ -143,7 +143,7 @@ def score_lattice(s: StateRecord, p: SettingsRecord, model: int, begin: int, end
 
 @kernel
 def centre_moments(moments: LatticeMoments) -> None:
-    """Divide sums by their mass, and take second moments about the mean."""
+    """Divide the sums by their mass, and convert second moments to those about the mean."""
     mass = moments.mass
     moments.a /= mass
     moments.b /= mass
@@ -165,7 +165,7 @@ def centre_moments(moments: LatticeMoments) -> None:
 
 @kernel
 def leave_frame(pose: Pose, root: LowerTriangle, moments: LatticeMoments, cov: LowerTriangle) -> None:
-    """Move a pose to the mean, and write the covariance that the moments are in the frame of `root`.
+    """Move a pose to the lattice's mean, and write the covariance of the moments in the odometry frame.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def lay_lattice(s: StateRecord, p: SettingsRecord, model: int) -> None:
 
 @kernel
 def begin_lattice(s: StateRecord, p: SettingsRecord, model: int, t: int) -> None:
-    """Begin to determine mean and covariance of a polygon's pose.
+    """Begin the computation of mean and covariance of a polygon's pose.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def begin_lattice(s: StateRecord, p: SettingsRecord, model: int, t: int) -> None
     model : int
         Which polygon.
     t : int
-        Its track, near the best pose; where its covariance is zero, nothing is expected of the covariance.
+        Its track, near the best pose; where its covariance is zero, the first lattice uses default deviations.
     """
     job = s[0].job
     track = s[0].polygons[t]
@@ -253,9 +253,9 @@ def begin_lattice(s: StateRecord, p: SettingsRecord, model: int, t: int) -> None
 
 @kernel
 def advance_lattice(s: StateRecord, p: SettingsRecord, model: int, left: int) -> int:
-    """Score points of the lattice for the rest of a quantum, one at least; return what that cost.
+    """Score points of the lattice for the rest of a quantum, at least one; return the cost.
 
-    Where a lattice is scored and its mass is off the middle, or not about as wide as expected, the frame follows it
+    Where the mass of a scored lattice is off the middle, or not about as wide as expected, the frame moves to it
     and the lattice is laid again, `ATTEMPTS` times at most. The job's `lattices` is `ATTEMPTS` when all is done; mean
     and covariance are then its `middle` and `covariance`.
 

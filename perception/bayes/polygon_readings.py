@@ -1,4 +1,4 @@
-"""Which raw readings say anything for or against a polygon, and what the sensors remember of them."""
+"""Selection of the raw readings that bear on a polygon, and their collection from the sensors' histories."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from perception.kernel import kernel
 
 @kernel
 def bears_on_polygon(q: Reading, cx: float, cy: float, bound: float, p: SettingsRecord) -> bool:
-    """Return whether a reading says anything for or against a body within a circle.
+    """Return whether a reading is evidence for or against a body within a circle.
 
     Parameters
     ----------
@@ -22,8 +22,8 @@ def bears_on_polygon(q: Reading, cx: float, cy: float, bound: float, p: Settings
     cx, cy, bound : float
         Centre and radius of the circle, m.
     p : (1,) Settings
-        The beam; a range that ends farther than the gate before the circle says nothing, nor does a sensor farther
-        off than `pair_range_max_m`.
+        The beam; a range that ends farther than the gate before the circle is not evidence, nor is one of a sensor
+        farther off than `pair_range_max_m`.
     """
     reach = p[0].pair_range_max_m
     dx = cx - q.x
@@ -40,7 +40,7 @@ def bears_on_polygon(q: Reading, cx: float, cy: float, bound: float, p: Settings
 
 @kernel
 def gather_polygon_history(s: StateRecord, p: SettingsRecord, model: int, cx: float, cy: float) -> int:
-    """Copy to the scratch what the sensors remember that bears on a polygon at (cx, cy); return how many readings.
+    """Copy the remembered readings that bear on a polygon at (cx, cy) to the scratch; return their number.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Refinement of polygons' tracks, in stages.
+"""Refinement of polygon tracks, in stages.
 
-A track is refined as a job that each quantum advances by a step: readings are assigned to it or its neighbours, its
-pose is looked for, judged, and located. Its likelihood is flat at the top, because ranges are rounded: the pose is
-the middle of the plateau and the plateau's width is the uncertainty.
+A refinement is a job that each quantum advances: readings are divided between the track and its neighbours, its pose
+is searched and evaluated, and its covariance is computed. The likelihood is flat at the top, because ranges are
+rounded: the pose is the middle of the plateau, and the plateau's width is the uncertainty.
 """
 
 from __future__ import annotations
@@ -49,16 +49,16 @@ from perception.kernel import kernel
 
 EVIDENCE_MIN_NAT: Final = 5.0
 UNKNOWN_LEAD_NAT: Final = 8.0
-"""A track ends with evidence below the first, or behind an unknown object's by the second."""
+"""A track ends with evidence below the first, or below an unknown object's by the second."""
 ESTABLISH: Final = 0.9
 ESTABLISH_HITS: Final = 10.0
 ESTABLISH_SURE: Final = 3.0
 MANY_HITS: Final = 20.0
 MANY_SURE: Final = 2.0
-"""A track is established by so many hits, and so many that had to be: corners alone fit anywhere."""
+"""Least probability, hits and sure hits (fewer with many hits) of an established track: corners alone fit anywhere."""
 DOUBT: Final = 0.3
 DOUBT_SHARE: Final = 0.75
-"""One less probable, or that explains less of what is near, is tentative again."""
+"""A track less probable, or that explains less of its near readings, is tentative again."""
 TWIN: Final = 0.4
 """Two bodies whose centres are nearer than this, in inner radii, are one."""
 
@@ -95,9 +95,9 @@ def update_status(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> Non
 
 @kernel
 def merge_polygons(s: StateRecord, p: SettingsRecord, t: int) -> None:
-    """Leave one body in a place: twins merge, and of overlapping ones an established and likelier one stays.
+    """Leave one body in a place: merge twins, and of overlapping bodies keep an established and likelier one.
 
-    One that a user marked stays in any case.
+    A body that a user marked stays in any case.
 
     Parameters
     ----------
@@ -130,14 +130,14 @@ def merge_polygons(s: StateRecord, p: SettingsRecord, t: int) -> None:
 
 @kernel
 def begin_refinement(s: StateRecord, p: SettingsRecord, threshold: float) -> bool:
-    """Begin a job with the polygon that is next; return whether there is one.
+    """Begin a job for the polygon to refine next; return whether there is one.
 
     Parameters
     ----------
     s, p
         Memory, updated, and settings.
     threshold : float
-        Less than this share of unseen evidence is not worth the work.
+        Least share of unseen evidence of a track to refine.
     """
     chosen = choose_polygon(s, p, threshold)
     if chosen < 0:
@@ -159,7 +159,7 @@ def begin_refinement(s: StateRecord, p: SettingsRecord, threshold: float) -> boo
 
 @kernel
 def judge(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
-    """Enter the pose that was found, what the readings say there, and the track's status.
+    """Update a track's pose, evidence and status from the pose search.
 
     Parameters
     ----------
@@ -190,10 +190,10 @@ def judge(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> No
 
 @kernel
 def advance_refinement(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, left: int) -> int:
-    """Continue a refinement for the rest of a quantum; return what that cost.
+    """Continue a refinement for the rest of a quantum; return the cost.
 
-    Readings are divided between the track and its neighbours; its pose is looked for, widely and then near by; what
-    the readings say there decides its status; its covariance is determined last.
+    Readings are divided between the track and its neighbours; its pose is searched, widely and then near by; the
+    evidence there decides its status; its covariance is computed last.
 
     Parameters
     ----------
@@ -249,7 +249,7 @@ def advance_refinement(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, 
 
 @kernel
 def polygon_quantum(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, threshold: float) -> bool:
-    """Continue the job for a quantum, or else begin the next one; return whether there was one.
+    """Continue the job for a quantum, or else begin the next job; return whether there was one.
 
     Refinements and hypotheses take turns where both wait.
 

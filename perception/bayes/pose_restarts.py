@@ -1,4 +1,4 @@
-"""Where a refinement looks for a track's pose: near by, widely, and from restarts at other maxima.
+"""Searches for a polygon track's pose: near by, wide, and restarts at other maxima.
 
 A polygon's likelihood has many maxima: a face shifted along itself, a body turned by half of its symmetry's angle, or
 lying on another of its sides.
@@ -21,12 +21,12 @@ from perception.records import Records
 ASSIGN, SEARCH_WIDE, RESTART, SEARCH_NEAR, JUDGE, LATTICE = range(6)
 """Stages of a refinement, values of `PolygonJob.stage`."""
 COARSE_READINGS: Final = 96
-"""A wide search scores this many readings at most."""
+"""Greatest number of readings that a wide search scores."""
 SEARCH_EVERY: Final = 4
-"""A pose whose covariance is known and that explains its readings is looked for in every so many refinements only."""
+"""A pose whose covariance is known and that explains its readings is searched only once in this many refinements."""
 YOUNG: Final = 4
 WIDE_EVERY: Final = 8
-"""The search is wide in fewer refinements than the first, in each of so many after, …"""
+"""The search is wide in this many first refinements, then in every `WIDE_EVERY`-th, …"""
 FITTING: Final = 0.85
 """… and every other time while less than this share of the near readings is explained."""
 WIDE_STEP_M: Final = 0.3 * FOOT_M
@@ -35,21 +35,21 @@ NARROW_STEP_M: Final = 0.05 * FOOT_M
 NARROW_ROUNDS: Final = 6
 """First step and rounds of either search."""
 RESTART_SHIFTS: Final = (0.5, -0.5, 1.0, -1.0)
-"""Restarts are shifted along and across by so many inner radii, …"""
+"""Shifts of the restarts along and across, in inner radii, …"""
 RESTART_TURNS: Final = (-0.5, 0.5)
-"""… turned by so many times π over the order of the symmetry, …"""
+"""… turns, in π over the order of the symmetry, …"""
 ROLLS_MAX: Final = 12
-"""… and rolled onto so many of the other sides at most."""
+"""… and greatest number of other sides that they are rolled onto."""
 RESTART_STEP_M: Final = 0.1 * FOOT_M
 RESTART_ROUNDS: Final = 5
 """First step and rounds of their searches."""
 RESTART_GAIN_NAT: Final = 1.0
-"""Another maximum must be higher by this."""
+"""Gain required of another maximum."""
 
 
 @kernel
 def begin_pose_search(s: StateRecord, t: int) -> None:
-    """Begin to look for a track's pose: widely while little is known or explained, else near by, or not at all."""
+    """Begin a search for a track's pose: wide while little is known or explained, else near by, or none."""
     track = s[0].polygons[t]
     job = s[0].job
     count = track.refinements
@@ -61,7 +61,7 @@ def begin_pose_search(s: StateRecord, t: int) -> None:
         start_search(s, track.x, track.y, track.heading, WIDE_STEP_M, WIDE_ROUNDS, COARSE_READINGS)
         job.stage = SEARCH_WIDE
     elif track.covariance.xx > 0.0 and is_fitting and count % SEARCH_EVERY != 0:
-        job.stage = JUDGE  # the lattice follows the pose by itself
+        job.stage = JUDGE  # the lattice moves to the pose without a search
     else:
         search_near(s)
 
@@ -76,7 +76,7 @@ def search_near(s: StateRecord) -> None:
 
 @kernel
 def keep_best(s: StateRecord) -> None:
-    """Enter the search's pose as the best."""
+    """Store the search's pose as the best."""
     job = s[0].job
     job.best.x = job.search.x
     job.best.y = job.search.y
@@ -86,7 +86,7 @@ def keep_best(s: StateRecord) -> None:
 
 @kernel
 def facing_side(s: StateRecord, sides: Records[PolygonSide], is_closed: bool) -> tuple[int, float]:
-    """Return which side of the pose at the job's middle faces the job's readings most, and which face of it, ±1.
+    """Return the side that faces the job's readings most, at the pose of the job's middle, and its face, ±1.
 
     The face is −1 where the readings are on the inner side of an open outline.
 
@@ -127,7 +127,7 @@ def facing_side(s: StateRecord, sides: Records[PolygonSide], is_closed: bool) ->
 
 @kernel
 def roll(s: StateRecord, p: SettingsRecord, model: int, k: int) -> bool:
-    """Roll the pose at the job's middle so that the `k`-th other side lies where one was; return if there is one.
+    """Roll the pose at the job's middle onto its `k`-th other side; return whether there is such a side.
 
     Parameters
     ----------
@@ -165,9 +165,9 @@ def roll(s: StateRecord, p: SettingsRecord, model: int, k: int) -> bool:
 
 @kernel
 def next_restart(s: StateRecord, p: SettingsRecord, t: int) -> None:
-    """Begin the next search from another maximum round the first that was found; else search near the best.
+    """Begin the search at the next other maximum around the first one found; else search near the best.
 
-    Restarts are the pose shifted along, across and turned, rolled onto its other sides, and a challenger's.
+    Restarts are the pose shifted along and across, turned, rolled onto its other sides, and the challenger's pose.
 
     Parameters
     ----------
