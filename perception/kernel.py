@@ -3,7 +3,7 @@
 Numba's own decorator is untyped; this one keeps the signature visible to the type checker. Kernels are plain
 module-level functions on float64 arrays with preallocated outputs: no fastmath (it breaks NaN and infinity, which
 mean something in a range), no threads (the loop that calls them has a deadline). `NUMBA_DISABLE_JIT=1` runs them
-as the Python they are.
+as plain Python.
 """
 
 from __future__ import annotations

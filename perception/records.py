@@ -31,7 +31,7 @@ T_co = TypeVar("T_co", covariant=True)
 R = TypeVar("R", bound="Record")
 
 INTERPRETED: Final = bool(cast("Any", numba).config.DISABLE_JIT)
-"""Whether kernels run as the Python they are."""
+"""Whether kernels run as plain Python."""
 ITEM_BYTES: Final = 8
 """Size of every number in a record, so that no record is padded."""
 

@@ -1,4 +1,4 @@
-"""Snapshots of a perception method's memory, as named arrays, so that a replay can begin in the middle.
+"""Snapshots of a perception method's memory as named arrays, so that a replay can begin in the middle.
 
 The walk is over the objects themselves, so that a field added to a method is in the snapshot the same day. What a
 method is configured with (its configuration, its models, `settings`) is left out, and so is what its class lists as
@@ -13,21 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 Snapshot: TypeAlias = dict[str, NDArray[Any]]
-"""Copies of all that is remembered, by dotted name; a number is an array of no dimension."""
+"""Copies of the memory's values, by dotted name; a number is an array of no dimension."""
 
 CONFIGURED: Final = "settings"
 OURS: Final = "perception."
 
 
 def snapshot_of(owner: object) -> Snapshot:
-    """Return copies of every array and number that an object and its parts remember."""
+    """Return copies of every array and number in the memory of an object and its parts."""
     taken: Snapshot = {}
     _take(owner, "", taken)
     return taken
 
 
 def put_back(owner: object, snapshot: Snapshot) -> None:
-    """Overwrite what an object remembers with a snapshot of another one made from the same settings.
+    """Overwrite an object's memory with a snapshot of another object made from the same settings.
 
     Raises
     ------

@@ -230,8 +230,8 @@ def posterior_circle(
     """Write mean and covariance of a circle's centre under the ranges' likelihood; return the greatest one (nat).
 
     The ranges are linearised about the centre; their log likelihood is summed on a 7 × 7 grid in the frame of the
-    root. Where the mass lies on the rim, off the middle, or is not about one pitch wide, the frame moves to it and the
-    grid is laid again, four times at most. The same code covers a polygon (noise → 0) and a bell.
+    root. Where the mass lies on the rim, off the middle, or is not about one pitch wide, the frame moves to it and
+    the grid is laid again, four times at most. The same code covers a polygon (noise → 0) and a bell.
 
     Parameters
     ----------

@@ -2,8 +2,8 @@
 
 There are two sources. *Roughness* needs no model: of three consecutive readings of one sensor the middle one should
 lie between the outer two, on any surface. The *residuals* of sure objects discriminate far better, but only if the
-objects are correct. So roughness decides which noises are possible, and both sources which one is likeliest. With residuals
-alone a false object could raise the noise until it fits.
+objects are correct. So roughness decides which noises are possible, and both sources which one is likeliest. With
+residuals alone a false object could raise the noise until it fits.
 """
 
 from __future__ import annotations

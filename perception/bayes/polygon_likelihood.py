@@ -3,8 +3,8 @@
 Smooth sides reflect like mirrors, only from the foot of the perpendicular; rough ones answer from their nearest point
 in the beam (cone rule). Either rule predicts one range for each reading, and whether the echo must be heard. Which
 rule a body obeys is unknown, so it is scored under both and the two likelihoods are added: the choice is paid for
-once. Choosing the better rule for each reading would give false precision, because some pose always gains from a dozen
-chance agreements.
+once. Choosing the better rule for each reading would give false precision, because some pose always gains from a
+dozen chance agreements.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ all the readings of a sensor may then be heard, or none, and a price for each wo
 
 EDGE_REACH_M: Final = 1.0
 EDGE_NAT_PER_M: Final = 3.0 / FOOT_M
-"""A convex edge scatters 20 to 30 dB below a mirror's echo: an echo from beyond this costs that much more per metre."""
+"""A convex edge scatters 20 to 30 dB below a mirror's echo: an echo from beyond this costs this much per metre."""
 
 NO_ANSWER_M: Final = 1e18
 """A range that stands for no answer."""
@@ -307,9 +307,9 @@ def continue_search(
 ) -> int:  # fmt: skip
     """Continue a search for the pose of greatest likelihood; return the number of poses scored.
 
-    The likelihood has steps where sides begin and cease to answer, so no derivative is used: a coordinate search tries
-    each of the body's axes both ways, and shrinks the steps when none gains. A search stops when its budget is spent
-    and continues from there; it is over when no round is left.
+    The likelihood has steps where sides begin and cease to answer, so no derivative is used: a coordinate search
+    tries each of the body's axes both ways, and shrinks the steps when none gains. A search stops when its budget is
+    spent and continues from there; it is over when no round is left.
 
     Parameters
     ----------

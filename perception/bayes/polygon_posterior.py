@@ -1,7 +1,7 @@
 """Posterior of a polygon's pose: mean and covariance of the exact likelihood.
 
-As for circles (`circle_posterior`), in three dimensions: the likelihood, corners and silences included, is summed on a
-lattice in the frame of the expected covariance's Cholesky root. Derivatives at the best pose would not do: the
+As for circles (`circle_posterior`), in three dimensions: the likelihood, corners and silences included, is summed on
+a lattice in the frame of the expected covariance's Cholesky root. Derivatives at the best pose would not do: the
 evidence is flat on top, and drops abruptly beyond a side's end.
 """
 

@@ -55,7 +55,7 @@ ESTABLISH_HITS: Final = 10.0
 ESTABLISH_SURE: Final = 3.0
 MANY_HITS: Final = 20.0
 MANY_SURE: Final = 2.0
-"""Least probability, hits and sure hits (fewer with many hits) of an established track: corners alone fit anywhere."""
+"""Least probability, hits and sure hits (fewer with many hits) to establish a track: corners alone fit anywhere."""
 DOUBT: Final = 0.3
 DOUBT_SHARE: Final = 0.75
 """A track less probable, or that explains less of its near readings, is tentative again."""

@@ -1,4 +1,4 @@
-"""Predicted ranges of a circle or a line, the evidence of raw ranges for either, and robust fits.
+"""Predicted ranges of circles and lines, the evidence of raw ranges for them, and robust fits.
 
 The true outline takes the place of the paper's chords here: an arc where the body is an arc, so that the chords'
 inward bias is gone. A circle answers where the direction to its centre lies in the beam, with the distance less its
@@ -19,22 +19,22 @@ from perception.kernel import kernel
 from perception.records import Records
 
 FAR: Final = 1e6
-"""A range of this much or more (m) means that nothing was heard."""
+"""A range of this much or more (m) means no echo."""
 
 NONE_YET: Final = 1e9
-"""Least range and extent (m) of what nothing has hit."""
+"""Initial least range and extent (m) of an object without a hit."""
 
 DROP_SHARE: Final = 0.2
 """Drop-outs are a matter of the sensor up to this share of what should have hit (and one more) …"""
 
 DROP_NAT: Final = 2.0
-"""… and each further one costs this much more, nat: a body that is not there looks just like that."""
+"""… and each further one costs this much more, nat: many drop-outs indicate an absent body."""
 
 DAMPING: Final = 0.02
-"""Share of the information that holds a fit where it is, so that directions nothing observes stay put."""
+"""Share of the information that holds a fit where it is, so that unobserved directions do not move."""
 
 STEP_MAX_GATES: Final = 0.8
-"""Longest step of a circle's fit, in gates: farther, and it leaves the readings it was made from."""
+"""Longest step of a circle's fit, in gates: a longer one would leave the readings that it came from."""
 
 STEP_MIN_GATES: Final = 4e-4
 """A step below this many gates ends a circle's fit."""
@@ -46,12 +46,12 @@ TURN_MIN: Final = 1e-5
 """A turn below this ends a line's fit, rad."""
 
 NO_INFORMATION: Final = 1e-12
-"""Information (in single perfect readings) that a fit starts from, to be regular where nothing is heard."""
+"""Information (in single perfect readings) that a fit starts from, to be regular without echoes."""
 
 
 @kernel
 def robust_weight(e: float, var: float, soft: float) -> float:
-    """Return the weight of a residual: its information, less the farther it is off.
+    """Return the Geman–McClure weight of a residual, 1/m²: its information, reduced for large residuals.
 
     1 / (v (1 + e²/(s v))²) is the Geman–McClure weight, with s the number of σ² at which it has fallen to a quarter.
 
@@ -70,7 +70,7 @@ def robust_weight(e: float, var: float, soft: float) -> float:
 def score_circle(
     readings: Records[Reading], cx: float, cy: float, radius: float, p: Records[Settings], noise: int, score: Score
 ) -> None:
-    """Score what readings say of a circle: a log ratio to the background.
+    """Score readings for a circle: write the log ratio to the background and the counts.
 
     ====================================  =====================================================================
     e = r − (distance to centre − ρ)      counts
@@ -147,7 +147,7 @@ def fit_circle(
     readings: Records[Reading], cx: float, cy: float, radius: float, p: Records[Settings], soft: float, var0: float,
     rel2: float, steps: int, fit: CircleFit,
 ) -> bool:  # fmt: skip
-    """Fit the centre of a circle of known radius: robust, damped Gauss–Newton on the raw ranges.
+    """Fit the centre of a circle of known radius by robust, damped Gauss–Newton on the raw ranges.
 
     With û the direction from a sensor to the centre and g the weight of its residual e, a step solves
     (Σ g û ûᵀ + λ I) δ = Σ g e û, λ a share of the trace. The readings that take part are chosen anew in each step.
@@ -225,7 +225,7 @@ def fit_line(
     readings: Records[Reading], nx: float, ny: float, ox: float, oy: float, distance: float, cos_may: float,
     gate: float, soft: float, var0: float, rel2: float, steps: int, fit: LineFit,
 ) -> None:  # fmt: skip
-    """Fit a line n·(p − o) = c: robust, damped Gauss–Newton on the raw ranges, over the normal's direction and c.
+    """Fit a line n·(p − o) = c by robust, damped Gauss–Newton on the raw ranges, over the normal's direction and c.
 
     Parameters
     ----------
@@ -284,7 +284,7 @@ def score_line(
     readings: Records[Reading], line: LineFit, ox: float, oy: float, p: Records[Settings], noise: int,
     score: LineScore,
 ) -> None:  # fmt: skip
-    """Score what readings say of a line, as `score_circle`; silence counts only between the feet of its own hits.
+    """Score readings for a line, as `score_circle`; silence counts only between the feet of the line's own hits.
 
     Parameters
     ----------

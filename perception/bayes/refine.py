@@ -1,8 +1,8 @@
-"""Refinement of one circle: its place, its evidence, its alternatives, and whether it stays.
+"""Refinement of one circle track: position, evidence, alternatives and status.
 
 A quantum of refinement has a bounded cost: a posterior over at most a reservoir of readings, and one alternative (all
-of them while little is known). What has converged is chosen less and less, see `track_selection`, so later passes
-cost less than the first.
+of them while little is known). Converged tracks are selected less often (see `track_selection`), so later
+passes cost less than the first.
 """
 
 from __future__ import annotations
@@ -35,38 +35,38 @@ FIT_STEPS: Final = 2
 FIRST_FIT_STEPS: Final = 3
 """Steps of the fit that precedes the posterior; of a tentative track."""
 FIT_LEAD: Final = 6.0
-"""A robust fit this many σ² off (and the first two refinements) takes the pose over."""
+"""A robust fit this many σ² off (and the first two refinements) replaces the pose."""
 YOUNG: Final = 2
 LOST_NAT: Final = 2.0
-"""A mean this much worse than where it was looked for has left the beams that heard it."""
+"""Loss of evidence at the mean, against the start, at which it has left the beams that heard the object."""
 CORRELATION_MAX: Final = 0.9
 ROOT_MIN_M2: Final = 1e-6 * FOOT_M * FOOT_M
-"""Bounds of the covariance that a fit is believed to have."""
+"""Bounds of the covariance assumed for a fit."""
 SWITCH_ROOT_M: Final = 0.02 * FOOT_M
-"""After a change of kind the pose is looked for this far round at least."""
+"""Least root of the covariance with which the pose is searched after a change of kind."""
 SWITCH_UNSEEN: Final = 4
-"""A change of kind counts as so many unseen readings."""
+"""Unseen readings that a change of kind counts as."""
 ALTERNATIVE_STEPS: Final = 4
 """Steps of an alternative's fit."""
 LINE_HITS_MIN: Final = 6.0
-"""A line that replaces a circle is kept from so many hits on."""
+"""Least hits of a line that is kept when it replaces a circle."""
 MISS_SHARE: Final = 0.5
-"""A corner shares this much of the silences that speak against the circle."""
+"""Share of the evidence of missed echoes against the circle that also counts against a corner."""
 WALL_BEYOND_M: Final = 8.0 * FOOT_M
 WALL_BEHIND: Final = -0.85
 WALL_FRONT: Final = 0.7
 IN_WALL_NAT: Final = -8.0
-"""A body whose centre lies in a wall, or in so many radii behind or before it, pays this."""
+"""Log prior of a body whose centre lies in a wall, or within this many radii behind or before it."""
 LINE_PRIOR_NAT: Final = 1.0
-"""Walls are commoner than models by this."""
+"""Log prior ratio of walls to models."""
 UNKNOWN_LEAD_NAT: Final = 6.0
-"""A track that an unknown object leads by this ends."""
+"""Lead of an unknown object at which a track ends."""
 ESTABLISH: Final = 0.7
 ESTABLISH_HITS: Final = 8.0
 ESTABLISH_ROOT_M: Final = 0.25 * FOOT_M
-"""A track is established from this probability and so many hits on, if it is known as well as this."""
+"""Least probability and hits, and greatest standard deviation, at which a track is established."""
 DOUBT: Final = 0.2
-"""Below this probability it is tentative again."""
+"""Probability below which an established track is tentative again."""
 APART: Final = 0.8
 """Two centres nearer than this share of the larger radius are one object: bodies do not overlap."""
 EXPONENT_MAX: Final = 60.0
@@ -112,7 +112,7 @@ def fit_start(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> 
 
 @kernel
 def locate(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> None:
-    """Find a track's place by a robust fit and a search across the beam, and its mean and covariance round there.
+    """Update a track's position, mean and covariance, by a robust fit and a search across the beam.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def update_score(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) 
 
 @kernel
 def change_kind(s: StateRecord, p: SettingsRecord, track: CircleTrack, k: int, evidence_nat: float) -> None:
-    """Make a track the circle that explains it better.
+    """Change a track to another circle that explains it better.
 
     Parameters
     ----------
@@ -218,9 +218,9 @@ def may_become(s: StateRecord, track: CircleTrack, k: int, evidence_nat: float) 
 
 @kernel
 def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int, prior: float) -> bool:
-    """Compare the alternatives that are next; return whether the track is still an object and not a line.
+    """Compare the next alternatives; return whether the track is still an object and not a line.
 
-    `leads` holds by how much each led when it was compared. (Log ratios of different ages cannot be compared: the
+    `leads` holds the lead of each at its last comparison. (Log ratios of different ages cannot be compared: the
     readings have changed in between.)
 
     Parameters
@@ -282,7 +282,7 @@ def is_in_wall(s: StateRecord, x: float, y: float, radius: float) -> bool:
 
 @kernel
 def existence_probability(s: StateRecord, p: SettingsRecord, track: CircleTrack, prior: float) -> float:
-    """Return the share of a track's explanation among all of them: radii, line, corner, unknown, nothing.
+    """Return the probability of a track's explanation among all: radii, line, corner, unknown object, nothing.
 
     Parameters
     ----------
@@ -308,7 +308,7 @@ def existence_probability(s: StateRecord, p: SettingsRecord, track: CircleTrack,
 
 @kernel
 def update_status(track: CircleTrack, p: SettingsRecord) -> None:
-    """Establish a track that is probable and well known, or doubt one that is not."""
+    """Establish a track that is probable and well located; make an improbable one tentative again."""
     if track.status == TENTATIVE and track.probability > ESTABLISH and track.hits >= ESTABLISH_HITS:
         if track.dispersion >= p[0].dispersion_min and max(track.root_xx, track.root_yy) < ESTABLISH_ROOT_M:
             track.status = ESTABLISHED
@@ -378,7 +378,7 @@ def merge_duplicates(tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
 
 @kernel
 def quantum(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, threshold: float) -> bool:
-    """Refine the circle that is next; return whether another one is waiting.
+    """Refine the circle that is next; return whether another circle waits.
 
     Parameters
     ----------

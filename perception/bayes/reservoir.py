@@ -1,8 +1,8 @@
-"""The raw readings that a track keeps: the newest from each direction.
+"""The raw readings kept by a track: the newest of each bearing.
 
-Hits and silences share the bins, so that the readings that found an object are pushed out by those that find it
-gone, from wherever the robot looks again; nothing is dropped for its age. The readings of one direction never crowd
-out another's, which is what a position needs most.
+Hits and silences share the bins, so that new silences replace the hits of an object that has gone, for each bearing
+from which the robot observes it again. No reading is dropped for its age. Readings of one bearing never replace those
+of another, because a position needs readings from many bearings.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ TWO_PI: Final = 2.0 * math.pi
 BEAM_MARGIN_M: Final = 0.02 * FOOT_M
 """A centre this far outside a beam may still move into it while a hypothesis is fitted."""
 ROOM: Final = 64
-"""Readings that are left free at the end of the scratch."""
+"""Places left free at the end of the scratch's readings."""
 
 
 @kernel
@@ -56,7 +56,7 @@ def keep_reading(track: CircleTrack | PolygonTrack, cx: float, cy: float, readin
 
 @kernel
 def copy_reservoir(track: CircleTrack | PolygonTrack, readings: Records[Reading]) -> int:
-    """Copy all readings of a track to `readings`, and return how many."""
+    """Copy all readings of a track to `readings`; return their number."""
     n = 0
     for b in range(len(track.bins)):
         kept = track.bins[b].readings

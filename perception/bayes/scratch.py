@@ -1,4 +1,4 @@
-"""Records that kernels write anew before each use: segments, scores and fits of one firing or one object."""
+"""Records that kernels overwrite before each use: segments, scores and fits of one firing or one object."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class PairSegment(Record):
     """An outline segment from a pair of readings."""
 
     x: float
-    """Its middle, m."""
+    """Its middle point, m."""
     y: float
     normal_x: float
     normal_y: float
@@ -43,7 +43,7 @@ class PairSegment(Record):
 
 
 class LinearReading(Record):
-    """A reading's error near a circle, and how it changes along the axes of the posterior's frame."""
+    """A reading's error near a circle, and its slope along the axes of the posterior's frame."""
 
     error: float
     """m"""
@@ -56,7 +56,7 @@ class LinearReading(Record):
 
 
 class Score(Record):
-    """What readings say of a circle or a polygon."""
+    """The evidence of readings for a circle or a polygon."""
 
     log_likelihood_ratio: float
     hits: float
@@ -69,13 +69,13 @@ class Score(Record):
     closest: float
     """Least range of a hit, m."""
     dispersion: float
-    """How unlike the axes are that heard it."""
+    """Dispersion of the axes of the sensors that heard it."""
     sure_hits: float
-    """Hits that had to be; of a polygon only."""
+    """Hits where an echo was certain to be heard; of a polygon only."""
 
 
 class LineScore(Record):
-    """What readings say of a line."""
+    """The evidence of readings for a line."""
 
     log_likelihood_ratio: float
     hits: float
@@ -126,13 +126,13 @@ class CirclePosterior(Record):
 
 
 class Scratch(Record):
-    """What kernels write anew before each use."""
+    """Values that kernels overwrite before each use."""
 
     fired: Annotated[Records[Reading], SENSORS_MAX]
     """The readings of this firing."""
     fired_sensors: Annotated[Ints, SENSORS_MAX]
     explained_by: Annotated[Ints, SENSORS_MAX]
-    """What explains each; see `UNEXPLAINED`."""
+    """Explanation of each fired reading; see `UNEXPLAINED`."""
     segments: Annotated[Records[PairSegment], PAIRS_PER_SENSOR * SENSORS_MAX]
     """The segments of this firing."""
     readings: Annotated[Records[Reading], READINGS_MAX]

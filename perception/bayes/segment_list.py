@@ -1,4 +1,4 @@
-"""The outline map as users see it: copies, in the order of its buckets."""
+"""Copies of the outline map for display, in the order of its buckets."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def mapped_segments(memory: Memory) -> NDArray[Any]:
 
 
 def drawn(segments: NDArray[Any]) -> Floats:
-    """Return ends x, y, x, y (m) and normal (rad), shape (n, 5), of records with middle and normal, shape (n,)."""
+    """Return ends x, y, x, y (m) and normal (rad), shape (n, 5), of mapped segments, shape (n,)."""
     ends = np.empty((len(segments), 5))
     x, y, nx, ny = (segments[name] for name in ("x", "y", "normal_x", "normal_y"))
     along_x, along_y = -0.5 * SHOWN_M * ny, 0.5 * SHOWN_M * nx

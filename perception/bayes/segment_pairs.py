@@ -1,9 +1,9 @@
-"""Outline segments from pairs of readings, each with its uncertainty, and the map that holds them.
+"""Construction of outline segments from pairs of readings, and the map that holds them.
 
 A pair may be two readings of one sensor or of neighbours in one firing, at any baseline. A short baseline gives a
 segment early and a poor direction, a long one late and a good one; so each carries its uncertainty, and hypotheses
 start from the surest. The map is a hashed grid of small buckets: a cell's newest segments push out its oldest, and a
-bucket whose hash is wanted by another cell changes hands. Its size and the cost of a look-up do not grow with the
+another cell of the same hash takes a bucket over. Its size and the cost of a look-up do not grow with the
 mission, and what has gone is overwritten by what is seen instead.
 """
 
@@ -28,7 +28,7 @@ Y_PRIME: Final = 19349663
 
 @kernel
 def tangent(first: Reading, second: Reading, cos_half: float, var_r: float, out: PairSegment) -> bool:
-    """Find the line that touches the arcs of two ranges inside both beams, and how well it is known.
+    """Write the common tangent of two ranges' arcs inside both beams, with its uncertainty; return whether it exists.
 
     McKerrow's construction (1993; paper §3.2, Figure 2): the tangent's normal makes the angle acos((r1 − r2)/L) with
     the baseline of length L. Both ends carry an independent error of variance `var_r` along the normal, so that the
@@ -102,7 +102,7 @@ def bucket_index(cell_x: int, cell_y: int, buckets: int) -> int:
 def add_to_map(
     buckets: Records[Bucket], cell_m: float, x: float, y: float, nx: float, ny: float, number: int, time_s: float
 ) -> int:
-    """Put a segment into its cell's bucket, and return that bucket's index.
+    """Put a segment into its cell's bucket; return the bucket's index.
 
     A full bucket forgets its oldest segment. A bucket that another cell holds is emptied and taken over.
 
@@ -115,7 +115,7 @@ def add_to_map(
     x, y, nx, ny : float
         The segment's middle (m) and unit normal.
     number, time_s
-        What is kept with it.
+        Its number and the time of its firing, s.
     """
     cell_x = math.floor(x / cell_m)
     cell_y = math.floor(y / cell_m)

@@ -1,4 +1,4 @@
-"""The Bayesian method's whole memory: records of a fixed layout, made once and never resized.
+"""Memory of the Bayesian method: records of a fixed layout, allocated once and never resized.
 
 Kernels call them `s` (one `State`), `tracks` (circles, as many as the configuration allows) and `p` (one `Settings`
 record of `perception.bayes.parameters`). Lengths are metres, angles radians.
@@ -40,7 +40,7 @@ FREE, TENTATIVE, ESTABLISHED = range(3)
 """Values of `Track.status`."""
 CONFIRMED: Final = 1
 PLACED: Final = 2
-"""Bits of `Track.marks`: a user confirmed the object; or placed it, and the readings do not bear it out yet."""
+"""Bits of `Track.marks`: a user confirmed the object; a user placed it, and readings do not support it yet."""
 START_NOISE: Final = 9
 """Index of the noise assumed at the start: σ = 0.03 ft, 0.5 %."""
 START_NOISE_NAT: Final = 6.0
@@ -48,15 +48,15 @@ START_NOISE_NAT: Final = 6.0
 
 
 class Sensor(Record):
-    """What is remembered of one sensor."""
+    """Memory of one sensor."""
 
     history: Annotated[Records[Reading], HISTORY]
-    """A ring buffer of spaced readings, whatever they hit."""
+    """A ring buffer of spaced readings, hits and silences."""
     times_s: Annotated[Floats, HISTORY]
     kept: int
     """Readings ever put there."""
     last: Reading
-    """The last reading that said anything new."""
+    """The last reading that was not redundant."""
 
 
 class Bucket(Record):
@@ -70,7 +70,7 @@ class Bucket(Record):
 
 
 class Line(Record):
-    """A wall, or a line that may become one; its normal and distance refer to an origin on the spot."""
+    """A wall, or a line that may become one; its normal and distance refer to a local origin."""
 
     normal_x: float
     normal_y: float
@@ -109,12 +109,12 @@ class PolygonBin(Record):
 
 
 class Track(Record):
-    """What tracks of circles and of polygons have in common."""
+    """Fields that circle and polygon tracks have in common."""
 
     status: int
     """`FREE`, `TENTATIVE` or `ESTABLISHED`."""
     unseen: int
-    """Readings that refinement has not seen."""
+    """Readings since the last refinement."""
     reservoir: int
     """Readings that bore on it at the last refinement."""
     refinements: int
@@ -125,7 +125,7 @@ class Track(Record):
     passed_over: int
     """Quanta that went to other tracks since its last one."""
     number: int
-    """What a user knows it by."""
+    """Number that users see."""
     marks: int
     """Sum of `CONFIRMED` and `PLACED`."""
     x: float
@@ -140,7 +140,7 @@ class Track(Record):
 
 
 class CircleTrack(Track):
-    """A round object, or what looks like one."""
+    """Track of a round object."""
 
     kind: int
     """Index of its radius in `Settings.circles`."""
@@ -160,13 +160,13 @@ class CircleTrack(Track):
     misses: float
     """Readings that should have hit and passed through."""
     dispersion: float
-    """How unlike the axes are that heard it."""
+    """Dispersion of the axes of the sensors that heard it."""
     unknown_nat: float
     """Evidence of an unknown object in its place."""
     leads: Annotated[Floats, ALTERNATIVES_MAX]
-    """By how much each alternative leads, nat: the radii, then a line, then a corner; 0 where it was not compared."""
+    """Lead of each alternative, nat: the radii, then a line, then a corner; 0 where it was not compared."""
     noise_nat: Annotated[Floats, NOISES]
-    """What its residuals say of each noise."""
+    """Log likelihood of its residuals under each noise, nat."""
     bins: Annotated[Records[CircleBin], BEARING_BINS]
     """The readings it keeps, by bearing."""
 
@@ -180,7 +180,7 @@ class PolygonTrack(Track):
     """1 while another pose is to be tried."""
     heading: float
     sure_hits: float
-    """Hits that had to be."""
+    """Hits where an echo was certain to be heard."""
     covariance: LowerTriangle
     """Of the pose; all zero until it is known."""
     challenger: Pose
@@ -197,11 +197,11 @@ class Rejection(Record):
     what: int
     """Index of a circle, or `POLYGON` plus that of a polygon model."""
     evidence_nat: float
-    """… before so much evidence speaks for it."""
+    """… until the evidence exceeds this."""
 
 
 class PolygonRequest(Record):
-    """A segment behind which a polygon shall be tried."""
+    """A request for a polygon hypothesis behind a segment."""
 
     model: int
     x: float
@@ -221,7 +221,7 @@ class PoseSearch(Record):
     """At that pose, nat."""
     step_m: float
     trial: int
-    """What it tries next; −1 while nothing has been scored."""
+    """The next trial; −1 before the first score."""
     rounds_left: int
     has_gained: int
     """1 where this round gained."""
@@ -243,7 +243,7 @@ class LatticeMoments(Record):
 
 
 class PolygonJob(Record):
-    """A piece of work on polygons, and how far it has come; see `perception.bayes.polygon_job`."""
+    """The current job on polygons and its progress; see `perception.bayes.polygon_job`."""
 
     kind: int
     stage: int
@@ -257,7 +257,7 @@ class PolygonJob(Record):
     noise_level: int
     """Noise assumed when the job began."""
     next_step: int
-    """Where a stage has come to."""
+    """Progress within the stage."""
     lattices: int
     """Lattices laid."""
     refines_next: int
@@ -284,25 +284,25 @@ class PolygonJob(Record):
 
 
 class State(Record):
-    """Everything that is remembered but the tracks of circles."""
+    """The memory without the circle tracks."""
 
     sensor_count: int
     noise_level: int
-    """Index of the noise that is assumed, in `Settings.noises`."""
+    """Index of the assumed noise in `Settings.noises`."""
     segments_made: int
     refinements: int
     ring_x: float
-    """Where the ring last fired, m."""
+    """Position of the ring at its last firing, m."""
     ring_y: float
     objects_numbered: int
-    """Numbers given to objects, which are never given again."""
+    """Numbers assigned to objects; a number is never reused."""
     segments_numbered: int
     """The same for segments."""
     rejection_count: int
     roughness_nat: Annotated[Floats, NOISES]
-    """What the roughness of the readings says of each noise."""
+    """Evidence of the readings' roughness for each noise."""
     residuals_nat: Annotated[Floats, NOISES]
-    """What the residuals of all objects say of each noise."""
+    """Evidence of all objects' residuals for each noise."""
     sensors: Annotated[Records[Sensor], SENSORS_MAX]
     buckets: Annotated[Records[Bucket], BUCKETS]
     """The outline map."""
@@ -322,10 +322,10 @@ AnyTrack: TypeAlias = CircleTrack | PolygonTrack
 
 
 class Memory:
-    """The arrays of all that is remembered, as numpy and as kernels take them."""
+    """The arrays of the memory, as numpy arrays and as kernels take them."""
 
     SCRATCH: Final = ("s", "tracks")
-    """The same memory once more."""
+    """Views of the same memory, left out of snapshots."""
 
     def __init__(self, sensors: int, tracks: int = MAX_TRACKS) -> None:
         self.state = zeros(State, 1)
@@ -341,7 +341,7 @@ class Memory:
         return self.state["polygons"][0]  # type: ignore[no-any-return]
 
     def clear(self) -> None:
-        """Forget everything but which numbers have been given."""
+        """Clear the memory, except the numbers assigned so far."""
         kept = {name: self.state[name].copy() for name in ("sensor_count", "objects_numbered", "segments_numbered")}
         for array in (self.state, self.circles):
             array.view(np.uint8)[...] = 0

@@ -1,7 +1,7 @@
 """Migration of the memory when models are added.
 
-Further models are further explanations. What is remembered of raw readings, walls and places stays as it is; what is
-indexed by explanation moves to the explanation's new index, and is compared with the new ones in its turn.
+Further models are further explanations. Raw readings, walls and positions stay as they are. Values indexed by
+explanation move to the explanation's new index, and are compared with the new explanations in turn.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def radii_of(p: SettingsRecord) -> Floats:
 
 
 def migrate(memory: Memory, before: SettingsRecord, after: SettingsRecord) -> None:
-    """Move what is indexed by explanation to the indices of other settings.
+    """Move values indexed by explanation to the indices of other settings.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Circle hypotheses: where an unexplained segment suggests a model's body.
 
-The paper starts them from clusters of segments; a cluster joins drums that stand a foot apart and splits one seen
-from two sides. The paper's relaxation then moves the body onto the outline map, as there; whether it is an object is
-decided by the raw readings, against every alternative.
+The paper starts hypotheses from clusters of segments; but a cluster joins drums that stand a foot apart, and splits a
+drum seen from two sides. As in the paper, relaxation (§3.4) moves the body onto the outline map; the raw readings
+then decide whether it is an object, against every alternative.
 """
 
 from __future__ import annotations
@@ -45,16 +45,16 @@ FIRST_SOFT: Final = 16.0
 """Robustness of the first fit; see `alternatives.SOFT`."""
 READINGS_MIN: Final = 5
 EVIDENCE_MIN_NAT: Final = 10.0
-"""A track starts with so many readings and this evidence."""
+"""Least readings and evidence of a new track."""
 SWITCH_NAT: Final = 6.0
-"""Another explanation must lead by this."""
+"""Lead required of another explanation."""
 RIVAL_OVER_UNKNOWN_NAT: Final = 3.0
-"""A rival must lead an unknown object by this."""
+"""Lead required of a rival over an unknown object."""
 LINE_HITS_MIN: Final = 8.0
 LINE_MIN_M: Final = 0.8 * FOOT_M
-"""A line is kept from this length and so many hits on."""
+"""Least length and hits of a line that is kept."""
 VARIANCE_MAX_M2: Final = 0.2 * FOOT_M * FOOT_M
-"""Greatest variance of a centre that a fit is believed to have."""
+"""Greatest variance assumed for a fitted centre."""
 
 
 @kernel
@@ -206,7 +206,7 @@ def reset_circle(track: CircleTrack) -> None:
 def restart_circle(
     s: StateRecord, track: CircleTrack, kind: int, radius: float, x: float, y: float, n: int
 ) -> None:  # fmt: skip
-    """Make a track a tentative one on the first `n` readings of the scratch.
+    """Set a track to a tentative one on the first `n` readings of the scratch.
 
     Parameters
     ----------
@@ -255,7 +255,7 @@ def start_circle(
 def gather_relevant(
     s: StateRecord, tracks: CircleTracks, p: SettingsRecord, x: float, y: float, radius: float
 ) -> int:  # fmt: skip
-    """Copy to the scratch what the sensors remember that bears on a new circle; return how many readings.
+    """Copy the remembered readings that bear on a new circle to the scratch; return their number.
 
     Parameters
     ----------
@@ -271,7 +271,7 @@ def gather_relevant(
 def initiate_circle(
     s: StateRecord, tracks: CircleTracks, p: SettingsRecord, kind: int, x: float, y: float, nx: float, ny: float
 ) -> int:  # fmt: skip
-    """Try a circle behind a segment, and start a track where the readings bear it out; return 1 if that took work.
+    """Try a circle behind a segment and start a track if the readings support it; return 1 if that took work.
 
     Parameters
     ----------

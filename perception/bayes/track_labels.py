@@ -16,7 +16,7 @@ from perception.kernel import kernel
 
 @kernel
 def assign_number(s: StateRecord, track: AnyTrack) -> None:
-    """Give a new track the next number, and no marks."""
+    """Assign the next number to a new track, and clear its marks."""
     s[0].objects_numbered += 1
     track.number = s[0].objects_numbered
     track.marks = 0
@@ -34,7 +34,7 @@ def drop_track(track: AnyTrack) -> bool:
 
 @kernel
 def outlives(track: AnyTrack, other: AnyTrack, has_more: bool) -> bool:
-    """Return whether the first of two tracks in one place stays, and give the one that stays the older number.
+    """Return whether the first of two tracks in one place stays; the one that stays gets the older number.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Selection of the track that the next quantum of refinement goes to.
+"""Selection of the track to refine in the next quantum.
 
 The value of a quantum is the unseen evidence for an object's size, more where its place is unsure; among those above
 the threshold the nearer to the robot goes first, as the robot meets it next. A budget that is spent in every cycle
@@ -23,9 +23,9 @@ UNSURE_ROOT_M: Final = 0.03 * FOOT_M
 CERTAIN: Final = 0.95
 """… or where it is less probable than this."""
 SIZE: Final = 8.0
-"""Readings added to an object's own, so that a small one is not refined at every reading."""
+"""Readings added to an object's count, so that an object with few is not refined at every reading."""
 FINAL_VALUE: Final = 1e-6
-"""By so much a final refinement is above the threshold."""
+"""Value of a final refinement above the threshold."""
 PASSES_MAX: Final = 60
 """Quanta that may go to others; then a track goes before all that are not passed over as often."""
 OVERDUE: Final = 1e9
@@ -34,7 +34,7 @@ OVERDUE: Final = 1e9
 
 @kernel
 def unseen_evidence(track: AnyTrack, idle_firings: int, threshold: float, weight: float) -> float:
-    """Return the unseen readings of a track for its size, `weight` times.
+    """Return the unseen readings of a track relative to its size, times `weight`.
 
     A track without evidence for a while is refined to the end: whatever is unseen, and a few rounds more.
 
@@ -113,7 +113,7 @@ def is_waiting(tracks: CircleTracks, p: SettingsRecord, threshold: float) -> boo
 
 @kernel
 def choose_circle(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, threshold: float) -> int:
-    """Return the circle that is next, −1 where none waits; the others that wait have been passed over.
+    """Return the circle to refine next, −1 where none waits; count a pass for the others that wait.
 
     Parameters
     ----------

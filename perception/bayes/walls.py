@@ -1,4 +1,4 @@
-"""Walls: lines that follow the echoes they explain, and give way to ranges that go through them.
+"""Walls: lines that are corrected by echoes and weakened by ranges that pass through them.
 
 Long walls cause false round objects: each part of one, seen alone, might be a large drum's side. So walls are
 recognised as early as possible and take their echoes. A short line takes none: every drum has a tangent, and drums
@@ -25,14 +25,14 @@ JOIN_M: Final = 1.0 * FOOT_M
 """A new line this parallel, this near and this little beyond the end of a known one is that one."""
 ANGLE_VARIANCE: Final = 0.02
 DISTANCE_VARIANCE_M2: Final = 0.01 * FOOT_M * FOOT_M
-"""How well a new line is known: rad², m²."""
+"""Variance of a new line: rad², m²."""
 ANGLE_DRIFT: Final = 1e-8
 DISTANCE_DRIFT_M2: Final = 1e-6 * FOOT_M * FOOT_M
-"""What each echo adds to that, rad² and m², so that the line never stops following."""
+"""Variance that each echo adds, rad² and m², so that the line keeps following."""
 FRONT_COS: Final = 0.8
-"""A sensor that faces a line less than this does not see it."""
+"""Least cosine between a sensor's axis and a line's normal at which it observes the line."""
 SLACK_M: Final = 0.02 * FOOT_M
-"""How much farther off than the noise an explained range may be."""
+"""Error of an explained range allowed beyond the noise."""
 GROW_M: Final = 0.5 * FOOT_M
 """A line grows by echoes this far beyond its ends."""
 WITHIN_M: Final = 0.2 * FOOT_M
@@ -87,13 +87,13 @@ def reaches(line: Line, along: float, beyond: float) -> bool:
 
 @kernel
 def is_wall(line: Line) -> bool:
-    """Return whether a line is long and was heard often enough to be called a wall."""
+    """Return whether a line is long enough and has enough echoes to be called a wall."""
     return bool(line.echoes > ECHOES_MIN and line.high - line.low > WALL_MIN_M)
 
 
 @kernel
 def add_line(s: StateRecord, fit: LineFit, ox: float, oy: float, score: LineScore) -> None:
-    """Remember a fitted line about the origin (ox, oy), unless it is known; the least credible one makes room.
+    """Add a fitted line about the origin (ox, oy), unless it is known; replace the least credible line if full.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def add_line(s: StateRecord, fit: LineFit, ox: float, oy: float, score: LineScor
 
 @kernel
 def correct_line(line: Line, px: float, py: float, e: float, var: float) -> None:
-    """Correct a line by one range: an extended Kalman filter on its angle and distance.
+    """Correct a line by one range, by an extended Kalman filter on its angle and distance.
 
     Parameters
     ----------
