@@ -1,8 +1,8 @@
 """Snapshots of a perception method's memory as named arrays, so that a replay can begin in the middle.
 
-The walk is over the objects themselves, so that a field added to a method is in the snapshot the same day. What a
-method is configured with (its configuration, its models, `settings`) is left out, and so is what its class lists as
-`SCRATCH`: that is written anew before each use.
+The functions walk over the objects' attributes, so that a snapshot includes every new field of a method. The method's
+configuration, models and `settings` are left out, and so are the attributes that its class lists as `SCRATCH`, which
+are overwritten before each use.
 """
 
 from __future__ import annotations

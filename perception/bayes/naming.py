@@ -100,7 +100,7 @@ def report_circles(tracks: CircleTracks, reported: Records[Reported], sure: Ints
     tracks : (n,) CircleTrack
         The circles.
     reported : (n,) Reported
-        What each was last reported as; updated.
+        The values each was last reported with; updated.
     sure : (≥ n,) int
         Out.
     """

@@ -20,7 +20,7 @@ from perception.records import column
 SAME_M: Final = 1e-9
 """Radii nearer than this are one."""
 CHANGED_UNSEEN: Final = 4
-"""A track whose radius becomes a model's own counts so many readings as unseen, so that it is refined."""
+"""Unseen readings added to a track whose radius becomes a model's own, so that it is refined."""
 
 
 def radii_of(p: SettingsRecord) -> Floats:

@@ -19,9 +19,9 @@ from perception.kernel import kernel
 
 UNSURE_FACTOR: Final = 4.0
 UNSURE_ROOT_M: Final = 0.03 * FOOT_M
-"""Evidence counts so many times where an object's place is less sure than this, maybe altogether wrong, …"""
+"""Factor on the evidence of an object whose position is less certain than this, and perhaps wrong, …"""
 CERTAIN: Final = 0.95
-"""… or where it is less probable than this."""
+"""… or of an object less probable than this."""
 SIZE: Final = 8.0
 """Readings added to an object's count, so that an object with few is not refined at every reading."""
 FINAL_VALUE: Final = 1e-6
@@ -36,7 +36,7 @@ OVERDUE: Final = 1e9
 def unseen_evidence(track: AnyTrack, idle_firings: int, threshold: float, weight: float) -> float:
     """Return the unseen readings of a track relative to its size, times `weight`.
 
-    A track without evidence for a while is refined to the end: whatever is unseen, and a few rounds more.
+    An idle track is refined until no reading is unseen, and a few times more.
 
     Parameters
     ----------
