@@ -6,17 +6,31 @@ import math
 from bisect import bisect_right
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from config.settings import Settings
 from config.world import WorldConfig
 from drivers.messages import Floats, LinkCounts, Odometry, Pose
 from perception.detected_object import DetectedObject
 
-T, SENSOR, X, Y, BEARING, RANGE, ROBOT_T = range(7)
-"""Columns of `Timeline.echoes`."""
+ECHO: Final = np.dtype(
+    [
+        ("t_s", np.float64),
+        ("sensor", np.int64),
+        ("x", np.float64),
+        ("y", np.float64),
+        ("bearing", np.float64),
+        ("range_m", np.float64),
+        ("robot_s", np.float64),
+    ]
+)
+"""A reading: time (s), sensor, its position (m) and bearing (rad), range (m, inf without an echo), and the time of
+the firing by the robot's clock (s)."""
+Echoes: TypeAlias = NDArray[np.void]
+"""Structured array (n,) of `ECHO`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,9 +107,8 @@ class Timeline:
     """Number of cycles, or of firings in a ring log."""
     cycle_unix: list[tuple[float, int]] = field(default_factory=list)
     """Time (s) and Unix time (ns) of each cycle; empty for a ring log. They differ by more after a pause."""
-    echoes: Floats = field(default_factory=_no_rows)
-    """(n, 7): t (s), sensor, position of the sensor x, y (m), its bearing (rad), range (m, inf without an echo), and
-    the time of the firing by the robot's clock (s)."""
+    echoes: Echoes = field(default_factory=lambda: np.empty(0, ECHO))
+    """Every reading of the run."""
     odometry: list[tuple[float, Odometry]] = field(default_factory=list)
     """At most ten a second."""
     snapshots: list[RunSnapshot] = field(default_factory=list)

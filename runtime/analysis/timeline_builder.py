@@ -15,7 +15,7 @@ from drivers.messages import Firing, Floats, Odometry, Pose
 from perception.paper.paper_method import PaperPerception
 from perception.pipeline import Perception
 from perception.sensor_mounts import mounts_array
-from runtime.analysis.timeline import Cluster, RunSnapshot, Timeline
+from runtime.analysis.timeline import ECHO, Cluster, Echoes, RunSnapshot, Timeline
 
 SNAPSHOTS_MAX: Final = 240
 """Snapshots kept. At this number every second one is dropped and the interval doubles."""
@@ -40,7 +40,7 @@ class TimelineBuilder:
         self._mounts = mounts_array(settings.ring.mounts)
         self._interval_s = FIRST_INTERVAL_S
         self._next_s = 0.0
-        self._rows: list[Floats] = []
+        self._rows: list[Echoes] = []
         self._row_count = 0
         self._segments: dict[bytes, tuple[float, float, Floats]] = {}
         self._pose: Pose | None = None
@@ -64,12 +64,11 @@ class TimelineBuilder:
         c, s = math.cos(firing.ring_yaw), math.sin(firing.ring_yaw)
         fired = np.flatnonzero(~np.isnan(firing.ranges_m))
         mounts = self._mounts[fired]
-        rows = np.empty((len(fired), 7))
-        rows[:, 0], rows[:, 1] = t_s, fired
-        rows[:, 2] = firing.pose.x + c * mounts[:, 0] - s * mounts[:, 1]
-        rows[:, 3] = firing.pose.y + s * mounts[:, 0] + c * mounts[:, 1]
-        rows[:, 4] = firing.ring_yaw + mounts[:, 2]
-        rows[:, 5], rows[:, 6] = firing.ranges_m[fired], firing.robot_s
+        rows = np.empty(len(fired), ECHO)
+        rows["t_s"], rows["sensor"], rows["robot_s"] = t_s, fired, firing.robot_s
+        rows["x"] = firing.pose.x + c * mounts[:, 0] - s * mounts[:, 1]
+        rows["y"] = firing.pose.y + s * mounts[:, 0] + c * mounts[:, 1]
+        rows["bearing"], rows["range_m"] = firing.ring_yaw + mounts[:, 2], firing.ranges_m[fired]
         self._rows.append(rows)
         self._row_count += len(rows)
         self._front.observe(firing)

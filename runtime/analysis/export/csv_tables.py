@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from runtime.analysis.timeline import BEARING, RANGE, ROBOT_T, SENSOR, T, Timeline, X, Y
+from runtime.analysis.timeline import Timeline
 
 Table: TypeAlias = Mapping[str, Sequence[Any]]
 """Columns by name, all of the same length. None means unknown."""
@@ -31,19 +31,19 @@ def tables(timeline: Timeline) -> dict[str, Table]:
 def _echoes(timeline: Timeline) -> Table:
     """Return one row for each sensor that fired; `heard` is whether it received an echo."""
     rows = timeline.echoes
-    heard = np.isfinite(rows[:, RANGE])
-    reach = np.where(heard, rows[:, RANGE], np.nan)
+    heard = np.isfinite(rows["range_m"])
+    reach = np.where(heard, rows["range_m"], np.nan)
     return {
-        "t_s": rows[:, T].tolist(),
-        "robot_t_s": rows[:, ROBOT_T].tolist(),
-        "sensor": rows[:, SENSOR].astype(int).tolist(),
-        "sensor_x_m": rows[:, X].tolist(),
-        "sensor_y_m": rows[:, Y].tolist(),
-        "bearing_rad": rows[:, BEARING].tolist(),
+        "t_s": rows["t_s"].tolist(),
+        "robot_t_s": rows["robot_s"].tolist(),
+        "sensor": rows["sensor"].astype(int).tolist(),
+        "sensor_x_m": rows["x"].tolist(),
+        "sensor_y_m": rows["y"].tolist(),
+        "bearing_rad": rows["bearing"].tolist(),
         "heard": heard.tolist(),
         "range_m": _known(reach.tolist()),
-        "echo_x_m": _known((rows[:, X] + reach * np.cos(rows[:, BEARING])).tolist()),
-        "echo_y_m": _known((rows[:, Y] + reach * np.sin(rows[:, BEARING])).tolist()),
+        "echo_x_m": _known((rows["x"] + reach * np.cos(rows["bearing"])).tolist()),
+        "echo_y_m": _known((rows["y"] + reach * np.sin(rows["bearing"])).tolist()),
     }
 
 

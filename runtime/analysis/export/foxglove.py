@@ -31,7 +31,7 @@ from runtime.analysis.export.shapes import (
     yaw_quaternion,
 )
 from runtime.analysis.plots.geometry import outline, world_outlines
-from runtime.analysis.timeline import BEARING, RANGE, LogEntry, RunSnapshot, Timeline, X, Y
+from runtime.analysis.timeline import LogEntry, RunSnapshot, Timeline
 
 ARC_POINTS: Final = 9
 LINE_PX: Final = 2.0
@@ -151,10 +151,10 @@ class _RunExporter:
             self._ring.log(message, log_time=at)
             return
         half = math.radians(ring.beam_half_angle_deg)
-        for row in scan.rows.tolist():
+        for row in scan.rows:
             message = fx.LaserScan(
-                timestamp=_stamp(at), frame_id="odom", pose=_placed(row[X], row[Y], row[BEARING]),
-                start_angle=-half, end_angle=half, ranges=[row[RANGE]] * ARC_POINTS,
+                timestamp=_stamp(at), frame_id="odom", pose=_placed(row["x"], row["y"], row["bearing"]),
+                start_angle=-half, end_angle=half, ranges=[row["range_m"]] * ARC_POINTS,
             )  # fmt: skip
             self._ring.log(message, log_time=at)
 

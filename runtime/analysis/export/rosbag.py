@@ -29,7 +29,7 @@ from runtime.analysis.export.shapes import (
     yaw_quaternion,
 )
 from runtime.analysis.plots.geometry import outline, world_outlines
-from runtime.analysis.timeline import RANGE, SENSOR, RunSnapshot, Timeline
+from runtime.analysis.timeline import RunSnapshot, Timeline
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Msg, Msgarg
@@ -153,12 +153,12 @@ class _RunExporter:
         ring = self._timeline.settings.ring
         self._frames("/tf", [("odom", "ring", Pose(scan.x, scan.y, scan.yaw))], at)
         for row in scan.rows:
-            name = f"s{int(row[SENSOR]):02d}"
+            name = f"s{int(row['sensor']):02d}"
             # Without an echo the range is inf, as REP 117 defines.
             message = self._make(
                 "sensor_msgs/msg/Range", header=self._header(f"sonar_{name[1:]}", at), radiation_type=0,
                 field_of_view=2.0 * math.radians(ring.beam_half_angle_deg), min_range=ring.range_min_m,
-                max_range=ring.range_max_m, range=float(row[RANGE]), variance=0.0,
+                max_range=ring.range_max_m, range=float(row["range_m"]), variance=0.0,
             )  # fmt: skip
             self._write(f"/sonar/{name}", "sensor_msgs/msg/Range", message, at)
 

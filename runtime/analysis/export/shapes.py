@@ -10,8 +10,7 @@ from typing import Final
 import numpy as np
 
 from config.robot import RingConfig
-from drivers.messages import Floats
-from runtime.analysis.timeline import BEARING, RANGE, ROBOT_T, SENSOR, T, Timeline, X, Y
+from runtime.analysis.timeline import Echoes, Timeline
 
 HEIGHT_M = 0.9
 """Height of what is drawn upright, m: that of a drum."""
@@ -42,8 +41,8 @@ class FiringScan:
     y: float
     yaw: float
     """Pose of the ring."""
-    rows: Floats
-    """The rows of `Timeline.echoes`."""
+    rows: Echoes
+    """Its part of `Timeline.echoes`."""
 
 
 def firing_scans(timeline: Timeline) -> Iterator[FiringScan]:
@@ -51,14 +50,14 @@ def firing_scans(timeline: Timeline) -> Iterator[FiringScan]:
     rows, mounts = timeline.echoes, timeline.settings.ring.mounts
     if not len(rows):
         return
-    cuts = np.flatnonzero((np.diff(rows[:, ROBOT_T]) != 0.0) | (np.diff(rows[:, T]) != 0.0)) + 1
+    cuts = np.flatnonzero((np.diff(rows["robot_s"]) != 0.0) | (np.diff(rows["t_s"]) != 0.0)) + 1
     for part in np.split(rows, cuts):
         first = part[0]
-        mx, my, angle = mounts[int(first[SENSOR])]
-        yaw = float(first[BEARING]) - angle
+        mx, my, angle = mounts[int(first["sensor"])]
+        yaw = float(first["bearing"]) - angle
         c, s = math.cos(yaw), math.sin(yaw)
         yield FiringScan(
-            float(first[T]), float(first[X]) - c * mx + s * my, float(first[Y]) - s * mx - c * my, yaw, part
+            float(first["t_s"]), float(first["x"]) - c * mx + s * my, float(first["y"]) - s * mx - c * my, yaw, part
         )  # fmt: skip
 
 
@@ -87,6 +86,6 @@ def whole_ring(sensors: int, radius: float, scan: FiringScan) -> list[float]:
         The firing.
     """
     ranges = np.full(sensors, np.nan)
-    ranges[scan.rows[:, SENSOR].astype(int)] = scan.rows[:, RANGE] + radius
+    ranges[scan.rows["sensor"].astype(int)] = scan.rows["range_m"] + radius
     ranges_list: list[float] = ranges.tolist()
     return ranges_list

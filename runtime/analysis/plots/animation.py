@@ -23,7 +23,7 @@ from PIL import Image
 from runtime.analysis.plots.layers import draw_arcs, draw_clusters, draw_objects, draw_path, draw_segments, draw_world
 from runtime.analysis.plots.paper_figures import Canvas, legend
 from runtime.analysis.plots.plot_style import MUTED
-from runtime.analysis.timeline import RANGE, RunSnapshot, Timeline
+from runtime.analysis.timeline import RunSnapshot, Timeline
 from runtime.support.length_format import Units
 
 FRAMES_MAX: Final = 72
@@ -88,7 +88,7 @@ def _title(axes: Axes, snapshot: RunSnapshot | None, timeline: Timeline) -> None
 def _draw(axes: Axes, timeline: Timeline, snapshot: RunSnapshot, canvas: Canvas) -> list[Line2D]:
     settings, frame = timeline.settings, canvas.frame
     newest = timeline.echoes[max(0, snapshot.echoes - ECHOES_SHOWN) : snapshot.echoes]
-    newest = newest[np.isfinite(newest[:, RANGE])]
+    newest = newest[np.isfinite(newest["range_m"])]
     poses = [m.pose for m in timeline.snapshots if m.t_s <= snapshot.t_s]
     return [
         *draw_arcs(axes, newest, math.radians(settings.ring.beam_half_angle_deg), frame),

@@ -12,7 +12,7 @@ from config.model import ModelConfig
 from config.world import WorldConfig
 from drivers.messages import Floats, Pose
 from perception.detected_object import DetectedObject
-from runtime.analysis.timeline import BEARING, RANGE, Timeline, X, Y
+from runtime.analysis.timeline import Echoes, Timeline
 from runtime.simulation.evaluation import CHI2_95
 
 MARGIN_M: Final = 0.45
@@ -38,7 +38,7 @@ class Frame:
         return scaled
 
 
-def arcs(echoes: Floats, half_angle: float) -> Floats:
+def arcs(echoes: Echoes, half_angle: float) -> Floats:
     """Return the arc of each echo as one cubic Bézier curve: control points of shape (n, 4, 2), m.
 
     With handles of 4/3 tan(φ/4) radii, φ the whole angle (the standard approximation of a circular arc by one cubic),
@@ -46,19 +46,19 @@ def arcs(echoes: Floats, half_angle: float) -> Floats:
 
     Parameters
     ----------
-    echoes : array (n, 7)
-        Rows of `Timeline.echoes`, with finite ranges.
+    echoes : structured array (n,)
+        Of `Timeline.echoes`, with finite ranges.
     half_angle : float
         Of the beam, rad.
     """
-    radius, bearing = echoes[:, RANGE, None], echoes[:, BEARING, None]
+    radius, bearing = echoes["range_m"][:, None], echoes["bearing"][:, None]
     handle = 4.0 / 3.0 * math.tan(half_angle / 2.0)
     ends = bearing + half_angle * np.array([-1.0, 1.0])
     out = np.stack([np.cos(ends), np.sin(ends)], axis=-1)
     along = np.stack([-np.sin(ends), np.cos(ends)], axis=-1)
     first, last = out[:, 0], out[:, 1]
     unit = np.stack([first, first + handle * along[:, 0], last - handle * along[:, 1], last], axis=1)
-    placed: Floats = echoes[:, None, (X, Y)] + radius[:, :, None] * unit
+    placed: Floats = np.column_stack([echoes["x"], echoes["y"]])[:, None] + radius[:, :, None] * unit
     return placed
 
 

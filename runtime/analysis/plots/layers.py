@@ -21,7 +21,7 @@ from drivers.messages import Floats, Pose
 from perception.detected_object import DetectedObject
 from runtime.analysis.plots.geometry import Frame, arcs, ellipse, outline, rotated, world_outlines
 from runtime.analysis.plots.plot_style import CLUSTER, ECHO, INK, MODEL, MUTED, PAPER, ROBOT, SEGMENT, TRUTH
-from runtime.analysis.timeline import RANGE, BookmarkEntry, Cluster, Timeline
+from runtime.analysis.timeline import BookmarkEntry, Cluster, Echoes, Timeline
 from runtime.simulation.evaluation import nearest_pairs
 from runtime.support.length_format import Units, format_length
 
@@ -108,21 +108,22 @@ def draw_bookmarks(axes: Axes, bookmarks: Sequence[BookmarkEntry], frame: Frame)
     return [Line2D([], [], label="bookmark", **style)] if placed else []
 
 
-def received_echoes(echoes: Floats) -> Floats:
+def received_echoes(echoes: Echoes) -> Echoes:
     """Return the rows of echoes with a finite range, thinned evenly to at most `ARCS_MAX`."""
-    back = echoes[np.isfinite(echoes[:, RANGE])]
-    return back[:: max(1, math.ceil(len(back) / ARCS_MAX))]
+    back: Echoes = echoes[np.isfinite(echoes["range_m"])]
+    thinned: Echoes = back[:: max(1, math.ceil(len(back) / ARCS_MAX))]
+    return thinned
 
 
-def draw_arcs(axes: Axes, echoes: Floats, half_angle: float, frame: Frame) -> list[Line2D]:
+def draw_arcs(axes: Axes, echoes: Echoes, half_angle: float, frame: Frame) -> list[Line2D]:
     """Draw each echo as the arc on which its reflection may lie.
 
     Parameters
     ----------
     axes : Axes
         Drawn into.
-    echoes : array (n, 7)
-        Rows of `Timeline.echoes`, with finite ranges.
+    echoes : structured array (n,)
+        Of `Timeline.echoes`, with finite ranges.
     half_angle : float
         Of the beam, rad.
     frame : Frame

@@ -25,7 +25,7 @@ from runtime.analysis.plots.layers import (
     received_echoes,
 )
 from runtime.analysis.plots.plot_style import MUTED, WIDTH_IN
-from runtime.analysis.timeline import RANGE, Timeline
+from runtime.analysis.timeline import Timeline
 from runtime.support.length_format import Units
 
 HEIGHT_MIN_IN, HEIGHT_MAX_IN = 3.0, 8.5
@@ -78,7 +78,7 @@ def pictures(timeline: Timeline, units: Units) -> dict[str, Figure]:
     half = math.radians(timeline.settings.ring.beam_half_angle_deg)
     least = timeline.settings.perception.clusters.segments_min
     arcs_shown = received_echoes(timeline.echoes)
-    count, shown = int((timeline.echoes[:, RANGE] < math.inf).sum()), len(arcs_shown)
+    count, shown = int((timeline.echoes["range_m"] < math.inf).sum()), len(arcs_shown)
     few = f", {shown:,} of them drawn" if shown < count else ""
     method = "the Bayesian method" if timeline.settings.perception.method == "bayes" else "relaxation"
     frame = canvas.frame

@@ -20,7 +20,7 @@ from runtime.analysis.plots.run_history import history_figure
 from runtime.analysis.report.html_parts import note, section, settings_list, table, tile
 from runtime.analysis.report.inline_svg import inlined
 from runtime.analysis.report.stylesheet import CSS
-from runtime.analysis.timeline import RANGE, Timeline
+from runtime.analysis.timeline import Timeline
 from runtime.simulation.evaluation import DrumRow
 from runtime.simulation.open_loop import BoxRow, match_objects
 from runtime.support.length_format import Units, format_length, format_point
@@ -86,7 +86,7 @@ def _head(timeline: Timeline, units: Units) -> str:
             tiles.append(tile(f"{format_length(max(errors), units, 3)} {units}", "worst error"))
     else:
         tiles.append(tile(str(len(timeline.objects)), "objects recognised"))
-    back = int(np.isfinite(timeline.echoes[:, RANGE]).sum())
+    back = int(np.isfinite(timeline.echoes["range_m"]).sum())
     tiles.append(tile(f"{back:,}", f"echoes of {len(timeline.echoes):,} readings"))
     tiles.append(tile(f"{timeline.cycles:,}", "cycles" if timeline.modes else "firings"))
     tiles.append(tile(f"{timeline.seconds:.1f} s", "duration"))

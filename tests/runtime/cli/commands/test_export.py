@@ -44,10 +44,10 @@ def test_csv(hall_run: Path, timeline: Timeline, tmp_path: Path) -> None:
             read[path.stem] = list(csv.DictReader(file))
     assert set(read) == TABLES
     assert len(read["echoes"]) == len(timeline.echoes)
-    for row, kept in zip(read["echoes"], timeline.echoes.tolist(), strict=True):
-        assert float(row["bearing_rad"]) == kept[4], "every digit"
-        assert row["heard"] == str(math.isfinite(kept[5]))
-        assert row["range_m"] == (str(kept[5]) if math.isfinite(kept[5]) else "")
+    for row, kept in zip(read["echoes"], timeline.echoes, strict=True):
+        assert float(row["bearing_rad"]) == kept["bearing"], "every digit"
+        assert row["heard"] == str(math.isfinite(kept["range_m"]))
+        assert row["range_m"] == (str(float(kept["range_m"])) if math.isfinite(kept["range_m"]) else "")
     last = [row for row in read["objects"] if float(row["t_s"]) == timeline.seconds]
     assert [(r["model"], float(r["x_m"]), float(r["y_m"])) for r in last] == [
         (o.model, o.x, o.y) for o in timeline.objects
@@ -64,8 +64,8 @@ def test_parquet(hall_run: Path, timeline: Timeline, tmp_path: Path) -> None:
     assert set(read) == TABLES
     echoes = read["echoes"]
     assert b"metres" in echoes.schema.metadata[b"echolocate"]
-    assert echoes["sensor"].to_pylist() == timeline.echoes[:, 1].astype(int).tolist()
-    assert echoes["range_m"].null_count == int(np.isinf(timeline.echoes[:, 5]).sum())
+    assert echoes["sensor"].to_pylist() == timeline.echoes["sensor"].tolist()
+    assert echoes["range_m"].null_count == int(np.isinf(timeline.echoes["range_m"]).sum())
     assert read["objects"]["x_m"].to_pylist()[-1] == timeline.objects[-1].x
     assert read["segments"].num_rows == len(timeline.segments) > 50
 
@@ -110,7 +110,9 @@ def test_foxglove(hall_run: Path, timeline: Timeline, tmp_path: Path) -> None:
     scan = newest["/ring"]
     assert len(scan.ranges) == 24
     fired = [i for i, r in enumerate(scan.ranges) if not math.isnan(r)]
-    assert fired == sorted(int(row[1]) for row in timeline.echoes if row[6] == timeline.echoes[-1, 6])
+    assert fired == sorted(
+        int(row["sensor"]) for row in timeline.echoes if row["robot_s"] == timeline.echoes["robot_s"][-1]
+    )
 
 
 def test_a_scan_puts_echoes_where_they_were(timeline: Timeline) -> None:
@@ -154,9 +156,9 @@ def test_rosbag2(hall_run: Path, timeline: Timeline, tmp_path: Path, capsys: pyt
     assert sum(counts[topic] for topic in sonars) == len(timeline.echoes)
     assert kinds["/odom"] == "nav_msgs/msg/Odometry"
     assert kinds["/markers"] == "visualization_msgs/msg/MarkerArray"
-    sensor = int(timeline.echoes[-1, 1])
+    sensor = int(timeline.echoes["sensor"][-1])
     published = newest[f"/sonar/s{sensor:02d}"]
-    assert published.range == pytest.approx(timeline.echoes[-1, 5])
+    assert published.range == pytest.approx(timeline.echoes["range_m"][-1])
     assert published.header.frame_id == f"sonar_{sensor:02d}"
     assert published.field_of_view == pytest.approx(math.radians(24.0))
     odometry = timeline.odometry[-1][1]

@@ -17,7 +17,7 @@ from config.load import load_settings, load_world
 from config.units import FOOT_M
 from drivers.messages import Floats, Pose
 from runtime.analysis.plots.geometry import Frame, arcs, outline
-from runtime.analysis.timeline import Timeline
+from runtime.analysis.timeline import ECHO, Timeline
 from runtime.analysis.timeline_sources import TimelineSource, load_timeline
 from runtime.cli.app import run_command
 
@@ -107,7 +107,7 @@ def test_a_trace_holds_the_run(hall_run: Path) -> None:
     assert times == sorted(times)
     assert times[-1] == timeline.seconds
     assert len(timeline.objects) >= 3
-    heard = timeline.echoes[np.isfinite(timeline.echoes[:, 5])]
+    heard = timeline.echoes[np.isfinite(timeline.echoes["range_m"])]
     half = math.radians(timeline.settings.ring.beam_half_angle_deg)
     # Without noise every arc touches a drum: its distance to the nearest rim is within the rounding of a range.
     points = trace_frame(timeline).points(curve_points(arcs(heard, half)))
@@ -129,12 +129,12 @@ def curve_points(curves: Floats) -> Floats:
 
 
 def test_an_arc_is_an_arc() -> None:
-    echoes = np.array([[0.0, 0.0, 1.0, -2.0, 0.7, 3.0, 0.0], [0.0, 1.0, 0.0, 0.0, -2.0, 0.5, 0.0]])
+    echoes = np.array([(0.0, 0, 1.0, -2.0, 0.7, 3.0, 0.0), (0.0, 1, 0.0, 0.0, -2.0, 0.5, 0.0)], ECHO)
     points = curve_points(arcs(echoes, math.radians(12.0)))
     for row, curve in zip(echoes, points, strict=True):
-        away = curve - row[2:4]
-        assert np.allclose(np.hypot(*away.T), row[5], rtol=2e-6)
-        turn = np.remainder(np.arctan2(away[:, 1], away[:, 0]) - row[4] + math.pi, 2 * math.pi) - math.pi
+        away = curve - (row["x"], row["y"])
+        assert np.allclose(np.hypot(*away.T), row["range_m"], rtol=2e-6)
+        turn = np.remainder(np.arctan2(away[:, 1], away[:, 0]) - row["bearing"] + math.pi, 2 * math.pi) - math.pi
         assert turn.min() == pytest.approx(-math.radians(12.0))
         assert turn.max() == pytest.approx(math.radians(12.0))
 
