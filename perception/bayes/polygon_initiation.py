@@ -27,7 +27,7 @@ from perception.bayes.scratch import POLYGON
 from perception.bayes.segment_pairs import segments_near
 from perception.bayes.state import ESTABLISHED, FREE, TENTATIVE, PolygonTrack, StateRecord
 from perception.bayes.track_initiation import CELL_M, enter_attracting, free_track, relax_hypothesis
-from perception.bayes.track_labels import assign_number, is_rejected
+from perception.bayes.track_labels import assign_number, clear_track, is_rejected
 from perception.kernel import kernel
 from perception.records import Records
 
@@ -189,19 +189,7 @@ def start_polygon(s: StateRecord, model: int, x: float, y: float, heading: float
 @kernel
 def reset_polygon(track: PolygonTrack) -> None:
     """Set a polygon track to zero, except its number, its marks and the readings beyond the counts of its bins."""
-    track.status = FREE
-    track.unseen = 0
-    track.reservoir = 0
-    track.refinements = 0
-    track.idle_firings = 0
-    track.final_refinements = 0
-    track.passed_over = 0
-    track.x = 0.0
-    track.y = 0.0
-    track.log_likelihood_ratio = 0.0
-    track.hits = 0.0
-    track.near = 0.0
-    track.probability = 0.0
+    clear_track(track)
     track.model = 0
     track.has_challenger = 0
     track.heading = 0.0
@@ -215,8 +203,6 @@ def reset_polygon(track: PolygonTrack) -> None:
     track.challenger.x = 0.0
     track.challenger.y = 0.0
     track.challenger.heading = 0.0
-    for b in range(len(track.bins)):
-        track.bins[b].count = 0
 
 
 @kernel

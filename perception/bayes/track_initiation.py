@@ -20,7 +20,7 @@ from perception.bayes.range_fit import fit_circle
 from perception.bayes.reservoir import gather_history, keep_reading
 from perception.bayes.segment_pairs import segments_near
 from perception.bayes.state import FREE, TENTATIVE, AnyTrack, CircleTrack, CircleTracks, StateRecord
-from perception.bayes.track_labels import assign_number, is_rejected
+from perception.bayes.track_labels import assign_number, clear_track, is_rejected
 from perception.bayes.walls import add_line
 from perception.kernel import Floats, kernel
 from perception.records import Records
@@ -170,19 +170,7 @@ def relax_onto_map(s: StateRecord, p: SettingsRecord, kind: int) -> None:
 @kernel
 def reset_circle(track: CircleTrack) -> None:
     """Set a circle's track to zero, but for its number, its marks and the readings beyond the counts of its bins."""
-    track.status = FREE
-    track.unseen = 0
-    track.reservoir = 0
-    track.refinements = 0
-    track.idle_firings = 0
-    track.final_refinements = 0
-    track.passed_over = 0
-    track.x = 0.0
-    track.y = 0.0
-    track.log_likelihood_ratio = 0.0
-    track.hits = 0.0
-    track.near = 0.0
-    track.probability = 0.0
+    clear_track(track)
     track.kind = 0
     track.alternative = 0
     track.is_named = 0
@@ -198,8 +186,6 @@ def reset_circle(track: CircleTrack) -> None:
     track.unknown_nat = 0.0
     track.leads[:] = 0.0
     track.noise_nat[:] = 0.0
-    for b in range(len(track.bins)):
-        track.bins[b].count = 0
 
 
 @kernel

@@ -23,6 +23,26 @@ def assign_number(s: StateRecord, track: AnyTrack) -> None:
 
 
 @kernel
+def clear_track(track: AnyTrack) -> None:
+    """Set what all tracks have in common to zero, except number, marks and the readings in the bins."""
+    track.status = FREE
+    track.unseen = 0
+    track.reservoir = 0
+    track.refinements = 0
+    track.idle_firings = 0
+    track.final_refinements = 0
+    track.passed_over = 0
+    track.x = 0.0
+    track.y = 0.0
+    track.log_likelihood_ratio = 0.0
+    track.hits = 0.0
+    track.near = 0.0
+    track.probability = 0.0
+    for b in range(len(track.bins)):
+        track.bins[b].count = 0
+
+
+@kernel
 def drop_track(track: AnyTrack) -> bool:
     """Free a track, or make it tentative where a user marked it; return whether it was freed."""
     if track.marks == 0:
