@@ -49,8 +49,8 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         ),
         "P3": Promise(
             "No bad command leaves",
-            "10⁶ random schema outputs with NaN, ±Inf, 1e308: not one non-finite or over-limit DRIVE; a missing axis "
-            "is Stop(reason)",
+            "40,000 random schema outputs (soak: 10⁶) with NaN, ±Inf, 1e308: no non-finite or over-limit DRIVE; a "
+            "missing axis is Stop(reason)",
         ),
         "P4": Promise(
             "The decoder is total",
@@ -90,7 +90,7 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         "P11": Promise(
             "Configuration cannot half-apply",
             "every field × {missing, wrong type, low, high, typo}: message with path, value, range, nearest name; "
-            "10⁴ random live reloads are atomic, the last good one kept; restart-only fields say so",
+            "1,000 random live reloads (soak: 10⁴) are atomic, the last valid one kept; restart-only fields say so",
         ),
         "P12": Promise(
             "Disk trouble stays on disk",
@@ -104,7 +104,7 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         ),
         "P14": Promise(
             "Input files cannot do harm",
-            "10⁵ mutated ring logs, worlds, models, robot files (here a share of them, in `make soak` all): clear "
+            "2,000 mutated ring logs, worlds, models, robot files (soak: 10⁵): clear "
             "error or right result, no traceback, no hang, memory ≤ 500 MB",
         ),
         "P15": Promise(

@@ -1,7 +1,6 @@
-"""A world just large enough to drive the schemas in: discs and walls, ideal echoes, a base with limited acceleration.
+"""A simple simulator for the motor schemas: discs and walls, ideal echoes, a base with limited acceleration.
 
-Naive on purpose and its own code throughout: it shares nothing with the emulator, so neither can hide the other's
-mistakes.
+It shares no code with the emulator, so that neither can hide a mistake of the other.
 """
 
 from __future__ import annotations
@@ -20,9 +19,13 @@ from perception.percept import Percept, Pose
 
 SENSORS = 24
 HALF_BEAM_RAD = math.radians(12.0)
+RANGE_MAX_M = 7.77
 STEP_S = 0.05
 FOOT = 0.3048
 BODY = BodyConfig(radius_m=1.25 * FOOT, speed_max_m_s=0.6, turn_max_rad_s=1.5, synchro=True)
+
+CONE = (-HALF_BEAM_RAD, -0.5 * HALF_BEAM_RAD, 0.0, 0.5 * HALF_BEAM_RAD, HALF_BEAM_RAD)
+"""Directions of the rays of a cone, rad from its axis."""
 
 Disc = tuple[float, float, float]
 Wall = tuple[float, float, float, float]
@@ -36,7 +39,7 @@ class World:
     walls: tuple[Wall, ...] = ()
 
     def clearance(self, x: float, y: float) -> float:
-        """Distance from a point to the nearest surface."""
+        """Return the distance from a point to the nearest surface, m."""
         gaps = [math.hypot(x - cx, y - cy) - r for cx, cy, r in self.discs]
         for x1, y1, x2, y2 in self.walls:
             share = ((x - x1) * (x2 - x1) + (y - y1) * (y2 - y1)) / ((x2 - x1) ** 2 + (y2 - y1) ** 2)
@@ -45,24 +48,29 @@ class World:
         return min(gaps, default=math.inf)
 
     def ray(self, x: float, y: float, angle: float) -> float:
-        """Distance along a ray to the first surface, found by marching as far as is free each time."""
-        far, c, s = 0.0, math.cos(angle), math.sin(angle)
-        while far < 7.77:
-            free = self.clearance(x + far * c, y + far * s)
-            if free < 1e-3:
-                return far
-            far += free
-        return math.inf
+        """Return the distance along a ray to the first surface within the ring's range, or infinity."""
+        c, s = math.cos(angle), math.sin(angle)
+        found = []
+        for cx, cy, r in self.discs:
+            ahead, aside = c * (cx - x) + s * (cy - y), c * (cy - y) - s * (cx - x)
+            if abs(aside) < r:
+                found.append(ahead - math.sqrt(r * r - aside * aside))
+        for x1, y1, x2, y2 in self.walls:
+            across = c * (y2 - y1) - s * (x2 - x1)
+            if across != 0.0:
+                share = (s * (x1 - x) - c * (y1 - y)) / across
+                if 0.0 <= share <= 1.0:
+                    found.append(c * (x1 + share * (x2 - x1) - x) + s * (y1 + share * (y2 - y1) - y))
+        return min((far for far in found if 0.0 <= far < RANGE_MAX_M), default=math.inf)
 
     def echo(self, x: float, y: float, angle: float, *, wide: bool) -> float:
-        """Range of a pencil beam, or of a cone: the nearest of five rays across it."""
-        spread = np.linspace(-HALF_BEAM_RAD, HALF_BEAM_RAD, 5) if wide else np.zeros(1)
-        return min(self.ray(x, y, angle + float(off)) for off in spread)
+        """Return the range of a pencil beam, or of a cone: the nearest of five rays across it."""
+        return min(self.ray(x, y, angle + off) for off in (CONE if wide else (0.0,)))
 
 
 @dataclass
 class Run:
-    """What a drive came to."""
+    """The result of a drive."""
 
     clearance: float = math.inf
     """Least distance between the rim and any surface."""
@@ -79,7 +87,7 @@ def drive(
     wide: bool = False,
     noise: np.random.Generator | None = None,
 ) -> Run:
-    """Drive with both schemas for that long; 24 echoes of this very moment each step, the ring not turning."""
+    """Drive with both schemas; in each step the ring, which does not turn, gives 24 echoes at once."""
     run, pose, v, w = Run(), start, 0.0, 0.0
     leg = ahead.Leg.starting_at(start)
     for _ in range(round(seconds / STEP_S)):
@@ -101,7 +109,7 @@ def drive(
 
 
 def echoes(world: World, pose: Pose, *, wide: bool, noise: np.random.Generator | None) -> np.ndarray:
-    """The points the ring hears, each on its sensor's axis; with noise, rounded to a tenth of a foot as well."""
+    """Return the echoes as points on the sensors' axes; with noise, ranges are also rounded to a tenth of a foot."""
     points = []
     for i in range(SENSORS):
         angle = 2.0 * math.pi * i / SENSORS
@@ -119,6 +127,6 @@ def clamp(value: float, limit: float) -> float:
 
 
 def hallway(shifts: tuple[tuple[float, float], ...] = ((0.0, 0.0),) * 6) -> World:
-    """The paper's two rows of three drums, each moved by a shift in metres."""
+    """Return the paper's two rows of three drums, each moved by a shift, m."""
     places = [(x * FOOT, y * FOOT) for y in (4.0, -4.0) for x in (1.0, 4.0, 7.0)]
     return World(tuple((x + dx, y + dy, FOOT) for (x, y), (dx, dy) in zip(places, shifts, strict=True)))

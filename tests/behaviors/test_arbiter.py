@@ -1,4 +1,4 @@
-"""The arbiter: what it makes of sums, and that nothing whatever makes it answer outside the base's limits."""
+"""The arbiter: velocities from sums of responses, reasons for stops, and the limits of the base for any input."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from behaviors.arbiter import Drive, Stop, arbitrate
-from behaviors.clearance import free_path_m, stoppable_speed_m_s
 from behaviors.response import Response
 from config.robot import BodyConfig
 from config.settings import ArbiterConfig
@@ -83,7 +82,7 @@ def test_cautious_velocity_above_base_velocity_does_not_hurry_turns() -> None:
 
 
 @pytest.mark.parametrize("vectors", [((0.0, 0.0),), ((1.0, 0.0), (-1.0, 0.0)), ((1.0, 0.0), (-1.0, 0.0099)), ()])
-def test_balance_stands_still(vectors: tuple[tuple[float, float], ...]) -> None:
+def test_balanced_responses_stop(vectors: tuple[tuple[float, float], ...]) -> None:
     assert twist(decide(*vectors)) == Twist(0.0, 0.0)
 
 
@@ -95,14 +94,14 @@ def test_missing_schema_stops_and_names_it() -> None:
 
 
 @pytest.mark.parametrize("extra", ["move_ahead", "stranger"])
-def test_a_schema_too_many_stops_and_is_named(extra: str) -> None:
+def test_an_unexpected_response_stops_and_is_named(extra: str) -> None:
     given = [Response("move_ahead", 1.0, 0.0), Response(extra, 1.0, 0.0)]
     said = reason(arbitrate(given, at(), BODY, CONFIG, ["move_ahead"]))
     assert said.startswith(f"the schema {extra} answered without being asked")
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_a_vector_that_is_none_stops_and_is_named(bad: float) -> None:
+def test_a_non_finite_vector_stops_and_is_named(bad: float) -> None:
     assert "schema s1" in reason(decide((1.0, 0.0), (0.0, bad)))
     assert "schema s0" in reason(decide((bad, 0.0), (0.0, 1.0)))
 
@@ -111,7 +110,7 @@ def test_a_vector_that_is_none_stops_and_is_named(bad: float) -> None:
     ("bad", "shown"),
     [(None, "None"), ("ahead" * 9, "'" + "aheadaheadaheadahea"), (10**400, "1" + 19 * "0"), (math.nan, "nan")],
 )
-def test_what_is_no_number_at_all_stops_and_is_shown(bad: Any, shown: str) -> None:
+def test_a_value_that_is_not_a_float_stops_and_is_shown(bad: Any, shown: str) -> None:
     assert f"the schema s1 answered (0, {shown})," in reason(decide((1.0, 0.0), (0.0, bad)))
 
 
@@ -122,19 +121,19 @@ def test_vectors_too_large_to_add_stop() -> None:
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 @pytest.mark.parametrize("part", ["x", "y", "theta"])
-def test_a_pose_that_is_none_stops(bad: float, part: str) -> None:
+def test_a_non_finite_pose_stops(bad: float, part: str) -> None:
     values = {"x": 0.0, "y": 0.0, "theta": 0.0, part: bad}
     decision = decide((1.0, 0.0), percept=Percept(Pose(**values), np.empty((0, 2))))
     assert "pose" in reason(decision)
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_an_echo_that_is_no_point_stops_even_if_no_schema_minds(bad: float) -> None:
+def test_a_non_finite_echo_stops_even_if_no_schema_uses_it(bad: float) -> None:
     assert "echo" in reason(decide((1.0, 0.0), percept=at(0.0, (5.0, 0.0), (1.0, bad))))
 
 
-def test_stands_before_an_echo_ahead_and_slows_towards_it() -> None:
-    """Rim 0.4 and clearance 0.1: an echo 0.5 ahead leaves no way, one 0.625 leaves √(2·0.5·0.125) m/s."""
+def test_slows_and_stops_before_an_echo_ahead() -> None:
+    """Rim 0.4 m and clearance 0.1 m: an echo at 0.5 m leaves no path, one at 0.625 m allows √(2·0.5·0.125) m/s."""
     assert twist(decide((1.0, 0.0), percept=at(0.0, (0.5, 0.0)))) == Twist(0.0, 0.0)
     assert twist(decide((1.0, 0.0), percept=at(0.0, (0.3, 0.1)))).v == 0.0
     fast = ArbiterConfig(base_velocity_m_s=0.5, clearance_m=0.1)
@@ -142,44 +141,21 @@ def test_stands_before_an_echo_ahead_and_slows_towards_it() -> None:
     assert twist(decide((1.0, 0.0), percept=at(0.0, (-0.3, 0.0), (0.3, 0.51), (0.3, -0.51)))).v == 0.3
 
 
-def test_pushes_that_cancel_do_not_drive_it_into_what_is_ahead() -> None:
+def test_cancelling_pushes_do_not_drive_it_into_an_obstacle() -> None:
     decision = decide((1.0, 0.0), (-1e6, 0.0), (1e6, 0.0), percept=at(0.0, (0.45, 0.0), (-0.45, 0.0)))
     assert twist(decision).v == 0.0
 
 
-def test_may_turn_where_it_may_not_go() -> None:
+def test_may_turn_where_it_may_not_drive() -> None:
     got = twist(decide((0.8, 0.6), percept=at(0.0, (0.45, 0.0))))
     assert got.v == 0.0
     assert got.w == 1.0
 
 
-def naive_free_path(percept: Percept, reach: float) -> float:
-    """March the disc forward in millimetres until an echo that it approaches is inside."""
-    c, s = math.cos(percept.pose.theta), math.sin(percept.pose.theta)
-    for step in range(4000):
-        x, y = percept.pose.x + 0.001 * step * c, percept.pose.y + 0.001 * step * s
-        for ox, oy in percept.obstacles.tolist():
-            if math.hypot(ox - x, oy - y) < reach and (ox - percept.pose.x) * c + (oy - percept.pose.y) * s > 0.0:
-                return 0.001 * step
-    return math.inf
-
-
-def test_free_path_agrees_with_the_oracle() -> None:
-    rng = np.random.default_rng(97)
-    for _ in range(40):
-        x, y, theta = rng.uniform((-1.0, -1.0, -7.0), (1.0, 1.0, 7.0)).tolist()
-        pose = Pose(x, y, theta)
-        percept = Percept(pose, rng.uniform(-3.0, 3.0, (5, 2)))
-        slow = naive_free_path(percept, 0.5)
-        assert free_path_m(percept, 0.5) == (slow if slow == math.inf else pytest.approx(slow, abs=0.0011))
-    assert free_path_m(at(), 0.5) == math.inf
-    assert stoppable_speed_m_s(at(), BODY, 0.1) == math.inf
-
-
 def test_never_over_a_limit_never_nan() -> None:
-    """10⁵ decisions on vectors of every size, many of them broken: each is a Stop or inside all limits."""
+    """Decisions on vectors of every magnitude, many non-finite: each is a Stop or within all limits."""
     rng = np.random.default_rng(20)
-    n = 100_000
+    n = 5000
     sizes = 10.0 ** rng.uniform(-320.0, 308.0, (n, 2, 2)) * rng.choice([-1.0, 1.0], (n, 2, 2))
     special = rng.choice([0.0, -0.0, 1.0, 1e6, math.nan, math.inf, -math.inf, 1.7e308], (n, 2, 2))
     vectors = np.where(rng.random((n, 2, 2)) < 0.3, special, sizes)

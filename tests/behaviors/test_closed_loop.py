@@ -1,4 +1,4 @@
-"""Both schemas and the arbiter, with the settings that are shipped, driving in a small world of their own."""
+"""Closed loop: both schemas and the arbiter with the shipped settings drive in the simulator of `hall.py`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ IRREGULAR = 0.4 * FOOT
 
 
 def reaches_the_end(run: Run, within_s: float) -> None:
-    """Assert that the drive got through the hall untouched, and stood nowhere on the way once it was moving."""
+    """Assert that the drive reached the end of the hall without touching anything and without stopping."""
     assert run.clearance > 0.1
     through = next((i for i, pose in enumerate(run.path) if pose.x >= END_M), None)
     assert through is not None, f"still at {run.path[-1]}"
@@ -34,7 +34,7 @@ def test_straight_down_the_papers_hallway(wide: bool) -> None:
     assert run.clearance > 0.45
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_down_an_irregular_hallway_with_noise(seed: int) -> None:
     rng = np.random.default_rng(seed)
     shifts = tuple((float(dx), float(dy)) for dx, dy in rng.uniform(-IRREGULAR, IRREGULAR, (6, 2)))
@@ -49,7 +49,7 @@ def test_from_a_crooked_start(y: float, theta: float) -> None:
     assert abs(run.path[-1].y) < 0.1
 
 
-def test_round_two_drums_that_stand_in_the_way() -> None:
+def test_around_two_drums_in_the_way() -> None:
     world = World(((1.0, 0.25, FOOT), (3.0, -0.25, FOOT)))
     run = drive(world, START, SHIPPED, 40.0, wide=True)
     assert run.clearance > 0.1
@@ -58,7 +58,7 @@ def test_round_two_drums_that_stand_in_the_way() -> None:
 
 @pytest.mark.parametrize("noisy", [False, True])
 @pytest.mark.parametrize("speed", [0.3, 0.6])
-def test_head_on_at_a_wall_it_ends_before_it(noisy: bool, speed: float) -> None:
+def test_it_stops_before_a_wall_ahead(noisy: bool, speed: float) -> None:
     config = SHIPPED.model_copy(update={"arbiter": ArbiterConfig(base_velocity_m_s=speed)})
     world = World(walls=((2.0, -3.0, 2.0, 3.0),))
     run = drive(
@@ -70,7 +70,7 @@ def test_head_on_at_a_wall_it_ends_before_it(noisy: bool, speed: float) -> None:
         assert abs(run.speeds[-1]) < 0.02
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("summing", ["largest", "sum"])
 def test_touches_nothing_in_clutter(seed: int, summing: str) -> None:
     rng = np.random.default_rng(seed)
@@ -85,7 +85,7 @@ def test_touches_nothing_in_clutter(seed: int, summing: str) -> None:
     assert run.clearance > 0.1
 
 
-def test_there_and_back_again() -> None:
+def test_drives_back_and_forth() -> None:
     config = BehaviorsConfig(move_ahead=MoveAheadConfig(distance_m=2.0, at_end="turn_back"))
     run = drive(World(), Pose(0.0, 0.0, 0.0), config, 40.0)
     assert 2.0 < max(pose.x for pose in run.path) < 2.5
@@ -99,8 +99,8 @@ def test_stops_at_the_configured_distance() -> None:
     assert run.speeds[-1] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_the_least_range_a_ring_reports_is_inside_the_safety_margin() -> None:
-    """Something touching the rim reads as half a foot, or the step above it; the push must be at its full by then."""
+def test_the_least_range_of_the_ring_is_inside_the_safety_margin() -> None:
+    """An object at the rim reads as half a foot or one step more; the push must be unbounded there."""
     avoid, arbiter = AvoidStaticObstacleConfig(), ArbiterConfig()
     assert avoid.avoid_obstacle_safety_margin_m > 0.6 * FOOT
     assert arbiter.clearance_m > 0.5 * FOOT

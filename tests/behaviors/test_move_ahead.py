@@ -1,4 +1,4 @@
-"""Move-ahead: the vector, and the leg's life as a robot goes along it."""
+"""Move-ahead: its vector, and the end of a leg as the robot drives along it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_gain_along_the_direction_whatever_the_pose(
         assert leg == Leg(0.0, 0.0)
 
 
-def test_a_leg_without_end_goes_on() -> None:
+def test_an_unlimited_leg_continues() -> None:
     response, leg = move_ahead(at(1e9, 0.0), Leg(0.0, 0.0), MoveAheadConfig())
     assert (response.x, leg.done, leg.outbound) == (1.0, False, True)
 
@@ -57,7 +57,7 @@ def test_distance_counts_along_the_heading_only() -> None:
     assert (response.x, leg.done) == (1.0, False)
 
 
-def test_turns_back_and_out_again_for_as_long_as_it_is_asked() -> None:
+def test_drives_back_and_forth_until_it_is_stopped() -> None:
     config = MoveAheadConfig(distance_m=1.0, at_end="turn_back")
     leg, seen = Leg(2.0, 0.0), []
     for x in (2.0, 2.9, 3.0, 3.1, 2.5, 2.1, 2.0, 1.9, 2.5, 3.0, 2.5):

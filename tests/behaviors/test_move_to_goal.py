@@ -1,4 +1,4 @@
-"""move-to-goal: its magnitude by distance, that it arrives, and that it stays arrived."""
+"""Move-to-goal: its magnitude by distance, and that a reached goal stays reached."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def at(x: float, y: float, theta: float = 0.3) -> Percept:
 def test_magnitude_by_distance(distance: float, magnitude: float, bearing: float) -> None:
     goal = Goal(1.0 + distance * math.cos(bearing), -2.0 + distance * math.sin(bearing))
     reached = distance <= 0.1
-    # Rounding may put a goal that lies on the rim to either side of it.
+    # Rounding may put a goal on the success radius to either side of it.
     goal = Goal(1.0, -2.0) if distance == 0.0 else goal
     near = at(1.0 + 1e-9 * math.cos(bearing), -2.0 + 1e-9 * math.sin(bearing)) if reached else at(1.0, -2.0)
     response, after = move_to_goal(near, goal, CONFIG)
@@ -37,14 +37,14 @@ def test_magnitude_by_distance(distance: float, magnitude: float, bearing: float
     assert after == Goal(goal.x, goal.y, reached=reached)
 
 
-def test_reached_it_stays_reached() -> None:
+def test_a_reached_goal_stays_reached() -> None:
     _, goal = move_to_goal(at(0.0, 0.05), Goal(0.0, 0.0), CONFIG)
     response, later = move_to_goal(at(30.0, 40.0), goal, CONFIG)
     assert (response.x, response.y) == (0.0, 0.0)
     assert later is goal
 
 
-def test_a_pose_that_is_no_number_reaches_the_arbiter_as_such() -> None:
+def test_a_non_finite_pose_gives_a_non_finite_vector() -> None:
     response, goal = move_to_goal(at(math.nan, 0.0), Goal(1.0, 0.0), CONFIG)
     assert math.isnan(response.x)
     assert not goal.reached
