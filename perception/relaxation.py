@@ -59,10 +59,11 @@ def increment(
     total_turn = 0.0
     total_near = 0
     for i in range(sides.shape[0]):
-        cx = x + c * sides[i, 0] - s * sides[i, 1]
-        cy = y + s * sides[i, 0] + c * sides[i, 1]
-        direction = sides[i, 2] + theta
-        sphere = gamma * sides[i, 3]
+        middle_x, middle_y, side_direction, length = sides[i, 0], sides[i, 1], sides[i, 2], sides[i, 3]
+        cx = x + c * middle_x - s * middle_y
+        cy = y + s * middle_x + c * middle_y
+        direction = side_direction + theta
+        sphere = gamma * length
         weight = 0.0
         fx = 0.0
         fy = 0.0
@@ -70,13 +71,14 @@ def increment(
         near = 0
         for k in range(members.shape[0]):
             j = members[k]
-            nx = math.cos(segments[j, 4])
-            ny = math.sin(segments[j, 4])
-            offset = nx * (segments[j, 0] - cx) + ny * (segments[j, 1] - cy)
+            start_x, start_y, normal = segments[j, 0], segments[j, 1], segments[j, 4]
+            nx = math.cos(normal)
+            ny = math.sin(normal)
+            offset = nx * (start_x - cx) + ny * (start_y - cy)
             distance = abs(offset)
             if distance >= sphere:
                 continue
-            da = (segments[j, 4] + half_pi - direction) % math.pi
+            da = (normal + half_pi - direction) % math.pi
             if da > half_pi:
                 da -= math.pi
             pull = sphere - distance

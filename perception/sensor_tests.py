@@ -198,7 +198,7 @@ def is_stuck(
         changes, _, _ = neighbour_counts(i, neighbours, sensors, True)  # noqa: FBT003 - kernels take no keywords
         stuck = changes >= NEIGHBOUR_CHANGES_MIN
     if not stuck and math.hypot(dx, dy) >= PASSED_MIN_M and c.run_length >= PASSED_READINGS_MIN:
-        changes, leaps, _ = neighbour_counts(i, neighbours, sensors, False)  # noqa: FBT003
+        changes, leaps, _ = neighbour_counts(i, neighbours, sensors, False)  # noqa: FBT003 - kernels take no keywords
         stuck = leaps >= NEIGHBOUR_CHANGES_MIN or changes >= PASSED_CHANGES_MIN
     return bool(stuck and others_changed(i, sensors))
 

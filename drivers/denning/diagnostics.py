@@ -29,7 +29,7 @@ def wrong_robot(ident: Ident, config: RobotConfig) -> str | None:
     if ident.version != VERSION:
         return (
             f"the robot '{ident.name}' speaks version {ident.version} of the protocol and this program version "
-            f"{VERSION}; bring the older one up to date"
+            f"{VERSION}; update the older one"
         )
     count = len(config.ring.mounts)
     if ident.sensors != count:

@@ -20,21 +20,7 @@ def make_driver(config: RobotConfig) -> RobotDriver:
 def make_device(
     config: RobotConfig, world: WorldConfig, seed: int, *, faults: Sequence[Fault], clock_start_us: int
 ) -> RobotDevice:
-    """Return an emulated Denning robot.
-
-    Parameters
-    ----------
-    config
-        The robot.
-    world
-        What surrounds the robot, and where in it the robot starts.
-    seed
-        Seed of all random numbers: the same seed and input give the same output.
-    faults
-        What goes wrong with the robot or its line, and when; may be empty.
-    clock_start_us
-        First reading of the robot's own clock, µs; it wraps at 2³².
-    """
+    """Return an emulated Denning robot, whose clock wraps at 2³² µs; see `drivers.registry.make_device`."""
     from drivers.denning.device import DenningDevice  # it loads compiled kernels, which a real robot does not need
 
     return DenningDevice(config, world, seed, faults=faults, clock_start_us=clock_start_us)

@@ -11,14 +11,13 @@ from typing import Final
 
 from perception.bayes.elements import Reading
 from perception.bayes.noise_estimation import noise_variance
-from perception.bayes.parameters import SettingsRecord
+from perception.bayes.parameters import FIT_SOFTNESS
 from perception.bayes.range_fit import fit_circle, fit_line, score_circle, score_line
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import StateRecord
 from perception.kernel import kernel
 from perception.records import Records
 
-SOFT: Final = 9.0
-"""Robustness of the fits: squared residual, in σ², at which the weight has fallen to a quarter."""
 HOPELESS_NAT: Final = -1e9
 """Evidence (nat) of an explanation that cannot be fitted."""
 
@@ -112,7 +111,7 @@ def fit_other_circle(
     var0, rel2 = noise_variance(s, p)
     k = other - radius
     if not fit_circle(
-        readings, cx + k * ux, cy + k * uy, other, p, SOFT, var0, rel2, steps, scratch.circle_fit
+        readings, cx + k * ux, cy + k * uy, other, p, FIT_SOFTNESS, var0, rel2, steps, scratch.circle_fit
     ):  # fmt: skip
         return HOPELESS_NAT
     return score(s, p, n, scratch.circle_fit.x, scratch.circle_fit.y, other)
@@ -136,7 +135,19 @@ def fit_other_line(
         return HOPELESS_NAT
     var0, rel2 = noise_variance(s, p)
     fit_line(
-        readings, ux, uy, cx, cy, -radius, p[0].cos_may_answer, p[0].gate_m, SOFT, var0, rel2, steps, scratch.line_fit
+        readings,
+        ux,
+        uy,
+        cx,
+        cy,
+        -radius,
+        p[0].cos_may_answer,
+        p[0].gate_m,
+        FIT_SOFTNESS,
+        var0,
+        rel2,
+        steps,
+        scratch.line_fit,
     )
     score_line(readings, scratch.line_fit, cx, cy, p, s[0].noise_level, scratch.line_score)
     return scratch.line_score.log_likelihood_ratio

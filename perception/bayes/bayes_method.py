@@ -20,7 +20,7 @@ from perception.bayes.elements import BUCKET_CAPACITY, MAX_POLYGONS
 from perception.bayes.evidence import evidence_of
 from perception.bayes.kernel_settings import apply_config, apply_library, circle_models, copied, make_settings
 from perception.bayes.map_edits import edit_memory, row_of
-from perception.bayes.naming import POLYGON_PROBABILITY, Reported, report_circles, sure_polygons
+from perception.bayes.naming import Reported, report_circles, sure_polygons
 from perception.bayes.object_report import (
     alternative_labels,
     circle_object,
@@ -30,6 +30,7 @@ from perception.bayes.object_report import (
 )
 from perception.bayes.observe import observe
 from perception.bayes.pinned_segments import Pins
+from perception.bayes.polygon_parameters import POLYGON_PROBABILITY
 from perception.bayes.polygon_tracks import polygon_quantum
 from perception.bayes.refine import quantum
 from perception.bayes.segment_list import drawn, mapped_segments

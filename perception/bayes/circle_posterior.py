@@ -16,38 +16,24 @@ import numpy as np
 
 from perception.bayes.elements import GRID_CELLS, Reading
 from perception.bayes.likelihood import level_of
-from perception.bayes.parameters import TABLE_BINS, SettingsRecord
+from perception.bayes.parameters import (
+    GRID_ATTEMPTS,
+    GRID_CORRELATION_MAX,
+    GRID_GROWTH,
+    GRID_NARROW,
+    GRID_NEGLIGIBLE_NAT,
+    GRID_OFF_CENTRE,
+    GRID_SIGMA_MIN_GATES,
+    GRID_THINNEST,
+    GRID_WIDE,
+)
 from perception.bayes.scratch import CirclePosterior, LinearReading
+from perception.bayes.settings_record import TABLE_BINS, SettingsRecord
 from perception.kernel import Floats, kernel
 from perception.records import Records
 
 SIDE: Final = 7
 """Cells along a side of the grid (SIDE² is `GRID_CELLS`); odd, so that one lies on the mean."""
-
-ATTEMPTS: Final = 4
-"""Greatest number of grids laid in one call: the bound on the work."""
-
-NEGLIGIBLE_NAT: Final = 30.0
-"""A cell this many nats below the best one is ignored."""
-
-OFF_CENTRE: Final = 1.2
-"""The grid is laid again when the mean is this many pitches off its middle."""
-
-NARROW: Final = 0.3
-WIDE: Final = 2.2
-"""Variances, in squared pitches, beyond which the grid is too coarse or too small: 1 is as expected."""
-
-THINNEST: Final = 0.06
-"""Least variance, in squared pitches, that the next grid assumes: a narrower peak falls between the cells."""
-
-CORRELATION_MAX: Final = 0.95
-"""Greatest correlation that the next grid assumes."""
-
-GROWTH: Final = 2.0
-"""Factor on the covariance where the best cell lies on the rim."""
-
-SIGMA_MIN_GATES: Final = 2e-4
-"""Least σ of the frame, in gates; its greatest is one gate, beyond which no reading counts."""
 
 
 @kernel
@@ -166,7 +152,7 @@ def moments(best: float, cells: Floats) -> tuple[float, float, float, float, flo
     sbb = 0.0
     for cell in range(GRID_CELLS):
         v = cells[cell] - best
-        if v < -NEGLIGIBLE_NAT:
+        if v < -GRID_NEGLIGIBLE_NAT:
             continue
         w = math.exp(v)
         a = float(cell // SIDE - SIDE // 2)
@@ -204,14 +190,14 @@ def move_frame(
     r2 = posterior.root_yy
     posterior.x += r0 * ma
     posterior.y += r1 * ma + r2 * mb
-    fa = max(saa, THINNEST)
-    fb = max(sbb, THINNEST)
-    limit = CORRELATION_MAX * math.sqrt(fa * fb)
+    fa = max(saa, GRID_THINNEST)
+    fb = max(sbb, GRID_THINNEST)
+    limit = GRID_CORRELATION_MAX * math.sqrt(fa * fb)
     fc = min(limit, max(-limit, sab))
     xx = growth * (r0 * r0 * fa)
     xy = growth * (r0 * (r1 * fa + r2 * fc))
     yy = growth * (r1 * r1 * fa + 2.0 * r1 * r2 * fc + r2 * r2 * fb)
-    least = SIGMA_MIN_GATES * SIGMA_MIN_GATES * gate * gate
+    least = GRID_SIGMA_MIN_GATES * GRID_SIGMA_MIN_GATES * gate * gate
     root_xx = math.sqrt(min(max(xx, least), gate * gate))
     root_yx = min(max(xy / root_xx, -gate), gate)
     posterior.covariance_xx = xx
@@ -256,15 +242,15 @@ def posterior_circle(
         Greatest log likelihood, nat.
     """
     best = 0.0
-    for _ in range(ATTEMPTS):
+    for _ in range(GRID_ATTEMPTS):
         m = linearise(readings, radius, p, noise, posterior, linear)
         at, best = score_cells(linear[:m], p[0].table, cells)
         i = at // SIDE
         j = at % SIDE
         rim = i == 0 or i == SIDE - 1 or j == 0 or j == SIDE - 1
         ma, mb, saa, sab, sbb = moments(best, cells)
-        move_frame(ma, mb, saa, sab, sbb, GROWTH if rim else 1.0, p[0].gate_m, posterior)
-        fits = min(saa, sbb) >= NARROW and max(saa, sbb) <= WIDE
-        if fits and not rim and abs(ma) <= OFF_CENTRE and abs(mb) <= OFF_CENTRE:
+        move_frame(ma, mb, saa, sab, sbb, GRID_GROWTH if rim else 1.0, p[0].gate_m, posterior)
+        fits = min(saa, sbb) >= GRID_NARROW and max(saa, sbb) <= GRID_WIDE
+        if fits and not rim and abs(ma) <= GRID_OFF_CENTRE and abs(mb) <= GRID_OFF_CENTRE:
             break
     return best

@@ -9,49 +9,32 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.alternatives import SOFT, bearing_sum
+from perception.bayes.alternatives import bearing_sum
 from perception.bayes.elements import Reading
 from perception.bayes.likelihood import level_of, log_likelihood
-from perception.bayes.parameters import TABLE_BINS, SettingsRecord
+from perception.bayes.parameters import (
+    CORNER_EDGE_LEAD_GATES,
+    CORNER_FACE_READINGS_MIN,
+    CORNER_FIT_STEPS,
+    CORNER_HIT_NAT,
+    CORNER_LEEWAY_COS,
+    CORNER_MODEL_NAT,
+    CORNER_OPENING_MIN,
+    CORNER_OUT_OF_BEAM_GATES,
+    CORNER_READINGS_MIN,
+    CORNER_ROUNDS,
+    FIT_SOFTNESS,
+)
 from perception.bayes.range_fit import fit_line
 from perception.bayes.reservoir import copy_reading
 from perception.bayes.scratch import CornerFit, LineFit
+from perception.bayes.settings_record import TABLE_BINS, SettingsRecord
 from perception.bayes.state import StateRecord
 from perception.kernel import kernel
 from perception.records import Records
 
 IMPOSSIBLE_NAT: Final = -1e9
 """Evidence (nat) of a corner that cannot be fitted."""
-
-READINGS_MIN: Final = 8
-"""Least number of readings of two faces …"""
-
-FACE_READINGS_MIN: Final = 3
-"""… and of one face: two to fix it and one to test it."""
-
-ROUNDS: Final = 3
-"""Rounds of assigning readings to the faces and fitting both."""
-
-STEPS: Final = 3
-"""Steps of a face's fit."""
-
-LEEWAY: Final = 0.02
-"""Cosine by which a face's fit extends the beam, so that a face started at a wrong angle keeps its readings."""
-
-OUT_OF_BEAM_GATES: Final = 2.0
-"""Error added, in gates, where a face lies outside the beam."""
-
-EDGE_LEAD_GATES: Final = 0.04
-"""A reading is assigned to the edge only if the edge explains it this many gates better than a face."""
-
-OPENING_MIN: Final = 0.2
-"""Least |sin| of the angle between the faces at which they have an edge."""
-
-HIT_NAT: Final = 0.4
-"""Price of each hit: a choice of three surfaces also explains chance readings."""
-
-MODEL_NAT: Final = 8.0
-"""Price of the two parameters that a circle does not have."""
 
 
 @kernel
@@ -92,15 +75,15 @@ def is_of_face(
     e0 = abs(face_error(q, cx, cy, first))
     e1 = abs(face_error(q, cx, cy, second))
     if first.normal_x * q.axis_x + first.normal_y * q.axis_y < cos_may:
-        e0 += OUT_OF_BEAM_GATES * gate
+        e0 += CORNER_OUT_OF_BEAM_GATES * gate
     if second.normal_x * q.axis_x + second.normal_y * q.axis_y < cos_may:
-        e1 += OUT_OF_BEAM_GATES * gate
+        e1 += CORNER_OUT_OF_BEAM_GATES * gate
     if (e0 <= e1) != (side == 0):
         return False
     if not has_edge:
         return True
     at_edge = abs(q.range_m - math.hypot(corner.edge_x - q.x, corner.edge_y - q.y))
-    return bool(min(e0, e1) <= at_edge + EDGE_LEAD_GATES * gate)
+    return bool(min(e0, e1) <= at_edge + CORNER_EDGE_LEAD_GATES * gate)
 
 
 @kernel
@@ -117,7 +100,7 @@ def find_edge(cx: float, cy: float, corner: CornerFit) -> bool:
     a = corner.faces[0]
     b = corner.faces[1]
     det = a.normal_x * b.normal_y - a.normal_y * b.normal_x
-    if abs(det) <= OPENING_MIN:
+    if abs(det) <= CORNER_OPENING_MIN:
         return False
     corner.edge_x = cx + (a.distance * b.normal_y - b.distance * a.normal_y) / det
     corner.edge_y = cy + (a.normal_x * b.distance - b.normal_x * a.distance) / det
@@ -146,10 +129,10 @@ def fit_faces(
         Whether there are two faces, and whether they have an edge.
     """
     count, sx, sy = bearing_sum(readings, cx, cy, radius, gate)
-    if count < READINGS_MIN:
+    if count < CORNER_READINGS_MIN:
         return False, False
     has_edge = False
-    for turn in range(ROUNDS):
+    for turn in range(CORNER_ROUNDS):
         for side in range(2):
             k = 0
             ax = 0.0
@@ -173,15 +156,15 @@ def fit_faces(
             face = corner.faces[side]
             if turn == 0:
                 length = math.hypot(ax, ay)
-                if k < FACE_READINGS_MIN or length == 0.0:
+                if k < CORNER_FACE_READINGS_MIN or length == 0.0:
                     return False, False
                 face.normal_x = ax / length
                 face.normal_y = ay / length
                 face.distance = -radius
-            if k >= FACE_READINGS_MIN:
+            if k >= CORNER_FACE_READINGS_MIN:
                 fit_line(
-                    face_readings[:k], face.normal_x, face.normal_y, cx, cy, face.distance, cos_may - LEEWAY, gate,
-                    SOFT, var0, rel2, STEPS, fit,
+                    face_readings[:k], face.normal_x, face.normal_y, cx, cy, face.distance,
+                    cos_may - CORNER_LEEWAY_COS, gate, FIT_SOFTNESS, var0, rel2, CORNER_FIT_STEPS, fit,
                 )  # fmt: skip
                 face.normal_x = fit.normal_x
                 face.normal_y = fit.normal_y
@@ -243,5 +226,5 @@ def score_corner(
             d = math.sqrt(ex * ex + ey * ey)
             if ex * q.axis_x + ey * q.axis_y >= cos_may * d:
                 v = max(v, log_likelihood(p, level, q.range_m - d))
-        total += v - HIT_NAT if v > 0.0 else p[0].table[level, TABLE_BINS - 1]
-    return total - MODEL_NAT
+        total += v - CORNER_HIT_NAT if v > 0.0 else p[0].table[level, TABLE_BINS - 1]
+    return total - CORNER_MODEL_NAT

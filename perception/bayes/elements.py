@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from perception.bayes.parameters import CIRCLES_MAX
+from perception.bayes.settings_record import CIRCLES_MAX
 from perception.records import Record
 
 MAX_TRACKS: Final = 48

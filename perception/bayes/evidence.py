@@ -11,11 +11,11 @@ import numpy as np
 from perception.bayes.elements import READINGS_MAX, Reading
 from perception.bayes.noise_estimation import noise_variance
 from perception.bayes.occlusion import is_relevant
-from perception.bayes.parameters import SettingsRecord
 from perception.bayes.polygon_likelihood import score_polygon
 from perception.bayes.range_fit import FAR, score_circle
 from perception.bayes.reservoir import copy_reservoir
 from perception.bayes.scratch import Score
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CircleTracks, Memory, StateRecord
 from perception.edits import Arc, Evidence
 from perception.kernel import Floats, kernel

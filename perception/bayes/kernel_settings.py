@@ -1,8 +1,6 @@
 """Construction of the settings record from the ring, the model library and the configuration.
 
-The constants were tuned on random halls with the Denning's ring. They hold for other rings as well, because values
-that depend on the ring (beam, resolution, range) or on the models (radius, outline) are computed from these. Lengths
-that depend on neither reflect the spacing of objects in a building; they are in metres, to a tenth of a foot.
+The method's own numbers come from `perception.bayes.parameters` and `perception.bayes.polygon_parameters`.
 """
 
 from __future__ import annotations
@@ -17,9 +15,38 @@ import numpy as np
 from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import BayesConfig
-from config.units import FOOT_M
 from perception.bayes.likelihood import build_levels, build_table
 from perception.bayes.parameters import (
+    ASSOCIATING_LINE_M,
+    BACKGROUND_RANGE_M,
+    COMPARE_ALL_BELOW,
+    DISPERSION_MIN,
+    FAR_M,
+    FAR_NAT_PER_M,
+    FINAL_REFINEMENTS,
+    GATE_M,
+    HISTORY_SPACING_M,
+    HYPOTHESIS_SIGMA_MAX_M,
+    IDLE_FIRINGS,
+    MAY_ANSWER_DEG,
+    MERGE_RADII,
+    MISSED_ECHO_PROBABILITY,
+    MODEL_PRIOR_NAT,
+    MUST_ANSWER_DEG,
+    NOISE_ABSOLUTE_M,
+    NOISE_RELATIVE,
+    OUTLIER_SHARE,
+    PAIR_GAP_S,
+    PAIR_RANGE_MAX_M,
+    RIVAL_APART_M,
+    RIVAL_RADII_M,
+    ROUGHNESS_GATE_NAT,
+    SHORT_ECHO_NAT,
+    TABLE_SIGMAS_M,
+    UNKNOWN_NAT,
+)
+from perception.bayes.polygon_parameters import POLYGON_UNKNOWN_NAT
+from perception.bayes.settings_record import (
     CHORDS,
     CIRCLES_MAX,
     POLYGONS_MAX,
@@ -33,28 +60,8 @@ from perception.kernel import Floats
 from perception.object_model import ObjectModel
 from perception.records import array_of, column, records, zeros
 
-RIVALS_M: Final = (0.0, 0.35 * FOOT_M, 2.2 * FOOT_M)
-"""Radii that compete with every model: an edge or corner, a post, a barrel."""
-MERGE_RADII: Final = 0.9
-"""Two centres nearer than this many radii of the smallest model are one object."""
-RIVAL_APART_M: Final = 0.1 * FOOT_M
-"""A rival as near as this to a model's radius is that model."""
 SAME_RADIUS_M: Final = 1e-3
 """Models of radii as near as this are one circle, named after the first of them."""
-
-MAY_DEG: Final = 0.4
-"""A reading this far outside the beam may match: the accuracy of mounts and headings."""
-MUST_DEG: Final = 1.5
-"""A reading must hit only this far inside it: sensitivity fades towards the edge."""
-DENSITY_M: Final = 15.0 * FOOT_M
-"""Range over which echoes of the background are uniform; its density is the inverse."""
-OUTLIERS: Final = 0.03
-"""Share of outliers: ranges from another object."""
-SIGMAS_M: Final = (0.001 * FOOT_M, 0.6 * FOOT_M)
-"""Least and greatest noise of the likelihood's table."""
-ABSOLUTE_M: Final = tuple(v * FOOT_M for v in (0.003, 0.012, 0.03, 0.05, 0.08))
-RELATIVE: Final = (0.0, 0.005, 0.01, 0.02)
-"""Absolute and relative noises of the hypotheses: σ² = absolute² + (relative · range)²."""
 
 
 def polygon_symmetry(vertices: Floats) -> int:
@@ -138,7 +145,7 @@ def apply_library(p: SettingsRecord, models: Sequence[ModelConfig]) -> None:
         There are more models than the record holds.
     """
     known, _ = circle_models(models)
-    rivals = [r for r in RIVALS_M if all(abs(r - k) > RIVAL_APART_M for k in known)]
+    rivals = [r for r in RIVAL_RADII_M if all(abs(r - k) > RIVAL_APART_M for k in known)]
     if not known:
         rivals = [*rivals[1:], rivals[0]]  # hypotheses need a body behind a segment, and a point has no extent
     radii = [*known, *rivals]
@@ -146,7 +153,7 @@ def apply_library(p: SettingsRecord, models: Sequence[ModelConfig]) -> None:
     if len(radii) > CIRCLES_MAX or len(outlines) > POLYGONS_MAX:
         raise ValueError(
             f"{len(known)} round models and {len(outlines)} polygons are too many: at most "
-            f"{CIRCLES_MAX - len(RIVALS_M)} and {POLYGONS_MAX} can be recognised at a time; leave some out"
+            f"{CIRCLES_MAX - len(RIVAL_RADII_M)} and {POLYGONS_MAX} can be recognised at a time; leave some out"
         )
     for name in ("circles", "polygons"):
         column(p, name).view(np.uint8)[...] = 0
@@ -183,37 +190,42 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: Bayes
     """
     p = records(Settings, zeros(Settings, 1))
     half_angle = math.radians(ring.beam_half_angle_deg)
-    may, must = half_angle + math.radians(MAY_DEG), max(0.5 * half_angle, half_angle - math.radians(MUST_DEG))
+    may, must = (
+        half_angle + math.radians(MAY_ANSWER_DEG),
+        max(0.5 * half_angle, half_angle - math.radians(MUST_ANSWER_DEG)),
+    )
     it = p[0]
     it.half_angle_rad = half_angle
     it.cos_half_angle, it.sin_half_angle = math.cos(half_angle), math.sin(half_angle)
     it.cos_may_answer, it.cos_must_answer = math.cos(may), math.cos(must)
     it.sin_must_answer = math.sqrt(1.0 - it.cos_must_answer * it.cos_must_answer)
     it.half_resolution_m, it.range_max_m = 0.5 * ring.resolution_m, ring.range_max_m
-    it.gate_m = 0.5 * FOOT_M
-    it.missed_echo_nat = math.log(0.1)
-    it.short_echo_nat = -1.0
-    it.unknown_nat = 2.0
-    it.unknown_polygon_nat = 2.9
-    it.model_prior_nat = 3.0
-    it.dispersion_min = 0.0015
-    it.far_m = 6.0 * FOOT_M
-    it.far_nat_per_m = 2.0 / FOOT_M
-    it.roughness_gate_nat = 20.0
-    it.pair_range_max_m = 12.0 * FOOT_M
-    it.history_spacing_m = 0.2 * FOOT_M
-    it.pair_gap_s = 30.0
-    it.compare_all_below = 80
-    it.associating_line_m = 4.0 * FOOT_M
-    it.hypothesis_sigma_m = 0.7 * FOOT_M
-    it.idle_firings = 12
-    it.final_refinements = 6
+    it.gate_m = GATE_M
+    it.missed_echo_nat = math.log(MISSED_ECHO_PROBABILITY)
+    it.short_echo_nat = SHORT_ECHO_NAT
+    it.unknown_nat = UNKNOWN_NAT
+    it.unknown_polygon_nat = POLYGON_UNKNOWN_NAT
+    it.model_prior_nat = MODEL_PRIOR_NAT
+    it.dispersion_min = DISPERSION_MIN
+    it.far_m = FAR_M
+    it.far_nat_per_m = FAR_NAT_PER_M
+    it.roughness_gate_nat = ROUGHNESS_GATE_NAT
+    it.pair_range_max_m = PAIR_RANGE_MAX_M
+    it.history_spacing_m = HISTORY_SPACING_M
+    it.pair_gap_s = PAIR_GAP_S
+    it.compare_all_below = COMPARE_ALL_BELOW
+    it.associating_line_m = ASSOCIATING_LINE_M
+    it.hypothesis_sigma_m = HYPOTHESIS_SIGMA_MAX_M
+    it.idle_firings = IDLE_FIRINGS
+    it.final_refinements = FINAL_REFINEMENTS
     sigmas = np.empty(TABLE_LEVELS)
     build_table(
-        float(it.half_resolution_m), *SIGMAS_M, 1.0 / DENSITY_M, OUTLIERS, column(p, "table")[0],
+        float(it.half_resolution_m), *TABLE_SIGMAS_M, 1.0 / BACKGROUND_RANGE_M, OUTLIER_SHARE, column(p, "table")[0],
         column(p, "table_bins_per_m")[0], sigmas,
     )  # fmt: skip
-    for noise, (absolute, relative) in zip(it.noises, itertools.product(ABSOLUTE_M, RELATIVE), strict=True):
+    for noise, (absolute, relative) in zip(
+        it.noises, itertools.product(NOISE_ABSOLUTE_M, NOISE_RELATIVE), strict=True
+    ):
         noise.absolute_m, noise.relative = absolute, relative
     build_levels(records(NoiseModel, column(p, "noises")[0]), sigmas)
     apply_library(p, models)

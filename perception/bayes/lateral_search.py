@@ -9,19 +9,12 @@ directly.
 from __future__ import annotations
 
 import math
-from typing import Final
 
-from config.units import FOOT_M
 from perception.bayes.alternatives import score
-from perception.bayes.parameters import SettingsRecord
+from perception.bayes.parameters import LATERAL_LEAD_NAT, LATERAL_PLACES, LATERAL_STEP_M
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CircleTrack, StateRecord
 from perception.kernel import kernel
-
-PLACES: Final = 3
-STEP_M: Final = 0.12 * FOOT_M
-"""Positions on either side, and their spacing: together half a foot, a beam's edge at two and a half feet."""
-LEAD_NAT: Final = 1.0
-"""Evidence by which another position must lead; a smaller lead is chance."""
 
 
 @kernel
@@ -59,20 +52,20 @@ def search_across(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int)
     d = math.hypot(dx, dy)
     if d <= track.radius:
         return False
-    best = score(s, p, n, track.x, track.y, track.radius) + LEAD_NAT
+    best = score(s, p, n, track.x, track.y, track.radius) + LATERAL_LEAD_NAT
     at = 0
-    for k in range(-PLACES, PLACES + 1):
+    for k in range(-LATERAL_PLACES, LATERAL_PLACES + 1):
         if k != 0:
-            c = math.cos(k * STEP_M / d)
-            sn = math.sin(k * STEP_M / d)
+            c = math.cos(k * LATERAL_STEP_M / d)
+            sn = math.sin(k * LATERAL_STEP_M / d)
             v = score(s, p, n, x + c * dx - sn * dy, y + sn * dx + c * dy, track.radius)
             if v > best:
                 best = v
                 at = k
     if at == 0:
         return False
-    c = math.cos(at * STEP_M / d)
-    sn = math.sin(at * STEP_M / d)
+    c = math.cos(at * LATERAL_STEP_M / d)
+    sn = math.sin(at * LATERAL_STEP_M / d)
     track.x = x + c * dx - sn * dy
     track.y = y + sn * dx + c * dy
     return True

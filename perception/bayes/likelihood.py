@@ -11,7 +11,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from perception.bayes.parameters import (
+from perception.bayes.parameters import TABLE_REACH_SIGMAS
+from perception.bayes.settings_record import (
     NOISES,
     RANGE_BINS,
     RANGE_BINS_PER_M,
@@ -22,9 +23,6 @@ from perception.bayes.parameters import (
 )
 from perception.kernel import Floats, kernel
 from perception.records import Records
-
-REACH_SIGMAS: Final = 6.0
-"""Distance beyond the box, in σ, at which only outliers remain."""
 
 SHARP: Final = 1e-3
 """Least half box, as a share of σ: below it the difference of two error functions only loses digits."""
@@ -66,7 +64,7 @@ def build_table(
     for k in range(TABLE_LEVELS):
         sigma = sigma_lo * math.exp(ratio * k)
         sigmas[k] = sigma
-        bins_per_m[k] = (TABLE_BINS - 2) / (half_box + REACH_SIGMAS * sigma)
+        bins_per_m[k] = (TABLE_BINS - 2) / (half_box + TABLE_REACH_SIGMAS * sigma)
         for b in range(TABLE_BINS - 2):
             e = b / bins_per_m[k]
             if half_box > SHARP * sigma:

@@ -7,17 +7,21 @@ onto the outline map; then the raw readings refine it.
 from __future__ import annotations
 
 import math
-from typing import Final
 
 from perception.bayes.occlusion import keep_relevant
-from perception.bayes.parameters import SettingsRecord
+from perception.bayes.parameters import (
+    CENTRE_VARIANCE_MAX_M2,
+    PLACED_ROUNDS,
+    PLACED_STRAY_MAX_M,
+    PLACED_STRAY_MAX_RAD,
+)
 from perception.bayes.polygon_initiation import relax_polygon, restart_polygon
 from perception.bayes.polygon_job import REFINEMENT, end_job
 from perception.bayes.polygon_readings import gather_polygon_history
 from perception.bayes.reservoir import copy_reservoir, gather_history
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import PLACED, CircleTrack, CircleTracks, StateRecord
 from perception.bayes.track_initiation import (
-    VARIANCE_MAX_M2,
     free_track,
     gather_relevant,
     relax_onto_map,
@@ -26,12 +30,6 @@ from perception.bayes.track_initiation import (
 )
 from perception.bayes.track_labels import assign_number
 from perception.kernel import kernel
-
-ROUNDS: Final = 3
-"""Relaxations of a model onto the map, a few steps each."""
-STRAYED_M: Final = 0.5
-STRAYED_RAD: Final = 0.8
-"""Greatest displacement of a relaxation: one that moves farther has found something else."""
 
 
 @kernel
@@ -66,9 +64,9 @@ def settle_circle(s: StateRecord, p: SettingsRecord, kind: int, x: float, y: flo
     """
     hypothesis = s[0].scratch.hypothesis
     set_hypothesis(s, x, y, 0.0)
-    for _ in range(ROUNDS):
+    for _ in range(PLACED_ROUNDS):
         relax_onto_map(s, p, kind)
-    if math.hypot(hypothesis.x - x, hypothesis.y - y) > STRAYED_M:
+    if math.hypot(hypothesis.x - x, hypothesis.y - y) > PLACED_STRAY_MAX_M:
         hypothesis.x = x
         hypothesis.y = y
 
@@ -76,9 +74,9 @@ def settle_circle(s: StateRecord, p: SettingsRecord, kind: int, x: float, y: flo
 @kernel
 def mark_placed(track: CircleTrack) -> None:
     """Mark a circle as placed by a user, and set its covariance to that of a user's position."""
-    track.covariance_xx = VARIANCE_MAX_M2
-    track.covariance_yy = VARIANCE_MAX_M2
-    track.root_xx = math.sqrt(VARIANCE_MAX_M2)
+    track.covariance_xx = CENTRE_VARIANCE_MAX_M2
+    track.covariance_yy = CENTRE_VARIANCE_MAX_M2
+    track.root_xx = math.sqrt(CENTRE_VARIANCE_MAX_M2)
     track.root_yy = track.root_xx
     track.marks |= PLACED
 
@@ -149,9 +147,12 @@ def settle_polygon(s: StateRecord, p: SettingsRecord, model: int, x: float, y: f
     """
     hypothesis = s[0].scratch.hypothesis
     set_hypothesis(s, x, y, heading)
-    for _ in range(ROUNDS):
+    for _ in range(PLACED_ROUNDS):
         relax_polygon(s, p, model)
-    if math.hypot(hypothesis.x - x, hypothesis.y - y) > STRAYED_M or abs(hypothesis.heading - heading) > STRAYED_RAD:
+    if (
+        math.hypot(hypothesis.x - x, hypothesis.y - y) > PLACED_STRAY_MAX_M
+        or abs(hypothesis.heading - heading) > PLACED_STRAY_MAX_RAD
+    ):
         set_hypothesis(s, x, y, heading)
 
 

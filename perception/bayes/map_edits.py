@@ -8,17 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 
 from perception.bayes.elements import HISTORY, REJECTIONS_MAX
 from perception.bayes.manual_tracks import leave_job, move_circle, move_polygon, place_circle, place_polygon
-from perception.bayes.parameters import SettingsRecord
+from perception.bayes.parameters import CIRCLE_EVIDENCE_MIN_NAT, REJECTED_MAX_NAT
 from perception.bayes.pinned_segments import Pins, delete
 from perception.bayes.scratch import POLYGON
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CONFIRMED, FREE, Memory
-from perception.bayes.track_initiation import EVIDENCE_MIN_NAT
 from perception.edits import (
     ClearMap,
     ConfirmObject,
@@ -31,9 +30,6 @@ from perception.edits import (
     no_such_object,
     no_such_segments,
 )
-
-REJECTED_MAX_NAT: Final = 40.0
-"""New evidence that always lifts a rejection: about ten good echoes, four times what starts a track."""
 
 
 def row_of(memory: Memory, number: int) -> int | None:
@@ -81,7 +77,7 @@ def edit_memory(
                 move_polygon(memory.s, p, t, x, y, theta)
         case ConfirmObject(number):
             if t < 0 and memory.circles["kind"][row] >= p[0].model_count:
-                return f"object {number} looks like none of the models: place the one that it is there"
+                return f"object {number} matches no model: place the right model there instead"
             (memory.circles if t < 0 else memory.polygons)["marks"][t if t >= 0 else row] |= CONFIRMED
         case RejectObject():
             _reject(memory, p, row)
@@ -94,7 +90,10 @@ def _pin(memory: Memory, pins: Pins, numbers: Sequence[int], *, pinned: bool) ->
         return no_such_segments(missing) if missing else None
     missing, full = pins.add(memory, numbers)
     if full:
-        return f"{len(full)} of these segments cannot be pinned: too many are, there or altogether; the others are"
+        return (
+            f"{len(full)} of {len(numbers)} segments could not be pinned: too many are pinned already, in that place "
+            "or in the whole map; unpin some first"
+        )
     return no_such_segments(missing) if missing else None
 
 
@@ -107,7 +106,7 @@ def _place(
         t = place_circle(memory.s, memory.tracks, p, rounds.index(edit.model), edit.x, edit.y)
     else:
         return f"no model is called {edit.model}: load it first"
-    return None if t >= 0 else "as many objects are known as there is room for: reject one first"
+    return None if t >= 0 else "no room for another object: reject one first"
 
 
 def _reject(memory: Memory, p: SettingsRecord, row: int) -> None:
@@ -130,7 +129,7 @@ def _reject(memory: Memory, p: SettingsRecord, row: int) -> None:
     state = memory.state
     rejection = memory.s[0].rejections[int(state["rejection_count"][0]) % REJECTIONS_MAX]
     rejection.x, rejection.y, rejection.radius, rejection.what = x, y, radius, what
-    rejection.evidence_nat = min(max(evidence, EVIDENCE_MIN_NAT), REJECTED_MAX_NAT)
+    rejection.evidence_nat = min(max(evidence, CIRCLE_EVIDENCE_MIN_NAT), REJECTED_MAX_NAT)
     state["rejection_count"] += 1
 
 

@@ -7,38 +7,30 @@ object, which explains any few echoes to some degree.
 from __future__ import annotations
 
 import math
-from typing import Final
 
-from config.units import FOOT_M
 from perception.bayes.elements import MAX_POLYGONS, POLYGON_BIN_CAPACITY
-from perception.bayes.parameters import SettingsRecord
+from perception.bayes.parameters import (
+    ALONE_LEAD_NAT,
+    NAME_KEPT_PROBABILITY,
+    NAMED_DISPERSION_MIN,
+    NAMED_OVER_UNKNOWN,
+    NAMED_OVER_UNKNOWN_ALONE,
+    NAMED_SIGMA_MAX_M,
+    NO_WALL_LEAD_NAT,
+)
+from perception.bayes.polygon_parameters import (
+    POLYGON_DISPERSION_MIN,
+    POLYGON_NAMED_HITS,
+    POLYGON_NAMED_HITS_SWEPT,
+    POLYGON_NEAR_M,
+    POLYGON_SIGMA_MAX_M,
+    POLYGON_SWEPT_READINGS,
+)
 from perception.bayes.range_fit import FAR
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import ESTABLISHED, FREE, CircleTrack, CircleTracks, PolygonTrack, StateRecord
 from perception.kernel import Ints, kernel
 from perception.records import Record, Records
-
-OVER_UNKNOWN: Final = 1.25
-OVER_UNKNOWN_ALONE: Final = 1.1
-"""Least ratio of the evidence to that of an unknown object; less where every alternative is far behind."""
-ALONE_NAT: Final = -20.0
-"""Lead of the best alternative at which it counts as far behind."""
-NO_WALL_NAT: Final = -4.0
-"""Lead of a wall at which it is excluded. Walls are the most frequent alternative."""
-DISPERSION_MIN: Final = 0.008
-"""Least dispersion of the axes of an object seen from two sides; an object straight ahead has less."""
-KEPT: Final = 0.5
-"""Least probability at which a name is kept: likelier than everything else together."""
-SIGMA_MAX_M: Final = 0.17 * FOOT_M
-"""Greatest standard deviation of a named circle along either axis."""
-POLYGON_PROBABILITY: Final = 0.9
-POLYGON_NEAR_M: Final = 6.5 * FOOT_M
-POLYGON_DISPERSION: Final = 0.02
-"""Least dispersion of a polygon's axes: a single face seen square on from afar may belong to any wall."""
-POLYGON_SIGMA_MAX_M: Final = 0.2 * FOOT_M
-POLYGON_HITS: Final = 20.0
-POLYGON_HITS_SWEPT: Final = 12.0
-POLYGON_SWEPT: Final = 80
-"""Least hits of a polygon; fewer suffice where this many readings, silences included, bear on it and fit it."""
 
 
 class Reported(Record):
@@ -72,18 +64,22 @@ def update_name(track: CircleTrack, p: SettingsRecord, sure: float, least: float
         Least probability to give a name, and the same where a wall is excluded.
     """
     line = p[0].circle_count
-    if track.leads[line] == 0.0 or track.leads[line] > NO_WALL_NAT:
+    if track.leads[line] == 0.0 or track.leads[line] > NO_WALL_LEAD_NAT:
         least = sure
-    if track.status != ESTABLISHED or track.kind >= p[0].model_count or track.probability < min(least, KEPT):
+    if (
+        track.status != ESTABLISHED
+        or track.kind >= p[0].model_count
+        or track.probability < min(least, NAME_KEPT_PROBABILITY)
+    ):
         track.is_named = 0
         return
     best = -1e300
     for k in range(line + 2):
         if k != track.kind:
             best = max(best, track.leads[k])
-    over = OVER_UNKNOWN_ALONE if best < ALONE_NAT else OVER_UNKNOWN
-    is_vague = max(track.covariance_xx, track.covariance_yy) >= SIGMA_MAX_M**2
-    if track.log_likelihood_ratio <= over * track.unknown_nat or track.dispersion < DISPERSION_MIN or is_vague:
+    over = NAMED_OVER_UNKNOWN_ALONE if best < ALONE_LEAD_NAT else NAMED_OVER_UNKNOWN
+    is_vague = max(track.covariance_xx, track.covariance_yy) >= NAMED_SIGMA_MAX_M**2
+    if track.log_likelihood_ratio <= over * track.unknown_nat or track.dispersion < NAMED_DISPERSION_MIN or is_vague:
         track.is_named = 0
     elif track.probability >= least:
         track.is_named = 1
@@ -163,9 +159,9 @@ def is_sure_polygon(track: PolygonTrack, least: float) -> bool:
                 x += q.axis_x
                 y += q.axis_y
                 heard += 1
-    if track.hits < (POLYGON_HITS_SWEPT if swept >= POLYGON_SWEPT else POLYGON_HITS):
+    if track.hits < (POLYGON_NAMED_HITS_SWEPT if swept >= POLYGON_SWEPT_READINGS else POLYGON_NAMED_HITS):
         return False
-    return heard > 0 and nearest <= POLYGON_NEAR_M and 1.0 - math.hypot(x, y) / heard > POLYGON_DISPERSION
+    return heard > 0 and nearest <= POLYGON_NEAR_M and 1.0 - math.hypot(x, y) / heard > POLYGON_DISPERSION_MIN
 
 
 @kernel

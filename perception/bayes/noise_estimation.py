@@ -11,49 +11,40 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from config.units import FOOT_M
 from perception.bayes.elements import Reading
 from perception.bayes.likelihood import level_of, log_likelihood
-from perception.bayes.parameters import NOISES, Settings
+from perception.bayes.parameters import (
+    CURVATURE_VARIANCE_M2,
+    ELSEWHERE_PER_M,
+    EXPLAINED_SIGMAS,
+    RANGE_VARIANCE_MIN_M2,
+    RESIDUAL_EVERY,
+    RESIDUAL_HITS_MIN,
+    RESIDUAL_PROBABILITY_MIN,
+    ROUGHNESS_MEMORY,
+    SAME_SURFACE_SHARE,
+    TRIPLE_MAX_M,
+)
 from perception.bayes.range_fit import FAR
+from perception.bayes.settings_record import NOISES, Settings
 from perception.bayes.state import ESTABLISHED, CircleTrack, State
 from perception.kernel import Floats, kernel
 from perception.records import Records
 
 TWO_PI: Final = 2.0 * math.pi
-SIGMAS: Final = 3.0
-"""Greatest error of an explained range, in σ, beyond half its rounding."""
-TRIPLE_M: Final = 1.0 * FOOT_M
-"""Greatest distance between the positions of a triple: farther apart they rarely see one surface."""
-BENT_M2: Final = 1e-4 * FOOT_M * FOOT_M
-"""Variance that a curved surface adds."""
-FORGET: Final = 0.997
-"""Factor on the evidence from roughness after each triple: a memory of about three hundred triples."""
-ELSEWHERE_PER_M: Final = 0.02 / FOOT_M
-"""Density of a middle reading that hit something else, 1/m."""
-BELL_SHARE: Final = 0.8
-"""Share of middle readings that hit the same surface."""
-BOX_M2: Final = 1e-6 * FOOT_M * FOOT_M
-"""Least variance of a range, so that perfect ones do not divide by zero."""
-SURE: Final = 0.95
-"""An object's residuals count from this probability on …"""
-READINGS_MIN: Final = 25.0
-"""… and from this many hits on, …"""
-EVERY: Final = 3
-"""… in every third of its refinements."""
 
 
 @kernel
 def noise_variance(s: Records[State], p: Records[Settings]) -> tuple[float, float]:
     """Return the assumed variance of a range r as (var0, rel2): var0 (m²) + rel2 · r²."""
     noise = p[0].noises[s[0].noise_level]
-    return noise.absolute_m**2 + p[0].half_resolution_m ** 2 / 3.0 + BOX_M2, noise.relative**2
+    return noise.absolute_m**2 + p[0].half_resolution_m ** 2 / 3.0 + RANGE_VARIANCE_MIN_M2, noise.relative**2
 
 
 @kernel
 def tolerance_m(half_box: float, var: float) -> float:
     """Return the greatest error of an explained range, m, for rounding ± `half_box` (m) and variance `var` (m²)."""
-    return half_box + SIGMAS * math.sqrt(var)
+    return half_box + EXPLAINED_SIGMAS * math.sqrt(var)
 
 
 @kernel
@@ -78,7 +69,7 @@ def add_roughness(
     ab = math.hypot(a.x - b.x, a.y - b.y)
     bc = math.hypot(b.x - c.x, b.y - c.y)
     ac = ab + bc
-    if ac > TRIPLE_M or ac == 0.0:
+    if ac > TRIPLE_MAX_M or ac == 0.0:
         return
     share = bc / ac
     e = b.range_m - share * a.range_m - (1.0 - share) * c.range_m
@@ -86,9 +77,11 @@ def add_roughness(
     half_box = p[0].half_resolution_m
     for h in range(NOISES):
         noise = p[0].noises[h]
-        var = k * (noise.absolute_m**2 + (noise.relative * b.range_m) ** 2 + half_box**2 / 3.0) + BENT_M2
-        bell = BELL_SHARE * math.exp(-0.5 * e * e / var) / math.sqrt(TWO_PI * var)
-        evidence[h] = evidence[h] * FORGET + math.log(bell + ELSEWHERE_PER_M)
+        var = (
+            k * (noise.absolute_m**2 + (noise.relative * b.range_m) ** 2 + half_box**2 / 3.0) + CURVATURE_VARIANCE_M2
+        )
+        bell = SAME_SURFACE_SHARE * math.exp(-0.5 * e * e / var) / math.sqrt(TWO_PI * var)
+        evidence[h] = evidence[h] * ROUGHNESS_MEMORY + math.log(bell + ELSEWHERE_PER_M)
 
 
 @kernel
@@ -105,11 +98,11 @@ def add_residuals(s: Records[State], tracks: Records[CircleTrack], p: Records[Se
         Readings.
     """
     track = tracks[t]
-    if track.status != ESTABLISHED or track.refinements % EVERY != 0 or track.kind >= p[0].model_count:
+    if track.status != ESTABLISHED or track.refinements % RESIDUAL_EVERY != 0 or track.kind >= p[0].model_count:
         return
     for h in range(NOISES):
         track.noise_nat[h] = 0.0
-    if track.probability < SURE or track.hits < READINGS_MIN:
+    if track.probability < RESIDUAL_PROBABILITY_MIN or track.hits < RESIDUAL_HITS_MIN:
         return
     for j in range(n):
         q = s[0].scratch.readings[j]

@@ -9,28 +9,20 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from config.units import FOOT_M
-from perception.bayes.kernel_settings import MAY_DEG
-from perception.bayes.parameters import SettingsRecord
+from perception.bayes.parameters import (
+    CIRCLE_INFLATION,
+    PLACED_SIGMA_M,
+    POST_RADIUS_M,
+    ROOM_CORNER_M,
+    UNKNOWN_HITS_MIN,
+    WALL_ECHOES_MIN,
+    WALL_LENGTH_MIN_M,
+)
+from perception.bayes.polygon_parameters import POLYGON_INFLATION, POLYGON_TURN_SIGMA_RAD
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, Memory, PolygonTrack
-from perception.bayes.walls import ECHOES_MIN, WALL_MIN_M
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
-
-PLACED_SIGMA_M: Final = 0.15
-"""Standard deviation of a position that a user gave, m."""
-CIRCLE_INFLATION: Final = 1.1
-"""Factor on a circle's covariance when it is reported."""
-POLYGON_INFLATION: Final = 1.15
-"""Factor on a polygon's reported covariance: the noise does not include the influence of its neighbours."""
-POLYGON_TURN: Final = math.radians(MAY_DEG)
-"""Least standard deviation of its heading, rad: that of the beam's edges, since an echo at an edge turns a body."""
-CORNER_M: Final = 1.0 * FOOT_M
-"""A point this near to a wall's line is a corner of the room, not an edge of an object."""
-POST_M: Final = 1.0 * FOOT_M
-"""A round rival thinner than this is a post, a thicker one a barrel."""
-UNKNOWN_HITS: Final = 5.0
-"""Least hits of an unnamed object that is reported."""
 
 CIRCLE_FIELDS: Final = (
     "x", "y", "covariance_xx", "covariance_xy", "covariance_yy", "hits", "number", "marks",
@@ -82,7 +74,7 @@ def polygon_covariance(track: PolygonTrack) -> Floats:
     covariance[np.tril_indices(3)] = POLYGON_INFLATION * np.array(
         [held.xx, held.yx, held.yy, held.hx, held.hy, held.hh]
     )
-    covariance[2, 2] += POLYGON_TURN**2
+    covariance[2, 2] += POLYGON_TURN_SIGMA_RAD**2
     return covariance + np.tril(covariance, -1).T
 
 
@@ -111,7 +103,8 @@ def polygon_object(track: PolygonTrack, p: SettingsRecord, label: str, probabili
 def known_walls(memory: Memory) -> NDArray[Any]:
     """Return the lines that count as walls, as records of `state.Line`."""
     lines = memory.state["lines"][0]
-    return lines[(lines["echoes"] > ECHOES_MIN) & (lines["high"] - lines["low"] > WALL_MIN_M)]  # type: ignore[no-any-return]
+    is_wall = (lines["echoes"] > WALL_ECHOES_MIN) & (lines["high"] - lines["low"] > WALL_LENGTH_MIN_M)
+    return lines[is_wall]  # type: ignore[no-any-return]  # numpy types a field as Any
 
 
 def wall_object(line: Row) -> DetectedObject:
@@ -131,7 +124,7 @@ def wall_object(line: Row) -> DetectedObject:
 
 def round_label(radius: float) -> str:
     """Return the label of a round object of this radius (m) that is not a model."""
-    return "edge" if radius == 0.0 else "post" if radius < POST_M else "barrel"
+    return "edge" if radius == 0.0 else "post" if radius < POST_RADIUS_M else "barrel"
 
 
 def rival_label(memory: Memory, t: int) -> str:
@@ -143,8 +136,8 @@ def rival_label(memory: Memory, t: int) -> str:
         nx, ny = line["normal_x"], line["normal_y"]
         dx, dy = x - line["origin_x"], y - line["origin_y"]
         along = -ny * dx + nx * dy
-        is_within = line["low"] - CORNER_M < along < line["high"] + CORNER_M
-        if is_within and abs(nx * dx + ny * dy - line["distance"]) < CORNER_M:
+        is_within = line["low"] - ROOM_CORNER_M < along < line["high"] + ROOM_CORNER_M
+        if is_within and abs(nx * dx + ny * dy - line["distance"]) < ROOM_CORNER_M:
             return "inside corner"
     return "edge"
 
@@ -176,7 +169,7 @@ def other_objects(
     for t in np.flatnonzero(circles["status"] != FREE).tolist():
         row = circle_row(memory, t)
         x, y, hits = row[0], row[1], row[5]
-        if hits < UNKNOWN_HITS or any(math.dist((x, y), (o.x, o.y)) < merge_m for o in named):
+        if hits < UNKNOWN_HITS_MIN or any(math.dist((x, y), (o.x, o.y)) < merge_m for o in named):
             continue
         probability = float(circles["probability"][t])
         is_rival = circles["status"][t] == ESTABLISHED and circles["kind"][t] >= models and probability >= least

@@ -8,16 +8,22 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from config.units import FOOT_M
 from perception.bayes.elements import HISTORY, Reading
 from perception.bayes.noise_estimation import add_roughness, choose_noise, noise_variance, tolerance_m
 from perception.bayes.pairing import make_segments
-from perception.bayes.parameters import SettingsRecord
+from perception.bayes.parameters import (
+    ASSOCIATION_MARGIN_M,
+    HYPOTHESES_PER_FIRING,
+    KEEPING_MARGIN_M,
+    STILL_COS,
+    STILL_M,
+)
 from perception.bayes.polygon_association import associate_polygons
 from perception.bayes.polygon_initiation import request_polygon
 from perception.bayes.range_fit import FAR
 from perception.bayes.reservoir import copy_reading, keep_reading
 from perception.bayes.scratch import PROPOSED, UNEXPLAINED, PairSegment
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import ESTABLISHED, FREE, TENTATIVE, CircleTracks, StateRecord
 from perception.bayes.track_initiation import initiate_circle
 from perception.bayes.track_selection import is_waiting
@@ -27,15 +33,6 @@ from perception.records import Records
 
 COORDINATE_MAX_M: Final = 0.5 * FAR
 """A position farther than this from the odometry's origin is invalid: ranges this long mean silence."""
-
-STILL_M: Final = 0.05 * FOOT_M
-STILL_COS: Final = 0.9998
-"""A reading is redundant if its sensor moved and turned less than this (1°) and its range is the same."""
-ASSOCIATION_MARGIN_M: Final = 0.004 * FOOT_M
-KEEPING_MARGIN_M: Final = 0.01 * FOOT_M
-"""Distance outside a beam at which a centre may lie for the reading to be associated and kept."""
-TRIES: Final = 2
-"""Greatest number of hypotheses computed per firing."""
 
 
 @kernel
@@ -263,7 +260,7 @@ def propose(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, made: int) 
         for model in range(p[0].polygon_count):
             tries += request_polygon(s, model, x, y, nx, ny)
         s[0].scratch.explained_by[at.reading] = PROPOSED
-        if tries >= TRIES:
+        if tries >= HYPOTHESES_PER_FIRING:
             return
 
 

@@ -12,8 +12,8 @@ import math
 
 from perception.bayes.elements import Reading
 from perception.bayes.noise_estimation import noise_variance, tolerance_m
-from perception.bayes.parameters import Settings
 from perception.bayes.reservoir import copy_reading
+from perception.bayes.settings_record import Settings
 from perception.bayes.state import ESTABLISHED, CircleTrack, State
 from perception.kernel import kernel
 from perception.records import Records

@@ -6,28 +6,24 @@ Paper §3.2, after McKerrow; each segment comes with its uncertainty.
 from __future__ import annotations
 
 import math
-from typing import Final
 
-from config.units import FOOT_M
 from perception.bayes.elements import HISTORY, Reading
 from perception.bayes.noise_estimation import noise_variance
-from perception.bayes.parameters import SettingsRecord
+from perception.bayes.parameters import (
+    BASELINE_MAX_M,
+    BASELINE_MIN_M,
+    BASELINES,
+    CELL_M,
+    MAPPED_LENGTH_MIN_M,
+    NEIGHBOUR_BASELINE_MAX_M,
+    NEIGHBOUR_BASELINE_MIN_M,
+)
 from perception.bayes.range_fit import FAR
 from perception.bayes.scratch import PairSegment
 from perception.bayes.segment_pairs import add_to_map, tangent
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import StateRecord
-from perception.bayes.track_initiation import CELL_M
 from perception.kernel import kernel
-
-BASELINE_M: Final = 0.5 * FOOT_M
-"""Shortest baseline of one sensor; the longer ones are twice and four times this."""
-BASELINES: Final = 3
-BASELINE_MAX_M: Final = 2.6 * FOOT_M
-NEIGHBOUR_MIN_M: Final = 0.3 * FOOT_M
-NEIGHBOUR_MAX_M: Final = 1.0 * FOOT_M
-"""Range of baselines of neighbours that did not fire together."""
-MAPPED_MIN_M: Final = 0.2 * FOOT_M
-"""Least length of a mapped segment: a shorter one's direction is too uncertain for the relaxation."""
 
 
 @kernel
@@ -78,7 +74,7 @@ def pair_in_time(s: StateRecord, p: SettingsRecord, i: int, time_s: float, var: 
         if time_s - sensor.times_s[at] > p[0].pair_gap_s:
             break
         base = math.hypot(q.x - old.x, q.y - old.y)
-        if base < BASELINE_M * (1 << step):
+        if base < BASELINE_MIN_M * (1 << step):
             continue
         if base > BASELINE_MAX_M:
             break
@@ -118,7 +114,10 @@ def pair_in_ring(s: StateRecord, p: SettingsRecord, i: int, m: int, time_s: floa
             at = (other.kept - 1) % HISTORY
             old = other.history[at]
             base = math.hypot(q.x - old.x, q.y - old.y)
-            if time_s - other.times_s[at] < p[0].pair_gap_s and NEIGHBOUR_MIN_M < base < NEIGHBOUR_MAX_M:
+            if (
+                time_s - other.times_s[at] < p[0].pair_gap_s
+                and NEIGHBOUR_BASELINE_MIN_M < base < NEIGHBOUR_BASELINE_MAX_M
+            ):
                 made = add_pair(s, p, i, old, var, made)
     return made
 
@@ -165,7 +164,7 @@ def make_segments(s: StateRecord, p: SettingsRecord, m: int, time_s: float) -> i
             made = pair_in_time(s, p, i, time_s, var, made)
             made = pair_in_ring(s, p, i, m, time_s, var, made)
     for k in range(made):
-        if scratch.segments[k].length > MAPPED_MIN_M:
+        if scratch.segments[k].length > MAPPED_LENGTH_MIN_M:
             map_segment(s, scratch.segments[k], time_s)
     s[0].segments_made += made
     return made

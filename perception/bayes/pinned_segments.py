@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perception.bayes.elements import BUCKET_CAPACITY, MappedSegment
+from perception.bayes.parameters import CELL_M
 from perception.bayes.segment_pairs import add_to_map
 from perception.bayes.state import Memory, StateRecord
-from perception.bayes.track_initiation import CELL_M
 from perception.kernel import Ints, kernel
 from perception.records import zeros
 

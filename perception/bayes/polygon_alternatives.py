@@ -3,37 +3,28 @@
 from __future__ import annotations
 
 import math
-from typing import Final
 
-from config.units import FOOT_M
-from perception.bayes.alternatives import SOFT
 from perception.bayes.elements import MAX_LINES, Reading
 from perception.bayes.noise_estimation import noise_variance, tolerance_m
-from perception.bayes.parameters import SettingsRecord
+from perception.bayes.parameters import FIT_SOFTNESS
+from perception.bayes.polygon_parameters import (
+    CIRCLE_FIT_STEPS,
+    CIRCLE_NEAR_M,
+    OVER_CIRCLE_LEAD_NAT,
+    POLYGON_WALL_BEHIND,
+    POLYGON_WALL_BEYOND_M,
+    POLYGON_WALL_ECHOES_MIN,
+    POLYGON_WALL_FRONT,
+    POLYGON_WALL_LENGTH_RADII,
+    POLYGON_WALL_SHARE,
+)
 from perception.bayes.range_fit import fit_circle, score_circle
 from perception.bayes.refine import bounded_exp
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import ESTABLISHED, FREE, CircleTracks, Line, PolygonTrack, StateRecord
 from perception.bayes.walls import off_and_along, reaches
 from perception.kernel import kernel
 from perception.records import Records
-
-WALL_ECHOES_MIN: Final = 12.0
-"""Least echoes of a line that replaces a body."""
-WALL_SIZE: Final = 3.0
-"""Least length of a wall, in inner radii."""
-WALL_BEHIND: Final = -1.15
-WALL_FRONT: Final = 0.7
-"""A body whose centre is this many inner radii behind a wall's face, or before it, is the wall, …"""
-WALL_SHARE: Final = 0.6
-"""… if the wall explains this many readings per hit of the body. (Bodies in a row have a line in common.)"""
-WALL_BEYOND_M: Final = 2.0 * FOOT_M
-"""Distance beyond the ends of a line at which a body may still be a part of it."""
-CIRCLE_NEAR_M: Final = 0.3 * FOOT_M
-"""Circles whose centres lie no farther than this off the farthest vertex stand in the same place."""
-LEAD_NAT: Final = 6.0
-"""Lead at which an established polygon removes a circle in its place."""
-FIT_STEPS: Final = 4
-"""Steps of a circle's fit."""
 
 
 @kernel
@@ -77,11 +68,16 @@ def is_part_of_wall(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> b
     var0, rel2 = noise_variance(s, p)
     for k in range(MAX_LINES):
         line = s[0].lines[k]
-        if line.echoes > WALL_ECHOES_MIN and line.high - line.low > max(p[0].associating_line_m, WALL_SIZE * inner):
+        if line.echoes > POLYGON_WALL_ECHOES_MIN and line.high - line.low > max(
+            p[0].associating_line_m, POLYGON_WALL_LENGTH_RADII * inner
+        ):
             off, along = off_and_along(line, track.x, track.y)
-            if reaches(line, along, WALL_BEYOND_M) and WALL_BEHIND * inner < off < WALL_FRONT * inner:
+            if (
+                reaches(line, along, POLYGON_WALL_BEYOND_M)
+                and POLYGON_WALL_BEHIND * inner < off < POLYGON_WALL_FRONT * inner
+            ):
                 tight = tolerance_m(p[0].half_resolution_m, var0 + rel2 * off * off)
-                if count_on_line(readings, line, p[0].cos_may_answer, tight) >= WALL_SHARE * track.hits:
+                if count_on_line(readings, line, p[0].cos_may_answer, tight) >= POLYGON_WALL_SHARE * track.hits:
                     return True
     return False
 
@@ -124,7 +120,16 @@ def best_circle(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> float
         radius = p[0].circles[k].radius_m
         behind = (radius - outline.inner_radius_m) / length
         if fit_circle(
-            readings, x + behind * ux, y + behind * uy, radius, p, SOFT, var0, rel2, FIT_STEPS, scratch.circle_fit
+            readings,
+            x + behind * ux,
+            y + behind * uy,
+            radius,
+            p,
+            FIT_SOFTNESS,
+            var0,
+            rel2,
+            CIRCLE_FIT_STEPS,
+            scratch.circle_fit,
         ):
             score_circle(
                 readings, scratch.circle_fit.x, scratch.circle_fit.y, radius, p, s[0].job.noise_level, scratch.score
@@ -157,7 +162,7 @@ def compare_circles(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, tra
         if circle.status != FREE and math.hypot(circle.x - track.x, circle.y - track.y) < around:
             prior = p[0].model_prior_nat if circle.kind < p[0].model_count else 0.0
             v = circle.log_likelihood_ratio + prior
-            if v < own - LEAD_NAT and track.status == ESTABLISHED and circle.marks == 0:
+            if v < own - OVER_CIRCLE_LEAD_NAT and track.status == ESTABLISHED and circle.marks == 0:
                 circle.status = FREE
             elif circle.status == ESTABLISHED:
                 total += bounded_exp(v - own)

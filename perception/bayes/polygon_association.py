@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import Final
 
 from perception.bayes.elements import MAX_POLYGONS, Reading
 from perception.bayes.noise_estimation import noise_variance, tolerance_m
-from perception.bayes.parameters import PolygonSide, SettingsRecord
-from perception.bayes.polygon_initiation import WHOLE
 from perception.bayes.polygon_job import cost
 from perception.bayes.polygon_likelihood import predict
+from perception.bayes.polygon_parameters import OVERLAP_RADII, WHOLE_SHARE
 from perception.bayes.polygon_readings import bears_on_polygon
 from perception.bayes.reservoir import copy_reading, keep_reading
 from perception.bayes.scratch import POLYGON
+from perception.bayes.settings_record import PolygonSide, SettingsRecord
 from perception.bayes.state import ESTABLISHED, FREE, CircleTracks, PolygonTrack, StateRecord
 from perception.kernel import kernel
 from perception.records import Records
-
-OVERLAP: Final = 1.8
-"""Two bodies whose centres are nearer than this, in inner radii, cannot both exist."""
 
 
 @kernel
@@ -68,7 +64,7 @@ def associate_polygons(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, 
         sides = outline.sides[: outline.side_count]
         x = track.x
         y = track.y
-        may_explain = track.status == ESTABLISHED and track.hits > WHOLE * track.near
+        may_explain = track.status == ESTABLISHED and track.hits > WHOLE_SHARE * track.near
         for i in range(m):
             q = s[0].scratch.fired[i]
             if not bears_on_polygon(q, x, y, outline.outer_radius_m, p):
@@ -133,7 +129,7 @@ def leave_to_next_neighbour(s: StateRecord, p: SettingsRecord, t: int) -> int:
     other_outline = p[0].polygons[other.model]
     inner, other_inner = outline.inner_radius_m, other_outline.inner_radius_m
     apart = math.hypot(other.x - own.x, other.y - own.y)
-    if apart > outline.outer_radius_m + p[0].gate_m + other_outline.outer_radius_m or apart < OVERLAP * inner:
+    if apart > outline.outer_radius_m + p[0].gate_m + other_outline.outer_radius_m or apart < OVERLAP_RADII * inner:
         return 1
     var0, _ = noise_variance(s, p)
     tight = tolerance_m(p[0].half_resolution_m, var0)

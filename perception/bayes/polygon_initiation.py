@@ -8,11 +8,9 @@ a trial is a job.
 from __future__ import annotations
 
 import math
-from typing import Final
 
-from config.units import FOOT_M
 from perception.bayes.elements import ATTRACTING_MAX, MAX_POLYGONS, REQUESTS_MAX, Reading
-from perception.bayes.parameters import SettingsRecord
+from perception.bayes.parameters import CELL_M
 from perception.bayes.polygon_job import (
     INITIATION,
     advance_search,
@@ -21,12 +19,35 @@ from perception.bayes.polygon_job import (
     score_pose,
     start_search,
 )
+from perception.bayes.polygon_parameters import (
+    APART,
+    APART_WHOLE,
+    CHALLENGE_UNSEEN,
+    COLLECTING_COST,
+    FINE_ROUNDS,
+    FINE_STEP_M,
+    POLYGON_AROUND_M,
+    POLYGON_HITS_MIN,
+    POLYGON_RELAXATION_STEPS,
+    POLYGON_RESTS_M,
+    POLYGON_RESTS_RAD,
+    REQUEST_SAME_COS,
+    REQUEST_SAME_M,
+    SIDE_SHIFTS,
+    TRIAL_EVIDENCE_MIN_NAT,
+    TRIAL_READINGS_MAX,
+    TRIAL_READINGS_MIN,
+    TRIAL_ROUNDS,
+    TRIAL_STEP_M,
+    WHOLE_SHARE,
+)
 from perception.bayes.polygon_readings import gather_polygon_history
 from perception.bayes.reservoir import copy_reading, keep_reading
 from perception.bayes.scratch import POLYGON
 from perception.bayes.segment_pairs import segments_near
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import ESTABLISHED, FREE, TENTATIVE, PolygonTrack, StateRecord
-from perception.bayes.track_initiation import CELL_M, enter_attracting, free_track, relax_hypothesis
+from perception.bayes.track_initiation import enter_attracting, free_track, relax_hypothesis
 from perception.bayes.track_labels import assign_number, clear_track, is_rejected
 from perception.kernel import kernel
 from perception.records import Records
@@ -34,40 +55,6 @@ from perception.records import Records
 LAY, TRY, FINE = range(3)
 """Stages of a hypothesis, values of `PolygonJob.stage`: a side is laid on the segment, tried, and the best trial is
 refined."""
-COLLECTING_COST: Final = 800
-"""The cost of collecting readings, in the unit of `polygon_job.QUANTUM`."""
-SAME_M: Final = 0.25 * FOOT_M
-SAME_COS: Final = 0.98
-"""A segment this near to another one, and this parallel, makes the same request."""
-AROUND_M: Final = 0.3 * FOOT_M
-"""Segments up to this far off the farthest vertex may attract the body."""
-RELAXATIONS: Final = 3
-NEGLIGIBLE_M: Final = 0.01 * FOOT_M
-NEGLIGIBLE_RAD: Final = 0.01
-"""Greatest number of relaxation steps; the relaxation ends with increments below both limits."""
-SHIFTS: Final = (-0.3, 0.0, 0.3)
-"""Where on a side the segment is laid, from its middle, in lengths of the side."""
-READINGS_MIN: Final = 8
-"""Least readings of a trial."""
-TRIAL_READINGS: Final = 80
-"""Greatest number of readings that a trial scores: it is only compared with the other trials."""
-TRIAL_STEP_M: Final = 0.2 * FOOT_M
-TRIAL_ROUNDS: Final = 8
-"""First step and rounds of a trial's search."""
-TRIAL_MIN_NAT: Final = 15.0
-"""Least evidence of the best trial."""
-FINE_STEP_M: Final = 0.1 * FOOT_M
-FINE_ROUNDS: Final = 10
-"""First step and rounds of the search from the best trial."""
-HITS_MIN: Final = 6.0
-"""Least hits of a new track."""
-WHOLE: Final = 0.9
-"""A track that explains this share of its near readings keeps its place …"""
-APART_WHOLE: Final = 1.5
-APART: Final = 0.5
-"""… and no like track starts this near, in inner radii; for any other track the distance is less."""
-CHALLENGE_UNSEEN: Final = 8
-"""Unseen readings that a challenger counts as."""
 
 
 @kernel
@@ -102,7 +89,7 @@ def occupant(s: StateRecord, p: SettingsRecord, model: int, x: float, y: float) 
     for t in range(MAX_POLYGONS):
         track = s[0].polygons[t]
         if track.status != FREE and track.model == model:
-            is_whole = track.status == ESTABLISHED and track.hits > WHOLE * track.near
+            is_whole = track.status == ESTABLISHED and track.hits > WHOLE_SHARE * track.near
             apart = (APART_WHOLE if is_whole else APART) * p[0].polygons[model].inner_radius_m
             if math.hypot(x - track.x, y - track.y) < apart:
                 return t
@@ -122,13 +109,18 @@ def relax_polygon(s: StateRecord, p: SettingsRecord, model: int) -> None:
     hypothesis = scratch.hypothesis
     outline = p[0].polygons[model]
     near = segments_near(
-        s[0].buckets, CELL_M, hypothesis.x, hypothesis.y, outline.outer_radius_m + AROUND_M, scratch.near
+        s[0].buckets, CELL_M, hypothesis.x, hypothesis.y, outline.outer_radius_m + POLYGON_AROUND_M, scratch.near
     )
     attracting = min(near, ATTRACTING_MAX)
     for j in range(attracting):
         enter_attracting(scratch.near[j], scratch.attracting[j])
     relax_hypothesis(
-        s, outline.relaxation_sides[: outline.side_count], attracting, NEGLIGIBLE_M, NEGLIGIBLE_RAD, RELAXATIONS
+        s,
+        outline.relaxation_sides[: outline.side_count],
+        attracting,
+        POLYGON_RESTS_M,
+        POLYGON_RESTS_RAD,
+        POLYGON_RELAXATION_STEPS,
     )
 
 
@@ -264,8 +256,8 @@ def request_polygon(s: StateRecord, model: int, x: float, y: float, nx: float, n
         it = s[0].requests[k]
         if (
             it.model == model
-            and math.hypot(x - it.x, y - it.y) < SAME_M
-            and nx * it.normal_x + ny * it.normal_y > SAME_COS
+            and math.hypot(x - it.x, y - it.y) < REQUEST_SAME_M
+            and nx * it.normal_x + ny * it.normal_y > REQUEST_SAME_COS
         ):
             return 0
     request = s[0].requests[job.requests_made % REQUESTS_MAX]
@@ -316,9 +308,9 @@ def lay_next(s: StateRecord, p: SettingsRecord) -> int:
     job = s[0].job
     model = job.model
     sides = p[0].polygons[model].side_count
-    k = job.next_step // len(SHIFTS)
+    k = job.next_step // len(SIDE_SHIFTS)
     if k >= ways_to_lie(p, model):
-        if job.best_nat < TRIAL_MIN_NAT:
+        if job.best_nat < TRIAL_EVIDENCE_MIN_NAT:
             end_job(s)
             return 1
         job.reading_count = gather_job_readings(s, p, model, job.best.x, job.best.y)
@@ -327,7 +319,7 @@ def lay_next(s: StateRecord, p: SettingsRecord) -> int:
         )  # fmt: skip
         job.stage = FINE
         return COLLECTING_COST
-    shift = SHIFTS[job.next_step % len(SHIFTS)]
+    shift = SIDE_SHIFTS[job.next_step % len(SIDE_SHIFTS)]
     face = 1.0 if k < sides else -1.0
     nx, ny = face * job.segment_normal_x, face * job.segment_normal_y
     lay_side(s, p, model, k % sides, shift, job.segment_x, job.segment_y, nx, ny)
@@ -336,9 +328,9 @@ def lay_next(s: StateRecord, p: SettingsRecord) -> int:
         relax_polygon(s, p, model)
     hypothesis = s[0].scratch.hypothesis
     job.reading_count = gather_job_readings(s, p, model, hypothesis.x, hypothesis.y)
-    if job.reading_count >= READINGS_MIN:
+    if job.reading_count >= TRIAL_READINGS_MIN:
         start_search(
-            s, hypothesis.x, hypothesis.y, hypothesis.heading, TRIAL_STEP_M, TRIAL_ROUNDS, TRIAL_READINGS
+            s, hypothesis.x, hypothesis.y, hypothesis.heading, TRIAL_STEP_M, TRIAL_ROUNDS, TRIAL_READINGS_MAX
         )  # fmt: skip
         job.stage = TRY
     return COLLECTING_COST
@@ -371,7 +363,7 @@ def advance_initiation(s: StateRecord, p: SettingsRecord, left: int) -> int:
         return spent
     evidence = score_pose(s, p, model, found.x, found.y, found.heading)
     score = s[0].scratch.score
-    if evidence >= p[0].unknown_nat * score.near and score.hits >= HITS_MIN:
+    if evidence >= p[0].unknown_nat * score.near and score.hits >= POLYGON_HITS_MIN:
         t = occupant(s, p, model, found.x, found.y)
         if t < 0:
             if not is_rejected(s, found.x, found.y, POLYGON + model, evidence):

@@ -8,18 +8,12 @@ have in common.
 
 from __future__ import annotations
 
-from typing import Final
-
 from perception.bayes.elements import Pose
-from perception.bayes.parameters import SettingsRecord
 from perception.bayes.polygon_likelihood import begin_search, continue_search, score_polygon
+from perception.bayes.polygon_parameters import READING_COST
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import StateRecord
 from perception.kernel import kernel
-
-QUANTUM: Final = 22_000
-"""Cost of a quantum, in predicted ranges of one side, or what takes as long."""
-READING_COST: Final = 3
-"""Cost of a reading, in sides, besides the model's own sides."""
 
 NO_JOB, INITIATION, REFINEMENT = range(3)
 """Values of `PolygonJob.kind`."""
@@ -27,7 +21,7 @@ NO_JOB, INITIATION, REFINEMENT = range(3)
 
 @kernel
 def cost(readings: int, every: int, sides: int) -> int:
-    """Return the cost of scoring one pose, in the unit of `QUANTUM`.
+    """Return the cost of scoring one pose, in the unit of `QUANTUM_COST`.
 
     Parameters
     ----------

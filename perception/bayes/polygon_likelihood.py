@@ -12,43 +12,33 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from config.units import FOOT_M
 from perception.bayes.elements import Reading
 from perception.bayes.likelihood import level_of, log_likelihood
-from perception.bayes.parameters import PolygonSide, SettingsRecord
-from perception.bayes.range_fit import DROP_NAT, DROP_SHARE
+from perception.bayes.parameters import DROP_OUT_NAT, DROP_OUT_SHARE
+from perception.bayes.polygon_parameters import (
+    DOUBTFUL_ANSWER_NAT,
+    EDGE_NAT_PER_M,
+    EDGE_REACH_M,
+    GRAZING_COS,
+    SEARCH_FINEST_M,
+    SEARCH_GAIN_MIN_NAT,
+    SEARCH_SHRINK,
+    SEARCH_TURN_RAD_PER_M,
+    SIDE_END_MARGIN_M,
+)
 from perception.bayes.scratch import Score
+from perception.bayes.settings_record import PolygonSide, SettingsRecord
 from perception.bayes.state import PoseSearch
 from perception.kernel import kernel
 from perception.records import Records
 
-CORNER_NAT: Final = 0.7
-"""Price of an answer that a mirror may give or not: about log 2. At a side's end or the beam's edge it costs nothing:
-all the readings of a sensor may then be heard, or none, and a price for each would turn the body until they must."""
-
-EDGE_REACH_M: Final = 1.0
-EDGE_NAT_PER_M: Final = 3.0 / FOOT_M
-"""A convex edge scatters 20 to 30 dB below a mirror's echo: an echo from beyond this costs this much per metre."""
-
 NO_ANSWER_M: Final = 1e18
 """A range that stands for no answer."""
-MARGIN_M: Final = 0.12 * FOOT_M
-"""A foot this near the end of its side need not answer: the accuracy of a pose."""
-GRAZING_COS: Final = 0.05
-"""An edge of the beam that is more parallel to a side than this does not meet it."""
 
 
 ALONG, ACROSS, TURN = range(3)
 """Axes of a search: along and across the body, and turn."""
-TURN_PER_M: Final = 0.7 / FOOT_M
-"""Ratio of a search's turn to its shift, rad/m: it moves the side of a body of 1.4 ft as far as the shift."""
 AXES: Final = 3
-SHRINK: Final = 0.5
-"""Factor on the steps when no move gains."""
-GAIN_MIN_NAT: Final = 1e-6
-"""Smallest score gain that counts as progress."""
-FINEST_M: Final = 0.005 * FOOT_M
-"""Step below which a search ends: a tenth of the resolution, narrower than the likelihood's plateau."""
 
 
 @kernel
@@ -111,7 +101,7 @@ def predict(
         lateral = ux * tx + uy * ty
         if 0.0 <= along <= length and height < foot and ahead >= cos_may:
             foot = height
-            foot_must = ahead >= cos_must and MARGIN_M < along < length - MARGIN_M
+            foot_must = ahead >= cos_must and SIDE_END_MARGIN_M < along < length - SIDE_END_MARGIN_M
         for end in range(2):
             across = end * length - along
             dot = height * ahead + across * lateral
@@ -138,7 +128,7 @@ def predict(
     must = foot_must or (must and nearest < NO_ANSWER_M)
     if foot < NO_ANSWER_M:
         return foot, foot_must, 0.0, nearest, must
-    price = CORNER_NAT
+    price = DOUBTFUL_ANSWER_NAT
     if is_closed and EDGE_REACH_M < corner < NO_ANSWER_M:
         first = sides[before]
         second = sides[after % len(sides)]
@@ -149,8 +139,8 @@ def predict(
 
 @kernel
 def surplus_nat(throughs: float, hits: float) -> float:
-    """Return the price (nat) of drop-outs beyond `DROP_SHARE` (and one)."""
-    return max(0.0, DROP_NAT * (throughs - DROP_SHARE * (hits + throughs) - 1.0))
+    """Return the price (nat) of drop-outs beyond `DROP_OUT_SHARE` (and one)."""
+    return max(0.0, DROP_OUT_NAT * (throughs - DROP_OUT_SHARE * (hits + throughs) - 1.0))
 
 
 @kernel
@@ -167,8 +157,8 @@ def score_polygon(
     else                        nothing
     ==========================  ===================================================
 
-    So each reading counts under either rule; of what must be heard, drop-outs beyond `DROP_SHARE` (and
-    one) cost `DROP_NAT` more each. The evidence is log((exp M + exp C) / 2) of the two sums.
+    So each reading counts under either rule; of what must be heard, drop-outs beyond `DROP_OUT_SHARE` (and
+    one) cost `DROP_OUT_NAT` more each. The evidence is log((exp M + exp C) / 2) of the two sums.
 
     Parameters
     ----------
@@ -286,7 +276,7 @@ def begin_search(
     x, y, heading : float
         Where it starts, m, rad.
     step_m : float
-        First step, m; turns go with it, by `TURN_PER_M`.
+        First step, m; turns go with it, by `SEARCH_TURN_RAD_PER_M`.
     rounds : int
         Rounds at most: the bound on the work.
     """
@@ -330,11 +320,15 @@ def continue_search(
             search.trial = 0
             continue
         axis = search.trial // 2
-        step = search.step_m * (TURN_PER_M if axis == TURN else 1.0) * (1.0 if search.trial % 2 == 1 else -1.0)
+        step = (
+            search.step_m
+            * (SEARCH_TURN_RAD_PER_M if axis == TURN else 1.0)
+            * (1.0 if search.trial % 2 == 1 else -1.0)
+        )
         x, y, heading = moved(search.x, search.y, search.heading, axis, step)
         v = score_polygon(readings, every, x, y, heading, sides, is_closed, p, noise, score)
         search.trial += 1
-        if v > search.log_likelihood_ratio + GAIN_MIN_NAT:
+        if v > search.log_likelihood_ratio + SEARCH_GAIN_MIN_NAT:
             search.x = x
             search.y = y
             search.heading = heading
@@ -345,8 +339,8 @@ def continue_search(
             search.trial = 0
             search.rounds_left -= 1
             if search.has_gained == 0:
-                search.step_m *= SHRINK
-                if search.step_m < FINEST_M:
+                search.step_m *= SEARCH_SHRINK
+                if search.step_m < SEARCH_FINEST_M:
                     search.rounds_left = 0
             search.has_gained = 0
     return scored

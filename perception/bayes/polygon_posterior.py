@@ -13,42 +13,39 @@ from typing import Final
 import numpy as np
 
 from perception.bayes.elements import LowerTriangle, Pose
-from perception.bayes.parameters import SettingsRecord
 from perception.bayes.polygon_job import cost, score_pose
 from perception.bayes.polygon_likelihood import score_polygon
+from perception.bayes.polygon_parameters import (
+    FIRST_SIGMA_M,
+    FIRST_SIGMA_RAD,
+    LATTICE_ATTEMPTS,
+    LATTICE_CORRELATION_SHARE,
+    LATTICE_LEAD_MAX_NAT,
+    LATTICE_NARROW,
+    LATTICE_OFF_CENTRE,
+    LATTICE_PITCH,
+    LATTICE_PITCHES_M,
+    LATTICE_PITCHES_RAD,
+    LATTICE_RADIUS2,
+    LATTICE_THINNEST,
+    LATTICE_WIDE,
+)
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import LatticeMoments, StateRecord
 from perception.kernel import kernel
 
-PITCH: Final = 1.3
-"""The lattice's pitch, in expected standard deviations, …"""
-REACH2: Final = 6
-"""… and its squared radius, in pitches: 81 points."""
 _CELLS: Final = np.stack(np.meshgrid(*3 * [np.arange(-3, 4)], indexing="ij"), axis=-1).reshape(-1, 3)
-LATTICE: Final = np.ascontiguousarray(_CELLS[(_CELLS**2).sum(axis=1) <= REACH2]).astype(np.int64)
-_NORMAL: Final = np.exp(-0.5 * PITCH**2 * (LATTICE**2).sum(axis=1))
+LATTICE: Final = np.ascontiguousarray(_CELLS[(_CELLS**2).sum(axis=1) <= LATTICE_RADIUS2]).astype(np.int64)
+_NORMAL: Final = np.exp(-0.5 * LATTICE_PITCH**2 * (LATTICE**2).sum(axis=1))
 CUT: Final = float((_NORMAL * LATTICE[:, 0] ** 2).sum() / _NORMAL.sum())
 """Variance of a normal distribution of the expected width, summed on the lattice, in squared pitches."""
-CUT_OFF: Final = PITCH**2 * CUT
+CUT_OFF: Final = LATTICE_PITCH**2 * CUT
 """The same in squared standard deviations: one, but for the tails that are cut off."""
-ATTEMPTS: Final = 5
-"""Greatest number of lattices laid for a track: the bound on the work."""
-LEAD_MAX_NAT: Final = 40.0
-"""Greatest lead of a point over the middle that counts."""
-OFF_CENTRE: Final = 0.7
-"""The lattice is laid again when the mean is this many pitches off its middle, …"""
-NARROW: Final = 0.7 * CUT
-WIDE: Final = 1.4 * CUT
-"""… or a variance lies outside these, in squared pitches."""
-THINNEST: Final = 0.1 * CUT
+NARROW: Final = LATTICE_NARROW * CUT
+WIDE: Final = LATTICE_WIDE * CUT
+"""The lattice is laid again when a variance lies outside these, in squared pitches."""
+THINNEST: Final = LATTICE_THINNEST * CUT
 """Least variance, in squared pitches, that the next lattice assumes: a narrower peak falls between the points."""
-CORRELATION_SHARE: Final = 0.95
-"""Share of a correlation that the next lattice assumes, so that it never collapses."""
-PITCH_M: Final = (1e-4, 0.15)
-PITCH_RAD: Final = (1e-4, 0.4)
-"""Least and greatest pitch."""
-FIRST_M: Final = 0.01
-FIRST_RAD: Final = 0.02
-"""Standard deviations assumed for a track's first lattice."""
 
 
 @kernel
@@ -78,13 +75,21 @@ def copy_triangle(source: LowerTriangle, target: LowerTriangle) -> None:
 
 @kernel
 def write_pitch(cov: LowerTriangle, root: LowerTriangle) -> None:
-    """Write one pitch of the lattice, `PITCH` lower Cholesky roots of a covariance, within bounds, to `root`."""
-    root.xx = clip(PITCH * math.sqrt(cov.xx), PITCH_M[0], PITCH_M[1])
-    root.yx = clip(PITCH**2 * cov.yx / root.xx, -PITCH_M[1], PITCH_M[1])
-    root.yy = clip(math.sqrt(max(PITCH**2 * cov.yy - root.yx**2, 0.0)), PITCH_M[0], PITCH_M[1])
-    root.hx = clip(PITCH**2 * cov.hx / root.xx, -PITCH_RAD[1], PITCH_RAD[1])
-    root.hy = clip((PITCH**2 * cov.hy - root.hx * root.yx) / root.yy, -PITCH_RAD[1], PITCH_RAD[1])
-    root.hh = clip(math.sqrt(max(PITCH**2 * cov.hh - root.hx**2 - root.hy**2, 0.0)), PITCH_RAD[0], PITCH_RAD[1])
+    """Write one pitch of the lattice to `root`: `LATTICE_PITCH` Cholesky roots of a covariance, within bounds."""
+    root.xx = clip(LATTICE_PITCH * math.sqrt(cov.xx), LATTICE_PITCHES_M[0], LATTICE_PITCHES_M[1])
+    root.yx = clip(LATTICE_PITCH**2 * cov.yx / root.xx, -LATTICE_PITCHES_M[1], LATTICE_PITCHES_M[1])
+    root.yy = clip(
+        math.sqrt(max(LATTICE_PITCH**2 * cov.yy - root.yx**2, 0.0)), LATTICE_PITCHES_M[0], LATTICE_PITCHES_M[1]
+    )
+    root.hx = clip(LATTICE_PITCH**2 * cov.hx / root.xx, -LATTICE_PITCHES_RAD[1], LATTICE_PITCHES_RAD[1])
+    root.hy = clip(
+        (LATTICE_PITCH**2 * cov.hy - root.hx * root.yx) / root.yy, -LATTICE_PITCHES_RAD[1], LATTICE_PITCHES_RAD[1]
+    )
+    root.hh = clip(
+        math.sqrt(max(LATTICE_PITCH**2 * cov.hh - root.hx**2 - root.hy**2, 0.0)),
+        LATTICE_PITCHES_RAD[0],
+        LATTICE_PITCHES_RAD[1],
+    )
 
 
 @kernel
@@ -128,7 +133,7 @@ def score_lattice(s: StateRecord, p: SettingsRecord, model: int, begin: int, end
         v = score_polygon(
             readings, 1, x, y, heading, sides, outline.is_closed > 0, p, job.noise_level, s[0].scratch.score
         )  # fmt: skip
-        share = math.exp(min(v - job.middle_nat, LEAD_MAX_NAT))
+        share = math.exp(min(v - job.middle_nat, LATTICE_LEAD_MAX_NAT))
         moments.mass += share
         moments.a += share * i
         moments.b += share * j
@@ -185,9 +190,9 @@ def leave_frame(pose: Pose, root: LowerTriangle, moments: LatticeMoments, cov: L
     v00 = max(moments.aa, THINNEST) / CUT_OFF
     v11 = max(moments.bb, THINNEST) / CUT_OFF
     v22 = max(moments.cc, THINNEST) / CUT_OFF
-    v10 = CORRELATION_SHARE * moments.ab / CUT_OFF
-    v20 = CORRELATION_SHARE * moments.ac / CUT_OFF
-    v21 = CORRELATION_SHARE * moments.bc / CUT_OFF
+    v10 = LATTICE_CORRELATION_SHARE * moments.ab / CUT_OFF
+    v20 = LATTICE_CORRELATION_SHARE * moments.ac / CUT_OFF
+    v21 = LATTICE_CORRELATION_SHARE * moments.bc / CUT_OFF
     # root · v, whose rows times those of root are the covariance's entries
     l00, l10, l11, l20, l21, l22 = root.xx, root.yx, root.yy, root.hx, root.hy, root.hh
     m10 = l10 * v00 + l11 * v10
@@ -241,12 +246,12 @@ def begin_lattice(s: StateRecord, p: SettingsRecord, model: int, t: int) -> None
     job.middle.heading = track.heading
     copy_triangle(track.covariance, job.covariance)
     if track.covariance.xx <= 0.0:
-        job.covariance.xx = FIRST_M**2
+        job.covariance.xx = FIRST_SIGMA_M**2
         job.covariance.yx = 0.0
-        job.covariance.yy = FIRST_M**2
+        job.covariance.yy = FIRST_SIGMA_M**2
         job.covariance.hx = 0.0
         job.covariance.hy = 0.0
-        job.covariance.hh = FIRST_RAD**2
+        job.covariance.hh = FIRST_SIGMA_RAD**2
     job.lattices = 0
     lay_lattice(s, p, model)
 
@@ -256,8 +261,8 @@ def advance_lattice(s: StateRecord, p: SettingsRecord, model: int, left: int) ->
     """Score points of the lattice for the rest of a quantum, at least one; return the cost.
 
     Where the mass of a scored lattice is off the middle, or not about as wide as expected, the frame moves to it
-    and the lattice is laid again, `ATTEMPTS` times at most. The job's `lattices` is `ATTEMPTS` when all is done; mean
-    and covariance are then its `middle` and `covariance`.
+    and the lattice is laid again, `LATTICE_ATTEMPTS` times at most. The job's `lattices` is `LATTICE_ATTEMPTS` when
+    all is done; mean and covariance are then its `middle` and `covariance`.
 
     Parameters
     ----------
@@ -282,9 +287,9 @@ def advance_lattice(s: StateRecord, p: SettingsRecord, model: int, left: int) ->
         narrowest = min(moments.aa, moments.bb, moments.cc)
         widest = max(moments.aa, moments.bb, moments.cc)
         job.lattices += 1
-        if off < OFF_CENTRE and narrowest > NARROW and widest < WIDE:
-            job.lattices = ATTEMPTS
-        if job.lattices < ATTEMPTS:
+        if off < LATTICE_OFF_CENTRE and narrowest > NARROW and widest < WIDE:
+            job.lattices = LATTICE_ATTEMPTS
+        if job.lattices < LATTICE_ATTEMPTS:
             lay_lattice(s, p, model)
     spent: int = (end - begin) * each
     return spent

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from perception.bayes.elements import HISTORY, Reading
-from perception.bayes.parameters import SettingsRecord
 from perception.bayes.reservoir import copy_reading
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import StateRecord
 from perception.kernel import kernel
 

@@ -8,17 +8,14 @@ rounded: the pose is the middle of the plateau, and the plateau's width is the u
 from __future__ import annotations
 
 import math
-from typing import Final
 
 from perception.bayes.elements import MAX_POLYGONS
-from perception.bayes.naming import POLYGON_PROBABILITY, is_sure_polygon
-from perception.bayes.parameters import SettingsRecord
+from perception.bayes.naming import is_sure_polygon
 from perception.bayes.polygon_alternatives import compare_circles, is_part_of_wall
-from perception.bayes.polygon_association import OVERLAP, leave_to_next_neighbour
+from perception.bayes.polygon_association import leave_to_next_neighbour
 from perception.bayes.polygon_initiation import advance_initiation, next_request
 from perception.bayes.polygon_job import (
     NO_JOB,
-    QUANTUM,
     REFINEMENT,
     advance_search,
     copy_pose,
@@ -27,14 +24,30 @@ from perception.bayes.polygon_job import (
     is_search_over,
     score_pose,
 )
-from perception.bayes.polygon_posterior import ATTEMPTS, advance_lattice, begin_lattice, copy_triangle
+from perception.bayes.polygon_parameters import (
+    FITTING_SHARE,
+    LATTICE_ATTEMPTS,
+    MANY_HITS,
+    MANY_HITS_SURE,
+    OVERLAP_RADII,
+    POLYGON_DOUBT_PROBABILITY,
+    POLYGON_DOUBT_SHARE,
+    POLYGON_ESTABLISH_HITS,
+    POLYGON_ESTABLISH_PROBABILITY,
+    POLYGON_ESTABLISH_SURE,
+    POLYGON_EVIDENCE_MIN_NAT,
+    POLYGON_PROBABILITY,
+    POLYGON_UNKNOWN_LEAD_NAT,
+    QUANTUM_COST,
+    RESTART_GAIN_NAT,
+    TWIN_RADII,
+)
+from perception.bayes.polygon_posterior import advance_lattice, begin_lattice, copy_triangle
 from perception.bayes.pose_restarts import (
     ASSIGN,
-    FITTING,
     JUDGE,
     LATTICE,
     RESTART,
-    RESTART_GAIN_NAT,
     SEARCH_NEAR,
     SEARCH_WIDE,
     begin_pose_search,
@@ -42,25 +55,11 @@ from perception.bayes.pose_restarts import (
     next_restart,
 )
 from perception.bayes.reservoir import copy_reservoir
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, TENTATIVE, CircleTracks, PolygonTrack, StateRecord
 from perception.bayes.track_labels import drop_track, outlives
 from perception.bayes.track_selection import choose_polygon
 from perception.kernel import kernel
-
-EVIDENCE_MIN_NAT: Final = 5.0
-UNKNOWN_LEAD_NAT: Final = 8.0
-"""A track ends with evidence below the first, or below an unknown object's by the second."""
-ESTABLISH: Final = 0.9
-ESTABLISH_HITS: Final = 10.0
-ESTABLISH_SURE: Final = 3.0
-MANY_HITS: Final = 20.0
-MANY_SURE: Final = 2.0
-"""Least probability, hits and sure hits (fewer with many hits) to establish a track: corners alone fit anywhere."""
-DOUBT: Final = 0.3
-DOUBT_SHARE: Final = 0.75
-"""A track less probable, or that explains less of its near readings, is tentative again."""
-TWIN: Final = 0.4
-"""Two bodies whose centres are nearer than this, in inner radii, are one."""
 
 
 @kernel
@@ -77,17 +76,20 @@ def update_status(s: StateRecord, p: SettingsRecord, track: PolygonTrack) -> Non
         Updated.
     """
     evidence = track.log_likelihood_ratio
-    if evidence < EVIDENCE_MIN_NAT or evidence < p[0].unknown_polygon_nat * track.near - UNKNOWN_LEAD_NAT:
+    if (
+        evidence < POLYGON_EVIDENCE_MIN_NAT
+        or evidence < p[0].unknown_polygon_nat * track.near - POLYGON_UNKNOWN_LEAD_NAT
+    ):
         drop_track(track)
     elif track.status == TENTATIVE:
-        is_fitting = track.hits > FITTING * track.near
-        sure = ESTABLISH_SURE if track.hits < MANY_HITS else MANY_SURE
-        is_heard = track.hits >= ESTABLISH_HITS and track.sure_hits >= sure
-        if track.probability > ESTABLISH and is_fitting and is_heard:
+        is_fitting = track.hits > FITTING_SHARE * track.near
+        sure = POLYGON_ESTABLISH_SURE if track.hits < MANY_HITS else MANY_HITS_SURE
+        is_heard = track.hits >= POLYGON_ESTABLISH_HITS and track.sure_hits >= sure
+        if track.probability > POLYGON_ESTABLISH_PROBABILITY and is_fitting and is_heard:
             s[0].job.stage = LATTICE
             if track.covariance.xx > 0.0:
                 track.status = ESTABLISHED
-    elif track.probability < DOUBT or track.hits < DOUBT_SHARE * track.near:
+    elif track.probability < POLYGON_DOUBT_PROBABILITY or track.hits < POLYGON_DOUBT_SHARE * track.near:
         track.status = TENTATIVE
     else:
         s[0].job.stage = LATTICE
@@ -113,8 +115,8 @@ def merge_polygons(s: StateRecord, p: SettingsRecord, t: int) -> None:
         if k == t or other.status == FREE:
             continue
         d = math.hypot(other.x - track.x, other.y - track.y)
-        is_twin = d < TWIN * inner
-        if not is_twin and d >= OVERLAP * inner:
+        is_twin = d < TWIN_RADII * inner
+        if not is_twin and d >= OVERLAP_RADII * inner:
             continue
         has_more = other.log_likelihood_ratio > track.log_likelihood_ratio
         is_marked = track.marks != 0 or other.marks != 0
@@ -237,7 +239,7 @@ def advance_refinement(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, 
             end_job(s)
         return cost((1 + p[0].circle_count) * job.reading_count, 1, p[0].polygons[model].side_count)
     spent = advance_lattice(s, p, model, left)
-    if job.lattices == ATTEMPTS:
+    if job.lattices == LATTICE_ATTEMPTS:
         track.x = job.middle.x
         track.y = job.middle.y
         track.heading = job.middle.heading
@@ -268,7 +270,7 @@ def polygon_quantum(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, thr
                 return False
         elif not next_request(s) and not begin_refinement(s, p, threshold):
             return False
-    left = QUANTUM
+    left = QUANTUM_COST
     while left > 0 and job.kind != NO_JOB:
         left -= advance_refinement(s, tracks, p, left) if job.kind == REFINEMENT else advance_initiation(s, p, left)
     return True

@@ -7,44 +7,33 @@ lying on another of its sides.
 from __future__ import annotations
 
 import math
-from typing import Final
 
-from config.units import FOOT_M
-from perception.bayes.parameters import PolygonSide, SettingsRecord
 from perception.bayes.polygon_initiation import lay_side, ways_to_lie
 from perception.bayes.polygon_job import start_search
 from perception.bayes.polygon_likelihood import ACROSS, ALONG, moved
+from perception.bayes.polygon_parameters import (
+    COARSE_READINGS,
+    FITTING_SHARE,
+    NARROW_ROUNDS,
+    NARROW_STEP_M,
+    RESTART_ROLLS_MAX,
+    RESTART_ROUNDS,
+    RESTART_SHIFTS,
+    RESTART_STEP_M,
+    RESTART_TURNS,
+    SEARCH_EVERY,
+    WIDE_ROUNDS,
+    WIDE_SEARCH_EVERY,
+    WIDE_SEARCHES_FIRST,
+    WIDE_STEP_M,
+)
+from perception.bayes.settings_record import PolygonSide, SettingsRecord
 from perception.bayes.state import StateRecord
 from perception.kernel import kernel
 from perception.records import Records
 
 ASSIGN, SEARCH_WIDE, RESTART, SEARCH_NEAR, JUDGE, LATTICE = range(6)
 """Stages of a refinement, values of `PolygonJob.stage`."""
-COARSE_READINGS: Final = 96
-"""Greatest number of readings that a wide search scores."""
-SEARCH_EVERY: Final = 4
-"""A pose whose covariance is known and that explains its readings is searched only once in this many refinements."""
-YOUNG: Final = 4
-WIDE_EVERY: Final = 8
-"""The search is wide in this many first refinements, then in every `WIDE_EVERY`-th, …"""
-FITTING: Final = 0.85
-"""… and every other time while less than this share of the near readings is explained."""
-WIDE_STEP_M: Final = 0.3 * FOOT_M
-WIDE_ROUNDS: Final = 14
-NARROW_STEP_M: Final = 0.05 * FOOT_M
-NARROW_ROUNDS: Final = 6
-"""First step and rounds of either search."""
-RESTART_SHIFTS: Final = (0.5, -0.5, 1.0, -1.0)
-"""Shifts of the restarts along and across, in inner radii, …"""
-RESTART_TURNS: Final = (-0.5, 0.5)
-"""… turns, in π over the order of the symmetry, …"""
-ROLLS_MAX: Final = 12
-"""… and greatest number of other sides that they are rolled onto."""
-RESTART_STEP_M: Final = 0.1 * FOOT_M
-RESTART_ROUNDS: Final = 5
-"""First step and rounds of their searches."""
-RESTART_GAIN_NAT: Final = 1.0
-"""Gain required of another maximum."""
 
 
 @kernel
@@ -53,11 +42,16 @@ def begin_pose_search(s: StateRecord, t: int) -> None:
     track = s[0].polygons[t]
     job = s[0].job
     count = track.refinements
-    is_fitting = track.hits >= FITTING * track.near
+    is_fitting = track.hits >= FITTING_SHARE * track.near
     job.best.x = track.x
     job.best.y = track.y
     job.best.heading = track.heading
-    if count < YOUNG or count % WIDE_EVERY == 0 or track.has_challenger > 0 or (not is_fitting and count % 2 == 0):
+    if (
+        count < WIDE_SEARCHES_FIRST
+        or count % WIDE_SEARCH_EVERY == 0
+        or track.has_challenger > 0
+        or (not is_fitting and count % 2 == 0)
+    ):
         start_search(s, track.x, track.y, track.heading, WIDE_STEP_M, WIDE_ROUNDS, COARSE_READINGS)
         job.stage = SEARCH_WIDE
     elif track.covariance.xx > 0.0 and is_fitting and count % SEARCH_EVERY != 0:
@@ -142,7 +136,7 @@ def roll(s: StateRecord, p: SettingsRecord, model: int, k: int) -> bool:
     outline = p[0].polygons[model]
     sides = outline.sides[: outline.side_count]
     ways = ways_to_lie(p, model)
-    if k >= min(ways, ROLLS_MAX + 1):
+    if k >= min(ways, RESTART_ROLLS_MAX + 1):
         return False
     side, face = facing_side(s, sides, outline.is_closed > 0)
     c = math.cos(middle.heading)

@@ -13,8 +13,17 @@ from typing import Final
 
 from perception.bayes.elements import Reading
 from perception.bayes.likelihood import level_of, log_likelihood
-from perception.bayes.parameters import Settings
+from perception.bayes.parameters import (
+    DROP_OUT_NAT,
+    DROP_OUT_SHARE,
+    FIT_DAMPING,
+    FIT_STEP_MAX_GATES,
+    FIT_STEP_MIN_GATES,
+    FIT_TURN_MAX_RAD,
+    FIT_TURN_MIN_RAD,
+)
 from perception.bayes.scratch import CircleFit, LineFit, LineScore, Score
+from perception.bayes.settings_record import Settings
 from perception.kernel import kernel
 from perception.records import Records
 
@@ -23,27 +32,6 @@ FAR: Final = 1e6
 
 NONE_YET: Final = 1e9
 """Initial least range and extent (m) of an object without a hit."""
-
-DROP_SHARE: Final = 0.2
-"""Drop-outs are a matter of the sensor up to this share of what should have hit (and one more) …"""
-
-DROP_NAT: Final = 2.0
-"""… and each further one costs this much more, nat: many drop-outs indicate an absent body."""
-
-DAMPING: Final = 0.02
-"""Share of the information that holds a fit where it is, so that unobserved directions do not move."""
-
-STEP_MAX_GATES: Final = 0.8
-"""Longest step of a circle's fit, in gates: a longer one would leave the readings that it came from."""
-
-STEP_MIN_GATES: Final = 4e-4
-"""A step below this many gates ends a circle's fit."""
-
-TURN_MAX: Final = 0.2
-"""Longest turn of a line's fit, rad."""
-
-TURN_MIN: Final = 1e-5
-"""A turn below this ends a line's fit, rad."""
 
 NO_INFORMATION: Final = 1e-12
 """Information (in single perfect readings) that a fit starts from, to be regular without echoes."""
@@ -130,9 +118,9 @@ def score_circle(
         elif ahead >= cos_must * d:
             llr += short
             shorts += 1.0
-    extra = misses - DROP_SHARE * (hits + misses)
+    extra = misses - DROP_OUT_SHARE * (hits + misses)
     if extra > 1.0:
-        llr -= DROP_NAT * (extra - 1.0)
+        llr -= DROP_OUT_NAT * (extra - 1.0)
     score.log_likelihood_ratio = llr
     score.hits = hits
     score.misses = misses
@@ -198,19 +186,19 @@ def fit_circle(
             c += g * dy * dy
             gx += g * dx * e
             gy += g * dy * e
-        held = DAMPING * (a + c)
+        held = FIT_DAMPING * (a + c)
         det = (a + held) * (c + held) - b * b
         if det <= 0.0:
             return False
         sx = ((c + held) * gx - b * gy) / det
         sy = ((a + held) * gy - b * gx) / det
         step = math.sqrt(sx * sx + sy * sy)
-        if step > STEP_MAX_GATES * gate:
-            sx *= STEP_MAX_GATES * gate / step
-            sy *= STEP_MAX_GATES * gate / step
+        if step > FIT_STEP_MAX_GATES * gate:
+            sx *= FIT_STEP_MAX_GATES * gate / step
+            sy *= FIT_STEP_MAX_GATES * gate / step
         x += sx
         y += sy
-        if step < STEP_MIN_GATES * gate:
+        if step < FIT_STEP_MIN_GATES * gate:
             break
     fit.x = x
     fit.y = y
@@ -264,15 +252,15 @@ def fit_line(
             h11 += g
             g0 += g * lever * e
             g1 += g * e
-        h00 *= 1.0 + DAMPING
-        h11 *= 1.0 + DAMPING
+        h00 *= 1.0 + FIT_DAMPING
+        h11 *= 1.0 + FIT_DAMPING
         det = h00 * h11 - h01 * h01
         if det <= 1e-3 * NO_INFORMATION / var0:  # no reading took part
             break
         turn = (h11 * g0 - h01 * g1) / det
-        alpha += min(TURN_MAX, max(-TURN_MAX, turn))
+        alpha += min(FIT_TURN_MAX_RAD, max(-FIT_TURN_MAX_RAD, turn))
         c += (h00 * g1 - h01 * g0) / det
-        if abs(turn) < TURN_MIN:
+        if abs(turn) < FIT_TURN_MIN_RAD:
             break
     fit.normal_x = math.cos(alpha)
     fit.normal_y = math.sin(alpha)

@@ -10,65 +10,57 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from config.units import FOOT_M
-from perception.bayes.alternatives import SOFT, fit_other_circle, fit_other_line, score
+from perception.bayes.alternatives import fit_other_circle, fit_other_line, score
 from perception.bayes.circle_posterior import posterior_circle
 from perception.bayes.corner_model import score_corner
 from perception.bayes.elements import MAX_LINES
-from perception.bayes.lateral_search import STEP_M, search_across
+from perception.bayes.lateral_search import search_across
 from perception.bayes.naming import update_name
 from perception.bayes.noise_estimation import add_residuals, noise_variance
 from perception.bayes.occlusion import keep_relevant
-from perception.bayes.parameters import SettingsRecord
+from perception.bayes.parameters import (
+    ALTERNATIVE_STEPS,
+    APART_RADII,
+    CENTRE_VARIANCE_MAX_M2,
+    CERTAIN_PROBABILITY,
+    CIRCLE_WALL_BEHIND,
+    CIRCLE_WALL_BEYOND_M,
+    CIRCLE_WALL_FRONT,
+    CORNER_MISS_SHARE,
+    DOUBT_PROBABILITY,
+    DOUBTED_DISPERSION_SHARE,
+    ESTABLISH_HITS,
+    ESTABLISH_PROBABILITY,
+    ESTABLISH_ROOT_M,
+    FIT_LEAD_SIGMAS2,
+    FIT_SOFTNESS,
+    FITTED_REFINEMENTS,
+    IN_WALL_NAT,
+    LATERAL_STEP_M,
+    LINE_LENGTH_MIN_M,
+    LINE_PRIOR_NAT,
+    LOST_NAT,
+    REPLACING_LINE_HITS_MIN,
+    ROOT_CORRELATION_MAX,
+    ROOT_VARIANCE_MIN_M2,
+    SWITCH_LEAD_NAT,
+    SWITCH_ROOT_M,
+    SWITCH_UNSEEN,
+    TENTATIVE_FIT_STEPS,
+    TRACK_FIT_STEPS,
+    TRACK_READINGS_MIN,
+    UNKNOWN_LEAD_NAT,
+    UNSURE_ROOT_M,
+)
 from perception.bayes.range_fit import fit_circle
 from perception.bayes.reservoir import copy_reservoir
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, TENTATIVE, CircleTrack, CircleTracks, StateRecord
-from perception.bayes.track_initiation import LINE_MIN_M, SWITCH_NAT, VARIANCE_MAX_M2
 from perception.bayes.track_labels import drop_track, is_rejected, outlives
-from perception.bayes.track_selection import CERTAIN, UNSURE_ROOT_M, choose_circle, is_waiting
+from perception.bayes.track_selection import choose_circle, is_waiting
 from perception.bayes.walls import add_line, is_wall, off_and_along, reaches
 from perception.kernel import kernel
 
-READINGS_MIN: Final = 3
-"""A track with fewer readings ends."""
-FIT_STEPS: Final = 2
-FIRST_FIT_STEPS: Final = 3
-"""Steps of the fit that precedes the posterior; of a tentative track."""
-FIT_LEAD: Final = 6.0
-"""A robust fit this many σ² off (and the first two refinements) replaces the pose."""
-YOUNG: Final = 2
-LOST_NAT: Final = 2.0
-"""Loss of evidence at the mean, against the start, at which it has left the beams that heard the object."""
-CORRELATION_MAX: Final = 0.9
-ROOT_MIN_M2: Final = 1e-6 * FOOT_M * FOOT_M
-"""Bounds of the covariance assumed for a fit."""
-SWITCH_ROOT_M: Final = 0.02 * FOOT_M
-"""Least root of the covariance with which the pose is searched after a change of kind."""
-SWITCH_UNSEEN: Final = 4
-"""Unseen readings that a change of kind counts as."""
-ALTERNATIVE_STEPS: Final = 4
-"""Steps of an alternative's fit."""
-LINE_HITS_MIN: Final = 6.0
-"""Least hits of a line that is kept when it replaces a circle."""
-MISS_SHARE: Final = 0.5
-"""Share of the evidence of missed echoes against the circle that also counts against a corner."""
-WALL_BEYOND_M: Final = 8.0 * FOOT_M
-WALL_BEHIND: Final = -0.85
-WALL_FRONT: Final = 0.7
-IN_WALL_NAT: Final = -8.0
-"""Log prior of a body whose centre lies in a wall, or within this many radii behind or before it."""
-LINE_PRIOR_NAT: Final = 1.0
-"""Log prior ratio of walls to models."""
-UNKNOWN_LEAD_NAT: Final = 6.0
-"""Lead of an unknown object at which a track ends."""
-ESTABLISH: Final = 0.7
-ESTABLISH_HITS: Final = 8.0
-ESTABLISH_ROOT_M: Final = 0.25 * FOOT_M
-"""Least probability and hits, and greatest standard deviation, at which a track is established."""
-DOUBT: Final = 0.2
-"""Probability below which an established track is tentative again."""
-APART: Final = 0.8
-"""Two centres nearer than this share of the larger radius are one object: bodies do not overlap."""
 EXPONENT_MAX: Final = 60.0
 """Exponents are clipped to ± this: what lies beyond is negligible in a sum."""
 
@@ -90,24 +82,27 @@ def fit_start(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> 
     """
     fit = s[0].scratch.circle_fit
     var0, rel2 = noise_variance(s, p)
-    steps = FIRST_FIT_STEPS if track.status == TENTATIVE else FIT_STEPS
+    steps = TENTATIVE_FIT_STEPS if track.status == TENTATIVE else TRACK_FIT_STEPS
     if not fit_circle(
-        s[0].scratch.readings[:n], track.x, track.y, track.radius, p, SOFT, var0, rel2, steps, fit
+        s[0].scratch.readings[:n], track.x, track.y, track.radius, p, FIT_SOFTNESS, var0, rel2, steps, fit
     ):  # fmt: skip
         return
     h00, h01, h11 = fit.information_xx, fit.information_xy, fit.information_yy
     det = h00 * h11 - h01 * h01
     dx = fit.x - track.x
     dy = fit.y - track.y
-    if det > 0.0 and (h00 * dx * dx + 2.0 * h01 * dx * dy + h11 * dy * dy > FIT_LEAD or track.refinements <= YOUNG):
+    if det > 0.0 and (
+        h00 * dx * dx + 2.0 * h01 * dx * dy + h11 * dy * dy > FIT_LEAD_SIGMAS2
+        or track.refinements <= FITTED_REFINEMENTS
+    ):
         track.x = fit.x
         track.y = fit.y
-        c00 = min(h11 / det, VARIANCE_MAX_M2)
-        c11 = min(h00 / det, VARIANCE_MAX_M2)
-        limit = CORRELATION_MAX * math.sqrt(c00 * c11)
+        c00 = min(h11 / det, CENTRE_VARIANCE_MAX_M2)
+        c11 = min(h00 / det, CENTRE_VARIANCE_MAX_M2)
+        limit = ROOT_CORRELATION_MAX * math.sqrt(c00 * c11)
         track.root_xx = math.sqrt(c00)
         track.root_yx = min(limit, max(-limit, -h01 / det)) / track.root_xx
-        track.root_yy = math.sqrt(max(c11 - track.root_yx**2, ROOT_MIN_M2))
+        track.root_yy = math.sqrt(max(c11 - track.root_yx**2, ROOT_VARIANCE_MIN_M2))
 
 
 @kernel
@@ -125,8 +120,8 @@ def locate(s: StateRecord, p: SettingsRecord, track: CircleTrack, n: int) -> Non
     """
     fit_start(s, p, track, n)
     if max(track.root_xx, track.root_yy) > UNSURE_ROOT_M and search_across(s, p, track, n):
-        track.root_xx = max(track.root_xx, STEP_M)
-        track.root_yy = max(track.root_yy, STEP_M)
+        track.root_xx = max(track.root_xx, LATERAL_STEP_M)
+        track.root_yy = max(track.root_yy, LATERAL_STEP_M)
     x = track.x
     y = track.y
     scratch = s[0].scratch
@@ -232,7 +227,7 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
     """
     line, corner = p[0].circle_count, p[0].circle_count + 1
     var0, rel2 = noise_variance(s, p)
-    turns = corner + 1 if n < p[0].compare_all_below and track.probability < CERTAIN else 1
+    turns = corner + 1 if n < p[0].compare_all_below and track.probability < CERTAIN_PROBABILITY else 1
     for _ in range(turns):
         track.alternative = (track.alternative + 1) % (corner + 1)
         if track.alternative == track.kind:
@@ -244,21 +239,24 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
                 s, p, n, track.x, track.y, track.radius, p[0].circles[k].radius_m, ALTERNATIVE_STEPS
             )  # fmt: skip
             track.leads[k] = v - track.log_likelihood_ratio
-            leads = v + (prior if k < p[0].model_count else 0.0) > track.log_likelihood_ratio + own_prior + SWITCH_NAT
+            leads = (
+                v + (prior if k < p[0].model_count else 0.0)
+                > track.log_likelihood_ratio + own_prior + SWITCH_LEAD_NAT
+            )
             if leads and may_become(s, track, k, v):
                 change_kind(s, p, track, k, v)
                 break
         elif k == line:
             v = fit_other_line(s, p, n, track.x, track.y, track.radius, ALTERNATIVE_STEPS)
             track.leads[k] = v - track.log_likelihood_ratio
-            if v > track.log_likelihood_ratio + max(prior, 0.0) + SWITCH_NAT:
+            if v > track.log_likelihood_ratio + max(prior, 0.0) + SWITCH_LEAD_NAT:
                 said = s[0].scratch.line_score
-                if said.hits >= LINE_HITS_MIN and said.high - said.low > LINE_MIN_M:
+                if said.hits >= REPLACING_LINE_HITS_MIN and said.high - said.low > LINE_LENGTH_MIN_M:
                     add_line(s, s[0].scratch.line_fit, track.x, track.y, said)
                 return False
         else:
             v = score_corner(s, p, n, track.x, track.y, track.radius, var0, rel2)
-            track.leads[k] = v + MISS_SHARE * p[0].missed_echo_nat * track.misses - track.log_likelihood_ratio
+            track.leads[k] = v + CORNER_MISS_SHARE * p[0].missed_echo_nat * track.misses - track.log_likelihood_ratio
     return True
 
 
@@ -275,7 +273,10 @@ def is_in_wall(s: StateRecord, x: float, y: float, radius: float) -> bool:
         line = s[0].lines[k]
         if is_wall(line):
             off, along = off_and_along(line, x, y)
-            if reaches(line, along, WALL_BEYOND_M) and WALL_BEHIND * radius < off < WALL_FRONT * radius:
+            if (
+                reaches(line, along, CIRCLE_WALL_BEYOND_M)
+                and CIRCLE_WALL_BEHIND * radius < off < CIRCLE_WALL_FRONT * radius
+            ):
                 return True
     return False
 
@@ -309,10 +310,12 @@ def existence_probability(s: StateRecord, p: SettingsRecord, track: CircleTrack,
 @kernel
 def update_status(track: CircleTrack, p: SettingsRecord) -> None:
     """Establish a track that is probable and well located; make an improbable one tentative again."""
-    if track.status == TENTATIVE and track.probability > ESTABLISH and track.hits >= ESTABLISH_HITS:
+    if track.status == TENTATIVE and track.probability > ESTABLISH_PROBABILITY and track.hits >= ESTABLISH_HITS:
         if track.dispersion >= p[0].dispersion_min and max(track.root_xx, track.root_yy) < ESTABLISH_ROOT_M:
             track.status = ESTABLISHED
-    elif track.status == ESTABLISHED and (track.probability < DOUBT or track.dispersion < 0.5 * p[0].dispersion_min):
+    elif track.status == ESTABLISHED and (
+        track.probability < DOUBT_PROBABILITY or track.dispersion < DOUBTED_DISPERSION_SHARE * p[0].dispersion_min
+    ):
         track.status = TENTATIVE
 
 
@@ -335,7 +338,7 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     track.unseen = 0
     track.refinements += 1
     s[0].refinements += 1
-    if n < READINGS_MIN:
+    if n < TRACK_READINGS_MIN:
         drop_track(track)
         return
     locate(s, p, track, n)
@@ -368,7 +371,7 @@ def merge_duplicates(tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
     for k in range(len(tracks)):
         other = tracks[k]
         if k != t and other.status != FREE:
-            apart = max(p[0].merge_m, APART * max(track.radius, other.radius))
+            apart = max(p[0].merge_m, APART_RADII * max(track.radius, other.radius))
             if math.hypot(other.x - track.x, other.y - track.y) < apart:
                 if outlives(other, track, other.log_likelihood_ratio > track.log_likelihood_ratio):
                     track.status = FREE

@@ -10,16 +10,14 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from config.units import FOOT_M
 from perception.bayes.elements import HISTORY, Reading
-from perception.bayes.parameters import Settings
+from perception.bayes.parameters import HYPOTHESIS_MARGIN_M
+from perception.bayes.settings_record import Settings
 from perception.bayes.state import CircleTrack, PolygonTrack, State
 from perception.kernel import kernel
 from perception.records import Records
 
 TWO_PI: Final = 2.0 * math.pi
-BEAM_MARGIN_M: Final = 0.02 * FOOT_M
-"""A centre this far outside a beam may still move into it while a hypothesis is fitted."""
 ROOM: Final = 64
 """Places left free at the end of the scratch's readings."""
 
@@ -90,7 +88,7 @@ def gather_history(s: Records[State], p: Records[Settings], cx: float, cy: float
             if dot <= 0.0:
                 continue
             d = math.sqrt(dx * dx + dy * dy)
-            if dot < cos_may * d - BEAM_MARGIN_M or d - radius > range_max:
+            if dot < cos_may * d - HYPOTHESIS_MARGIN_M or d - radius > range_max:
                 continue
             if n >= len(readings) - ROOM:
                 return n

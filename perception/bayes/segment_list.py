@@ -22,7 +22,7 @@ def mapped_segments(memory: Memory) -> NDArray[Any]:
     counts = buckets["count"]
     used = np.flatnonzero(counts)
     held = np.arange(BUCKET_CAPACITY) < counts[used, None]
-    return buckets["segments"][used][held]  # type: ignore[no-any-return]
+    return buckets["segments"][used][held]  # type: ignore[no-any-return]  # numpy types a field as Any
 
 
 def drawn(segments: NDArray[Any]) -> Floats:

@@ -1,7 +1,7 @@
 """Memory of the Bayesian method: records of a fixed layout, allocated once and never resized.
 
 Kernels call them `s` (one `State`), `tracks` (circles, as many as the configuration allows) and `p` (one `Settings`
-record of `perception.bayes.parameters`). Lengths are metres, angles radians.
+record of `perception.bayes.settings_record`). Lengths are metres, angles radians.
 """
 
 from __future__ import annotations
@@ -31,8 +31,9 @@ from perception.bayes.elements import (
     Pose,
     Reading,
 )
-from perception.bayes.parameters import NOISES
+from perception.bayes.parameters import START_NOISE, START_NOISE_NAT
 from perception.bayes.scratch import Scratch
+from perception.bayes.settings_record import NOISES
 from perception.kernel import Floats
 from perception.records import Record, Records, records, zeros
 
@@ -41,10 +42,6 @@ FREE, TENTATIVE, ESTABLISHED = range(3)
 CONFIRMED: Final = 1
 PLACED: Final = 2
 """Bits of `Track.marks`: a user confirmed the object; a user placed it, and readings do not support it yet."""
-START_NOISE: Final = 9
-"""Index of the noise assumed at the start: σ = 0.03 ft, 0.5 %."""
-START_NOISE_NAT: Final = 6.0
-"""Evidence for it at the start."""
 
 
 class Sensor(Record):
@@ -338,7 +335,7 @@ class Memory:
     @property
     def polygons(self) -> np.ndarray[Any, Any]:
         """The tracks of polygons as numpy takes them, shape (MAX_POLYGONS,)."""
-        return self.state["polygons"][0]  # type: ignore[no-any-return]
+        return self.state["polygons"][0]  # type: ignore[no-any-return]  # numpy types a field as Any
 
     def clear(self) -> None:
         """Clear the memory, except the numbers assigned so far."""

@@ -11,16 +11,15 @@ from typing import Final
 import numpy as np
 
 from perception.bayes.elements import REJECTIONS_MAX
-from perception.bayes.parameters import SettingsRecord
+from perception.bayes.parameters import RADIUS_CHANGED_UNSEEN
 from perception.bayes.scratch import POLYGON
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import FREE, Memory
 from perception.kernel import Floats
 from perception.records import column
 
 SAME_M: Final = 1e-9
 """Radii nearer than this are one."""
-CHANGED_UNSEEN: Final = 4
-"""Unseen readings added to a track whose radius becomes a model's own, so that it is refined."""
 
 
 def radii_of(p: SettingsRecord) -> Floats:
@@ -52,7 +51,7 @@ def migrate(memory: Memory, before: SettingsRecord, after: SettingsRecord) -> No
         if is_changed[kind]:  # a rival as near as this to a model is that model
             circles["radius"][t] = new[index[kind]]
             circles["refinements"][t] = 0
-            circles["unseen"][t] += CHANGED_UNSEEN
+            circles["unseen"][t] += RADIUS_CHANGED_UNSEEN
         leads[t, index[kind]] = 0.0
     circles["leads"] = leads
     for k in range(REJECTIONS_MAX):

@@ -8,53 +8,40 @@ then decide whether it is an object, against every alternative.
 from __future__ import annotations
 
 import math
-from typing import Final
 
-from config.units import FOOT_M
-from perception.bayes.alternatives import SOFT, fit_other_circle, fit_other_line, score
+from perception.bayes.alternatives import fit_other_circle, fit_other_line, score
 from perception.bayes.elements import ATTRACTING_MAX, MappedSegment
 from perception.bayes.noise_estimation import noise_variance
 from perception.bayes.occlusion import keep_relevant
-from perception.bayes.parameters import SettingsRecord
+from perception.bayes.parameters import (
+    ATTRACTING_MIN,
+    CELL_M,
+    CENTRE_VARIANCE_MAX_M2,
+    CIRCLE_AROUND_M,
+    CIRCLE_EVIDENCE_MIN_NAT,
+    CIRCLE_READINGS_MIN,
+    CIRCLE_RESTS_M,
+    CIRCLE_RESTS_RAD,
+    FACING_RADII,
+    FIRST_FIT_SOFTNESS,
+    FIT_SOFTNESS,
+    INITIATION_STEPS,
+    LINE_LENGTH_MIN_M,
+    NEW_LINE_HITS_MIN,
+    RELAXATION_GAMMA,
+    RIVAL_OVER_UNKNOWN_NAT,
+    SWITCH_LEAD_NAT,
+)
 from perception.bayes.range_fit import fit_circle
 from perception.bayes.reservoir import gather_history, keep_reading
 from perception.bayes.segment_pairs import segments_near
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import FREE, TENTATIVE, AnyTrack, CircleTrack, CircleTracks, StateRecord
 from perception.bayes.track_labels import assign_number, clear_track, is_rejected
 from perception.bayes.walls import add_line
 from perception.kernel import Floats, kernel
 from perception.records import Records
 from perception.relaxation import relax
-
-CELL_M: Final = 1.0 * FOOT_M
-"""A cell of the outline map."""
-AROUND_M: Final = 0.4 * FOOT_M
-"""Segments up to this far off the body may attract it."""
-FACING: Final = 0.6
-"""A segment attracts where the body's centre lies at least this share of its radius behind it."""
-ATTRACTING_MIN: Final = 3
-"""Fewer segments than this do not move a hypothesis."""
-GAMMA: Final = 2.0
-"""The paper's γ."""
-STEPS: Final = 4
-"""Steps of the relaxation, and of each fit."""
-NEGLIGIBLE_M: Final = 0.005 * FOOT_M
-NEGLIGIBLE_RAD: Final = 0.005
-"""A relaxation ends with increments below both."""
-FIRST_SOFT: Final = 16.0
-"""Robustness of the first fit; see `alternatives.SOFT`."""
-READINGS_MIN: Final = 5
-EVIDENCE_MIN_NAT: Final = 10.0
-"""Least readings and evidence of a new track."""
-SWITCH_NAT: Final = 6.0
-"""Lead required of another explanation."""
-RIVAL_OVER_UNKNOWN_NAT: Final = 3.0
-"""Lead required of a rival over an unknown object."""
-LINE_HITS_MIN: Final = 8.0
-LINE_MIN_M: Final = 0.8 * FOOT_M
-"""Least length and hits of a line that is kept."""
-VARIANCE_MAX_M2: Final = 0.2 * FOOT_M * FOOT_M
-"""Greatest variance assumed for a fitted centre."""
 
 
 @kernel
@@ -131,8 +118,8 @@ def relax_hypothesis(
     pose[1] = hypothesis.y
     pose[2] = hypothesis.heading
     relax(
-        sides, scratch.attracting[:], scratch.attracting_rows[:attracting], GAMMA, negligible_m, negligible_rad,
-        steps, pose,
+        sides, scratch.attracting[:], scratch.attracting_rows[:attracting], RELAXATION_GAMMA, negligible_m,
+        negligible_rad, steps, pose,
     )  # fmt: skip
     hypothesis.x = pose[0]
     hypothesis.y = pose[1]
@@ -153,18 +140,20 @@ def relax_onto_map(s: StateRecord, p: SettingsRecord, kind: int) -> None:
     scratch = s[0].scratch
     x, y = scratch.hypothesis.x, scratch.hypothesis.y
     radius = p[0].circles[kind].radius_m
-    near = segments_near(s[0].buckets, CELL_M, x, y, radius + AROUND_M, scratch.near)
+    near = segments_near(s[0].buckets, CELL_M, x, y, radius + CIRCLE_AROUND_M, scratch.near)
     attracting = 0
     for j in range(near):
         segment = scratch.near[j]
         deep = segment.normal_x * (x - segment.x) + segment.normal_y * (y - segment.y)
-        if deep > FACING * radius:
+        if deep > FACING_RADII * radius:
             enter_attracting(segment, scratch.attracting[attracting])
             attracting += 1
             if attracting == ATTRACTING_MAX:
                 break
     if attracting >= ATTRACTING_MIN:
-        relax_hypothesis(s, p[0].circles[kind].chords[:], attracting, NEGLIGIBLE_M, NEGLIGIBLE_RAD, STEPS)
+        relax_hypothesis(
+            s, p[0].circles[kind].chords[:], attracting, CIRCLE_RESTS_M, CIRCLE_RESTS_RAD, INITIATION_STEPS
+        )
 
 
 @kernel
@@ -279,27 +268,36 @@ def initiate_circle(
         return 0
     relax_onto_map(s, p, kind)
     n = gather_relevant(s, tracks, p, hypothesis.x, hypothesis.y, radius)
-    if n < READINGS_MIN:
+    if n < CIRCLE_READINGS_MIN:
         return 0
     var0, rel2 = noise_variance(s, p)
     if not fit_circle(
-        scratch.readings[:n], hypothesis.x, hypothesis.y, radius, p, FIRST_SOFT, var0, rel2, STEPS, fit
+        scratch.readings[:n],
+        hypothesis.x,
+        hypothesis.y,
+        radius,
+        p,
+        FIRST_FIT_SOFTNESS,
+        var0,
+        rel2,
+        INITIATION_STEPS,
+        fit,
     ):
         return 0
     n = gather_relevant(s, tracks, p, fit.x, fit.y, radius)
-    if not fit_circle(scratch.readings[:n], fit.x, fit.y, radius, p, SOFT, var0, rel2, STEPS, fit):
+    if not fit_circle(scratch.readings[:n], fit.x, fit.y, radius, p, FIT_SOFTNESS, var0, rel2, INITIATION_STEPS, fit):
         return 0
     x, y = fit.x, fit.y
     h00, h01, h11 = fit.information_xx, fit.information_xy, fit.information_yy
     llr = score(s, p, n, x, y, radius)
     near = scratch.score.near
-    if scratch.score.hits < READINGS_MIN or llr < EVIDENCE_MIN_NAT:
+    if scratch.score.hits < CIRCLE_READINGS_MIN or llr < CIRCLE_EVIDENCE_MIN_NAT:
         return 1
     prior = p[0].model_prior_nat
     own = llr + (prior if kind < p[0].model_count else 0.0)
-    if fit_other_line(s, p, n, x, y, radius, STEPS) > own + SWITCH_NAT:
+    if fit_other_line(s, p, n, x, y, radius, INITIATION_STEPS) > own + SWITCH_LEAD_NAT:
         line = scratch.line_score
-        if line.hits >= LINE_HITS_MIN and line.high - line.low > LINE_MIN_M:
+        if line.hits >= NEW_LINE_HITS_MIN and line.high - line.low > LINE_LENGTH_MIN_M:
             add_line(s, scratch.line_fit, x, y, line)
         return 1
     chosen = kind
@@ -308,10 +306,10 @@ def initiate_circle(
     best_y = y
     for k in range(p[0].circle_count):
         if k != kind:
-            v = fit_other_circle(s, p, n, x, y, radius, p[0].circles[k].radius_m, STEPS) + (
+            v = fit_other_circle(s, p, n, x, y, radius, p[0].circles[k].radius_m, INITIATION_STEPS) + (
                 prior if k < p[0].model_count else 0.0
             )
-            if v > best + SWITCH_NAT:
+            if v > best + SWITCH_LEAD_NAT:
                 best = v
                 chosen = k
                 best_x = fit.x
@@ -328,8 +326,8 @@ def initiate_circle(
     det = h00 * h11 - h01 * h01
     track = tracks[t]
     track.log_likelihood_ratio = llr
-    track.covariance_xx = min(h11 / det, VARIANCE_MAX_M2) if det > 0.0 else VARIANCE_MAX_M2
-    track.covariance_yy = min(h00 / det, VARIANCE_MAX_M2) if det > 0.0 else VARIANCE_MAX_M2
+    track.covariance_xx = min(h11 / det, CENTRE_VARIANCE_MAX_M2) if det > 0.0 else CENTRE_VARIANCE_MAX_M2
+    track.covariance_yy = min(h00 / det, CENTRE_VARIANCE_MAX_M2) if det > 0.0 else CENTRE_VARIANCE_MAX_M2
     track.root_xx = math.sqrt(track.covariance_xx)
     track.root_yy = math.sqrt(track.covariance_yy)
     return 1

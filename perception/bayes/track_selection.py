@@ -11,25 +11,21 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from config.units import FOOT_M
 from perception.bayes.elements import MAX_POLYGONS
-from perception.bayes.parameters import SettingsRecord
+from perception.bayes.parameters import (
+    CERTAIN_PROBABILITY,
+    FINAL_VALUE,
+    PASSES_MAX,
+    RESERVOIR_OFFSET,
+    UNSURE_FACTOR,
+    UNSURE_ROOT_M,
+)
+from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import FREE, AnyTrack, CircleTrack, CircleTracks, StateRecord
 from perception.kernel import kernel
 
-UNSURE_FACTOR: Final = 4.0
-UNSURE_ROOT_M: Final = 0.03 * FOOT_M
-"""Factor on the evidence of an object whose position is less certain than this, and perhaps wrong, …"""
-CERTAIN: Final = 0.95
-"""… or of an object less probable than this."""
-SIZE: Final = 8.0
-"""Readings added to an object's count, so that an object with few is not refined at every reading."""
-FINAL_VALUE: Final = 1e-6
-"""Value of a final refinement above the threshold."""
-PASSES_MAX: Final = 60
-"""Quanta that may go to others; then a track goes before all that are not passed over as often."""
 OVERDUE: Final = 1e9
-"""Priority of such a track."""
+"""Priority of a track that was passed over more than `PASSES_MAX` times."""
 
 
 @kernel
@@ -49,7 +45,7 @@ def unseen_evidence(track: AnyTrack, idle_firings: int, threshold: float, weight
     weight : float
         Factor.
     """
-    v: float = weight * (track.unseen / (track.reservoir + SIZE))
+    v: float = weight * (track.unseen / (track.reservoir + RESERVOIR_OFFSET))
     if track.idle_firings > idle_firings and track.final_refinements > 0:
         v += threshold + FINAL_VALUE
     return v
@@ -70,7 +66,7 @@ def circle_value(track: CircleTrack, p: SettingsRecord, threshold: float) -> flo
     """
     if track.status == FREE:
         return 0.0
-    is_unsure = max(track.root_xx, track.root_yy) > UNSURE_ROOT_M or track.probability < CERTAIN
+    is_unsure = max(track.root_xx, track.root_yy) > UNSURE_ROOT_M or track.probability < CERTAIN_PROBABILITY
     return unseen_evidence(track, p[0].idle_firings, threshold, UNSURE_FACTOR if is_unsure else 1.0)
 
 

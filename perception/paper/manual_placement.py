@@ -17,10 +17,8 @@ from config.settings import RelaxationConfig
 from perception.kernel import Floats, Ints
 from perception.object_model import ObjectModel
 from perception.paper.outline_map import OutlineMap
+from perception.paper.parameters import PLACEMENTS_MAX
 from perception.relaxation import relax
-
-PLACEMENTS_MAX: Final = 32
-"""Placements, and rejections, at a time."""
 
 PLACEMENT: Final = np.dtype(
     [

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from typing import Final
 
 import numpy as np
 
@@ -16,11 +15,10 @@ from config.settings import MapConfig
 from drivers.messages import Firing
 from perception.edits import Segments
 from perception.kernel import Floats, Ints, kernel
+from perception.paper.parameters import PINNED_SHARE_MAX
 
 EMPTY, PRESENT, PINNED = range(3)
 """Values of `OutlineMap.status`."""
-PINNED_SHARE_MAX: Final = 0.5
-"""Share of the capacity that may be pinned."""
 
 
 @kernel
@@ -77,16 +75,17 @@ def erase_contradicted(
             slot = (start + k) % capacity
             if status[slot] != PRESENT:
                 continue
-            ex = segments[slot, 2] - segments[slot, 0]
-            ey = segments[slot, 3] - segments[slot, 1]
+            x1, y1, x2, y2 = segments[slot, 0], segments[slot, 1], segments[slot, 2], segments[slot, 3]
+            ex = x2 - x1
+            ey = y2 - y1
             length2 = ex * ex + ey * ey
             if length2 == 0.0:
                 continue
-            along = ((x - segments[slot, 0]) * ex + (y - segments[slot, 1]) * ey) / length2
+            along = ((x - x1) * ex + (y - y1) * ey) / length2
             if along < 0.0 or along > 1.0:
                 continue
-            fx = segments[slot, 0] + along * ex - x
-            fy = segments[slot, 1] + along * ey - y
+            fx = x1 + along * ex - x
+            fy = y1 + along * ey - y
             distance = math.hypot(fx, fy)
             if distance < r - margin and fx * ax + fy * ay >= distance * cos_half:
                 status[slot] = EMPTY

@@ -36,8 +36,9 @@ from perception.kernel import Floats, Ints
 from perception.object_model import ObjectModel
 from perception.paper.candidates import Candidates
 from perception.paper.clusters import Clusters
-from perception.paper.manual_placement import PLACEMENTS_MAX, NumberSource, Placements, Rejections, wrapped_pose
+from perception.paper.manual_placement import NumberSource, Placements, Rejections, wrapped_pose
 from perception.paper.outline_map import OutlineMap
+from perception.paper.parameters import PLACEMENTS_MAX
 from perception.paper.recognition import goodness_of_fit
 from perception.paper.segments import SegmentExtractor
 from perception.sensor_mounts import mounts_array
@@ -226,7 +227,7 @@ class PaperPerception:
     def _put(self, number: int, m: int, pose: tuple[float, float, float], *, confirmed: bool) -> str | None:
         """Put a placement at a pose; return None, or why there is no room for it."""
         if self.placements.find(number) is None and self.placements.count == PLACEMENTS_MAX:
-            return f"{PLACEMENTS_MAX} objects are placed already, and there is no room for more: reject one first"
+            return f"{PLACEMENTS_MAX} objects are placed already, the most there is room for: reject one first"
         self._numbers.last = max(self._numbers.last, number)
         self.placements.put(number, m, pose, confirmed=confirmed)
         return None

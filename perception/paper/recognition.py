@@ -52,23 +52,25 @@ def goodness_of_fit(
     squares = 0.0
     for k in range(members.shape[0]):
         j = members[k]
-        mx = 0.5 * (segments[j, 0] + segments[j, 2]) - x
-        my = 0.5 * (segments[j, 1] + segments[j, 3]) - y
+        x1, y1, x2, y2, normal = segments[j, 0], segments[j, 1], segments[j, 2], segments[j, 3], segments[j, 4]
+        mx = 0.5 * (x1 + x2) - x
+        my = 0.5 * (y1 + y2) - y
         px = c * mx + s * my
         py = -s * mx + c * my
         best = math.inf
         nearest = 0
         for i in range(sides.shape[0]):
-            ux = math.cos(sides[i, 2])
-            uy = math.sin(sides[i, 2])
-            along = (px - sides[i, 0]) * ux + (py - sides[i, 1]) * uy
-            half = 0.5 * sides[i, 3]
+            middle_x, middle_y, direction, side_length = sides[i, 0], sides[i, 1], sides[i, 2], sides[i, 3]
+            ux = math.cos(direction)
+            uy = math.sin(direction)
+            along = (px - middle_x) * ux + (py - middle_y) * uy
+            half = 0.5 * side_length
             along = min(max(along, -half), half)
-            distance = math.hypot(px - sides[i, 0] - along * ux, py - sides[i, 1] - along * uy)
+            distance = math.hypot(px - middle_x - along * ux, py - middle_y - along * uy)
             if distance < best:
                 best = distance
                 nearest = i
-        da = (segments[j, 4] + half_pi - theta - sides[nearest, 2]) % math.pi
+        da = (normal + half_pi - theta - sides[nearest, 2]) % math.pi
         if da > half_pi:
             da -= math.pi
         if best <= tolerance_m and abs(da) <= tolerance_rad:

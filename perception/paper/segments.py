@@ -15,13 +15,9 @@ from config.robot import RingConfig
 from config.settings import SegmentsConfig
 from drivers.messages import Firing
 from perception.kernel import Floats, kernel
+from perception.paper.parameters import READING_SPACING, READINGS_KEPT
 from perception.records import Record, Records, records, zeros
 from perception.sensor_mounts import mounts_array
-
-READINGS_KEPT: Final = 16
-"""Readings kept of each sensor. They are a fraction of a baseline apart, so that they span several baselines."""
-SPACING: Final = 0.25
-"""A reading is kept once its sensor has moved by this share of the shortest baseline since the last one kept."""
 
 
 class KeptReading(Record):
@@ -206,7 +202,7 @@ class SegmentExtractor:
         count = pair_readings(
             firing.ranges_m, self._mounts, firing.pose.x, firing.pose.y, firing.ring_yaw, firing.robot_s,
             self._sensor_records, self._half_angle, config.baseline_min_m, config.baseline_max_m, config.gap_max_s,
-            SPACING * config.baseline_min_m, self._out,
+            READING_SPACING * config.baseline_min_m, self._out,
         )  # fmt: skip
         return self._out[:count]
 

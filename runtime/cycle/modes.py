@@ -34,8 +34,8 @@ LINE_REASONS: Final = MappingProxyType(
     }
 )
 
-HALTED: Final = "halted by the operator; re-arm to go on"
-DISARMED: Final = "disarmed by the operator; re-arm to go on"
+HALTED: Final = "halted by the operator; re-arm to continue"
+DISARMED: Final = "disarmed by the operator; re-arm to continue"
 HELD_UP: Final = "the program was held up for {:.1f} s, so commands came too late: check the load, then re-arm"
 
 

@@ -313,7 +313,7 @@ class RobotProcess:
         """Halt before anything else, then enter FAULT, which is never left, and log the error."""
         self._halt()
         what = f"the cycle failed ({describe_exception(error)})"
-        reason = f"{what}, likely by a fault of the program: see the log, then start it again"
+        reason = f"{what}, likely through a program error: see the log, then restart the program"
         self._state.mode = self._state.mode.enter(Mode.FAULT, self._clock(), reason)
         self._report_mode()
         self._log.error("the cycle failed", exc_info=error)

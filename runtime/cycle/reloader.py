@@ -61,7 +61,7 @@ class Reloader:
 
     def probe(self) -> str | None:
         """Return how an attempt ended unexpectedly, None otherwise; see `runtime.support.health`."""
-        return "it was ended from outside" if self._task is not None and self._task.cancelled() else None
+        return "its task was cancelled" if self._task is not None and self._task.cancelled() else None
 
     def cancel(self) -> None:
         """Drop the attempt in progress."""
@@ -75,7 +75,7 @@ class Reloader:
                 self._conclude(await self._check())
             except Exception as error:  # noqa: BLE001 - a reload that fails must not end a run that goes well
                 self._log.error(
-                    "the configuration is kept: reading it failed", error=f"{type(error).__name__}: {error}"
+                    "the configuration cannot be read and stays as it is", error=f"{type(error).__name__}: {error}"
                 )
             if not self._is_requested:
                 return
@@ -96,9 +96,9 @@ class Reloader:
     def _conclude(self, result: ReloadResult) -> None:
         if result.problems:
             for line in result.problems:
-                self._log.warning("the configuration is kept", problem=line)
+                self._log.warning("the new configuration is refused", problem=line)
         elif not result.changed:
-            self._log.info("the configuration is as before")
+            self._log.info("the configuration has not changed")
         else:
             changed = self._live_settings.apply(result.settings, can_undo=False)
-            self._log.info("the configuration is taken over", changed=[str(d) for d in changed])
+            self._log.info("the new configuration is in use", changed=[str(d) for d in changed])

@@ -88,32 +88,6 @@ class RunSummary(TypedDict):
     log: NotRequired[LogRow]
 
 
-class VerifyRow(TypedDict):
-    """What the replay of a recording found: see `runtime.recording.replayer.ReplayResult`."""
-
-    differences: int
-    first: str | None
-    first_cycle: int | None
-    keyframes: int
-    skipped: int
-    missing: list[tuple[int, int]]
-    refinement: dict[str, int]
-    times_real_time: float
-    damage: list[str]
-
-
-class ReplaySummary(TypedDict):
-    """Summary of ``echolocate replay``."""
-
-    verify: NotRequired[VerifyRow]
-
-    objects: list[ObjectRow]
-    segments: int
-    clusters: int
-    cycles: int
-    cycle_us: Quantiles
-
-
 def object_row(seen: DetectedObject) -> ObjectRow:
     """Return an object in its JSON form."""
     row: ObjectRow = {

@@ -189,7 +189,7 @@ def check_format(path: Path, scanner: McapScanner, info: RunInfo | None = None) 
     version = info.format if info is not None else FORMAT if header is None else int(header[1])
     if version != FORMAT:
         raise RecordingError(
-            f"{path}: has recording format {version} (written by {scanner.library}), and this echolocate reads "
+            f"{path}: has recording format {version} (written by {scanner.library}), and this program reads "
             f"format {FORMAT} only: use {'a newer' if version > FORMAT else 'the older'} echolocate"
         )
 

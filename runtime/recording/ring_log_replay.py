@@ -8,7 +8,8 @@ from collections.abc import Iterable, Iterator
 from config.settings import Settings
 from drivers.messages import Firing
 from perception.pipeline import Perception
-from runtime.cycle.summary import ReplaySummary, object_row
+from runtime.cycle.summary import object_row
+from runtime.recording.replay_summary import ReplaySummary
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.refinement_budget import within_quanta_per_cycle
 

@@ -45,7 +45,7 @@ class RingLogWriter:
     def __exit__(self, *_: object) -> None:
         self._thread.close()
         if self._thread.is_stuck:
-            self._note(f"{self._path}: the disk did not take the end within {CLOSE_MAX_S:.0f} s")
+            self._note(f"{self._path}: its end was not written within {CLOSE_MAX_S:.0f} s: check the disk")
         elif self._thread.failure is not None:
             self._note(f"{self._path}: its writer failed: {self._thread.failure}")
         with contextlib.suppress(OSError):

@@ -196,7 +196,7 @@ def keyframe(cycle: int, run_s: float, state: StateFields, snapshot: Snapshot) -
     return Keyframe.model_construct(
         run_s=run_s,
         cycle=cycle,
-        state=CarriedState.model_construct(**state),  # type: ignore[arg-type]
+        state=CarriedState.model_construct(**state),  # type: ignore[arg-type]  # as for its fields above
         arrays=arrays,
         data=data,
     )

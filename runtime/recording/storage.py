@@ -45,7 +45,7 @@ class SingleFile:
         return self.first if part == 1 else self.first.with_stem(f"{self.first.stem}-{part}")
 
     def enforce_limits(self, current: Path) -> None:
-        """Delete nothing: files that the user named are never deleted."""
+        """Do nothing: files that the user named are never deleted."""
 
     def is_part_full(self, part_bytes: int) -> bool:  # noqa: ARG002 - a file named by the user is not split
         """Return False."""
@@ -78,7 +78,7 @@ class RotatingFolder:
         return path
 
     def enforce_limits(self, current: Path) -> None:
-        """Delete the oldest recordings until the rest is within the limits; never the file `current`."""
+        """Delete the oldest recordings, but never `current`, until the folder is within its limits."""
         self._delete_oldest(self.config.keep, current)
 
     def is_part_full(self, part_bytes: int) -> bool:

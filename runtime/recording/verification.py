@@ -7,7 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import orjson
@@ -186,7 +186,7 @@ def _keyframe_difference(frame: Keyframe, state: State) -> tuple[str, object, ob
     return find_difference(orjson.loads(encode(frame.state)), orjson.loads(replayed), "state.")
 
 
-def find_difference(recorded: Any, replayed: Any, path: str = "") -> tuple[str, object, object] | None:  # noqa: ANN401
+def find_difference(recorded: object, replayed: object, path: str = "") -> tuple[str, object, object] | None:
     """Return the first place where two JSON trees differ in any bit, and both values; None if they are equal.
 
     Parameters

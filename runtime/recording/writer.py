@@ -171,7 +171,7 @@ class RecordingWriter:
         self.thread.close()
         sys.setswitchinterval(self._interval_s)
         if self.thread.is_stuck:
-            error = f"the disk did not take the end of {self._status.file} within {CLOSE_MAX_S:.0f} s"
+            error = f"the end of {self._status.file} was not written within {CLOSE_MAX_S:.0f} s: check the disk"
             self._status = replace(self._status, last_error=error)
         elif self._file is not None:
             self._abandon(f"{self._status.file}: its writer failed: {self.thread.failure}")

@@ -111,5 +111,5 @@ class CycleScheduler:
 
     def _started(self) -> Pacer:
         if self._pacer is None:
-            raise RuntimeError("the scheduler was used before it was started: a fault of this program")
+            raise RuntimeError("the scheduler was used before it was started: a program error")
         return self._pacer

@@ -22,10 +22,10 @@ LEAD_S: Final = 0.02
 ANSWER_MAX_S: Final = 2.0
 """Longest wait for the emulator's acknowledgement, s; beyond it the emulator hangs."""
 
-ENDED: Final = "the emulator has ended, so the run has no robot any more: start it again"
+ENDED: Final = "the emulator has ended, so the run has no robot: start the run again"
 HANGS: Final = (
     f"the emulator did not answer within {ANSWER_MAX_S:.0f} s, likely it is stopped or the machine is overloaded; "
-    "the run goes on in real time"
+    "the run continues in real time"
 )
 NO_CYCLE: Final = "no cycle has started yet: wait until the robot has answered"
 REAL_ROBOT: Final = (
@@ -153,7 +153,7 @@ class EmulatorTimeControl:
                     self.clock.acknowledged(float(run_s))
                     self._acknowledged = int(number)
             case [word, *why] if word == REFUSED:
-                self._problem = f"the emulator refuses: {' '.join(why)}: a fault of the program"
+                self._problem = f"the emulator refuses: {' '.join(why)}: a program error"
         self._changed.set()
 
     def emulator_ended(self) -> None:

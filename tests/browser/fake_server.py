@@ -22,7 +22,7 @@ TOKEN: Final = "right-token"
 TOML: Final = "[cycle]\nperception_budget_s = 0.005\n"
 KINDS: Final = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 
-HALTED: Final = "halted by the operator; re-arm to go on"
+HALTED: Final = "halted by the operator; re-arm to continue"
 
 
 @dataclass

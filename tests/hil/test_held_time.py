@@ -131,7 +131,7 @@ async def test_a_halt_while_it_is_held_leaves_nothing_to_move(tmp_path: Path) ->
 
     trace, held_s = tmp_path / "trace.csv", list[float]()
     summary, _, trace, _ = await run(tmp_path, act)
-    assert summary["stop_reasons"] == ["halted by the operator; re-arm to go on"]
+    assert summary["stop_reasons"] == ["halted by the operator; re-arm to continue"]
     after = [row for row in rows(trace) if row.host_s > held_s[0] + 0.03]
     assert after
     assert all(row.flags & Flags.LATCHED for row in after), "it was heard where time stood still"

@@ -46,7 +46,7 @@ def test_a_configuration_reloaded_while_driving(tmp_path: Path) -> None:
     ):
         wait_for(lambda: is_driving(robot.trace), "driving")
         bad = reloaded(run, config, good.replace("0.3", '"fast"'), 1)
-        assert bad["event"] == "the configuration is kept"
+        assert bad["event"] == "the new configuration is refused"
         assert str(bad["problem"]).startswith(f"{config}: behaviors.arbiter.base_velocity_m_s = ")
         fixed = reloaded(run, config, good.replace("0.3", "0.05") + "[link]\nbaud = 9600\n", 2)
         assert str(fixed["problem"]).startswith("link.baud: ")
@@ -54,7 +54,7 @@ def test_a_configuration_reloaded_while_driving(tmp_path: Path) -> None:
         assert is_driving(robot.trace), "neither changed anything"
         slow = good.replace("0.3", "0.05") + '[ring]\nfiring = "quadrants"\n'
         taken = reloaded(run, config, slow, 3)
-        assert taken["event"] == "the configuration is taken over"
+        assert taken["event"] == "the new configuration is in use"
         wait_for(lambda: 0.0 < rows(robot.trace)[-1].v < 0.1, "driving slowly")
         assert run.modes()[-1] == "DRIVE"
         run.signal(signal.SIGTERM)

@@ -10,8 +10,8 @@ import numpy as np
 from config.load import load_settings
 from perception.bayes.elements import MAX_LINES, Reading
 from perception.bayes.kernel_settings import make_settings
-from perception.bayes.parameters import RANGE_BINS_PER_M, Settings, SettingsRecord
 from perception.bayes.range_fit import FAR
+from perception.bayes.settings_record import RANGE_BINS_PER_M, Settings, SettingsRecord
 from perception.bayes.state import Memory
 from perception.kernel import Floats
 from perception.records import Records, array_of, records, zeros

@@ -16,7 +16,8 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings, override_settings
 from runtime.cli.commands.offline_io import plain_console
 from runtime.cli.tables import objects_table
-from runtime.cycle.summary import ReplaySummary, object_row, write_json
+from runtime.cycle.summary import object_row, write_json
+from runtime.recording.replay_summary import ReplaySummary
 from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.length_format import Units, format_length
 from runtime.support.progress import progress

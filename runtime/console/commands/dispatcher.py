@@ -124,11 +124,11 @@ class CommandDispatcher:
         _send_answer(client, number, None, error)
 
 
-def _answer(client: Client, number: int, data: Any) -> None:  # noqa: ANN401 - the data of any answer
+def _answer(client: Client, number: int, data: object) -> None:
     _send_answer(client, number, data, None)
 
 
-def _send_answer(client: Client, number: int | None, data: Any, error: CommandError | None) -> None:  # noqa: ANN401
+def _send_answer(client: Client, number: int | None, data: object, error: CommandError | None) -> None:
     client.send(
         {
             "type": "answer",

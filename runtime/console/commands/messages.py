@@ -188,7 +188,7 @@ class MessageReader:
     def __init__(self, types: Mapping[str, type]) -> None:
         self._types = dict(types)
         models = tuple(_wire_model(name, of) for name, of in types.items())
-        union = Union[models]  # type: ignore[valid-type]  # noqa: UP007 - made of a list
+        union = Union[models]  # type: ignore[valid-type]  # noqa: UP007 - made of a tuple
         self._adapter: TypeAdapter[Any] = TypeAdapter(Annotated[union, Field(discriminator="type")])
 
     def read(self, text: str | bytes) -> Message:

@@ -57,7 +57,7 @@ def _within(model: BaseModel, at: Location) -> Iterator[Parameter]:
             yield found
 
 
-def _parameter(location: Location, field: FieldInfo, value: Any) -> Parameter | None:  # noqa: ANN401
+def _parameter(location: Location, field: FieldInfo, value: Any) -> Parameter | None:  # noqa: ANN401 - any setting
     """Return a field as a parameter, None if its value is not a single plain one."""
     kinds = [kind for kind in _options(field.annotation) if kind is not type(None)]
     if len(kinds) != 1:
@@ -103,7 +103,7 @@ def _bounds(field: FieldInfo) -> tuple[float | None, float | None]:
     for bound in field.metadata:
         match bound:
             case annotated_types.Ge(ge=value) | annotated_types.Gt(gt=value):
-                low = float(value)  # type: ignore[arg-type]
+                low = float(value)  # type: ignore[arg-type]  # the library promises a comparison only
             case annotated_types.Le(le=value) | annotated_types.Lt(lt=value):
-                high = float(value)  # type: ignore[arg-type]
+                high = float(value)  # type: ignore[arg-type]  # the library promises a comparison only
     return low, high

@@ -80,7 +80,7 @@ class Tuning:
             # As in a file, a preset replaces a firing pattern given as sets.
             location, given = PRESET[:-1], {**self._firing(), "preset": value, "sets": None}
         else:
-            given = value  # type: ignore[assignment]
+            given = value  # type: ignore[assignment]  # a table above, one value here
         return self._apply(path, lambda: with_value(self.current, SOURCE, location, given), f" = {shown(value)}")
 
     async def add_model(self, toml: str) -> ModelConfig:

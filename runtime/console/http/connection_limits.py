@@ -89,6 +89,7 @@ class TimedProtocol(asyncio.Protocol):
         self._on_lost = on_lost
         self._transport: asyncio.Transport | None = None
         self._is_aborted = False
+        # asyncio looks its callbacks up on the object, so attributes can take the place of methods.
         self.connection_made = timed(CONSOLE_RECEIVE, self._made)  # type: ignore[method-assign]
         self.data_received = timed(CONSOLE_RECEIVE, inner.data_received)  # type: ignore[method-assign]
         self.connection_lost = timed(CONSOLE_RECEIVE, self._lost)  # type: ignore[method-assign]

@@ -14,7 +14,7 @@ from perception.bayes.bayes_method import BayesPerception
 from perception.bayes.kernel_settings import make_settings
 from perception.bayes.naming import Reported
 from perception.bayes.object_report import circle_object, circle_row
-from perception.bayes.parameters import CIRCLES_MAX, POLYGONS_MAX
+from perception.bayes.settings_record import CIRCLES_MAX, POLYGONS_MAX
 from perception.bayes.state import ESTABLISHED, Memory
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats, kernel

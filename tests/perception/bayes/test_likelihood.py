@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from perception.bayes.likelihood import build_levels, build_table, level_of, log_likelihood
-from perception.bayes.parameters import (
+from perception.bayes.settings_record import (
     NOISES,
     RANGE_BINS,
     RANGE_BINS_PER_M,

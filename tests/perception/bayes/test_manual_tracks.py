@@ -12,13 +12,13 @@ from perception.bayes.elements import BUCKET_CAPACITY, BUCKETS, READINGS_MAX, RE
 from perception.bayes.evidence import circle_evidence
 from perception.bayes.kernel_settings import apply_library, copied, make_settings
 from perception.bayes.map_edits import edit_memory
+from perception.bayes.parameters import CELL_M, PLACED_STRAY_MAX_M, PLACED_STRAY_MAX_RAD
 from perception.bayes.pinned_segments import Pins, delete, places_of
 from perception.bayes.scratch import Score
 from perception.bayes.segment_list import mapped_segments
 from perception.bayes.segment_pairs import add_to_map, bucket_index
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE, Memory
 from perception.bayes.state_migration import migrate, radii_of
-from perception.bayes.track_initiation import CELL_M
 from perception.edits import PinSegments
 from perception.records import array_of, records, zeros
 from tests import naive_bayes
@@ -248,7 +248,7 @@ def test_a_bucket_is_never_pinned_altogether_and_that_is_said() -> None:
         add_segment(memory, np.array([0.1, 0.1, 1.0, 0.0]), number)
     refused = edit_memory(memory, P, pins, (), (), PinSegments(tuple(range(1, 9)), pinned=True))
     assert refused is not None
-    assert refused.startswith("2 of these segments cannot be pinned")
+    assert refused.startswith("2 of 8 segments could not be pinned")
     assert pins.count == 6
 
 
@@ -262,10 +262,10 @@ def test_relaxation_from_a_users_pose_stays_near_it() -> None:
             add_segment(memory, np.array([*rng.uniform(-0.7, 0.7, 2), math.cos(normal), math.sin(normal)]), number)
         at = memory.s[0].scratch.hypothesis
         manual_tracks.settle_circle(memory.s, BOX_P, 0, 0.1, -0.1)
-        assert math.hypot(at.x - 0.1, at.y + 0.1) <= manual_tracks.STRAYED_M
+        assert math.hypot(at.x - 0.1, at.y + 0.1) <= PLACED_STRAY_MAX_M
         manual_tracks.settle_polygon(memory.s, BOX_P, 0, 0.1, -0.1, 0.3)
-        assert math.hypot(at.x - 0.1, at.y + 0.1) <= manual_tracks.STRAYED_M
-        assert abs(at.heading - 0.3) <= manual_tracks.STRAYED_RAD
+        assert math.hypot(at.x - 0.1, at.y + 0.1) <= PLACED_STRAY_MAX_M
+        assert abs(at.heading - 0.3) <= PLACED_STRAY_MAX_RAD
         strayed += (at.x, at.y, at.heading) == (0.1, -0.1, 0.3)
     assert strayed > 0
 

@@ -11,8 +11,9 @@ from config.load import load_settings
 from perception.bayes.bayes_method import BayesPerception
 from perception.bayes.elements import POLYGON_BEARING_BINS, POLYGON_BIN_CAPACITY
 from perception.bayes.kernel_settings import make_settings
-from perception.bayes.polygon_initiation import COLLECTING_COST, advance_initiation, next_request
-from perception.bayes.polygon_job import INITIATION, NO_JOB, QUANTUM, REFINEMENT, cost
+from perception.bayes.polygon_initiation import advance_initiation, next_request
+from perception.bayes.polygon_job import INITIATION, NO_JOB, REFINEMENT, cost
+from perception.bayes.polygon_parameters import COLLECTING_COST, QUANTUM_COST
 from perception.bayes.polygon_tracks import advance_refinement, begin_refinement, polygon_quantum
 from perception.bayes.state import FREE, Memory
 from perception.pipeline import Perception
@@ -79,11 +80,11 @@ def test_a_step_costs_what_is_left_or_the_least_there_is() -> None:
         for begin in BEGIN:
             if begin(memory):
                 kinds[int(memory.s[0].job.kind)] += 1
-                spent = finish(memory, QUANTUM)
+                spent = finish(memory, QUANTUM_COST)
                 assert min(spent) > 0
-                assert max(spent) <= QUANTUM + STEP_MAX
+                assert max(spent) <= QUANTUM_COST + STEP_MAX
     assert min(kinds.values()) >= 3
-    assert STEP_MAX < QUANTUM
+    assert STEP_MAX < QUANTUM_COST
 
 
 def test_what_comes_of_a_job_does_not_depend_on_where_it_was_cut() -> None:

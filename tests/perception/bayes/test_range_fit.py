@@ -14,8 +14,8 @@ from perception.bayes.circle_posterior import posterior_circle
 from perception.bayes.corner_model import IMPOSSIBLE_NAT, score_corner
 from perception.bayes.elements import Reading
 from perception.bayes.likelihood import build_levels, build_table
-from perception.bayes.parameters import RANGE_BINS_PER_M, TABLE_LEVELS, NoiseModel, SettingsRecord
 from perception.bayes.scratch import CircleFit, CirclePosterior, LinearReading, LineFit, LineScore, Score
+from perception.bayes.settings_record import RANGE_BINS_PER_M, TABLE_LEVELS, NoiseModel, SettingsRecord
 from perception.bayes.state import Memory
 from perception.kernel import Floats
 from perception.records import Record, Records, array_of, records, zeros

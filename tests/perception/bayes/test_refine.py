@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from drivers.messages import Firing, Pose
 from perception.bayes import alternatives, noise_estimation, refine, reservoir, track_initiation
 from perception.bayes.bayes_method import BayesPerception
+from perception.bayes.parameters import SWITCH_LEAD_NAT, SWITCH_UNSEEN
 from perception.bayes.range_fit import FAR
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE, CircleTrack, Memory
 from perception.kernel import Floats
@@ -219,11 +220,11 @@ def test_a_refinement_counts_and_decides_by_what_it_found() -> None:
         assert track.final_refinements == 3 - is_idle
         assert track.reservoir == n
         assert track.refinements in (0, count + 1)  # restarted as another kind
-        assert track.unseen == (refine.SWITCH_UNSEEN if track.refinements == 0 else 0)
+        assert track.unseen == (SWITCH_UNSEEN if track.refinements == 0 else 0)
         assert 0 <= track.alternative < ALTERNATIVES
         after = int(track.status)
         if track.probability < 0.0:  # too few readings, or a line
-            is_line = n >= 3 and track.leads[len(RADII)] > track_initiation.SWITCH_NAT
+            is_line = n >= 3 and track.leads[len(RADII)] > SWITCH_LEAD_NAT
             assert after == FREE
             assert n < 3 or is_line
         else:

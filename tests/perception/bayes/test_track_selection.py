@@ -12,6 +12,7 @@ from perception.bayes import track_selection as selection
 from perception.bayes.bayes_method import BayesPerception
 from perception.bayes.elements import MAX_POLYGONS
 from perception.bayes.kernel_settings import make_settings
+from perception.bayes.parameters import PASSES_MAX
 from perception.bayes.state import ESTABLISHED, FREE, TENTATIVE, Memory
 from runtime.simulation.scenes import halls, readings
 from tests import naive_tracks
@@ -20,7 +21,7 @@ SETTINGS = load_settings("hallway", models=("semicircle", "box"))
 P = make_settings(SETTINGS.ring, SETTINGS.models, SETTINGS.perception.bayes)
 TRACKS = 8
 THRESHOLD = 0.08
-WAIT_MAX = selection.PASSES_MAX + TRACKS + 1
+WAIT_MAX = PASSES_MAX + TRACKS + 1
 
 
 def shared() -> Memory:
@@ -48,7 +49,7 @@ def test_the_rule_against_its_oracle() -> None:
         is_waiting = rng.integers(2)
         circles["unseen"], circles["reservoir"] = counts[0] * is_waiting, counts[1]
         circles["idle_firings"], circles["final_refinements"] = counts[2], counts[3] * is_waiting
-        circles["passed_over"] = rng.integers(selection.PASSES_MAX + 4, size=TRACKS) * rng.integers(2)
+        circles["passed_over"] = rng.integers(PASSES_MAX + 4, size=TRACKS) * rng.integers(2)
         circles["x"], circles["y"] = rng.normal(0, 4, (2, TRACKS))
         circles["root_xx"], circles["root_yy"] = rng.uniform(0, 0.02, (2, TRACKS))
         circles["probability"] = rng.uniform(0.9, 1.0, TRACKS)
@@ -66,7 +67,7 @@ def test_the_rule_against_its_oracle() -> None:
         expected = passed + waits
         if want >= 0:
             expected[want] = 0
-            overdue += int(passed[want] > selection.PASSES_MAX)
+            overdue += int(passed[want] > PASSES_MAX)
         assert (circles["passed_over"] == expected).all()
         none += want < 0
     assert none > 10
@@ -91,7 +92,7 @@ def test_polygons_are_chosen_by_evidence_and_waiting_time_alone() -> None:
     polygons["status"][:TRACKS], polygons["reservoir"][:TRACKS], polygons["unseen"][:TRACKS] = ESTABLISHED, 100, 10
     polygons["unseen"][2] += 1
     assert selection.choose_polygon(memory.s, P, THRESHOLD) == 2
-    polygons["passed_over"][7] = selection.PASSES_MAX + 1
+    polygons["passed_over"][7] = PASSES_MAX + 1
     assert selection.choose_polygon(memory.s, P, THRESHOLD) == 7
     polygons["unseen"] = 0
     assert selection.choose_polygon(memory.s, P, THRESHOLD) == -1
@@ -139,7 +140,7 @@ def test_in_a_hall_with_one_quantum_a_firing_every_track_gets_its_turn() -> None
         tracks = (perception.memory.circles, perception.memory.polygons)
         longest = max(longest, *(int(of["passed_over"].max()) for of in tracks))
     assert cut > 100, "one quantum was enough: nothing was put to the test"
-    assert 3 < longest <= selection.PASSES_MAX + SETTINGS.perception.bayes.tracks_max + 1
+    assert 3 < longest <= PASSES_MAX + SETTINGS.perception.bayes.tracks_max + 1
 
 
 def test_neither_circles_nor_polygons_keep_the_others_from_their_turn() -> None:

@@ -60,15 +60,15 @@ class Scripted:
 @pytest.mark.promise("P11")
 async def test_the_last_valid_configuration_is_kept_until_a_valid_one_comes() -> None:
     script = Scripted(ConfigError("a", "b"), RuntimeError("of ours"), BEFORE, SLOWER, SLOWER)
-    assert await script.attempt() == "the configuration is kept"
+    assert await script.attempt() == "the new configuration is refused"
     assert [entry.get("problem") for entry in script.log.entries] == ["a", "b"]
-    assert await script.attempt() == "the configuration is kept: reading it failed"
+    assert await script.attempt() == "the configuration cannot be read and stays as it is"
     assert "of ours" in script.log.entries[-1]["error"]
-    assert await script.attempt() == "the configuration is as before"
+    assert await script.attempt() == "the configuration has not changed"
     assert script.taken == []
-    assert await script.attempt() == "the configuration is taken over"
+    assert await script.attempt() == "the new configuration is in use"
     assert script.log.entries[-1]["changed"] == ["behaviors.arbiter.base_velocity_m_s: 0.3 → 0.2"]
-    assert await script.attempt() == "the configuration is as before"
+    assert await script.attempt() == "the configuration has not changed"
     assert script.taken == [SLOWER]
     assert threading.get_ident() not in script.threads
 
@@ -76,10 +76,10 @@ async def test_the_last_valid_configuration_is_kept_until_a_valid_one_comes() ->
 async def test_settings_that_cannot_be_prepared_are_not_applied() -> None:
     script = Scripted(SLOWER, SLOWER)
     script.problem = "models: no kernels"
-    assert await script.attempt() == "the configuration is kept"
+    assert await script.attempt() == "the new configuration is refused"
     assert (script.log.entries[-1]["problem"], script.taken) == ("models: no kernels", [])
     script.problem = None
-    assert await script.attempt() == "the configuration is taken over"
+    assert await script.attempt() == "the new configuration is in use"
     assert script.prepared == [(BEFORE, SLOWER)] * 2
 
 

@@ -11,7 +11,8 @@ import pytest
 
 from config.errors import FAILED, UserError
 from perception.pipeline import DetectedObject
-from runtime.cycle.summary import LinkRow, ObjectRow, ReplaySummary, RunSummary, object_row, write_json
+from runtime.cycle.summary import LinkRow, ObjectRow, RunSummary, object_row, write_json
+from runtime.recording.replay_summary import ReplaySummary
 from runtime.simulation.evaluation import DrumRow, Outcome
 
 SEEN = DetectedObject("semicircle", 1.0, -2.0, 0.1 + 0.2, 1e-17, 39, 2.0 / 3.0)

@@ -136,7 +136,7 @@ def test_a_pause_is_invisible_to_the_base_and_nothing_moves_in_it(monkeypatch: p
             assert after.pose.x - before.pose.x < 0.05, "it brakes and does not drive on"
 
         summary, _ = run(it, act)
-    assert summary["stop_reasons"] == ["halted by the operator; re-arm to go on"]
+    assert summary["stop_reasons"] == ["halted by the operator; re-arm to continue"]
 
 
 def test_one_step_is_one_cycle_and_one_period(monkeypatch: pytest.MonkeyPatch) -> None:
