@@ -1,4 +1,4 @@
-"""A folder of one's own to load files from."""
+"""An empty working directory to load files from."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ import pytest
 
 @pytest.fixture
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have the working directory hold nothing but what the test puts there."""
+    """Change to an empty working directory."""
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,4 @@
-"""Files to load and the problems of a load that fails; shared by the tests of loading."""
+"""Files to load, and the problems of a load that fails."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Every field there is, read off the schema: missing, of a wrong type, out of bounds, misspelt.
+"""Every field of every model: missing, of a wrong type, out of bounds, misspelt.
 
-The cases come from the pydantic models, so a new setting is tested the day it is added; what the message must
-say is worked out here, apart from the code that words it.
+The cases come from the pydantic models, so that a new setting is tested without a change here. The expected messages
+are composed here, independently of the code under test.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Setting:
 
 
 def inner(annotation: Any) -> Any:
-    """Return the annotation without its None and its wrappers."""
+    """Return an annotation without None, Annotated and Optional."""
     while True:
         arguments = [a for a in get_args(annotation) if a is not type(None)]
         if get_origin(annotation) in (tuple, Literal) or not arguments:
@@ -95,7 +95,7 @@ def settings_of(root: str, model: type[BaseModel], table: Any, at: tuple[str | i
 
 
 def entries_of(root: str, annotation: Any, table: Any, at: tuple[str | int, ...]) -> Iterator[Setting]:
-    """Yield what the first entry of a list may be."""
+    """Yield the settings of the first entry of a list."""
     entry, location = get_args(annotation)[0], (*at, 0)
     kind = inner(entry)
     if get_origin(kind) is tuple:
@@ -107,11 +107,25 @@ def entries_of(root: str, annotation: Any, table: Any, at: tuple[str | int, ...]
         yield Setting(root, location, FieldInfo.from_annotation(entry), kind)
 
 
-SETTINGS = [s for root, (model, table, _) in ROOTS.items() for s in settings_of(root, model, table)]
+EVERY = [s for root, (model, table, _) in ROOTS.items() for s in settings_of(root, model, table)]
+"""Every setting of every kind of file; those of a robot, a world and a model are also settings of a run."""
+
+
+def distinct(every: list[Setting]) -> Iterator[Setting]:
+    """Yield every field once, and from each kind of file one setting of every type."""
+    fields, types = set[int](), set[tuple[str, Any]]()
+    for setting in every:
+        if id(setting.field) not in fields or (setting.root, setting.kind) not in types:
+            yield setting
+        fields.add(id(setting.field))
+        types.add((setting.root, setting.kind))
+
+
+SETTINGS = list(distinct(EVERY))
 NAMED = [s for s in SETTINGS if isinstance(s.location[-1], str)]
-"""Those that have a name; entries of lists have numbers."""
+"""Settings with a name; entries of lists have numbers."""
 NAMES_FILES = (("models",), ("world",))
-"""Settings of a run that may also be names, and have defaults: see test_load."""
+"""Settings of a run that may also be names, and have defaults: see test_layers."""
 
 
 def is_name_of_a_file(setting: Setting) -> bool:
@@ -135,8 +149,8 @@ def refused(setting: Setting, table: dict[str, Any], folder: Path) -> list[str]:
     return [line.removeprefix(f"{path}: ") for line in lines]
 
 
-def test_the_walk_reaches_everything() -> None:
-    paths = {s.path for s in SETTINGS if s.root.startswith("run")}
+def test_every_section_is_reached() -> None:
+    paths = {s.path for s in EVERY if s.root.startswith("run")}
     assert {"ring.count", "ring.sensors.0.angle_deg", "ring.firing.sets", "body.synchro", "link.tries"} <= paths
     assert {"world.drum.0.x_m", "world.polygon.0.vertices_m", "models.0.arc_radius_m", "log.level"} <= paths
     assert {"perception.relaxation.gamma", "behaviors.arbiter.turn_gain_per_s", "cycle.rate_hz"} <= paths
@@ -144,7 +158,7 @@ def test_the_walk_reaches_everything() -> None:
 
 
 def models_within(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Yield every settings model that an annotation leads to, by whatever way."""
+    """Yield every settings model within an annotation."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
         for field in annotation.model_fields.values():
@@ -160,22 +174,20 @@ def strict_models(base: type[Strict] = Strict) -> Iterator[type[Strict]]:
 
 
 @pytest.mark.promise("P11")
-def test_no_field_of_any_model_is_left_out(record_property: Callable[[str, object], None]) -> None:
-    """So a new setting is tested the day it is added: a branch that the tables above do not open is a failure."""
+def test_no_field_of_any_model_is_left_out(measured: Callable[[str], None]) -> None:
+    """A field that the tables above do not reach is a failure."""
     every = {model for root, _, _ in ROOTS.values() for model in models_within(root)}
     shipped = {m for m in strict_models() if m.__module__.startswith("config.")}
     assert shipped <= every, "a settings model that no file can hold"
     wanted = {id(field) for model in every for field in model.model_fields.values()}
     assert wanted <= {id(s.field) for s in SETTINGS}
     cases = sum(len(WRONG[s.kind]) for s in SETTINGS) + len(REQUIRED) + len(NAMED) + len(list(bounds()))
-    record_property(
-        "measured", f"{len(wanted)} fields of {len(every)} models, {cases} invalid files, each reported in a line"
-    )
+    measured(f"{len(wanted)} fields of {len(every)} models, {cases} invalid files, each reported in a line")
 
 
 @pytest.mark.promise("P11")
 def test_every_number_has_a_lower_and_an_upper_bound() -> None:
-    """Without both, a slip of the keyboard overflows somewhere far from the file that it is in."""
+    """Otherwise a mistyped number causes an overflow far from its file."""
     for setting in SETTINGS:
         if setting.kind in (int, float):
             bounds = [type(bound) for bound in setting.field.metadata]
@@ -184,46 +196,60 @@ def test_every_number_has_a_lower_and_an_upper_bound() -> None:
 
 
 @pytest.mark.parametrize("root", ROOTS)
-def test_the_unharmed_table_is_good(root: str, tmp_path: Path) -> None:
+def test_the_unchanged_table_is_valid(root: str, tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(document(ROOTS[root][1]), encoding="utf-8")
     ROOTS[root][2](tmp_path / "mine.toml")
 
 
+def changed(setting: Setting, value: object) -> dict[str, Any]:
+    """Return the valid table of a kind of file with another value for one setting."""
+    table = copy.deepcopy(ROOTS[setting.root][1])
+    holder(table, setting.location)[setting.location[-1]] = value
+    return table
+
+
+def assert_one_line(setting: Setting, table: dict[str, Any], folder: Path, expected: str) -> None:
+    lines = refused(setting, table, folder)
+    assert len(lines) == 1, (str(setting), lines)
+    assert lines[0].startswith(expected), str(setting)
+
+
 @pytest.mark.promise("P11")
-@pytest.mark.parametrize("setting", [s for s in SETTINGS if not is_name_of_a_file(s)], ids=str)
-def test_wrong_type(setting: Setting, tmp_path: Path) -> None:
-    for given in WRONG[setting.kind]:
-        table = copy.deepcopy(ROOTS[setting.root][1])
-        holder(table, setting.location)[setting.location[-1]] = WRONG_TYPES[given]
-        lines = refused(setting, table, tmp_path)
-        shown = "{…}" if given == "table" else toml(WRONG_TYPES[given])
-        assert len(lines) == 1
-        assert lines[0].startswith(f"{setting.path} = {shown}: {WANTED[setting.kind]}")
+@pytest.mark.parametrize("root", ROOTS)
+def test_wrong_type(root: str, tmp_path: Path) -> None:
+    for setting in (s for s in SETTINGS if s.root == root and not is_name_of_a_file(s)):
+        for given in WRONG[setting.kind]:
+            shown = "{…}" if given == "table" else toml(WRONG_TYPES[given])
+            expected = f"{setting.path} = {shown}: {WANTED[setting.kind]}"
+            assert_one_line(setting, changed(setting, WRONG_TYPES[given]), tmp_path, expected)
 
 
 REQUIRED = [s for s in NAMED if s.field.is_required() and s.location not in NAMES_FILES]
 
 
 @pytest.mark.promise("P11")
-@pytest.mark.parametrize("setting", REQUIRED, ids=str)
-def test_missing(setting: Setting, tmp_path: Path) -> None:
-    table = copy.deepcopy(ROOTS[setting.root][1])
-    del holder(table, setting.location)[setting.location[-1]]
-    assert refused(setting, table, tmp_path) == [f"{setting.path}: missing"]
+@pytest.mark.parametrize("root", ROOTS)
+def test_missing(root: str, tmp_path: Path) -> None:
+    for setting in (s for s in REQUIRED if s.root == root):
+        table = copy.deepcopy(ROOTS[setting.root][1])
+        del holder(table, setting.location)[setting.location[-1]]
+        assert refused(setting, table, tmp_path) == [f"{setting.path}: missing"]
 
 
 @pytest.mark.promise("P11")
-@pytest.mark.parametrize("setting", NAMED, ids=str)
-def test_misspelt(setting: Setting, tmp_path: Path) -> None:
-    table = copy.deepcopy(ROOTS[setting.root][1])
-    key = str(setting.location[-1])
-    misspelt = f"{key[:-1]}q{key[-1]}"
-    holder(table, setting.location)[misspelt] = 1
-    path = ".".join(map(str, (*setting.location[:-1], misspelt)))
-    assert refused(setting, table, tmp_path) == [f"{path}: unknown key; did you mean {key}?"]
+@pytest.mark.parametrize("root", ROOTS)
+def test_misspelt(root: str, tmp_path: Path) -> None:
+    for setting in (s for s in NAMED if s.root == root):
+        key = str(setting.location[-1])
+        misspelt = f"{key[:-1]}q{key[-1]}"
+        table = copy.deepcopy(ROOTS[setting.root][1])
+        holder(table, setting.location)[misspelt] = 1
+        path = ".".join(map(str, (*setting.location[:-1], misspelt)))
+        assert refused(setting, table, tmp_path) == [f"{path}: unknown key; did you mean {key}?"]
 
 
 def bounds() -> Iterator[tuple[Setting, float, str]]:
+    """Yield each numeric setting with a value beyond each of its bounds, and the expected start of the message."""
     for setting in SETTINGS:
         step = 1 if setting.kind is int else 0.001
         for bound in setting.field.metadata if setting.kind in (int, float) else ():
@@ -240,33 +266,24 @@ def bounds() -> Iterator[tuple[Setting, float, str]]:
 
 
 @pytest.mark.promise("P11")
-@pytest.mark.parametrize(("setting", "value", "wanted"), list(bounds()), ids=str)
-def test_out_of_bounds(setting: Setting, value: float, wanted: str, tmp_path: Path) -> None:
-    table = copy.deepcopy(ROOTS[setting.root][1])
-    holder(table, setting.location)[setting.location[-1]] = value
-    lines = refused(setting, table, tmp_path)
-    assert len(lines) == 1
-    assert lines[0].startswith(f"{setting.path} = {value}: {wanted}")
+def test_out_of_bounds(tmp_path: Path) -> None:
+    for setting, value, wanted in bounds():
+        assert_one_line(setting, changed(setting, value), tmp_path, f"{setting.path} = {value}: {wanted}")
 
 
-@pytest.mark.parametrize("setting", [s for s in SETTINGS if s.kind is float], ids=str)
-def test_neither_infinite_nor_nan(setting: Setting, tmp_path: Path) -> None:
-    for value in (float("inf"), float("-inf"), float("nan")):
-        table = copy.deepcopy(ROOTS[setting.root][1])
-        holder(table, setting.location)[setting.location[-1]] = value
-        lines = refused(setting, table, tmp_path)
-        assert len(lines) == 1
-        assert lines[0].startswith(f"{setting.path} = {value}: must be ")
+NUMBERS = [s for s in SETTINGS if s.kind is float]
 
 
-@pytest.mark.parametrize("setting", [s for s in SETTINGS if s.kind is float], ids=str)
-def test_a_number_may_be_written_without_a_fraction(setting: Setting, tmp_path: Path) -> None:
-    good = [0, 1, 2, 10, 45]
-    table = copy.deepcopy(ROOTS[setting.root][1])
+def test_neither_infinite_nor_nan(tmp_path: Path) -> None:
+    for setting in NUMBERS:
+        for value in (float("inf"), float("-inf"), float("nan")):
+            assert_one_line(setting, changed(setting, value), tmp_path, f"{setting.path} = {value}: must be ")
+
+
+def test_a_number_may_be_written_without_a_fraction(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
-    for value in good:
-        holder(table, setting.location)[setting.location[-1]] = value
-        path.write_text(document(table), encoding="utf-8")
+    for setting in NUMBERS:
+        path.write_text(document(changed(setting, 1)), encoding="utf-8")
         try:
             ROOTS[setting.root][2](path)
         except ConfigError as error:

@@ -14,9 +14,6 @@ from tests.config.toml_text import MODEL, ROBOT, WORLD
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
-# --- where a value came from
-
-
 def test_each_error_names_the_source_of_its_value(tmp_path: Path) -> None:
     robot, world, model = copy.deepcopy(ROBOT), copy.deepcopy(WORLD), copy.deepcopy(MODEL)
     robot["ring"]["resolution_m"] = -1
@@ -72,7 +69,7 @@ def test_a_missing_key_is_the_enclosing_sections(tmp_path: Path) -> None:
     ]
 
 
-def test_a_disagreement_names_all_who_have_a_part_in_it(tmp_path: Path) -> None:
+def test_a_conflict_names_the_sources_of_all_its_values(tmp_path: Path) -> None:
     mine = write(tmp_path / "mine.toml", ROBOT)
     run = write(tmp_path / "run.toml", {"robot": "mine.toml", "ring": {"range_max_m": 5, "resolution_m": 0}})
     text = "ring: range_min_m 6.0 is not below range_max_m 5.0"
@@ -82,7 +79,7 @@ def test_a_disagreement_names_all_who_have_a_part_in_it(tmp_path: Path) -> None:
     assert problem(mine, ["perception.segments.baseline_min_m=0.9"]) == f"--set: {text}"
 
 
-def test_a_disagreement_in_a_world_or_model_file(tmp_path: Path) -> None:
+def test_a_conflict_in_a_model_file(tmp_path: Path) -> None:
     model = copy.deepcopy(MODEL)
     model["vertices_m"][1] = model["vertices_m"][0]
     mine = write(tmp_path / "mine.toml", model)
@@ -92,7 +89,7 @@ def test_a_disagreement_in_a_world_or_model_file(tmp_path: Path) -> None:
     assert problem(models=[str(mine)]) == f"{mine}: vertex 1 [0.0, 0.0] repeats vertex 0"
 
 
-def test_a_section_no_robot_file_may_have(tmp_path: Path) -> None:
+def test_a_section_that_no_robot_file_may_have(tmp_path: Path) -> None:
     mine = write(tmp_path / "mine.toml", {**ROBOT, "cycle": {"rate_hz": 5}})
     run = write(tmp_path / "run.toml", {"robot": "mine.toml"})
     assert problem(run) == f"{mine}: cycle: unknown key; known here: robot, ring, body, link"
@@ -110,7 +107,7 @@ def test_entries_of_a_wrong_list_are_reported_once() -> None:
     assert problem(None, ["ring.firing={sets=[[0, -1]]}"]).startswith("--set: ring.firing.sets.0.1 = -1: must be")
 
 
-def test_a_table_replaced_whole_forgets_where_its_old_values_came_from(tmp_path: Path) -> None:
+def test_a_replaced_table_has_the_source_of_its_new_values(tmp_path: Path) -> None:
     run = write(tmp_path / "run.toml", {"robot": "denning", "body": {"radius_m": 0.2}})
     lines = problems(run, ["body={radius_m=0, speed_max_m_s=1, turn_max_rad_s=-1}"])
     assert [line.split(" = ")[0] for line in lines] == ["--set: body.radius_m", "--set: body.turn_max_rad_s"]

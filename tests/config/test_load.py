@@ -1,4 +1,4 @@
-"""Layers, names and paths of the files that settings come from."""
+"""Names and paths of settings files, and the layers that they are merged in."""
 
 from __future__ import annotations
 
@@ -16,9 +16,6 @@ from tests.config.loading import problem, problems, write
 from tests.config.toml_text import MODEL, ROBOT, WORLD, irregular
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
-
-
-# --- names and paths
 
 
 def test_a_name_finds_the_shipped_file_and_a_path_any_file(tmp_path: Path) -> None:
@@ -83,7 +80,7 @@ def test_bare_name_of_an_existing_file(tmp_path: Path) -> None:
         load_robot("mine")
 
 
-def test_a_missing_file_says_who_named_it_and_what_is_known(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported_with_the_file_that_names_it(tmp_path: Path) -> None:
     assert problem("run.toml") == "run.toml: file not found; known runs: hallway, irregular"
     run = write(tmp_path / "run.toml", {"robot": "robots/mine.toml"})
     assert problem(run) == f"{tmp_path}/robots/mine.toml: file not found; named by {run}; known robots: denning"
@@ -105,12 +102,9 @@ def test_every_missing_file_is_reported(tmp_path: Path) -> None:
         ("models", [], "models = []: needs at least one entry, has 0"),
     ],
 )
-def test_what_names_a_file_must_be_a_name(key: str, value: Any, text: str, tmp_path: Path) -> None:
+def test_the_name_of_a_file_must_be_a_string(key: str, value: Any, text: str, tmp_path: Path) -> None:
     run = write(tmp_path / "run.toml", {"robot": "denning", key: value})
     assert problem(run) == f"{run}: {text}"
-
-
-# --- layers
 
 
 def test_a_run_overrides_the_robot_key_by_key(tmp_path: Path) -> None:
@@ -124,7 +118,7 @@ def test_a_run_overrides_the_robot_key_by_key(tmp_path: Path) -> None:
     assert settings.link.baud == robot.link.baud
 
 
-def test_what_a_run_leaves_out_is_the_papers_experiment(tmp_path: Path) -> None:
+def test_the_defaults_are_the_papers_experiment(tmp_path: Path) -> None:
     settings = load_settings(write(tmp_path / "run.toml", {"robot": "denning"}))
     assert settings.world == load_world("hallway")
     assert settings.models == (load_model("semicircle"),)
@@ -140,7 +134,7 @@ def test_a_run_without_a_robot(tmp_path: Path) -> None:
     assert problem(run).startswith(f"{run}: robot: missing; name a robot or a robot file; known robots: denning")
 
 
-def test_one_model_may_stand_without_its_list(tmp_path: Path) -> None:
+def test_one_model_needs_no_list(tmp_path: Path) -> None:
     run = write(tmp_path / "run.toml", {"robot": "denning", "models": "box"})
     assert [m.name for m in load_settings(run).models] == ["box"]
 
@@ -149,7 +143,7 @@ def test_two_models_of_one_name() -> None:
     assert problem(models=["box", "box"]).endswith("two models are named box: give each model a name of its own")
 
 
-def test_a_firing_table_with_its_own_pattern_replaces_the_robots(tmp_path: Path) -> None:
+def test_a_firing_pattern_replaces_that_of_the_robot(tmp_path: Path) -> None:
     mine = write(tmp_path / "mine.toml", irregular(ROBOT))
     for firing in ("single", {"preset": "single"}):
         run = write(tmp_path / "run.toml", {"robot": "mine.toml", "ring": {"firing": firing}})
@@ -169,7 +163,7 @@ def test_a_preset_written_as_a_string_can_be_refined(tmp_path: Path) -> None:
     assert (firing.preset, firing.step_period_s) == ("quadrants", 0.2)
 
 
-def test_a_value_overridden_with_a_good_one_does_no_harm(tmp_path: Path) -> None:
+def test_an_invalid_value_may_be_overridden_by_a_valid_one(tmp_path: Path) -> None:
     robot = copy.deepcopy(ROBOT)
     robot["body"]["radius_m"] = -1
     write(tmp_path / "mine.toml", robot)
@@ -177,7 +171,7 @@ def test_a_value_overridden_with_a_good_one_does_no_harm(tmp_path: Path) -> None
     assert load_settings(run).body.radius_m == 0.2
 
 
-def test_the_kind_of_a_file_is_seen_from_its_keys(tmp_path: Path) -> None:
+def test_the_kind_of_a_file_follows_from_its_keys(tmp_path: Path) -> None:
     assert isinstance(load_any(write(tmp_path / "w.toml", WORLD)), WorldConfig)
     assert isinstance(load_any(write(tmp_path / "m.toml", MODEL)), ModelConfig)
     assert isinstance(load_any(write(tmp_path / "r.toml", ROBOT)), Settings)

@@ -1,4 +1,4 @@
-"""Model files that fit nothing are refused, with the file and the vertex to look at."""
+"""Outlines that no object can have are refused, with the file and the vertex."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from config.load import ConfigError, list_shipped, load_model
 from config.model import ModelConfig
+from tests.examples import examples
 
 SQUARE = [(0.3, 0.3), (-0.3, 0.3), (-0.3, -0.3), (0.3, -0.3)]
 
@@ -54,9 +55,10 @@ def test_shipped_models_and_plain_shapes_are_accepted(tmp_path: Path) -> None:
         assert load_model(name).name == name
     assert load_model(write(tmp_path, SQUARE)).closed
     assert len(load_model(write(tmp_path, [(0.0, 0.0), (1.0, 0.0)], closed=False)).vertices_m) == 2
-    load_model(write(tmp_path, [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)], closed=False))  # straight on is no crossing
+    load_model(write(tmp_path, [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)], closed=False))  # straight on
 
 
+@examples(0.5)
 @given(
     st.integers(3, 20),
     st.floats(0.05, 5.0),
@@ -72,9 +74,10 @@ def test_no_star_shaped_outline_is_refused(
     ModelConfig(name="star", vertices_m=vertices, closed=closed)
 
 
+@examples(0.3)
 @given(st.integers(4, 12), st.data())
 def test_a_swap_of_two_corners_of_a_convex_outline_is_found(n: int, data: st.DataObject) -> None:
-    """Only a swap of neighbours in a triangle leaves an outline without crossing; from four corners on none does."""
+    """From four corners on, every swap of neighbours makes two sides cross."""
     vertices = [(math.cos(2.0 * math.pi * k / n), math.sin(2.0 * math.pi * k / n)) for k in range(n)]
     i = data.draw(st.integers(0, n - 1))
     j = (i + 1) % n

@@ -1,4 +1,4 @@
-"""Single settings from the command line: `--set`, over the files, and what is wrong with it."""
+"""Single settings from the command line by `--set`: they override the files, and errors are explained."""
 
 from __future__ import annotations
 
@@ -12,9 +12,6 @@ from tests.config.loading import problem, problems, write
 from tests.config.toml_text import ROBOT, irregular
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
-
-
-# --- --set
 
 
 @pytest.mark.parametrize(
@@ -53,7 +50,7 @@ def test_set(text: str, path: str | None, value: object) -> None:
     assert type(found) is type(value)
 
 
-def test_set_goes_over_the_files_and_later_over_earlier(tmp_path: Path) -> None:
+def test_set_overrides_the_files_and_a_later_one_the_earlier(tmp_path: Path) -> None:
     run = write(tmp_path / "run.toml", {"robot": "denning", "body": {"radius_m": 0.2}})
     assert load_settings(run, ["body.radius_m=0.3"]).body.radius_m == 0.3
     assert load_settings(run, ["body.radius_m=0.3", "body.radius_m=0.5"]).body.radius_m == 0.5
@@ -61,7 +58,7 @@ def test_set_goes_over_the_files_and_later_over_earlier(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["foo", "", "=", "=1", ".a=1", "a.=1", "a..b=1", " =1"])
-def test_set_without_the_form(text: str) -> None:
+def test_set_of_another_form(text: str) -> None:
     assert problem(None, [text]).startswith(f"--set {text}: must have the form section.key=value")
 
 
@@ -96,7 +93,7 @@ def test_set_without_the_form(text: str) -> None:
         ("ring.beam_half_angle_deg=120", "--set: ring.beam_half_angle_deg = 120: must be below 90 (and above 0)"),
     ],
 )
-def test_set_gone_wrong(text: str, wanted: str) -> None:
+def test_an_invalid_set(text: str, wanted: str) -> None:
     line = problem(None, [text])
     assert line.startswith(wanted)
     assert len(line) < 250

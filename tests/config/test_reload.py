@@ -1,4 +1,4 @@
-"""A running process takes a changed configuration over whole or keeps the last good one, whatever the file holds."""
+"""A changed configuration is applied as a whole, or the last valid one is kept, for any content of the file."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from pydantic import BaseModel
 from config.load import ConfigError, load_settings
 from config.reload import LIVE_SETTINGS, Difference, differences, reload
 from config.settings import Settings
-from tests.config.test_every_field import SETTINGS, Setting, holder
+from tests.config.test_every_field import EVERY, Setting, holder
 from tests.config.toml_text import MODEL, RUN, document
 
-RELOADS = 10_000
+RELOADS, SOAK_RELOADS = 1000, 10_000
 
 
 def every_path(model: type[BaseModel], at: str = "") -> Iterator[str]:
@@ -33,11 +33,11 @@ def settings_from(folder: Path, table: dict[str, Any]) -> Settings:
     return load_settings(path)
 
 
-def test_whatever_is_declared_live_exists() -> None:
+def test_every_setting_declared_live_exists() -> None:
     assert set(every_path(Settings)) >= LIVE_SETTINGS
 
 
-def test_what_a_process_is_built_from_is_not_live() -> None:
+def test_settings_that_a_process_is_built_from_are_not_live() -> None:
     fixed = """
         link.port link.baud ring.count ring.sensors ring.range_max_m body.radius_m models cycle.rate_hz log.file world
         perception.method perception.map.capacity perception.bayes.tracks_max perception.clusters.clusters_max
@@ -46,7 +46,7 @@ def test_what_a_process_is_built_from_is_not_live() -> None:
         assert not Difference(tuple(path.split(".")), 1, 2).live, path
 
 
-def test_what_an_operator_turns_while_it_runs_is_live() -> None:
+def test_settings_that_an_operator_changes_while_driving_are_live() -> None:
     live = """
         behaviors.move_ahead.move_ahead_gain behaviors.avoid_static_obstacle.avoid_obstacle_gain
         behaviors.move_to_goal.move_to_goal_gain behaviors.teleoperation.message_age_max_s
@@ -57,7 +57,7 @@ def test_what_an_operator_turns_while_it_runs_is_live() -> None:
         assert Difference(tuple(path.split(".")), 1, 2).live, path
 
 
-def test_further_models_are_live_and_other_ones_are_not(tmp_path: Path) -> None:
+def test_adding_a_model_is_live_and_replacing_one_is_not(tmp_path: Path) -> None:
     before = settings_from(tmp_path, RUN)
     more = {**RUN, "models": [MODEL, {**MODEL, "name": "b"}]}
     outcome = reload(before, lambda: settings_from(tmp_path, more))
@@ -72,7 +72,7 @@ def test_further_models_are_live_and_other_ones_are_not(tmp_path: Path) -> None:
     assert len(fewer.problems) == 1
 
 
-def test_every_live_change_is_named_and_taken_over(tmp_path: Path) -> None:
+def test_every_live_change_is_named_and_applied(tmp_path: Path) -> None:
     before = settings_from(tmp_path, RUN)
     table = copy.deepcopy(RUN)
     table["behaviors"]["arbiter"] = {"base_velocity_m_s": 0.25}
@@ -124,7 +124,7 @@ def test_no_change_is_no_problem(tmp_path: Path) -> None:
     assert (outcome.changed, outcome.problems) == ((), ())
 
 
-GOOD: dict[Any, tuple[Any, ...]] = {
+VALID: dict[Any, tuple[Any, ...]] = {
     float: (0.0, 0.05, 0.1, 0.3, 0.5, 0.9, 1.0, 5.0, 40.0),
     int: (0, 1, 2, 5, 16, 24, 300, 9600),
     bool: (True, False),
@@ -133,22 +133,22 @@ GOOD: dict[Any, tuple[Any, ...]] = {
     "list": ([], [[0], [1]]),
     "table": ({},),
 }
-BAD = ("oddly", -1.0, 1e300, True, {"a": 1}, [1.5], 7)
-FIELDS = [s for s in SETTINGS if s.root == "run"]
+INVALID = ("oddly", -1.0, 1e300, True, {"a": 1}, [1.5], 7)
+FIELDS = [s for s in EVERY if s.root == "run"]
 LIVE_FIELDS = [s for s in FIELDS if Difference(s.location, 0, 1).live]
 
 
-def harm(rng: random.Random, table: dict[str, Any]) -> None:
-    """Change one to three settings to something that may be good or bad."""
+def mutate(rng: random.Random, table: dict[str, Any]) -> None:
+    """Change one to three settings to valid or invalid values."""
     for _ in range(rng.randint(1, 3)):
         setting: Setting = rng.choice(LIVE_FIELDS if rng.random() < 0.7 else FIELDS)
         key = setting.location[-1]
         try:
             under = holder(table, setting.location)
-            value = rng.choice(GOOD[setting.kind]) if rng.random() < 0.9 else rng.choice(BAD)
+            value = rng.choice(VALID[setting.kind]) if rng.random() < 0.9 else rng.choice(INVALID)
             under[f"{key}q" if rng.random() < 0.03 else key] = copy.deepcopy(value)
         except (AttributeError, IndexError, KeyError, TypeError):
-            continue  # the way there is already harmed
+            continue  # an earlier change has replaced the table above it
 
 
 def rendered(settings: Settings) -> str:
@@ -156,15 +156,25 @@ def rendered(settings: Settings) -> str:
 
 
 @pytest.mark.promise("P11")
-def test_any_number_of_random_reloads_are_atomic(record_property: Callable[[str, object], None]) -> None:
-    """Each is taken over whole or changes nothing; and no live difference is ever left out or added."""
-    rng = random.Random(11)
+def test_any_number_of_random_reloads_are_atomic(measured: Callable[[str], None]) -> None:
+    check_reloads(RELOADS, 11, measured)
+
+
+@pytest.mark.soak
+@pytest.mark.promise("P11")
+def test_ten_thousand_random_reloads_are_atomic(measured: Callable[[str], None]) -> None:
+    check_reloads(SOAK_RELOADS, 12, measured)
+
+
+def check_reloads(count: int, seed: int, measured: Callable[[str], None]) -> None:
+    """Assert that each reload is applied as a whole or not at all, and that every live difference is reported."""
+    rng = random.Random(seed)
     current = Settings.model_validate(copy.deepcopy(RUN))
-    counts = {"taken over": 0, "no good": 0, "needs a restart": 0, "as before": 0}
+    counts = {"applied": 0, "invalid": 0, "needs a restart": 0, "unchanged": 0}
     table = copy.deepcopy(RUN)
-    for _ in range(RELOADS):
+    for _ in range(count):
         attempt = copy.deepcopy(table)
-        harm(rng, attempt)
+        mutate(rng, attempt)
         wanted: list[Settings] = []
 
         def propose(attempt: dict[str, Any] = attempt, wanted: list[Settings] = wanted) -> Settings:
@@ -178,22 +188,22 @@ def test_any_number_of_random_reloads_are_atomic(record_property: Callable[[str,
         outcome = reload(current, propose)
         current = outcome.settings
         if not wanted:
-            kind = "no good"
+            kind = "invalid"
         elif outcome.problems:
             kind = "needs a restart"
             assert any(not d.live for d in differences(before, wanted[0]))
         elif outcome.changed:
-            kind = "taken over"
+            kind = "applied"
             assert current is wanted[0]
             assert all(d.live for d in outcome.changed)
             assert {d.path for d in outcome.changed} == {d.path for d in differences(before, current)}
             table = attempt
         else:
-            kind = "as before"
+            kind = "unchanged"
             assert wanted[0] == before
         counts[kind] += 1
-        if kind != "taken over":
+        if kind != "applied":
             assert current is before
-        assert rendered(before) == text, "the last good one is untouched"
-    assert min(counts.values()) > RELOADS // 100, counts
-    record_property("measured", f"{RELOADS} random reloads, none half applied: {counts}")
+        assert rendered(before) == text, "the last valid one is untouched"
+    assert min(counts.values()) > count // 100, counts
+    measured(f"{count:,} random reloads, none half applied: {counts}")

@@ -1,4 +1,4 @@
-"""The shipped files: all of them load, and they say what the paper says."""
+"""The shipped files: all of them load, and their values are those of the paper."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FT = 0.3048
 TABLE_2 = {(1.0, 4.0), (4.0, 4.0), (7.0, 4.0), (1.0, -4.0), (4.0, -4.0), (7.0, -4.0)}
 
 
-def test_what_is_shipped() -> None:
+def test_the_names_of_shipped_files() -> None:
     assert list_shipped("robots") == ("denning",)
     assert list_shipped("worlds") == ("hallway", "irregular")
     assert list_shipped("models") == ("box", "drum", "semicircle")

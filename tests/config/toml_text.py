@@ -1,4 +1,4 @@
-"""TOML as text from a table, and one table that gives every setting a good value."""
+"""TOML text of a table, and one table with a valid value for every setting."""
 
 from __future__ import annotations
 

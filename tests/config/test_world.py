@@ -1,0 +1,46 @@
+"""The world file: an empty one is an empty hall without errors; objects are bounded in place, size and number."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from config.world import ITEMS_MAX, WorldConfig
+from tests.config.toml_text import WORLD
+
+
+def test_an_empty_world_has_no_objects_and_no_errors() -> None:
+    world = WorldConfig()
+    assert (world.drum, world.wall, world.box, world.polygon) == ((), (), (), ())
+    assert (world.start.x_m, world.start.y_m, world.start.heading_deg) == (0.0, 0.0, 0.0)
+    sound = world.acoustics
+    assert {sound.noise_m, sound.noise_relative, sound.dropout, sound.outliers, sound.crosstalk} == {0.0}
+    assert (sound.sound_speed_scale, world.odometry.scale) == (1.0, 1.0)
+
+
+def test_every_kind_of_object_is_read() -> None:
+    world = WorldConfig.model_validate(WORLD)
+    assert (world.drum[0].radius_m, world.wall[0].x2_m, world.box[0].angle_deg) == (0.3, 5.0, 30.0)
+    assert world.polygon[0].vertices_m == ((5.0, 5.0), (6.0, 5.0), (6.0, 6.0))
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        {"drum": [{"x_m": 10_001.0, "y_m": 0.0, "radius_m": 1.0}]},
+        {"drum": [{"x_m": 0.0, "y_m": 0.0, "radius_m": 0.0}]},
+        {"box": [{"x_m": 0.0, "y_m": 0.0, "width_m": 1.0, "depth_m": 101.0}]},
+        {"polygon": [{"vertices_m": [[0.0, 0.0], [1.0, 0.0]]}]},
+        {"polygon": [{"vertices_m": [[float(k), 0.0] for k in range(ITEMS_MAX + 1)]}]},
+        {"wall": [{"x1_m": 0.0, "y1_m": 0.0, "x2_m": 1.0, "y2_m": 0.0}] * (ITEMS_MAX + 1)},
+        {"acoustics": {"model": "laser"}},
+        {"acoustics": {"dropout": 1.1}},
+        {"start": {"heading_deg": 361.0}},
+    ],
+    ids=lambda table: str(table)[:60],
+)
+def test_a_world_beyond_the_bounds_is_refused(table: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError):
+        WorldConfig.model_validate(table)
