@@ -12,22 +12,26 @@ from pathlib import Path
 
 import pytest
 import pytest_asyncio
-from playwright.async_api import Browser, async_playwright
+from playwright.async_api import async_playwright, expect
 
-from tests.browser.fake_server import FakeServer, serving
-from tests.browser.open_page import Opener
+from tests.browser.fake_server import TIMEOUT_S, FakeServer, serving
+from tests.browser.open_page import Opener, PagePool
 from tests.browser.synthetic_run import Hall
 
 ARGUMENTS = ("--disable-gpu", "--disable-dev-shm-usage", "--force-color-profile=srgb")
 
 
 @pytest_asyncio.fixture(scope="session", loop_scope="session")
-async def browser() -> AsyncIterator[Browser]:
+async def pool() -> AsyncIterator[PagePool]:
+    """Pages of one browser for all tests."""
     program = shutil.which("chromium")
     assert program is not None, "chromium is missing: `make test` installs it, or apt-get install chromium"
+    expect.set_options(timeout=1000 * TIMEOUT_S)
     async with async_playwright() as playwright:
-        launched = await playwright.chromium.launch(executable_path=program, args=list(ARGUMENTS))
-        yield launched
+        launched = await playwright.chromium.launch(
+            executable_path=program, args=list(ARGUMENTS), timeout=1000 * TIMEOUT_S
+        )
+        yield PagePool(launched)
         await launched.close()
 
 
@@ -43,17 +47,19 @@ async def server(hall: Hall) -> AsyncIterator[FakeServer]:
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def opener(browser: Browser, screenshots: Callable[[str], Path]) -> AsyncIterator[Opener]:
+async def opener(pool: PagePool, screenshots: Callable[[str], Path | None]) -> AsyncIterator[Opener]:
     """Open pages, and check at the end that none reported an error."""
-    async with Opener(browser, screenshots) as pages:
+    async with Opener(pool, screenshots) as pages:
         yield pages
     pages.check()
 
 
 @pytest.fixture
-def screenshots(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[str], Path]:
-    """Where a screenshot goes: the folder given by --screenshots, or the test's own."""
+def screenshots(request: pytest.FixtureRequest) -> Callable[[str], Path | None]:
+    """Where a screenshot goes; None without the option --screenshots."""
     folder = request.config.getoption("screenshots")
-    where = tmp_path if folder is None else Path(folder)
+    if folder is None:
+        return lambda _name: None
+    where = Path(folder)
     where.mkdir(parents=True, exist_ok=True)
     return lambda name: where / f"{name}.png"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import cmath
 import contextlib
+import itertools
 import json
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
@@ -17,9 +18,14 @@ from tests.browser.synthetic_run import Hall, greeting
 
 PAGE: Final = Path(__file__).parents[2] / "runtime" / "console" / "page"
 POLICY: Final = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
-TIMEOUT_S: Final = 30.0
+TIMEOUT_S: Final = 60.0
+"""For what comes at once on any machine: only what hangs takes so long."""
 TOKEN: Final = "right-token"
 TOML: Final = "[cycle]\nperception_budget_s = 0.005\n"
+SYNC: Final = "sync"
+"""A request of the tests, see `Opened.sync`; it is answered and not kept."""
+LOOK_S: Final = 0.05
+HEARTBEAT_S: Final = 1.0
 KINDS: Final = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 
 HALTED: Final = "halted by the operator; re-arm to continue"
@@ -34,11 +40,17 @@ class Client:
     sent_segments: int = 0
     gone: set[int] = field(default_factory=set)
     whole: bool = True
+    last: dict[str, Any] | None = None
+    """The last state sent to it."""
 
 
 @dataclass
 class FakeServer:
-    """The robot's process as the page sees it."""
+    """The robot's process as the page sees it.
+
+    The robot moves only when a test calls `advance`. A state is sent when it has changed, after each message, and
+    otherwise once a second.
+    """
 
     hall: Hall
     mode: str = "DRIVE"
@@ -53,14 +65,19 @@ class FakeServer:
     pinned: set[int] = field(default_factory=set)
     refusals: dict[str, tuple[str, str | None]] = field(default_factory=dict)
     received: list[dict[str, Any]] = field(default_factory=list)
-    arrived_s: list[float] = field(default_factory=list)
     clients: list[Client] = field(default_factory=list)
     cycle: int = 40
     session: dict[str, Any] = field(default_factory=dict)
     changed: list[tuple[str, Any]] = field(default_factory=list)
     flags: list[str] = field(default_factory=list)
     silent: bool = False
-    """Send nothing, like a process that hangs."""
+    """Send no state, like a process that hangs."""
+    refusing: bool = False
+    """Accept no connection."""
+    deaf: bool = False
+    """Answer nothing, like a connection that died without being closed."""
+    connections: int = 0
+    """Connections so far, with those that were refused."""
     port: int = 0
     _changed: asyncio.Event = field(default_factory=asyncio.Event)
     _counted: int = 0
@@ -84,9 +101,21 @@ class FakeServer:
         """Return the messages of a kind received so far."""
         return [m for m in self.received if m["type"] == kind]
 
-    def times_of(self, kind: str) -> list[float]:
-        """Return the times at which they were received, by the loop's clock."""
-        return [t for m, t in zip(self.received, self.arrived_s, strict=True) if m["type"] == kind]
+    async def wait_for_clients(self, count: int) -> None:
+        """Wait until this many pages are connected."""
+        try:
+            async with asyncio.timeout(TIMEOUT_S):
+                while len(self.clients) != count:
+                    self._changed.clear()
+                    await self._changed.wait()
+        except TimeoutError:
+            raise AssertionError(f"{len(self.clients)} pages are connected, not {count}") from None
+
+    async def advance(self, cycles: int = 1) -> None:
+        """Let the robot drive on, and send the state of each cycle."""
+        for _ in range(cycles):
+            self.cycle += 1
+            await self.send_states()
 
     async def send(self, message: dict[str, Any]) -> None:
         """Send a message to every page."""
@@ -119,16 +148,27 @@ class FakeServer:
             "recording": self.recording, "paused": self.paused, "speed": self.speed, "playback": self.playback,
         }  # fmt: skip
 
+    async def send_states(self) -> None:
+        """Send the present state to every page."""
+        for client in list(self.clients):
+            await self._send_state(client, self.frame(client))
+
+    async def _send_state(self, client: Client, frame: dict[str, Any]) -> None:
+        if self.silent:
+            return
+        client.last = frame
+        with contextlib.suppress(ConnectionError):
+            await client.socket.send_str(json.dumps(frame))
+
     async def run(self) -> None:
-        """Send a state to every page, twenty times a second."""
-        while True:
-            if not self.silent:
-                if self.mode == "DRIVE" and not self.paused:
-                    self.cycle += 1
-                for client in list(self.clients):
-                    with contextlib.suppress(ConnectionError):
-                        await client.socket.send_str(json.dumps(self.frame(client)))
-            await asyncio.sleep(0.05)
+        """Send states that have changed, and one as a heartbeat."""
+        turns = round(HEARTBEAT_S / LOOK_S)
+        for turn in itertools.count():
+            for client in [] if self.silent else list(self.clients):
+                frame = self.frame(client)
+                if frame != client.last or turn % turns == 0:
+                    await self._send_state(client, frame)
+            await asyncio.sleep(LOOK_S)
 
     async def index(self, _request: web.Request) -> web.StreamResponse:
         return _file(PAGE / "index.html")
@@ -138,11 +178,14 @@ class FakeServer:
 
     async def report(self, request: web.Request) -> web.StreamResponse:
         self.received.append({"type": "GET /report", "id": 0, "token": request.query.get("token")})
-        self.arrived_s.append(asyncio.get_running_loop().time())
         self._changed.set()
         return web.Response(text="<!doctype html><title>report</title><h1>Report</h1>", content_type="text/html")
 
     async def talk(self, request: web.Request) -> web.StreamResponse:
+        if "upgrade" in request.headers:
+            self.connections += 1
+        if self.refusing:
+            raise web.HTTPServiceUnavailable
         if request.query.get("token") != TOKEN:
             raise web.HTTPForbidden(text="wrong token")
         socket = web.WebSocketResponse(max_msg_size=1 << 16)
@@ -152,19 +195,24 @@ class FakeServer:
         role = "control" if self.controller == client.number else "watch"
         await socket.send_str(json.dumps((self.session or greeting()) | {"role": role}))
         self.clients.append(client)
+        self._changed.set()
+        await self._send_state(client, self.frame(client))
         try:
             async for message in socket:
                 if message.type is WSMsgType.TEXT:
                     await self._hear(client, json.loads(message.data))
         finally:
             self.clients.remove(client)
+            self._changed.set()
         return socket
 
     async def _hear(self, client: Client, message: dict[str, Any]) -> None:
-        self.received.append(message)
-        self.arrived_s.append(asyncio.get_running_loop().time())
-        self._changed.set()
         kind = message["type"]
+        if kind != SYNC:
+            self.received.append(message)
+            self._changed.set()
+        if self.deaf:
+            return
         error, at = self.refusals.get(kind, (None, None))
         data = None
         if error is None:
@@ -177,7 +225,11 @@ class FakeServer:
             "field": at,
             "data": data,
         }
+        if kind == SYNC:
+            await self.send_states()
         await client.socket.send_str(json.dumps(answer))
+        if kind != SYNC:
+            await self.send_states()
 
     def _heed(self, client: Client, kind: str, message: dict[str, Any]) -> Any:
         match kind:

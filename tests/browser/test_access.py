@@ -8,95 +8,88 @@ import pytest
 from playwright.async_api import expect
 
 from tests.browser.fake_server import PAGE, FakeServer
-from tests.browser.open_page import DESKTOP, PHONE, PROJECTOR, Opened, Opener
+from tests.browser.open_page import DESKTOP, PHONE, PROJECTOR, Opened, Opener, until
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 PANELS = ("Objects", "Drive", "Layers", "Tune", "Time", "Log")
-MODES = ("drive", "ready", "connecting", "safe_stop", "fault")
+MODES = ("READY", "SAFE_STOP", "FAULT", "CONNECTING")
 AA = 4.5
 AA_LARGE = 3.0
 
 
 async def scene(server: FakeServer, opener: Opener, size: tuple[int, int], **more: Any) -> Opened:
-    server.paused, server.cycle = True, 170
+    server.cycle = 170
     opened = await opener.open(server.url, size, **more)
     await opened.steady()
     await server.send({"type": "log", "timestamp": "2026-01-02T10:11:12Z", "level": "warning",
                        "event": "a sensor hears less", "fields": {"sensor": "17"}})  # fmt: skip
     await server.send({"type": "log", "timestamp": "2026-01-02T10:11:13Z", "level": "error",
                        "event": "the line was lost", "fields": {}})  # fmt: skip
+    await opened.sync()
     return opened
 
 
+async def faint_texts(opened: Opened) -> list[tuple[str, float]]:
+    """Return the visible texts with too little contrast, and check that there are texts."""
+    texts = await opened.probe("texts")
+    assert len(texts) > 30
+    return [(words, round(ratio, 2)) for words, ratio, large in texts if ratio < (AA_LARGE if large else AA)]
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-async def test_all_text_has_contrast(server: FakeServer, opener: Opener, scheme: Literal["light", "dark"]) -> None:
+async def test_all_text_has_contrast_in_every_panel_and_mode(
+    server: FakeServer, opener: Opener, scheme: Literal["light", "dark"]
+) -> None:
     opened = await scene(server, opener, DESKTOP, scheme=scheme, calm=True)
     for panel in PANELS:
         await opened.tab(panel)
-        texts = await opened.probe("texts")
-        assert len(texts) > 30
-        faint = [(words, round(ratio, 2)) for words, ratio, large in texts if ratio < (AA_LARGE if large else AA)]
-        assert not faint, (panel, faint)
+        assert not await faint_texts(opened), panel
         await opened.save_screenshot(f"{scheme}-{panel.lower()}")
-
-
-@pytest.mark.parametrize("mode", ["READY", "SAFE_STOP", "FAULT", "CONNECTING"])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-async def test_each_mode_has_contrast_text_and_a_shape(
-    server: FakeServer, opener: Opener, mode: str, scheme: Literal["light", "dark"]
-) -> None:
-    server.mode, server.reason = mode, "bumper contact: free the robot, then re-arm"
-    opened = await scene(server, opener, DESKTOP, scheme=scheme, calm=True)
-    await opened.says("#mode-name", mode.replace("_", " "))
-    assert await opened.page.locator("#mode-icon").get_attribute("href") == f"#m-{mode.lower()}"
-    texts = await opened.probe("texts")
-    assert not [(words, ratio) for words, ratio, large in texts if ratio < (AA_LARGE if large else AA)]
-    shapes = {
-        await opened.page.locator(f"#m-{m}").inner_html()
-        for m in ("drive", "ready", "connecting", "safe_stop", "fault")
-    }
+    for mode in MODES:
+        server.mode, server.reason = mode, "bumper contact: free the robot, then re-arm"
+        await opened.says("#mode-name", mode.replace("_", " "))
+        assert await opened.page.locator("#mode-icon").get_attribute("href") == f"#m-{mode.lower()}"
+        assert not await faint_texts(opened), mode
+    shapes = {await opened.page.locator(f"#m-{m.lower()}").inner_html() for m in ("DRIVE", *MODES)}
     assert len(shapes) == 5, "two modes look alike but for their colour"
 
 
-async def test_every_control_has_an_accessible_name(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, DESKTOP)
-    for panel in PANELS:
-        await opened.tab(panel)
-        assert await opened.probe("unnamed") == []
+DESKTOPS = {"desktop": DESKTOP, "projector": PROJECTOR, "tablet": (820, 1180)}
+HANDHELDS = {"phone": PHONE, "side": (740, 360)}
 
 
-@pytest.mark.parametrize(
-    ("name", "size"),
-    [("phone", PHONE), ("desktop", DESKTOP), ("projector", PROJECTOR), ("tablet", (820, 1180)), ("side", (740, 360))],
-)
-async def test_it_fits_every_screen(server: FakeServer, opener: Opener, name: str, size: tuple[int, int]) -> None:
-    touch = name in {"phone", "side"}
-    opened = await scene(server, opener, size, touch=touch)
-    seen = [p for p in (*PANELS, "Cycle") if await opened.page.get_by_role("tab", name=p, exact=True).is_visible()]
-    assert ("Cycle" in seen) == (name not in {"desktop", "projector"})
-    for panel in seen:
-        await opened.tab(panel)
-        wide = await opened.probe("too_wide")
-        assert wide["page"] <= 0, (panel, wide)
-        assert max(wide["panel"]) <= 0, (panel, wide)
-        assert wide["tabs"] <= 0, (panel, wide)
-        await opened.save_screenshot(f"{name}-{panel.lower()}")
-    assert await opened.page.locator("#mode-name").is_visible()
-    box = await opened.page.locator("#map-front").bounding_box()
-    assert box is not None
-    assert box["height"] >= 190
+@pytest.mark.parametrize("touch", [False, True], ids=["desktop", "handheld"])
+async def test_it_fits_every_screen_and_every_control_has_a_name(
+    server: FakeServer, opener: Opener, *, touch: bool
+) -> None:
+    sizes = HANDHELDS if touch else DESKTOPS
+    opened = await scene(server, opener, next(iter(sizes.values())), touch=touch)
+    for name, size in sizes.items():
+        await opened.page.set_viewport_size({"width": size[0], "height": size[1]})
+        await opened.until(f"innerWidth === {size[0]} && innerHeight === {size[1]}", f"the size of a {name}")
+        tabs = [
+            p for p in (*PANELS, "Cycle") if await opened.page.get_by_role("tab", name=p, exact=True).is_visible()
+        ]
+        assert tabs[: len(PANELS)] == list(PANELS)
+        assert ("Cycle" in tabs) == (name not in {"desktop", "projector"})
+        for panel in tabs:
+            await opened.tab(panel)
+            wide = await opened.probe("too_wide")
+            assert wide["page"] <= 0, (name, panel, wide)
+            assert max(wide["panel"]) <= 0, (name, panel, wide)
+            assert wide["tabs"] <= 0, (name, panel, wide)
+            assert await opened.probe("unnamed") == [], (name, panel)
+            if touch:
+                assert not await opened.probe("too_small"), (name, panel)
+            await opened.save_screenshot(f"{name}-{panel.lower()}")
+        assert await opened.page.locator("#mode-name").is_visible()
+        box = await opened.page.locator("#map-front").bounding_box()
+        assert box is not None
+        assert box["height"] >= 190
 
 
-async def test_touch_targets_are_large_enough(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, PHONE, touch=True)
-    for panel in (*PANELS, "Cycle"):
-        await opened.tab(panel)
-        small = await opened.probe("too_small")
-        assert not small, (panel, small)
-
-
-async def test_panels_are_reached_with_keys_alone(server: FakeServer, opener: Opener) -> None:
+async def test_panels_tools_and_help_are_reached_with_keys_alone(server: FakeServer, opener: Opener) -> None:
     opened = await scene(server, opener, DESKTOP)
     page = opened.page
     await page.locator("#tab-objects").focus()
@@ -106,6 +99,20 @@ async def test_panels_are_reached_with_keys_alone(server: FakeServer, opener: Op
         await expect(page.locator(f"#tab-{panel}")).to_be_focused()
     await page.keyboard.press("End")
     await expect(page.locator("#panel-log")).to_be_visible()
+
+    await page.locator("#tool-pan").focus()
+    await page.keyboard.press("ArrowDown")
+    await expect(page.locator("#tool-select")).to_have_attribute("aria-checked", "true")
+    await expect(page.locator("#tool-select")).to_be_focused()
+    await page.keyboard.press("ArrowUp")
+    await page.keyboard.press("ArrowUp")
+    await expect(page.locator("#tool-tape")).to_have_attribute("aria-checked", "true")
+
+    await page.keyboard.press("?")
+    await opened.says("#dialog", "HALT, except while you type text")
+    await opened.save_screenshot("keys")
+    await page.keyboard.press("Escape")
+    await expect(page.locator("#dialog")).to_be_hidden()
 
 
 async def test_focus_cycles_and_is_always_visible(server: FakeServer, opener: Opener) -> None:
@@ -123,56 +130,31 @@ async def test_focus_cycles_and_is_always_visible(server: FakeServer, opener: Op
     )
 
 
-async def test_tools_are_radio_buttons(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, DESKTOP)
+async def test_description_motion_colours_and_origin(server: FakeServer, opener: Opener) -> None:
+    """Read the map's description, reduce motion, change the colours, and list what was loaded."""
+    opened = await scene(server, opener, DESKTOP, calm=True)
     page = opened.page
-    await page.locator("#tool-pan").focus()
-    await page.keyboard.press("ArrowDown")
-    await expect(page.locator("#tool-select")).to_have_attribute("aria-checked", "true")
-    await expect(page.locator("#tool-select")).to_be_focused()
-    await page.keyboard.press("ArrowUp")
-    await page.keyboard.press("ArrowUp")
-    await expect(page.locator("#tool-tape")).to_have_attribute("aria-checked", "true")
-
-
-async def test_keys_are_listed(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, DESKTOP)
-    await opened.page.keyboard.press("?")
-    await opened.says("#dialog", "HALT, except while you type text")
-    await opened.save_screenshot("keys")
-    await opened.page.keyboard.press("Escape")
-    await expect(opened.page.locator("#dialog")).to_be_hidden()
-
-
-async def test_the_map_has_a_text_description(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, DESKTOP)
     await opened.says("#map-text", "6 objects: drum at 7.0, 4.0 ft")
 
-
-async def test_reduced_motion_is_respected(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, DESKTOP, calm=True)
     moving = (
         "() => [...document.querySelectorAll('*')]"
         ".filter((e) => getComputedStyle(e).transitionDuration !== '0s').length"
     )
-    assert await opened.page.evaluate(moving) == 0
+    assert await page.evaluate(moving) == 0
 
+    light = await opened.picture()
+    await page.emulate_media(color_scheme="dark")
+    await expect(page.locator("body")).to_have_css("background-color", "rgb(25, 31, 38)")
 
-async def test_a_change_of_colour_scheme_applies_at_once(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, DESKTOP)
-    corner = "() => document.getElementById('map-back').toDataURL()"
-    light = await opened.page.evaluate(corner)
-    await opened.page.emulate_media(color_scheme="dark")
-    await opened.drawn()
-    assert await opened.page.evaluate(corner) != light
-    assert await opened.page.evaluate("() => getComputedStyle(document.body).backgroundColor") == "rgb(25, 31, 38)"
+    async def is_drawn_anew() -> bool:
+        return await opened.picture() != light
 
+    await until(is_drawn_anew, "a map in dark colours")
 
-async def test_nothing_is_loaded_from_elsewhere(server: FakeServer, opener: Opener) -> None:
-    opened = await scene(server, opener, DESKTOP)
-    asked = await opened.page.evaluate("() => performance.getEntriesByType('resource').map((e) => e.name)")
-    assert len(asked) > 20
-    assert all(name.startswith((f"http://127.0.0.1:{server.port}/page/", "blob:")) for name in asked), asked
+    origin = f"http://127.0.0.1:{server.port}/"
+    assert opened.requests[0] == server.url
+    assert len(opened.requests) > 20
+    assert all(url.startswith((f"{origin}page/", "blob:")) for url in opened.requests[1:]), opened.requests
 
 
 async def test_no_script_or_style_is_inline() -> None:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import asyncio
-import itertools
-
 import pytest
 from playwright.async_api import expect
 
 from tests.browser.fake_server import FakeServer
-from tests.browser.open_page import PHONE, Opened, Opener, until
+from tests.browser.open_page import FRAME_MS, PHONE, Opened, Opener
 
-pytestmark = [pytest.mark.realtime, pytest.mark.asyncio(loop_scope="session")]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
-FOCI = ("body", "#map-front", "#tab-log", "#teleop-keys", "#ellipse-scale", "#teleop-limit", "#fit")
+EVERY_MS = 50
+SIZES = ((360, 740), (360, 500), (740, 360), (1440, 900), (1920, 1080))
+FOCI = {"body": None, "#map-front": None, "#tab-log": None, "#teleop-keys": "Drive", "#ellipse-scale": "Layers",
+        "#teleop-limit": "Drive", "#fit": None}  # fmt: skip
+"""What has the focus, and the panel that it is on."""
 
 CAPITAL = "() => document.body.dispatchEvent(new KeyboardEvent('keydown', { key: 'A', bubbles: true }))"
 
@@ -26,37 +27,48 @@ navigator.getGamepads = () => (pad.connected ? [pad] : []);
 """
 
 
-async def still_sends(server: FakeServer) -> None:
-    """Wait until commands arrive repeatedly."""
-    count = len(server.of("teleoperate"))
-    await server.wait("teleoperate", count + 5)
+def commands(server: FakeServer) -> list[tuple[float, float]]:
+    """Return the velocities received so far, m/s and rad/s."""
+    return [(message["v"], message["w"]) for message in server.of("teleoperate")]
 
 
-async def has_let_go(server: FakeServer) -> None:
-    """Wait for the zero command, and check that none follows it."""
-    await until(lambda: _last_is_zero(server), "zero at the end")
-    count = len(server.of("teleoperate"))
-    await asyncio.sleep(0.3)  # six times as long as from one command to the next
-    assert len(server.of("teleoperate")) == count, "it goes on sending though nothing is held"
+async def drives(server: FakeServer, opened: Opened) -> tuple[float, float]:
+    """Check that the page sends a velocity every 50 ms; return it."""
+    await opened.sync()
+    count = len(commands(server))
+    await opened.run_for(4 * EVERY_MS)
+    await opened.sync()
+    sent = commands(server)[count:]
+    assert len(sent) == 4
+    assert len(set(sent)) == 1
+    return sent[0]
 
 
-async def _last_is_zero(server: FakeServer) -> bool:
-    last = server.of("teleoperate")[-1:]
-    return bool(last) and (last[0]["v"], last[0]["w"]) == (0, 0)
+async def has_let_go(server: FakeServer, opened: Opened) -> None:
+    """Check that the last command is zero, and that none follows it."""
+    await opened.sync()  # the page has the state that stops it,
+    await opened.sync()  # and the server what the page sent thereupon
+    count = len(commands(server))
+    assert commands(server)[-1] == (0, 0)
+    await opened.run_for(6 * EVERY_MS)
+    await opened.sync()
+    assert len(commands(server)) == count, "it goes on sending though nothing is held"
 
 
 async def test_halt_is_on_screen_whatever_is_open(server: FakeServer, opener: Opener) -> None:
-    for size in ((360, 740), (360, 500), (740, 360), (1440, 900), (1920, 1080)):
-        opened = await opener.open(server.url, size)
+    opened = await opener.open(server.url)
+    for count, (width, height) in enumerate(SIZES, start=1):
+        await opened.page.set_viewport_size({"width": width, "height": height})
+        await opened.until(f"innerWidth === {width} && innerHeight === {height}", "the size")
         await opened.page.keyboard.press("?")
+        await expect(opened.page.locator("#dialog")).to_be_visible()
         halt = opened.page.get_by_role("button", name="HALT")
         await expect(halt).to_be_in_viewport(ratio=1.0)
-        await halt.click(timeout=5000)  # what lies over it would take the click
-        await server.wait("halt", 1)
-        server.received.clear()
-        server.arrived_s.clear()
+        await halt.click()  # what lies over it would take the click
+        await server.wait("halt", count)
         await opened.says("#mode-name", "SAFE STOP")
         server.mode, server.reason = "DRIVE", None
+        await opened.says("#mode-name", "DRIVE")
 
 
 async def test_halt_latches_and_shows_the_reason(server: FakeServer, opener: Opener) -> None:
@@ -75,39 +87,23 @@ async def test_halt_latches_and_shows_the_reason(server: FakeServer, opener: Ope
     await expect(opened.page.locator("#banner-stopped")).to_have_count(0)
 
 
-@pytest.mark.parametrize("target", FOCI)
-async def test_the_space_bar_halts_wherever_the_focus_is(server: FakeServer, opener: Opener, target: str) -> None:
+async def test_the_space_bar_halts_wherever_the_focus_is_but_in_text(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
-    if target in {"#teleop-keys", "#teleop-limit"}:
-        await opened.tab("Drive")
-    elif target == "#ellipse-scale":
-        await opened.tab("Layers")
-    await opened.page.locator(target).focus()
-    scale = await opened.world("view.scale")
-    await opened.page.keyboard.press("Space")
-    await server.wait("halt")
-    assert await opened.page.locator("#teleop-keys").is_checked() is False
-    assert await opened.world("view.scale") == scale or target != "#fit", "and presses no button besides"
-    assert len(server.of("halt")) == 1
-
-
-async def test_the_space_bar_types_a_space_in_text_fields(server: FakeServer, opener: Opener) -> None:
-    opened = await opener.open(server.url)
+    for count, (target, panel) in enumerate(FOCI.items(), start=1):
+        if panel is not None:
+            await opened.tab(panel)
+        await opened.page.locator(target).focus()
+        scale = await opened.world("view.scale")
+        await opened.page.keyboard.press("Space")
+        await opened.sync()
+        assert len(server.of("halt")) == count, target
+        assert await opened.page.locator("#teleop-keys").is_checked() is False
+        assert await opened.world("view.scale") == scale, "and presses no button besides"
     await opened.tab("Time")
     await opened.page.locator("#bookmark-text").press_sequentially("a b")
     await expect(opened.page.locator("#bookmark-text")).to_have_value("a b")
-    assert not server.of("halt")
-
-
-async def test_a_halt_without_a_connection_is_reported_and_sent_on_reconnecting(
-    server: FakeServer, opener: Opener
-) -> None:
-    opened = await opener.open(server.url)
-    await server.drop()
-    await opened.page.keyboard.press("Space")
-    await opened.says("#toasts", "HALT could not be sent")
-    await server.wait("halt")
-    assert server.received[0]["type"] == "halt", "before anything else"
+    await opened.sync()
+    assert len(server.of("halt")) == len(FOCI)
 
 
 async def test_arm_and_disarm(server: FakeServer, opener: Opener) -> None:
@@ -129,6 +125,7 @@ async def test_arm_and_disarm(server: FakeServer, opener: Opener) -> None:
     await opened.page.evaluate(CAPITAL)
     await opened.page.keyboard.press("u")
     await opened.says("#units", "m")
+    await opened.sync()
     assert len(server.of("arm")) == 2, "locked capitals arm nothing"
 
 
@@ -146,6 +143,7 @@ async def test_an_observer_can_halt_but_not_drive(server: FakeServer, opener: Op
     await opened.page.mouse.down()
     await opened.says("#toasts", "ask for control first")
     await opened.page.mouse.up()
+    await opened.sync()
     assert not server.of("teleoperate")
     await opened.save_screenshot("watching")
     await opened.page.keyboard.press("Space")
@@ -189,35 +187,23 @@ async def press_pad(opened: Opened, x: float, y: float) -> None:
 async def test_the_pad_drives_while_it_is_held(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await press_pad(opened, -0.5, 1.0)
-    await still_sends(server)
-    last = server.of("teleoperate")[-1]
-    assert last["v"] == pytest.approx(0.5 * 0.5 * 0.894, abs=0.02), (
-        "half the speed at most, as far forward as the knob"
-    )
-    assert last["w"] == pytest.approx(0.5 * 1.0 * 0.447, abs=0.03), "left is counter-clockwise"
+    v, w = await drives(server, opened)
+    assert v == pytest.approx(0.5 * 0.5 * 0.894, abs=0.02), "half the speed at most, as far forward as the knob"
+    assert w == pytest.approx(0.5 * 1.0 * 0.447, abs=0.03), "left is counter-clockwise"
     await opened.says("#teleop-state", "driving:")
     await opened.save_screenshot("pad")
     await opened.page.mouse.up()
-    await has_let_go(server)
+    await has_let_go(server, opened)
     await opened.says("#teleop-state", "released")
 
 
-async def test_commands_come_often_enough(server: FakeServer, opener: Opener) -> None:
-    opened = await opener.open(server.url)
-    await press_pad(opened, 0.0, 1.0)
-    await server.wait("teleoperate", 31)
-    await opened.page.mouse.up()
-    times = server.times_of("teleoperate")[:31]
-    gaps = sorted(after - before for before, after in itertools.pairwise(times))
-    assert gaps[len(gaps) // 2] <= 0.1, f"half of them came later than after {gaps[len(gaps) // 2]:.3f} s"
-
-
-async def test_keys_drive_only_if_enabled(server: FakeServer, opener: Opener) -> None:
+async def test_keys_drive_only_where_they_are_meant_to(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     page = opened.page
     await page.locator("#map-front").focus()
     await page.keyboard.down("w")
     await page.keyboard.up("w")
+    await opened.sync()
     assert not server.of("teleoperate")
     await opened.tab("Drive")
     await page.locator("#teleop-keys").focus()
@@ -225,32 +211,20 @@ async def test_keys_drive_only_if_enabled(server: FakeServer, opener: Opener) ->
     await expect(page.locator("#teleop-keys")).to_be_checked()
     await page.keyboard.down("w")
     await page.keyboard.down("d")
-    await still_sends(server)
-    assert (server.of("teleoperate")[-1]["v"], server.of("teleoperate")[-1]["w"]) == (0.25, -0.5)
+    assert await drives(server, opened) == (0.25, -0.5)
     await page.keyboard.up("w")
-    await until(lambda: _turns_only(server), "turning alone")
+    assert await drives(server, opened) == (0, -0.5)
     await page.keyboard.up("d")
-    await has_let_go(server)
+    await has_let_go(server, opened)
 
-
-async def _turns_only(server: FakeServer) -> bool:
-    last = server.of("teleoperate")[-1]
-    return bool(last["v"] == 0 and last["w"] == -0.5)
-
-
-async def test_arrows_drive_on_the_pad_with_a_limit(server: FakeServer, opener: Opener) -> None:
-    opened = await opener.open(server.url)
-    page = opened.page
-    await opened.tab("Drive")
     await page.locator("#teleop-limit").focus()
     await page.keyboard.press("End")
     await opened.says("#teleop-limit-value", "100 %")
     await page.locator("#pad").focus()
     await page.keyboard.down("ArrowDown")
-    await still_sends(server)
-    assert server.of("teleoperate")[-1]["v"] == -0.5
+    assert (await drives(server, opened))[0] == -0.5
     await page.keyboard.up("ArrowDown")
-    await has_let_go(server)
+    await has_let_go(server, opened)
 
 
 async def test_a_gamepad_drives_only_with_its_shoulder_button(server: FakeServer, opener: Opener) -> None:
@@ -260,13 +234,14 @@ async def test_a_gamepad_drives_only_with_its_shoulder_button(server: FakeServer
     await opened.tab("Drive")
     await opened.says("#teleop-gamepad", "a pad")
     await page.evaluate("() => { padUnderTest.axes[1] = -1; }")
-    await asyncio.sleep(0.2)
+    await opened.run_for(4 * EVERY_MS)
+    await opened.sync()
     assert not server.of("teleoperate"), "the stick alone moves nothing"
     await page.evaluate("() => { padUnderTest.buttons[5].pressed = true; }")
-    await still_sends(server)
-    assert server.of("teleoperate")[-1]["v"] == 0.25
+    await opened.run_for(FRAME_MS)
+    assert (await drives(server, opened))[0] == 0.25
     await page.evaluate("() => { padUnderTest.connected = false; dispatchEvent(new Event('gamepaddisconnected')); }")
-    await has_let_go(server)
+    await has_let_go(server, opened)
     await opened.says("#teleop-gamepad", "no gamepad")
 
 
@@ -280,53 +255,57 @@ LOSSES: dict[str, str] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("loss", LOSSES)
-async def test_any_loss_stops_teleoperation(server: FakeServer, opener: Opener, loss: str) -> None:
+async def test_any_loss_stops_teleoperation(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
-    await press_pad(opened, 0.0, 1.0)
-    await still_sends(server)
-    await opened.page.evaluate(LOSSES[loss])
-    await has_let_go(server)
-    await opened.page.mouse.move(10, 400, steps=3)  # moving on with the button down holds nothing again
-    await has_let_go(server)
-
-
-async def test_leaving_the_page_sends_zero(server: FakeServer, opener: Opener) -> None:
-    opened = await opener.open(server.url)
-    await press_pad(opened, 0.0, 1.0)
-    await still_sends(server)
-    await opened.page.goto("about:blank")
-    await has_let_go(server)
+    for loss in LOSSES:
+        await press_pad(opened, 0.0, 1.0)
+        await drives(server, opened)
+        await opened.page.evaluate(LOSSES[loss])
+        if loss == "lostpointercapture":
+            await opened.page.mouse.move(11, 400)  # a browser may announce this loss only at the next movement
+        await has_let_go(server, opened)
+        await opened.page.mouse.move(10, 400, steps=3)  # moving on with the button down holds nothing again
+        await has_let_go(server, opened)
+        await opened.page.mouse.up()
 
 
 async def test_halt_and_leaving_drive_stop_teleoperation(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await press_pad(opened, 0.0, 1.0)
-    await still_sends(server)
+    await drives(server, opened)
     await opened.page.keyboard.press("Space")
-    await has_let_go(server)
+    await has_let_go(server, opened)
     await opened.page.mouse.up()
     await opened.says("#mode-name", "SAFE STOP")
 
     server.mode = "DRIVE"
     await opened.says("#mode-name", "DRIVE")
     await press_pad(opened, 0.0, 1.0)
-    await still_sends(server)
+    await drives(server, opened)
     server.mode, server.reason = "SAFE_STOP", "bumper contact"
-    await has_let_go(server)
+    await has_let_go(server, opened)
     await opened.says("#teleop-state", "stopped: the mode is SAFE STOP")
 
 
-async def test_losing_control_stops_teleoperation(server: FakeServer, opener: Opener) -> None:
+async def test_losing_control_or_leaving_the_page_stops_teleoperation(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await press_pad(opened, 0.0, 1.0)
-    await still_sends(server)
+    await drives(server, opened)
     server.controller = None
-    await has_let_go(server)
+    await opened.sync()
+    await has_let_go(server, opened)
+    await opened.page.mouse.up()
+
+    server.controller = 1
+    await opened.sync()
+    await press_pad(opened, 0.0, 1.0)
+    await drives(server, opened)
+    await opened.page.goto("about:blank")
+    await server.wait_for_clients(0)
+    assert commands(server)[-1] == (0, 0)
 
 
 async def test_a_goal_by_click_and_by_numbers(server: FakeServer, opener: Opener) -> None:
-    server.paused = True
     opened = await opener.open(server.url)
     await opened.steady()
     page = opened.page
@@ -355,8 +334,7 @@ async def test_a_goal_by_click_and_by_numbers(server: FakeServer, opener: Opener
     await opened.says("#drive-request-text", "as configured")
 
 
-async def test_a_goal_with_the_keyboard_alone(server: FakeServer, opener: Opener) -> None:
-    server.paused = True
+async def test_a_goal_and_gains_with_the_keyboard_alone(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await opened.steady()
     await opened.page.locator("#map-front").focus()
@@ -368,9 +346,6 @@ async def test_a_goal_with_the_keyboard_alone(server: FakeServer, opener: Opener
     goal = await server.wait("goal")
     assert (goal["x"], goal["y"]) == pytest.approx((x, y), abs=1e-6)
 
-
-async def test_gains_can_be_set_in_the_drive_panel(server: FakeServer, opener: Opener) -> None:
-    opened = await opener.open(server.url)
     await opened.tab("Drive")
     gain = opened.page.locator("#drive-gains").get_by_label("move ahead gain")
     await gain.fill("0.5")
@@ -387,10 +362,9 @@ async def test_a_thumb_drives_and_halts_on_a_phone(server: FakeServer, opener: O
     touch = await opened.page.context.new_cdp_session(opened.page)
     x, y = box["x"] + box["width"] / 2, box["y"] + 30
     await touch.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})
-    await still_sends(server)
-    assert server.of("teleoperate")[-1]["v"] > 0.2
+    assert (await drives(server, opened))[0] > 0.2
     await opened.save_screenshot("phone-driving")
     await touch.send("Input.dispatchTouchEvent", {"type": "touchCancel", "touchPoints": []})
-    await has_let_go(server)
+    await has_let_go(server, opened)
     await opened.page.get_by_role("button", name="HALT").tap()
     await server.wait("halt")

@@ -18,7 +18,7 @@ GAIN = "behaviors.avoid_static_obstacle.avoid_obstacle_gain"
 
 
 async def still(server: FakeServer, opener: Opener, size: tuple[int, int] | None = None) -> Opened:
-    server.paused, server.cycle = True, 170
+    server.cycle = 170
     opened = await (opener.open(server.url) if size is None else opener.open(server.url, size, touch=True))
     await opened.steady()
     return opened
@@ -42,7 +42,7 @@ async def lasso(opened: Opened, x: float, y: float, r: float) -> None:
     await page.mouse.up()
 
 
-async def test_a_click_selects_a_segment_and_delete_removes_it(server: FakeServer, opener: Opener) -> None:
+async def test_segments_are_selected_with_the_pointer_to_delete_and_pin(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     page = opened.page
     await page.locator("#tool-select").click()
@@ -58,10 +58,6 @@ async def test_a_click_selects_a_segment_and_delete_removes_it(server: FakeServe
     await opened.until(f"!run.segments.has({chosen[0]})", "the segment gone")
     await expect(page.locator("#selection-bar")).to_be_hidden()
 
-
-async def test_a_lasso_selects_segments_to_pin_and_unpin(server: FakeServer, opener: Opener) -> None:
-    opened = await still(server, opener)
-    page = opened.page
     await page.keyboard.press("2")
     await lasso(opened, *DRUMS[1], 1.35 * RADIUS)
     inside = sorted(await opened.world(
@@ -80,15 +76,11 @@ async def test_a_lasso_selects_segments_to_pin_and_unpin(server: FakeServer, ope
     assert (await server.wait("pin_segments", 2))["pinned"] is False
     await page.keyboard.press("Escape")
 
-
-async def test_shift_adds_and_removes(server: FakeServer, opener: Opener) -> None:
-    opened = await still(server, opener)
-    await opened.page.keyboard.press("2")
     await lasso(opened, *DRUMS[0], 1.35 * RADIUS)
     first = await opened.world("selection.segments.size")
-    await opened.page.keyboard.down("Shift")
+    await page.keyboard.down("Shift")
     await lasso(opened, *DRUMS[2], 1.35 * RADIUS)
-    await opened.page.keyboard.up("Shift")
+    await page.keyboard.up("Shift")
     assert await opened.world("selection.segments.size") > first
 
 
@@ -109,7 +101,7 @@ async def test_segments_are_selected_with_the_keyboard_alone(server: FakeServer,
     assert await opened.world("selection.segments.size + (selection.object === null ? 0 : 1)") > 0
 
 
-async def test_a_model_is_placed_by_pressing_and_rotated_by_dragging(server: FakeServer, opener: Opener) -> None:
+async def test_objects_are_placed_dragged_and_rotated_with_the_pointer(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     page = opened.page
     await page.get_by_role("radio", name="Place a model").click()
@@ -123,10 +115,6 @@ async def test_a_model_is_placed_by_pressing_and_rotated_by_dragging(server: Fak
     assert placed["model"] == "box"
     assert (placed["x"], placed["y"], placed["theta"]) == pytest.approx((3.0, 0.0, math.pi / 2), abs=0.02)
 
-
-async def test_an_object_is_dragged_and_rotated(server: FakeServer, opener: Opener) -> None:
-    opened = await still(server, opener)
-    page = opened.page
     await page.keyboard.press("3")
     x, y = DRUMS[4]
     await page.mouse.move(*await opened.screen(x, y))
@@ -165,30 +153,26 @@ async def test_an_object_is_nudged_and_rotated_by_keys(server: FakeServer, opene
     assert (await server.wait("move_object", 3))["theta"] == pytest.approx(math.radians(5.0))
 
 
-async def test_reject_and_confirm(server: FakeServer, opener: Opener) -> None:
+async def test_objects_are_confirmed_and_rejected_and_the_map_cleared(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
-    await opened.page.locator("#objects li").nth(2).click()
-    await opened.page.get_by_role("button", name="Confirm").click()
+    page = opened.page
+    await page.locator("#objects li").nth(2).click()
+    await page.get_by_role("button", name="Confirm").click()
     assert await server.wait("confirm_object") == {"object": 3}
-    await opened.page.get_by_role("button", name="Reject").click()
+    await page.get_by_role("button", name="Reject").click()
     assert await server.wait("reject_object") == {"object": 3}
 
-
-async def test_a_rejected_request_shows_the_reason(server: FakeServer, opener: Opener) -> None:
-    opened = await still(server, opener)
     server.refusals["reject_object"] = ("object 3 left the map before", None)
-    await opened.page.locator("#objects li").nth(2).click()
-    await opened.page.get_by_role("button", name="Reject").click()
+    await page.locator("#objects li").nth(2).click()
+    await page.get_by_role("button", name="Reject").click()
     await opened.says("#toasts", "object 3 left the map before")
 
-
-async def test_the_map_is_cleared_only_after_confirmation(server: FakeServer, opener: Opener) -> None:
-    opened = await still(server, opener)
-    await opened.page.get_by_role("button", name="Clear the map…").click()
-    await opened.page.get_by_role("button", name="Keep it").click()
-    await opened.page.get_by_role("button", name="Clear the map…").click()
+    await page.get_by_role("button", name="Clear the map…").click()
+    await page.get_by_role("button", name="Keep it").click()
+    await page.get_by_role("button", name="Clear the map…").click()
+    await opened.sync()
     assert not server.of("clear_map")
-    await opened.page.get_by_role("button", name="Clear the map", exact=True).click()
+    await page.get_by_role("button", name="Clear the map", exact=True).click()
     assert await server.wait("clear_map") == {}
 
 
@@ -209,6 +193,7 @@ async def test_a_model_file_is_loaded_and_its_error_shown_beside_it(
     file.write_bytes(b"#" * 70_000)
     await opened.page.get_by_label("Load another model").set_input_files(file)
     await opened.says("#model-error", "70 kB long")
+    await opened.sync()
     assert len(server.of("load_model")) == 2
 
 
@@ -238,15 +223,21 @@ async def test_a_parameter_is_set_and_its_error_shown_beside_it(server: FakeServ
     await gain.fill("much")
     await gain.press("Enter")
     await expect(field(opened, GAIN).locator(".error")).to_have_text("a number is wanted")
+    await opened.sync()
     assert len(server.of("set_parameter")) == 2
     await gain.press("Escape")
     await expect(gain).to_have_value("2.5")
 
 
-async def test_a_choice_is_set_and_undone(server: FakeServer, opener: Opener) -> None:
+async def test_parameters_are_filtered_chosen_undone_and_saved(server: FakeServer, opener: Opener) -> None:
     opened = await still(server, opener)
     page = opened.page
     await opened.tab("Tune")
+    await page.locator("#tune-filter").fill("founds a new")
+    await expect(page.locator("#tune-fields .field:visible")).to_have_count(1)
+    await expect(field(opened, "perception.clusters.threshold_m")).to_be_visible()
+    await page.locator("#tune-filter").fill("")
+
     await page.get_by_label("preset").select_option("quadrants")
     assert await server.wait("set_parameter") == {"path": "ring.firing.preset", "value": "quadrants"}
     gain = page.locator("#tune-fields").get_by_label("avoid obstacle gain")
@@ -258,22 +249,10 @@ async def test_a_choice_is_set_and_undone(server: FakeServer, opener: Opener) ->
     await page.locator("#tune-filter").focus()
     await expect(gain).to_have_value("1")
 
-
-async def test_parameters_are_filtered_by_text(server: FakeServer, opener: Opener) -> None:
-    opened = await still(server, opener)
-    await opened.tab("Tune")
-    await opened.page.locator("#tune-filter").fill("founds a new")
-    await expect(opened.page.locator("#tune-fields .field:visible")).to_have_count(1)
-    await expect(field(opened, "perception.clusters.threshold_m")).to_be_visible()
-
-
-async def test_settings_are_saved_as_toml(server: FakeServer, opener: Opener) -> None:
-    opened = await still(server, opener)
-    await opened.tab("Tune")
-    await opened.page.get_by_role("button", name="Save as TOML").click()
-    await expect(opened.page.locator("#toml")).to_have_value("[cycle]\nperception_budget_s = 0.005\n")
-    async with opened.page.expect_download() as saved:
-        await opened.page.get_by_role("button", name="Save as a file").click()
+    await page.get_by_role("button", name="Save as TOML").click()
+    await expect(page.locator("#toml")).to_have_value("[cycle]\nperception_budget_s = 0.005\n")
+    async with page.expect_download() as saved:
+        await page.get_by_role("button", name="Save as a file").click()
     path = await (await saved.value).path()
     assert path.read_text() == "[cycle]\nperception_budget_s = 0.005\n"
 

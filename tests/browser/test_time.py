@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from io import BytesIO
-
 import pytest
 from PIL import Image
 from playwright.async_api import expect
@@ -15,7 +13,7 @@ from tests.browser.synthetic_run import greeting
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
-async def test_pause_single_step_and_speed(server: FakeServer, opener: Opener) -> None:
+async def test_pause_single_step_speed_record_and_bookmark(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     page = opened.page
     await opened.tab("Time")
@@ -31,19 +29,6 @@ async def test_pause_single_step_and_speed(server: FakeServer, opener: Opener) -
     assert await server.wait("set_speed") == {"factor": 4}
     await opened.says("#time-text", "× 4")
 
-
-async def test_a_robot_on_a_port_cannot_be_paused(server: FakeServer, opener: Opener) -> None:
-    server.session = greeting(emulated=False, truth=None)
-    opened = await opener.open(server.url)
-    await opened.tab("Time")
-    for name in ("Pause", "One cycle"):
-        await expect(opened.page.get_by_role("button", name=name, exact=True)).to_be_disabled()
-
-
-async def test_record_and_bookmark(server: FakeServer, opener: Opener) -> None:
-    opened = await opener.open(server.url)
-    page = opened.page
-    await opened.tab("Time")
     record = page.get_by_role("button", name="Record", exact=True)
     await record.click()
     assert await server.wait("record") == {"on": True}
@@ -55,6 +40,14 @@ async def test_record_and_bookmark(server: FakeServer, opener: Opener) -> None:
     await expect(page.locator("#bookmark-text")).to_have_value("")
     await record.click()
     assert await server.wait("record", 2) == {"on": False}
+
+
+async def test_a_robot_on_a_port_cannot_be_paused(server: FakeServer, opener: Opener) -> None:
+    server.session = greeting(emulated=False, truth=None)
+    opened = await opener.open(server.url)
+    await opened.tab("Time")
+    for name in ("Pause", "One cycle"):
+        await expect(opened.page.get_by_role("button", name=name, exact=True)).to_be_disabled()
 
 
 async def test_a_recording_is_opened_scrubbed_played_and_left(server: FakeServer, opener: Opener) -> None:
@@ -104,17 +97,19 @@ async def test_teleoperation_is_refused_while_a_recording_is_shown(server: FakeS
     await opened.page.locator("#pad").focus()
     await opened.page.keyboard.press("ArrowUp")
     await opened.says("#toasts", "a recording is shown")
+    await opened.sync()
     assert not server.of("teleoperate")
     await opened.steady()
     await opened.page.locator("#map-front").focus()
     for key in ("2", "a", "Delete", "Shift+A"):
         await opened.page.keyboard.press(key)
     await opened.says("#toasts", "go back to the live run first")
+    await opened.sync()
     assert not server.of("delete_segments"), "the recording's numbers are not the live map's"
     assert not server.of("arm")
 
 
-async def test_a_screenshot_is_a_picture_of_the_map(server: FakeServer, opener: Opener) -> None:
+async def test_a_screenshot_and_the_report_are_saved(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await opened.steady()
     await opened.tab("Time")
@@ -122,19 +117,13 @@ async def test_a_screenshot_is_a_picture_of_the_map(server: FakeServer, opener: 
         await opened.page.get_by_role("button", name="Screenshot").click()
     download = await saved.value
     assert download.suggested_filename.startswith("echolocate-")
-    data = (await download.path()).read_bytes()
-    opened.screenshots("saved-screenshot").write_bytes(data)
-    image = Image.open(BytesIO(data)).convert("RGB")
+    image = Image.open(await download.path()).convert("RGB")
     width, height = await opened.world("[view.width, view.height]")
     assert image.size == (2 * width, 2 * (height + 34))
     colours = image.getcolors(maxcolors=1 << 24)
     assert colours is not None
     assert len(colours) > 200, "the picture is empty"
 
-
-async def test_the_report_is_requested_with_the_token(server: FakeServer, opener: Opener) -> None:
-    opened = await opener.open(server.url)
-    await opened.tab("Time")
     async with opened.page.context.expect_page() as shown:
         await opened.page.get_by_role("link", name="Report").click()
     await expect((await shown.value).get_by_role("heading")).to_have_text("Report")

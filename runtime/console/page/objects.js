@@ -10,7 +10,7 @@ const EVIDENCE_EVERY_MS = 1000;
 export class Objects {
   #list = byId("objects");
   #rows = new Map();
-  #asked_ms = 0;
+  #asked_ms = -Infinity;
   #asking = false;
 
   constructor({ run, units, selection, connection, notifications, tools }) {
@@ -75,7 +75,7 @@ export class Objects {
 
   #onSelected() {
     this.run.evidence = null;
-    this.#asked_ms = 0;
+    this.#asked_ms = -Infinity;
     byId("evidence").replaceChildren();
     this.refresh();
     const { object } = this.selection;
