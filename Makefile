@@ -50,14 +50,15 @@ soak: $(VENV)/soak.stamp
 mutants: $(VENV)/test.stamp
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m tests.mutation.campaign
 
-# Compares our methods with libraries, then measures timing. BENCH=--quick shortens the comparison,
-# TIMING="--against earlier.json" adds the figures of an earlier run.
+# Compares our methods with libraries, then measures timing; at last pytest checks what depends on the wall clock.
+# BENCH=--quick shortens the comparison, TIMING="--against earlier.json" adds the figures of an earlier run.
 bench: $(VENV)/bench.stamp
 	@$(BIN)/python -m bench $(BENCH)
 	@$(BIN)/python -m bench timing $(TIMING)
 	@$(BIN)/python -m bench waking
 	@$(BIN)/python -m bench recording
 	@$(BIN)/python -m bench console
+	$(BIN)/python -m pytest -q bench/wallclock
 
 clean:
 	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .import_linter_cache
@@ -87,5 +88,5 @@ $(VENV)/soak.stamp: pyproject.toml | $(VENV)/bin/python
 	@touch $@
 
 $(VENV)/bench.stamp: pyproject.toml | $(VENV)/bin/python
-	$(PIP) --editable ".[bench]"
+	$(PIP) --editable ".[dev,bench]"
 	@touch $@

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import re
 import signal
@@ -15,10 +16,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from drivers.messages import Flags
 from tests.hil.machine import TIMEOUT_S
+from tests.hil.truth import Truth
 
 ROOT = Path(__file__).parents[2]
 DEADMAN_S = 0.5
+ARM_AGAIN_S = 1.5
+"""Time after which a robot that does not drive is armed again, s: longer than an arming takes at most."""
 
 
 def wait_for(done: Callable[[], bool], what: str, seen: Callable[[], object] = str) -> None:
@@ -79,6 +84,23 @@ class Running:
     def comes_to(self, mode: str) -> None:
         """Wait until it says that it is in a mode."""
         wait_for(lambda: self.modes()[-1:] == [mode], mode, lambda: (self.modes(), self.err))
+
+    def drive(self, truth: Truth) -> None:
+        """Arm the robot, as often as needed, until its wheels turn; a busy machine may stop a drive at any time."""
+        armed_s = -math.inf
+
+        def drives() -> bool:
+            nonlocal armed_s
+            modes, host_s = self.modes()[-1:], time.monotonic()
+            if modes in (["READY"], ["SAFE_STOP"]) and host_s > armed_s + ARM_AGAIN_S:
+                armed_s = host_s
+                self.signal(signal.SIGUSR1)
+            if modes != ["DRIVE"]:
+                return False
+            row = truth.read()[-1]
+            return row.driving and not row.flags & Flags.LATCHED
+
+        wait_for(drives, "driving", lambda: (self.modes(), self.err))
 
 
 @contextlib.contextmanager

@@ -1,0 +1,135 @@
+"""`echolocate run` in this process: ports that cannot be used, files in use, addresses, and its signals."""
+
+from __future__ import annotations
+
+import asyncio
+import fcntl
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from config.errors import FAILED, WRONG_CALL
+from runtime.cli.app import run_command
+from runtime.cli.commands.run import signals
+from runtime.cycle.inputs import Request
+from runtime.support.file_lock import file_lock
+from tests.drivers.stranger import Stranger
+from tests.hil.machine import TIMEOUT_S
+
+HEADLESS = ("--headless", "--no-record", "--no-console", "--arm", "--seconds", "600")
+
+
+def error_line(capfd: pytest.CaptureFixture[str]) -> str:
+    """Return the only error line of a run that wrote nothing else."""
+    captured = capfd.readouterr()
+    assert captured.out == ""
+    assert "Traceback" not in captured.err
+    (line,) = [line for line in captured.err.splitlines() if line.startswith("echolocate: ")]
+    return line
+
+
+@pytest.mark.parametrize("kind", ["missing", "file", "folder", "fifo", "null", "dangling link"])
+def test_what_is_no_serial_port(tmp_path: Path, kind: str, capfd: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "port"
+    match kind:
+        case "file":
+            path.touch()
+        case "folder":
+            path.mkdir()
+        case "fifo":
+            os.mkfifo(path)
+        case "null":
+            path.symlink_to(os.devnull)
+        case "dangling link":
+            path.symlink_to(tmp_path / "nowhere")
+    assert run_command(["run", "--port", str(path), *HEADLESS]) == WRONG_CALL
+    assert str(path) in error_line(capfd)
+
+
+@pytest.mark.promise("P13")
+def test_a_port_in_use(capfd: pytest.CaptureFixture[str]) -> None:
+    with Stranger() as stranger:
+        fd = os.open(stranger.path, os.O_RDWR | os.O_NOCTTY)
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        try:
+            assert run_command(["run", "--port", stranger.path, *HEADLESS]) == FAILED
+        finally:
+            os.close(fd)
+        line = error_line(capfd)
+        assert stranger.path in line
+        assert "in use" in line
+        assert not stranger.heard
+
+
+@pytest.mark.promise("P13")
+def test_a_record_that_another_run_writes(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    record = tmp_path / "run.csv"
+    with Stranger() as stranger, file_lock(record, "--record"):
+        command = ["run", "--port", stranger.path, "--headless", "--no-console", "--record", str(record)]
+        assert run_command(command) == FAILED
+        assert f"--record {record}: another process writes to this file" in error_line(capfd)
+        assert not stranger.heard, "it is refused before anything is said to a robot"
+
+
+def test_a_port_that_goes_away_before_the_handshake(capfd: pytest.CaptureFixture[str]) -> None:
+    with Stranger(hangs_up=True) as stranger:
+        assert run_command(["run", "--port", stranger.path, *HEADLESS]) == FAILED
+        assert stranger.heard, "it was asked"
+        assert stranger.path in error_line(capfd)
+
+
+@pytest.mark.parametrize(("host", "code"), [("192.0.2.1", FAILED), ("no.such.host.invalid", WRONG_CALL)])
+def test_where_there_is_nowhere_to_listen(host: str, code: int, capfd: pytest.CaptureFixture[str]) -> None:
+    with Stranger() as stranger:
+        command = ["run", "--port", stranger.path, "--headless", "--no-record", "--set", f"console.host={host}"]
+        assert run_command(command) == code
+        assert host in error_line(capfd)
+        assert not stranger.heard
+
+
+class StubProcess:
+    """Notes what it is asked for."""
+
+    def __init__(self) -> None:
+        self.asked: asyncio.Queue[object] = asyncio.Queue()
+
+    def request(self, request: Request) -> None:
+        self.asked.put_nowait(request)
+
+    def stop(self) -> None:
+        self.asked.put_nowait("stop")
+
+
+class StubReloader:
+    """Notes its requests in the process's queue."""
+
+    def __init__(self, asked: asyncio.Queue[object]) -> None:
+        self.asked = asked
+        self.is_cancelled = False
+
+    def request(self) -> None:
+        self.asked.put_nowait("reload")
+
+    def cancel(self) -> None:
+        self.is_cancelled = True
+
+
+async def test_signals_are_requests_while_the_run_lasts() -> None:
+    process = StubProcess()
+    reloader = StubReloader(process.asked)
+    expected = {
+        signal.SIGINT: "stop",
+        signal.SIGTERM: "stop",
+        signal.SIGUSR1: Request.ARM,
+        signal.SIGUSR2: Request.HALT,
+        signal.SIGHUP: "reload",
+    }
+    with signals(process, reloader):  # type: ignore[arg-type]
+        for number, asked in expected.items():
+            signal.raise_signal(number)
+            assert await asyncio.wait_for(process.asked.get(), TIMEOUT_S) == asked
+    assert reloader.is_cancelled
+    # The runner of asyncio has its own handler of SIGINT.
+    assert {signal.getsignal(number) for number in expected.keys() - {signal.SIGINT}} == {signal.SIG_DFL}

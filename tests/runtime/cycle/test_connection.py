@@ -1,0 +1,112 @@
+"""Ports on which no robot answers as it should, and the halt at the end of a run, in virtual time."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+
+import pytest
+import structlog
+
+from config.errors import FAILED, UserError
+from drivers.emulator.faults import Deaf, Fault, Garbage, Mute
+from drivers.messages import Flags
+from runtime.cycle.connection import CONNECT_MAX_S, HALT_MAX_S, POLL_S
+from runtime.cycle.process import RobotProcess
+from tests.runtime.virtual_time import STEP_S, MemoryLink, in_virtual_time
+
+LONG_S = 600.0
+
+
+def _drop(*_: object) -> dict[str, object]:
+    raise structlog.DropEvent
+
+
+LOG = structlog.wrap_logger(None, processors=[_drop])
+
+
+def refusal(
+    monkeypatch: pytest.MonkeyPatch, *faults: Fault, disturb: Callable[[MemoryLink], None] | None = None
+) -> str:
+    """Run on a robot with these faults; return the error, having checked when it came."""
+    with in_virtual_time(monkeypatch, faults=faults) as (loop, settings, _robot, links):
+        process = RobotProcess(settings, LOG, clock=loop.time)
+        begin_s = loop.time()
+        if disturb is not None:
+            loop.call_later(0.1, lambda: disturb(links[0]))
+        with pytest.raises(UserError) as caught:
+            loop.run_until_complete(process.run(arm=True, seconds=LONG_S))
+        assert loop.time() - begin_s <= CONNECT_MAX_S + 2.0 * POLL_S
+        assert caught.value.exit_code == FAILED
+        assert not links[0].is_open, "the line is closed"
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+def test_a_robot_that_is_deaf(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = refusal(monkeypatch, Deaf(kind="deaf", at_s=0.0, duration_s=LONG_S))
+    assert "HELLO" in text
+    assert "although the robot sends other frames" in text
+
+
+def test_a_port_that_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = refusal(monkeypatch, Mute(kind="mute", at_s=0.0, duration_s=LONG_S))
+    assert "HELLO" in text
+    assert "nothing is received" in text
+
+
+def test_a_port_that_sends_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    noise, rng = Garbage(kind="garbage", at_s=0.0, duration_s=LONG_S, bytes_per_s=5000.0), random.Random(1)
+
+    def only_noise(link: MemoryLink) -> None:
+        live = link.live
+
+        def noisy() -> bytes:
+            return rng.randbytes(len(live()))
+
+        link.live = noisy  # type: ignore[method-assign]
+
+    text = refusal(monkeypatch, noise, disturb=only_noise)
+    assert "likely the baud rate" in text
+
+
+def test_a_line_that_is_lost_before_the_handshake(monkeypatch: pytest.MonkeyPatch) -> None:
+    silent = Mute(kind="mute", at_s=0.0, duration_s=LONG_S)
+    assert refusal(monkeypatch, silent, disturb=MemoryLink.pull) == "pulled out"
+
+
+def test_the_base_has_stopped_before_the_line_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    with in_virtual_time(monkeypatch) as (loop, settings, robot, links):
+        process, ends = RobotProcess(settings, LOG, clock=loop.time), list[tuple[float, float]]()
+        stop = MemoryLink.stop
+
+        async def noted(link: MemoryLink) -> None:
+            ends.append((loop.time(), robot.truth.twist.v))
+            await stop(link)
+
+        monkeypatch.setattr(MemoryLink, "stop", noted)
+
+        def end() -> None:
+            assert robot.truth.twist.v > 0.2, "it drives"
+            ends.append((loop.time(), robot.truth.twist.v))
+            process.stop()
+
+        loop.call_later(4.0, end)
+        loop.run_until_complete(process.run(arm=True, seconds=None))
+        (asked_s, _), (closed_s, v), *_ = ends
+        assert v == 0.0
+        assert robot.truth.flags & Flags.LATCHED
+        assert closed_s - asked_s < HALT_MAX_S, "it was confirmed"
+        assert not links[0].is_open
+
+
+def test_a_base_that_does_not_confirm_its_halt_is_left_after_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its deadman stops it."""
+    silent = Mute(kind="mute", at_s=4.0 - STEP_S, duration_s=LONG_S)
+    with in_virtual_time(monkeypatch, faults=(silent,)) as (loop, settings, _robot, _links):
+        process = RobotProcess(settings, LOG, clock=loop.time)
+        loop.call_later(4.0, process.stop)
+        begin_s = loop.time()
+        loop.run_until_complete(process.run(arm=True, seconds=None))
+        assert loop.time() - begin_s == pytest.approx(4.0 + HALT_MAX_S, abs=2.0 * POLL_S)
