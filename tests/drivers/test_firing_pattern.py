@@ -104,19 +104,3 @@ def test_a_step_exactly_as_long_as_its_window_will_do() -> None:
     assert firing_pattern(ring(firing)).window_m == 2.0
     wire = wire_pattern(ring(firing))
     assert wire.step_period_ms * 1e-3 >= time_of_flight_s(wire.window * 0.03048)
-
-
-@pytest.mark.parametrize(
-    ("firing", "count", "range_max_m", "text"),
-    [
-        (FiringConfig(preset="single"), 25, 7.7, "25 sensors, and this robot's protocol supports at most 24"),
-        (FiringConfig(sets=((0,), (1,)), rotations=13), 24, 7.7, "26 firings .* holds 24"),
-        (FiringConfig(preset="octets", step_period_s=0.1), 24, 8.0, "listens for 0.1524 to 7.7724"),
-        (FiringConfig(preset="octets", window_m=0.15), 24, 7.7, "listens for 0.1524 to 7.7724"),
-    ],
-)
-def test_what_the_protocol_cannot_say_is_refused(
-    firing: FiringConfig, count: int, range_max_m: float, text: str
-) -> None:
-    with pytest.raises(FiringError, match=text):
-        wire_pattern(ring(firing, count, range_max_m))

@@ -135,22 +135,6 @@ async def test_a_port_in_use_says_so(pty: PtyPair) -> None:
             await second.open_once()
 
 
-@pytest.mark.parametrize(
-    ("error", "text"),
-    [
-        (serial.SerialException(13, "could not open port"), r"no permission .*\(dialout on"),
-        (ValueError("Invalid baud rate: 7"), "cannot be set to 115200 baud .*; correct link.baud"),
-        (serial.SerialException("something new"), r"cannot open .* \(something new\); check the cable"),
-    ],
-)
-async def test_other_reasons_have_their_line(pty: PtyPair, error: Exception, text: str) -> None:
-    def opener(_: LinkConfig) -> serial.Serial:
-        raise error
-
-    with pytest.raises(LinkError, match=text):
-        await Host().link(pty.path, opener=opener).open_once()
-
-
 async def test_a_port_that_never_opens_does_not_hold_the_loop(pty: PtyPair) -> None:
     host, release, closed = Host(), threading.Event(), threading.Event()
 

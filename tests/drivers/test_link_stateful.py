@@ -194,8 +194,8 @@ class LinkMachine(RuleBasedStateMachine):
 
 
 QUICK = settings(
-    max_examples=25,
-    stateful_step_count=25,
+    max_examples=15,
+    stateful_step_count=20,
     deadline=None,
     derandomize=True,  # `make soak` looks further
     phases=(Phase.generate,),  # each step takes real time, and one that fails its whole timeout

@@ -14,6 +14,8 @@ from tests.drivers.cable import STEP_S, Cable, Way
 
 ECHO_WITHIN_S = 1.0 - LinkConfig().reopen_max_s
 """What a second leaves when the plug comes back right after an attempt to open it."""
+HANDSHAKE_BYTES = 60
+"""Bytes of the longer direction until the robot has accepted the pattern: IDENT, ACK and the first odometry."""
 WAYS: tuple[Way, ...] = ("to the robot", "to the host")
 
 
@@ -26,12 +28,15 @@ def one_pattern() -> dict[Way, int]:
     return dict(cable.passed)
 
 
-def cut_before_every_byte(way: Way, outages_s: Sequence[float]) -> str:
-    """Cut twice in a row before the same byte, so that the handshake of a replugged line is cut as well."""
+def cut_before_bytes(way: Way, outages_s: Sequence[float], stride: int = 1) -> str:
+    """Cut twice in a row before the same byte, so that the handshake of a replugged line is cut as well.
+
+    Of the bytes after the handshake only each `stride`-th is tried.
+    """
     total = one_pattern()[way]
     assert total > 20
-    worst = 0.0
-    for byte in range(total):
+    worst, places = 0.0, [byte for byte in range(total) if byte < HANDSHAKE_BYTES or byte % stride == 0]
+    for byte in places:
         cable = Cable(cut_after=(way, byte))
         for turn in range(2):
             cable.plug()
@@ -48,14 +53,13 @@ def cut_before_every_byte(way: Way, outages_s: Sequence[float]) -> str:
         times = [firing.robot_s for firing in cable.firings]
         assert all(b - a >= 0.0499 for a, b in itertools.pairwise(times)), "none twice, none too soon"
     shown = ", ".join(f"{outage_s:g}" for outage_s in outages_s)
-    return f"cut before each of {total} bytes {way}, for {shown} s: echoes ≤ {worst:.3f} s after it is open again"
+    return f"cut before {len(places)} of {total} bytes {way}, for {shown} s: echoes ≤ {worst:.3f} s after reopening"
 
 
-@pytest.mark.compiled
 @pytest.mark.promise("P5")
 @pytest.mark.parametrize("way", WAYS)
-def test_cut_before_every_byte(way: Way, measured: Callable[[str], None]) -> None:
-    measured(cut_before_every_byte(way, (STEP_S, 0.2)))
+def test_cut_before_any_byte(way: Way, measured: Callable[[str], None]) -> None:
+    measured(cut_before_bytes(way, (STEP_S, 0.2), stride=7))
 
 
 @pytest.mark.soak
@@ -63,10 +67,9 @@ def test_cut_before_every_byte(way: Way, measured: Callable[[str], None]) -> Non
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("outage_s", [STEP_S, 0.05, 0.45, 1.1, 12.9])
 def test_cut_before_every_byte_for_long_and_short(way: Way, outage_s: float, measured: Callable[[str], None]) -> None:
-    measured(cut_before_every_byte(way, (outage_s,)))
+    measured(cut_before_bytes(way, (outage_s,)))
 
 
-@pytest.mark.compiled
 def test_an_unplugged_line_costs_no_good_frame() -> None:
     """What a cut tears is counted as bad or lost; what comes after is whole."""
     cable = Cable()

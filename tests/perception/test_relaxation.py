@@ -15,7 +15,7 @@ from tests.perception.random_outlines import EXACT, as_segments, random_segments
 def test_increment_equals_the_papers_formulas() -> None:
     rng = np.random.default_rng(5)
     moved = 0
-    for _ in range(3_000):
+    for _ in range(400):
         sides = random_sides(rng, int(rng.integers(1, 8)))
         rows = random_segments(rng, 40, 1.0)
         members = rng.permutation(40)[: int(rng.integers(0, 30))].astype(np.int64)
@@ -25,7 +25,7 @@ def test_increment_equals_the_papers_formulas() -> None:
         expected = naive.increment(model, as_segments(rows[members]), 2.0, x, y, theta)
         assert got == pytest.approx(expected, abs=EXACT)
         moved += got != (0.0, 0.0, 0.0)
-    assert moved > 2_500
+    assert moved > 330
 
 
 def test_increment_without_near_segments_is_zero() -> None:
@@ -40,7 +40,7 @@ def test_increment_without_near_segments_is_zero() -> None:
 
 def test_relaxation_repeats_the_increment_until_it_is_negligible() -> None:
     rng = np.random.default_rng(7)
-    for _ in range(200):
+    for _ in range(40):
         sides = random_sides(rng, 4)
         rows = random_segments(rng, 20, 0.6)
         members = np.arange(20)

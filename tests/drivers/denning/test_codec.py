@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.denning import frames
 from drivers.denning.codec import FRAME_MAX, Decoder, crc, encode
 from drivers.denning.frames import Ack, Drive, Echo, Frame, Halt, Hello, Ident, NakCode, Odom, Pattern
 from tests.drivers.vectors import BAD, GOOD, Side
@@ -254,15 +253,3 @@ def test_the_end_of_a_frame_that_was_under_way_when_the_line_opened_is_no_bad_fr
     decoder = Decoder("robot", midway=midway)
     decoder.feed(b"\xff" * 1000 + b"\0")
     assert decoder.bad == 1, "no frame is as long as that"
-
-
-def test_the_numbers_of_the_protocol() -> None:
-    """A robot elsewhere has them too."""
-    assert [(code.name, int(code)) for code in NakCode] == [
-        ("UNKNOWN_TYPE", 1), ("WRONG_LENGTH", 2), ("VALUE_OUT_OF_RANGE", 3), ("LATCHED", 4),
-    ]  # fmt: skip
-    assert (frames.VERSION, frames.SENSORS_MAX, frames.MASKS_MAX) == (1, 24, 24)
-    assert (frames.WINDOW_MIN, frames.WINDOW_MAX) == (5, 255)
-    assert (frames.FAULT, frames.TENTHS_MIN, frames.TENTHS_MAX, frames.NO_ECHO) == (0, 5, 254, 255)
-    assert frames.TENTH_FT_M == 0.03048
-    assert FRAME_MAX == 128

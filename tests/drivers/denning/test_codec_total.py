@@ -65,21 +65,12 @@ def survive(side: Side, seed: int, total: int) -> tuple[int, int, int]:
     return chunked.frames, chunked.bad, held
 
 
-@pytest.mark.compiled
+@pytest.mark.parametrize("total", [300_000, pytest.param(500_000_000, marks=pytest.mark.soak)])
 @pytest.mark.parametrize("side", SIDES)
-def test_ten_million_bytes(side: Side, measured: Measured) -> None:
-    total = 5_000_000
+def test_noise_of_every_kind_is_survived(side: Side, total: int, measured: Measured) -> None:
     frames, bad, held = survive(side, 40, total)
-    assert frames > 10_000
-    assert bad > 10_000
-    measured(f"{total:.0e} bytes from the {side}: {frames:,} frames, {bad:,} dropped, ≤ {held} bytes held")
-
-
-@pytest.mark.soak
-@pytest.mark.parametrize("side", SIDES)
-def test_a_thousand_million_bytes(side: Side, measured: Measured) -> None:
-    total = 500_000_000
-    frames, bad, held = survive(side, 41, total)
+    assert frames > 0.002 * total
+    assert bad > 0.002 * total
     measured(f"{total:.0e} bytes from the {side}: {frames:,} frames, {bad:,} dropped, ≤ {held} bytes held")
 
 
@@ -133,15 +124,11 @@ def check_false(corrupt: int, seed: int, count: int) -> str:
     return f"{count:,} frames with {corrupt} bytes overwritten: {false} pass, CRC-16 predicts {expected:.1f}"
 
 
-@pytest.mark.compiled
-@pytest.mark.parametrize("corrupt", [8, 20])
-def test_false_accepts_are_as_many_as_the_checksum_predicts(corrupt: int, measured: Measured) -> None:
-    measured(check_false(corrupt, 42, 500_000))
-
-
-@pytest.mark.soak
-def test_false_accepts_are_as_many_as_the_checksum_predicts_in_the_long_run(measured: Measured) -> None:
-    measured(check_false(20, 43, 100_000_000))
+@pytest.mark.parametrize(
+    ("corrupt", "count"), [(8, 65_536), (20, 65_536), pytest.param(20, 100_000_000, marks=pytest.mark.soak)]
+)
+def test_false_accepts_are_as_many_as_the_checksum_predicts(corrupt: int, count: int, measured: Measured) -> None:
+    measured(check_false(corrupt, 42, count))
 
 
 def test_what_the_checksum_always_catches_is_always_caught(measured: Measured) -> None:
@@ -151,8 +138,8 @@ def test_what_the_checksum_always_catches_is_always_caught(measured: Measured) -
     rng = np.random.default_rng(44)
     errors = {1 << i for i in range(bits)}
     errors |= {1 << i | 1 << j for i, j in itertools.combinations(range(bits), 2)}
-    errors |= {sum(1 << int(i) for i in rng.choice(bits, 3, replace=False)) for _ in range(20_000)}
-    bursts, places = rng.integers(1, 2**16, 20_000).tolist(), rng.integers(0, bits - 16, 20_000).tolist()
+    errors |= {sum(1 << int(i) for i in rng.choice(bits, 3, replace=False)) for _ in range(3_000)}
+    bursts, places = rng.integers(1, 2**16, 3_000).tolist(), rng.integers(0, bits - 16, 3_000).tolist()
     errors |= {burst << place for burst, place in zip(bursts, places, strict=True)}
     decoder = Decoder("robot")
     assert passes(decoder, body)
@@ -161,7 +148,7 @@ def test_what_the_checksum_always_catches_is_always_caught(measured: Measured) -
 
 
 def test_noise_alone_makes_no_more_frames_than_the_checksum_lets_pass(measured: Measured) -> None:
-    total = 10_000_000
+    total = 2_000_000
     rng = np.random.default_rng(45)
     decoder, pieces = Decoder("robot"), 0
     for _ in range(total // 100_000):

@@ -8,7 +8,6 @@ import pytest
 
 from config.robot import FiringConfig
 from drivers.denning.codec import Decoder, encode
-from drivers.denning.driver import DenningDriver
 from drivers.denning.frames import (
     Ack,
     Echo,
@@ -18,17 +17,11 @@ from drivers.denning.frames import (
     NakCode,
     Pattern,
 )
-from drivers.driver import LineState, RobotDriver
+from drivers.driver import LineState
 from drivers.firing_pattern import FiringError
 from drivers.messages import LinkCounts, Twist
 from tests.drivers.driver_harness import CONFIG, IDENT, ODOM, PERIOD_US, DriverHarness, only
 from tests.drivers.vectors import OCTETS
-
-
-def test_it_is_a_robot_driver() -> None:
-    driver: RobotDriver = DenningDriver(CONFIG)
-    assert driver.state is LineState.CLOSED
-    assert driver.outgoing(writable=True) == b""
 
 
 def test_greeting_then_pattern_then_ready() -> None:

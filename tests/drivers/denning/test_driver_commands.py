@@ -18,7 +18,7 @@ from drivers.denning.frames import (
 )
 from drivers.driver import LineState
 from drivers.messages import Twist
-from tests.drivers.driver_harness import CONFIG, IDENT, DriverHarness, only
+from tests.drivers.driver_harness import IDENT, DriverHarness, only
 
 
 def test_the_newest_drive_wins_and_is_held_to_the_limits_of_the_body(harness: DriverHarness) -> None:
@@ -32,17 +32,6 @@ def test_the_newest_drive_wins_and_is_held_to_the_limits_of_the_body(harness: Dr
     (drive,) = harness.received()
     assert isinstance(drive, Drive)
     assert (drive.v_mm_s, drive.w_mrad_s) == (600, -1000)
-
-
-def test_a_limit_is_not_passed_by_rounding() -> None:
-    body = CONFIG.body.model_copy(update={"speed_max_m_s": 0.3057, "turn_max_rad_s": 40.0})
-    harness = DriverHarness(CONFIG.model_copy(update={"body": body}))
-    harness.open()
-    harness.handshake()
-    harness.robot.drive(Twist(0.3057, 39.0))
-    (drive,) = harness.received()
-    assert isinstance(drive, Drive)
-    assert (drive.v_mm_s, drive.w_mrad_s) == (305, 32767)
 
 
 @pytest.mark.parametrize("twist", [Twist(math.nan, 0.0), Twist(0.0, math.inf)])

@@ -15,31 +15,9 @@ from drivers.denning.frames import (
     Echo,
     RobotFrame,
 )
-from drivers.messages import Flags, LinkCounts, Pose
+from drivers.messages import LinkCounts, Pose
 from tests.drivers.driver_harness import CONFIG, IDENT, ODOM, PERIOD_US, DriverHarness
 from tests.drivers.vectors import OCTETS
-
-
-def test_odometry_in_si(harness: DriverHarness) -> None:
-    harness.odom(
-        1_000_000,
-        x_0p1mm=12345,
-        y_0p1mm=-6789,
-        heading_1em4rad=70000,
-        ring_yaw_1em4rad=-100,
-        v_mm_s=305,
-        w_mrad_s=-250,
-        flags=0b11001,
-        last_drive_seq=9,
-    )
-    odometry = harness.robot.take_received().odometry
-    assert odometry is not None
-    assert odometry.robot_s == pytest.approx(1.0)
-    assert (odometry.pose.x, odometry.pose.y, odometry.pose.theta) == pytest.approx((1.2345, -0.6789, 7.0))
-    assert (odometry.ring_yaw, odometry.twist.v, odometry.twist.w) == pytest.approx((-0.01, 0.305, -0.25))
-    assert odometry.flags == Flags.LATCHED | Flags.DEADMAN | Flags.BATTERY_LOW
-    assert odometry.last_drive_seq == 9
-    assert harness.robot.take_received().odometry is None
 
 
 def test_a_firing_has_the_pose_of_its_own_moment(harness: DriverHarness) -> None:

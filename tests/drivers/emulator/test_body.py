@@ -138,7 +138,7 @@ def test_small_fast_body_does_not_slip_through_a_wall() -> None:
     assert body.pose.x == pytest.approx(0.99, abs=1e-6)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_nothing_is_ever_penetrated(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -194,9 +194,9 @@ def test_heading_drifts_with_the_root_of_the_way_and_the_truth_does_not() -> Non
         assert body.odometry_ring_yaw == body.odometry_pose.theta
         return body.odometry_pose.theta
 
-    for dt_s in (0.02, 0.1):  # the spread does not depend on how the way is cut
-        spread = np.std([drift(dt_s, seed) for seed in range(300)])
-        assert spread == pytest.approx(0.04, rel=0.12)
+    for dt_s in (0.04, 0.2):  # the spread does not depend on the size of the steps
+        spread = np.std([drift(dt_s, seed) for seed in range(200)])
+        assert spread == pytest.approx(0.04, rel=0.15)  # three standard errors of the spread of 200 seeds
 
 
 def test_reset_and_jump_touch_the_odometry_only() -> None:

@@ -11,7 +11,7 @@ from perception.paper.candidates import follow_clusters
 
 def test_clusters_are_followed_nearest_pair_first() -> None:
     rng = np.random.default_rng(10)
-    for _ in range(500):
+    for _ in range(200):
         old = rng.uniform(-2, 2, (int(rng.integers(0, 8)), 2))
         new = rng.uniform(-2, 2, (int(rng.integers(0, 8)), 2))
         pairs = sorted((math.dist(a, b), i, j) for i, a in enumerate(old) for j, b in enumerate(new))

@@ -27,7 +27,7 @@ def run_clusters(rows: Floats, status: Ints, start: int, count: int, threshold: 
 
 def test_clusters_equal_table_1() -> None:
     rng = np.random.default_rng(3)
-    for _ in range(300):
+    for _ in range(60):
         capacity = int(rng.integers(8, 80))
         rows = random_segments(rng, capacity, 2.0)
         status = (rng.uniform(size=capacity) < 0.8).astype(np.int64)

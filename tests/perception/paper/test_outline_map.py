@@ -50,7 +50,7 @@ def listed(outline: OutlineMap) -> list[tuple[int, float, float, int]]:
 
 def test_any_order_of_adding_ageing_deleting_and_pinning_equals_its_oracle() -> None:
     rng = np.random.default_rng(3)
-    for _ in range(60):
+    for _ in range(20):
         outline, kept, t = outline_map(), list[Segment](), 0.0
         for _ in range(120):
             t += float(rng.choice([0.1, 1.0, 4.0]))
@@ -140,7 +140,7 @@ def test_half_the_map_may_be_pinned() -> None:
 def test_contradiction_equals_its_oracle() -> None:
     rng = np.random.default_rng(8)
     erased = 0
-    for _ in range(2_000):
+    for _ in range(300):
         capacity, start, count = 30, int(rng.integers(30)), int(rng.integers(31))
         rows = random_segments(rng, capacity, 2.0)
         rows[rng.integers(capacity), 2:4] = rows[0, 0:2]
@@ -162,7 +162,7 @@ def test_contradiction_equals_its_oracle() -> None:
         n = erase_contradicted(rows, status, start, count, ranges, mounts, x, y, yaw, 0.4, 0.2)
         np.testing.assert_array_equal(status, expected)
         erased += n
-    assert erased > 500
+    assert erased > 75
 
 
 def test_the_papers_method_refuses_to_pin_more_than_half_of_the_map() -> None:

@@ -13,7 +13,7 @@ from tests.perception.random_outlines import EXACT, as_segments, random_segments
 def test_goodness_of_fit_equals_its_oracle() -> None:
     rng = np.random.default_rng(9)
     supported = 0
-    for _ in range(2_000):
+    for _ in range(300):
         sides = random_sides(rng, int(rng.integers(1, 7)))
         rows = random_segments(rng, 25, 0.8)
         members = rng.permutation(25)[: int(rng.integers(0, 25))].astype(np.int64)
@@ -23,4 +23,4 @@ def test_goodness_of_fit_equals_its_oracle() -> None:
         expected = naive.goodness_of_fit(model, as_segments(rows[members]), x, y, theta, 0.2, 0.6)
         assert got == pytest.approx(expected, abs=EXACT)
         supported += got[0]
-    assert supported > 1_000
+    assert supported > 150

@@ -16,7 +16,7 @@ from tests.perception.random_outlines import EXACT
 def test_tangent_equals_its_oracle() -> None:
     rng = np.random.default_rng(1)
     found = 0
-    for _ in range(20_000):
+    for _ in range(4_000):
         x1, y1, axis1 = rng.uniform(-3, 3, 3)
         x2, y2 = x1 + rng.uniform(-0.5, 0.5), y1 + rng.uniform(-0.5, 0.5)
         axis2 = axis1 + rng.uniform(-0.3, 0.3)
@@ -34,7 +34,7 @@ def test_tangent_equals_its_oracle() -> None:
             n1 = math.cos(alpha) * x1 + math.sin(alpha) * y1 + r1
             n2 = math.cos(alpha) * x2 + math.sin(alpha) * y2 + r2
             assert n1 == pytest.approx(n2, abs=EXACT)  # the defining property, to full precision
-    assert found > 3_000
+    assert found > 600
 
 
 def test_tangent_of_a_wall_is_the_wall() -> None:
@@ -53,7 +53,7 @@ def test_no_tangent_outside_the_beams_nor_for_impossible_ranges() -> None:
 def test_pairing_equals_its_oracle_along_random_drives() -> None:
     rng = np.random.default_rng(2)
     made = 0
-    for _ in range(30):
+    for _ in range(12):
         mounts = np.column_stack([rng.uniform(-0.4, 0.4, (6, 2)), rng.uniform(-math.pi, math.pi, 6)])
         sensors = records(SensorReadings, zeros(SensorReadings, 6))
         out = np.zeros((6, 5))
@@ -83,4 +83,4 @@ def test_pairing_equals_its_oracle_along_random_drives() -> None:
             assert n == len(expected)
             made += n
             np.testing.assert_allclose(out[:n, :4], np.array(expected).reshape(-1, 5)[:, :4], atol=EXACT)
-    assert made > 1_000
+    assert made > 400

@@ -1,0 +1,27 @@
+"""Sensor faults as text: the most severe one, its likely cause and the next action, in one line."""
+
+from __future__ import annotations
+
+import pytest
+
+from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK, describe_fault
+
+
+@pytest.mark.parametrize(
+    ("faults", "name", "text"),
+    [
+        (FAILING, "failing", "sensor 7 never answers when it should fire"),
+        (STUCK, "stuck", "sensor 7 always answers 1.25 m although the base has moved on"),
+        (SILENT, "silent", "sensor 7 hears nothing where both its neighbours hear echoes"),
+        (CROSSTALK, "crosstalk", "sensor 7 reads short when it fires together with 3, 11 and not otherwise"),
+        (FAILING | STUCK | SILENT | CROSSTALK, "failing", "check its cable and its board"),
+        (STUCK | SILENT | CROSSTALK, "stuck", "look for something that hangs in front of it"),
+        (SILENT | CROSSTALK, "silent", "check that nothing covers it"),
+        (CROSSTALK, "crosstalk", "fire them apart (ring.firing)"),
+    ],
+)
+def test_the_most_severe_fault_is_described(faults: int, name: str, text: str) -> None:
+    report = describe_fault(7, faults, 1.25, [3, 11])
+    assert (report.sensor, report.fault) == (7, name)
+    assert text in report.reason
+    assert "\n" not in report.reason

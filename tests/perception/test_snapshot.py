@@ -1,0 +1,62 @@
+"""Snapshots: every array and number by its dotted name, and refusal of a snapshot of something else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from config.load import load_settings
+from perception.pipeline import Perception
+from perception.snapshot import put_back, snapshot_of
+from tests.perception.edited import fresh
+
+
+class Part:
+    def __init__(self, value: float) -> None:
+        self.value = value
+
+
+Part.__module__ = "perception.of_a_test"
+
+
+class Owner:
+    SCRATCH = ("_work",)
+
+    def __init__(self, size: int = 3) -> None:
+        self.array = np.arange(float(size))
+        self.count, self.done, self.part = 5, True, Part(0.5)
+        self.settings, self.name, self._work = np.zeros(9), "not kept", np.zeros(4)
+
+
+def test_arrays_numbers_and_parts_are_copied_and_scratch_is_not() -> None:
+    owner = Owner()
+    snapshot = snapshot_of(owner)
+    assert sorted(snapshot) == ["array", "count", "done", "part.value"]
+    owner.array[:] = -1.0
+    owner.count, owner.done, owner.part.value = 0, False, 9.0
+    kept = owner.array
+    put_back(owner, snapshot)
+    assert owner.array is kept, "kernels hold views of the arrays"
+    assert owner.array.tolist() == [0.0, 1.0, 2.0]
+    assert (owner.count, owner.done, owner.part.value) == (5, True, 0.5)
+    assert type(owner.done) is bool
+
+
+def test_a_snapshot_of_something_else_is_refused() -> None:
+    owner, snapshot = Owner(), snapshot_of(Owner())
+    with pytest.raises(ValueError, match="another method or version: other"):
+        put_back(owner, snapshot | {"other": np.zeros(1)})
+    with pytest.raises(ValueError, match=r"of other settings: array is \(4,\), not \(3,\)"):
+        put_back(owner, snapshot_of(Owner(4)))
+    with pytest.raises(ValueError, match="array has other fields"):
+        put_back(owner, snapshot | {"array": np.arange(3)})
+
+
+def test_the_state_of_one_method_is_not_put_into_the_other() -> None:
+    paper, bayes = fresh("paper"), fresh("bayes")
+    with pytest.raises(ValueError, match="another method or version"):
+        bayes.restore(paper.snapshot())
+    ring = load_settings("hallway").ring.model_copy(update={"count": 12})
+    chosen = load_settings("hallway", ["perception.method=paper"])
+    with pytest.raises(ValueError, match="of other settings"):
+        Perception(ring, chosen.models, chosen.perception).restore(paper.snapshot())
