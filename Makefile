@@ -1,17 +1,28 @@
-# `make run` starts the robot with the emulator, `make test` runs all checks and tests.
+# `make run` starts the robot with the emulator, `make test` runs all checks and tests, `make check` the quick ones.
 # `make bench` measures accuracy and timing, `make soak` runs the long forms of the tests.
 
 PYTHON ?= python3.11
 VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install -q --disable-pip-version-check
+PYTEST := $(BIN)/python -m pytest -q
+WORKERS = $(shell expr 2 \* $$(nproc))
 
-.PHONY: run test lint tests boundscheck promises mutants soak bench clean
+.PHONY: run test check lint kernels tests compiled interpreted boundscheck promises mutants soak bench clean
 
 run: $(VENV)/run.stamp
 	@$(BIN)/echolocate run
 
-test: lint tests boundscheck
+# Two at a time where one processor would wait: types are checked while kernels compile, array bounds beside the run
+# without compiled kernels.
+test: $(VENV)/test.stamp
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target lint kernels
+	@$(MAKE) --no-print-directory compiled
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target interpreted boundscheck
+
+# What answers within a minute while one edits: lint, types, and the tests of what changed since the last commit.
+check: lint
+	$(BIN)/python -m tests.changed
 
 lint: $(VENV)/test.stamp
 	$(BIN)/ruff check .
@@ -20,19 +31,23 @@ lint: $(VENV)/test.stamp
 	$(BIN)/lint-imports
 	$(BIN)/codespell
 
-# Kernels are tested compiled, and again as plain Python, because coverage cannot trace compiled code. Tests that depend
-# on the wall clock run last, two at a time, with no other load.
-tests: $(VENV)/test.stamp
-	$(BIN)/python -m pytest -q -n auto -m "(kernels or compiled) and not realtime and not soak"
-	$(BIN)/python -m pytest -q -n auto -m "not (kernels or compiled) and not realtime and not soak" --cov --cov-report=
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -n auto -m "kernels and not realtime and not compiled and not soak" \
-		--cov --cov-append --cov-report=term:skip-covered --cov-fail-under=90
-	$(BIN)/python -m pytest -q -n 2 -m "realtime and not soak"
+kernels: $(VENV)/test.stamp
+	$(BIN)/python -m tests.compile_kernels
 
-# Compiled code does not check array bounds by default; this run does.
+tests: compiled interpreted
+
+# All tests. Many of them wait for the clock, so there are twice as many at a time as processors.
+compiled: $(VENV)/test.stamp
+	$(PYTEST) -n $(WORKERS) --dist worksteal -m "not soak" --cov --cov-report=
+
+# Kernels again as plain Python: coverage cannot trace compiled code.
+interpreted: $(VENV)/test.stamp
+	NUMBA_DISABLE_JIT=1 $(PYTEST) -n auto --dist worksteal -m "kernels and not compiled and not realtime and not soak" \
+		--cov --cov-append --cov-report=term:skip-covered --cov-fail-under=90
+
+# Whole drives with array bounds checked, which compiled code does not do by default.
 boundscheck: $(VENV)/test.stamp
-	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(BIN)/python -m pytest -q -n auto -m "not realtime and not compiled and not soak" \
-		tests/perception tests/drivers/emulator tests/drivers/denning/test_device.py
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/kernels-boundscheck $(PYTEST) -m "boundscheck and not soak"
 
 # Measures every promise and writes docs/promises.md. (The option needs its "=": pytest would take the page for a test.)
 promises: $(VENV)/test.stamp

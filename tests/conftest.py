@@ -4,6 +4,9 @@ Numba reads its settings on import, so the cache is configured here, before any 
 `NUMBA_DISABLE_JIT=1` (so that coverage can trace kernels) or `NUMBA_BOUNDSCHECK=1` is slower than real time; tests
 marked `realtime` are skipped there. Tests marked `soak` run only on request.
 
+`make tests` runs everything compiled and with coverage, then the tests of kernels (marker `kernels`) as plain Python,
+because coverage cannot trace compiled code; those marked `compiled` would be too slow there.
+
 The result of a run must depend on the sources alone: hypothesis generates the same examples in every run (`make soak`
 generates new ones), and the settings of the user's terminal are removed.
 """
@@ -17,11 +20,10 @@ from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
-from rich.console import Console
 
-from config.load import load_settings
-from runtime.support.kernel_cache import PARTS, prepare_kernels, use_kernel_cache
+from runtime.support.kernel_cache import use_kernel_cache
 from tests import promises
+from tests.compile_kernels import compile_all
 
 use_kernel_cache()
 
@@ -29,8 +31,8 @@ TERMINAL = ("COLUMNS", "LINES", "FORCE_COLOR", "NO_COLOR", "CLICOLOR", "CLICOLOR
             "TTY_INTERACTIVE", "PY_COLORS", "JUPYTER_COLUMNS", "JUPYTER_LINES")  # fmt: skip
 """Environment variables that set the width and colours of output."""
 
-KERNEL_TESTS = [Path(__file__).parent / package for package in ("perception", "drivers")]
-"""Folders with tests of compiled kernels."""
+KERNEL_TESTS = [Path(__file__).parent / package for package in ("perception", "drivers/emulator")]
+"""Folders with the tests of compiled kernels."""
 
 for _name in TERMINAL:
     os.environ.pop(_name, None)
@@ -108,11 +110,7 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(_PromisesPlugin(config), "promises")
     if getattr(config.option, "numprocesses", None):
         # Compile once here; otherwise every worker process would compile everything.
-        _compile_all()
-
-
-def _compile_all() -> None:
-    prepare_kernels(load_settings("hallway"), Console(stderr=True), PARTS)
+        compile_all()
 
 
 @pytest.fixture
@@ -130,4 +128,4 @@ def _state_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
 @pytest.fixture(scope="session")
 def warm_kernels() -> None:
     """Compile every kernel before times are measured, also for processes that a test starts."""
-    _compile_all()
+    compile_all()
