@@ -1,0 +1,94 @@
+"""Run the tests of what changed since the last commit: `python -m tests.changed`, part of `make check`.
+
+The test of a/b.py is tests/a/test_b.py, so a path is enough to find it. A helper of tests stands for the test files
+that import it. Where nothing is found, a few quick files run instead.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+QUICK = (
+    "tests/config/test_load.py",
+    "tests/config/test_reload.py",
+    "tests/behaviors/test_arbiter.py",
+    "tests/drivers/denning/test_codec.py",
+    "tests/drivers/denning/test_driver.py",
+    "tests/perception/paper",
+    "tests/runtime/cycle/test_modes.py",
+    "tests/test_docs.py",
+    "tests/test_source_rules.py",
+)
+"""Files that take seconds and cover every package, for a change that maps to no test."""
+KERNELS = ("perception/", "drivers/emulator/")
+"""After a change of these, tests run without the compiler: compiling the kernels again takes a minute."""
+
+
+def changed_files() -> list[str]:
+    """Return the files that differ from the last commit, new ones included, relative to the root."""
+    commands = (["git", "diff", "--name-only", "HEAD"], ["git", "ls-files", "--others", "--exclude-standard"])
+    listed = [subprocess.run(c, cwd=ROOT, check=True, capture_output=True, text=True).stdout for c in commands]
+    return sorted({line for text in listed for line in text.splitlines()})
+
+
+def find_tests(files: Iterable[str], root: Path = ROOT) -> list[str]:
+    """Return the test files of changed files, relative to the root.
+
+    Parameters
+    ----------
+    files : iterable of str
+        Paths relative to the root; files that were removed may be among them.
+    root : Path
+        Folder of the code base.
+    """
+    found: set[str] = set()
+    for name in files:
+        path = Path(name)
+        if path.suffix != ".py":
+            continue
+        if path.parts[0] != "tests":
+            found.add(f"tests/{path.parent.as_posix()}/test_{path.name}")
+        elif path.name.startswith("test_"):
+            found.add(name)
+        else:
+            found |= importing(path, root)
+    return sorted(test for test in found if (root / test).exists())
+
+
+def importing(helper: Path, root: Path) -> set[str]:
+    """Return the test files that import a helper of tests; for a conftest.py, those of its folder."""
+    if helper.name == "conftest.py":
+        return {test.relative_to(root).as_posix() for test in (root / helper.parent).glob("test_*.py")}
+    package, name = ".".join(helper.parent.parts), helper.stem
+    lines = (f"from {package} import {name}", f"from {package}.{name} import")
+    return {
+        test.relative_to(root).as_posix()
+        for test in (root / "tests").rglob("test_*.py")
+        if any(line in test.read_text("utf-8") for line in lines)
+    }
+
+
+def main() -> int:
+    """Run the tests; return pytest's exit code."""
+    files = changed_files()
+    tests = find_tests(files)
+    marked = "not soak and not realtime"
+    environment = dict(os.environ)
+    if any(name.startswith(KERNELS) and name.endswith(".py") for name in files):
+        environment["NUMBA_DISABLE_JIT"] = "1"
+        marked += " and not compiled"
+    sys.stdout.write(f"{len(files)} changed files, {len(tests) or 'no'} test files by their paths\n")
+    sys.stdout.flush()
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-m", marked, *(tests or QUICK)]
+    code = subprocess.run(command, cwd=ROOT, env=environment, check=False).returncode
+    nothing_collected = 5
+    return 0 if tests and code == nothing_collected else code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

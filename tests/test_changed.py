@@ -1,0 +1,44 @@
+"""Which tests `make check` runs for a change."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.changed import QUICK, ROOT, find_tests
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    for name, text in {
+        "tests/a/test_b.py": "from tests.a.helper import thing\n",
+        "tests/a/test_c.py": "from tests.a import helper\n",
+        "tests/a/test_d.py": "",
+        "tests/a/helper.py": "thing = 1\n",
+        "tests/a/conftest.py": "",
+        "tests/x/test_y.py": "from tests.a.helper import thing\n",
+    }.items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("changed", "tests"),
+    [
+        (["a/b.py"], ["tests/a/test_b.py"]),
+        (["a/no_test_of_its_own.py", "a/b.toml", "README.md"], []),
+        (["tests/a/test_d.py", "a/b.py"], ["tests/a/test_b.py", "tests/a/test_d.py"]),
+        (["tests/a/test_removed.py"], []),
+        (["tests/a/helper.py"], ["tests/a/test_b.py", "tests/a/test_c.py", "tests/x/test_y.py"]),
+        (["tests/a/conftest.py"], ["tests/a/test_b.py", "tests/a/test_c.py", "tests/a/test_d.py"]),
+    ],
+)
+def test_a_change_maps_to_tests_by_path(root: Path, changed: list[str], tests: list[str]) -> None:
+    assert find_tests(changed, root) == tests
+
+
+def test_the_quick_tests_exist() -> None:
+    assert all((ROOT / name).exists() for name in QUICK)
