@@ -112,6 +112,7 @@ def test_evidence_agrees_with_the_objects_and_changes_nothing(seen: Perception) 
     assert all(before[name].tobytes() == after[name].tobytes() for name in before)
 
 
+@pytest.mark.compiled
 def test_evidence_for_an_object_that_is_not_a_model(reached_drums: Perception) -> None:
     """A track that resembles a post is labelled as one and cannot be confirmed as a model."""
     from perception.bayes.bayes_method import BayesPerception
@@ -136,6 +137,8 @@ def test_evidence_for_an_object_that_is_not_a_model(reached_drums: Perception) -
 # Snapshots and models.
 
 
+@pytest.mark.compiled
+@pytest.mark.boundscheck
 def test_a_snapshot_holds_the_edited_state(seen: Perception, firings: list[Firing]) -> None:
     """Perception continues from a snapshot taken between edits with identical results."""
     objects, listed = seen.objects(), seen.segments().numbers.tolist()
@@ -158,6 +161,7 @@ def test_a_snapshot_holds_the_edited_state(seen: Perception, firings: list[Firin
     assert [name for name in mine if mine[name].tobytes() != theirs[name].tobytes()] == []
 
 
+@pytest.mark.compiled
 def test_models_are_added_while_perception_runs(seen: Perception, firings: list[Firing]) -> None:
     """Known objects keep their labels and places; the new models can be placed and are compared from then on."""
     method = "bayes" if is_bayes(seen) else "paper"

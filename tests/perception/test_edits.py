@@ -85,6 +85,7 @@ def test_deleting_segments_leaves_the_others_unchanged(seen: Perception) -> None
     assert f"and {len(doomed) - 5} more" in refused
 
 
+@pytest.mark.compiled
 def test_pinned_segments_stay_until_unpinned(seen: Perception, firings: list[Firing]) -> None:
     listed = seen.segments()
     pins = tuple(listed.numbers[np.argsort(listed.times)][:: max(1, len(listed.numbers) // 12)].tolist())
@@ -202,6 +203,7 @@ def test_an_object_moved_far_away_is_judged_by_the_readings_there(seen: Percepti
     assert math.dist((found.x, found.y), (rested.x, rested.y)) < 0.1
 
 
+@pytest.mark.compiled
 def test_only_new_readings_bring_a_rejected_object_back(seen: Perception, firings: list[Firing]) -> None:
     number = number_of(there(seen))
     others = {o.number for o in seen.objects()} - {number}
@@ -224,6 +226,7 @@ def test_only_new_readings_bring_a_rejected_object_back(seen: Perception, firing
         assert back.number != number
 
 
+@pytest.mark.compiled
 def test_a_confirmed_object_is_reported_whatever_its_evidence(
     reached_drums: Perception, firings: list[Firing]
 ) -> None:
@@ -269,6 +272,7 @@ def test_a_confirmed_object_of_the_papers_method_outlasts_its_segments(seen: Per
     assert seen.objects() == ()
 
 
+@pytest.mark.compiled
 def test_clearing_the_map_keeps_number_counters_and_obstacles(seen: Perception, firings: list[Firing]) -> None:
     numbers, listed = {o.number for o in seen.objects()}, set(seen.segments().numbers.tolist())
     assert seen.edit(PinSegments(tuple(listed)[:2], pinned=True)) is None

@@ -46,7 +46,7 @@ def test_nan_stays_nan() -> None:
     assert not is_missing(math.inf)
 
 
-@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled in this run")
+@pytest.mark.compiled
 def test_a_kernel_that_allocates_does_not_compile() -> None:
     @kernel
     def allocating(n: int) -> float:

@@ -31,6 +31,7 @@ def test_a_firing_of_another_ring_is_refused(count: int) -> None:
         perception.observe(Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, np.full(count, 2.0)))
 
 
+@pytest.mark.compiled
 def test_a_reset_empties_the_map() -> None:
     chosen = settings()
     perception = Perception(chosen.ring, chosen.models, chosen.perception)
@@ -48,6 +49,7 @@ def test_a_reset_empties_the_map() -> None:
     assert len(perception.objects()) == 6
 
 
+@pytest.mark.compiled
 def test_of_two_models_the_better_fit_is_reported() -> None:
     shipped = settings()
     models = (load_model("box"), load_model("semicircle"))

@@ -26,6 +26,7 @@ def corridor(tmp_path: Path) -> tuple[Settings, list[Firing]]:
     return load_settings(robot=str(tmp_path / "robot.toml")), list(read_ring_log(tmp_path / "corridor.csv", 8))
 
 
+@pytest.mark.compiled
 def test_the_corridor_gives_at_least_300_outline_segments(tmp_path: Path) -> None:
     chosen, firings = corridor(tmp_path)
     assert replay_firings(chosen, firings)["segments"] >= 300
@@ -65,6 +66,7 @@ def best_line_share(segments: Floats) -> float:
     return best
 
 
+@pytest.mark.compiled
 def test_the_ring_of_24_runs_through_at_its_full_length(tmp_path: Path) -> None:
     recordings.scitos_ring_log(tmp_path / "ring.csv")
     (tmp_path / "robot.toml").write_text(recordings.scitos_robot())

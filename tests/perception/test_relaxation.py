@@ -40,7 +40,7 @@ def test_increment_without_near_segments_is_zero() -> None:
 
 def test_relaxation_repeats_the_increment_until_it_is_negligible() -> None:
     rng = np.random.default_rng(7)
-    for _ in range(40):
+    for _ in range(12):
         sides = random_sides(rng, 4)
         rows = random_segments(rng, 20, 0.6)
         members = np.arange(20)

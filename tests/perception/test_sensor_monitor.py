@@ -136,6 +136,7 @@ def test_a_stuck_sensor_is_masked_and_reported(halls: int, measured: Callable[[s
     )
 
 
+@pytest.mark.boundscheck
 def test_a_stuck_sensor_is_reported_with_its_range_and_gives_no_reading() -> None:
     watch = SensorMonitor(RING)
     world, path = random_hall(3, NOISY)

@@ -137,7 +137,7 @@ def test_a_stuck_sensor_recovers_after_several_other_readings_and_a_silent_one_a
     assert memory[0].faults == STUCK
     for k in range(RECOVERY_READINGS):
         assert memory[0].faults == STUCK
-        update_run_faults(0, 1.0 + k, 3.0, 0.0, 0.0, HALF, 0.01, NEIGHBOURS, memory)
+        update_run_faults(0, 3.0 + k, 3.0, 0.0, 0.0, HALF, 0.01, NEIGHBOURS, memory)
     assert memory[0].faults == 0
     update_run_faults(0, math.inf, 6.0, 0.0, 0.0, HALF, 0.01, NEIGHBOURS, memory)
     assert memory[0].faults == SILENT

@@ -96,6 +96,7 @@ def random_cases(
 
 
 @pytest.mark.parametrize("worlds", WORLDS)
+@pytest.mark.boundscheck
 def test_cone_is_exactly_the_nearest_point_in_the_beam(worlds: int) -> None:
     heard = 0
     for world, shapes, sensors, half in random_cases(1, worlds):
@@ -121,6 +122,7 @@ def test_cone_agrees_with_densely_sampled_surfaces() -> None:
 
 
 @pytest.mark.parametrize("worlds", WORLDS)
+@pytest.mark.boundscheck
 def test_specular_is_exactly_the_first_visible_mirror(worlds: int) -> None:
     heard = 0
     for world, shapes, sensors, half in random_cases(3, worlds):

@@ -140,6 +140,7 @@ def test_small_fast_body_does_not_slip_through_a_wall() -> None:
 
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
+@pytest.mark.compiled
 def test_nothing_is_ever_penetrated(seed: int) -> None:
     rng = np.random.default_rng(seed)
     room = [(-2, -2, 2, -2), (2, -2, 2, 2), (2, 2, -2, 2), (-2, 2, -2, -2)]

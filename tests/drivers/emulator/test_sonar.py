@@ -62,18 +62,18 @@ def test_faster_sound_shortens_ranges() -> None:
 
 
 def test_noise_has_the_asked_spread() -> None:
-    got = fire_many(wall_at(4.0, noise_relative=0.005, noise_m=0.015), 500, sensors=20)
+    got = fire_many(wall_at(4.0, noise_relative=0.005, noise_m=0.015), 100, sensors=20)
     assert got.mean() == pytest.approx(4.0, abs=0.002)
     assert got.std() == pytest.approx(0.025, rel=0.05)
 
 
 def test_dropouts_come_as_often_as_asked() -> None:
-    got = fire_many(wall_at(4.0, dropout=0.2), 500, sensors=20)
-    assert np.isinf(got).mean() == pytest.approx(0.2, abs=0.02)
+    got = fire_many(wall_at(4.0, dropout=0.2), 100, sensors=20)
+    assert np.isinf(got).mean() == pytest.approx(0.2, abs=0.03)
 
 
 def test_outliers_are_uniform_in_the_window() -> None:
-    got = fire_many(wall_at(4.0, outliers=0.3), 500, sensors=20, range_max_m=10.0, range_min_m=1.0)
+    got = fire_many(wall_at(4.0, outliers=0.3), 100, sensors=20, range_max_m=10.0, range_min_m=1.0)
     wild = got[np.abs(got - 4.0) > 1e-9]
     assert wild.size / got.size == pytest.approx(0.3, abs=0.03)
     assert 1.0 <= wild.min() < 1.1
@@ -84,7 +84,7 @@ def test_outliers_are_uniform_in_the_window() -> None:
 @pytest.mark.parametrize(("farthest_m", "reaches_m"), [(3.0, 3.0), (50.0, 10.0)])
 def test_outliers_reach_no_farther_than_asked(farthest_m: float, reaches_m: float) -> None:
     world = wall_at(4.0, outliers=0.3, outlier_max_m=farthest_m)
-    got = fire_many(world, 500, sensors=20, range_max_m=10.0, range_min_m=1.0)
+    got = fire_many(world, 100, sensors=20, range_max_m=10.0, range_min_m=1.0)
     wild = got[np.abs(got - 4.0) > 1e-9]
     assert 1.0 <= wild.min() < 1.1
     assert reaches_m - 0.1 < wild.max() <= reaches_m

@@ -58,6 +58,7 @@ def test_another_gamma_relaxes_everything_again_to_another_pose(firings: list[Fi
     np.testing.assert_allclose(perception.candidates.rows["pose"][:many], rested[:many], atol=0.02)
 
 
+@pytest.mark.compiled
 def test_another_threshold_clusters_the_same_map_as_if_set_from_the_start(firings: list[Firing]) -> None:
     perception = perceived(firings)
     other = changed(clusters={"threshold_m": 0.25})
@@ -89,6 +90,7 @@ def test_smaller_clusters_get_candidates_once_allowed(firings: list[Firing]) -> 
     assert int((perception.candidates.rows["number"][: perception.clusters.count] > 0).sum()) == few
 
 
+@pytest.mark.compiled
 def test_new_segments_follow_the_new_settings(firings: list[Firing]) -> None:
     perception = perceived(firings[:60])
     perception.apply_settings(changed(segments={"baseline_min_m": 0.45, "baseline_max_m": 0.5}))

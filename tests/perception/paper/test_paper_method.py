@@ -40,6 +40,7 @@ def errors_ft(objects: tuple[DetectedObject, ...], places_ft: list[tuple[float, 
 HALL = [(x, y) for x in (1.0, 4.0, 7.0) for y in (4.0, -4.0)]
 
 
+@pytest.mark.boundscheck
 def test_exactly_six_drums_are_found_within_the_errors_of_table_2() -> None:
     perception = perceive(settings())
     for firing in drive(load_world("hallway")):
@@ -53,6 +54,7 @@ def test_exactly_six_drums_are_found_within_the_errors_of_table_2() -> None:
     assert all(o.model == "semicircle" and 0.0 < o.score <= 1.0 and 0.0 < o.sigma < 0.1 for o in objects)
 
 
+@pytest.mark.compiled
 def test_objects_are_found_while_driving() -> None:
     """Segments join continuously: each pair of drums is found within a foot after the robot has passed it."""
     perception = perceive(settings())
@@ -67,6 +69,7 @@ def test_objects_are_found_while_driving() -> None:
     assert all(found_at[i] < x + 1.0 for i, (x, _) in enumerate(HALL))
 
 
+@pytest.mark.compiled
 def test_warm_starts_take_a_few_iterations() -> None:
     """Paper §3.4: "only a few iterations are required" once a model is at rest and the map changes gradually."""
     perception = perceive(settings())
@@ -112,6 +115,7 @@ def test_refinement_takes_turns() -> None:
     np.testing.assert_array_equal(moved, large)
 
 
+@pytest.mark.compiled
 def test_old_segments_leave_and_their_objects_with_them() -> None:
     perception = perceive(settings(map=MapConfig(age_max_s=30.0)))
     last = None
@@ -129,6 +133,7 @@ def test_old_segments_leave_and_their_objects_with_them() -> None:
     assert perception.objects() == ()
 
 
+@pytest.mark.compiled
 def test_the_segments_of_a_removed_drum_are_contradicted() -> None:
     """Echoes from a wall behind its former place remove its segments from the map."""
     world = drums((4.0, 3.5))
@@ -148,6 +153,8 @@ def test_the_segments_of_a_removed_drum_are_contradicted() -> None:
     assert near.sum() <= 2  # a segment seen from the side only is faced by no sensor that hears the wall
 
 
+@pytest.mark.compiled
+@pytest.mark.boundscheck
 def test_a_full_map_drops_its_oldest_segments() -> None:
     perception = perceive(settings(map=MapConfig(capacity=64)))
     for firing in drive(load_world("hallway")):
@@ -160,6 +167,7 @@ def test_a_full_map_drops_its_oldest_segments() -> None:
     assert list(outline.times[order]) == sorted(outline.times[order])
 
 
+@pytest.mark.compiled
 def test_a_split_cluster_is_one_object() -> None:
     """A small T splits each drum's segments into two clusters; both candidates come to rest on the same drum."""
     perception = perceive(settings(clusters=ClustersConfig(threshold_m=0.33)))
@@ -170,6 +178,7 @@ def test_a_split_cluster_is_one_object() -> None:
     assert len(perception.objects()) == 6
 
 
+@pytest.mark.compiled
 def test_a_turning_body_gives_the_same_objects() -> None:
     """With a ring that turns with its body, sensors sweep over the drums; positions agree."""
     world = drums((4.0, 4.0), (4.0, -4.0))
@@ -188,6 +197,7 @@ def test_a_turning_body_gives_the_same_objects() -> None:
 
 
 @pytest.mark.parametrize("seed", [11, 12, 13])
+@pytest.mark.compiled
 def test_noise_of_one_percent_leaves_at_least_seven_of_eight(seed: int) -> None:
     rng = np.random.default_rng(seed)
     x, places = 1.0, []
