@@ -54,13 +54,13 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         ),
         "P4": Promise(
             "The decoder is total",
-            "10⁷ fuzzed bytes (soak: 10⁹): no exception, buffer ≤ 1 KiB, in step again after two good frames, any "
+            "6·10⁵ fuzzed bytes (soak: 10⁹): no exception, buffer ≤ 1 KiB, in step again after two good frames, any "
             "chunking equals the whole; false accepts counted against what CRC-16 predicts",
         ),
         "P5": Promise(
             "Unplug anywhere",
-            "the line cut before every byte of handshake and one full pattern, both directions: echoes again ≤ 1 s "
-            "after replug; 1,000 cycles with flat file descriptors, tasks and memory",
+            "the line cut before every byte of the handshake and every seventh of one full pattern (soak: every one), "
+            "both directions: echoes again ≤ 1 s after replug; 1,000 cycles with flat file descriptors, tasks and memory",
         ),
         "P6": Promise(
             "A stalled peer is harmless",
