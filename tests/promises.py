@@ -59,8 +59,9 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         ),
         "P5": Promise(
             "Unplug anywhere",
-            "the line cut before every byte of the handshake and every seventh of one full pattern (soak: every one), "
-            "both directions: echoes again ≤ 1 s after replug; 1,000 cycles with flat file descriptors, tasks and memory",
+            "the line cut before every byte of the handshake and every seventh of one full pattern (soak: every "
+            "byte), both directions: echoes again ≤ 1 s after replug; 1,000 cycles with flat file descriptors, tasks "
+            "and memory",
         ),
         "P6": Promise(
             "A stalled peer is harmless",

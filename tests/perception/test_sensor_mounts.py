@@ -20,6 +20,7 @@ def test_the_shipped_ring_looks_outward() -> None:
     ring = load_settings("hallway").ring
     array = mounts_array(ring.mounts)
     assert array.shape == (24, 3)
+    assert ring.radius_m is not None
     np.testing.assert_allclose(np.hypot(array[:, 0], array[:, 1]), ring.radius_m)
     outward = np.cos(np.arctan2(array[:, 1], array[:, 0]) - array[:, 2])
     assert outward == pytest.approx(np.ones(24))

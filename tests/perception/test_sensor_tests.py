@@ -33,6 +33,7 @@ from perception.sensor_tests import (
 COUNT = 4
 NEIGHBOURS = np.array([[1, 3], [2, 0], [3, 1], [0, 2]])
 ALONE = np.full((COUNT, 2), -1)
+AXES = np.array([0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi])
 HALF = math.radians(12.0)
 
 
@@ -155,9 +156,8 @@ class Checker:
         self.expected = np.ones(COUNT, np.bool_)
 
     def __call__(self, ranges: Floats, x: float = 0.0, yaw: float = 0.0) -> int:
-        axes = np.arange(COUNT) * 0.5 * math.pi
         return check_firing(
-            ranges, x, 0.0, yaw, axes, NEIGHBOURS, self.expected, HALF, 0.01, 3.0, self.sensors, self.ring, self.sets,
+            ranges, x, 0.0, yaw, AXES, NEIGHBOURS, self.expected, HALF, 0.01, 3.0, self.sensors, self.ring, self.sets,
             self.trusted, self.possible,
         )  # fmt: skip
 

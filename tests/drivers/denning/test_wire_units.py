@@ -84,7 +84,7 @@ def test_velocities_are_thousandths_within_the_limit() -> None:
 
 
 def test_an_identity_in_si() -> None:
-    assert identity_of(IDENT) == Identity("denning", 24, pytest.approx(0.381), 0.5, 0.02, 0xB001)
+    assert identity_of(IDENT) == Identity("denning", 24, 381 * 1e-3, 0.5, 0.02, 0xB001)
 
 
 def test_flags_that_are_not_known_are_dropped() -> None:

@@ -29,12 +29,12 @@ def test_numbers_are_given_once() -> None:
 
 def test_a_placement_is_found_moved_and_removed_by_its_number() -> None:
     placed = placements()
-    assert not placed.pending
+    before = placed.pending
     for number in (5, 7, 9):
         placed.put(number, number % 2, (0.1 * number, 0.0, 0.0), confirmed=False)
     placed.put(7, 0, (1.0, 2.0, 3.0), confirmed=True)
     assert placed.count == 3
-    assert placed.pending
+    assert (before, placed.pending) == (False, True)
     assert placed.find(7) == 1
     assert placed.rows[1]["pose"].tolist() == [1.0, 2.0, 3.0]
     assert (placed.rows[1]["model"], placed.rows[1]["is_confirmed"]) == (0, 1)
