@@ -10,8 +10,9 @@ import pytest
 from config.load import load_model
 from config.settings import RelaxationConfig
 from perception.object_model import ObjectModel
-from perception.paper.manual_placement import PLACEMENTS_MAX, NumberSource, Placements, Rejections, wrapped_pose
+from perception.paper.manual_placement import NumberSource, Placements, Rejections, wrapped_pose
 from perception.paper.paper_method import PaperPerception
+from perception.paper.parameters import PLACEMENTS_MAX
 from tests.perception.halls import settings
 
 MODELS = tuple(ObjectModel.from_config(load_model(name)) for name in ("semicircle", "box"))
