@@ -52,5 +52,5 @@ def test_a_kernel_that_allocates_does_not_compile() -> None:
     def allocating(n: int) -> float:
         return float(np.zeros(n).sum())
 
-    with pytest.raises(numba.NumbaError, match=r"(?i)nrt"):
+    with pytest.raises(numba.NumbaError, match="Only accept returning of array"):
         allocating(3)
