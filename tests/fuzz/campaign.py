@@ -1,6 +1,6 @@
 """Reads mutated input files in a process whose memory is limited and measured.
 
-`python -m tests.fuzz.campaign KIND SEED COUNT` prints the result as JSON, with the files that caused a failure.
+`python -m tests.fuzz.campaign SEED COUNT KIND…` prints the results as JSON, with the files that caused a failure.
 """
 
 from __future__ import annotations
@@ -130,4 +130,4 @@ def campaign(kind: str, seed: int, count: int) -> dict[str, Any]:
 
 if __name__ == "__main__":
     resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
-    sys.stdout.write(json.dumps(campaign(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))))
+    sys.stdout.write(json.dumps([campaign(kind, int(sys.argv[1]), int(sys.argv[2])) for kind in sys.argv[3:]]))

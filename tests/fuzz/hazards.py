@@ -1,7 +1,8 @@
 """Reads files designed to exhaust memory or time, in a process of its own.
 
-`python -m tests.fuzz.hazards` prints the cost of each as JSON. Most exploit how tomllib, csv and pydantic work: cost
-quadratic in the length of a dotted key, rows joined by a quote, and lists that are multiplied with one another.
+`python -m tests.fuzz.hazards SHARE` prints the cost of each as JSON; its files have this share of the full size. Most
+exploit how tomllib, csv and pydantic work: cost quadratic in the length of a dotted key, rows joined by a quote, and
+lists that are multiplied with one another.
 """
 
 from __future__ import annotations
@@ -29,14 +30,14 @@ from tests.fuzz.campaign import (
 GIGABYTE = 1 << 30
 
 
-def toml(text: str) -> bytes:
-    """Return the start of `text`, up to the largest size of a settings file."""
-    return text.encode()[:SIZE_MAX]
+def toml(size: int, text: str) -> bytes:
+    """Return the first `size` bytes of a text."""
+    return text.encode()[:size]
 
 
-def repeated(entry: str, end: str = "]") -> str:
-    """Return list entries up to about the largest size of a settings file, and the end of the list."""
-    return (entry * (SIZE_MAX // len(entry)))[: SIZE_MAX - 200].rpartition(",")[0] + end
+def repeated(size: int, entry: str, end: str = "]") -> str:
+    """Return list entries up to about `size` bytes, and the end of the list."""
+    return (entry * (size // len(entry)))[: size - 200].rpartition(",")[0] + end
 
 
 def nested(begin: str, end: str, depth: int) -> str:
@@ -44,59 +45,63 @@ def nested(begin: str, end: str, depth: int) -> str:
     return "a = " + begin * depth + end * depth
 
 
-def with_firing(text: str) -> bytes:
+def with_firing(size: int, text: str) -> bytes:
     """Return a valid robot file with the given `[ring.firing]`."""
     return toml(
+        size,
         "[ring]\ncount = 24\nradius_m = 0.4\nbeam_half_angle_deg = 12.0\nresolution_m = 0.03\nrange_min_m = 0.15\n"
         "range_max_m = 7.0\n[body]\nradius_m = 0.4\nspeed_max_m_s = 0.5\nturn_max_rad_s = 1.0\n"
-        f"[ring.firing]\n{text}\n"
+        f"[ring.firing]\n{text}\n",
     )
 
 
-TOML: dict[str, Callable[[], bytes]] = {
-    "a dotted key": lambda: toml(".".join(["a"] * (SIZE_MAX // 2 - 4)) + " = 1"),
-    "a dotted key, spaced": lambda: toml(" . ".join(["a"] * (SIZE_MAX // 4 - 4)) + " = 1"),
-    "a dotted key, quoted": lambda: toml(" . ".join(['"\\""'] * (SIZE_MAX // 8)) + " = 1"),
-    "a dotted key, quoted 'literally'": lambda: toml(".".join(["''"] * (SIZE_MAX // 4)) + " = 1"),
-    "a dotted key of long parts": lambda: toml(".".join(['"' + "x" * 260 + '"'] * (SIZE_MAX // 264)) + " = 1"),
-    "a dotted key in a table": lambda: toml("a = {" + ".".join(["a"] * (SIZE_MAX // 2 - 8)) + " = 1}"),
-    "a dotted header": lambda: toml("[" + ".".join(["a"] * (SIZE_MAX // 2 - 4)) + "]"),
-    "many dotted keys": lambda: toml("\n".join(".".join(["a"] * 30) + f".k{i} = 1" for i in range(15_000))),
-    "quotes": lambda: toml("a = '''" + '"' * (SIZE_MAX - 20) + "'''"),
-    "escaped quotes": lambda: toml('a = "' + '\\"' * (SIZE_MAX // 2 - 10) + '"'),
-    "quotes in a comment": lambda: toml("#" + '"\\' * (SIZE_MAX // 2 - 10)),
-    "a long word": lambda: toml("a" * (SIZE_MAX - 20) + " = 1"),
-    "spaces": lambda: toml("a" + " " * (SIZE_MAX - 20) + " = 1"),
-    "nested lists": lambda: toml(nested("[", "]", SIZE_MAX // 2 - 10)),
-    "nested lists, 300": lambda: toml(nested("[", "]", 300)),
-    "nested tables": lambda: toml(nested("{a = ", "}", SIZE_MAX // 8)),
-    "an unclosed list": lambda: toml("a = " + "[" * (SIZE_MAX - 10)),
-    "tables": lambda: toml("\n".join(f"[a{i}]" for i in range(100_000))),
-    "tables in a list": lambda: toml("[[drum]]\n" * (SIZE_MAX // 9)),
-    "keys": lambda: toml("\n".join(f"k{i} = 1" for i in range(80_000))),
-    "digits": lambda: toml("a = " + "1" * (SIZE_MAX - 10)),
-    "decimal places": lambda: toml("a = 0." + "1" * (SIZE_MAX - 10)),
-    "hexadecimal digits": lambda: toml("a = 0x" + "f" * (SIZE_MAX - 10)),
-    "a list of numbers": lambda: toml("a = [" + repeated("1,")),
-    "a gigabyte of zeros": lambda: b"",
-    "sets": lambda: with_firing("rotations = 255\nsets = [" + repeated("[0],")),
-    "a set": lambda: with_firing("sets = [[" + repeated("0,", "]]")),
-    "a set with a huge sensor index": lambda: with_firing("sets = [[9223372036854775807]]"),
-    "the largest number of sets": lambda: with_firing("rotations = 255\nsets = [" + "[0,1,2]," * 254 + "[3]]"),
-    "drums": lambda: toml("drum = [" + repeated("{x_m=1.0,y_m=2.0,radius_m=0.3},")),
-    "vertices of a polygon": lambda: toml("polygon = [{vertices_m = [" + repeated("[0.0,1.0],", "]}]")),
-    "sensors": lambda: toml("[ring]\nsensors = [" + repeated("{x_m=0.1,y_m=0.1,angle_deg=0.0},")),
-    "vertices of a model": lambda: toml("name = 'm'\nclosed = true\nvertices_m = [" + repeated("[0.0,1.0],")),
-    "models": lambda: toml("robot = 'denning'\nmodels = [" + repeated('"box",')),
-    "inline models": lambda: toml("robot = 'denning'\nmodels = [" + repeated("{name='a'},")),
+TOML: dict[str, Callable[[int], bytes]] = {
+    "a dotted key": lambda n: toml(n, ".".join(["a"] * (n // 2 - 4)) + " = 1"),
+    "a dotted key, spaced": lambda n: toml(n, " . ".join(["a"] * (n // 4 - 4)) + " = 1"),
+    "a dotted key, quoted": lambda n: toml(n, " . ".join(['"\\""'] * (n // 8)) + " = 1"),
+    "a dotted key, quoted 'literally'": lambda n: toml(n, ".".join(["''"] * (n // 4)) + " = 1"),
+    "a dotted key of long parts": lambda n: toml(n, ".".join(['"' + "x" * 260 + '"'] * (n // 264)) + " = 1"),
+    "a dotted key in a table": lambda n: toml(n, "a = {" + ".".join(["a"] * (n // 2 - 8)) + " = 1}"),
+    "a dotted header": lambda n: toml(n, "[" + ".".join(["a"] * (n // 2 - 4)) + "]"),
+    "many dotted keys": lambda n: toml(n, "\n".join(".".join(["a"] * 30) + f".k{i} = 1" for i in range(n // 20))),
+    "quotes": lambda n: toml(n, "a = '''" + '"' * (n - 20) + "'''"),
+    "escaped quotes": lambda n: toml(n, 'a = "' + '\\"' * (n // 2 - 10) + '"'),
+    "quotes in a comment": lambda n: toml(n, "#" + '"\\' * (n // 2 - 10)),
+    "a long word": lambda n: toml(n, "a" * (n - 20) + " = 1"),
+    "spaces": lambda n: toml(n, "a" + " " * (n - 20) + " = 1"),
+    "nested lists": lambda n: toml(n, nested("[", "]", n // 2 - 10)),
+    "nested lists, 300": lambda n: toml(n, nested("[", "]", 300)),
+    "nested tables": lambda n: toml(n, nested("{a = ", "}", n // 8)),
+    "an unclosed list": lambda n: toml(n, "a = " + "[" * (n - 10)),
+    "tables": lambda n: toml(n, "\n".join(f"[a{i}]" for i in range(n // 3))),
+    "tables in a list": lambda n: toml(n, "[[drum]]\n" * (n // 9)),
+    "keys": lambda n: toml(n, "\n".join(f"k{i} = 1" for i in range(n // 3))),
+    "digits": lambda n: toml(n, "a = " + "1" * (n - 10)),
+    "decimal places": lambda n: toml(n, "a = 0." + "1" * (n - 10)),
+    "hexadecimal digits": lambda n: toml(n, "a = 0x" + "f" * (n - 10)),
+    "a list of numbers": lambda n: toml(n, "a = [" + repeated(n, "1,")),
+    "a gigabyte of zeros": lambda _n: b"",
+    "sets": lambda n: with_firing(n, "rotations = 255\nsets = [" + repeated(n, "[0],")),
+    "a set": lambda n: with_firing(n, "sets = [[" + repeated(n, "0,", "]]")),
+    "a set with a huge sensor index": lambda n: with_firing(n, "sets = [[9223372036854775807]]"),
+    "the largest number of sets": lambda n: with_firing(n, "rotations = 255\nsets = [" + "[0,1,2]," * 254 + "[3]]"),
+    "drums": lambda n: toml(n, "drum = [" + repeated(n, "{x_m=1.0,y_m=2.0,radius_m=0.3},")),
+    "vertices of a polygon": lambda n: toml(n, "polygon = [{vertices_m = [" + repeated(n, "[0.0,1.0],", "]}]")),
+    "sensors": lambda n: toml(n, "[ring]\nsensors = [" + repeated(n, "{x_m=0.1,y_m=0.1,angle_deg=0.0},")),
+    "vertices of a model": lambda n: toml(n, "name = 'm'\nclosed = true\nvertices_m = [" + repeated(n, "[0.0,1.0],")),
+    "models": lambda n: toml(n, "robot = 'denning'\nmodels = [" + repeated(n, '"box",')),
+    "inline models": lambda n: toml(n, "robot = 'denning'\nmodels = [" + repeated(n, "{name='a'},")),
 }
+"""Files by name, as functions of their largest size, bytes."""
 
-LOGS: dict[str, Callable[[], bytes]] = {
-    "a log: an unclosed quote": lambda: RING_LOG + b'"a' + b'","\n' * 5_000_000,
-    "a log: an endless line": lambda: RING_LOG + b"1," * 20_000_000,
-    "a log: columns": lambda: b"t,x,y,theta," + b",".join(b"r%02d" % i for i in range(1_000_000)) + b"\n",
-    "a log: blank lines": lambda: RING_LOG + b"\n" * 1_000_000 + b"x",
-    "a log: a gigabyte of zeros": lambda: b"",
+LOGS: dict[str, Callable[[float], bytes]] = {
+    "a log: an unclosed quote": lambda share: RING_LOG + b'"a' + b'","\n' * int(5e6 * share),
+    "a log: an endless line": lambda share: RING_LOG + b"1," * int(2e7 * share),
+    "a log: columns": lambda share: (
+        b"t,x,y,theta," + b",".join(b"r%02d" % i for i in range(int(1e6 * share))) + b"\n"
+    ),
+    "a log: blank lines": lambda share: RING_LOG + b"\n" * int(1e6 * share) + b"x",
+    "a log: a gigabyte of zeros": lambda _share: b"",
 }
 HAZARDS = (*TOML, *LOGS)
 
@@ -115,13 +120,13 @@ def cost(path: Path, read: Callable[[Path], None]) -> dict[str, Any]:
     return {"cpu_s": round(time.process_time() - start_s, 3), "failure": failure}
 
 
-def main() -> None:
+def main(share: float) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
     costs = {}
     with tempfile.TemporaryDirectory(dir=MEMORY_DISK if MEMORY_DISK.is_dir() else None) as folder:
-        for name, make in (TOML | LOGS).items():
+        for name in HAZARDS:
             path = Path(folder) / ("hazard.csv" if name in LOGS else "hazard.toml")
-            path.write_bytes(make())
+            path.write_bytes(LOGS[name](share) if name in LOGS else TOML[name](int(share * SIZE_MAX)))
             if "gigabyte" in name:
                 with path.open("r+b") as file:
                     file.truncate(GIGABYTE)
@@ -132,4 +137,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(float(sys.argv[1]))

@@ -12,12 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, target
+from hypothesis import given, target
 from hypothesis import strategies as st
 
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Ack, Frame
 from drivers.messages import Firing, Pose
+from tests.examples import examples
 from tests.fuzz.targets import LOG, SEEDS, TARGETS
 from tests.promises import ROOT
 
@@ -37,7 +38,7 @@ def test_seeds_and_mutations_of_them(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", TARGETS)
-@settings(deadline=None, max_examples=60)
+@examples(0.3)
 @given(data=st.data())
 def test_generated_bytes(name: str, data: st.DataObject) -> None:
     parts = data.draw(st.lists(st.one_of(st.binary(max_size=200), st.sampled_from(SEEDS[name])), max_size=6))

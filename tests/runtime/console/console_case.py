@@ -1,4 +1,4 @@
-"""A console over real sockets, on a stub of the robot's process that notes what it is asked for."""
+"""A console over real sockets, on a stub of the robot's process that keeps every request."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import time as host_time
 from collections.abc import AsyncIterator, Callable, Mapping, MutableMapping
 from dataclasses import dataclass, field, replace
 from typing import Any
+from unittest import mock
 
 import aiohttp
 import numpy as np
@@ -37,20 +38,22 @@ from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.time_control import TimeControl
 from runtime.timing.timing_monitor import TimingMonitor
 
-TIMEOUT_S = 20.0
+TIMEOUT_S = 60.0
+"""Only a hang reaches it."""
+NO_IDLE_FRAMES_S = 1e6
 FREE_PORT = "console.port=0"
 
 
 @dataclass
 class StubDriver:
-    """A driver, as far as frames show it."""
+    """The counts that frames show of a driver."""
 
     counts: LinkCounts = field(default_factory=lambda: LinkCounts(7, 1, 2))
 
 
 @dataclass
 class StubRun:
-    """In place of `RobotProcess`: does nothing and notes what it is asked for."""
+    """Stub of `RobotProcess` that keeps every request."""
 
     settings: Settings
     log: Any
@@ -207,8 +210,13 @@ async def open_console(
     replay: ReplayControl | None = None,
     limits: Limits | None = None,
     emulated: bool = True,
+    idle_period_s: float = NO_IDLE_FRAMES_S,
 ) -> AsyncIterator[ConsoleCase]:
-    """Open a console whose clock advances with cycles only."""
+    """Open a console whose clock advances with cycles only.
+
+    Its ticker for frames without a cycle follows the host's clock, so it is off unless `idle_period_s` is given: on a
+    busy machine it would add frames.
+    """
     lines: list[dict[str, Any]] = []
     clock = [1000.0]
 
@@ -224,7 +232,10 @@ async def open_console(
         recording=recording, replay=replay, limits=limits, clock=lambda: clock[0],
     )  # fmt: skip
     before = asyncio.all_tasks()
-    with run.health.catching_unhandled_errors():
+    with (
+        run.health.catching_unhandled_errors(),
+        mock.patch("runtime.console.frames.frame_publisher.IDLE_PERIOD_S", idle_period_s),
+    ):
         async with aiohttp.ClientSession() as session, console.open():
             yield ConsoleCase(run, console, session, lines, clock)
         left = [task for task in asyncio.all_tasks() - before if "aiohttp.connector" not in repr(task)]

@@ -1,4 +1,4 @@
-"""What all clients are sent: session information, lines of the log."""
+"""Messages to all clients: session information and lines of the log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Commands that take time: time control, recording, replay; answered when they are done."""
+"""Commands that take time (time control, recording, replay) are answered when they are done."""
 
 from __future__ import annotations
 

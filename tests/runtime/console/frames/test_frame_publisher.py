@@ -63,9 +63,8 @@ async def test_no_frame_while_cycles_overrun() -> None:
         assert (await page.next("state"))["cycle"] == 11
 
 
-async def test_frames_continue_while_no_cycle_ends(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("runtime.console.frames.frame_publisher.IDLE_PERIOD_S", 0.02)
-    async with open_console() as case:
+async def test_frames_continue_while_no_cycle_ends() -> None:
+    async with open_console(idle_period_s=0.02) as case:
         page = await case.page()
         case.clock[0] += 1.0
         assert (await page.next("state"))["cycle"] == 0

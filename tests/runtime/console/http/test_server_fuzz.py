@@ -1,7 +1,7 @@
-"""A hundred thousand malformed or oversized messages: none raises an error, none moves the robot.
+"""Malformed, oversized and unpermitted messages: none raises an error, none moves the robot.
 
-Most go to the dispatcher, where their effect is seen at once; others over a websocket, and some to a whole process in
-virtual time, whose emulated base shows whether it moved.
+Most go to the dispatcher, where their effect shows at once; others over a websocket, and some to a whole process in
+virtual time, whose emulated base shows whether it moved. `make soak` sends a hundred thousand.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from tests.runtime.console.console_case import FREE_PORT, ConsoleCase, open_cons
 from tests.runtime.console.sample_messages import ALL
 from tests.runtime.virtual_time import in_virtual_time
 
-TO_DISPATCHER = 70_000
-OVER_WEBSOCKET = 30_000
-IN_A_RUN = 4_000
+TO_DISPATCHER, SOAK_TO_DISPATCHER = 5000, 70_000
+OVER_WEBSOCKET, SOAK_OVER_WEBSOCKET = 1000, 30_000
+IN_A_RUN = 2000
 BOUNDLESS = Limits(messages_per_s=1e9, queue_messages=10**9, queue_bytes=10**12)
 
 ODD: list[Any] = [
@@ -110,14 +110,23 @@ def is_well_formed(text: str) -> bool:
 
 
 async def test_messages_to_the_dispatcher() -> None:
-    """Malformed messages do nothing even from the client in control; from another client only HALT does anything."""
-    rng = random.Random(1)
+    await check_dispatcher(TO_DISPATCHER, 1)
+
+
+@pytest.mark.soak
+async def test_many_messages_to_the_dispatcher() -> None:
+    await check_dispatcher(SOAK_TO_DISPATCHER, 4)
+
+
+async def check_dispatcher(count: int, seed: int) -> None:
+    """Malformed messages have no effect even from the client in control; from other clients only HALT has one."""
+    rng = random.Random(seed)
     async with open_console(limits=BOUNDLESS) as case:
         hub = case.console.hub
         controller, watcher = (hub.join(NullTransport(), name, {}, has_token=True) for name in ("first", "second"))
         stranger = hub.join(NullTransport(), "third", {}, has_token=False)
         well_formed = 0
-        for k, text in enumerate(messages(rng, TO_DISPATCHER)):
+        for k, text in enumerate(messages(rng, count)):
             if k % 5000 == 0:
                 for client in (controller, watcher, stranger):
                     client._queue.clear()
@@ -134,17 +143,27 @@ async def test_messages_to_the_dispatcher() -> None:
                 assert orjson.loads(controller._queue[-1])["ok"] is False
             case.run.asked.clear()
         assert hub.control.is_held_by(controller)
-        assert well_formed > 0.01 * TO_DISPATCHER, "too few messages are well-formed to test anything"
+        assert well_formed > 0.01 * count, "too few messages are well-formed to test anything"
         for client in (controller, watcher, stranger):
             hub.leave(client)
 
 
 async def test_messages_over_a_websocket() -> None:
-    rng = random.Random(2)
+    await check_websocket(OVER_WEBSOCKET, 2)
+
+
+@pytest.mark.soak
+async def test_many_messages_over_a_websocket() -> None:
+    await check_websocket(SOAK_OVER_WEBSOCKET, 5)
+
+
+async def check_websocket(count: int, seed: int) -> None:
+    """Malformed messages of the client in control and unpermitted ones of another client have no effect."""
+    rng = random.Random(seed)
     async with open_console(limits=BOUNDLESS) as case:
         first, second = await case.page(), await case.page()
         sent = {id(first): 0, id(second): 0}
-        for k, text in enumerate(messages(rng, OVER_WEBSOCKET)):
+        for k, text in enumerate(messages(rng, count)):
             page = first if not is_well_formed(text) else second
             if '"take_control"' in text:
                 continue
@@ -172,7 +191,7 @@ async def answered(case: ConsoleCase, page: Any, count: int) -> None:
 def test_a_whole_process_does_not_move(monkeypatch: pytest.MonkeyPatch, *, armed: bool) -> None:
     """Neither a watching client's messages nor malformed ones of the client in control move the robot.
 
-    Armed and teleoperated to stand still, it does not move either.
+    Nor do they if it is armed and teleoperated at zero velocity.
     """
     rng = random.Random(3)
     texts = messages(rng, IN_A_RUN)
