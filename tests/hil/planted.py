@@ -2,7 +2,8 @@
 
 PLANTED names what is planted, between commas:
 
-- ``busy``: SIGURG holds the loop in a callback for ten seconds, SIGWINCH for a little more than the deadman.
+- ``busy``: SIGURG holds the loop in a callback for ten seconds, SIGWINCH for a little more than the deadman. The
+  moment when that begins goes to standard output.
 - ``fsync``: the disk takes five seconds to confirm anything.
 """
 
@@ -25,6 +26,8 @@ from tests.hil.running import ROOT, Running
 
 LONG_S, SHORT_S = 10.0, 1.2
 FSYNC_S = 5.0
+HELD = "held from"
+"""Before the moment, by the host's monotonic clock, from which on the loop is held."""
 
 
 def plant_busy() -> None:
@@ -32,8 +35,9 @@ def plant_busy() -> None:
     run = RobotProcess.run
 
     def hold(seconds: float) -> None:
-        end_s = time.monotonic() + seconds
-        while time.monotonic() < end_s:
+        begin_s = time.monotonic()
+        os.write(sys.stdout.fileno(), f"{HELD} {begin_s:.6f}\n".encode())
+        while time.monotonic() < begin_s + seconds:
             pass
 
     async def held(self: RobotProcess, **how: Any) -> Any:

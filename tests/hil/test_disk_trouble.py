@@ -1,7 +1,7 @@
-"""P12: whatever a disk or a terminal does, the cycle keeps its time, and what is lost is counted and reported.
+"""P12 on a real pty: a process whose disk, log and terminal take nothing drives, reports its losses and ends.
 
-Each trouble runs next to a run without any, at the same time on the same machine: that one's late cycles are the
-machine's own.
+Each trouble by itself is tested in virtual time (tests/runtime/cycle/test_disk_trouble.py), and by the wall clock in
+bench/wallclock/test_disk_trouble.py. Here all of them meet in one process, which has to come to its end as well.
 """
 
 from __future__ import annotations
@@ -11,108 +11,25 @@ import fcntl
 import json
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from config.errors import DONE, FAILED
+from config.errors import DONE
 from tests.hil.planted import planted
-from tests.hil.running import Running
+from tests.hil.running import emulated, wait_for
+from tests.hil.truth import Truth
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels"), pytest.mark.promise("P12")]
 
-SECONDS = 5
-FSYNC_SECONDS = 8
-"""So long that an fsync of five seconds falls into it whole."""
-BEYOND = 24
-"""Cycles that may be late or missed beyond the control's: a machine that holds up one run and not the other
-does so for a second at most. A single wait for such a disk in the loop costs a hundred."""
+BLOCK_BYTES = 512
+"""The shell's `ulimit -f` counts in these."""
+BLOCKS = 32
 
 
-@contextlib.contextmanager
-def run_with(
-    folder: Path, name: str, plants: str = "", *more: str, seconds: int = SECONDS, **how: Any
-) -> Iterator[tuple[Running, Path]]:
-    summary = folder / f"{name}.json"
-    command = ["run", "--seconds", str(seconds), "--json", str(summary), *more]
-    with planted(folder, name, plants, *command, **how) as run:
-        yield run, summary
-
-
-def compare(
-    run: Running, summary: Path, folder: Path, code: int = DONE, seconds: int = SECONDS
-) -> tuple[dict[str, Any], str]:
-    """Wait for the run and a control; assert that only the machine delayed cycles; return the summary and figures."""
-    with run_with(folder, "control", "", "--no-record", seconds=seconds) as (control, control_summary):
-        assert control.process.wait(seconds + 60.0) == DONE, control.err
-        assert run.process.wait(60.0) == code, run.err
-    assert "Traceback" not in run.err
-    own, control_figures = json.loads(summary.read_bytes()), json.loads(control_summary.read_bytes())
-    late, control_late = own["late"] + own["missed"], control_figures["late"] + control_figures["missed"]
-    assert own["cycles"] + own["missed"] >= 20 * seconds - 5
-    assert late <= control_late + BEYOND, (own["timing"], control_figures["timing"])
-    stopped = [reason for reason in own["stop_reasons"] if reason not in control_figures["stop_reasons"]]
-    assert not stopped or control_figures["stop_reasons"], stopped
-    return own, f"{late} of {own['cycles']} cycles late or missed (control {control_late})"
-
-
-def test_a_disk_that_takes_five_seconds(tmp_path: Path, measured: Callable[[str], None]) -> None:
-    path = tmp_path / "run.mcap"
-    with run_with(tmp_path, "run", "fsync", "--record", str(path), seconds=FSYNC_SECONDS) as (run, summary):
-        written, figures = compare(run, summary, tmp_path, seconds=FSYNC_SECONDS)
-    assert written["recording"]["sync_max_s"] >= 5.0
-    assert written["recording"]["dropped"] == 0
-    measured(f"5 s to confirm: {figures}")
-
-
-def test_a_full_disk_under_the_log_and_the_recording(tmp_path: Path, measured: Callable[[str], None]) -> None:
-    full = Path("/dev/full")
-    with run_with(tmp_path, "run", "", "--record", str(full), log=full) as (run, summary):
-        written, figures = compare(run, summary, tmp_path, FAILED)
-    assert written["recording"]["dropped"] > 0
-    assert written["log"]["lost"] >= 4
-    assert "No space left" in written["log"]["last_error"]
-    assert "log lines are missing in the file" in run.err, "where lines still arrive"
-    assert f"{written['log']['lost']} lines of the log are missing: No space left" in " ".join(run.out.split())
-    (error,) = run.error_lines
-    assert "No space left" in error
-    lost = f"{written['log']['lost']} lines and {written['recording']['dropped']} messages lost and reported"
-    measured(f"full: {figures}; {lost}")
-
-
-def test_a_disk_that_fills_up_on_the_way(tmp_path: Path, measured: Callable[[str], None]) -> None:
-    """A limit on the size of files: every file that grows beyond 16 KiB fails from then on."""
-    (tmp_path / "runs").mkdir()
-    where = ("--set", f"recording.folder={json.dumps(str(tmp_path / 'runs'))}")
-    # The shell counts in blocks of 512 bytes.
-    with run_with(tmp_path, "run", "", *where, limit="ulimit -f 32") as (run, summary):
-        written, figures = compare(run, summary, tmp_path)
-    assert written["recording"]["dropped"] > 0
-    assert written["recording"]["last_error"] is not None
-    assert "the recording is incomplete" in (tmp_path / "run.jsonl").read_text("utf-8")
-    measured(f"full after 16 KiB: {figures}; {written['recording']['dropped']} messages lost and reported")
-
-
-def test_a_folder_where_nothing_can_be_written(tmp_path: Path, measured: Callable[[str], None]) -> None:
-    """A file in the folder's place refuses everybody, the superuser as well."""
-    (tmp_path / "file").touch()
-    where = ("--set", f"recording.folder={json.dumps(str(tmp_path / 'file'))}")
-    with run_with(tmp_path, "run", "", *where) as (run, summary):
-        written, figures = compare(run, summary, tmp_path)
-    assert written["recording"]["dropped"] > 0
-    assert str(tmp_path / "file") in written["recording"]["last_error"]
-    measured(f"no folder to write in: {figures}; {written['recording']['dropped']} messages lost and reported")
-
-
-def stuck_pipe() -> tuple[int, int]:
-    """Return both ends of a pipe that is full and has no reader."""
-    out, into = os.pipe()
-    return out, fill(into)
-
-
-def fill(into: int) -> int:
+def filled_pipe(into: int) -> int:
+    """Fill a pipe until it takes nothing, and return its writing end."""
     fcntl.fcntl(into, fcntl.F_SETPIPE_SZ, 4096)
     os.set_blocking(into, False)
     with contextlib.suppress(BlockingIOError):
@@ -122,19 +39,39 @@ def fill(into: int) -> int:
     return into
 
 
-def test_a_log_and_a_terminal_that_take_nothing(tmp_path: Path, measured: Callable[[str], None]) -> None:
-    """The log is a pipe that is full, and so is what stands for the terminal: each write to them waits forever."""
-    fifo = tmp_path / "log"
+def test_a_disk_that_fills_up_and_a_log_and_a_terminal_that_take_nothing(
+    tmp_path: Path, measured: Callable[[str], None]
+) -> None:
+    """Files end at 16 KiB; the log and what stands for the terminal are full pipes: a write to them never ends."""
+    fifo, runs, summary = tmp_path / "log", tmp_path / "runs", tmp_path / "summary.json"
     os.mkfifo(fifo)
-    held = fill(os.open(fifo, os.O_RDWR))
-    out, into = stuck_pipe()
+    runs.mkdir()
+    held = filled_pipe(os.open(fifo, os.O_RDWR))
+    out, into = os.pipe()
+    filled_pipe(into)
+    command = ["run", "--json", str(summary), "--set", f"recording.folder={json.dumps(str(runs))}"]
     try:
-        with run_with(tmp_path, "run", "", "--no-record", log=fifo, stderr=into) as (run, summary):
-            written, figures = compare(run, summary, tmp_path)
-            assert written["log"]["lost"] >= 3
-            assert "the last items were not written" in written["log"]["last_error"]
+        with (
+            emulated(tmp_path) as robot,
+            planted(
+                tmp_path, "run", "", *command, "--port", robot.port, log=fifo, stderr=into,
+                limit=f"ulimit -f {BLOCKS}",
+            ) as run,
+        ):  # fmt: skip
+            full = BLOCKS * BLOCK_BYTES
+            wait_for(lambda: any(path.stat().st_size >= full for path in runs.iterdir()), "a full disk")
+            truth = Truth(robot.trace)
+            assert all(row.still for row in truth.read()), "it was not armed"
+            run.signal(signal.SIGTERM)
+            assert run.process.wait() == DONE
     finally:
         for fd in (held, out, into):
             os.close(fd)
-    measured(f"log and terminal that take nothing: {figures}; {written['log']['lost']} lines lost and reported")
-    assert run.process.returncode != -signal.SIGABRT
+    written = json.loads(summary.read_bytes())
+    assert written["recording"]["dropped"] > 0
+    assert "File too large" in written["recording"]["last_error"]
+    assert written["log"]["lost"] >= 3
+    assert "the last items were not written" in written["log"]["last_error"]
+    assert f"{written['log']['lost']} lines of the log are missing: the last items" in " ".join(run.out.split())
+    lost = f"{written['log']['lost']} lines and {written['recording']['dropped']} messages lost and reported"
+    measured(f"disk full after 16 KiB, log and terminal that take nothing: {lost}")

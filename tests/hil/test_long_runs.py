@@ -1,4 +1,7 @@
-"""P15: long runs: memory, tasks, and the robot's clock, which wraps every 71.6 minutes."""
+"""P15: long runs: memory, tasks, and the robot's clock, which wraps every 71.6 minutes.
+
+Short forms are in tests/bench/test_growth.py and, for the wrap on a pty, in tests/hil/test_signals.py.
+"""
 
 from __future__ import annotations
 
@@ -37,12 +40,6 @@ def drive_for(hours: float, wrap_s: float, timeout_s: float) -> dict[str, Any]:
     return figures
 
 
-def test_half_an_hour_in_virtual_time(measured: Callable[[str], None]) -> None:
-    figures = drive_for(0.5, 900.0, 600.0)
-    assert figures["wraps"] == 1
-    measured(f"0.5 h in virtual time, t_us wrapped once: {figures['slope_mb_h']:+.2f} MB/h, always in DRIVE")
-
-
 @pytest.mark.soak
 def test_a_day_in_virtual_time(measured: Callable[[str], None]) -> None:
     figures = drive_for(24.0, 900.0, 6 * 3600.0)
@@ -75,12 +72,6 @@ def check_stops(summary: dict[str, Any]) -> None:
     """Assert that the robot was stopped by nothing but a busy machine."""
     others = [reason for reason in summary["stop_reasons"] if "held up for" not in reason]
     assert not others, summary["stop_reasons"]
-
-
-def test_robot_clock_wraps_on_the_pty(tmp_path: Path, measured: Callable[[str], None]) -> None:
-    summary = on_the_pty(tmp_path, 8.0, 6.0)
-    check_stops(summary)
-    measured(f"the robot's clock wrapped on the pty during a drive: {summary['link']['lost']} frames lost, no stop")
 
 
 @pytest.mark.soak

@@ -1,11 +1,12 @@
 """P1: whatever becomes of the main process or its line, at whatever moment, the base stops by itself and stays so.
 
-Judged by the emulator's truth and on its own clock: however busy the machine is, the robot's half second is half a
-second. Four robots at a time, one for each kind of fault.
+The emulator's truth is judged on the emulator's clock: however busy the machine is, the robot's half second is half a
+second. The long form has four robots at a time, one for each kind of fault.
 
 No program can rule out that it is stopped between its last look at the clock and the write of a DRIVE.
 That one leaves when it goes on, with a HALT right behind it; a machine that stands still just then lets the wheels
-turn until the HALT comes.
+turn until the HALT comes. The short form therefore looks at the wheels before the process goes on, and again from the
+HALT on; virtual time shows that the HALT follows (tests/runtime/cycle/test_halt_bounded.py).
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ from pathlib import Path
 
 import pytest
 
+from drivers.messages import Flags
 from tests.hil.machine import TIMEOUT_S, stalls_excused
-from tests.hil.planted import LONG_S, planted
+from tests.hil.planted import HELD, LONG_S, planted
 from tests.hil.running import DEADMAN_S, Running, emulated, wait_for
-from tests.hil.truth import Truth
+from tests.hil.truth import DRIVING_M_S, Truth
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels"), pytest.mark.promise("P1")]
 
@@ -52,10 +54,10 @@ class Drive:
     def stops(self) -> int:
         return self.run.modes().count("SAFE_STOP")
 
-    def get_under_way(self) -> None:
+    def get_under_way(self, at_least_m_s: float = DRIVING_M_S) -> None:
         """Arm until it drives; a busy machine may have stopped it once more by itself."""
         end_s, armed_s = time.monotonic() + TIMEOUT_S, 0.0
-        while not self.truth.read()[-1].driving:
+        while not ((rows := self.truth.read()) and rows[-1].v > at_least_m_s):
             host_s = time.monotonic()
             assert host_s < end_s, (self.run.modes(), self.run.err)
             if host_s - armed_s > 2.0 and self.run.modes()[-1:] in (["SAFE_STOP"], ["READY"]):
@@ -213,10 +215,56 @@ def all_at_once(folder: Path, **counts: tuple[int, ...]) -> tuple[int, float]:
     return sum(how_many[0] for how_many in counts.values()), worst_s
 
 
-@stalls_excused
-def test_at_twenty_moments(tmp_path: Path, measured: Callable[[str], None]) -> None:
-    count, worst_s = all_at_once(tmp_path, stopped=(7,), busy=(4, 1), unplugged=(6,), killed=(3,))
-    measured(f"{count} faults of four kinds at random phases: wheels still ≤ {worst_s:.3f} s later, until re-armed")
+def stands_after(drive: Drive, fault_host_s: float) -> float:
+    """Wait until the wheels stand; return how long they turned after a fault, by the robot's clock, s."""
+    drive.truth.wait(lambda row: row.host_s > fault_host_s, "a row after the fault")
+    since_t_s = next(row.t_s for row in drive.truth.rows if row.host_s > fault_host_s)
+    before_s, drive.worst_s = drive.worst_s, 0.0
+    drive.match_objects(since_t_s)
+    turned_s, drive.worst_s = drive.worst_s, max(before_s, drive.worst_s)
+    return turned_s
+
+
+def stands_until_armed(drive: Drive, stops_before: int) -> None:
+    """Wait until the program has halted the base; then the wheels stand until it is armed again."""
+    wait_for(lambda: drive.stops() > stops_before, f"a SAFE_STOP after {drive.run.modes()}")
+    halted = drive.truth.wait(lambda row: row.still and Flags.LATCHED in row.flags, "a halted base")
+    drive.truth.wait(lambda row: row.t_s > halted.t_s + DEADMAN_S, "a while in SAFE_STOP")
+    after = drive.truth.since(halted.t_s)
+    assert all(row.still and Flags.LATCHED in row.flags for row in after)
+
+
+def test_one_fault_of_each_kind(tmp_path: Path, measured: Callable[[str], None]) -> None:
+    with (
+        emulated(tmp_path, "--world", world(tmp_path)) as robot,
+        planted(tmp_path, "run", "busy", "run", "--port", robot.port, *STRAIGHT_ON) as run,
+    ):
+        run.comes_to("READY")
+        drive = Drive(run, Truth(robot.trace))
+        drive.truth.wait(lambda row: row.t_s > 0.0, "the robot's time")
+        assert all(row.still for row in drive.truth.read()), "nothing moves before it is armed"
+
+        drive.get_under_way()
+        before = drive.stops()
+        stopped_s = stands_after(drive, run.signal(signal.SIGSTOP).after_s)
+        run.signal(signal.SIGCONT)
+        stands_until_armed(drive, before)
+
+        drive.get_under_way()
+        before = drive.stops()
+        run.signal(signal.SIGWINCH)
+        wait_for(lambda: run.out.startswith(HELD) and run.out.endswith("\n"), "a loop that is held")
+        busy_s = stands_after(drive, float(run.out.removeprefix(HELD)))
+        stands_until_armed(drive, before)
+
+        drive.get_under_way()
+        run.signal(signal.SIGKILL)
+        run.process.wait()
+        killed_s = stands_after(drive, time.monotonic())
+    measured(
+        f"by the robot's clock, wheels still after SIGSTOP ≤ {stopped_s:.3f} s, in a busy loop ≤ {busy_s:.3f} s, "
+        f"after SIGKILL ≤ {killed_s:.3f} s"
+    )
 
 
 @pytest.mark.soak

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import os
-import time
 import tracemalloc
 from collections.abc import Iterable
 from pathlib import Path
@@ -301,29 +299,6 @@ def test_cannot_be_written(tmp_path: Path) -> None:
 def test_disc_full() -> None:
     with pytest.raises(RingLogError, match="/dev/full: cannot be written: No space left on device"):
         write_ring_log(Path(os.devnull).with_name("full"), [firing(float(t), [1.0] * 24) for t in range(1000)])
-
-
-@pytest.mark.realtime
-def test_a_long_recording_is_read_fast(tmp_path: Path) -> None:
-    rng = np.random.default_rng(24)
-    ranges = rng.uniform(0.3, 5.0, (5456, 24)).round(3)
-    ranges[rng.random(ranges.shape) < 0.14] = math.inf
-    path = tmp_path / "log.csv"
-    write_ring_log(path, (firing(i / 9, row) for i, row in enumerate(ranges.tolist())))
-    spent, bare = [], []
-    for _ in range(3):
-        before = time.process_time()
-        count = sum(1 for _ in read_ring_log(path, sensors=24))
-        between = time.process_time()
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = csv.reader(file)
-            next(rows)
-            assert sum(len([float(cell) for cell in row]) for row in rows) == 29 * 5456
-        spent.append(between - before)
-        bare.append(time.process_time() - between)
-    assert count == 5456
-    # Three times as long as reading the numbers alone, which checks nothing and keeps nothing.
-    assert min(spent) < 10.0 * min(bare), (spent, bare)
 
 
 def test_line_limit_leaves_room_for_the_largest_ring(tmp_path: Path) -> None:

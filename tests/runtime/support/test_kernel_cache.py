@@ -271,7 +271,7 @@ sys.exit(" ".join(late))
 """
 
 
-@pytest.mark.realtime
+@pytest.mark.compiled
 @pytest.mark.usefixtures("warm_kernels")
 @pytest.mark.parametrize(
     ("sets", "models", "further"),
@@ -290,7 +290,7 @@ def test_nothing_of_perception_is_compiled_while_the_robot_drives_and_a_person_e
     further = str(tmp_path / further) if "." in further else further
     done = subprocess.run(
         [sys.executable, "-c", COMPILED_LATER, sets, models, further],
-        cwd=ROOT, text=True, capture_output=True, timeout=120, check=False,
+        cwd=ROOT, text=True, capture_output=True, check=False,
     )  # fmt: skip
     sources = "".join(path.read_text("utf-8") for path in (ROOT / "perception").rglob("*.py"))
     assert "Traceback" not in done.stderr, done.stderr
@@ -298,7 +298,7 @@ def test_nothing_of_perception_is_compiled_while_the_robot_drives_and_a_person_e
     assert late == [], done.stderr
 
 
-@pytest.mark.realtime
+@pytest.mark.compiled
 @pytest.mark.usefixtures("warm_kernels")
 def test_a_kernel_that_comes_to_life_is_counted_once() -> None:
     """Kernels are imported from file to file; each signature counts once, and one more argument type is one more."""

@@ -19,6 +19,7 @@ from runtime.cycle.modes import Mode
 from runtime.cycle.step import State
 from runtime.recording.reader import open_recording, parse_settings
 from runtime.simulation.closed_loop import OperatorInput
+from tests.hil.machine import TIMEOUT_S
 from tests.recorded import hall, record
 from tests.runtime.console.playback.test_replay_client import Page, until
 
@@ -65,7 +66,8 @@ def test_the_changes_of_all_frames_add_up_to_the_last_map(folder: Path) -> None:
 
 @pytest.mark.realtime
 @pytest.mark.usefixtures("warm_kernels")
-async def test_a_client_is_shown_a_recording(folder: Path) -> None:
+async def test_a_client_is_shown_a_recording(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("runtime.console.playback.replay_client.OPEN_MAX_S", TIMEOUT_S)
     page, client = Page(), ReplayClient(folder, REPLAY_PROGRAM, lambda: None)
     try:
         about = (await client.open(page, "hall.mcap"))["about"]

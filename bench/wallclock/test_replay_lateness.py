@@ -27,7 +27,7 @@ from tests.hil.machine import TIMEOUT_S, stalls_excused
 from tests.recorded import hall, record
 from tests.runtime.console.playback.test_replay_client import PROGRAM, Page
 
-pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
+pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 WINDOWS = 4
 WINDOW_S = 1.25
