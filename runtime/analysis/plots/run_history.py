@@ -49,8 +49,10 @@ def history_figure(timeline: Timeline, units: Units) -> Figure:
     periods.set(xlabel="t (s)", ylabel="between cycles (ms)")
     periods.set_ylim(bottom=0.0)
     for number, mark in enumerate(timeline.bookmarks, 1):
-        for panel in panels:
-            panel.axvline(mark.t_s, color=MUTED, linewidth=0.9, linestyle=(0, (1, 1.5)), gid=f"bookmark-{number}")
+        for row, panel in enumerate(panels, 1):
+            panel.axvline(
+                mark.t_s, color=MUTED, linewidth=0.9, linestyle=(0, (1, 1.5)), gid=f"bookmark-{number}-panel-{row}"
+            )
         known.annotate(str(number), (mark.t_s, 1.0), xycoords=("data", "axes fraction"), xytext=(2.0, -9.0),
                        textcoords="offset points", fontsize=8)  # fmt: skip
     figure.align_ylabels()
