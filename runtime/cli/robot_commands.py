@@ -106,9 +106,9 @@ def emulate(
     clock
         Initial value of the robot's own clock, s; it wraps at 4294.967296.
     control
-        Take time control from standard input, one line per request: pace NUMBER HOST_S RUN_S FACTOR UNTIL_S. From the
-        host's monotonic time HOST_S on, the robot's time starts at RUN_S and runs FACTOR times as fast until UNTIL_S.
-        The time reached is reported on standard output: at NUMBER RUN_S.
+        Take time control from standard input, one line per request: time_scale NUMBER HOST_S RUN_S FACTOR UNTIL_S.
+        From the host's monotonic time HOST_S on, the robot's time starts at RUN_S and runs FACTOR times as fast until
+        UNTIL_S. The time reached is reported on standard output: acknowledged NUMBER RUN_S.
     config
         Run file that names robot and world.
     world
