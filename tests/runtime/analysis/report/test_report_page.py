@@ -1,123 +1,89 @@
-"""The page of a run: whole, alone, small, and true."""
+"""Tests of the report page: self-contained, valid, small, and with the run's own numbers."""
 
 from __future__ import annotations
 
-import html
 import re
-from html.parser import HTMLParser
-from pathlib import Path
 
 import pytest
 
-from config.errors import DONE
-from runtime.analysis.report.html_parts import note, table
-from runtime.analysis.report.inline_svg import VARIABLES, inlined
-from runtime.analysis.report.stylesheet import CSS
-from runtime.cli.app import run_command
+from runtime.analysis.report import report_page
+from runtime.analysis.report.report_page import page
+from runtime.analysis.timeline import ModeEntry
+from tests.runtime.analysis.report.page_reader import PageReader
+from tests.runtime.analysis.synthetic_timeline import synthetic_timeline
 
-VOID = {"meta", "link", "br", "img", "hr", "input", "use", "path"}
 SIZE_MAX = 3_000_000
-
-
-class Reader(HTMLParser):
-    """Collects a page's tags, ids, references and text, and whether every tag is closed."""
-
-    def __init__(self, page: str) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.tags: list[str] = []
-        self.ids: list[str] = []
-        self.links: list[str] = []
-        self.text: list[str] = []
-        self.feed(page)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append(tag)
-        if tag not in VOID:
-            self.open.append(tag)
-        for name, value in attrs:
-            if name == "id":
-                self.ids.append(value or "")
-            if name in {"href", "src", "xlink:href", "action", "data", "srcset"}:
-                self.links.append(value or "")
-
-    def handle_endtag(self, tag: str) -> None:
-        if tag not in VOID:
-            assert self.open.pop() == tag
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.handle_starttag(tag, attrs)
-        if tag not in VOID:
-            self.open.pop()
-
-    def handle_data(self, data: str) -> None:
-        self.text.append(data)
+SPREAD = {"p50": 170.0, "p99": 1250.0, "p999": 8004.0, "max": 49_653.0}
 
 
 @pytest.fixture(scope="module")
-def page(hall_run: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
-    path = tmp_path_factory.mktemp("page") / "hall.html"
-    assert run_command(["report", str(hall_run), "--out", str(path), "--units", "ft"]) == DONE
-    return path.read_text("utf-8")
+def shown() -> str:
+    return page(synthetic_timeline(), "ft")
 
 
-def test_page_is_self_contained(page: str) -> None:
-    reader = Reader(page)
+def test_page_is_self_contained(shown: str) -> None:
+    reader = PageReader(shown)
     assert reader.open == []
     assert all(link.startswith("#") for link in reader.links), reader.links
     assert {link[1:] for link in reader.links} <= set(reader.ids)
     assert len(reader.ids) == len(set(reader.ids))
-    assert not re.search(r"https?:|//[a-z]|@import|url\((?!#)", page)
+    assert not re.search(r"https?:|//[a-z]|@import|url\((?!#)", shown)
     assert "script" not in reader.tags
-    assert set(re.findall(r"url\(#([^)]*)\)", page)) <= set(reader.ids)
-    assert len(page.encode()) < SIZE_MAX
+    assert set(re.findall(r"url\(#([^)]*)\)", shown)) <= set(reader.ids)
+    assert len(shown.encode()) < SIZE_MAX
 
 
-def test_page_shows_the_run(page: str) -> None:
-    text = " ".join(Reader(page).text)
-    for title in ("Objects", "Figures", "Timing", "Link", "Modes and stop reasons", "Settings", "Made by"):
+def test_page_shows_the_run(shown: str) -> None:
+    text = " ".join(PageReader(shown).text)
+    for title in ("Objects", "Figures", "Bookmarks", "Timing", "Link", "Modes and stop reasons", "Settings"):
         assert title in text
-    assert page.count("<svg") == 5
-    drums = re.findall(r"<td>drum \d</td><td>\(([^)]*)\)</td>", page)
+    assert shown.count("<svg") == 5
+    drums = re.findall(r"<td>drum \d</td><td>\(([^)]*)\)</td>", shown)
     assert drums == ["1.00, 4.00", "4.00, 4.00", "7.00, 4.00", "1.00, -4.00", "4.00, -4.00", "7.00, -4.00"]
-    errors = [float(e) for e in re.findall(r"\(-?[\d.]+, -?[\d.]+\)</td><td>([\d.]+)</td>", page)]
-    assert len(errors) >= 3
-    assert max(errors) < 0.1
-    named = re.findall(r"<td>(drum \d), semicircle</td>", page)
-    assert len(set(named)) == len(named) == len(errors), "each by the name that it has in Table 2"
-    assert "not found" in text, "the last drums are not reached in that time"
+    errors = re.findall(r"\(-?[\d.]+, -?[\d.]+\)</td><td>([\d.]+)</td>", shown)
+    assert errors == ["0.033"] * 3
+    named = re.findall(r"<td>(drum \d), semicircle</td>", shown)
+    assert named == ["drum 1", "drum 2", "drum 3"], "each has its name of Table 2"
+    assert text.count("not found") == 3
+    assert "3 of 6" in text
+    assert "as the paper's Figure 6" in text
+    assert "0.249 ft" in text, "the paper's own mean error"
     assert "The robot never stopped for a reason." in text
+    assert "Refinement ended by: budget 20, nothing 40." in text
+    assert "From cycle to cycle, ms: least 50.0" in text
+    assert "sensor 7 never answers" in text
     assert "behaviors.arbiter.base_velocity_m_s" in text
-    assert "Refinement ended by: budget" in text
-    assert "0.249 ft" in text
+    assert "The file has no summary of the run" in text
 
 
-def test_page_of_a_ring_log(hall_log: Path, tmp_path: Path) -> None:
-    log = tmp_path / "log.csv"
-    log.write_bytes(hall_log.read_bytes())
-    assert run_command(["report", str(log)]) == DONE
-    page = (tmp_path / "log.html").read_text("utf-8")
-    assert "The true world is not known" in page
-    assert Reader(page).open == []
+@pytest.fixture
+def _no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out the figures, which take most of the time."""
+    monkeypatch.setattr(report_page, "_pictures", lambda *_: "")
 
 
-def test_content_is_escaped() -> None:
-    evil = "<script>alert('x')</script>&\""
-    for made in (table([evil], [[evil]]), note(evil)):
-        assert "<script" not in made
-        assert html.escape(evil) in made
+@pytest.mark.usefixtures("_no_figures")
+def test_page_without_a_known_world() -> None:
+    unknown = page(synthetic_timeline(with_world=False), "m")
+    assert "The true world is not known" in unknown
+    assert PageReader(unknown).open == []
+    assert "<td>1, semicircle</td>" in unknown
 
 
-def test_inlined_svg() -> None:
-    svg = (
-        '<?xml version="1.0"?><!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/x.dtd">'
-        '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"><!-- a -->'
-        '<g id="a"><path d="M 1.23456 2" style="stroke: #0072b2" clip-path="url(#c)"/>'
-        '<use xlink:href="#a"/></g></svg>'
-    )
-    assert inlined(svg, "p", "label") == (
-        '<svg role="img" aria-label="label"><g id="p-a"><path d="M 1.23 2" style="stroke: var(--echo)" '
-        'clip-path="url(#p-c)"/><use href="#p-a"/></g></svg>'
-    )
-    for variable in VARIABLES.values():
-        assert CSS.count(f"{variable}:") == 2, "in light and dark mode"
+@pytest.mark.usefixtures("_no_figures")
+def test_page_shows_the_summary_and_why_the_robot_stopped() -> None:
+    run = synthetic_timeline()
+    run.modes.append(ModeEntry(2.0, "SAFE_STOP", "bumper <contact>"))
+    run.summary = {
+        "late": 7, "missed": 4, "link": {"frames": 1832, "bad": 3, "lost": 2}, "stop_reasons": ["bumper <contact>"],
+        "timing": {"phases": {"refine": SPREAD}, "callbacks": {"link receive": SPREAD}, "late": SPREAD,
+                   "faults": {"outside the process": 6}},
+    }  # fmt: skip
+    shown = page(run, "m")
+    text = " ".join(PageReader(shown).text)
+    for piece in ("refine", "between cycles: link receive", "a cycle begins after it is due by", "1.25", "49.65"):
+        assert piece in text, piece
+    assert "7 cycles late, 4 missed; caused by outside the process (6)." in text
+    assert "1,832" in text
+    assert "bumper &lt;contact&gt;" in shown
+    assert "never stopped" not in text

@@ -1,0 +1,58 @@
+"""Tests of the tables: CSV with every digit, Parquet with types, units and missing values."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from runtime.analysis.export.csv_tables import tables, write_csv, write_parquet
+from tests.runtime.analysis.synthetic_timeline import START_NS, synthetic_timeline
+
+TABLES = {"echoes", "segments", "objects", "odometry"}
+RUN = synthetic_timeline()
+
+
+def test_csv(tmp_path: Path) -> None:
+    read = {}
+    for path in write_csv(RUN, tmp_path):
+        with path.open(encoding="utf-8", newline="") as file:
+            read[path.stem] = list(csv.DictReader(file))
+    assert set(read) == TABLES
+    assert len(read["echoes"]) == len(RUN.echoes)
+    for row, kept in zip(read["echoes"], RUN.echoes, strict=True):
+        assert float(row["bearing_rad"]) == kept["bearing"], "every digit"
+        assert row["heard"] == str(math.isfinite(kept["range_m"]))
+        assert row["range_m"] == (str(float(kept["range_m"])) if math.isfinite(kept["range_m"]) else "")
+    last = [row for row in read["objects"] if float(row["t_s"]) == RUN.seconds]
+    assert [(r["model"], float(r["x_m"]), float(r["y_m"])) for r in last] == [
+        (o.model, o.x, o.y) for o in RUN.objects
+    ]
+    assert all(float(r["first_seen_s"]) <= float(r["last_seen_s"]) for r in read["segments"])
+    assert [float(r["v_m_s"]) for r in read["odometry"]] == [0.3] * 4
+
+
+def test_parquet(tmp_path: Path) -> None:
+    read = {path.stem: pq.read_table(path) for path in write_parquet(RUN, tmp_path)}
+    assert set(read) == TABLES
+    echoes = read["echoes"]
+    assert b"metres" in echoes.schema.metadata[b"echolocate"]
+    assert echoes.schema.metadata[b"start_unix_ns"] == str(START_NS).encode()
+    assert echoes["sensor"].to_pylist() == RUN.echoes["sensor"].tolist()
+    assert echoes["range_m"].null_count == 3
+    assert read["objects"]["x_m"].to_pylist()[-1] == RUN.objects[-1].x
+    assert read["objects"]["probability"].null_count == 6
+    assert read["segments"].num_rows == 3
+
+
+def test_an_echo_is_placed_along_its_bearing() -> None:
+    echoes = tables(RUN)["echoes"]
+    for x, y, sensor_y, reach in zip(
+        echoes["echo_x_m"], echoes["echo_y_m"], echoes["sensor_y_m"], echoes["range_m"], strict=True
+    ):
+        assert (x is None) == (y is None) == (reach is None)
+        if reach is not None:
+            assert y == pytest.approx(sensor_y + reach), "sensor 6 looks along y"

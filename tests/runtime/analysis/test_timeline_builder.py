@@ -1,0 +1,96 @@
+"""Tests of the builder of timelines: where echoes began, what a restart discards, how many snapshots are kept."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.messages import Firing, Flags, Odometry, Pose, Twist
+from perception.pipeline import Perception
+from runtime.analysis import timeline_builder
+from runtime.analysis.timeline import Timeline
+from runtime.analysis.timeline_builder import TimelineBuilder
+from tests.runtime.analysis.synthetic_timeline import SETTINGS
+
+RADIUS_M = 0.381
+
+
+@pytest.fixture
+def timeline() -> Timeline:
+    return Timeline(Path("x"), SETTINGS, None)
+
+
+def perception() -> Perception:
+    return Perception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
+
+
+def firing(robot_s: float, pose: Pose, yaw: float = 0.0, **ranges_m: float) -> Firing:
+    """Return a firing of the named sensors (`s6=1.0`) only."""
+    ranges = np.full(24, np.nan)
+    for name, range_m in ranges_m.items():
+        ranges[int(name[1:])] = range_m
+    return Firing(robot_s, pose, yaw, ranges)
+
+
+def odometry(x: float) -> Odometry:
+    return Odometry(0.0, Pose(x, 0.0, 0.0), 0.0, Twist(0.0, 0.0), Flags.NONE, 0)
+
+
+def test_echoes_begin_where_their_sensors_were(timeline: Timeline) -> None:
+    builder = TimelineBuilder(timeline)
+    builder.add_firing(0.5, firing(7.5, Pose(1.0, 2.0, 0.3), math.pi / 2, s0=1.0, s6=math.inf))
+    assert builder.pose == Pose(1.0, 2.0, 0.3)
+    builder.finish(None)
+    rows = timeline.echoes
+    assert rows[["t_s", "sensor", "range_m", "robot_s"]].tolist() == [(0.5, 0, 1.0, 7.5), (0.5, 6, math.inf, 7.5)]
+    assert rows["x"] == pytest.approx([1.0, 1.0 - RADIUS_M])
+    assert rows["y"] == pytest.approx([2.0 + RADIUS_M, 2.0])
+    assert rows["bearing"] == pytest.approx([math.pi / 2, math.pi])
+
+
+def test_odometry_is_kept_ten_times_a_second_at_most(timeline: Timeline) -> None:
+    builder = TimelineBuilder(timeline)
+    for k in range(40):
+        builder.add_odometry(k / 32, odometry(float(k)))
+    assert [o.pose.x for _, o in timeline.odometry] == [4.0 * k for k in range(10)]
+    assert builder.pose == Pose(39.0, 0.0, 0.0)
+
+
+def test_a_restart_discards_what_came_before(timeline: Timeline) -> None:
+    builder, seen = TimelineBuilder(timeline), perception()
+    builder.add_firing(0.0, firing(1.0, Pose(0.0, 0.0, 0.0), s0=1.0))
+    builder.add_odometry(0.0, odometry(0.0))
+    builder.end_cycle(0.0, seen)
+    assert len(timeline.snapshots) == 1
+    builder.restart(2.0)
+    assert (builder.pose, timeline.snapshots, timeline.odometry) == (None, [], [])
+    builder.add_firing(2.5, firing(0.1, Pose(0.0, 0.0, 0.0), s3=2.0))
+    builder.finish(seen)
+    assert timeline.echoes["sensor"].tolist() == [3]
+    assert timeline.notes == ["the robot restarted after 2.0 s; nothing before that is shown"]
+
+
+def test_a_long_run_has_fewer_snapshots_and_always_its_end(
+    timeline: Timeline, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(timeline_builder, "SNAPSHOTS_MAX", 8)
+    builder, seen = TimelineBuilder(timeline), perception()
+    for k in range(200):
+        builder.add_odometry(0.05 * k, odometry(0.01 * k))
+        builder.end_cycle(0.05 * k, seen)
+    builder.finish(seen)
+    times = [snapshot.t_s for snapshot in timeline.snapshots]
+    assert len(times) <= 9
+    assert (times[0], times[-1]) == pytest.approx((0.0, 9.95))
+    gaps = np.diff(times[:-1])
+    assert gaps.min() >= 0.25 * 4 - 0.05, "the interval doubled twice or more"
+
+
+def test_without_a_pose_there_is_no_snapshot(timeline: Timeline) -> None:
+    builder = TimelineBuilder(timeline)
+    builder.end_cycle(0.0, perception())
+    builder.finish(perception())
+    assert timeline.last is None

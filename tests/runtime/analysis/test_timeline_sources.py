@@ -1,0 +1,58 @@
+"""Tests of loading timelines: from a recording by a replay, and from a ring log by running perception over it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.errors import WRONG_CALL, UserError
+from config.load import load_world
+from config.settings import Settings
+from runtime.analysis.timeline import Timeline
+from runtime.analysis.timeline_sources import TimelineSource, load_timeline
+
+
+def ignore(_settings: Settings) -> None:
+    """Prepare nothing."""
+
+
+def test_a_recording_is_replayed_whole(timeline: Timeline) -> None:
+    assert timeline.world == load_world("hallway")
+    assert timeline.cycles == 280
+    assert timeline.notes == [], "the replay does not differ from the run"
+    assert timeline.seconds == pytest.approx(13.95, abs=0.06)
+    assert [entered.mode for entered in timeline.modes][-1] == "DRIVE"
+    assert timeline.summary is not None
+    times = [snapshot.t_s for snapshot in timeline.snapshots]
+    assert times == sorted(times)
+    assert times[-1] == timeline.seconds
+    assert len(timeline.objects) >= 3
+    assert len(timeline.cycle_gaps_s) == 279
+    assert sum(timeline.refinement_stops.values()) == 280
+    assert timeline.counts is not None, "bytes of the line are recorded"
+
+
+def test_a_ring_log_has_echoes_and_objects_and_no_modes(hall_log: Path, timeline: Timeline) -> None:
+    prepared, steps = list[Settings](), list[None]()
+    sets = ("perception.method=paper",)
+    loaded = load_timeline(
+        TimelineSource(str(hall_log), sets, world="hallway"), prepared.append, lambda: steps.append(None)
+    )
+    assert prepared == [loaded.settings]
+    assert loaded.settings.perception.method == "paper"
+    assert loaded.world == timeline.world
+    assert loaded.cycles == len(steps) == len(np.unique(timeline.echoes["robot_s"]))
+    for name in ("sensor", "range_m", "robot_s"):
+        np.testing.assert_array_equal(loaded.echoes[name], timeline.echoes[name])
+    assert len(loaded.objects) >= 3
+    assert (loaded.modes, loaded.cycle_unix, loaded.summary, loaded.counts) == ([], [], None, None)
+    assert load_timeline(TimelineSource(str(hall_log), sets), ignore).world is None
+
+
+@pytest.mark.parametrize("option", [{"sets": ("cycle.rate_hz=10",)}, {"robot": "denning"}, {"models": ("drum",)}])
+def test_a_recording_contains_its_settings(hall_run: Path, option: dict[str, object]) -> None:
+    with pytest.raises(UserError, match="contains its settings") as caught:
+        load_timeline(TimelineSource(str(hall_run), **option), ignore)  # type: ignore[arg-type]
+    assert caught.value.exit_code == WRONG_CALL
