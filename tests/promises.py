@@ -45,7 +45,7 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         "P2": Promise(
             "Halt is bounded",
             "request → HALT on the wire ≤ one cycle + 10 ms with perception saturated, the disk stalled, a reconnect "
-            "under way; 1,000 trials in virtual time (bench: 30 in real time, soak: 1,000); one frame stops the base",
+            "under way; 200 trials in virtual time (bench: 30 in real time, soak: 1,000); one frame stops the base",
         ),
         "P3": Promise(
             "No bad command leaves",

@@ -1,4 +1,4 @@
-"""The tables for people: the right numbers in the right units, and a word for what was not found."""
+"""Tests of the printed tables: numbers in the right units, and what was not found."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rich.table import Table
 from runtime.cli.tables import objects_table, outcome_line, table_2, timing_line, timing_table
 from runtime.cycle.summary import ObjectRow, RunSummary
 from runtime.simulation.evaluation import Outcome
-from runtime.support.length_format import Units, format_length, format_point
+from runtime.support.length_format import Units
 from runtime.timing.cycle_stats import Spread
 from runtime.timing.footprint import FootprintRow
 from runtime.timing.timing_monitor import TimingSummary
@@ -33,15 +33,6 @@ def shown(table: Table) -> list[str]:
     file = io.StringIO()
     Console(file=file, width=120).print(table)
     return file.getvalue().splitlines()
-
-
-def test_lengths_in_both_units() -> None:
-    assert (format_length(0.3048, "ft"), format_length(0.3048, "m"), format_length(-1.0, "m", 3)) == (
-        "1.00",
-        "0.30",
-        "-1.000",
-    )
-    assert format_point(0.3048, -1.2192, "ft") == "(1.00, -4.00)"
 
 
 @pytest.mark.parametrize(
@@ -77,7 +68,7 @@ def test_objects() -> None:
     assert any("x (m)" in line for line in shown(objects_table([], "m")))
 
 
-def test_where_the_time_went_and_by_whose_fault() -> None:
+def test_the_timing_table_and_the_causes_of_delays() -> None:
     spread: Spread = {"p50": 170.0, "p99": 1250.0, "p999": 8004.0, "max": 49_653.0}
     timing: TimingSummary = {
         "period": 50_000.0, "following": 0.9958, "late": spread, "echo_wait": spread, "phases": {"refine": spread},

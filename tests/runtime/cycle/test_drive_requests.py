@@ -1,4 +1,4 @@
-"""Drive requests through the whole step: what moves the robot, what stops it, and that nothing resumes."""
+"""Tests of drive requests through the whole step: what moves the robot, what stops it, and that nothing resumes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The modes: every transition in a table, and what must hold after any sequence of inputs."""
+"""Tests of the modes: every transition in a table, and what must hold after any sequence of inputs."""
 
 from __future__ import annotations
 

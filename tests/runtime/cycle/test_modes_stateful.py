@@ -1,4 +1,4 @@
-"""The modes as a state machine: any actions of robot and operator in any order."""
+"""Tests of the modes as a state machine: any actions of robot and operator in any order."""
 
 from __future__ import annotations
 
@@ -132,5 +132,5 @@ class ModesMachine(RuleBasedStateMachine):
         assert state.entered_run_s <= seen.run_s
 
 
-ModesMachine.TestCase.settings = settings(max_examples=150, stateful_step_count=40, deadline=None)
+ModesMachine.TestCase.settings = settings(max_examples=60, stateful_step_count=40, deadline=None)
 TestModes = ModesMachine.TestCase

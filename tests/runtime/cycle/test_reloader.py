@@ -45,7 +45,7 @@ class Scripted:
     def _propose(self) -> Settings:
         self.threads.add(threading.get_ident())
         self.started.set()
-        assert self.unblocked.wait(30.0)
+        assert self.unblocked.wait(60.0)
         answer = self.answers.pop(0)
         if isinstance(answer, Exception):
             raise answer

@@ -1,4 +1,4 @@
-"""The pure step: its commands and when they are sent."""
+"""Tests of the step: its commands, and when they are sent."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_halt_is_sent_exactly_on_entering_safe_stop(found: dict[str, object], re
     assert record.command is Order.HALT
     for _ in range(50):
         after = script.cycle()
-        assert (after.mode.mode, after.command) == (Mode.SAFE_STOP, None), "it says nothing and never moves again"
+        assert (after.mode.mode, after.command) == (Mode.SAFE_STOP, None), "it sends nothing and does not move"
 
 
 def test_deadman_after_its_grace() -> None:

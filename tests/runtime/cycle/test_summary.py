@@ -1,4 +1,4 @@
-"""The summaries: the keys of the public surface, numbers that survive JSON, and a clear word on a bad path."""
+"""Tests of the summaries: public keys, numbers that survive JSON, and errors that name the path."""
 
 from __future__ import annotations
 

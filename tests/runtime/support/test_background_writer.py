@@ -1,4 +1,4 @@
-"""The background writer: its queue is bounded, losses are counted, and closing it never waits for long."""
+"""Tests of the background writer: its queue is bounded, losses are counted, and closing gives up in time."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_closing_gives_up_on_a_writer_that_blocks() -> None:
     assert writer.last_error == "the last items were not written within 0 s"
     assert not finished.is_set(), "the file stays open as long as a write is under way"
     release.set()
-    assert finished.wait(5.0)
+    assert finished.wait(60.0)
 
 
 def test_a_thread_that_fails_is_reported_and_what_is_queued_counts_as_lost() -> None:
@@ -100,7 +100,7 @@ def test_callbacks_run_on_the_thread_in_order() -> None:
         "notes", note, begin=lambda: note("begin"), tick=tick, finish=lambda: note("finish"), poll_s=0.001
     )
     with writer:
-        assert ticked.wait(5.0), "with a poll interval it ticks without items"
+        assert ticked.wait(60.0), "with a poll interval it ticks without items"
         writer.put("item")
     assert called[:2] == ["begin", "tick"]
     assert called[-1] == "finish"

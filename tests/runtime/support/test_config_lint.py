@@ -1,4 +1,4 @@
-"""Valid but unwise settings: the warning names the setting, the value and the reason."""
+"""Tests of warnings about valid but unwise settings: they name the setting, the value and the reason."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ def test_the_shipped_runs_need_no_warning() -> None:
 
 
 def test_a_margin_that_the_ring_cannot_hear_is_named() -> None:
-    said = lint_settings(load_settings("hallway", ["ring.range_min_m=0.18"]))
-    assert len(said) == 1
-    assert "behaviors.arbiter.clearance_m = 0.16" in said[0]
-    assert "ring.range_min_m = 0.18" in said[0]
+    warnings = lint_settings(load_settings("hallway", ["ring.range_min_m=0.18"]))
+    assert len(warnings) == 1
+    assert "behaviors.arbiter.clearance_m = 0.16" in warnings[0]
+    assert "ring.range_min_m = 0.18" in warnings[0]
 
 
 def test_a_cycle_much_slower_than_the_ring_is_named() -> None:
-    said = lint_settings(load_settings("hallway", ["cycle.rate_hz=5"]))
-    assert len(said) == 1
-    assert "cycle.rate_hz = 5" in said[0]
-    assert "20 firings a second" in said[0]
+    warnings = lint_settings(load_settings("hallway", ["cycle.rate_hz=5"]))
+    assert len(warnings) == 1
+    assert "cycle.rate_hz = 5" in warnings[0]
+    assert "20 firings a second" in warnings[0]

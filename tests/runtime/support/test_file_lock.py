@@ -1,4 +1,4 @@
-"""One owner of a file: real processes, one of which dies without a word."""
+"""Tests of the file lock: one process at a time, also after one was killed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[3]
 HOLD = "import sys, pathlib\nfrom runtime.support.file_lock import file_lock\n" + (
     "with file_lock(pathlib.Path(sys.argv[1]), 'x'):\n    print('held', flush=True)\n    sys.stdin.read()\n"
 )
-KILLS = 20
+KILLS = 8
 
 
 def holder(path: Path) -> subprocess.Popen[bytes]:
@@ -29,7 +29,7 @@ def holder(path: Path) -> subprocess.Popen[bytes]:
     return process
 
 
-def end(process: subprocess.Popen[bytes]) -> None:
+def kill(process: subprocess.Popen[bytes]) -> None:
     process.kill()
     process.communicate()
 
@@ -51,7 +51,7 @@ def test_a_second_process_is_refused_in_one_line(tmp_path: Path) -> None:
         with pytest.raises(UserError) as caught, file_lock(path, f"--record {path}"):
             pass
     finally:
-        end(first)
+        kill(first)
     assert caught.value.exit_code == FAILED
     line = str(caught.value)
     assert line.startswith(f"--record {path}: another process writes to this file; ")
@@ -60,8 +60,8 @@ def test_a_second_process_is_refused_in_one_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.promise("P13")
-def test_no_lock_is_left_over(tmp_path: Path, record_property: Callable[[str, object], None]) -> None:
-    """Killed, a holder leaves the file behind and no lock, be it the same file each time."""
+def test_a_killed_process_leaves_no_lock(tmp_path: Path, record_property: Callable[[str, object], None]) -> None:
+    """A killed holder leaves the file, and no lock on it."""
     path = tmp_path / "run.csv"
     for _ in range(KILLS):
         first = holder(path)
@@ -80,7 +80,7 @@ def test_a_file_that_was_replaced_is_another_file(tmp_path: Path) -> None:
         (tmp_path / "new").replace(path)
         assert is_free(path)
     finally:
-        end(first)
+        kill(first)
 
 
 def test_a_file_replaced_again_and_again_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -89,14 +89,14 @@ def test_a_file_replaced_again_and_again_is_refused(tmp_path: Path, monkeypatch:
     assert not is_free(path)
 
 
-def test_it_is_free_again_at_the_end(tmp_path: Path) -> None:
+def test_the_lock_is_released_at_the_end(tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     with file_lock(path, "x"):
         assert not is_free(path)
     assert is_free(path)
 
 
-def test_pipes_and_devices_have_no_owner(tmp_path: Path) -> None:
+def test_pipes_and_devices_are_not_locked(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "fifo")
     for path in (tmp_path / "fifo", Path(os.devnull)):
         with file_lock(path, "x"):
@@ -104,7 +104,7 @@ def test_pipes_and_devices_have_no_owner(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", [".", "no/such/folder/run.csv", "x" * 300])
-def test_what_cannot_be_written(tmp_path: Path, name: str) -> None:
+def test_an_unwritable_path_is_refused(tmp_path: Path, name: str) -> None:
     with (
         pytest.raises(UserError, match=r"^--record x: cannot be written: .*; choose another file$"),
         file_lock(tmp_path / name, "--record x"),

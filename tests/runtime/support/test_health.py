@@ -44,7 +44,7 @@ PLANT = 40
 """The cycle in which something is killed: the robot drives by then."""
 LAST = 90
 WITHIN = 2
-TIMEOUT_S = 20.0
+TIMEOUT_S = 60.0
 
 Plant = Callable[[RobotProcess, VirtualLoop], None]
 
@@ -65,11 +65,11 @@ class Watched:
 
     def run(self, prepare: Callable[[RobotProcess], None] = lambda _process: None) -> RunSummary:
         """Run for `LAST` cycles and keep what there was."""
-        ears = Decoder("host")
+        decoder = Decoder("host")
 
         def on_bytes(way: str, _host_s: float, data: bytes) -> None:
             if way == "out":
-                self.sent += [(len(self.modes), frame) for frame in ears.feed(data)]
+                self.sent += [(len(self.modes), frame) for frame in decoder.feed(data)]
 
         def on_cycle(record: CycleRecord, state: State, _stats: CycleStats, _driver: RobotDriver) -> None:
             self.modes[record.cycle] = record.mode.mode
@@ -132,7 +132,7 @@ def cancel(name: str) -> Plant:
 
 
 def test_a_task_that_is_killed(monkeypatch: pytest.MonkeyPatch, measured: Callable[[str], None]) -> None:
-    """The one task besides the cycle's own; nothing brings it back, so no arming helps."""
+    """The only task besides the cycle's; it is not restarted, so arming does not help."""
     names: set[str] = set()
 
     def plant(process: RobotProcess, loop: VirtualLoop) -> None:
@@ -141,11 +141,11 @@ def test_a_task_that_is_killed(monkeypatch: pytest.MonkeyPatch, measured: Callab
 
     run = Watched(plant, monkeypatch, arm_at=PLANT + 20)
     summary = run.run()
-    assert names == {"link"}, "a task that no test kills"
+    assert names == {"link"}, "another task, which no test kills"
     run.assert_stopped_because(summary, "the part `link` of this program has ended (it ended without an error)")
     assert all(run.modes[cycle] is Mode.SAFE_STOP for cycle in range(PLANT + WITHIN, LAST))
-    assert run.flags & Flags.DEADMAN, "its line is closed: it has stopped by itself"
-    assert max(run.fed) <= PLANT + WITHIN < LAST - 20, "and so will the watchdog ring"
+    assert run.flags & Flags.DEADMAN, "its line is closed, so the deadman has stopped it"
+    assert max(run.fed) <= PLANT + WITHIN < LAST - 20, "so the watchdog fires"
     measured("each task of the loop cancelled, each thread and callback raising: SAFE_STOP ≤ 2 cycles later, by name")
 
 
@@ -177,21 +177,21 @@ def test_a_task_that_is_not_awaited(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_callback_that_raises_is_over_and_may_be_armed_after(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fall_over() -> None:
+    def fail_at_once() -> None:
         raise ZeroDivisionError("planted")
 
     def plant(_process: RobotProcess, loop: VirtualLoop) -> None:
-        loop.call_soon(fall_over)
+        loop.call_soon(fail_at_once)
 
     run = Watched(plant, monkeypatch, arm_at=PLANT + 20)
     summary = run.run()
-    run.assert_stopped_because(summary, "callback `fall_over` (ZeroDivisionError: planted")
+    run.assert_stopped_because(summary, "callback `fail_at_once` (ZeroDivisionError: planted")
     assert run.modes[LAST] is Mode.DRIVE
     assert max(run.fed) >= LAST - 10
 
 
 def test_the_cycle_itself_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The process cannot go on: it halts the base before it ends."""
+    """The process halts the base before it ends."""
 
     def plant(_process: RobotProcess, loop: VirtualLoop) -> None:
         task = asyncio.current_task(loop)
@@ -205,7 +205,7 @@ def test_the_cycle_itself_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert any(type(frame).__name__ == "Halt" for _, frame in run.sent)
 
 
-def gone(worker: Callable[[], str | None]) -> None:
+def wait_for_end(worker: Callable[[], str | None]) -> None:
     """Wait until a thread has ended."""
     end_s = time.monotonic() + TIMEOUT_S
     while worker() is None:
@@ -225,7 +225,7 @@ def test_a_thread_that_raises(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def plant(_process: RobotProcess, _loop: VirtualLoop) -> None:
         go.set()
-        gone(worker.probe)
+        wait_for_end(worker.probe)
 
     run = Watched(plant, monkeypatch)
     summary = run.run(lambda process: process.health.watch("planner", worker.probe))
@@ -234,7 +234,7 @@ def test_a_thread_that_raises(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_recorders_thread(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """What is no trouble with the disk is a fault of the program, there as well."""
+    """An error that the disk does not explain is a fault of the program."""
     broken = threading.Event()
     enter = RecordingWriter._enter
 
@@ -251,7 +251,7 @@ def test_the_recorders_thread(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
         def plant(_process: RobotProcess, _loop: VirtualLoop) -> None:
             broken.set()
             recorder.on_log({"event": "one more"})
-            gone(recorder.probe)
+            wait_for_end(recorder.probe)
 
         run = Watched(plant, monkeypatch, observers=(recorder.on_cycle,))
         summary = run.run(lambda process: process.health.watch("recorder", recorder.probe))
@@ -274,7 +274,7 @@ def test_the_views_thread(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> No
             def plant(_process: RobotProcess, _loop: VirtualLoop) -> None:
                 view._slot = object()  # type: ignore[assignment]
                 view._wake.set()
-                gone(view.probe)
+                wait_for_end(view.probe)
 
             run = Watched(plant, monkeypatch)
             summary = run.run(lambda process: process.health.watch("view", view.probe))
@@ -292,7 +292,7 @@ def test_the_logs_thread(monkeypatch: pytest.MonkeyPatch) -> None:
         def plant(_process: RobotProcess, _loop: VirtualLoop) -> None:
             assert standing.file is not None
             standing.file.put(b"a line\n")
-            gone(standing.probe)
+            wait_for_end(standing.probe)
 
         run = Watched(plant, monkeypatch)
         summary = run.run(lambda process: process.health.watch("log", standing.probe))

@@ -1,4 +1,4 @@
-"""The kernels' cache: a folder for each version of the sources, wherever one can be written."""
+"""Tests of the kernel cache: a folder for each version of the sources, in the first place that is writable."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from importlib.machinery import ModuleSpec
 from pathlib import Path
-from typing import Any
 
 import pytest
 from rich.console import Console
@@ -19,7 +18,6 @@ from rich.console import Console
 import runtime.support.kernel_cache as kernels
 from config.load import load_settings
 from config.settings import Settings
-from perception.bayes import polygon_tracks, refine
 from runtime.support import kernel_warmup as warming
 
 ROOT = Path(__file__).parents[3]
@@ -27,7 +25,7 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.fixture
 def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A cache of its own, and a machine's folder for temporary files of its own."""
+    """Return an empty cache folder; temporary files go to a folder of the test as well."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "tmp").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
@@ -49,7 +47,7 @@ def packages(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder / kernels.PACKAGES[1] / "a.py"
 
 
-def test_it_is_the_same_folder_for_the_same_sources(home: Path) -> None:
+def test_the_same_sources_have_the_same_folder(home: Path) -> None:
     folder = kernels.cache_folder()
     assert folder == kernels.cache_folder()
     assert folder.is_dir()
@@ -57,7 +55,7 @@ def test_it_is_the_same_folder_for_the_same_sources(home: Path) -> None:
     assert list(folder.iterdir()) == []
 
 
-def test_one_byte_of_one_source_makes_another_folder(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_changed_byte_of_a_source_changes_the_folder(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     source = packages(home.parent / "sources", monkeypatch)
     first = kernels.cache_folder()
     source.write_text("X = 2\n")
@@ -81,7 +79,7 @@ def test_kernels_with_checked_bounds_are_kept_apart(home: Path, monkeypatch: pyt
     assert plain.is_relative_to(home)
 
 
-def test_every_source_with_kernels_counts() -> None:
+def test_every_package_with_kernels_is_hashed() -> None:
     holders = {
         path.parent
         for room in ("perception", "drivers", "behaviors", "runtime")
@@ -119,7 +117,7 @@ def test_an_existing_setting_is_respected(home: Path, monkeypatch: pytest.Monkey
     assert home.exists()
 
 
-def test_only_what_a_run_needs_is_compiled() -> None:
+def test_a_run_compiles_only_the_parts_that_it_needs() -> None:
     hallway = load_settings("hallway")
     assert kernels.needed_parts(hallway) == (kernels.EMULATOR, kernels.BAYES)
     boxes = load_settings("hallway", models=["semicircle", "box"])
@@ -129,7 +127,7 @@ def test_only_what_a_run_needs_is_compiled() -> None:
     assert set(warming.RUN_ONCE) == set(kernels.PARTS)
 
 
-def test_each_part_is_compiled_once_and_warmed_up_ever_after(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_part_is_compiled_once_and_then_warmed_up(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(home))
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
     home.mkdir()
@@ -168,7 +166,7 @@ def test_each_part_is_compiled_once_and_warmed_up_ever_after(home: Path, monkeyp
         ((kernels.EMULATOR, kernels.BAYES), 1, []),
     ],
 )
-def test_a_helper_takes_what_comes_last(
+def test_a_second_process_compiles_the_last_part(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parts: tuple[str, ...], processors: int, helped: list[str]
 ) -> None:
     happened: list[str] = []
@@ -189,30 +187,6 @@ def test_a_helper_takes_what_comes_last(
     kernels.compile_parts(load_settings("hallway"), tmp_path, parts)
     assert happened == [*helped, *(["waited"] if helped else []), *parts]
     assert {path.name for path in tmp_path.iterdir()} == set(parts)
-
-
-def test_a_helper_compiles_the_refinement_of_either_kind(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On an empty memory that compiles and does nothing."""
-    asked = []
-    for module, name in ((refine, "quantum"), (polygon_tracks, "polygon_quantum")):
-        monkeypatch.setattr(module, name, lambda _s, _tracks, _p, _share, name=name: asked.append(name))
-    warming.compile_refinement(kernels.BAYES)
-    warming.compile_refinement(kernels.POLYGONS)
-    assert asked == ["quantum", "polygon_quantum"]
-
-
-def test_a_helper_that_hangs_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    real, started = subprocess.Popen, []
-
-    def hanging(_command: list[str], **streams: Any) -> subprocess.Popen[bytes]:
-        started.append(real([sys.executable, "-c", "import time; time.sleep(600)"], **streams))
-        return started[-1]
-
-    monkeypatch.setattr(subprocess, "Popen", hanging)
-    monkeypatch.setattr(warming, "PARALLEL_MAX_S", 0.01)
-    with warming.compile_in_parallel(kernels.BAYES):
-        assert started[0].poll() is None
-    assert started[0].returncode is not None
 
 
 COMPILED_LATER = """

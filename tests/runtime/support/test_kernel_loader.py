@@ -1,4 +1,4 @@
-"""Kernels that are readied while the robot drives: before the change is taken over, and beside the loop."""
+"""Tests of the kernel loader: kernels are loaded before a change is in force, and outside the loop."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ BOXES = load_settings("hallway", models=["semicircle", "box"])
 
 
 class Kernels:
-    """Stands for the compiling and loading of kernels, which takes too long for tests."""
+    """Stub of compiling and loading kernels, which take too long for tests."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
         self.folder = folder
@@ -60,7 +60,7 @@ def kernels_stub(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Kernels:
     return Kernels(monkeypatch, tmp_path)
 
 
-async def test_what_was_never_compiled_is_compiled_once_and_loaded_by_a_thread(kernels_stub: Kernels) -> None:
+async def test_missing_kernels_are_compiled_once_and_loaded_by_a_thread(kernels_stub: Kernels) -> None:
     assert set(await asyncio.gather(kernels_stub.ready(ROUND, BOXES), kernels_stub.ready(ROUND, BOXES))) == {None}
     assert kernels_stub.compiled == [POLYGONS]
     assert kernels_stub.loaded == [(POLYGONS,), (POLYGONS,)], "each caller loads them: it costs little"
@@ -71,7 +71,7 @@ async def test_what_was_never_compiled_is_compiled_once_and_loaded_by_a_thread(k
     ]
 
 
-async def test_what_is_ready_is_left_alone(kernels_stub: Kernels, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_kernels_in_use_are_not_loaded_again(kernels_stub: Kernels, monkeypatch: pytest.MonkeyPatch) -> None:
     for running, proposed in ((ROUND, ROUND), (ROUND, DRUMS), (BOXES, BOXES), (BOXES, ROUND)):
         assert await kernels_stub.ready(running, proposed) is None
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
@@ -79,7 +79,7 @@ async def test_what_is_ready_is_left_alone(kernels_stub: Kernels, monkeypatch: p
     assert (kernels_stub.compiled, kernels_stub.loaded, kernels_stub.ready.loaded) == ([], [], 0)
 
 
-async def test_what_cannot_be_compiled_is_refused_with_a_way_out(kernels_stub: Kernels) -> None:
+async def test_a_failed_compilation_is_refused_with_a_remedy(kernels_stub: Kernels) -> None:
     kernels_stub.fails = True
     refusal = await kernels_stub.ready(ROUND, BOXES)
     assert refusal is not None
@@ -117,7 +117,7 @@ async def _ready(log: structlog.typing.FilteringBoundLogger) -> None:
 
 @pytest.mark.soak
 def test_another_process_compiles_all_that_belongs_to_polygons(tmp_path: Path) -> None:
-    """From nothing; and nothing of the part is left to compile for the process that loads it."""
+    """From an empty cache; the process that loads the part afterwards compiles nothing."""
     env = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
     env |= {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path)}
 

@@ -1,4 +1,4 @@
-"""The log: lines a machine can parse in a file, lines a person can read on the terminal."""
+"""Tests of the log: JSON lines in a file, readable lines on the terminal."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_each_line_of_the_file_is_json(tmp_path: Path, capsys: pytest.CaptureFix
     assert "\x1b" not in shown.err, "no colours without a terminal"
 
 
-def test_level_keeps_lesser_lines_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_lines_below_the_level_are_dropped(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "run.jsonl"
     with open_log(LogConfig(file=str(path), level="warning"), terminal=True) as log:
         log.debug("a")
@@ -46,7 +46,7 @@ def test_level_keeps_lesser_lines_out(tmp_path: Path, capsys: pytest.CaptureFixt
     assert len(capsys.readouterr().err.splitlines()) == 2
 
 
-def test_no_line_on_the_terminal_while_a_view_owns_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_line_is_printed_over_a_live_view(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "run.jsonl"
     with open_log(LogConfig(file=str(path)), terminal=False) as log:
         log.error("quiet")
@@ -54,7 +54,7 @@ def test_no_line_on_the_terminal_while_a_view_owns_it(tmp_path: Path, capsys: py
     assert len(lines(path)) == 1
 
 
-def test_a_log_goes_on_where_it_ended(tmp_path: Path) -> None:
+def test_a_log_is_appended_to(tmp_path: Path) -> None:
     path = tmp_path / "run.jsonl"
     for k in range(2):
         with open_log(LogConfig(file=str(path)), terminal=False) as log:
@@ -75,7 +75,7 @@ def test_an_exception_stays_one_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["", "file/run.jsonl"])
-def test_a_file_that_cannot_be_written_is_a_wrong_configuration(tmp_path: Path, name: str) -> None:
+def test_an_unwritable_file_is_a_wrong_configuration(tmp_path: Path, name: str) -> None:
     (tmp_path / "file").touch()
     path = tmp_path / name
     with (
@@ -87,16 +87,14 @@ def test_a_file_that_cannot_be_written_is_a_wrong_configuration(tmp_path: Path, 
     assert str(path) in str(caught.value)
 
 
-def test_without_a_file_of_its_own_the_log_goes_where_state_belongs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_by_default_the_log_is_in_the_state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     with open_log(LogConfig(), terminal=False) as log:
         log.info("kept")
     assert [line["event"] for line in lines(tmp_path / "state" / "echolocate" / "echolocate.jsonl")] == ["kept"]
 
 
-def test_a_state_folder_that_cannot_be_written_is_no_reason_not_to_start(
+def test_an_unwritable_state_folder_is_a_warning(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "state").touch()

@@ -1,4 +1,4 @@
-"""The folder of a run is removed at its end, or by the next start if it was killed; no other folder is touched."""
+"""Tests of the folder of a run: removed at its end, or by the next start if it was killed; no other is touched."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def owner() -> tuple[subprocess.Popen[str], Path]:
     return process, Path(process.stdout.readline().strip())
 
 
-def test_it_is_the_user_s_own_and_gone_at_the_end(tmp_path: Path) -> None:
+def test_only_the_user_can_enter_it_and_it_is_removed_at_the_end(tmp_path: Path) -> None:
     with temp_folder() as folder:
         assert folder.parent == tmp_path
         assert folder.stat().st_mode & 0o777 == 0o700
@@ -53,19 +53,19 @@ def test_it_is_the_user_s_own_and_gone_at_the_end(tmp_path: Path) -> None:
     assert Path("/dev/null").exists()
 
 
-def test_what_a_killed_run_has_left_goes_with_the_next_start(tmp_path: Path) -> None:
+def test_the_folder_of_a_killed_run_is_removed_by_the_next_start(tmp_path: Path) -> None:
     process, folder = owner()
     with process:
         aged(folder)
         remove_stale_folders()
-        assert (folder / "robot").is_symlink(), "its owner lives"
+        assert (folder / "robot").is_symlink(), "its owner is alive"
         process.kill()
     assert folder.exists()
     with temp_folder() as own:
         assert list(tmp_path.iterdir()) == [own]
 
 
-def test_what_is_not_ours_stays(tmp_path: Path) -> None:
+def test_other_folders_are_kept(tmp_path: Path) -> None:
     young = tmp_path / f"{PREFIX}young"
     young.mkdir()
     link, elsewhere = tmp_path / f"{PREFIX}link", tmp_path / "elsewhere"

@@ -1,4 +1,4 @@
-"""The timing stats: true quantiles, worst cases that are never forgotten, memory that never grows."""
+"""Tests of the timing statistics: exact quantiles, maxima over the whole run, bounded memory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run uses of its machine, compared with known work of this test's own process."""
+"""Tests of the footprint of a run, compared with known work."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ print(json.dumps(stats.close()), block[0])
 
 
 def test_allocated_memory_is_measured() -> None:
-    """In a process of its own: what other tests have left is given back at any time."""
+    """In a process of its own, because memory of earlier tests may be freed at any time."""
     done = subprocess.run([sys.executable, "-c", FILLED], cwd=ROOT, text=True, capture_output=True, check=True)
     row = json.loads(done.stdout.rpartition(" ")[0])
     assert 50.0 < row["growth_mb"] < 100.0
@@ -37,7 +37,7 @@ def test_allocated_memory_is_measured() -> None:
 
 
 def test_cpu_time_is_a_share_of_elapsed_time() -> None:
-    """Not asserted is how large the share of a busy loop is: others may run on this machine."""
+    """How large the share of a busy loop is depends on what else runs on this machine."""
     stats = Footprint(MemoryPolicy())
     end_cpu_s = time.process_time() + 0.05
     while time.process_time() < end_cpu_s:

@@ -1,4 +1,4 @@
-"""Garbage while driving: old objects are excluded, young ones collected in slack only, collections counted."""
+"""Tests of garbage collection while driving: old objects are excluded, young ones collected in slack only."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from runtime.timing.memory_policy import EVERY_CYCLES, SLACK_MIN_S, MemoryPolicy
 
 
 class Ring:
-    """Garbage that only a collection frees."""
+    """An object that only a collection frees."""
 
     def __init__(self) -> None:
         self.itself = self

@@ -1,4 +1,4 @@
-"""Pacing in virtual time: echoes that wait for nothing, bounded periods, never a burst, misses counted exactly."""
+"""Tests of the pacer in virtual time: echoes begin cycles at once, periods are bounded, misses counted exactly."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def test_any_step_is_followed_at_a_rate_near_the_configured_one(step_s: float, p
 
 
 def test_echoes_that_stop_and_resume() -> None:
-    """It goes on at its own period within two steps, and an echo is followed again at once."""
+    """Cycles return to their own period within two steps, and follow the first new echo at once."""
     first, pause_s = echoes(100, PERIOD, 0.001), 2.013
     ring = Ring(Pacer(BEGIN, PERIOD, PERIOD), first + [t + 100 * PERIOD + pause_s for t in first])
     while ring.run_s < first[-1] + 1.9:

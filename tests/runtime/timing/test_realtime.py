@@ -1,4 +1,4 @@
-"""Asking for precedence: granted or refused, the run goes on, and a refusal says what to do."""
+"""Tests of real-time requests: granted or refused, the run continues, and a refusal names the remedy."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="these requests 
 
 
 class Libc:
-    """A C library that refuses everything, and remembers."""
+    """A C library that refuses every call and counts it."""
 
     def __init__(self) -> None:
         self.calls: list[str] = []
@@ -47,7 +47,7 @@ def refusing(monkeypatch: pytest.MonkeyPatch) -> Libc:
     return libc
 
 
-def test_only_configured_precedence_is_requested(refusing: Libc) -> None:
+def test_only_configured_settings_are_requested(refusing: Libc) -> None:
     assert apply_realtime(NOTHING) == []
     assert refusing.calls == []
 
@@ -82,7 +82,7 @@ def test_no_system_call_on_an_unknown_machine(refusing: Libc, monkeypatch: pytes
     assert refusing.calls == []
 
 
-IN_EARNEST = """
+REAL_REQUESTS = """
 import os, sys
 from config.settings import RealtimeConfig
 from runtime.timing.realtime import apply_realtime
@@ -96,8 +96,8 @@ assert ("realtime.core" in named) == (os.sched_getaffinity(0) != {core}), refusa
 
 
 def test_on_this_system_granted_requests_take_effect() -> None:
-    """In a process of its own: nothing of it may stay with the tests that follow."""
+    """In a process of its own, so that later tests are not affected."""
     done = subprocess.run(
-        [sys.executable, "-c", IN_EARNEST], cwd=ROOT, text=True, capture_output=True, timeout=60, check=False
+        [sys.executable, "-c", REAL_REQUESTS], cwd=ROOT, text=True, capture_output=True, check=False
     )
     assert done.returncode == 0, done.stderr

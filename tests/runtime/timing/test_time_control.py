@@ -1,4 +1,4 @@
-"""A paused run: nothing stops, nothing is lost, nothing moves, and one step is one cycle."""
+"""Tests of the control of time: in a pause nothing stops, is lost or moves, and one step is one cycle."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def test_a_pause_is_invisible_to_the_base_and_nothing_moves_in_it(monkeypatch: p
             await asyncio.sleep(LONG_S)
             process.request(Request.HALT)
             await asyncio.sleep(LONG_S)
-            assert it.robot.truth.flags & Flags.LATCHED, "a HALT is heard where time stands still"
+            assert it.robot.truth.flags & Flags.LATCHED, "a HALT takes effect in a pause"
             assert it.robot.truth.pose == before.pose
             assert await it.control.resume() is None
             await until(lambda: watched.records[-1].mode.mode is Mode.SAFE_STOP)
@@ -144,7 +144,7 @@ def test_one_step_is_one_cycle_and_one_period(monkeypatch: pytest.MonkeyPatch) -
 
         async def act(_process: RobotProcess, watched: Watched) -> None:
             assert await it.control.pause() is None
-            for _ in range(60):
+            for _ in range(30):
                 cycles, before_s, robot_s = len(watched.records), it.control.clock(), emulated_s(it.robot)
                 assert await it.control.single_step() is None
                 assert it.control.is_paused
@@ -154,11 +154,11 @@ def test_one_step_is_one_cycle_and_one_period(monkeypatch: pytest.MonkeyPatch) -
                 assert emulated_s(it.robot) - robot_s <= went_s + 0.02
                 await asyncio.sleep(1.0)
                 assert len(watched.records) == cycles + 1
-            first, last = watched.records[-60], watched.records[-1]
-            assert last.inputs.run_s - first.inputs.run_s == pytest.approx(59 * CYCLE_S, rel=0.05)
-            assert sum(len(record.inputs.received.firings) for record in watched.records[-60:]) >= 58
+            first, last = watched.records[-30], watched.records[-1]
+            assert last.inputs.run_s - first.inputs.run_s == pytest.approx(29 * CYCLE_S, rel=0.05)
+            assert sum(len(record.inputs.received.firings) for record in watched.records[-30:]) >= 28
             assert await it.control.resume() is None
-            await until(lambda: len(watched.records) >= 160)
+            await until(lambda: len(watched.records) >= 110)
 
         summary, _watched = run(it, act)
     assert (summary["mode"], summary["stop_reasons"]) == ("DRIVE", [])
@@ -179,7 +179,7 @@ def test_a_step_pauses_a_run_that_is_not_paused(monkeypatch: pytest.MonkeyPatch)
     assert summary["stop_reasons"] == []
 
 
-@pytest.mark.parametrize("factor", [0.1, 0.5, 3.0, 10.0])
+@pytest.mark.parametrize("factor", [0.1, 3.0, 10.0])
 def test_another_speed_changes_nothing_else(monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
     with pausable_run(monkeypatch) as it:
 
@@ -203,7 +203,7 @@ def test_another_speed_changes_nothing_else(monkeypatch: pytest.MonkeyPatch, fac
     assert sum(gaps) / len(gaps) == pytest.approx(CYCLE_S, rel=0.05)
 
 
-@pytest.mark.parametrize("hold_s", [0.01, 0.2, 3.0])
+@pytest.mark.parametrize("hold_s", [0.01, 3.0])
 def test_fast_motion_waits_for_a_slow_process(monkeypatch: pytest.MonkeyPatch, hold_s: float) -> None:
     """A machine that cannot keep up with ten times real time is slower, and no reason to stop."""
     with pausable_run(monkeypatch) as it:
@@ -312,8 +312,9 @@ def test_an_emulator_that_ends_is_reported_and_the_run_goes_on_to_its_stop(
     assert summary["stop_reasons"]
 
 
-def test_a_thousand_random_commands(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever is asked for in whatever order, all at once, the robot drives on and no echo is lost."""
+@pytest.mark.parametrize("rounds", [60, pytest.param(250, marks=pytest.mark.soak)])
+def test_random_commands(monkeypatch: pytest.MonkeyPatch, rounds: int) -> None:
+    """Four requests at once in any order: the robot drives on and no echo is lost."""
     import random
 
     rng = random.Random(7)
@@ -324,7 +325,7 @@ def test_a_thousand_random_commands(monkeypatch: pytest.MonkeyPatch) -> None:
                 it.control.pause, it.control.resume, it.control.single_step,
                 lambda: it.control.set_speed(rng.choice([0.1, 0.5, 1.0, 2.0, 10.0])),
             ]  # fmt: skip
-            for _ in range(250):
+            for _ in range(rounds):
                 assert await asyncio.gather(*(rng.choice(calls)() for _ in range(4))) == [None] * 4
                 await asyncio.sleep(rng.choice([0.0, 0.003, 0.07]))
             assert await it.control.set_speed(1.0) is None

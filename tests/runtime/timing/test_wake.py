@@ -1,4 +1,4 @@
-"""Sleeping until a deadline or until woken: nothing is lost or comes early, and what had arrived is taken in."""
+"""Tests of sleeping until a deadline or a wake: never early, nothing lost, pending input processed."""
 
 from __future__ import annotations
 

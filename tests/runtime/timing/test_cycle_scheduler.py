@@ -1,0 +1,96 @@
+"""Tests of the scheduler: it begins cycles with echoes, measures them, and names what makes them overrun."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+
+import pytest
+
+from config.load import load_settings
+from runtime.timing.cycle_scheduler import CycleScheduler
+from runtime.timing.timing_monitor import OUTSIDE
+from runtime.timing.wake import LoopTimer
+from tests.runtime.virtual_time import VirtualLoop
+
+SETTINGS = load_settings("hallway")
+PERIOD_S = 1.0 / SETTINGS.cycle.rate_hz
+
+
+@pytest.fixture
+def loop(monkeypatch: pytest.MonkeyPatch) -> Iterator[VirtualLoop]:
+    monkeypatch.setattr("runtime.timing.wake.best_timer", LoopTimer)
+    made = VirtualLoop()
+    yield made
+    made.close()
+
+
+def test_cycles_begin_at_their_period_and_with_an_echo_at_once(loop: VirtualLoop) -> None:
+    scheduler = CycleScheduler(SETTINGS, loop.time)
+    begins: list[tuple[float, float | None]] = []
+
+    async def run() -> None:
+        with scheduler.start(loop.time(), 0.45):
+            while len(begins) < 8:
+                now = await scheduler.wait()
+                if now is None:
+                    continue
+                start = scheduler.begin(now)
+                begins.append((now.run_s, start.echo_age_s))
+                if len(begins) == 4:
+                    loop.call_later(0.03, lambda: scheduler.on_echo(loop.time()))
+                assert scheduler.end(loop.time()) > 0.0
+
+    begin_s = loop.time()
+    loop.run_until_complete(run())
+    scheduler.close()
+    times = [at_s - begin_s for at_s, _ in begins]
+    assert times[:4] == pytest.approx([k * PERIOD_S for k in range(4)], abs=1e-6)
+    assert times[4] == pytest.approx(times[3] + 0.03, abs=1e-6), "the echo began the cycle"
+    assert [age for _, age in begins] == [None] * 4 + [pytest.approx(0.0)] + [None] * 3
+    assert scheduler.stats.cycles >= 7
+    assert (scheduler.stats.late, scheduler.overrun) == (0, None)
+
+
+def test_overruns_in_a_row_are_a_reason_to_stop_that_names_the_cause(loop: VirtualLoop) -> None:
+    scheduler = CycleScheduler(SETTINGS, loop.time, ("link receive",))
+    receive = scheduler.timing_monitor.timed("link receive", lambda: loop.spend(2.0 * PERIOD_S))
+    reasons: list[str | None] = []
+
+    async def run() -> None:
+        with scheduler.start(loop.time(), 0.45):
+            while len(reasons) < SETTINGS.cycle.overruns_max + 2:
+                now = await scheduler.wait()
+                if now is not None:
+                    scheduler.begin(now)
+                    reasons.append(scheduler.overrun)
+                    scheduler.end(loop.time())
+                    receive()
+
+    loop.run_until_complete(run())
+    scheduler.close()
+    assert reasons[: SETTINGS.cycle.overruns_max] == [None] * SETTINGS.cycle.overruns_max
+    assert str(reasons[-1]).startswith(f"{SETTINGS.cycle.overruns_max + 1} cycles in a row left no time")
+    # The callback spends no processor time here, so the system is blamed for the delay.
+    assert f"mostly through {OUTSIDE}" in str(reasons[-1])
+
+
+def test_a_wake_ends_the_wait_without_a_cycle(loop: VirtualLoop) -> None:
+    scheduler = CycleScheduler(SETTINGS, loop.time)
+
+    async def run() -> None:
+        with scheduler.start(loop.time() + 10.0, 0.45):
+            loop.call_later(1.0, scheduler.wake)
+            assert await scheduler.wait() is None
+
+    begin_s = loop.time()
+    loop.run_until_complete(run())
+    scheduler.close()
+    assert loop.time() - begin_s == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_scheduler_is_started_before_it_is_used(loop: VirtualLoop) -> None:
+    scheduler = CycleScheduler(SETTINGS, loop.time)
+    scheduler.on_echo(loop.time())  # one that comes early is ignored
+    with pytest.raises(RuntimeError, match="before it was started"):
+        loop.run_until_complete(asyncio.ensure_future(scheduler.wait(), loop=loop))
