@@ -122,10 +122,18 @@ class Perception:
         The objects to recognise.
     config : PerceptionConfig
         The method and its settings.
+    method : Method, optional
+        In place of the one that `config` names.
     """
 
-    def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> None:
-        self.method = make_method(ring, models, config)
+    def __init__(
+        self,
+        ring: RingConfig,
+        models: Sequence[ModelConfig],
+        config: PerceptionConfig,
+        method: Method | None = None,
+    ) -> None:
+        self.method = make_method(ring, models, config) if method is None else method
         self.sensor_monitor = SensorMonitor(ring)
         self._echoes = FreshEchoes(mounts_array(ring.mounts))
         self._sensors = len(ring.mounts)

@@ -16,7 +16,7 @@ from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import BayesConfig, PerceptionConfig
 from drivers.messages import Firing
-from perception.bayes.elements import BUCKET_CAPACITY, MAX_POLYGONS
+from perception.bayes.elements import MAX_POLYGONS
 from perception.bayes.evidence import evidence_of
 from perception.bayes.kernel_settings import apply_config, apply_library, circle_models, copied, make_settings
 from perception.bayes.map_edits import edit_memory, row_of
@@ -33,14 +33,17 @@ from perception.bayes.pinned_segments import Pins
 from perception.bayes.polygon_parameters import POLYGON_PROBABILITY
 from perception.bayes.polygon_tracks import polygon_quantum
 from perception.bayes.refine import quantum
-from perception.bayes.segment_list import drawn, mapped_segments
-from perception.bayes.state import FREE, Memory
+from perception.bayes.segment_list import count_made, count_segments, drawn, mapped_segments
+from perception.bayes.state import Memory
 from perception.bayes.state_migration import migrate
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import Edit, Evidence, Segments
 from perception.kernel import Floats
 from perception.records import records, zeros
 from perception.sensor_mounts import mounts_array
+
+UNKNOWN: Final = -1
+"""In place of a number of segments made: those in the map are to be counted."""
 
 
 class BayesPerception:
@@ -56,8 +59,8 @@ class BayesPerception:
         The settings that a user may change.
     """
 
-    SCRATCH: Final = ("_sure", "_last_reported", "_reported")
-    """Attributes that reporting derives; they are not in a snapshot."""
+    SCRATCH: Final = ("_sure", "_last_reported", "_reported", "_counted_at", "_segment_count")
+    """Attributes that are derived from the rest; they are not in a snapshot."""
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: BayesConfig) -> None:
         self._mounts = mounts_array(ring.mounts)
@@ -71,7 +74,7 @@ class BayesPerception:
         self._sure = np.zeros(max(config.tracks_max, MAX_POLYGONS), np.int64)
         self._last_reported = zeros(Reported, config.tracks_max)
         self._reported = records(Reported, self._last_reported)
-        self._forget_reports()
+        self._forget_derived()
         self._circles: dict[int, DetectedObject] = {}
         self._objects: tuple[DetectedObject, ...] | None = None
         self._left = 0
@@ -93,10 +96,11 @@ class BayesPerception:
     @property
     def counts(self) -> MapCounts:
         """The numbers of segments and tracks, tentative tracks included."""
-        state = self.memory.state
-        segments = np.minimum(state["buckets"]["count"], BUCKET_CAPACITY).sum()
-        tracks = sum(np.count_nonzero(of["status"] != FREE) for of in (self.memory.circles, self.memory.polygons))
-        return MapCounts(int(segments), int(state["segments_made"][0]), int(tracks))
+        made, tracks = count_made(self.memory.s, self.memory.tracks)
+        if made != self._counted_at or self._pins.count > 0:
+            # Beside new segments, only an edit or the renewal of a pin changes the map.
+            self._counted_at, self._segment_count = made, count_segments(self.memory.s)
+        return MapCounts(self._segment_count, made, tracks)
 
     def observe(self, firing: Firing) -> int:
         """Process one firing; return the number of outline segments that it completed."""
@@ -177,7 +181,7 @@ class BayesPerception:
 
     def edit(self, edit: Edit) -> str | None:
         """Apply a user's edit; return None, or the reason why it cannot be done."""
-        self._objects = None
+        self._objects, self._counted_at = None, UNKNOWN
         return edit_memory(self.memory, self.settings, self._pins, self._round, self._outlines, edit)
 
     def evidence(self, number: int) -> Evidence | None:
@@ -198,7 +202,7 @@ class BayesPerception:
         """Clear the memory, as after a reset of the odometry."""
         self.memory.clear()
         self._pins.clear()
-        self._objects = ()
+        self._objects, self._counted_at = (), UNKNOWN
         self._left = 0
         self._polygons_left = 0
         self._circles_pending = self._polygons_pending = self._polygons_turn = False
@@ -215,15 +219,18 @@ class BayesPerception:
         apply_library(self.settings, models)
         migrate(self.memory, before, self.settings)
         self._name_models(models)
-        self._forget_reports()
+        self._forget_derived()
 
     def drop_caches(self) -> None:
         """Drop what was derived from the memory, after the memory was restored from a snapshot."""
-        self._forget_reports()
+        self._forget_derived()
 
-    def _forget_reports(self) -> None:
+    def _forget_derived(self) -> None:
         self._last_reported["x"] = np.nan
         self._objects = None
+        self._segment_count = 0
+        self._counted_at = UNKNOWN
+        """Number of segments made when those in the map were counted."""
 
     def _name_models(self, models: Sequence[ModelConfig]) -> None:
         _, self._round = circle_models(models)

@@ -28,8 +28,8 @@ from runtime.console.http.server import Server, ServerContext
 from runtime.console.http.static_files import StaticFile, page_files
 from runtime.console.protocols import NOT_AVAILABLE, RecordingControl, ReplayControl, Run
 from runtime.console.timed_coroutine import timed_coroutine
+from runtime.cycle.callbacks import CONSOLE_RECEIVE
 from runtime.cycle.live_settings import PrepareSettings
-from runtime.cycle.process import CONSOLE_RECEIVE
 from runtime.cycle.step import CycleRecord, State
 from runtime.support.length_format import Units
 from runtime.timing.cycle_stats import CycleStats

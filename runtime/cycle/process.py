@@ -18,13 +18,20 @@ from drivers.link import Link
 from drivers.messages import Firing, Twist
 from drivers.registry import make_driver
 from perception.edits import Edit, Evidence
-from perception.pipeline import Perception
 from runtime.cycle.alerts import Alerts
+from runtime.cycle.callbacks import CALLBACKS, COLLECTION, LINE_LOST, LINE_OPENED, LINK_RECEIVE
 from runtime.cycle.connection import Connection
 from runtime.cycle.drive_requests import DriveRequest
 from runtime.cycle.inputs import Inputs, Request, command_gap_max_s, gather_inputs
 from runtime.cycle.live_settings import LiveSettings
-from runtime.cycle.modes import Mode
+from runtime.cycle.modes import Mode, ModeState
+from runtime.cycle.preparation import (
+    Preparation,
+    prepared_state,
+    run_until_prepared,
+    unprepared_state,
+    unprepared_step,
+)
 from runtime.cycle.step import Command, CycleRecord, State, apply_command, apply_settings, step
 from runtime.cycle.summary import RunSummary, run_summary
 from runtime.support.health import Health, describe_exception
@@ -48,27 +55,20 @@ Direction: TypeAlias = Literal["in", "out"]
 EDITS_MAX: Final = 64
 """Most edits of the map that wait for one cycle: more than a person makes in its 50 ms."""
 
-LINE_OPENED: Final = "line opened"
-LINK_RECEIVE: Final = "link receive"
-LINE_LOST: Final = "line lost"
-COLLECTION: Final = "garbage collection"
-CONSOLE_RECEIVE: Final = "console receive"
-CONSOLE_FRAME: Final = "console frame"
-CONSOLE_SEND: Final = "console send"
-CALLBACKS: Final = (
-    LINE_OPENED, LINK_RECEIVE, LINE_LOST, COLLECTION, CONSOLE_RECEIVE, CONSOLE_FRAME, CONSOLE_SEND
-)  # fmt: skip
-"""Names of this program's callbacks that the loop runs between two cycles."""
+OnCycle: TypeAlias = Callable[[CycleRecord, State, CycleStats, RobotDriver], None]
+"""Gets a cycle, the state it left, the timing of all cycles, and the driver for the counts of its line."""
 
 
 @dataclass(frozen=True, slots=True)
 class Observers:
     """Callbacks that follow the run; each must return quickly."""
 
-    on_cycle: Callable[[CycleRecord, State, CycleStats, RobotDriver], None] | None = None
+    on_cycle: OnCycle | None = None
     on_firing: Callable[[Firing], None] | None = None
     on_bytes: Callable[[Direction, float, bytes], None] | None = None
     """Gets the direction, the moment by the host's clock, and the bytes that went over the line."""
+    on_unprepared_cycle: OnCycle | None = None
+    """Gets the cycles before recognition is ready, in place of `on_cycle`."""
     on_settings: Callable[[Settings], None] | None = None
     """Gets settings that changed while the robot runs, before the first cycle under them."""
 
@@ -88,6 +88,8 @@ class RobotProcess:
         Monotonic, s. A `RunClock` that can be paused pauses the run with it.
     notifier : SdNotifier, optional
         Reports to the service manager that started this process, if one did.
+    preparation : Preparation, optional
+        Prepares recognition beside the first cycles; None if it is ready.
 
     Attributes
     ----------
@@ -104,6 +106,7 @@ class RobotProcess:
         observers: Observers = Observers(),
         clock: Callable[[], float] = time.monotonic,
         notifier: SdNotifier | None = None,
+        preparation: Preparation | None = None,
     ) -> None:
         self.live_settings = LiveSettings(settings)
         self._settings = settings
@@ -114,7 +117,8 @@ class RobotProcess:
         self._notifier = SdNotifier() if notifier is None else notifier
         self.health = Health(log)
         self._driver = make_driver(settings)
-        self._state = State(Perception(settings.ring, settings.models, settings.perception))
+        self._preparation = preparation
+        self._state = prepared_state(settings) if preparation is None else unprepared_state(settings)
         self._scheduler = CycleScheduler(settings, self._clock, CALLBACKS)
         timed = self.timing_monitor.timed
         self._link = Link(
@@ -204,6 +208,9 @@ class RobotProcess:
             footprint = Footprint(self._memory)
             try:
                 self._arm_when_ready = arm
+                if self._preparation is not None:
+                    await self._prepare(self._preparation)
+                    footprint = Footprint(self._memory)
                 with self._memory.driving():
                     await self._run_cycles(seconds)
             finally:
@@ -213,6 +220,22 @@ class RobotProcess:
         return run_summary(
             self._state, self._scheduler.stats, self.timing_monitor, self._driver, process_row, self._stop_reasons
         )
+
+    async def _prepare(self, preparation: Preparation) -> None:
+        """Run cycles without perception until recognition is ready; it begins with an empty map."""
+        await run_until_prepared(preparation, self._settings, self._unprepared_cycle, self._stop, self._log)
+        mode, self._state = self._state.mode, prepared_state(self._settings)
+        self._state.mode = mode
+
+    def _unprepared_cycle(self, progress: str) -> None:
+        """Run a cycle before recognition is ready: the line is served, the echoes are shown, the robot stands."""
+        (run_s, host_s), before = self._clock.both(), self._state.mode
+        self._apply_live_settings()
+        inputs = self._gather(run_s, host_s)
+        record = unprepared_step(
+            self._state, inputs, self._settings, progress, lambda command: self._carry_out(command, run_s)
+        )
+        self._report(record, before, self._observers.on_unprepared_cycle)
 
     async def _run_cycles(self, seconds: float | None) -> None:
         """Run cycle after cycle until the run ends: sleep until one is due, run it, plan the next."""
@@ -236,15 +259,12 @@ class RobotProcess:
         """Run one cycle in the order of DESIGN.md: gather, step (which sends the command and refines), record."""
         mark = self.timing_monitor.mark
         self._apply_live_settings()
-        inputs = self._gather(now)
+        start = self._scheduler.begin(now)
+        inputs = self._gather(now.run_s, now.host_s, start.echo_age_s)
         mark(Phase.GATHER)
         before = self._state.mode
         record = self._step(inputs, now, mark)
-        if self._state.mode.entered_since(before):
-            self._report_mode()
-        self._notify_observers(record)
-        if inputs.fault is None:
-            self._notifier.alive(inputs.run_s)
+        self._report(record, before, self._observers.on_cycle)
         mark(Phase.OBSERVERS)
 
     def _apply_live_settings(self) -> None:
@@ -256,7 +276,7 @@ class RobotProcess:
         if self._observers.on_settings is not None:
             self._observers.on_settings(self._settings)
 
-    def _gather(self, now: ClockSample) -> Inputs:
+    def _gather(self, run_s: float, host_s: float, echo_age_s: float | None = None) -> Inputs:
         """Return what the robot sent and the operator requested since the last cycle."""
         if self._arm_when_ready and self._state.mode.mode is Mode.READY:
             self._arm_when_ready = False
@@ -264,17 +284,16 @@ class RobotProcess:
         request, self._request = self._request, None
         drive_request, self._drive_request = self._drive_request, None
         edits, self._edits = tuple(self._edits), []
-        start = self._scheduler.begin(now)
         return gather_inputs(
             self._driver,
-            now.run_s,
+            run_s,
             request,
-            echo_age_s=start.echo_age_s,
+            echo_age_s=echo_age_s,
             overrun=self._scheduler.overrun,
             fault=self.health.fault(),
             edits=edits,
             drive_request=drive_request,
-            host_s=now.host_s,
+            host_s=host_s,
         )
 
     def _step(self, inputs: Inputs, now: ClockSample, mark: Callable[[Phase], None]) -> CycleRecord:
@@ -290,16 +309,20 @@ class RobotProcess:
             mark,
         )
 
-    def _notify_observers(self, record: CycleRecord) -> None:
-        """Record and show the cycle, and log what is new about sensors and odometry."""
-        received, observers = record.inputs.received, self._observers
+    def _report(self, record: CycleRecord, before: ModeState, on_cycle: OnCycle | None) -> None:
+        """Record and show the cycle, and log what is new about mode, sensors and odometry."""
+        received, on_firing = record.inputs.received, self._observers.on_firing
+        if self._state.mode.entered_since(before):
+            self._report_mode()
         for line in self._alerts.update(received, self._state.perception):
             self._log.warning(line)
-        if observers.on_firing is not None:
+        if on_firing is not None:
             for firing in received.firings:
-                observers.on_firing(firing)
-        if observers.on_cycle is not None:
-            observers.on_cycle(record, self._state, self._scheduler.stats, self._driver)
+                on_firing(firing)
+        if on_cycle is not None:
+            on_cycle(record, self._state, self._scheduler.stats, self._driver)
+        if record.inputs.fault is None:
+            self._notifier.alive(record.inputs.run_s)
 
     def _report_mode(self) -> None:
         """Log the mode that was entered, and report it to the service manager."""

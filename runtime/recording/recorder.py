@@ -134,6 +134,11 @@ class Recorder:
         """The state of the recording."""
         return self._writer.status
 
+    @property
+    def last_error(self) -> str | None:
+        """The last trouble with the disk, None if there was none."""
+        return self._writer.last_error
+
     def probe(self) -> str | None:
         """Return how its thread ended; None while it runs. See `runtime.support.health`."""
         return self._writer.thread.probe()

@@ -32,7 +32,7 @@ class RingLogWriter:
         self._file: TextIO | None = None
         self._rows: RingLogRows | None = None
         self._bytes = 0
-        self._error: str | None = None
+        self.last_error: str | None = None
         self._thread = BackgroundWriter[Firing](
             "ring log", self._write, begin=self._begin, finish=self._finish, capacity=QUEUE_MAX,
             close_max_s=CLOSE_MAX_S,
@@ -55,7 +55,7 @@ class RingLogWriter:
     def status(self) -> RecorderStatus:
         """The state of the ring log; `messages` counts firings, and `bytes` is known at the end."""
         written = 0 if self._rows is None else self._rows.count
-        return RecorderStatus(str(self._path), 1, self._bytes, written, self._thread.lost, self._error)
+        return RecorderStatus(str(self._path), 1, self._bytes, written, self._thread.lost, self.last_error)
 
     def put(self, firing: Firing) -> None:
         """Queue a firing."""
@@ -75,12 +75,12 @@ class RingLogWriter:
 
     def _write(self, firing: Firing) -> None:
         if self._file is None or self._rows is None:
-            raise OSError(self._error)  # counted as lost
+            raise OSError(self.last_error)  # counted as lost
         try:
             self._rows.write(firing)
         except (OSError, RingLogError) as error:
             self._fail(str(error if isinstance(error, RingLogError) else cannot_write(self._path, error)))
-            raise OSError(self._error) from error
+            raise OSError(self.last_error) from error
 
     def _finish(self) -> None:
         if self._file is None or self._rows is None:
@@ -101,4 +101,4 @@ class RingLogWriter:
 
     def _note(self, error: str) -> None:
         """Keep the first error: the others follow from it."""
-        self._error = self._error or error
+        self.last_error = self.last_error or error

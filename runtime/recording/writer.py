@@ -181,6 +181,11 @@ class RecordingWriter:
         """The state of the recording."""
         return replace(self._status, dropped=self._status.dropped + self.thread.lost)
 
+    @property
+    def last_error(self) -> str | None:
+        """As in `status`, at a fraction of its cost: asked after every cycle."""
+        return self._status.last_error
+
     def _drop(self, count: int) -> None:
         self._status = replace(self._status, dropped=self._status.dropped + count)
 

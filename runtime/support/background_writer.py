@@ -115,7 +115,7 @@ class BackgroundWriter(Generic[Item]):
         always : bool
             Queue it even if the queue is full: for the few items without which later ones cannot be read.
         """
-        if self.is_full and not always:
+        if len(self._queue) >= self._capacity and not always:
             self._refused += 1
             self.last_error = "items come faster than they can be written"
             return False

@@ -48,6 +48,7 @@ def _drive(settings: Settings, perception: Perception, firings: int = FIRINGS) -
         while firings > 1 and perception.can_refine:
             perception.refine()
     perception.labelled_objects()
+    perception.counts  # noqa: B018 - a property that runs kernels
 
 
 def _square() -> ModelConfig:

@@ -69,10 +69,10 @@ class RunRecording:
         def on_cycle(record: CycleRecord, state: State, stats: CycleStats, driver: RobotDriver) -> None:
             recorder.on_cycle(record, state)
             for writer in writers:
-                status = writer.status
-                if status.last_error != self._reported.get(writer):
-                    self._reported[writer] = status.last_error
-                    log.warning("the recording is incomplete", reason=status.last_error, dropped=status.dropped)
+                error = writer.last_error
+                if error != self._reported.get(writer):
+                    self._reported[writer] = error
+                    log.warning("the recording is incomplete", reason=error, dropped=writer.status.dropped)
             if view is not None:
                 view(record, state, stats, driver)
 

@@ -16,7 +16,7 @@ from runtime.console.clients.client_hub import ClientHub
 from runtime.console.commands.command import CommandContext
 from runtime.console.frames.frame_encoder import NO_LINK_COUNTS, FrameContext, FrameEncoder
 from runtime.console.protocols import Run
-from runtime.cycle.process import CONSOLE_FRAME
+from runtime.cycle.callbacks import CONSOLE_FRAME
 from runtime.cycle.step import CycleRecord, State
 from runtime.support.health import describe_exception
 from runtime.timing.cycle_stats import CycleStats

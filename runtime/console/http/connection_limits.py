@@ -15,7 +15,7 @@ from config.errors import WRONG_CALL, UserError
 from config.settings import ConsoleConfig
 from runtime.console.http.client_limits import TokenBucket
 from runtime.console.timed_coroutine import Timed
-from runtime.cycle.process import CONSOLE_RECEIVE
+from runtime.cycle.callbacks import CONSOLE_RECEIVE
 
 PORTS_TRIED: Final = 20
 """How many successive ports are tried before any free one is taken."""

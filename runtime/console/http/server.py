@@ -25,7 +25,7 @@ from runtime.console.http.connection_limits import ConnectionLimiter
 from runtime.console.http.log_forwarder import LogForwarder
 from runtime.console.http.static_files import StaticFile, security_headers
 from runtime.console.timed_coroutine import Timed, timed_coroutine
-from runtime.cycle.process import CONSOLE_RECEIVE, CONSOLE_SEND
+from runtime.cycle.callbacks import CONSOLE_RECEIVE, CONSOLE_SEND
 
 if TYPE_CHECKING:
     import socket

@@ -29,7 +29,7 @@ from runtime.cycle.drive_requests import DriveRequest
 from runtime.cycle.inputs import Request
 from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.modes import Mode, ModeState
-from runtime.cycle.process import CALLBACKS
+from runtime.cycle.callbacks import CALLBACKS
 from runtime.cycle.step import CycleRecord, Inputs, Refused, State
 from runtime.support.health import Health
 from runtime.support.kernel_loader import KernelLoader
