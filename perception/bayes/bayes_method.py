@@ -229,7 +229,7 @@ class BayesPerception:
         self._last_reported["x"] = np.nan
         self._objects = None
         self._segment_count = 0
-        self._counted_at = UNKNOWN
+        self._counted_at: int = UNKNOWN
         """Number of segments made when those in the map were counted."""
 
     def _name_models(self, models: Sequence[ModelConfig]) -> None:

@@ -12,7 +12,8 @@ import os
 import runpy
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Final
 
 ECHOLOCATE: Final = "runtime.cli"
@@ -29,7 +30,12 @@ def child_environment() -> dict[str, str]:
 
 
 async def start_child(
-    module: str, arguments: Sequence[str], *, pipes: bool, low_priority: bool = False
+    module: str,
+    arguments: Sequence[str],
+    *,
+    pipes: bool,
+    low_priority: bool = False,
+    environment: Mapping[str, str] = MappingProxyType({}),
 ) -> asyncio.subprocess.Process:
     """Start a module as a program, in a session of its own, and return its process.
 
@@ -43,21 +49,23 @@ async def start_child(
         Whether standard input and output are pipes to this process; standard error always is one.
     low_priority : bool
         Whether it runs at low priority; see `lower_priority`.
+    environment : mapping, optional
+        Variables of its environment beside those of this process.
     """
     pipe, nothing = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
     program = [LOW_PRIORITY, module] if low_priority else [module]
     return await asyncio.create_subprocess_exec(
         sys.executable, "-m", *program, *arguments,
         stdin=pipe if pipes else nothing, stdout=pipe if pipes else nothing, stderr=pipe, start_new_session=True,
-        env=child_environment(),
+        env={**child_environment(), **environment},
     )  # fmt: skip
 
 
 async def kill_child(process: asyncio.subprocess.Process) -> None:
-    """Kill a process that holds nothing that could be lost, and wait for its end."""
+    """Kill a process of `start_child`, with its own children, and wait for its end; it holds nothing to be lost."""
     if process.returncode is None:
         with contextlib.suppress(ProcessLookupError):
-            os.kill(process.pid, signal.SIGKILL)
+            os.killpg(process.pid, signal.SIGKILL)  # its session is a process group
     await process.wait()
 
 

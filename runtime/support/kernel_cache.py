@@ -166,6 +166,6 @@ def compile_parts(settings: Settings, folder: Path, parts: Sequence[str]) -> Non
             kernel_warmup.observe_once(settings)
             if POLYGONS in parts:
                 kernel_warmup.RUN_ONCE[BAYES](settings)
-    warm_up(settings, parts)
     for part in parts:
+        warm_up(settings, [part])
         (folder / part).touch()

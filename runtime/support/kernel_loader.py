@@ -1,20 +1,28 @@
-"""Load the kernels of a model that is added while the robot drives, without delaying a cycle.
+"""Prepare kernels beside a running loop: another process compiles them, then a thread loads them.
 
-A run loads the kernels it needs before its first cycle. Those for polygons are half of all, so a run whose models
-are all round leaves them out. If a polygon is added later, they are prepared before the new settings take effect:
-compiled by a process at low priority if they never were, then loaded by a thread between whose steps the loop runs.
+On the very first start nothing is compiled; the run begins nevertheless, and `KernelPreparation` prepares what it
+needs while the robot stands. The kernels for polygons are half of all, so a run whose models are all round leaves
+them out; if a polygon is added later, `KernelLoader` prepares them before the new settings take effect.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable
+import math
+import time
+from collections.abc import Awaitable, Callable, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
+from config.errors import FAILED, UserError
 from config.settings import Settings
 from runtime.support.child_process import kill_child, start_child
 from runtime.support.kernel_cache import (
+    BAYES,
+    EMULATOR,
+    PAPER,
+    POLYGONS,
     compiled_signatures,
     is_interpreted,
     needed_parts,
@@ -28,6 +36,25 @@ if TYPE_CHECKING:
 
 COMPILING_MAX_S: Final = 600.0
 """Time limit for the compiling process: ten times what it usually takes at low priority beside a driving robot."""
+
+
+WARM_UP: Final = "runtime.support.kernel_warmup"
+"""The module that compiles, run as a program."""
+
+COMPILED: Final = "*.nbi"
+"""Pattern of numba's index files, one for each compiled kernel."""
+
+KERNEL_COUNTS: Final = MappingProxyType({BAYES: 125, POLYGONS: 61, PAPER: 20})
+"""Kernels of each part that no part before it has, as counted after compiling; for the display of progress only."""
+
+SHARE_MIN: Final = 0.1
+"""Share of the kernels from which the time left is estimated."""
+
+COUNT_PERIOD_S: Final = 1.0
+"""Time between two counts of the compiled kernels."""
+
+LOOK_PERIOD_S: Final = 0.1
+"""Time between two looks at whether the compiling process is done."""
 
 
 class KernelLoader:
@@ -75,8 +102,93 @@ class KernelLoader:
         return None
 
 
+class KernelPreparation:
+    """Compile and load the kernels of a run whose robot stands until they are ready.
+
+    The emulator runs uncompiled meanwhile; its kernels are compiled last, for the next start.
+
+    Parameters
+    ----------
+    parts : sequence of str
+        Those of `PARTS` that the run needs, the emulator's among them if it has one.
+    host_clock : callable
+        Monotonic, s.
+    """
+
+    def __init__(self, parts: Sequence[str], host_clock: Callable[[], float] = time.monotonic) -> None:
+        self._parts = [part for part in parts if part != EMULATOR]
+        self._all_parts = [*self._parts, EMULATOR]
+        self._folder = use_kernel_cache()
+        self._expected = sum(KERNEL_COUNTS[part] for part in self._parts)
+        self._host_clock = host_clock
+        self._begin_host_s = host_clock()
+        self._progress = "recognition is being prepared"
+        self._progress_host_s = -math.inf
+        self._process: asyncio.subprocess.Process | None = None
+
+    @property
+    def progress(self) -> str:
+        """How many kernels are compiled, and how long the rest will take; a new count every second."""
+        host_s = self._host_clock()
+        if host_s - self._progress_host_s >= COUNT_PERIOD_S:
+            self._progress_host_s = host_s
+            done = min(sum(1 for _ in self._folder.rglob(COMPILED)), self._expected)
+            self._progress = progress_text(done, self._expected, host_s - self._begin_host_s)
+        return self._progress
+
+    async def __call__(self, settings: Settings) -> None:
+        """Return when no kernel of the parts is left to compile or to load.
+
+        Raises
+        ------
+        UserError
+            They could not be compiled.
+        """
+        self._process = await start_child(WARM_UP, [",".join(self._all_parts), "whole"], pipes=False)
+        while uncompiled_parts(self._folder, self._parts):
+            if self._process.returncode is not None:
+                raise UserError(
+                    f"recognition could not be prepared: its kernels were not compiled into {self._folder}, "
+                    "likely for lack of memory or disk space; make room, then start again",
+                    FAILED,
+                )
+            await asyncio.sleep(LOOK_PERIOD_S)
+        await asyncio.to_thread(warm_up, settings, self._parts)
+
+    async def close(self) -> None:
+        """End a compilation in progress; the next start continues from there."""
+        if self._process is not None:
+            await kill_child(self._process)
+
+
+def begin_preparation(settings: Settings) -> KernelPreparation | None:
+    """Return the preparation of a run with these settings; None if there is nothing to compile."""
+    parts = needed_parts(settings)
+    if is_interpreted() or not uncompiled_parts(use_kernel_cache(), parts):
+        return None
+    return KernelPreparation(parts)
+
+
+def progress_text(done: int, expected: int, elapsed_s: float) -> str:
+    """Return how far compiling is, for the operator.
+
+    Parameters
+    ----------
+    done, expected : int
+        Kernels compiled, of how many.
+    elapsed_s : float
+        Since the start, s.
+    """
+    text = f"recognition is being prepared: {done} of {expected} kernels"
+    if done >= expected:
+        return f"{text}; they are being loaded"
+    if done < expected * SHARE_MIN:
+        return text
+    return f"{text}, about {max(1.0, elapsed_s * (expected - done) / done):.0f} s left"
+
+
 async def _compile_in_child(part: str) -> None:
-    process = await start_child("runtime.support.kernel_warmup", [part, "whole"], pipes=False, low_priority=True)
+    process = await start_child(WARM_UP, [part, "whole"], pipes=False, low_priority=True)
     try:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(process.communicate(), COMPILING_MAX_S)

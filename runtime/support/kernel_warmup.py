@@ -2,7 +2,8 @@
 
 Two processes that compile the same kernel do the same work twice. So the second process begins with what the first
 one compiles last: `python -m runtime.support.kernel_warmup bayes` compiles the refinement of circles, `… polygons`
-that of polygons, and `… polygons whole` everything that polygons need, for a robot that is driving.
+that of polygons, and `… bayes,emulator whole` everything that these parts need, in this order, for a robot whose
+process has already started.
 """
 
 from __future__ import annotations
@@ -159,13 +160,16 @@ def compile_refinement(part: str) -> None:
     refine(memory.s, memory.tracks, make_settings(settings.ring, settings.models, bayes), bayes.fresh_share)
 
 
-def compile_part(part: str) -> None:
-    """Compile all kernels of a part."""
+def compile_whole(parts: Sequence[str]) -> None:
+    """Compile all kernels of these parts, in this order."""
     from config.load import load_settings
 
-    compile_parts(load_settings(None), use_kernel_cache(), [part])
+    compile_parts(load_settings(None), use_kernel_cache(), parts)
 
 
 if __name__ == "__main__":
     use_kernel_cache()
-    (compile_part if sys.argv[2:] == ["whole"] else compile_refinement)(sys.argv[1])
+    if sys.argv[2:] == ["whole"]:
+        compile_whole(sys.argv[1].split(","))
+    else:
+        compile_refinement(sys.argv[1])

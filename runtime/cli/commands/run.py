@@ -22,6 +22,7 @@ from runtime.cli.tables import objects_table, timing_line, timing_table
 from runtime.support.config_lint import lint_settings
 from runtime.support.file_lock import file_lock
 from runtime.support.kernel_cache import prepare_kernels
+from runtime.support.kernel_loader import KernelPreparation, begin_preparation
 from runtime.support.length_format import Units
 from runtime.support.logs import LogStatus, open_log
 from runtime.support.sd_notify import SdNotifier
@@ -102,7 +103,9 @@ def run_robot(
         settings = with_port(settings, port)
     refuse_unwritable({"--record": record, "--json": json_file})
     console = Console(stderr=True)
-    prepare_kernels(settings, console)
+    preparation = begin_preparation(settings)
+    if preparation is None:
+        prepare_kernels(settings, console)
     live = not headless and console.is_terminal and not console.is_dumb_terminal
     log_status = LogStatus()
     with contextlib.ExitStack() as stack:
@@ -128,12 +131,14 @@ def run_robot(
                 control: TimeControl = NoTimeControl()
                 if isinstance(clock, ScaledClock):
                     arguments = emulator.arguments(config, sets)
-                    emulator_port, control = await running.enter_async_context(start_emulator(arguments, clock))
+                    emulator_port, control = await running.enter_async_context(
+                        start_emulator(arguments, clock, compiled=preparation is None)
+                    )
                     run_settings = with_port(settings, emulator_port)
                 return await run_process(
                     run_settings, log, console, clock=clock, control=control, live=live, units=units,
                     recording=recording, log_status=log_status, arm=arm or port is None, seconds=seconds,
-                    emulated=port is None,
+                    emulated=port is None, preparation=preparation,
                     reload=lambda: reload_settings(
                         config, sets, emulator.world, port_option, None if port else run_settings.link.port,
                         no_console=no_console,
@@ -240,6 +245,7 @@ async def run_process(
     arm: bool,
     seconds: float | None,
     emulated: bool,
+    preparation: KernelPreparation | None,
     reload: Callable[[], Settings],
 ) -> RunSummary:
     """Run the robot's process with live view, console, signals and keys; return the summary of the run.
@@ -264,6 +270,8 @@ async def run_process(
         As of `runtime.cycle.process.RobotProcess.run`.
     emulated : bool
         Whether the robot is emulated.
+    preparation : KernelPreparation, optional
+        Prepares recognition beside the run; None if it is ready.
     reload : callable
         Reads the settings again.
     """
@@ -283,8 +291,10 @@ async def run_process(
 
         observers = recording.observers(on_cycle, log)
         process = RobotProcess(
-            settings, log, observers, clock, notifier=stack.enter_context(SdNotifier.from_environment())
+            settings, log, observers, clock, stack.enter_context(SdNotifier.from_environment()), preparation
         )
+        if preparation is not None:
+            stack.push_async_callback(preparation.close)
         kernel_loader = KernelLoader(log)
         reloader = Reloader(process.live_settings, reload, log, kernel_loader)
         if settings.console.enabled:

@@ -12,6 +12,7 @@ export class Status {
   #connection;
   #notifications;
   #announce = byId("announce");
+  #announced = null;
   #closed = null;
   #silent = false;
   #counts = new Map();
@@ -38,7 +39,10 @@ export class Status {
     setAttribute(byId("mode-icon"), "href", `#m-${mode.toLowerCase()}`);
     setText(byId("mode-name"), `${this.#run.watchesRecording ? "then: " : ""}${mode.replace("_", " ")}`);
     setText(byId("reason"), reason ?? "");
-    setText(this.#announce, `Mode ${mode.replace("_", " ").toLowerCase()}${reason ? `: ${reason}` : ""}`);
+    // A reason that counts is announced once, not each second.
+    const kind = `${mode} ${reason ?? ""}`.replace(/\d+/g, "");
+    if (kind !== this.#announced) setText(this.#announce, `Mode ${mode.replace("_", " ").toLowerCase()}${reason ? `: ${reason}` : ""}`);
+    this.#announced = kind;
   }
 
   #facts() {

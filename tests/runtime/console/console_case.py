@@ -25,11 +25,11 @@ from perception.pipeline import Perception
 from runtime.console.console import Console
 from runtime.console.http.client_limits import Limits
 from runtime.console.protocols import RecordingControl, ReplayControl
+from runtime.cycle.callbacks import CALLBACKS
 from runtime.cycle.drive_requests import DriveRequest
 from runtime.cycle.inputs import Request
 from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.modes import Mode, ModeState
-from runtime.cycle.callbacks import CALLBACKS
 from runtime.cycle.step import CycleRecord, Inputs, Refused, State
 from runtime.support.health import Health
 from runtime.support.kernel_loader import KernelLoader
