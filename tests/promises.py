@@ -114,6 +114,10 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "unretrieved task exception, t_us wrap crossed",
         ),
         "P16": Promise("Traceable", "this table is generated from the tests that ran"),
+        "P17": Promise(
+            "Compiled code is ours",
+            "kernels are loaded only from a folder that this user owns and nobody else can write, or from one made anew",
+        ),
     }
 )  # fmt: skip
 

@@ -7,8 +7,11 @@ one process compiles everything before the next starts.
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
+import shutil
+import stat
 import sys
 import tempfile
 from collections.abc import Iterable, Sequence
@@ -37,6 +40,9 @@ PARTS: Final = (EMULATOR, BAYES, POLYGONS, PAPER)
 """What is compiled separately: a method by its name, what the Bayesian method needs beyond it for polygons, and the
 emulator. A file with the name of a part in the cache folder says that it is compiled."""
 
+PRIVATE: Final = 0o700
+OTHERS_WRITE: Final = stat.S_IWGRP | stat.S_IWOTH
+
 
 def kernels_key() -> str:
     """Return a digest of everything that compiled kernels depend on: the sources, Python, numba and numpy."""
@@ -51,20 +57,29 @@ def kernels_key() -> str:
 
 
 def cache_folder() -> Path:
-    """Return a writable folder for the kernels of these sources, created if needed.
+    """Return a folder for the kernels of these sources that only this user can write; it is created if needed.
 
-    It is in the user's cache; where that cannot be written, in the folder for temporary files.
+    Numba unpickles what it finds there, so whoever can write into it can run code as this user. It is in the user's
+    cache; where that cannot be written or others can write into it, it is a new folder for this process and its
+    children, which is removed at the end.
     """
-    key = kernels_key()
-    for base in (user_cache_path("echolocate"), Path(tempfile.gettempdir(), f"echolocate-{os.getuid()}")):
-        folder = base / "kernels" / key
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
+    folder = user_cache_path("echolocate") / "kernels" / kernels_key()
+    try:
+        folder.mkdir(mode=PRIVATE, parents=True, exist_ok=True)
+        if all(_is_ours(place) for place in (folder, *folder.parents[:2])):
             with tempfile.TemporaryFile(dir=folder):
                 return folder
-        except OSError:
-            continue
-    return Path(tempfile.mkdtemp(prefix="echolocate-"))
+    except OSError:
+        pass
+    private = Path(tempfile.mkdtemp(prefix="echolocate-kernels-"))
+    atexit.register(shutil.rmtree, private, ignore_errors=True)
+    return private
+
+
+def _is_ours(folder: Path) -> bool:
+    """Return whether a folder, not a link to one, belongs to this user and nobody else can write into it."""
+    found = folder.lstat()
+    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & OTHERS_WRITE
 
 
 def use_kernel_cache() -> Path:

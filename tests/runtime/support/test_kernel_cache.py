@@ -89,17 +89,58 @@ def test_every_package_with_kernels_is_hashed() -> None:
     assert holders == {ROOT.joinpath(*name.split(".")) for name in kernels.PACKAGES}
 
 
-def test_an_unwritable_home_falls_back(home: Path) -> None:
+def private(folder: Path, home: Path) -> bool:
+    """Return whether this is a new, private folder outside the user's cache."""
+    return folder.parent == home.parent / "tmp" and folder.stat().st_mode & 0o777 == 0o700
+
+
+def test_an_unwritable_cache_is_replaced_by_a_new_private_folder(home: Path) -> None:
     home.write_text("a file is no folder, not even for root")
     folder = kernels.cache_folder()
-    assert folder.is_relative_to(home.parent / "tmp" / f"echolocate-{os.getuid()}")
-    assert folder.is_dir()
-    (home.parent / "tmp").rename(home.parent / "gone")
-    (home.parent / "tmp").mkdir()
-    (home.parent / "tmp" / f"echolocate-{os.getuid()}").write_text("taken by another user")
-    last = kernels.cache_folder()
-    assert last.is_dir()
-    assert last.parent == home.parent / "tmp"
+    assert private(folder, home)
+    assert kernels.cache_folder() != folder, "nobody can know its name beforehand"
+
+
+@pytest.mark.promise("P17")
+@pytest.mark.parametrize("depth", [0, 1, 2])
+@pytest.mark.parametrize("how", ["others can write", "a link", "another owner"])
+def test_a_cache_into_which_others_could_plant_code_is_not_used(
+    home: Path, monkeypatch: pytest.MonkeyPatch, depth: int, how: str
+) -> None:
+    folder = kernels.cache_folder()
+    assert folder.is_relative_to(home)
+    planted = (folder, *folder.parents)[depth]
+    if how == "others can write":
+        planted.chmod(0o770)
+    elif how == "a link":
+        planted.rename(home.parent / "theirs")
+        planted.symlink_to(home.parent / "theirs")
+    else:
+        lstat = Path.lstat
+        fields = os.stat_result(lstat(planted))
+
+        def of_another(path: Path) -> os.stat_result:
+            found = list(lstat(path))
+            found[4] = fields.st_uid + (path == planted)
+            return os.stat_result(found)
+
+        monkeypatch.setattr(Path, "lstat", of_another)
+    assert private(kernels.cache_folder(), home)
+
+
+def test_a_folder_in_place_of_the_cache_is_removed_at_the_end(home: Path) -> None:
+    home.write_text("a file is no folder")
+    program = "from runtime.support.kernel_cache import cache_folder; print(cache_folder())"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(home.parent / "tmp")}
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, timeout=60, check=True
+    )
+    assert private_name(done.stdout)
+    assert list((home.parent / "tmp").iterdir()) == []
+
+
+def private_name(printed: str) -> bool:
+    return Path(printed.strip()).name.startswith("echolocate-kernels-")
 
 
 def test_a_home_without_xdg_is_dot_cache(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
