@@ -74,6 +74,9 @@ class BayesPerception:
         self._sure = np.zeros(max(config.tracks_max, MAX_POLYGONS), np.int64)
         self._last_reported = zeros(Reported, config.tracks_max)
         self._reported = records(Reported, self._last_reported)
+        self._segment_count = 0
+        self._counted_at = UNKNOWN
+        """Number of segments made when those in the map were counted."""
         self._forget_derived()
         self._circles: dict[int, DetectedObject] = {}
         self._objects: tuple[DetectedObject, ...] | None = None
@@ -228,9 +231,7 @@ class BayesPerception:
     def _forget_derived(self) -> None:
         self._last_reported["x"] = np.nan
         self._objects = None
-        self._segment_count = 0
-        self._counted_at: int = UNKNOWN
-        """Number of segments made when those in the map were counted."""
+        self._counted_at = UNKNOWN
 
     def _name_models(self, models: Sequence[ModelConfig]) -> None:
         _, self._round = circle_models(models)

@@ -77,7 +77,7 @@ def cache_folder() -> Path:
 
 
 def _is_ours(folder: Path) -> bool:
-    """Return whether a folder, not a link to one, belongs to this user and nobody else can write into it."""
+    """Return whether a folder, not a link to one, belongs to this user and no other can write into it."""
     found = folder.lstat()
     return stat.S_ISDIR(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & OTHERS_WRITE
 

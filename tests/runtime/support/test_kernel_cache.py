@@ -98,7 +98,7 @@ def test_an_unwritable_cache_is_replaced_by_a_new_private_folder(home: Path) -> 
     home.write_text("a file is no folder, not even for root")
     folder = kernels.cache_folder()
     assert private(folder, home)
-    assert kernels.cache_folder() != folder, "nobody can know its name beforehand"
+    assert kernels.cache_folder() != folder, "its name cannot be known beforehand"
 
 
 @pytest.mark.promise("P17")

@@ -14,12 +14,13 @@ import pytest
 import structlog
 from structlog.testing import LogCapture
 
+from config.errors import UserError
 from config.load import load_settings
 from config.settings import Settings
 from runtime.support import kernel_cache as kernels
 from runtime.support import kernel_loader
-from runtime.support.kernel_cache import POLYGONS
-from runtime.support.kernel_loader import KernelLoader
+from runtime.support.kernel_cache import BAYES, EMULATOR, POLYGONS
+from runtime.support.kernel_loader import KernelLoader, KernelPreparation
 from tests.hil.running import ROOT
 
 ROUND = load_settings("hallway")
@@ -113,6 +114,88 @@ async def test_a_run_that_ends_does_not_wait_for_a_compiler(tmp_path: Path, monk
 
 async def _ready(log: structlog.typing.FilteringBoundLogger) -> None:
     await KernelLoader(log)(ROUND, BOXES)
+
+
+class Compiler:
+    """Stands for the process that compiles: leaves index files and marks of parts, or ends without."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, folder: Path, parts: Sequence[str]) -> None:
+        self.returncode: int | None = None
+        self.words: Sequence[str] = ()
+        self.killed: list[Compiler] = []
+        self._folder = folder
+        self._parts = parts
+        monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
+        monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
+        monkeypatch.setattr(kernel_loader, "start_child", self._start)
+        monkeypatch.setattr(kernel_loader, "kill_child", self._kill)
+        monkeypatch.setattr(kernel_loader, "warm_up", lambda _settings, parts: self.loaded.append(tuple(parts)))
+        self.loaded: list[tuple[str, ...]] = []
+
+    async def _start(self, module: str, words: Sequence[str], *, pipes: bool) -> Compiler:
+        assert (module, pipes) == ("runtime.support.kernel_warmup", False)
+        self.words = words
+        self._task = asyncio.create_task(self._compile())
+        return self
+
+    async def _compile(self) -> None:
+        await asyncio.sleep(0.01)
+        for part in self._parts:
+            (self._folder / part).touch()
+        self.returncode = 0
+
+    async def _kill(self, process: Compiler) -> None:
+        self.killed.append(process)
+
+
+def test_a_preparation_is_needed_only_where_something_is_uncompiled(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    Compiler(monkeypatch, tmp_path, ())
+    assert isinstance(kernel_loader.begin_preparation(ROUND), KernelPreparation)
+    for part in (EMULATOR, BAYES):
+        (tmp_path / part).touch()
+    assert kernel_loader.begin_preparation(ROUND) is None
+    assert isinstance(kernel_loader.begin_preparation(BOXES), KernelPreparation)
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    assert kernel_loader.begin_preparation(BOXES) is None
+
+
+async def test_a_preparation_compiles_in_another_process_and_loads_the_rest(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    compiler = Compiler(monkeypatch, tmp_path, (BAYES,))
+    preparation = KernelPreparation((EMULATOR, BAYES))
+    await preparation(ROUND)
+    assert compiler.words == ["bayes,emulator", "whole"], "what the robot waits for comes first"
+    assert compiler.loaded == [(BAYES,)], "the emulator is another process"
+    await preparation.close()
+    assert compiler.killed == [compiler]
+
+
+async def test_a_preparation_without_a_result_says_why(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    Compiler(monkeypatch, tmp_path, ())
+    with pytest.raises(UserError, match="memory or disk space"):
+        await KernelPreparation((EMULATOR, BAYES))(ROUND)
+
+
+def test_progress_counts_kernels_and_shows_the_time_left(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    Compiler(monkeypatch, tmp_path, ())
+    host_s = 100.0
+    preparation = KernelPreparation((EMULATOR, BAYES), lambda: host_s)
+    count = kernel_loader.KERNEL_COUNTS[BAYES]
+    (tmp_path / "room").mkdir()
+    assert preparation.progress == f"recognition is being prepared: 0 of {count} kernels"
+    for k in range(count // 5):
+        (tmp_path / "room" / f"kernel{k}.nbi").touch()
+    host_s = 100.5
+    assert "0 of" in preparation.progress, "counted once a second"
+    host_s = 110.0
+    assert preparation.progress == f"recognition is being prepared: {count // 5} of {count} kernels, about 40 s left"
+    for k in range(count + 5):
+        (tmp_path / "room" / f"kernel{k}.nbi").touch()
+    host_s = 120.0
+    assert preparation.progress.endswith(f"{count} of {count} kernels; they are being loaded")
 
 
 @pytest.mark.soak
