@@ -67,10 +67,10 @@ class Observers:
     on_firing: Callable[[Firing], None] | None = None
     on_bytes: Callable[[Direction, float, bytes], None] | None = None
     """Gets the direction, the moment by the host's clock, and the bytes that went over the line."""
-    on_unprepared_cycle: OnCycle | None = None
-    """Gets the cycles before recognition is ready, in place of `on_cycle`."""
     on_settings: Callable[[Settings], None] | None = None
     """Gets settings that changed while the robot runs, before the first cycle under them."""
+    on_unprepared_cycle: OnCycle | None = None
+    """Gets the cycles before recognition is ready, in place of `on_cycle`."""
 
 
 class RobotProcess:

@@ -77,7 +77,7 @@ class RunRecording:
                 view(record, state, stats, driver)
 
         on_firing = None if ring_log is None else ring_log.put
-        return Observers(on_cycle, on_firing, recorder.on_bytes, view, recorder.on_settings)
+        return Observers(on_cycle, on_firing, recorder.on_bytes, recorder.on_settings, view)
 
     def on_summary(self, summary: Mapping[str, Any]) -> None:
         """Record the summary of the run."""
