@@ -118,6 +118,11 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "Compiled code is ours",
             "kernels are loaded only from a folder that this user owns and nobody else can write, or from a new one",
         ),
+        "P19": Promise(
+            "Nothing is left over",
+            "a page closed while its recording opens; SIGINT, SIGTERM or SIGHUP at any moment of a start: no "
+            "process, no folder, no traceback, exit code 128 + n",
+        ),
     }
 )  # fmt: skip
 

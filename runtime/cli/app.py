@@ -7,6 +7,7 @@ its cache folder is set.
 from __future__ import annotations
 
 import os
+import signal
 import sys
 
 from cyclopts import App, CycloptsError, Group
@@ -16,11 +17,14 @@ from runtime import VERSION
 from runtime.cli.experiment_commands import experiment
 from runtime.cli.recording_commands import export, figures, recover, replay, report
 from runtime.cli.robot_commands import check, emulate, run, service
+from runtime.cli.start_signals import EXIT_CODE_BASE, ending_in_order
 
 app = App(
     name="echolocate",
     help="A robot's main process that recognises and locates objects by sonar alone.",
-    help_epilogue="Exit status: 0 done, 1 the work failed, 2 the call or the configuration was wrong.",
+    help_epilogue=(
+        "Exit status: 0 done, 1 the work failed, 2 the call or the configuration wrong, 128 + n ended by signal n."
+    ),
     version=VERSION,
     group_parameters=Group("Options"),
 )
@@ -40,8 +44,9 @@ for flag in ("--help", "--version"):
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 the work failed, 2 the call or the configuration was wrong."""
     try:
-        code = run_command(sys.argv[1:] if arguments is None else arguments)
-        sys.stdout.flush()
+        with ending_in_order():
+            code = run_command(sys.argv[1:] if arguments is None else arguments)
+            sys.stdout.flush()
     except BrokenPipeError:
         # The reader of the pipe has gone, as `head` does. Python flushes once more at exit, so redirect that.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -63,7 +68,7 @@ def run_command(arguments: list[str]) -> int:
         print_error(str(error))
         return error.exit_code
     except KeyboardInterrupt:
-        return FAILED
+        return EXIT_CODE_BASE + signal.SIGINT
     return result if isinstance(result, int) else DONE
 
 

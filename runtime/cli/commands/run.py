@@ -18,6 +18,7 @@ from config.settings import Settings
 from drivers.registry import make_driver
 from runtime import VERSION
 from runtime.cli.commands.run_recording import RunRecording, open_run_recording
+from runtime.cli.start_signals import ending_the_start
 from runtime.cli.tables import objects_table, timing_line, timing_table
 from runtime.support.config_lint import lint_settings
 from runtime.support.file_lock import file_lock
@@ -127,6 +128,7 @@ def run_robot(
             from runtime.timing.time_control import NoTimeControl
 
             async with contextlib.AsyncExitStack() as running:
+                running.enter_context(ending_the_start())  # until `signals` takes over
                 run_settings = settings
                 control: TimeControl = NoTimeControl()
                 if isinstance(clock, ScaledClock):

@@ -192,7 +192,11 @@ class ReplayClient:
         try:
             process = await start_child(self._program, [str(path)], pipes=True, low_priority=True)
             replay = ReplayProcess(process, partial(_forward, viewer), viewer.send)
-            description = await replay.begin()
+            try:
+                description = await replay.begin()
+            except BaseException:  # a cancellation too: the page may be closed while the recording opens
+                await replay.close()
+                raise
         finally:
             self._opening -= 1
         if viewer.is_gone:

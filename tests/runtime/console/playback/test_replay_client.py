@@ -200,3 +200,25 @@ async def test_a_child_process_is_ended_at_once() -> None:
     process = await start_child(ECHOLOCATE, ["report", "--help"], pipes=False, low_priority=True)
     await kill_child(process)
     assert process.returncode is not None
+
+
+@pytest.mark.promise("P19")
+async def test_a_page_that_closes_while_its_recording_opens_leaves_no_worker(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, measured: Callable[[str], None]
+) -> None:
+    started: list[asyncio.subprocess.Process] = []
+
+    async def start(*args: Any, **options: Any) -> asyncio.subprocess.Process:
+        started.append(await start_child(*args, **options))
+        return started[-1]
+
+    monkeypatch.setattr("runtime.console.playback.replay_client.start_child", start)
+    client = ReplayClient(folder, "tests.runtime.console.never_opens", lambda: None)
+    opening = asyncio.create_task(client.open(Page(), "hall.mcap"))
+    await until(lambda: bool(started))
+    opening.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await opening
+    assert started[0].returncode is not None
+    assert client._opening == 0
+    measured("a page closed while its recording opens: its worker has ended before the command has")
