@@ -63,8 +63,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     promises.collect(config, items)
     for item in items:
-        if any(item.path.is_relative_to(folder) for folder in KERNEL_TESTS):
+        has_kernels = any(item.path.is_relative_to(folder) for folder in KERNEL_TESTS)
+        if has_kernels:
             item.add_marker("kernels")
+        # Tracing doubles the time of plain Python: too slow for real time, and long tests cover what short ones do.
+        if item.get_closest_marker("realtime") or (item.get_closest_marker("compiled") and not has_kernels):
+            item.add_marker("no_cover")
     slow = slow_kernel_setting()
     if slow is None:
         return
