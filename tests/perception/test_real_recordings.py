@@ -3,39 +3,29 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from config.load import load_settings
-from config.settings import Settings
 from drivers.messages import Firing
 from perception.kernel import Floats
 from perception.paper.segments import SegmentExtractor
-from runtime.recording.ring_log import read_ring_log
 from runtime.recording.ring_log_replay import replay_firings
-from tests import recordings
+from tests.recordings import recording
 
 SIDES = (0, 7)
 
 
-def corridor(tmp_path: Path) -> tuple[Settings, list[Firing]]:
-    recordings.udacity_ring_log(tmp_path / "corridor.csv")
-    (tmp_path / "robot.toml").write_text(recordings.udacity_robot())
-    return load_settings(robot=str(tmp_path / "robot.toml")), list(read_ring_log(tmp_path / "corridor.csv", 8))
-
-
 @pytest.mark.compiled
-def test_the_corridor_gives_at_least_300_outline_segments(tmp_path: Path) -> None:
-    chosen, firings = corridor(tmp_path)
+def test_the_corridor_gives_at_least_300_outline_segments() -> None:
+    chosen, firings = recording("corridor")
     assert replay_firings(chosen, firings)["segments"] >= 300
 
 
 @pytest.mark.parametrize("side", SIDES)
-def test_the_corridors_walls_are_straight_lines(tmp_path: Path, side: int) -> None:
+def test_the_corridors_walls_are_straight_lines(side: int) -> None:
     """Of a side sensor's segments in the first 10 m, 80 % lie within 0.15 m and 15° of one straight line."""
-    chosen, firings = corridor(tmp_path)
+    chosen, firings = recording("corridor")
     extractor = SegmentExtractor(chosen.ring, chosen.perception.segments)
     path_m, before, rows = 0.0, firings[0].pose, []
     for firing in firings:
@@ -67,8 +57,6 @@ def best_line_share(segments: Floats) -> float:
 
 
 @pytest.mark.compiled
-def test_the_ring_of_24_runs_through_at_its_full_length(tmp_path: Path) -> None:
-    recordings.scitos_ring_log(tmp_path / "ring.csv")
-    (tmp_path / "robot.toml").write_text(recordings.scitos_robot())
-    chosen = load_settings(robot=str(tmp_path / "robot.toml"))
-    assert replay_firings(chosen, read_ring_log(tmp_path / "ring.csv", 24))["cycles"] == 5456
+def test_the_ring_of_24_runs_through_at_its_full_length() -> None:
+    chosen, firings = recording("ring24")
+    assert replay_firings(chosen, firings)["cycles"] == 1000
