@@ -8,10 +8,11 @@ import os
 import socket
 import struct
 import threading
+import time
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-TIMEOUT_S = 30.0
+TIMEOUT_S = 120.0
 READ_BYTES = 65_536
 
 
@@ -57,7 +58,10 @@ class RawPage:
 
     def next(self, *kinds: str) -> dict[str, Any]:
         """Return the next message of some kind, or the next of all where none is named."""
+        end_s = time.monotonic() + TIMEOUT_S
         while True:
+            if time.monotonic() > end_s:
+                raise TimeoutError(f"no message of {kinds}")
             data = self._take(2)
             length = data[1]
             if length >= 126:

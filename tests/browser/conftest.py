@@ -57,7 +57,7 @@ async def opener(pool: PagePool, screenshots: Callable[[str], Path | None]) -> A
 @pytest.fixture
 def screenshots(request: pytest.FixtureRequest) -> Callable[[str], Path | None]:
     """Where a screenshot goes; None without the option --screenshots."""
-    folder = request.config.getoption("screenshots")
+    folder = request.config.getoption("screenshots", None)
     if folder is None:
         return lambda _name: None
     where = Path(folder)

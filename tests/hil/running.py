@@ -25,6 +25,11 @@ DEADMAN_S = 0.5
 ARM_AGAIN_S = 1.5
 """Time after which a robot that does not drive is armed again, s: longer than an arming takes at most."""
 
+PATIENT = (
+    "--set", "link.tries=100", "--set", "link.silence_max_s=60.0", "--set", "cycle.overruns_max=10000",
+)  # fmt: skip
+"""Settings of a run that gives up neither a robot nor its own cycles because the machine is busy."""
+
 
 def wait_for(done: Callable[[], bool], what: str, seen: Callable[[], object] = str) -> None:
     """Wait until `done`; on timeout fail with what is `seen`."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import signal
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from config.errors import FAILED
 from drivers.messages import Flags
 from runtime.recording.channels import LOG
 from runtime.recording.reader import open_recording
-from tests.hil.running import DEADMAN_S, emulated, running, start_url, wait_for
+from tests.hil.running import DEADMAN_S, PATIENT, emulated, running, start_url, wait_for
 from tests.hil.truth import Row, Truth
 from tests.rawpage import RawPage
 
@@ -26,7 +27,7 @@ pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
 STOPPED_WITHIN_S = DEADMAN_S + 0.3
 """The deadman, and the ramp down to a stop, by the robot's clock, s."""
-QUIET = ("--no-record", "--no-console")
+QUIET = ("--no-record", "--no-console", *PATIENT)
 BOX = 'name = "crate"\nclosed = true\nvertices_m = [[0.4, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.4, -0.3]]\n'
 SETTINGS = 'robot = "denning"\nbehaviors.move_ahead.distance_m = {}\n'
 VELOCITY, DISTANCE = "behaviors.arbiter.base_velocity_m_s", "behaviors.move_ahead.distance_m"
@@ -82,12 +83,36 @@ def test_a_robot_has_one_owner_until_that_is_killed(tmp_path: Path) -> None:
     assert {line.split(",")[1] for line in latency.read_text().splitlines()[1:]} == {"echo", "drive"}
 
 
+def message(page: RawPage, kind: str, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+    """Return the next message of a kind that is wanted."""
+    found: list[dict[str, Any]] = []
+
+    def is_found() -> bool:
+        found[:] = [page.next(kind)]
+        return wanted(found[0])
+
+    wait_for(is_found, f"the {kind}", lambda: found)
+    return found[0]
+
+
 def frame_in(page: RawPage, mode: str) -> dict[str, Any]:
-    """Return the first frame in a mode; the robot is armed for it where it must drive."""
-    while (frame := page.next("state"))["mode"] != mode:
+    """Return the next frame in a mode; the robot is armed for it where it must drive."""
+
+    def is_in(frame: dict[str, Any]) -> bool:
         if mode == "DRIVE" and frame["mode"] in {"READY", "SAFE_STOP"}:
             assert page.ask(type="arm")["ok"]
-    return frame
+        return bool(frame["mode"] == mode)
+
+    return message(page, "state", is_in)
+
+
+def values_of(parameters: dict[str, Any]) -> dict[str, Any]:
+    return {row["path"]: row["value"] for row in parameters["parameters"]}
+
+
+def crates(frame: dict[str, Any]) -> list[int]:
+    """Return the numbers of the objects that are crates."""
+    return [o["number"] for o in frame["objects"] if o["model"] == "crate"]
 
 
 def test_a_run_from_its_start_url_to_its_end(tmp_path: Path) -> None:
@@ -97,7 +122,7 @@ def test_a_run_from_its_start_url_to_its_end(tmp_path: Path) -> None:
         emulated(tmp_path) as robot,
         running(
             tmp_path, "run", "run", str(more), "--port", robot.port, "--record", str(recording), "--json",
-            str(summary), "--set", "console.port=0",
+            str(summary), "--set", "console.port=0", *PATIENT,
         ) as run,
     ):  # fmt: skip
         truth, url = Truth(robot.trace), start_url(run)
@@ -108,28 +133,23 @@ def test_a_run_from_its_start_url_to_its_end(tmp_path: Path) -> None:
 
         assert page.ask(type="set_parameter", path=VELOCITY, value=0.2)["ok"]
         assert frame_in(page, "DRIVE")["controller"]
-        assert page.ask(type="load_model", toml=BOX)["data"] == {"name": "crate"}
-        assert page.ask(type="place_model", model="crate", x=2.0, y=1.0, theta=0.3)["ok"]
-        while not (seen := [o for o in page.next("state")["objects"] if o["model"] == "crate"]):
-            pass
-        assert page.ask(type="evidence", object=seen[0]["number"])["ok"]
-        assert page.ask(type="reject_object", object=seen[0]["number"])["ok"]
-
-        frame_in(page, "DRIVE")
         assert page.ask(type="halt")["ok"]
         frame_in(page, "SAFE_STOP")
         truth.wait(is_halted, "the halt")
 
         more.write_text(SETTINGS.format(5.0), "utf-8")
         run.signal(signal.SIGHUP)
-        while True:
-            values = {row["path"]: row["value"] for row in page.next("parameters")["parameters"]}
-            if values[DISTANCE] == 5.0:
-                break
-        assert values[VELOCITY] == 0.3, "the value of the file replaces the operator's"
+        values = message(page, "parameters", lambda it: values_of(it)[DISTANCE] == 5.0)
+        assert values_of(values)[VELOCITY] == 0.3, "the value of the file replaces the operator's"
 
-        while not is_driving(truth.read()[-1]):
-            frame_in(page, "DRIVE")
+        frame_in(page, "DRIVE")
+        assert page.ask(type="load_model", toml=BOX)["data"] == {"name": "crate"}
+        assert page.ask(type="place_model", model="crate", x=2.0, y=1.0, theta=0.3)["ok"]
+        (number,) = crates(message(page, "state", lambda it: crates(it) != []))
+        assert page.ask(type="evidence", object=number)["ok"]
+        assert page.ask(type="reject_object", object=number)["ok"]
+
+        wait_for(lambda: bool(frame_in(page, "DRIVE")) and is_driving(truth.read()[-1]), "driving")
         run.signal(signal.SIGTERM)
         with pytest.raises(ConnectionError, match="the run is over"):
             page.next("nothing that is ever said")
