@@ -23,8 +23,13 @@ def measured(request: pytest.FixtureRequest) -> Callable[[str], None]:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    terminalreporter.section("measured")
-    for report in terminalreporter.getreports("passed"):
-        for key, text in report.user_properties:
-            if key == MEASURED and report.when == "call":
-                terminalreporter.line(f"{report.nodeid}: {text}")
+    figures = [
+        f"{report.nodeid}: {text}"
+        for report in terminalreporter.getreports("passed")
+        for key, text in report.user_properties
+        if key == MEASURED and report.when == "call"
+    ]
+    if figures:
+        terminalreporter.section("measured")
+    for line in figures:
+        terminalreporter.line(line)
