@@ -116,7 +116,7 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         "P16": Promise("Traceable", "this table is generated from the tests that ran"),
         "P17": Promise(
             "Compiled code is ours",
-            "kernels are loaded only from a folder that this user owns and nobody else can write, or from a new one",
+            "kernels are loaded only from a folder that this user owns and no other can write, or from a new one",
         ),
         "P19": Promise(
             "Nothing is left over",

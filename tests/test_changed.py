@@ -12,12 +12,12 @@ from tests.changed import QUICK, ROOT, find_tests
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
     for name, text in {
-        "tests/a/test_b.py": "from tests.a.helper import thing\n",
+        "tests/a/test_b.py": "from tests.a.helper import value\n",
         "tests/a/test_c.py": "from tests.a import helper\n",
         "tests/a/test_d.py": "",
-        "tests/a/helper.py": "thing = 1\n",
+        "tests/a/helper.py": "value = 1\n",
         "tests/a/conftest.py": "",
-        "tests/x/test_y.py": "from tests.a.helper import thing\n",
+        "tests/x/test_y.py": "from tests.a.helper import value\n",
     }.items():
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -59,7 +59,7 @@ def kernels_key() -> str:
 def cache_folder() -> Path:
     """Return a folder for the kernels of these sources that only this user can write; it is created if needed.
 
-    Numba unpickles what it finds there, so whoever can write into it can run code as this user. It is in the user's
+    Numba unpickles what it finds there, so a user who can write into it can run code as this one. It is in the user's
     cache; where that cannot be written or others can write into it, it is a new folder for this process and its
     children, which is removed at the end.
     """

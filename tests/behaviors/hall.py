@@ -52,9 +52,9 @@ class World:
         c, s = math.cos(angle), math.sin(angle)
         found = []
         for cx, cy, r in self.discs:
-            ahead, aside = c * (cx - x) + s * (cy - y), c * (cy - y) - s * (cx - x)
-            if abs(aside) < r:
-                found.append(ahead - math.sqrt(r * r - aside * aside))
+            ahead, across_m = c * (cx - x) + s * (cy - y), c * (cy - y) - s * (cx - x)
+            if abs(across_m) < r:
+                found.append(ahead - math.sqrt(r * r - across_m * across_m))
         for x1, y1, x2, y2 in self.walls:
             across = c * (y2 - y1) - s * (x2 - x1)
             if across != 0.0:

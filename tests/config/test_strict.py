@@ -45,7 +45,7 @@ def test_non_finite_numbers_are_refused(value: float) -> None:
 
 def test_unknown_keys_and_changes_are_refused() -> None:
     with pytest.raises(ValidationError, match="Extra inputs"):
-        Example.model_validate({"siz_m": 1.0})
+        Example.model_validate({"sizes_m": 1.0})
     with pytest.raises(ValidationError, match="frozen"):
         Example().size_m = 2.0  # type: ignore[misc]
 

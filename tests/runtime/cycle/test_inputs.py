@@ -33,7 +33,7 @@ class StubDriver:
         return RECEIVED
 
 
-def test_the_driver_is_asked_at_the_time_of_the_cycle_and_its_news_taken_once() -> None:
+def test_the_driver_is_asked_at_the_time_of_the_cycle_and_what_it_received_is_taken_once() -> None:
     driver: Any = StubDriver()
     drive_request = Legs()
     inputs = gather_inputs(

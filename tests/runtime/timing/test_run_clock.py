@@ -106,7 +106,7 @@ def test_scaled_time_waits_for_the_emulator_and_for_a_slow_cycle() -> None:
     assert clock() == 100.0, "the emulator has not been heard"
     assert clock.expect(100.05) == math.inf
     machine.pass_time(0.0)
-    assert clock() == pytest.approx(100.05 + LEASE_S), "no farther before the cycle has begun"
+    assert clock() == pytest.approx(100.05 + LEASE_S), "no farther before the cycle has started"
     assert clock.expect(100.05) <= 0.0
     clock.cycle_began()
     clock.expect(100.10)
