@@ -1,20 +1,26 @@
-"""Recordings made for tests: runs in virtual time with refinement cut short at random, recorded as a real run is."""
+"""Recordings for tests: runs in virtual time, recorded as a real run is, with refinement ended early at random."""
 
 from __future__ import annotations
 
+import io
 import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
+from unittest import mock
 
 import numpy as np
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from config.load import load_settings
 from config.settings import Settings
-from runtime.cycle.step import State
+from drivers.messages import Pose
+from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import CHANNELS, CYCLE, RawMessage, schema_of
 from runtime.recording.mcap_file import CHUNK_BYTES, INDEX, PROFILE
+from runtime.recording.mcap_scanner import McapScanner
 from runtime.recording.reader import open_recording
 from runtime.recording.recorder import Recorder
 from runtime.recording.schema import FORMAT
@@ -23,9 +29,10 @@ from runtime.recording.verification import ReplayResult, verify_recording
 from runtime.recording.writer import RecorderStatus
 from runtime.simulation.closed_loop import OperatorInput, simulate
 
-WAIT_S = 30.0
+WAIT_S = 60.0
+"""Only a hang reaches it."""
 SECONDS = 12.0
-"""Of the recorded run that tests share."""
+"""Length of the recorded run that tests share, s."""
 
 
 def hall(*sets: str) -> Settings:
@@ -34,7 +41,7 @@ def hall(*sets: str) -> Settings:
 
 
 def until(done: Callable[[], bool], what: str) -> None:
-    """Wait for another thread."""
+    """Wait until a condition holds that another thread makes true."""
     end_s = time.monotonic() + WAIT_S
     while not done():
         assert time.monotonic() < end_s, what
@@ -42,7 +49,7 @@ def until(done: Callable[[], bool], what: str) -> None:
 
 
 class FiveInSix:
-    """Refuses every sixth quantum, at random."""
+    """A refinement budget that refuses every sixth quantum, at random."""
 
     def __init__(self, seed: int) -> None:
         self._rng = np.random.default_rng(seed)
@@ -51,7 +58,7 @@ class FiveInSix:
         """Begin a cycle."""
 
     def __call__(self, _done: int) -> bool:
-        """Say whether there may be another quantum."""
+        """Return whether another quantum may begin."""
         return bool(self._rng.random() > 1.0 / 6.0)
 
 
@@ -63,20 +70,52 @@ def record(
     queue_max: int = 8192,
     reloads: Mapping[int, Settings] = MappingProxyType({}),
     operator: Callable[[int, State], OperatorInput] | None = None,
+    after: Mapping[int, Callable[[Recorder], None]] = MappingProxyType({}),
+    *,
+    on: bool = True,
 ) -> RecorderStatus:
-    """Record a run in virtual time in which every sixth quantum of refinement is refused for want of time."""
+    """Record a run in virtual time in which every sixth quantum of refinement is refused; return the final status.
+
+    A busy machine may take long to write the end of the file: it has a minute for that.
+
+    Parameters
+    ----------
+    settings
+        Settings of the run, with a world.
+    path
+        The file or folder of the recording.
+    seconds
+        Length of the run, s of virtual time.
+    seed
+        Of the emulator, and of the refused quanta.
+    queue_max
+        Capacity of the recorder's queue.
+    reloads
+        Settings to put in force, by cycle.
+    operator
+        The operator's input in every cycle.
+    after
+        Actions on the recorder, by the cycle that they follow.
+    on
+        Whether to record from the start.
+    """
     world = settings.world
     assert world is not None
     now = [0.0]
     place = SingleFile(path) if isinstance(path, Path) else path
-    with Recorder(settings, place, clock=lambda: now[0], queue_max=queue_max, emulated=True) as recorder:
-        until(lambda: recorder.status.file is not None or recorder.status.last_error is not None, "a file")
+    with (
+        mock.patch("runtime.recording.writer.CLOSE_MAX_S", WAIT_S),
+        Recorder(settings, place, clock=lambda: now[0], queue_max=queue_max, emulated=True, on=on) as recorder,
+    ):
+        until(lambda: not on or recorder.status.file is not None or recorder.status.last_error is not None, "a file")
 
-        def on_state(record: object, state: object, _start: object) -> None:
-            recorder.on_cycle(record, state)  # type: ignore[arg-type]
+        def on_state(record: CycleRecord, state: State, _start: Pose) -> None:
+            recorder.on_cycle(record, state)
             for way in ("in", "out"):
                 recorder.on_bytes(way, now[0], b"\x00bytes\xff")
             now[0] += 0.05
+            if record.cycle in after:
+                after[record.cycle](recorder)
 
         recorder.on_log({"level": "info", "event": "start", "timestamp": "now", "why": None})
 
@@ -97,6 +136,23 @@ def entries_of(path: Path) -> list[RawMessage]:
     """Return every message of a recording."""
     with open_recording(path) as recording:
         return list(recording.messages())
+
+
+def scanned(data: bytes) -> tuple[list[list[RawMessage]], McapScanner]:
+    """Return every readable chunk, and the scanner."""
+    scanner = McapScanner(memoryview(data))
+    return list(scanner.chunks()), scanner
+
+
+def chunks_at(data: bytes) -> list[tuple[int, int]]:
+    """Return where each chunk begins and ends in the file, as the stock reader finds them."""
+    file, found, begin = io.BytesIO(data), [], 0
+    for entry in StreamReader(file, emit_chunks=True).records:
+        if isinstance(entry, Chunk):
+            end = file.tell()
+            begin = end - len(entry.data) - 44 - 9
+            found.append((begin, end))
+    return found
 
 
 def rewrite(
@@ -120,7 +176,7 @@ def rewrite(
 
 
 def verify_file(path: Path, **span: float) -> ReplayResult:
-    """Replay a recording that is whole, or a span of it."""
+    """Verify a recording without corrupt regions, or a span of it."""
     with open_recording(path) as recording:
         result = verify_recording(recording, **span)  # type: ignore[arg-type]
         assert recording.corrupt_regions == []

@@ -1,4 +1,4 @@
-"""Runs among the six drums, recorded once for all tests: to replay; to show, and its firings as a ring log."""
+"""Runs in the six-drum hallway, recorded once per worker process: to replay and to analyse, also as a ring log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Log times are true Unix times even if the run's clock pauses or changes its speed; messages hold the run's time."""
+"""Log times are Unix times even if the run's clock is paused; messages hold the run's time."""
 
 from __future__ import annotations
 

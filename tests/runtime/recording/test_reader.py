@@ -1,4 +1,4 @@
-"""Every command that reads a recording, on files that are none or too new, or with the disk full: one line."""
+"""Files that are not recordings, or of another version, are refused in one line by every command that reads them."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from mcap.writer import Writer
 from config.errors import DONE, FAILED, WRONG_CALL
 from runtime.cli.app import run_command
 from runtime.recording.channels import CYCLE, RUN_INFO, RawMessage, decode, encode
-from runtime.recording.schema import FORMAT, RunInfo
-from tests.recorded import entries_of, rewrite
+from runtime.recording.reader import RecordingError, cycle_head, is_recording, open_recording
+from runtime.recording.schema import FORMAT, Cycle, RunInfo
+from tests.recorded import entries_of, hall, rewrite, scanned
 
 FORMS = ("csv", "parquet", "foxglove", "rosbag2", "ringlog")
 READING = {
@@ -31,7 +32,7 @@ COMMANDS = {**READING, "recover": ("recover", "{file}", "--out", "{out}")}
 def outcome_of(
     command: tuple[str, ...], file: Path, out: Path, capsys: pytest.CaptureFixture[str]
 ) -> tuple[int, str]:
-    """Run a command on a file; return its exit code and the one line that it says."""
+    """Run a command on a file; return its exit code and its error message, which is one line."""
     code = run_command([word.format(file=file, out=out) for word in command])
     err = capsys.readouterr().err
     assert err.startswith("echolocate: "), err
@@ -41,7 +42,7 @@ def outcome_of(
 
 @pytest.fixture(scope="module")
 def newer(hall_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A recording as a later version of this program would write it, with a topic that this one does not know."""
+    """Return a recording of the next format version."""
     path = tmp_path_factory.mktemp("newer") / "newer.mcap"
     rewrite_as(hall_run, path, FORMAT + 1)
     return path
@@ -63,9 +64,11 @@ def test_wrong_files(command: tuple[str, ...], tmp_path: Path, capsys: pytest.Ca
         writer.finish()
     (tmp_path / "empty.mcap").touch()
     (tmp_path / "picture.mcap").write_bytes(b"\x89PNG\r\n" + bytes(5000))
+    (tmp_path / "text.mcap").write_text("t,x,y,theta\n" * 99)
     (tmp_path / "folder.mcap").mkdir()
     why = {
-        "empty.mcap": "is empty", "picture.mcap": "", "foreign.mcap": "another program ('ros2')",
+        "empty.mcap": "is empty", "picture.mcap": "", "text.mcap": "",
+        "foreign.mcap": "another program ('ros2')",
         "folder.mcap": "Is a directory", "nowhere.mcap": "No such file",
     }  # fmt: skip
     for name, reason in why.items():
@@ -77,39 +80,83 @@ def test_wrong_files(command: tuple[str, ...], tmp_path: Path, capsys: pytest.Ca
     assert not out.exists() or not list(out.iterdir()), "nothing was written"
 
 
+@pytest.fixture(scope="module")
+def odd(hall_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a recording with correct checksums whose cycles have another form."""
+    path = tmp_path_factory.mktemp("odd") / "odd.mcap"
+    rewrite([e._replace(data=b'{"record": 7}') if e.topic == CYCLE else e for e in entries_of(hall_run)], path)
+    return path
+
+
 @pytest.mark.parametrize("command", READING.values(), ids=READING)
+def test_every_command_refuses_another_format_or_form(
+    command: tuple[str, ...], newer: Path, odd: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, line = outcome_of(command, newer, tmp_path / "out", capsys)
+    assert (code, f"has recording format {FORMAT + 1} " in line) == (WRONG_CALL, True)
+    code, line = outcome_of(command, odd, tmp_path / "out", capsys)
+    assert (code, "is not valid in this version (record: " in line) == (WRONG_CALL, True)
+
+
 @pytest.mark.parametrize(
     ("version", "word"), [(FORMAT + 1, "a newer echolocate"), (FORMAT - 1, "the older echolocate")]
 )
-def test_another_format_is_refused_with_both_versions(
-    command: tuple[str, ...], version: int, word: str, hall_run: Path, tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+def test_another_format_is_refused_with_both_versions(run: Path, tmp_path: Path, version: int, word: str) -> None:
     path = tmp_path / "other.mcap"
-    rewrite_as(hall_run, path, version)
-    code, line = outcome_of(command, path, tmp_path / "out", capsys)
-    assert code == WRONG_CALL
-    assert f"has recording format {version} (written by echolocate 9)" in line
-    assert f"reads format {FORMAT} only" in line
-    assert word in line
+    rewrite_as(run, path, version)
+    with pytest.raises(RecordingError) as caught, open_recording(path):
+        pass
+    assert str(caught.value).startswith(f"{path}: has recording format {version} (written by echolocate 9)")
+    assert f"reads format {FORMAT} only: use {word}" in str(caught.value)
 
 
-@pytest.mark.parametrize("command", READING.values(), ids=READING)
-def test_a_message_of_another_form(
-    command: tuple[str, ...], hall_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Whole by its checksum, and written by a version that knew cycles otherwise."""
-    odd = tmp_path / "odd.mcap"
-    rewrite([e._replace(data=b'{"record": 7}') if e.topic == CYCLE else e for e in entries_of(hall_run)], odd)
-    code, line = outcome_of(command, odd, tmp_path / "out", capsys)
-    assert code == WRONG_CALL
-    assert "is not valid in this version (record: " in line
+def test_settings_of_another_version_are_refused(run: Path, tmp_path: Path) -> None:
+    path = tmp_path / "odd.mcap"
+    first, *rest = entries_of(run)
+    info = decode(RunInfo, first.data)
+    changed = info.model_copy(update={"settings": {**info.settings, "warp": 9}})
+    rewrite([first._replace(data=encode(changed)), *rest[:3]], path)
+    with (
+        pytest.raises(RecordingError, match="its settings are not valid in this version \\(warp: "),
+        open_recording(path),
+    ):
+        pass
 
 
-def test_a_newer_file_is_restored_as_it_is_or_refused_as_newer(
+def test_a_recording_is_opened_with_its_settings(run: Path) -> None:
+    with open_recording(run) as recording:
+        assert recording.settings == hall()
+        assert recording.world == hall().world
+        records = list(recording.cycle_records())
+        heads = [cycle_head(message) for message in recording.messages() if message.topic == CYCLE]
+        offsets = [offset for offset, _ in recording.chunks()]
+        assert recording.finished
+    assert heads == [(record.cycle, record.inputs.run_s) for record in records]
+    assert cycle_head(RawMessage(CYCLE, 0, b" " + encode(Cycle(record=records[4])))) == heads[4], "decoded if unusual"
+    assert offsets == sorted(set(offsets))
+
+
+def test_a_real_robot_has_no_true_world(run: Path, tmp_path: Path) -> None:
+    first, *_ = entries_of(run)
+    info = decode(RunInfo, first.data).model_copy(update={"emulated": False})
+    rewrite([first._replace(data=encode(info))], tmp_path / "real.mcap")
+    with open_recording(tmp_path / "real.mcap") as recording:
+        assert recording.world is None
+
+
+def test_a_recording_is_recognised_by_its_first_bytes_or_its_name(run: Path, tmp_path: Path) -> None:
+    (tmp_path / "renamed.csv").write_bytes(run.read_bytes()[:100])
+    (tmp_path / "log.csv").write_text("t,x,y,theta,r00\n")
+    assert is_recording(tmp_path / "renamed.csv")
+    assert is_recording(tmp_path / "absent.mcap")
+    assert not is_recording(tmp_path / "log.csv")
+    assert not is_recording(tmp_path / "absent.csv")
+
+
+def test_a_newer_file_is_recovered_unchanged_or_refused_as_newer(
     newer: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Its messages need not be understood to be copied; of what no one here can read it is said why."""
+    """Messages are copied without being decoded; a file without a whole chunk is refused."""
     cut, restored = tmp_path / "cut.mcap", tmp_path / "restored.mcap"
     cut.write_bytes(newer.read_bytes()[:-500])
     assert run_command(["recover", str(cut), "--out", str(restored)]) == DONE
@@ -123,14 +170,13 @@ def test_a_newer_file_is_restored_as_it_is_or_refused_as_newer(
 
 
 def entries_of_any(path: Path) -> list[RawMessage]:
-    from runtime.recording.mcap_scanner import McapScanner
-
-    return [entry for chunk in McapScanner(memoryview(path.read_bytes())).chunks() for entry in chunk]
+    chunks, _ = scanned(path.read_bytes())
+    return [entry for chunk in chunks for entry in chunk]
 
 
 @contextmanager
 def disk_of(size: int) -> Iterator[None]:
-    """Let no file of this process grow beyond `size` bytes, as on a disk that fills up."""
+    """Limit the files of this process to `size` bytes, as on a disk that fills up."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     try:

@@ -1,4 +1,4 @@
-"""A reload while a run is recorded: an input like any other, replayed at the very cycle at which it came."""
+"""A reload during a run is recorded as an input and replayed at its cycle."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def reloaded(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("since_s", [0.0, 5.0, 7.0, 9.0])
+@pytest.mark.parametrize("since_s", [0.0, 9.0])
 def test_replayed_to_the_bit_across_it(reloaded: Path, since_s: float) -> None:
     with open_recording(reloaded) as recording:
         result = verify_recording(recording, since_s=since_s)
@@ -48,7 +48,7 @@ def test_replayed_to_the_bit_across_it(reloaded: Path, since_s: float) -> None:
 
 
 @pytest.mark.compiled
-def test_it_is_in_the_record_and_in_force_from_its_cycle_on(reloaded: Path, tmp_path: Path) -> None:
+def test_it_is_recorded_and_in_force_from_its_cycle_on(reloaded: Path, tmp_path: Path) -> None:
     entries = entries_of(reloaded)
     (change,) = [decode(SettingsChange, e.data) for e in entries if e.topic == SETTINGS]
     assert change.cycle == AT
@@ -57,18 +57,18 @@ def test_it_is_in_the_record_and_in_force_from_its_cycle_on(reloaded: Path, tmp_
     found = [parse_settings(decode(RunInfo, e.data).settings) for e in entries[where:] if e.topic == RUN_INFO]
     assert found
     assert all(t == parse_settings(change.settings) for t in found), "a replay may begin at any keyframe"
-    # Without it the replay goes another way.
+    # Without it the replay differs.
     first = entries[0]
-    deaf = [e._replace(data=first.data) if e.topic == RUN_INFO else e for e in entries if e.topic != SETTINGS]
-    rewrite(deaf, tmp_path / "deaf.mcap")
-    with open_recording(tmp_path / "deaf.mcap") as recording:
+    without = [e._replace(data=first.data) if e.topic == RUN_INFO else e for e in entries if e.topic != SETTINGS]
+    rewrite(without, tmp_path / "without.mcap")
+    with open_recording(tmp_path / "without.mcap") as recording:
         result = verify_recording(recording)
     assert result.first_difference is not None
     assert result.first_difference.cycle >= AT
 
 
 @pytest.mark.compiled
-def test_a_retelling_knows_of_it(reloaded: Path) -> None:
+def test_a_comparison_follows_it(reloaded: Path) -> None:
     with open_recording(reloaded) as recording:
         found = compare_runs(recording, recording.settings)
     assert found.first_change_s is not None

@@ -1,4 +1,4 @@
-"""The ring log: a written file reads back to the bit, and every problem of a foreign file is reported in one line."""
+"""A ring log reads back to the bit; every problem of a file is reported in one line."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from drivers.messages import Firing, Pose
 from runtime.recording.ring_log import LINE_MAX_BYTES, RingLogError, read_ring_log, write_ring_log
+from tests.examples import examples
 
 HEADER = "t,x,y,theta,r00,r01\n"
 
@@ -47,7 +48,7 @@ def error_message(path: Path, sensors: int | None = None) -> str:
     return text.removeprefix(f"{path}: ")
 
 
-def test_reads_what_the_form_says(tmp_path: Path) -> None:
+def test_reads_the_documented_format(tmp_path: Path) -> None:
     rows = "0.5,1,2,0.25,1.5,\n0.5,1e0,+2,-0.25,inf,0\n"
     first, second = read_ring_log(log(tmp_path, HEADER + rows))
     assert (first.robot_s, first.pose, first.ring_yaw) == (0.5, Pose(1.0, 2.0, 0.25), 0.25)
@@ -73,13 +74,13 @@ def test_ring_yaw_is_an_angle_of_its_own(tmp_path: Path) -> None:
     ],
     ids=["byte order mark", "crlf", "blank lines", "no last newline", "quotes and spaces"],
 )
-def test_accepts_what_editors_make_of_it(tmp_path: Path, content: bytes) -> None:
+def test_accepts_the_variants_that_editors_write(tmp_path: Path, content: bytes) -> None:
     (got,) = read_ring_log(log(tmp_path, content), sensors=2)
     assert (got.robot_s, got.ranges_m.tolist()) == (1.0, [2.0, 3.0])
 
 
 @pytest.mark.parametrize("cell", ["inf", "Inf", "INF", "+inf", " inf", "Infinity"])
-def test_infinity_may_be_spelt_as_programs_do(tmp_path: Path, cell: str) -> None:
+def test_spellings_of_infinity(tmp_path: Path, cell: str) -> None:
     (got,) = read_ring_log(log(tmp_path, f"{HEADER}0,0,0,0,{cell},1\n"))
     assert got.ranges_m[0] == math.inf
 
@@ -102,7 +103,7 @@ def test_bad_stamp_names_row_column_value_and_what_is_allowed(tmp_path: Path, co
     assert text.startswith(f"row 3 column '{['t', 'x', 'y', 'theta'][column]}' {found}; allowed is a finite number")
 
 
-def test_empty_ring_yaw_is_not_taken_for_none(tmp_path: Path) -> None:
+def test_an_empty_ring_yaw_is_refused(tmp_path: Path) -> None:
     text = error_message(log(tmp_path, "t,x,y,theta,ring_yaw,r00\n0,0,0,1,,3\n"))
     assert text.startswith("row 2 column 'ring_yaw' is empty")
 
@@ -244,7 +245,7 @@ def recordings(draw: st.DrawFn) -> list[Firing]:
     ]
 
 
-@settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(0.3, HealthCheck.function_scoped_fixture)
 @given(recordings())
 def test_round_trip_to_the_bit(tmp_path: Path, firings: list[Firing]) -> None:
     path = tmp_path / "log.csv"
@@ -256,7 +257,7 @@ def test_round_trip_to_the_bit(tmp_path: Path, firings: list[Firing]) -> None:
     same(read_ring_log(path, len(firings[0].ranges_m)), canonical)
 
 
-@settings(deadline=None, max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(0.5, HealthCheck.function_scoped_fixture)
 @given(st.data())
 def test_a_damaged_file_is_read_or_refused_and_nothing_else(tmp_path: Path, data: st.DataObject) -> None:
     content = bytearray(f"{HEADER}0,0,0,0,1,inf\n1,0.5,0,0,,1\n".encode())
@@ -296,7 +297,7 @@ def test_cannot_be_written(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, the device that is always full")
-def test_disc_full() -> None:
+def test_disk_full() -> None:
     with pytest.raises(RingLogError, match="/dev/full: cannot be written: No space left on device"):
         write_ring_log(Path(os.devnull).with_name("full"), [firing(float(t), [1.0] * 24) for t in range(1000)])
 

@@ -1,4 +1,4 @@
-"""Recording switched on and off during a run, and marks in it: each file is whole, and replays to the bit."""
+"""Recording is switched on and off during a run, and bookmarked: each file is whole and replays to the bit."""
 
 from __future__ import annotations
 
@@ -21,33 +21,14 @@ from runtime.recording.channels import BOOKMARK, CYCLE, KEYFRAME, RUN_INFO, deco
 from runtime.recording.reader import open_recording
 from runtime.recording.recorder import BOOKMARK_MAX, Recorder
 from runtime.recording.schema import Bookmark
-from runtime.recording.storage import SingleFile
-from runtime.recording.verification import ReplayResult, verify_recording
+from runtime.recording.writer import RecorderStatus
 from runtime.simulation.closed_loop import simulate
-from tests.recorded import FiveInSix, entries_of, hall, until
+from tests.recorded import entries_of, hall, record, until, verify_file
 
 
-def switched(place: Path, at: dict[int, Callable[[Recorder], None]], seconds: float, *, on: bool) -> Recorder:
-    """Record a run in virtual time; `at` says what is done after which cycle."""
-    settings, now = hall("perception.method=paper"), [0.0]
-    assert settings.world is not None
-    with Recorder(settings, SingleFile(place), clock=lambda: now[0], emulated=True, on=on) as recorder:
-
-        def on_state(record: CycleRecord, state: State, _start: Pose) -> None:
-            recorder.on_cycle(record, state)
-            recorder.on_bytes("in", now[0], b"\x00bytes\xff")
-            now[0] = record.inputs.run_s
-            if record.cycle in at:
-                at[record.cycle](recorder)
-
-        simulate(settings, settings.world, 0, seconds, on_state=on_state, refinement_budget=FiveInSix(0))
-        recorder.on_summary({"mode": "DRIVE"})
-    return recorder
-
-
-def verify_file(path: Path) -> ReplayResult:
-    with open_recording(path) as recording:
-        return verify_recording(recording)
+def switched(path: Path, after: dict[int, Callable[[Recorder], None]], seconds: float, *, on: bool) -> RecorderStatus:
+    """Record a run by the paper's method; `after` holds the actions after some cycles."""
+    return record(hall("perception.method=paper"), path, seconds, after=after, on=on)
 
 
 def cycles_of(path: Path) -> list[int]:
@@ -76,17 +57,17 @@ def test_off_and_on_again(tmp_path: Path) -> None:
         assert not recorder.is_enabled
         closed(recorder)
 
-    recorder = switched(
+    status = switched(
         path,
         {1: opened, 60: off, 100: lambda r: r.set_enabled(on=True), 101: opened,
          102: lambda r: r.set_enabled(on=True)},
         8.0, on=True,
     )  # fmt: skip
-    assert (recorder.status.files, recorder.status.dropped, recorder.status.last_error) == (2, 0, None)
+    assert (status.files, status.dropped, status.last_error) == (2, 0, None)
     assert cycles_of(path) == list(range(1, 61))
     second = tmp_path / "run-2.mcap"
     assert cycles_of(second) == list(range(102, 161))
-    assert next(e.topic for e in entries_of(second) if e.topic != RUN_INFO) == KEYFRAME, "with it the file begins"
+    assert next(e.topic for e in entries_of(second) if e.topic != RUN_INFO) == KEYFRAME, "the file begins with it"
     for file, count, first in ((path, 60, 1), (second, 59, 102)):
         result = verify_file(file)
         assert (result.cycles, result.first_cycle, result.differences) == (count, first, 0)
@@ -97,8 +78,8 @@ def test_off_and_on_again(tmp_path: Path) -> None:
 
 
 def test_off_from_the_beginning_leaves_nothing(tmp_path: Path) -> None:
-    recorder = switched(tmp_path / "run.mcap", {}, 2.0, on=False)
-    assert (recorder.status.files, recorder.status.dropped, recorder.status.last_error) == (0, 0, None)
+    status = switched(tmp_path / "run.mcap", {}, 2.0, on=False)
+    assert (status.files, status.dropped, status.last_error) == (0, 0, None)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -134,31 +115,10 @@ def test_bookmarks_are_in_it_and_without_side_effects(tmp_path: Path) -> None:
     ]
 
 
-@pytest.mark.compiled
-def test_report_and_figures_show_them(tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-
-    def mark(text: str) -> Callable[[Recorder], None]:
-        return lambda recorder: None if recorder.bookmark(text) is None else pytest.fail("refused")
-
-    switched(path, {1: opened, 41: mark("a <drum> & more"), 61: mark("second")}, 5.0, on=True)
-    page = tmp_path / "run.html"
-    assert run_command(["report", str(path), "--out", str(page)]) == DONE
-    text = page.read_text("utf-8")
-    assert "<h2>Bookmarks</h2>" in text
-    assert "a &lt;drum&gt; &amp; more" in text
-    section = text[text.index("<h2>Bookmarks</h2>") :]
-    assert re.findall(r"<td>(\d\.\d\d) s</td>", section[: section.index("</section>")]) == ["2.00", "3.00"]
-    assert {f"models-bookmark-{n}" for n in (1, 2)} <= set(re.findall(r'id="([^"]*)"', text))
-    assert {f"history-bookmark-{n}" for n in (1, 2)} <= set(re.findall(r'id="([^"]*)"', text))
-    assert run_command(["figures", str(path), "--out", str(tmp_path / "drawn")]) == DONE
-    assert 'id="bookmark-2"' in (tmp_path / "drawn" / "raw.svg").read_text("utf-8")
-
-
 async def in_folder_of(
     folder: Path, act: Callable[[RunRecording], object], *, no_record: bool, record: str | None
 ) -> RunRecording:
-    """Keep what a short run does, as the command does."""
+    """Record a short run as the command `run` does."""
     settings = load_settings("hallway", ["perception.method=paper", f"recording.folder={json.dumps(str(folder))}"])
     assert settings.world is not None
     with open_run_recording(settings, record, no_record=no_record, emulated=True) as recording:
@@ -200,7 +160,7 @@ async def test_a_run_that_records_nothing_may_be_switched_on(tmp_path: Path, rec
     recording.raise_if_incomplete()
 
 
-async def test_the_console_s_words() -> None:
+async def test_requests_of_the_console_reach_the_recorder() -> None:
     class Recording:
         def __init__(self) -> None:
             self.asked: list[object] = []

@@ -1,4 +1,4 @@
-"""Seeking in a recording: from wherever it starts, a cycle and the state after it are the same, to the bit."""
+"""A seek from any position gives the same cycle, and the same state after it, to the bit."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_the_description_of_a_recording(cursor: ReplayCursor) -> None:
 
 def test_seek_from_anywhere_to_anywhere(cursor: ReplayCursor, truth: list[dict[str, Any]]) -> None:
     rng = random.Random(5)
-    for position in [CYCLES, 1, 2, CYCLES, 100, 99, 98, 97, *(rng.randint(1, CYCLES) for _ in range(25))]:
+    for position in [CYCLES, 1, 2, CYCLES, 100, 99, 98, 97, *(rng.randint(1, CYCLES) for _ in range(8))]:
         assert seek_to(cursor, position) == truth[position - 1]
         assert cursor.position == position
         assert cursor.t_s == pytest.approx(0.05 * (position - 1))
@@ -92,7 +92,7 @@ def test_kept_states_make_a_seek_backward_short(
     monkeypatch.setattr("runtime.console.playback.replay_cursor.KEEP_PERIOD", 10)
     while cursor.next_cycle() is not None:
         pass
-    for position in range(CYCLES - 1, CYCLES - 30, -1):
+    for position in range(CYCLES - 1, CYCLES - 15, -1):
         steps, last = 0, {}
         for replayed in cursor.seek(position):
             steps, last = steps + 1, fingerprint(replayed) if cursor.position == position else {}

@@ -14,19 +14,12 @@ import pytest
 from runtime.console.playback.replay_cursor import ReplayCursor
 from runtime.console.playback.replay_worker import FRAME_PERIOD_S, FrameParts, ReplayWorker
 from runtime.recording.reader import open_recording, parse_settings
-from tests.recorded import hall, record
+from tests.recorded import SECONDS
 from tests.runtime.console.stub_frames import make_stub_frames
 
 pytestmark = pytest.mark.compiled
 
-CYCLES = 200
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("replay_worker") / "hall.mcap"
-    record(hall(), path, 0.05 * CYCLES)
-    return path
+CYCLES = round(20 * SECONDS)
 
 
 class WorkerCase:

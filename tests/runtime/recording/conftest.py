@@ -1,0 +1,29 @@
+"""The shared run in small chunks, for tests that damage one, and writers that wait for busy machines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from unittest import mock
+
+import pytest
+
+from tests.recorded import WAIT_S, entries_of, rewrite
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _patient_writers() -> Iterator[None]:
+    """Give a busy machine a minute to write the end of a file."""
+    with (
+        mock.patch("runtime.recording.writer.CLOSE_MAX_S", WAIT_S),
+        mock.patch("runtime.recording.ring_log_writer.CLOSE_MAX_S", WAIT_S),
+    ):
+        yield
+
+
+@pytest.fixture(scope="session")
+def chunked_run(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the recording of 240 cycles in chunks of ten, with a keyframe every two seconds."""
+    path = tmp_path_factory.mktemp("chunked") / "hall.mcap"
+    rewrite(entries_of(run), path)
+    return path

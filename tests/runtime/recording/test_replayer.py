@@ -1,0 +1,101 @@
+"""The replayer: cycles are run again from the beginning, a keyframe or a checkpoint, and are skipped after a gap."""
+
+from __future__ import annotations
+
+from itertools import islice
+from pathlib import Path
+
+import pytest
+
+from runtime.recording.channels import CYCLE, KEYFRAME, decode, encode
+from runtime.recording.reader import open_recording
+from runtime.recording.replayer import KeyframeFinder, Replayer, ReplayStep, fresh_state, keyframe_cycle
+from runtime.recording.schema import Cycle, Keyframe, perception_snapshot
+from tests.recorded import entries_of, hall, record, rewrite
+
+
+def test_a_restored_state_is_whole(run: Path) -> None:
+    """Also values that perception derives from its memory and caches."""
+    frames = [decode(Keyframe, e.data) for e in entries_of(run) if e.topic == KEYFRAME]
+    with open_recording(run) as recording:
+        state = fresh_state(recording.settings)
+        assert state.perception.objects() == ()
+        state.perception.restore(perception_snapshot(frames[-1]))
+        assert len(state.perception.objects()) >= 3
+        other = fresh_state(hall("perception.bayes.tracks_max=7"))
+        with pytest.raises(ValueError, match="of other settings"):
+            other.perception.restore(perception_snapshot(frames[-1]))
+        with pytest.raises(ValueError, match="another method"):
+            fresh_state(hall("perception.method=paper")).perception.restore(perception_snapshot(frames[-1]))
+
+
+@pytest.fixture(scope="module")
+def paper_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("replayer") / "hall.mcap"
+    record(hall("perception.method=paper"), path, 6.0)
+    return path
+
+
+def is_equal(step: ReplayStep) -> bool:
+    """Return whether a cycle was replayed as it was recorded."""
+    assert step.replayed is not None
+    return encode(Cycle.model_construct(record=step.replayed)) == step.message.data
+
+
+def cycles(replayer: Replayer) -> list[ReplayStep]:
+    return [step for step in replayer if step.recorded is not None]
+
+
+def test_every_cycle_is_replayed_from_the_beginning(paper_run: Path) -> None:
+    with open_recording(paper_run) as recording:
+        replayer = Replayer(recording)
+        found = cycles(replayer)
+        assert replayer.settings_data == recording.info.settings
+    assert [step.recorded.cycle for step in found if step.recorded is not None] == list(range(1, 121))
+    assert all(is_equal(step) for step in found)
+
+
+def test_a_replay_continues_from_a_checkpoint_and_from_a_keyframe(paper_run: Path) -> None:
+    with open_recording(paper_run) as recording:
+        first = Replayer(recording)
+        while first.state is not None and first.state.cycle < 50:
+            next(first)
+        checkpoint = first.checkpoint()
+        assert checkpoint is not None
+        assert (checkpoint.cycle, checkpoint.nbytes > 1000) == (50, True)
+        finder = KeyframeFinder(recording)
+        positions = [found for at, chunk in recording.chunks() for m in chunk if (found := finder.find(at, m))]
+        assert len(positions) >= 2
+        for replayer, first_cycle in (
+            (Replayer(recording, checkpoint), 51),
+            (Replayer(recording, positions[1]), positions[1].cycle + 1),
+        ):
+            steps = cycles(replayer)
+            assert all(is_equal(step) for step in steps)
+            assert [one.recorded.cycle for one in steps if one.recorded is not None] == list(range(first_cycle, 121))
+
+
+def test_cycles_after_a_gap_are_skipped_until_the_next_keyframe(paper_run: Path, tmp_path: Path) -> None:
+    entries = entries_of(paper_run)
+    lost = [k for k, entry in enumerate(entries) if entry.topic == CYCLE][10]
+    following = next(keyframe_cycle(entry) for entry in entries[lost:] if entry.topic == KEYFRAME)
+    path = tmp_path / "gap.mcap"
+    rewrite([*entries[:lost], *entries[lost + 1 :]], path)
+    with open_recording(path) as recording:
+        replayer = Replayer(recording)
+        steps = list(islice((step for step in replayer if step.recorded is not None), 11))
+        assert steps[-1].replayed is None
+        assert replayer.state is None
+        assert replayer.checkpoint() is None
+        rest = cycles(replayer)
+    skipped = [step.recorded.cycle for step in rest if step.replayed is None and step.recorded is not None]
+    assert skipped == list(range(13, following + 1))
+    assert all(is_equal(step) for step in rest[len(skipped) :])
+
+
+def test_the_cycle_of_a_keyframe_is_read_without_decoding(paper_run: Path) -> None:
+    frames = [entry for entry in entries_of(paper_run) if entry.topic == KEYFRAME]
+    for entry in frames:
+        cycle = decode(Keyframe, entry.data).cycle
+        assert keyframe_cycle(entry) == cycle
+        assert keyframe_cycle(entry._replace(data=b" " + entry.data)) == cycle, "another form is decoded"

@@ -1,0 +1,62 @@
+"""Keyframes give back the state they were made of, to the bit; serial data keeps the time of every piece."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from behaviors.move_ahead import Leg
+from config.load import load_settings
+from perception.pipeline import Perception
+from runtime.cycle.step import State
+from runtime.recording.channels import decode, encode
+from runtime.recording.schema import Keyframe, SerialBytes, carried_state, keyframe, perception_snapshot, state_fields
+
+RECORD = np.dtype([("x", "<f8", (2,)), ("flag", "?"), ("inner", [("count", "<i4")])])
+
+
+def a_state() -> State:
+    settings = load_settings("hallway", ["perception.method=paper"])
+    return State(Perception(settings.ring, settings.models, settings.perception))
+
+
+def test_arrays_of_every_layout_come_back_to_the_bit() -> None:
+    records = np.zeros((2, 3), RECORD)
+    records["x"][1, 2] = math.nan, -0.0
+    records["inner"]["count"] = np.arange(6).reshape(2, 3)
+    arrays = {
+        "scalar": np.array(1.5),
+        "empty": np.empty((0, 5)),
+        "flags": np.array([True, False]),
+        "records": records,
+        "numbers": np.array([[1, -(2**62)]]),
+    }
+    frame = decode(Keyframe, encode(keyframe(3, 0.15, carried_state(a_state()), arrays)))
+    assert (frame.cycle, frame.run_s) == (3, 0.15)
+    found = perception_snapshot(frame)
+    assert list(found) == list(arrays)
+    for name, array in arrays.items():
+        assert (found[name].dtype, found[name].shape) == (array.dtype, array.shape)
+        assert found[name].tobytes() == array.tobytes()
+
+
+def test_the_carried_state_comes_back() -> None:
+    state = a_state()
+    state.cycle, state.run_s, state.leg = 7, 0.35, Leg(-0.0, 3.0)
+    fields = carried_state(state)
+    assert "perception" not in fields
+    frame = decode(Keyframe, encode(keyframe(7, 0.35, fields, {})))
+    found = state_fields(frame)
+    assert found == fields
+    assert repr(found) == repr(fields)
+
+
+def test_pieces_of_serial_data_keep_their_times() -> None:
+    payload = SerialBytes(run_s=2.0, after_us=[0, 1500, 1500], sizes=[2, 0, 1], data="00ff0a")
+    times_s, data = zip(*decode(SerialBytes, encode(payload)).pieces(), strict=True)
+    assert times_s == pytest.approx((2.0, 2.0015, 2.0015))
+    assert data == (b"\x00\xff", b"", b"\n")
+    with pytest.raises(ValueError, match="zip"):
+        SerialBytes(run_s=0.0, after_us=[0], sizes=[1, 1], data="0000").pieces()

@@ -1,0 +1,136 @@
+"""A replay equals the run to the bit, from the beginning or a keyframe; a difference is reported with its place."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from config.errors import DONE
+from runtime.recording.channels import CYCLE, KEYFRAME, decode, encode
+from runtime.recording.schema import Cycle, Keyframe, keyframe, perception_snapshot, state_fields
+from runtime.recording.verification import ABSENT, ReplayResult, find_difference
+from tests.recorded import SECONDS, entries_of, hall, record, rewrite, verify_file
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture(scope="module")
+def whole(run: Path) -> ReplayResult:
+    return verify_file(run)
+
+
+@pytest.mark.compiled
+def test_a_replay_is_the_run_to_the_bit(whole: ReplayResult) -> None:
+    result = whole
+    assert result.first_difference is None, str(result.first_difference)
+    assert (result.cycles, result.differences, result.first_cycle) == (20 * SECONDS, 0, 1)
+    assert set(result.refinement_stops) >= {"budget", "converged", "nothing"}
+    assert result.keyframes >= SECONDS / 2.0 - 2
+    assert result.missing == []
+    assert result.state is not None
+    assert len(result.state.perception.objects()) >= 3
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("since_s", [4.5, 11.0])
+def test_a_replay_from_a_keyframe_is_the_run_to_the_bit(run: Path, whole: ReplayResult, since_s: float) -> None:
+    part = verify_file(run, since_s=since_s)
+    assert part.first_difference is None, str(part.first_difference)
+    assert part.first_cycle is not None
+    assert 20 * (since_s - 2.1) <= part.first_cycle <= 20 * since_s + 2
+    assert part.cycles == 20 * SECONDS - part.first_cycle + 1
+    assert whole.state is not None
+    assert part.state is not None
+    assert part.state.perception.objects() == whole.state.perception.objects()
+    one, other = whole.state.perception.snapshot(), part.state.perception.snapshot()
+    assert {name: array.tobytes() for name, array in one.items()} == {n: a.tobytes() for n, a in other.items()}
+
+
+@pytest.mark.compiled
+def test_a_replay_in_another_process_is_the_run_to_the_bit(run: Path, tmp_path: Path) -> None:
+    """From the beginning, and from a keyframe."""
+    summaries = {since: tmp_path / f"{since}.json" for since in (0, 9)}
+    calls = [["replay", str(run), "--verify", "--from", str(k), "--json", str(p)] for k, p in summaries.items()]
+    program = f"from runtime.cli.app import run_command\nfor call in {calls!r}: assert run_command(call) == {DONE}"
+    done = subprocess.run(
+        [sys.executable, "-c", program], env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True,
+        text=True, timeout=600, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    for since, path in summaries.items():
+        found = json.loads(path.read_bytes())
+        assert found["verify"]["differences"] == 0
+        assert found["cycles"] >= 20 * (SECONDS - since)
+
+
+@pytest.mark.compiled
+def test_a_replay_by_the_papers_method_is_the_run_to_the_bit(tmp_path: Path) -> None:
+    path = tmp_path / "paper.mcap"
+    record(hall("perception.method=paper"), path, 10.0)
+    for since_s in (0.0, 5.0):
+        result = verify_file(path, since_s=since_s)
+        assert result.first_difference is None, str(result.first_difference)
+        assert result.cycles >= 20 * (10.0 - since_s)
+        assert set(result.refinement_stops) >= {"budget", "converged", "nothing"}
+
+
+@pytest.mark.compiled
+def test_the_first_difference_is_named(run: Path, tmp_path: Path) -> None:
+    entries = entries_of(run)
+    for i, entry in enumerate(entries):
+        if entry.topic == CYCLE and (cycle := decode(Cycle, entry.data).record).cycle in {77, 90}:
+            other = Cycle(record=replace(cycle, segments=cycle.segments + 1))
+            entries[i] = entry._replace(data=encode(other))
+    rewrite(entries, tmp_path / "x.mcap")
+    result = verify_file(tmp_path / "x.mcap")
+    assert result.differences == 2
+    assert result.first_difference is not None
+    assert (result.first_difference.cycle, result.first_difference.field) == (77, "segments")
+    assert result.first_difference.recorded == int(str(result.first_difference.replayed)) + 1
+
+
+@pytest.mark.compiled
+def test_a_memory_that_differs_is_named(run: Path, tmp_path: Path) -> None:
+    """A keyframe holds the map, which no record of a cycle holds: one changed bit of it is a difference."""
+    entries = entries_of(run)
+    where = [i for i, entry in enumerate(entries) if entry.topic == KEYFRAME][2]
+    frame = decode(Keyframe, entries[where].data)
+    memory = perception_snapshot(frame)
+    name = next(name for name in memory if name.endswith("memory.state"))
+    changed = memory[name].copy()
+    changed["sensors"]["history"]["range_m"][0, 0, 0] += 1e-9
+    altered = keyframe(frame.cycle, frame.run_s, state_fields(frame), {**memory, name: changed})
+    entries[where] = entries[where]._replace(data=encode(altered))
+    rewrite(entries, tmp_path / "x.mcap")
+    result = verify_file(tmp_path / "x.mcap")
+    assert result.differences == 1
+    assert result.first_difference is not None
+    assert (result.first_difference.cycle, result.first_difference.field.split("[")[0]) == (
+        frame.cycle,
+        f"perception {name}",
+    )
+
+
+@pytest.mark.parametrize(
+    ("recorded", "replayed", "expected"),
+    [
+        ({"a": 1, "b": [1, 2]}, {"a": 1, "b": [1, 2]}, None),
+        ({"a": {"b": [1, 2.0]}}, {"a": {"b": [1, 2.5]}}, ("a.b.1", 2.0, 2.5)),
+        ({"a": 1}, {"a": 1.0}, ("a", 1, 1.0)),
+        ({"a": 0.0}, {"a": -0.0}, ("a", 0.0, -0.0)),
+        ({"a": 1}, {}, ("a", 1, ABSENT)),
+        ({}, {"a": 1}, ("a", ABSENT, 1)),
+        ({"a": [1]}, {"a": [1, 2]}, ("a", [1], [1, 2])),
+        ({"a": True}, {"a": 1}, ("a", True, 1)),
+    ],
+)
+def test_the_first_difference_of_two_trees(recorded: object, replayed: object, expected: object) -> None:
+    found = find_difference(recorded, replayed)
+    assert repr(found) == repr(expected)
+    assert (found is None) == (find_difference(replayed, recorded) is None)
