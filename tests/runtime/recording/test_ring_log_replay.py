@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 from config.load import load_settings
+from config.units import FOOT_M
 from runtime.recording.ring_log import read_ring_log
 from runtime.recording.ring_log_replay import FiringReplayer, replay_firings
 
 PAPER = load_settings("hallway", ["perception.method=paper"])
+START_FT = -6.0
+"""Where the robot starts in the hallway; its odometry counts from there."""
 
 
 def test_perception_has_seen_each_firing_when_it_is_yielded(hall_log: Path) -> None:
@@ -34,8 +37,8 @@ def test_the_summary_names_the_drums(hall_log: Path) -> None:
     found = [(seen["x"], abs(seen["y"])) for seen in summary["objects"]]
     assert len(found) >= 3
     for x, y in found:
-        assert y == pytest.approx(4.0 * 0.3048, abs=0.1)
-        assert min(abs(x - 0.3048 * drum) for drum in (1.0, 4.0, 7.0)) < 0.1
+        assert y == pytest.approx(4.0 * FOOT_M, abs=0.1)
+        assert min(abs(x - FOOT_M * (drum - START_FT)) for drum in (1.0, 4.0, 7.0)) < 0.1
 
 
 def test_no_firing_gives_an_empty_summary() -> None:
