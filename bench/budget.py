@@ -59,6 +59,10 @@ class DriveCosts:
     """Of that part and the quanta, per cycle."""
     quanta_us: list[float] = field(default_factory=list)
     """Of each quantum."""
+    started_us: list[float] = field(default_factory=list)
+    """From the beginning of its cycle to the start of each quantum."""
+    begin_ns: int = 0
+    """Beginning of the cycle in progress."""
     causes: dict[str, int] = field(default_factory=dict)
     """Number of cycles by the reason why refinement stopped."""
 
@@ -98,6 +102,7 @@ class TimedPerception(Perception):
         done = super().refine()
         took_us = 1e-3 * (time.thread_time_ns() - begin_ns)
         self.costs.quanta_us.append(took_us)
+        self.costs.started_us.append(1e-3 * (begin_ns - self.costs.begin_ns))
         return done
 
 
@@ -140,6 +145,7 @@ def _one_cycle(
     marks: dict[Phase, float] = {}
     budget = CpuTimeBudget(budget_s)
     begin_s = time.thread_time()
+    costs.begin_ns = time.thread_time_ns()
     budget.begin()
     record = step(
         state, inputs, settings, lambda command: apply_command(driver, command), budget,

@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 
 from config.errors import DONE
+from tests.hil.machine import TIMEOUT_S
 from tests.hil.planted import planted
 from tests.hil.running import emulated, wait_for
 from tests.hil.truth import Truth
@@ -63,7 +64,7 @@ def test_a_disk_that_fills_up_and_a_log_and_a_terminal_that_take_nothing(
             truth = Truth(robot.trace)
             assert all(row.still for row in truth.read()), "it was not armed"
             run.signal(signal.SIGTERM)
-            assert run.process.wait() == DONE
+            assert run.process.wait(3.0 * TIMEOUT_S) == DONE
     finally:
         for fd in (held, out, into):
             os.close(fd)

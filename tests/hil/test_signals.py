@@ -157,7 +157,8 @@ def check_recording(recorded: Path) -> None:
     entries = entries_of(recorded)
     assert sum(entry.topic == SETTINGS for entry in entries) == 1
     lines = [decode(LogLine, entry.data).event for entry in entries if entry.topic == LOG]
-    assert lines[:3] == ["start", "console", "robot ready"]
+    assert lines[:2] == ["start", "console"]
+    assert "robot ready" in lines
     for way in ("in", "out"):
         pieces = [p for e in entries if e.topic == SERIAL[way] for p in decode(SerialBytes, e.data).pieces()]
         assert sum(len(data) for _, data in pieces) > 0

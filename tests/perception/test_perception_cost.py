@@ -1,12 +1,10 @@
 """Cost of perception per ring reading with compiled kernels, and its budget, which holds to one quantum.
 
-Times are CPU times of this thread, so that other programs on the machine do not count.
+Thread times are judged as in tests/perception/thread_time.py. Milliseconds are measured by `make bench`.
 """
 
 from __future__ import annotations
 
-import logging
-import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -20,14 +18,17 @@ from perception.pipeline import Perception
 from runtime.cycle.step import CycleRecord, State, step
 from runtime.simulation.closed_loop import simulate
 from runtime.timing.refinement_budget import within_quanta_per_cycle
+from tests.perception.thread_time import always_beyond, control_ms, median_ratio, thread_ms
 
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
 SETTINGS = load_settings("hallway")
 MANY_QUANTA = load_settings("hallway", ["perception.method=paper"])
 """The paper's method refines every candidate whose cluster changed, so that a budget can interrupt it."""
-MEDIAN_MS, P99_MS = 1.0, 5.0
-"""Limits of the CPU time per ring reading."""
+RATIO_MAX = 1.0
+"""Limit of a reading beside the control. Measured is 0.3; interpreted, a reading takes ten times the control."""
+WORST_RATIO_MAX = 10.0
+"""Limit of each single reading. Measured is 2."""
 
 
 @pytest.fixture(scope="module")
@@ -43,72 +44,67 @@ def fresh() -> Perception:
     return Perception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
 
 
-def cost_ms(perception: Perception, firing: Firing) -> float:
-    """Process one reading, with up to a cycle's quanta of refinement; return the CPU time, ms."""
-    begin_ns = time.thread_time_ns()
+def take(perception: Perception, firing: Firing) -> None:
+    """Process one reading, with up to a cycle's quanta of refinement."""
     perception.observe(firing)
     done = 0
     while perception.can_refine and within_quanta_per_cycle(done):
         perception.refine()
         done += 1
-    return 1e-6 * (time.thread_time_ns() - begin_ns)
 
 
-def control_ms(scratch: np.typing.NDArray[np.float64]) -> float:
-    """Return the CPU time of a fixed piece of interpreter and array work, ms, as a measure of the machine's speed."""
-    begin_ns = time.thread_time_ns()
-    total = 0.0
-    for k in range(1000):
-        total += k * 0.5
-    np.sort(scratch)
-    return 1e-6 * (time.thread_time_ns() - begin_ns) + 0.0 * total
-
-
-def test_cost_of_a_ring_reading(records: list[CycleRecord]) -> None:
+@pytest.fixture(scope="module")
+def firings(records: list[CycleRecord]) -> list[Firing]:
+    """Return the readings of the drive."""
     firings = [firing for record in records for firing in record.inputs.received.firings]
     assert len(firings) > 300
-    scratch = np.random.default_rng(1).random(4096)
-    perception, costs, controls = fresh(), [], []
-    for firing in firings:
-        costs.append(cost_ms(perception, firing))
-        controls.append(control_ms(scratch))
-    assert len(perception.objects()) == 6
-    median, p99 = np.quantile(costs, [0.5, 0.99])
-    ratio = median / np.median(controls)
-    figures = {"median_ms": median, "p99_ms": p99, "max_ms": max(costs), "ratio": ratio}
-    logging.getLogger(__name__).info("%s", figures)
-    assert median <= MEDIAN_MS, figures
-    assert p99 <= P99_MS, figures
-    # Compiled, a reading takes half as long as the control; interpreted, nearly ten times as long.
-    assert ratio <= 2.0, figures
+    return firings
 
 
-def test_cost_does_not_grow_with_distance(records: list[CycleRecord]) -> None:
-    """Old segments are dropped, so that later laps past the same drums cost what the first did."""
-    firings = [firing for record in records for firing in record.inputs.received.firings]
+def test_cost_of_a_ring_reading(firings: list[Firing]) -> None:
+    ratios: list[float] = []
+
+    def drive() -> tuple[list[float], float]:
+        perception, costs, controls = fresh(), [], []
+        for firing in firings:
+            costs.append(thread_ms(lambda: take(perception, firing)))  # noqa: B023
+            controls.append(control_ms())
+        assert len(perception.objects()) == 6
+        ratios.append(median_ratio(costs, controls))
+        return costs, WORST_RATIO_MAX * float(np.median(controls))
+
+    assert always_beyond(drive) == set(), "readings that are slow every time"
+    assert min(ratios) <= RATIO_MAX, ratios
+
+
+def test_cost_does_not_grow_with_distance(firings: list[Firing]) -> None:
+    """Old segments are dropped, so that the fourth lap past the same drums costs what the first does."""
     lap_s = firings[-1].robot_s - firings[0].robot_s + 1.0
-    perception, medians = fresh(), []
-    for lap in range(4):
-        costs = [
-            cost_ms(perception, Firing(f.robot_s + lap * 10.0 * lap_s, f.pose, f.ring_yaw, f.ranges_m))
-            for f in firings
-        ]
-        medians.append(float(np.median(costs)))
-    assert max(medians) <= MEDIAN_MS, medians
-    assert medians[-1] <= 3.0 * medians[0] + 0.2, medians
+    first, fourth = fresh(), fresh()
+    for lap in range(3):
+        for firing in firings:
+            take(fourth, later(firing, lap * 10.0 * lap_s))
+    costs, controls = [], []
+    for firing in firings:
+        controls.append(thread_ms(lambda: take(first, firing)))  # noqa: B023
+        costs.append(thread_ms(lambda: take(fourth, later(firing, 30.0 * lap_s))))  # noqa: B023
+    assert median_ratio(costs, controls) <= 2.0
+
+
+def later(firing: Firing, after_s: float) -> Firing:
+    return Firing(firing.robot_s + after_s, firing.pose, firing.ring_yaw, firing.ranges_m)
 
 
 def test_a_call_that_finds_nothing_to_do_costs_microseconds() -> None:
-    """Three arrays of records go over to compiled code; single records would take a hundred microseconds."""
+    """Three arrays of records go over to compiled code; single records would cost as much as the control."""
     perception = BayesPerception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception.bayes)
-    memory, never, costs = perception.memory, 1e9, []
+    memory, never = perception.memory, 1e9
     refine.quantum(memory.s, memory.tracks, perception.settings, never)
+    costs, controls = [], []
     for _ in range(200):
-        begin_ns = time.thread_time_ns()
-        for _ in range(20):
-            refine.quantum(memory.s, memory.tracks, perception.settings, never)
-        costs.append((time.thread_time_ns() - begin_ns) / 20)
-    assert np.median(costs) < 10_000, costs
+        costs.append(thread_ms(lambda: refine.quantum(memory.s, memory.tracks, perception.settings, never)))
+        controls.append(control_ms())
+    assert median_ratio(costs, controls) < 0.1
 
 
 class VirtualClock:

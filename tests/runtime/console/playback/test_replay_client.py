@@ -112,7 +112,7 @@ async def test_invalid_recordings_positions_and_speeds_are_refused(folder: Path)
         for name in ("", "none.mcap", "../runs/hall.mcap", str(folder / "hall.mcap"), "hall", "/etc/passwd"):
             with pytest.raises(ReplayError, match="there is no recording"):
                 await client.open(page, name)
-        with pytest.raises(ReplayError, match=r"broken\.mcap: holds no message"):
+        with pytest.raises(ReplayError, match=r"broken\.mcap: holds no readable message"):
             await client.open(page, "broken.mcap")
         assert page.live == []
         with pytest.raises(ReplayError, match="finite"):
@@ -190,7 +190,7 @@ async def test_the_report_of_a_run_in_progress(folder: Path, tmp_path: Path) -> 
     async with replay_client(folder) as client:
         with pytest.raises(ReplayError, match="not being recorded"):
             await client.report()
-    with pytest.raises(ReplayError, match=r"broken\.mcap: holds no message"):
+    with pytest.raises(ReplayError, match=r"broken\.mcap: holds no readable message"):
         await make_report(folder / "broken.mcap", "m")
     with pytest.raises(ReplayError, match="not done within"):
         await make_report(cut, "m", timeout_s=0.01)
