@@ -69,7 +69,7 @@ def test_sets_are_fired_in_turn_and_rotated_round_the_ring() -> None:
     assert [sensors(m) for m in masks] == [(0, 12), (23,), (1, 13), (0,), (2, 14), (1,)]
 
 
-def test_a_sensor_that_is_not_there_is_named() -> None:
+def test_an_unknown_sensor_is_named() -> None:
     with pytest.raises(FiringError, match="names sensor 24, 30, and this ring has sensors 0 to 23"):
         firing_pattern(ring(FiringConfig(sets=((30, 1), (24,)))))
 
@@ -79,7 +79,9 @@ def test_time_of_flight_is_there_and_back() -> None:
 
 
 @pytest.mark.parametrize(("step_s", "range_max_m"), [(0.02, 7.7724), (0.0203, 100.0)])
-def test_a_step_shorter_than_its_window_says_what_would_do(step_s: float, range_max_m: float) -> None:
+def test_a_step_shorter_than_its_window_is_refused_with_the_limits_that_would_fit(
+    step_s: float, range_max_m: float
+) -> None:
     def with_step(step_period_s: float, window_m: float | None = None) -> RingConfig:
         firing = FiringConfig(preset="octets", step_period_s=step_period_s, window_m=window_m)
         return ring(firing, 24, range_max_m)
@@ -99,7 +101,7 @@ def test_a_step_shorter_than_its_window_says_what_would_do(step_s: float, range_
         firing_pattern(with_step(step_s, longest + 2e-3))
 
 
-def test_a_step_exactly_as_long_as_its_window_will_do() -> None:
+def test_a_step_exactly_as_long_as_its_window_is_accepted() -> None:
     firing = FiringConfig(preset="single", step_period_s=time_of_flight_s(2.0), window_m=2.0)
     assert firing_pattern(ring(firing)).window_m == 2.0
     wire = wire_pattern(ring(firing))

@@ -15,7 +15,7 @@ import serial
 from config.robot import LinkConfig
 from drivers.link import Link, LinkError
 from tests.drivers.pty_pair import Host, PtyPair, running, soon
-from tests.hil.machine import TIMEOUT_S, stalls_excused
+from tests.hil.machine import TIMEOUT_S
 
 pytestmark = pytest.mark.usefixtures("loop_errors")
 
@@ -56,7 +56,7 @@ async def test_what_is_sent_leaves_though_the_loop_is_held_up_right_then(pty: Pt
         assert os.read(pty.master, 64) == b"drive"
 
 
-async def test_what_was_sent_last_leaves_before_the_line_is_closed(pty: PtyPair) -> None:
+async def test_the_last_bytes_are_sent_before_the_line_closes(pty: PtyPair) -> None:
     host = Host()
     link = host.link(pty.path)
     async with running(link):
@@ -106,7 +106,7 @@ async def test_attempts_to_reopen_are_spaced_out(pty: PtyPair) -> None:
 
 
 @pytest.mark.parametrize("name", ["missing", "missing/deeper", "file", "folder", "file/below"])
-async def test_a_wrong_path_says_so_in_one_line(tmp_path: Path, name: str) -> None:
+async def test_a_wrong_path_is_reported_in_one_line(tmp_path: Path, name: str) -> None:
     (tmp_path / "file").write_text("not a port")
     (tmp_path / "folder").mkdir()
     link = Host().link(tmp_path / name)
@@ -121,12 +121,12 @@ async def test_a_wrong_path_says_so_in_one_line(tmp_path: Path, name: str) -> No
     assert not link.is_open
 
 
-async def test_no_port_at_all_says_so() -> None:
+async def test_a_missing_port_setting_is_reported() -> None:
     with pytest.raises(LinkError, match="no serial port is named; give it as --port"):
         await Host().link(None).open_once()
 
 
-async def test_a_port_in_use_says_so(pty: PtyPair) -> None:
+async def test_a_port_in_use_is_reported(pty: PtyPair) -> None:
     host = Host()
     first, second = host.link(pty.path), Host().link(pty.path)
     async with running(first):
@@ -155,8 +155,7 @@ async def test_a_port_that_never_opens_does_not_hold_the_loop(pty: PtyPair) -> N
     assert await asyncio.to_thread(closed.wait, TIMEOUT_S), "what opens too late is closed again"
 
 
-@stalls_excused
-async def test_a_peer_that_stops_reading_fills_no_memory_and_holds_up_nothing(pty: PtyPair) -> None:
+async def test_a_peer_that_stops_reading_neither_fills_memory_nor_blocks_stopping(pty: PtyPair) -> None:
     host = Host()
     link = host.link(pty.path)
     async with running(link):
@@ -174,8 +173,6 @@ async def test_a_peer_that_stops_reading_fills_no_memory_and_holds_up_nothing(pt
         assert not link.send(b"x" * 64)
         assert sent < 200_000
         assert link.send(b""), "nothing always fits"
-        started = asyncio.get_running_loop().time()
-    assert asyncio.get_running_loop().time() - started < 2.0, "stopping is bounded"
     assert await soon(host.closed) == "closed by this program"
 
 
@@ -191,7 +188,7 @@ async def test_unplugged_while_bytes_wait_is_reported_at_once_and_without_a_trac
         assert not link.is_open
 
 
-async def test_not_writable_yet_leaves_room_for_a_halt(pty: PtyPair) -> None:
+async def test_a_full_line_still_has_room_for_a_halt(pty: PtyPair) -> None:
     host = Host()
     link = host.link(pty.path)
     async with running(link):
@@ -207,7 +204,7 @@ async def test_not_writable_yet_leaves_room_for_a_halt(pty: PtyPair) -> None:
         assert link.writable
 
 
-async def test_what_a_handler_raises_ends_the_line_and_names_the_cause(pty: PtyPair) -> None:
+async def test_an_exception_in_a_handler_ends_the_line_and_is_named(pty: PtyPair) -> None:
     host = Host()
 
     def careless(data: bytes) -> None:
@@ -250,7 +247,7 @@ async def test_handlers_of_opening_and_closing_may_fail_too(pty: PtyPair) -> Non
     assert "closing failed with ZeroDivisionError: at closing" in (link.last_error or "")
 
 
-async def test_stop_without_a_line_is_nothing() -> None:
+async def test_stop_without_a_line_does_nothing() -> None:
     link = Host().link(None)
     await link.stop()
     assert not link.is_open

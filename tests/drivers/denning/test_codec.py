@@ -64,7 +64,7 @@ def test_frames_of_the_other_side_are_unknown(side: Side, frame: Frame, wire: st
 
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize(("why", "wire"), BAD)
-def test_bad_frames_are_dropped_counted_and_passed_over(side: Side, why: str, wire: str) -> None:
+def test_corrupt_frames_are_counted_and_the_frames_after_them_decoded(side: Side, why: str, wire: str) -> None:
     decoder = Decoder(side)
     assert decoder.feed(bytes.fromhex(wire)) == [], why
     assert (decoder.frames, decoder.bad) == (0, 1)
@@ -85,7 +85,7 @@ def test_byte_by_byte_is_the_same_as_whole(side: Side) -> None:
     assert single.rejected == whole.rejected
 
 
-def test_what_the_device_must_refuse_can_be_distinguished() -> None:
+def test_a_refused_frame_keeps_its_number_and_the_reason() -> None:
     decoder = Decoder("host")
     for body in (
         bytes((0x7F, 10)),
@@ -110,7 +110,7 @@ def test_what_the_device_must_refuse_can_be_distinguished() -> None:
     assert (decoder.frames, decoder.bad, decoder.lost) == (0, 7, 0)
 
 
-def test_a_name_that_is_no_text_is_no_identity() -> None:
+def test_an_identity_whose_name_is_not_text_is_refused() -> None:
     good = encode(Ident(0, 1, 24, 381, 500, 20, 7, "x" * 16))
     assert len(Decoder("robot").feed(good)) == 1
     head = bytes((0x81, 0, 1, 24, 125, 1, 244, 1, 20, 0, 7, 0, 0, 0))
@@ -120,7 +120,7 @@ def test_a_name_that_is_no_text_is_no_identity() -> None:
         assert decoder.rejected == [(0, NakCode.VALUE_OUT_OF_RANGE)]
 
 
-def test_an_identity_with_another_length_of_name_is_none() -> None:
+def test_an_identity_with_a_name_field_of_another_length_is_refused() -> None:
     body = bytes((0x81, 0, 1, 24, 125, 1, 244, 1, 20, 0, 7, 0, 0, 0))
     for name in (b"", b"x" * 15, b"x" * 17):
         decoder = Decoder("robot")
@@ -128,7 +128,7 @@ def test_an_identity_with_another_length_of_name_is_none() -> None:
         assert decoder.rejected == [(0, NakCode.WRONG_LENGTH)]
 
 
-def test_a_name_keeps_its_last_letter_and_what_cannot_be_sent_becomes_a_question() -> None:
+def test_a_name_is_sent_whole_with_a_question_mark_for_what_utf_8_cannot_encode() -> None:
     for name, heard in (("BOX", "BOX"), ("", ""), ("\ud800", "?")):
         (ident,) = Decoder("robot").feed(encode(Ident(0, 1, 24, 381, 500, 20, 7, name)))
         assert isinstance(ident, Ident)
@@ -151,7 +151,7 @@ def test_gaps_in_the_sequence_are_counted_across_the_wrap() -> None:
     assert (decoder.frames, decoder.lost) == (6, 3 + 1)
 
 
-def test_an_overlong_frame_is_bad_once_and_holds_nothing() -> None:
+def test_an_overlong_frame_counts_once_and_is_not_buffered() -> None:
     decoder = Decoder("robot")
     for _ in range(100):
         assert decoder.feed(b"\x55" * 100) == []
@@ -169,7 +169,7 @@ def test_the_longest_frame_passes_and_one_byte_more_does_not() -> None:
     assert (decoder.take_rejected(), decoder.bad) == ([], 2)
 
 
-def test_refusals_no_one_takes_do_not_pile_up() -> None:
+def test_the_list_of_refused_frames_is_bounded() -> None:
     decoder = Decoder("host")
     for seq in range(256):
         decoder.feed(stuffed(bytes((0x7F, seq))))
@@ -177,7 +177,7 @@ def test_refusals_no_one_takes_do_not_pile_up() -> None:
 
 
 @given(st.lists(st.binary(max_size=400), max_size=12), st.sampled_from(SIDES))
-def test_any_bytes_are_survived(chunks: list[bytes], side: Side) -> None:
+def test_the_decoder_recovers_from_any_bytes(chunks: list[bytes], side: Side) -> None:
     decoder, whole = Decoder(side), Decoder(side)
     frames = []
     for chunk in chunks:
@@ -198,7 +198,7 @@ def test_any_payload_is_a_frame_that_encodes_to_itself_or_refused(kind: int, pay
 
 
 @given(st.one_of(odoms, echoes(), patterns))
-def test_any_frame_comes_back(frame: Frame) -> None:
+def test_any_frame_is_decoded_as_it_was_encoded(frame: Frame) -> None:
     decoder = Decoder("host" if isinstance(frame, Pattern) else "robot")
     assert decoder.feed(encode(frame)) == [frame]
 
@@ -234,7 +234,7 @@ ODOM = Odom(0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
         (Ident(0, 1, 24, 1, 1, 1, 1, "a\0b"), "Ident.name", "without a zero"),
     ],
 )
-def test_what_does_not_fit_is_refused_by_name(frame: Frame, field: str, limits: str) -> None:
+def test_a_value_out_of_range_is_refused_and_its_field_named(frame: Frame, field: str, limits: str) -> None:
     with pytest.raises(ValueError, match=r"must be|asks for") as caught:
         encode(frame)
     assert field in str(caught.value)
@@ -242,7 +242,7 @@ def test_what_does_not_fit_is_refused_by_name(frame: Frame, field: str, limits: 
 
 
 @pytest.mark.parametrize("midway", [True, False])
-def test_the_end_of_a_frame_that_was_under_way_when_the_line_opened_is_no_bad_frame(midway: bool) -> None:
+def test_the_rest_of_a_frame_that_began_before_the_line_opened_does_not_count_as_corrupt(midway: bool) -> None:
     whole = encode(Ack(3, 7))
     for cut in range(1, len(whole) - 1):
         decoder = Decoder("robot", midway=midway)

@@ -31,7 +31,7 @@ from tests.drivers.vectors import THIRDS
 # Conversation.
 
 
-def test_hello_is_answered_with_who_it_is() -> None:
+def test_hello_is_answered_with_ident() -> None:
     h = host()
     h.send(Hello, 1)
     h.run(0.01)
@@ -54,7 +54,7 @@ def test_commands_are_acknowledged_by_their_number_and_drive_is_not() -> None:
     assert h.of(Nak) == []
 
 
-def test_nonsense_is_refused_with_its_reason() -> None:
+def test_invalid_frames_are_refused_with_a_reason() -> None:
     h = host()
 
     def raw(kind: int, seq: int, payload: bytes) -> bytes:
@@ -143,7 +143,7 @@ def test_odometry_follows_the_truth() -> None:
 # Firing.
 
 
-def test_steps_come_at_their_times_and_after_their_windows() -> None:
+def test_firings_are_on_schedule_and_echoes_follow_their_windows() -> None:
     h = host()
     h.send(Pattern, 50, 255, THIRDS)
     h.run(1.0)
@@ -244,7 +244,7 @@ def test_deadman_is_measured_from_the_drive() -> None:
     assert h.flags_now() == Flags.DEADMAN
 
 
-def test_robot_never_spoken_to_has_its_deadman_tripped() -> None:
+def test_without_a_drive_the_deadman_trips() -> None:
     h = host()
     h.run(0.6)
     assert h.flags() == Flags.DEADMAN

@@ -50,7 +50,7 @@ def drive_on(harness: DriverHarness, seconds: float, t_us: int, *, deaf: bool = 
     return t_us
 
 
-def test_a_robot_that_talks_on_but_takes_no_drive_is_down(harness: DriverHarness) -> None:
+def test_a_robot_that_sends_but_acknowledges_no_drive_is_down(harness: DriverHarness) -> None:
     t_us = drive_on(harness, 1.0, 0)
     assert harness.state() is LineState.READY
     drive_on(harness, 0.3, t_us, deaf=True)
@@ -61,18 +61,18 @@ def test_a_robot_that_talks_on_but_takes_no_drive_is_down(harness: DriverHarness
     assert "check the cable" in (harness.robot.problem or "")
 
 
-def test_a_robot_that_never_names_the_drive_it_took_is_not_held_to_it(harness: DriverHarness) -> None:
+def test_a_robot_that_never_acknowledges_drives_is_not_supervised(harness: DriverHarness) -> None:
     drive_on(harness, 30.0, 0, deaf=True)
     assert harness.state() is LineState.READY
 
 
-def test_a_latched_robot_takes_no_drive_and_that_is_no_trouble(harness: DriverHarness) -> None:
+def test_a_latched_robot_need_not_acknowledge_drives(harness: DriverHarness) -> None:
     t_us = drive_on(harness, 1.0, 0)
     drive_on(harness, 2.0, t_us, deaf=True, flags=1)
     assert harness.state() is LineState.READY
 
 
-def test_lost_frames_are_no_deafness(harness: DriverHarness) -> None:
+def test_a_few_lost_drives_do_not_take_the_link_down(harness: DriverHarness) -> None:
     t_us = drive_on(harness, 1.0, 0)
     for _ in range(20):
         t_us = drive_on(harness, 0.25, t_us, deaf=True)
@@ -81,7 +81,7 @@ def test_lost_frames_are_no_deafness(harness: DriverHarness) -> None:
 
 
 @pytest.mark.parametrize("boot_id", [IDENT.boot_id, 0xB002])
-def test_a_robot_whose_ring_has_fallen_silent_is_asked_who_it_is(harness: DriverHarness, boot_id: int) -> None:
+def test_a_robot_whose_ring_falls_silent_is_sent_hello(harness: DriverHarness, boot_id: int) -> None:
     """A restart just as the clock wraps shows in nothing but that: the pattern is gone, and the odometry goes on."""
     t_us = harness.run(0.45, t_us=2**32 - 500_000)
     harness.robot.take_received()
@@ -101,7 +101,7 @@ def test_a_robot_whose_ring_has_fallen_silent_is_asked_who_it_is(harness: Driver
     assert harness.robot.problem is None
 
 
-def test_a_silent_ring_is_asked_about_at_a_modest_pace(harness: DriverHarness) -> None:
+def test_a_silent_ring_causes_about_two_hellos_a_second(harness: DriverHarness) -> None:
     hellos, t_us = 0, 0
     for _ in range(500):
         t_us += PERIOD_US
@@ -121,7 +121,7 @@ def test_missing_odometry_alone_is_down_too(harness: DriverHarness) -> None:
     assert "no odometry" in (harness.robot.problem or "")
 
 
-def test_an_echo_just_after_the_last_odometry_does_not_make_it_a_robot_that_talks(harness: DriverHarness) -> None:
+def test_after_one_echo_and_then_silence_the_message_says_nothing_received(harness: DriverHarness) -> None:
     t_us = harness.run(0.2, t_us=0)
     harness.pass_time(0.01)
     harness.send(Echo(0, t_us, 0, 1, (10,)))
@@ -184,7 +184,7 @@ def test_a_restart_that_announces_itself_is_noticed(harness: DriverHarness) -> N
     assert harness.robot.take_received().rebooted
 
 
-def test_a_second_answer_to_the_greeting_changes_nothing(harness: DriverHarness) -> None:
+def test_a_second_identity_changes_nothing(harness: DriverHarness) -> None:
     harness.odom(5_000_000)
     harness.send(IDENT)
     assert harness.state() is LineState.READY
@@ -193,7 +193,7 @@ def test_a_second_answer_to_the_greeting_changes_nothing(harness: DriverHarness)
 
 
 @pytest.mark.parametrize(("t_us", "x"), [(9_000_000, 0), (1_020_000, 50_000)])
-def test_a_clock_or_pose_that_leaps_is_asked_about_and_not_joined_to_the_past(
+def test_after_a_jump_of_clock_or_pose_the_robot_is_identified_and_nothing_interpolated_across_it(
     harness: DriverHarness, t_us: int, x: int
 ) -> None:
     harness.odom(1_000_000)

@@ -24,7 +24,7 @@ from tests.drivers.driver_harness import CONFIG, IDENT, ODOM, PERIOD_US, DriverH
 from tests.drivers.vectors import OCTETS
 
 
-def test_greeting_then_pattern_then_ready() -> None:
+def test_hello_then_pattern_then_ready() -> None:
     harness = DriverHarness()
     harness.open()
     assert harness.state() is LineState.HANDSHAKE
@@ -48,7 +48,7 @@ def test_greeting_then_pattern_then_ready() -> None:
     assert not harness.robot.take_received().rebooted
 
 
-def test_what_comes_before_the_greeting_is_done_is_not_used() -> None:
+def test_data_before_the_end_of_the_handshake_is_ignored() -> None:
     harness = DriverHarness()
     harness.open()
     harness.odom(1_000_000)
@@ -64,7 +64,7 @@ def test_what_comes_before_the_greeting_is_done_is_not_used() -> None:
     assert heard.firings == (), "a firing of an earlier pattern"
 
 
-def test_an_unanswered_command_is_sent_three_times_with_numbers_of_their_own() -> None:
+def test_an_unanswered_command_is_sent_three_times_each_with_its_own_number() -> None:
     harness = DriverHarness()
     harness.open()
     sent = []
@@ -77,7 +77,7 @@ def test_an_unanswered_command_is_sent_three_times_with_numbers_of_their_own() -
     assert "no answer to 3 HELLO commands and nothing is received" in (harness.robot.problem or "")
 
 
-def test_a_lost_ack_is_made_good_by_the_next_and_a_late_one_counts() -> None:
+def test_an_ack_of_any_try_counts() -> None:
     harness = DriverHarness()
     harness.open()
     harness.answer()
@@ -94,7 +94,7 @@ def test_a_lost_ack_is_made_good_by_the_next_and_a_late_one_counts() -> None:
     assert harness.robot.problem is None
 
 
-def test_a_robot_that_comes_back_is_taken_up_at_a_modest_pace() -> None:
+def test_a_silent_robot_is_sent_hello_twice_a_second_until_it_answers() -> None:
     harness = DriverHarness()
     harness.open()
     hellos = 0
@@ -145,7 +145,7 @@ def test_another_robot_than_expected_is_not_driven(ident: Ident, text: str) -> N
         (99, "NAK 99.* a reason this program does not know"),
     ],
 )
-def test_a_refused_pattern_is_trouble(code: int, text: str) -> None:
+def test_a_refused_pattern_takes_the_link_down(code: int, text: str) -> None:
     harness = DriverHarness()
     harness.open()
     harness.answer()
@@ -156,7 +156,7 @@ def test_a_refused_pattern_is_trouble(code: int, text: str) -> None:
         raise AssertionError(harness.robot.problem)
 
 
-def test_counts_go_on_over_lines(harness: DriverHarness) -> None:
+def test_frame_counts_continue_on_the_next_line(harness: DriverHarness) -> None:
     harness.send(ODOM)
     harness.robot.receive(b"\x01\x02\x03\0", harness.now)
     harness.robot.receive(encode(replace(ODOM, seq=6)), harness.now)
@@ -230,7 +230,7 @@ def test_another_firing_pattern_before_the_first_is_taken() -> None:
     assert harness.state() is LineState.READY
 
 
-def test_a_firing_pattern_that_cannot_be(harness: DriverHarness) -> None:
+def test_an_infeasible_firing_pattern_is_refused_and_the_current_one_stays(harness: DriverHarness) -> None:
     ring = CONFIG.ring.model_copy(update={"firing": FiringConfig(sets=((40,),))})
     with pytest.raises(FiringError):
         harness.robot.set_firing(ring)

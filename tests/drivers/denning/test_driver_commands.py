@@ -21,7 +21,7 @@ from drivers.messages import Twist
 from tests.drivers.driver_harness import IDENT, DriverHarness, only
 
 
-def test_the_newest_drive_wins_and_is_held_to_the_limits_of_the_body(harness: DriverHarness) -> None:
+def test_only_the_newest_drive_is_sent_within_the_limits_of_the_body(harness: DriverHarness) -> None:
     harness.robot.drive(Twist(0.1, 0.2))
     harness.robot.drive(Twist(0.3054, -0.25))
     (drive,) = harness.received()
@@ -35,7 +35,7 @@ def test_the_newest_drive_wins_and_is_held_to_the_limits_of_the_body(harness: Dr
 
 
 @pytest.mark.parametrize("twist", [Twist(math.nan, 0.0), Twist(0.0, math.inf)])
-def test_a_velocity_that_is_none_is_refused(harness: DriverHarness, twist: Twist) -> None:
+def test_a_velocity_that_is_not_finite_is_refused(harness: DriverHarness, twist: Twist) -> None:
     with pytest.raises(ValueError, match="must be finite"):
         harness.robot.drive(twist)
     assert harness.received() == []
@@ -50,7 +50,7 @@ def test_a_stalled_line_takes_only_halt(harness: DriverHarness) -> None:
     assert isinstance(halt, Halt)
 
 
-def test_the_drive_that_waited_for_the_line_is_the_newest(harness: DriverHarness) -> None:
+def test_after_a_stalled_line_only_the_newest_drive_is_sent(harness: DriverHarness) -> None:
     for v in (0.1, 0.2, 0.3):
         harness.robot.drive(Twist(v, 0.0))
         assert harness.received(writable=False) == []
@@ -59,7 +59,7 @@ def test_the_drive_that_waited_for_the_line_is_the_newest(harness: DriverHarness
     assert drive.v_mm_s == 300
 
 
-def test_halt_goes_first_and_drops_what_was_asked_before(harness: DriverHarness) -> None:
+def test_halt_is_sent_first_and_discards_earlier_requests(harness: DriverHarness) -> None:
     harness.robot.release()
     harness.robot.drive(Twist(0.1, 0.0))
     harness.robot.halt()
@@ -72,14 +72,14 @@ def test_halt_goes_first_and_drops_what_was_asked_before(harness: DriverHarness)
     assert [type(frame) for frame in harness.received()] == [Drive]
 
 
-def test_halt_goes_before_the_greeting() -> None:
+def test_halt_is_sent_before_hello() -> None:
     harness = DriverHarness()
     harness.robot.halt()
     harness.open()
     assert [type(frame) for frame in harness.received()] == [Halt, Hello]
 
 
-def test_halt_is_repeated_until_answered_whatever_happens(harness: DriverHarness) -> None:
+def test_halt_is_repeated_until_acknowledged(harness: DriverHarness) -> None:
     harness.robot.halt()
     halts = 0
     for _ in range(100):
@@ -128,7 +128,7 @@ def test_release_clears_a_pending_halt_without_waiting(harness: DriverHarness) -
     assert [type(frame) for frame in harness.answer()] == [Hello], "a release is not kept for later"
 
 
-def test_while_latched_a_refused_drive_is_no_trouble(harness: DriverHarness) -> None:
+def test_a_drive_refused_because_of_the_latch_is_not_a_problem(harness: DriverHarness) -> None:
     harness.robot.drive(Twist(0.1, 0.0))
     (drive,) = harness.received()
     harness.send(Nak(0, drive.seq, NakCode.LATCHED))

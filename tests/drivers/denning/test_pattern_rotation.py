@@ -82,7 +82,7 @@ def test_the_schedule_holds_through_a_real_conversation() -> None:
     assert np.allclose(steps, np.round(steps), atol=1e-3), "the rotation keeps its beat through every reconnect"
 
 
-def test_a_pattern_that_is_set_again_and_again_does_not_hurry_the_ring() -> None:
+def test_setting_a_pattern_again_does_not_speed_up_the_ring() -> None:
     pattern = Pattern(0, 50, 255, (1, 2, 4))
     rotation, times = Rotation(), []
     for now_us in range(0, 2_000_000, 1000):

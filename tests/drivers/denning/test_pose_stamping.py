@@ -37,7 +37,7 @@ def test_a_firing_has_the_pose_of_its_own_moment(harness: DriverHarness) -> None
     assert np.isnan(np.delete(firing.ranges_m, [0, 5])).all()
 
 
-def test_an_echo_before_its_odometry_is_held_and_keeps_its_turn(harness: DriverHarness) -> None:
+def test_an_echo_waits_for_the_odometry_after_it(harness: DriverHarness) -> None:
     harness.odom(0)
     harness.send(Echo(0, 10_000, 0, 1, (10,)), Echo(0, 30_000, 1, 1, (20,)))
     assert harness.robot.take_received().firings == ()
@@ -73,7 +73,7 @@ def test_one_chunk_or_byte_by_byte_is_the_same(harness: DriverHarness) -> None:
     assert harness.robot.counts == other.robot.counts == LinkCounts(frames=6)
 
 
-def test_an_echo_that_nothing_places_is_dropped_and_counted(harness: DriverHarness) -> None:
+def test_an_echo_without_odometry_around_it_is_dropped_and_counted(harness: DriverHarness) -> None:
     harness.odom(1_000_000)
     harness.send(Echo(0, 990_000, 0, 1, (10,)))
     assert harness.robot.late_echoes == 1, "older than the history"
@@ -159,7 +159,7 @@ def test_a_leap_of_the_odometry_is_taken_out_and_reported(harness: DriverHarness
     assert not heard.rebooted
 
 
-def test_a_base_that_moves_in_leaps_is_believed(harness: DriverHarness) -> None:
+def test_odometry_in_coarse_steps_is_not_taken_for_a_jump(harness: DriverHarness) -> None:
     """One whose odometry comes in steps, or that is faster than its file says, does not leap: it moves so."""
     t_us = 0
     for k in range(100):
@@ -172,7 +172,7 @@ def test_a_base_that_moves_in_leaps_is_believed(harness: DriverHarness) -> None:
     assert heard.notes == ()
 
 
-def test_echoes_without_odometry_do_not_pile_up(harness: DriverHarness) -> None:
+def test_the_number_of_echoes_that_wait_for_odometry_is_bounded(harness: DriverHarness) -> None:
     harness.odom(0)
     for k in range(200):
         harness.send(Echo(0, 1000 + k, 0, 1, (10,)))
@@ -181,7 +181,7 @@ def test_echoes_without_odometry_do_not_pile_up(harness: DriverHarness) -> None:
     assert len(harness.robot.take_received().firings) == 64
 
 
-def test_a_fault_of_the_sensors_beyond_the_ring_is_passed_over() -> None:
+def test_echoes_of_sensors_beyond_the_ring_are_ignored() -> None:
     ring = CONFIG.ring.model_copy(update={"count": 16})
     harness = DriverHarness(CONFIG.model_copy(update={"ring": ring}))
     harness.ident = replace(IDENT, sensors=16)
@@ -194,7 +194,7 @@ def test_a_fault_of_the_sensors_beyond_the_ring_is_passed_over() -> None:
     assert np.nansum(firing.ranges_m) == pytest.approx(0.3048)
 
 
-def test_firings_no_one_takes_do_not_pile_up(harness: DriverHarness) -> None:
+def test_the_number_of_firings_that_wait_is_bounded(harness: DriverHarness) -> None:
     for k in range(1100):
         harness.odom(k * PERIOD_US)
         harness.send(Echo(0, k * PERIOD_US, 0, 1, (10,)))

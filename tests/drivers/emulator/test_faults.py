@@ -36,7 +36,7 @@ def test_mute_robot_sends_nothing_and_its_numbers_go_on() -> None:
     assert h.decoder.bad == 0
 
 
-def test_deaf_robot_hears_nothing() -> None:
+def test_a_deaf_robot_receives_nothing() -> None:
     h = host(faults=script(kind="deaf", at_s=0.1, duration_s=0.1))
     h.run(0.15)
     h.send(Hello, 1)
@@ -47,7 +47,7 @@ def test_deaf_robot_hears_nothing() -> None:
     assert len(h.of(Ident)) == 1
 
 
-def test_garbage_and_bit_errors_are_noticed_and_got_over() -> None:
+def test_garbage_and_bit_errors_are_counted_and_survived() -> None:
     for kind in ("garbage", "bit_errors"):
         h = host(faults=script(kind=kind, at_s=0.2, duration_s=1.0))
         h.run(2.0)
@@ -57,7 +57,7 @@ def test_garbage_and_bit_errors_are_noticed_and_got_over() -> None:
         assert h.decoder.lost > 0
 
 
-def test_reboot_forgets_everything_but_where_it_stands() -> None:
+def test_after_a_reboot_only_the_true_pose_is_kept() -> None:
     faults = script(kind="reboot", at_s=2.0, duration_s=0.5)
     h = host(WorldConfig(), faults=faults)
     first = h.robot.boot_id

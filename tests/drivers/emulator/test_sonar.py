@@ -105,7 +105,7 @@ def test_same_seed_same_ranges_and_another_seed_others() -> None:
     assert not np.array_equal(run(1), run(2), equal_nan=True)
 
 
-def test_who_did_not_fire_says_so() -> None:
+def test_a_sensor_that_did_not_fire_reports_nan() -> None:
     world = wall_at(3.0, outliers=1.0)
     got = fire_many(world, 1, sensors=3)[0]
     assert np.isfinite(got).all()
@@ -129,7 +129,7 @@ def crosstalk_ranges(probability: float, sensors: list[int], angle_deg: float = 
     return np.array([sonar.fire(Pose(0, 0, 0), 0.0, sensors) for _ in range(400)])
 
 
-def test_crosstalk_is_half_the_way_round() -> None:
+def test_crosstalk_measures_half_of_the_path_between_two_sensors() -> None:
     got = crosstalk_ranges(1.0, [0, 1], angle_deg=17.0)
     np.testing.assert_allclose(got[:, 0], 2.0)
     np.testing.assert_allclose(got[:, 1], 0.5 * (2.0 + math.hypot(2.0, 0.2)))
