@@ -154,7 +154,7 @@ async def test_unplugging_hangs_up_and_plugging_in_links_again(link: Path) -> No
 async def test_without_its_parent_it_sees_the_robot_stop_and_ends(
     link: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    trace, parent = tmp_path / "truth.csv", [os.getppid()]
+    trace, parent = tmp_path / "truth.csv", [2]
     monkeypatch.setattr("drivers.emulator.pty_transport.os.getppid", lambda: parent[0])
     async with emulator(link, trace=trace, exit_with_parent=True) as robot:
         with Host(robot) as host:
