@@ -56,20 +56,6 @@ def test_csv(hall_run: Path, timeline: Timeline, tmp_path: Path) -> None:
     assert len(read["odometry"]) > 100
 
 
-def test_parquet(hall_run: Path, timeline: Timeline, tmp_path: Path) -> None:
-    import pyarrow.parquet as pq
-
-    folder = exported(hall_run, "parquet", tmp_path / "new")
-    read = {path.stem: pq.read_table(path) for path in folder.iterdir()}
-    assert set(read) == TABLES
-    echoes = read["echoes"]
-    assert b"metres" in echoes.schema.metadata[b"echolocate"]
-    assert echoes["sensor"].to_pylist() == timeline.echoes["sensor"].tolist()
-    assert echoes["range_m"].null_count == int(np.isinf(timeline.echoes["range_m"]).sum())
-    assert read["objects"]["x_m"].to_pylist()[-1] == timeline.objects[-1].x
-    assert read["segments"].num_rows == len(timeline.segments) > 50
-
-
 def test_foxglove(hall_run: Path, timeline: Timeline, tmp_path: Path) -> None:
     from mcap.reader import make_reader
     from mcap_protobuf.decoder import DecoderFactory
@@ -113,27 +99,6 @@ def test_foxglove(hall_run: Path, timeline: Timeline, tmp_path: Path) -> None:
     assert fired == sorted(
         int(row["sensor"]) for row in timeline.echoes if row["robot_s"] == timeline.echoes["robot_s"][-1]
     )
-
-
-def test_a_scan_puts_echoes_where_they_were(timeline: Timeline) -> None:
-    from runtime.analysis.export.shapes import even_radius, firing_scans, whole_ring
-
-    radius = even_radius(timeline.settings.ring)
-    assert radius is not None
-    assert radius == pytest.approx(0.381)
-    count = 0
-    for part in firing_scans(timeline):
-        ranges = whole_ring(24, radius, part)
-        for row in part.rows:
-            reach = ranges[int(row[1])]
-            if math.isfinite(reach):
-                angle = part.yaw + math.radians(15.0 * row[1])
-                there = (part.x + reach * math.cos(angle), part.y + reach * math.sin(angle))
-                assert there == pytest.approx(
-                    (row[2] + row[5] * math.cos(row[4]), row[3] + row[5] * math.sin(row[4])), abs=1e-9
-                )
-                count += 1
-    assert count > 300
 
 
 def test_rosbag2(hall_run: Path, timeline: Timeline, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -196,30 +161,6 @@ def test_a_ring_log_out_and_in(hall_run: Path, hall_log: Path, timeline: Timelin
 def test_a_ring_log_into_the_others(hall_log: Path, tmp_path: Path) -> None:
     for form in ("csv", "foxglove", "rosbag2"):
         exported(hall_log, form, tmp_path / form, "--world", "hallway")
-
-
-def test_an_uneven_ring_for_foxglove(tmp_path: Path) -> None:
-    """Each echo as an arc of its own."""
-    from mcap.reader import make_reader
-    from mcap_protobuf.decoder import DecoderFactory
-
-    robot = tmp_path / "robot.toml"
-    robot.write_text(
-        "[ring]\nsensors = [{x_m = 0.1, y_m = 0.0, angle_deg = 0.0}, {x_m = 0.0, y_m = 0.1, angle_deg = 80.0}]\n"
-        "beam_half_angle_deg = 10.0\nresolution_m = 0.01\nrange_min_m = 0.1\nrange_max_m = 5.0\n"
-        "[ring.firing]\nsets = [[0, 1]]\nstep_period_s = 0.1\n"
-        "[body]\nradius_m = 0.2\nspeed_max_m_s = 1.0\nturn_max_rad_s = 2.0\n",
-        encoding="utf-8",
-    )
-    log = tmp_path / "log.csv"
-    log.write_text("t,x,y,theta,r00,r01\n0,0,0,0,1.0,2.0\n0.1,0.1,0,0,0.9,inf\n0.2,0.2,0,0,0.8,\n", encoding="utf-8")
-    path = exported(log, "foxglove", tmp_path / "x.mcap", "--robot", str(robot))
-    with path.open("rb") as file:
-        reader = make_reader(file, decoder_factories=[DecoderFactory()])
-        scans = [proto for _, channel, _, proto in reader.iter_decoded_messages() if channel.topic == "/ring"]
-    assert [scan.ranges[0] for scan in scans] == [1.0, 2.0, 0.9, math.inf, 0.8]
-    assert scans[1].pose.position.y == pytest.approx(0.1)
-    assert scans[0].end_angle == pytest.approx(math.radians(10.0))
 
 
 @pytest.mark.parametrize("form", sorted(export.OPTIONAL_PACKAGES))
