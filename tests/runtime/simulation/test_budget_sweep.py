@@ -50,10 +50,10 @@ def test_smaller_budgets_end_no_worse(sweep: dict[float, BudgetRow]) -> None:
 @pytest.mark.compiled
 def test_command_prints_the_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "budgets.json"
-    assert run_command(["experiment", "budget", "--budget-ms", "0.3", "5", "--json", str(path)]) == DONE
+    assert run_command(["experiment", "budget", "--quanta", "1", "--json", str(path)]) == DONE
     result: dict[str, Any] = json.loads(path.read_bytes())
-    assert [row["budget"] for row in result["budgets"]] == [0.3, 5.0]
-    assert result["unit"] == "ms"
+    assert [row["budget"] for row in result["budgets"]] == [1.0]
+    assert result["unit"] == "quanta"
     assert all(row["found"] >= 38 and row["false"] == 0 for row in result["budgets"])
     assert "40 drums" in capsys.readouterr().out
 

@@ -16,6 +16,7 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings
 from config.settings import Settings
 from config.world import WorldConfig
+from runtime.analysis.plots import animation
 from runtime.cli.app import run_command
 from runtime.cli.commands.experiment import stop_at_leg_end
 from runtime.recording.reader import open_recording
@@ -62,7 +63,10 @@ def test_the_papers_hallway(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert shown.err == ""
 
 
-def test_an_experiment_leaves_recording_pictures_and_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_experiment_leaves_recording_pictures_and_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(animation, "FRAMES_MAX", 2)
     out = tmp_path / "out"
     outcome = experiment(tmp_path, "irregular", "--seeds", "3", "--out", str(out))
     reported = capsys.readouterr().out
