@@ -4,7 +4,8 @@
 PYTHON ?= python3.11
 VENV   := .venv
 BIN    := $(VENV)/bin
-PIP    := $(BIN)/python -m pip install -q --disable-pip-version-check
+UV     := $(shell command -v uv)
+PIP    := $(if $(UV),uv pip install -q --python $(BIN)/python,$(BIN)/python -m pip install -q --disable-pip-version-check)
 PYTEST := $(BIN)/python -m pytest -q
 WORKERS = $(shell expr 2 \* $$(nproc))
 
@@ -78,11 +79,16 @@ bench: $(VENV)/bench.stamp
 clean:
 	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .import_linter_cache
 
+# With uv where it is installed, which also finds or fetches the Python; otherwise with pip.
 $(VENV)/bin/python:
+ifneq ($(UV),)
+	uv venv -q --python $(PYTHON) $(VENV)
+else
 	@command -v $(PYTHON) >/dev/null || { echo "make: $(PYTHON) not found: install it, or choose another: make PYTHON=python3.12"; exit 1; }
 	@$(PYTHON) -c "import ensurepip" 2>/dev/null || { echo "installing $(PYTHON)-venv, which Debian's Python needs for virtual environments"; \
 		$$([ $$(id -u) = 0 ] || echo sudo) sh -c "apt-get -qq update && apt-get -qq install -y $(PYTHON)-venv"; }
 	$(PYTHON) -m venv $(VENV)
+endif
 
 $(VENV)/run.stamp: pyproject.toml | $(VENV)/bin/python
 	$(PIP) --editable .
