@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tests import naive_bayes as naive_full
+from tests import naive_bayes
 from tests.naive_bayes import Noise
 
 Array = NDArray[Any]
@@ -57,7 +57,7 @@ def gather(memory: Iterable[Array], centre: Array, rho: float, opt: float, reach
 
 def towards(w: Array, centre: Array, rho: float, gate: float) -> Array:
     """Return the mean unit direction to a circle's centre from those that hear it."""
-    seen = naive_full.look(w, centre)
+    seen = naive_bayes.look(w, centre)
     total = seen.u[np.abs(w[:, 4] - (seen.d - rho)) < gate].sum(0)
     return np.asarray(total / np.hypot(*total)) if total.any() else np.zeros(2)
 
@@ -194,10 +194,10 @@ def residual_evidence(
     w: Array, centre: Array, rho: float, half: float, gate: float, noises: Sequence[Noise]
 ) -> list[float]:  # fmt: skip
     """Return what an object's residuals say of each noise."""
-    seen = naive_full.look(w, centre)
+    seen = naive_bayes.look(w, centre)
     e = w[:, 4] - (seen.d - rho)
     use = (np.abs(e) < gate) & (seen.cos >= half)
-    return [float(naive_full.evidence(noise, w[use, 4], e[use]).sum()) for noise in noises]
+    return [float(naive_bayes.evidence(noise, w[use, 4], e[use]).sum()) for noise in noises]
 
 
 def place_readings(
@@ -285,6 +285,37 @@ def claimed_by(q: Array, tracks: Iterable[tuple[int, Array, float, float]], opt:
         if ahead > 0 and ahead >= opt * d - 0.004 * FT and e < half_box + 3 * noise + 2 * root:
             fits.append((e, t))
     return min(fits)[1] if fits and q[4] < SILENT else -1
+
+
+def is_hidden(
+    q: Array, centre: Array, rho: float, others: Iterable[tuple[Array, float, float]], gate: float
+) -> bool:  # fmt: skip
+    """Return whether a reading passed a circle and another circle (centre, radius, σ) stands between."""
+    ray = complex(*(centre - q[:2]))
+    if abs(ray) <= rho or q[4] - (abs(ray) - rho) <= gate:
+        return False
+    for place, radius, _ in others:
+        seen = complex(*(place - q[:2])) / (ray / abs(ray))
+        if 0 < seen.real < abs(ray) - rho and abs(seen.imag) < radius:
+            return True
+    return False
+
+
+def is_explained_elsewhere(
+    q: Array, centre: Array, rho: float, others: Iterable[tuple[Array, float, float]], gate: float, merge: float,
+    opt: float, half_box: float, variance: tuple[float, float],
+) -> bool:  # fmt: skip
+    """Return whether another circle, not in the same place, explains a reading with a smaller error."""
+    own = q[4] - (math.dist(centre, q[:2]) - rho)
+    if own > gate:
+        return False
+    for place, radius, sigma in others:
+        d, ahead = off_axis(q, place)
+        error = abs(q[4] - (d - radius))
+        tight = half_box + 3.0 * math.sqrt(variance[0] + variance[1] * d**2) + 2.0 * sigma
+        if math.dist(place, centre) >= merge and ahead >= opt * d and error < min(abs(own), tight):
+            return True
+    return False
 
 
 def after_merging(

@@ -1,34 +1,36 @@
-"""The method's reports and its kernels: objects reported anew only where they changed, and no allocations."""
+"""The method as perception calls it: reports, counts, models, meaningless input; and kernels without allocations."""
 
 from __future__ import annotations
 
+import math
 import os
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from numba.core.errors import NumbaError
+from numpy.typing import NDArray
 
-from config.load import load_settings
+from drivers.messages import Firing, Pose
 from perception.bayes import naming
 from perception.bayes.bayes_method import BayesPerception
-from perception.bayes.kernel_settings import make_settings
-from perception.bayes.naming import Reported
 from perception.bayes.object_report import circle_object, circle_row
-from perception.bayes.settings_record import CIRCLES_MAX, POLYGONS_MAX
-from perception.bayes.state import ESTABLISHED, Memory
+from perception.bayes.range_fit import FAR
+from perception.bayes.state import ESTABLISHED, FREE, TENTATIVE
 from perception.detected_object import DetectedObject
+from perception.edits import ConfirmObject, PinSegments, PlaceModel
 from perception.kernel import Floats, kernel
 from perception.records import records, zeros
 from runtime.simulation.scenes import halls, readings
-
-SETTINGS = load_settings("hallway")
-BOXES = load_settings("hallway", models=["semicircle", "box"])
+from tests.perception.bayes.tracks import BOXES, NOISES, SENSORS, SETTINGS
 
 
 def fresh_report(perception: BayesPerception) -> list[DetectedObject]:
-    """Report every sure circle from its track, as if for the first time."""
+    """Return every sure circle as a report from its track, without the reports before."""
     memory, sure = perception.memory, np.zeros(len(perception.memory.circles), np.int64)
-    reported = records(Reported, zeros(Reported, len(sure)))
+    reported = records(naming.Reported, zeros(naming.Reported, len(sure)))
     n = naming.report_circles(memory.tracks, reported, sure)
     name = SETTINGS.models[0].name
     rows = [t if t >= 0 else ~t for t in sure[:n].tolist()]
@@ -37,7 +39,7 @@ def fresh_report(perception: BayesPerception) -> list[DetectedObject]:
 
 
 @pytest.mark.compiled
-def test_no_object_is_out_of_date() -> None:
+def test_reported_objects_are_never_out_of_date() -> None:
     perception, most = BayesPerception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception.bayes), 0
     for seed in (0, 1):
         for firing in readings(SETTINGS.ring, halls("moved")[seed], seed):
@@ -51,58 +53,166 @@ def test_no_object_is_out_of_date() -> None:
     assert most == 6
 
 
-def test_only_what_changed_is_reported_anew() -> None:
-    rng, memory = np.random.default_rng(5), Memory(4, 6)
-    circles = memory.circles
-    last = zeros(Reported, 6)
-    last["x"] = np.nan
-    reported = records(Reported, last)
-    for name in ("x", "y", "covariance_xx", "covariance_xy", "covariance_yy", "hits", "probability"):
-        circles[name] = rng.normal(size=6)
-    circles["kind"] = rng.integers(0, 3, 6)
-    circles["is_named"] = 1
-
-    def report(*tracks: int) -> list[int]:
-        circles["status"] = 0
-        circles["status"][list(tracks)] = ESTABLISHED
-        sure = np.full(8, 99, np.int64)
-        n = naming.report_circles(memory.tracks, reported, sure)
-        assert sure[n:].tolist() == [99] * (8 - n)
-        found: list[int] = sure[:n].tolist()
-        return found
-
-    assert report(0, 2, 5) == [~0, ~2, ~5]
-    assert report(0, 2, 4, 5) == [0, 2, ~4, 5]
-    for name in ("x", "y", "covariance_xx", "covariance_xy", "covariance_yy", "hits", "probability"):
-        circles[name][2] += 1e-12
-        assert report(0, 2, 5) == [0, ~2, 5], name
-        assert report(0, 2, 5) == [0, 2, 5], name
-    circles["kind"][5] += 1
-    assert report(2, 5) == [2, ~5]
-    for name in ("number", "marks"):
-        circles[name][2] += 1
-        assert report(2, 5) == [~2, 5], name
+def garbage(rng: np.random.Generator) -> Firing:
+    """Return a firing whose pose, time and ranges may be NaN, infinite, negative, zero or huge."""
+    values = [math.nan, math.inf, -math.inf, 0.0, -1.0, 1e-300, 1e300, 1e5, 2 * FAR]
+    ranges = rng.uniform(0, 5, SENSORS)
+    chance = rng.random(SENSORS)
+    ranges = np.where(chance < 0.3, rng.choice(values, SENSORS), np.where(chance < 0.5, np.round(ranges, 1), ranges))
+    x, y, heading, time_s = rng.normal(0, 0.4, 4).tolist()
+    if rng.random() < 0.2:
+        x, y, heading, time_s = (float(rng.choice([v, *values])) for v in (x, y, heading, time_s))
+    return Firing(time_s * 10.0, Pose(x, y, heading), heading, ranges)
 
 
-def test_more_models_than_there_is_room_for_are_refused() -> None:
-    round_model, box = BOXES.models
-    for model, most in ((round_model, CIRCLES_MAX - 3), (box, POLYGONS_MAX)):
-        radii = np.linspace(1.0, 3.0, most + 1).tolist() if model is round_model else [None] * (most + 1)
-        models = [model.model_copy(update={"name": f"m{k}", "arc_radius_m": r}) for k, r in enumerate(radii)]
-        make_settings(BOXES.ring, models[:-1], BOXES.perception.bayes)
-        with pytest.raises(ValueError, match="at a time; leave some out"):
-            make_settings(BOXES.ring, models, BOXES.perception.bayes)
+def leaves(array: NDArray[Any]) -> Iterator[NDArray[Any]]:
+    """Yield the numbers of an array of records, field by field."""
+    if array.dtype.names is None:
+        yield array
+    for name in array.dtype.names or ():
+        yield from leaves(array[name])
+
+
+@pytest.mark.boundscheck
+@pytest.mark.parametrize(("tracks", "firings"), [(1, 6), pytest.param(48, 60, marks=pytest.mark.compiled)])
+def test_meaningless_firings_leave_a_finite_memory(tracks: int, firings: int) -> None:
+    config = SETTINGS.perception.bayes.model_copy(update={"tracks_max": tracks})
+    for seed, settings in enumerate((SETTINGS, BOXES)):
+        rng, perception = np.random.default_rng(seed), BayesPerception(SETTINGS.ring, settings.models, config)
+        memory = perception.memory
+        for _ in range(firings):
+            perception.observe(garbage(rng))
+            while perception.can_refine:
+                perception.refine()
+            for seen in perception.labelled_objects():
+                assert np.isfinite([seen.x, seen.y, seen.theta, seen.sigma, seen.score]).all()
+                assert 0.0 <= (seen.probability or 0.0) <= 1.0
+        state, circles, polygons = memory.state, memory.circles, memory.polygons
+        for array in (circles, polygons, state["lines"], state["roughness_nat"], state["residuals_nat"]):
+            assert all(np.isfinite(leaf).all() for leaf in leaves(array))
+        for array in (state["sensors"]["history"], state["buckets"]["segments"]):
+            assert all(np.isfinite(leaf).all() for leaf in leaves(array))
+        assert set(np.unique(circles["status"])) | set(np.unique(polygons["status"])) <= {
+            FREE,
+            TENTATIVE,
+            ESTABLISHED,
+        }
+        assert len(circles) == tracks
+        assert ((circles["kind"] >= 0) & (circles["kind"] < perception.settings[0].circle_count)).all()
+        assert 0 <= state["noise_level"][0] < len(NOISES)
+
+
+def perception_of_both_models(**config: Any) -> BayesPerception:
+    """Return an empty perception of drums and boxes."""
+    return BayesPerception(BOXES.ring, BOXES.models, BOXES.perception.bayes.model_copy(update=config))
+
+
+def test_an_empty_map_has_no_objects_and_nothing_to_refine() -> None:
+    perception = perception_of_both_models()
+    assert perception.objects() == perception.labelled_objects() == ()
+    assert (perception.can_refine, perception.converged, perception.refine()) == (False, True, 0)
+    assert perception.counts == (0, 0, 0)
+    assert perception.segments().geometry.shape == (0, 5)
+
+
+def test_a_placed_object_is_reported_until_the_map_is_reset() -> None:
+    perception = perception_of_both_models()
+    assert perception.edit(PlaceModel("semicircle", 1.0, 0.0, 0.0)) is None
+    assert perception.edit(PlaceModel("box", -1.0, 0.0, 0.0)) is None
+    assert sorted((o.model, o.x, o.placed) for o in perception.objects()) == [
+        ("box", -1.0, True), ("semicircle", 1.0, True),
+    ]  # fmt: skip
+    assert perception.counts.hypotheses == 2
+    numbers = {o.model: o.number for o in perception.objects()}
+    for model, number in numbers.items():
+        assert number is not None
+        evidence = perception.evidence(number)
+        assert evidence is not None
+        assert (evidence.object, evidence.model, evidence.arcs) == (number, model, ())
+    assert perception.evidence(99) is None
+    perception.reset()
+    assert perception.objects() == ()
+    assert perception.counts.hypotheses == 0
+
+
+def test_a_changed_object_is_reported_anew_and_an_unchanged_one_is_the_same_object() -> None:
+    perception = perception_of_both_models()
+    for x in (1.0, 3.0):
+        perception.edit(PlaceModel("semicircle", x, 0.0, 0.0))
+    first = {o.number: o for o in perception.objects()}
+    perception.edit(ConfirmObject(2))
+    second = {o.number: o for o in perception.objects()}
+    assert second[1] is first[1]
+    assert second[2] == replace(first[2], confirmed=True)
+
+
+def test_added_models_are_reported_by_their_names() -> None:
+    perception = perception_of_both_models()
+    keg = BOXES.models[0].model_copy(update={"name": "keg", "arc_radius_m": 0.2})
+    perception.edit(PlaceModel("semicircle", 1.0, 0.0, 0.0))
+    assert perception.edit(PlaceModel("keg", 3.0, 0.0, 0.0)) is not None
+    perception.set_models((*BOXES.models, keg))
+    assert perception.edit(PlaceModel("keg", 3.0, 0.0, 0.0)) is None
+    assert sorted((o.model, o.x) for o in perception.objects()) == [("keg", 3.0), ("semicircle", 1.0)]
+
+
+def test_a_firing_takes_as_many_quanta_as_configured_and_circles_and_polygons_alternate() -> None:
+    """Every track always has unseen evidence, so the quanta of a firing are all used."""
+    perception = perception_of_both_models(quanta_per_firing=2, polygon_quanta_per_firing=1)
+    perception.edit(PlaceModel("semicircle", 1.0, 0.0, 0.0))
+    perception.edit(PlaceModel("box", -1.0, 0.0, 0.0))
+    memory, silence = perception.memory, np.full(SENSORS, np.nan)
+    order: list[str] = []
+    for k in range(4):
+        memory.circles["unseen"][0] = 50
+        memory.polygons["unseen"][0] = 50
+        perception.observe(Firing(float(k), Pose(0.0, 0.0, 0.0), 0.0, silence))
+        assert perception.can_refine
+        circles = int(memory.state["refinements"][0])
+        while perception.can_refine and perception.refine():
+            is_circle = int(memory.state["refinements"][0]) > circles
+            order.append("circle" if is_circle else "polygon")
+            circles = int(memory.state["refinements"][0])
+    assert order.count("polygon") == 4
+    assert order.count("circle") >= 4
+
+
+def test_a_pinned_segment_survives_the_segments_after_it() -> None:
+    perception = perception_of_both_models()
+    drive = readings(SETTINGS.ring, halls("walls")[0], 0)
+    while not len(perception.segments().numbers):
+        perception.observe(next(drive))
+    number = int(perception.segments().numbers[0])
+    assert perception.edit(PinSegments((number,), pinned=True)) is None
+    geometry = perception.segments().geometry[0].tolist()
+    perception.memory.state["buckets"]["count"] = 0
+    perception.observe(Firing(1e3, Pose(0.0, 0.0, 0.0), 0.0, np.full(SENSORS, np.nan)))
+    kept = perception.segments()
+    assert kept.numbers.tolist() == [number]
+    assert kept.pinned.tolist() == [1]
+    assert kept.geometry[0].tolist() == geometry
+    assert perception.segment_geometry().tolist() == kept.geometry.tolist()
+    assert perception.counts.segments == 1
+
+
+def test_settings_change_while_running_except_the_number_of_tracks() -> None:
+    perception = perception_of_both_models()
+    changed = BOXES.perception.bayes.model_copy(update={"report_probability": 0.8, "tracks_max": 3})
+    tracks = len(perception.memory.circles)
+    perception.apply_settings(BOXES.perception.model_copy(update={"bayes": changed}))
+    assert perception.settings[0].report_probability == 0.8
+    assert len(perception.memory.circles) == tracks
 
 
 @kernel
 def allocates(n: int) -> Floats:
-    """Make an array, which no kernel may."""
+    """Return a new array, which a kernel must not make."""
     return np.zeros(n)
 
 
 @kernel
 def divides(a: float, b: float) -> float:
-    """Divide."""
+    """Return a quotient."""
     return a / b
 
 
@@ -112,7 +222,7 @@ def test_a_kernel_that_allocates_is_refused() -> None:
         allocates(3)
 
 
-def test_a_kernel_still_raises() -> None:
+def test_a_kernel_raises_on_division_by_zero() -> None:
     assert divides(1.0, 4.0) == 0.25
     with pytest.raises(ZeroDivisionError):
         divides(1.0, 0.0)

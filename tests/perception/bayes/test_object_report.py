@@ -1,4 +1,4 @@
-"""What is reported, against its oracle on random cases: what is sure, how well placed, and what a rival is called."""
+"""Reported objects against oracles on random cases: standard deviations, walls, and names of other objects."""
 
 from __future__ import annotations
 
@@ -7,104 +7,27 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes import naming, object_report, walls
-from perception.bayes.elements import MAX_POLYGONS, POLYGON_BIN_CAPACITY
-from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE
-from perception.records import records, zeros
-from tests import naive_tracks
+from perception.bayes import object_report, walls
+from perception.bayes.kernel_settings import make_settings
+from perception.bayes.state import ESTABLISHED, FREE, PLACED, TENTATIVE
 from tests.naive_tracks import FT
-from tests.perception.tracks import (
-    ALTERNATIVES,
-    TRACKS,
+from tests.perception.bayes.tracks import (
+    BOXES,
     P,
-    S,
-    around,
+    examples,
     line_rows,
+    new_memory,
     place_of,
     random_lines,
     random_track,
-    shared,
     unit,
 )
 
 
-def test_what_is_sure_is_reported() -> None:
-    rng, memory, out, sure = np.random.default_rng(16), shared(), np.zeros(max(MAX_POLYGONS, TRACKS), np.int64), 0
-    circles, reported = memory.circles, records(naming.Reported, zeros(naming.Reported, TRACKS))
-
-    def report() -> list[int]:
-        n = naming.report_circles(memory.tracks, reported, out)
-        return [t if t >= 0 else ~t for t in out[:n].tolist()]
-
-    for _ in range(2000):
-        for t in range(TRACKS):
-            random_track(rng, memory, t)
-        circles["kind"] = rng.integers(0, 2, TRACKS)
-        circles["probability"] = rng.uniform(0.4, 1, TRACKS)
-        circles["unknown_nat"] = circles["log_likelihood_ratio"] / rng.uniform(1, 1.4, TRACKS)
-        circles["covariance_xx"], circles["covariance_yy"] = rng.uniform(0, 0.07, (2, TRACKS)) ** 2
-        leads = circles["leads"][:, :ALTERNATIVES]
-        leads[...] = rng.uniform(-60, -15, leads.shape)
-        leads[:, -2] = rng.choice([0.0, -3.9, -4.1, -30.0], TRACKS)
-        circles["dispersion"] = rng.uniform(0.004, 0.03, TRACKS)
-        circles["is_named"] = rng.integers(0, 2, TRACKS)
-        want = [
-            t for t, it in enumerate(circles)
-            if naive_tracks.is_called(
-                it["is_named"] == 1, it["status"] == ESTABLISHED, it["kind"] < S.model_count, it["probability"], 0.92,
-                0.7, np.delete(leads[t], it["kind"]).tolist(), leads[t, -2], it["dispersion"],
-                it["log_likelihood_ratio"], it["unknown_nat"], [it["covariance_xx"], it["covariance_yy"]],
-            )
-        ]  # fmt: skip
-        for t in range(TRACKS):
-            naming.update_name(memory.tracks[t], P, 0.92, 0.7)
-        circles["marks"] = 0
-        assert report() == want
-        sure += len(want)
-        circles["marks"] = rng.choice([0, CONFIRMED, PLACED], TRACKS)
-        marked = np.flatnonzero((circles["status"] != FREE) & (circles["marks"] > 0)).tolist()
-        assert report() == sorted({*want, *marked})
-    assert sure > 200
-
-
-def test_polygons_are_sure_when_seen_from_near_and_from_two_sides() -> None:
-    rng, memory, out, sure = np.random.default_rng(17), shared(), np.zeros(MAX_POLYGONS, np.int64), 0
-    polygons = memory.polygons
-    for _ in range(200):
-        polygons.view(np.uint8)[...] = 0
-        kept = []
-        for t in range(MAX_POLYGONS):
-            track = memory.s[0].polygons[t]
-            track.status = int(rng.choice([TENTATIVE, ESTABLISHED]))
-            track.probability, track.hits = rng.uniform(0.85, 1), rng.uniform(10, 40)
-            polygons["covariance"]["xx"][t], polygons["covariance"]["yy"][t] = rng.uniform(0, 0.005, 2)
-            w = around(rng, int(rng.integers(0, 120)), np.zeros(2), 0.2)
-            w[:, 4] += rng.choice([0.0, 1.8])
-            w[:, 2:4] = unit(rng.uniform(0, 7) + rng.normal(0, rng.uniform(0, 0.5), len(w)))
-            for i, q in enumerate(w):
-                held = polygons["bins"][t, i % 10]
-                held["readings"][held["count"] % POLYGON_BIN_CAPACITY] = tuple(q)
-                polygons["bins"]["count"][t, i % 10] += 1
-            kept.append(w)
-        want = [
-            t for t, it in enumerate(polygons)
-            if naive_tracks.is_sure_polygon(
-                it["status"] == ESTABLISHED, it["probability"], 0.9, it["hits"],
-                [it["covariance"]["xx"], it["covariance"]["yy"]], kept[t],
-            )
-        ]  # fmt: skip
-        n = naming.sure_polygons(memory.s, 0.9, out)
-        assert out[:n].tolist() == want
-        sure += n
-        polygons["marks"][5] = CONFIRMED
-        n = naming.sure_polygons(memory.s, 0.9, out)
-        assert out[:n].tolist() == sorted({*want, 5})
-    assert sure > 200
-
-
-def test_a_covariances_worst_axis_and_the_names_of_rivals() -> None:
-    rng, memory, corners = np.random.default_rng(18), shared(), 0
-    for _ in range(1000):
+@examples(150, 1000)
+def test_greatest_deviation_walls_and_names_of_rivals_equal_their_oracles(examples: int) -> None:
+    rng, memory, corners = np.random.default_rng(18), new_memory(), 0
+    for _ in range(examples):
         root = rng.normal(0, 1, (2, 2))
         cov = root @ root.T
         worst = math.sqrt(float(np.linalg.eigvalsh(cov)[1]))
@@ -133,4 +56,56 @@ def test_a_covariances_worst_axis_and_the_names_of_rivals() -> None:
         corner = "inside corner" if by_wall else "edge"
         assert object_report.rival_label(memory, 0) == {0.0: corner, 0.1: "post", 0.6: "barrel"}[radius]
         corners += by_wall
-    assert corners > 50
+    assert corners > 0.05 * examples
+
+
+def test_other_objects_are_walls_rivals_and_unknown_objects_that_no_model_stands_on() -> None:
+    memory = new_memory()
+    model, edge = 0, int(P[0].model_count)
+    for t, (status, kind, x, hits, probability) in enumerate(
+        (
+            (ESTABLISHED, edge, 0.0, 9.0, 0.95),
+            (ESTABLISHED, edge, 2.0, 9.0, 0.5),
+            (TENTATIVE, model, 4.0, 9.0, 0.25),
+            (ESTABLISHED, edge, 6.0, object_report.UNKNOWN_HITS - 1.0, 0.95),
+            (ESTABLISHED, edge, 8.1, 9.0, 0.95),
+            (FREE, edge, 10.0, 9.0, 0.95),
+        )
+    ):
+        track = memory.tracks[t]
+        track.status, track.kind, track.x, track.hits, track.probability = status, kind, x, hits, probability
+        track.radius = float(P[0].circles[kind].radius_m)
+    named = [object_report.circle_object((8.0, 0.0, 0.1, 0.0, 0.1, 9.0, 1.0, 0.0), "semicircle", 0.9)]
+    found = object_report.other_objects(memory, P, 0.9, named)
+    label = object_report.rival_label(memory, 0)
+    assert [(o.model, o.x, o.probability) for o in found] == [
+        (label, 0.0, 0.95), ("unknown", 2.0, 0.5), ("unknown", 4.0, 0.75),
+    ]  # fmt: skip
+
+
+def test_alternatives_are_labelled_in_their_order() -> None:
+    assert object_report.alternative_labels(P, ["semicircle"]) == (
+        "semicircle", "edge", "post", "barrel", "wall", "corner",
+    )  # fmt: skip
+
+
+def test_a_polygon_is_reported_with_its_least_heading_and_an_uncertain_one_with_a_users_deviation() -> None:
+    memory, box_settings = new_memory(), make_settings(BOXES.ring, BOXES.models, BOXES.perception.bayes)
+    track = memory.s[0].polygons[0]
+    track.x, track.y, track.heading, track.number, track.marks = 1.0, 2.0, math.radians(170.0), 5, PLACED
+    placed = object_report.polygon_object(track, box_settings, "box", 0.4)
+    assert placed.theta == pytest.approx(math.radians(-10.0))
+    assert (placed.sigma, placed.covariance) == (object_report.PLACED_SIGMA_M, None)
+    assert (placed.number, placed.confirmed, placed.placed) == (5, False, True)
+    held = track.covariance
+    held.xx, held.yx, held.yy, held.hx, held.hy, held.hh = 4e-4, 1e-4, 1e-4, 2e-5, 1e-5, 1e-4
+    full = object_report.polygon_covariance(track)
+    assert (full == full.T).all()
+    expected = object_report.POLYGON_INFLATION * np.array(
+        [[4e-4, 1e-4, 2e-5], [1e-4, 1e-4, 1e-5], [2e-5, 1e-5, 1e-4]]
+    )
+    expected[2, 2] += object_report.POLYGON_TURN**2
+    assert full == pytest.approx(expected, rel=1e-12)
+    located = object_report.polygon_object(track, box_settings, "box", 0.4)
+    assert located.covariance == (full[0, 0], full[0, 1], full[1, 1])
+    assert located.sigma == pytest.approx(math.sqrt(np.linalg.eigvalsh(full[:2, :2])[1]))

@@ -1,18 +1,23 @@
-"""Random tracks, lines and readings for what the Bayesian method remembers; shared by the tests of its kernels."""
+"""Random tracks, lines and readings of the Bayesian method's memory; shared by the tests of its kernels."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import pytest
 
 from config.load import load_settings
+from perception.bayes import reservoir
 from perception.bayes.elements import MAX_LINES, Reading
 from perception.bayes.kernel_settings import make_settings
+from perception.bayes.parameters import RANGE_BINS_PER_M, Settings, SettingsRecord
 from perception.bayes.range_fit import FAR
-from perception.bayes.settings_record import RANGE_BINS_PER_M, Settings, SettingsRecord
+from perception.bayes.segment_pairs import add_to_map
 from perception.bayes.state import Memory
+from perception.bayes.track_initiation import CELL_M
 from perception.kernel import Floats
 from perception.records import Records, array_of, records, zeros
 from perception.sensor_mounts import mounts_array
@@ -42,7 +47,13 @@ TRACKS = 8
 ALTERNATIVES = len(RADII) + 2
 
 
+def examples(few: int, many: int) -> pytest.MarkDecorator:
+    """Run a test on `few` random examples in every run, and on `many` of the same seed in `make soak`."""
+    return pytest.mark.parametrize("examples", [few, pytest.param(many, marks=pytest.mark.soak)])
+
+
 def noises() -> list[naive_bayes.Noise]:
+    """Return the settings' noise hypotheses as the oracles take them."""
     table, bins_per_m = array_of(P)["table"][0], array_of(P)["table_bins_per_m"][0]
     return [naive_bayes.Noise(table, bins_per_m, noise.levels, RANGE_BINS_PER_M) for noise in S.noises]
 
@@ -56,6 +67,7 @@ def changed(p: SettingsRecord, **values: float) -> SettingsRecord:
 
 
 def sigma(memory: Memory) -> tuple[float, float]:
+    """Return the assumed absolute (m) and relative noise."""
     absolute, relative = NOISES[memory.s[0].noise_level]
     return float(absolute), float(relative)
 
@@ -73,6 +85,14 @@ def numbers(array: Any) -> Floats:
     return np.ndarray((len(array), array.itemsize // 8), np.float64, array, 0, (array.strides[0], 8))
 
 
+def keep(memory: Memory, t: int, w: Floats, bins: int = 36) -> None:
+    """Store readings in a circle's reservoir, in turn in so many of its bins."""
+    for j, q in enumerate(w):
+        held = memory.circles["bins"][t, j % bins]
+        held["readings"][j // bins] = tuple(q)
+        held["count"] += 1
+
+
 def enter_readings(memory: Memory, rows: Floats) -> None:
     """Put readings to the beginning of the scratch."""
     numbers(memory.state["scratch"]["readings"][0])[: len(rows)] = rows
@@ -83,16 +103,46 @@ def scratch_readings(memory: Memory, n: int) -> Floats:
     return numbers(memory.state["scratch"]["readings"][0])[:n]
 
 
+def history(memory: Memory, i: int) -> Floats:
+    """Return a sensor's history as rows: a view."""
+    return numbers(memory.state["sensors"]["history"][0, i])
+
+
+def kept_by(memory: Memory, t: int) -> Floats:
+    """Return the readings that a circle keeps, as rows."""
+    n = reservoir.copy_reservoir(memory.tracks[t], memory.s[0].scratch.readings)
+    return scratch_readings(memory, n)
+
+
+def random_drive(
+    rng: np.random.Generator, firings: int
+) -> Iterator[tuple[tuple[float, float, float], float, np.ndarray]]:
+    """Yield pose, time and ranges of a ring that moves, stops and turns; some ranges are lost or out of reach."""
+    place, yaw, time_s, truth = np.zeros(2), 0.0, 0.0, rng.uniform(0.3, 2, SENSORS)
+    for _ in range(firings):
+        step = rng.choice([0.0, 0.01, 0.1])
+        yaw += rng.choice([0.0, 0.01, 0.1]) * rng.normal()
+        place = place + step * unit(yaw)
+        time_s += rng.choice([0.2, 0.2, 0.2, 40.0], p=[0.33, 0.33, 0.33, 0.01])
+        truth = np.abs(truth + rng.normal(0, 0.02, SENSORS) * (rng.random(SENSORS) < 0.5))
+        chance = rng.random(SENSORS)
+        ranges = np.where(chance < 0.4, np.nan, np.where(chance < 0.5, np.inf, truth))
+        ranges[rng.random(SENSORS) < 0.01] = -1.0
+        yield (float(place[0]), float(place[1]), yaw), time_s, ranges
+
+
 def pair(v: np.ndarray) -> tuple[float, float]:
+    """Return the first two numbers of an array."""
     return float(v[0]), float(v[1])
 
 
 def unit(angle: Any) -> np.ndarray:
+    """Return the unit vectors in these directions (rad), on a new last axis."""
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 def around(rng: np.random.Generator, n: int, centre: np.ndarray, rho: float) -> np.ndarray:
-    """Readings x, y, axis, range of a circle: good ones, wild ones and silences."""
+    """Return readings of a circle as rows of place, axis and range: most are right, some wild, some silent."""
     bearing = rng.uniform(0, 2 * math.pi) + rng.uniform(0, 2 * math.pi, n) * rng.random()
     d = rho + rng.uniform(0.1, 3.0, n)
     r = np.maximum(0.0, d - rho + rng.normal(0, 0.01, n))
@@ -102,13 +152,15 @@ def around(rng: np.random.Generator, n: int, centre: np.ndarray, rho: float) -> 
     return np.column_stack([centre - d[:, None] * unit(bearing), unit(axis), r])
 
 
-def shared() -> Memory:
+def new_memory() -> Memory:
+    """Return an empty memory for the shipped ring and a few circle tracks."""
     return Memory(SENSORS, TRACKS)
 
 
-def random_track(rng: np.random.Generator, memory: Memory, t: int, state: int | None = None) -> None:
+def random_track(rng: np.random.Generator, memory: Memory, t: int, status: int | None = None) -> None:
+    """Fill a circle track at random; without `status` it may be free, tentative or established."""
     track = memory.tracks[t]
-    track.status = int(rng.integers(3)) if state is None else state
+    track.status = int(rng.integers(3)) if status is None else status
     track.kind = k = int(rng.integers(len(RADII)))
     track.x, track.y = rng.uniform(-0.8, 0.8, 2)
     track.radius = RADII[k]
@@ -121,13 +173,24 @@ def place_of(memory: Memory, t: int) -> Floats:
     return np.array([memory.circles["x"][t], memory.circles["y"][t]])
 
 
+def add_segment(memory: Memory, row: np.ndarray, number: int) -> int:
+    """Put a segment (middle, normal) into the map; return its bucket."""
+    x, y, nx, ny = row.tolist()
+    return add_to_map(memory.s[0].buckets, CELL_M, x, y, nx, ny, number, 0.1 * number)
+
+
+def places(memory: Memory) -> Floats:
+    """Return the centres of all circles, shape (n, 2), m."""
+    return np.column_stack([memory.circles["x"], memory.circles["y"]])
+
+
 def line_rows(memory: Memory) -> Floats:
     """Return the lines as rows, as `naive_tracks.Line.row` writes them: a view."""
     return numbers(memory.state["lines"][0])
 
 
 def random_lines(rng: np.random.Generator, memory: Memory, many: int) -> dict[int, Line]:
-    """Lines in some of the rows of the memory, as tall as they may be wrong."""
+    """Fill some of the memory's lines at random and the others with zeros; return them by index."""
     line_rows(memory)[...] = 0.0
     lines = {}
     for k in sorted(rng.choice(MAX_LINES, many, replace=False).tolist()):

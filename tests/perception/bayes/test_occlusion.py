@@ -1,0 +1,59 @@
+"""Readings that bear on a circle against their oracle: not hidden by, nor better explained by, another circle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from perception.bayes import noise_estimation, occlusion
+from perception.bayes.state import ESTABLISHED
+from tests import naive_tracks
+from tests.naive_tracks import rows
+from tests.perception.bayes.tracks import (
+    NOISES,
+    TRACKS,
+    P,
+    S,
+    around,
+    enter_readings,
+    examples,
+    new_memory,
+    pair,
+    place_of,
+    random_track,
+    scratch_readings,
+)
+
+
+@examples(50, 600)
+def test_the_relevant_readings_equal_their_oracle_and_keep_their_order(examples: int) -> None:
+    rng, memory = np.random.default_rng(22), new_memory()
+    circles, hidden, dropped = memory.circles, 0, 0
+    for _ in range(examples):
+        memory.s[0].noise_level = int(rng.integers(len(NOISES)))
+        for t in range(TRACKS):
+            random_track(rng, memory, t)
+        own = int(rng.integers(-1, TRACKS))
+        place = place_of(memory, own) if own >= 0 else rng.uniform(-1, 1, 2)
+        radius = float(circles["radius"][own]) if own >= 0 else 0.3
+        w = around(rng, 30, place, radius)
+        enter_readings(memory, w)
+        others = [
+            (place_of(memory, t), float(circles["radius"][t]), float(circles["root_xx"][t]))
+            for t in range(TRACKS) if circles["status"][t] == ESTABLISHED and t != own
+        ]  # fmt: skip
+        variance = noise_estimation.noise_variance(memory.s, P)
+        want = []
+        for q in w:
+            is_hidden = naive_tracks.is_hidden(q, place, radius, others, S.gate_m)
+            taken = naive_tracks.is_explained_elsewhere(
+                q, place, radius, others, S.gate_m, S.merge_m, S.cos_may_answer, S.half_resolution_m, variance
+            )
+            if not is_hidden and not taken:
+                want.append(q)
+            hidden += is_hidden
+            dropped += taken
+        kept = occlusion.keep_relevant(memory.s, memory.tracks, P, 30, *pair(place), radius, own)
+        assert scratch_readings(memory, kept).tolist() == [q.tolist() for q in want]
+        assert rows(scratch_readings(memory, kept)) == rows(want)
+    assert hidden > 0.5 * examples
+    assert dropped > 0.1 * examples
