@@ -1,6 +1,6 @@
-"""Slow, readable oracles for the emulator's acoustics: complex numbers, every candidate listed, nothing clever.
+"""Slow, readable oracles for the emulator's acoustics: complex numbers, and every candidate listed.
 
-They share no code with the product, not even the way a world becomes surfaces.
+They share no code with the product, not even the conversion of a world to surfaces.
 """
 
 from __future__ import annotations
@@ -16,11 +16,14 @@ from config.world import WorldConfig
 
 @dataclass(frozen=True)
 class Shapes:
+    """The surfaces of a world: circles (centre, radius) and sides (both ends)."""
+
     circles: list[tuple[complex, float]]
     sides: list[tuple[complex, complex]]
 
 
 def shapes_of(world: WorldConfig) -> Shapes:
+    """Return the surfaces of a world."""
     outlines = []
     for box in world.box:
         turn = cmath.exp(1j * math.radians(box.angle_deg))
@@ -35,12 +38,12 @@ def shapes_of(world: WorldConfig) -> Shapes:
 
 
 def in_beam(point: complex, sensor: complex, axis: float, half_angle: float, margin: float = 0.0) -> bool:
-    """`margin` widens the beam by that many radians."""
+    """Return whether a point lies in the beam, widened by `margin` (rad) on either side."""
     return abs(cmath.phase((point - sensor) * cmath.exp(-1j * axis))) <= half_angle + margin
 
 
 def _line_hits_side(origin: complex, direction: complex, a: complex, b: complex) -> float | None:
-    """How far along `direction` the side is crossed."""
+    """Return the distance along `direction` at which the side is crossed, None where it is not."""
     matrix = np.array([[direction.real, (a - b).real], [direction.imag, (a - b).imag]])
     if abs(np.linalg.det(matrix)) < 1e-12:
         return None
@@ -49,7 +52,7 @@ def _line_hits_side(origin: complex, direction: complex, a: complex, b: complex)
 
 
 def _line_hits_circle(origin: complex, direction: complex, centre: complex, radius: float) -> list[float]:
-    """How far along `direction` (of length one) the circle is crossed."""
+    """Return the distances along `direction` (a unit vector) at which the circle is crossed."""
     linear = -2 * ((centre - origin) * direction.conjugate()).real
     constant = abs(centre - origin) ** 2 - radius**2
     discriminant = linear**2 - 4 * constant
@@ -59,13 +62,13 @@ def _line_hits_circle(origin: complex, direction: complex, centre: complex, radi
 
 
 def foot_on_line(point: complex, a: complex, b: complex) -> tuple[complex, float]:
-    """The foot of the perpendicular and where along the side it lies (0 to 1 inside)."""
+    """Return the foot of the perpendicular and its position along the side (0 to 1 on it)."""
     share = ((point - a) / (b - a)).real
     return a + share * (b - a), share
 
 
 def cone(shapes: Shapes, sensor: complex, axis: float, half_angle: float) -> float:
-    """The nearest surface point in the beam: list all that can be nearest, keep those inside."""
+    """Return the distance of the nearest surface point in the beam: of all candidates, the nearest one inside."""
     candidates = []
     edges = [cmath.exp(1j * (axis - half_angle)), cmath.exp(1j * (axis + half_angle))]
     for centre, radius in shapes.circles:
@@ -85,7 +88,7 @@ def cone(shapes: Shapes, sensor: complex, axis: float, half_angle: float) -> flo
 
 
 def surface_samples(shapes: Shapes, spacing: float) -> np.ndarray:
-    """Points on every surface, no farther than `spacing` apart."""
+    """Return points on every surface, at most `spacing` apart."""
     pieces = []
     for centre, radius in shapes.circles:
         turn = np.linspace(0, 2 * math.pi, max(8, math.ceil(2 * math.pi * radius / spacing)))
@@ -96,6 +99,7 @@ def surface_samples(shapes: Shapes, spacing: float) -> np.ndarray:
 
 
 def in_sight(shapes: Shapes, sensor: complex, point: complex, slack: float) -> bool:
+    """Return whether no surface lies between sensor and point, up to `slack` before the point."""
     reach = abs(point - sensor) - slack
     if reach <= 0:
         return True
@@ -106,7 +110,7 @@ def in_sight(shapes: Shapes, sensor: complex, point: complex, slack: float) -> b
 
 
 def _opening_towards(vertex: complex, sensor: complex, sides: list[tuple[complex, complex]]) -> float:
-    """The angle between the surfaces at `vertex` that face the sensor, 2π where there is but one."""
+    """Return the angle between the surfaces at `vertex` that face the sensor; 2π with a single surface."""
     turns = []
     for a, b in sides:
         share = min(1.0, max(0.0, foot_on_line(vertex, a, b)[1]))
@@ -119,7 +123,7 @@ def _opening_towards(vertex: complex, sensor: complex, sides: list[tuple[complex
 def specular(
     shapes: Shapes, sensor: complex, axis: float, half_angle: float, edge_reach: float, slack: float
 ) -> float:
-    """The first mirror echo: every point that could answer, then beam and sight."""
+    """Return the range of the first mirror echo: of all points that may answer, the nearest one in beam and sight."""
     candidates = [c + (sensor - c) / abs(sensor - c) * radius for c, radius in shapes.circles]
     for a, b in shapes.sides:
         foot, share = foot_on_line(sensor, a, b)

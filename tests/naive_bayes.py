@@ -1,6 +1,6 @@
-"""Slow, readable oracles of the kernels in `perception.bayes`, written from the mathematics in whole arrays.
+"""Slow, readable oracles of the kernels in `perception.bayes`, written from the mathematics with whole arrays.
 
-Nothing here is called by the product, and nothing of the product is called here.
+They share no code with the product.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Array = NDArray[Any]
 
 
 class Noise(NamedTuple):
-    """How ranges err: the table of log ratios, its bins per metre and the level by range."""
+    """A noise hypothesis: the table of log ratios, its bins per metre and the level by range."""
 
     table: Array
     inv_step: Array
@@ -72,11 +72,11 @@ def tangent(a: Array, b: Array, half_angle: float) -> tuple[Array, float] | None
 
 
 class Buckets:
-    """The segment map as a dictionary: one tenant a slot, its newest segments."""
+    """The segment map as a dictionary: each slot holds the newest segments of one cell."""
 
     def __init__(self, slots: int, capacity: int, cell: float) -> None:
         self.slots, self.capacity, self.cell = slots, capacity, cell
-        self.tenants: dict[int, tuple[tuple[int, int], deque[Array]]] = {}
+        self.cells: dict[int, tuple[tuple[int, int], deque[Array]]] = {}
 
     def slot(self, cell: tuple[int, int]) -> int:
         return ((cell[0] * 73856093) ^ (cell[1] * 19349663)) % self.slots
@@ -84,19 +84,19 @@ class Buckets:
     def add(self, segment: Array) -> None:
         cell = (math.floor(segment[0] / self.cell), math.floor(segment[1] / self.cell))
         slot = self.slot(cell)
-        if slot not in self.tenants or self.tenants[slot][0] != cell:
-            self.tenants[slot] = (cell, deque(maxlen=self.capacity))
-        self.tenants[slot][1].append(segment[:4].copy())
+        if slot not in self.cells or self.cells[slot][0] != cell:
+            self.cells[slot] = (cell, deque(maxlen=self.capacity))
+        self.cells[slot][1].append(segment[:4].copy())
 
     def near(self, x: float, y: float, radius: float) -> list[tuple[float, ...]]:
         return sorted(
-            tuple(float(v) for v in s) for _, kept in self.tenants.values() for s in kept
+            tuple(float(v) for v in s) for _, kept in self.cells.values() for s in kept
             if (s[0] - x) ** 2 + (s[1] - y) ** 2 < radius**2
         )  # fmt: skip
 
 
 class Look(NamedTuple):
-    """Readings seen from a place: distance to it, cosine off the axis, unit bearing to it."""
+    """A place seen from each sensor: its distance, the cosine of its angle off the axis, the unit vector to it."""
 
     d: Array
     cos: Array
@@ -104,7 +104,7 @@ class Look(NamedTuple):
 
 
 def look(w: Array, place: Array) -> Look:
-    """Look at a place from each sensor."""
+    """Return a place as seen from each sensor."""
     to = place - w[:, :2]
     d = np.hypot(to[:, 0], to[:, 1])
     u = to / d[:, None]
@@ -115,7 +115,7 @@ def score_circle(
     w: Array, centre: Array, rho: float, cosines: tuple[float, float, float], gate: float, miss: float, short: float,
     noise: Noise,
 ) -> dict[str, float]:  # fmt: skip
-    """Return what readings say of a circle."""
+    """Return the evidence of readings for a circle, and its counts."""
     opt, half, inside = cosines
     seen = look(w, centre)
     e = w[:, 4] - (seen.d - rho)
@@ -180,7 +180,7 @@ def fit_line(
         if not use.any():
             break
         g = weights(e[use], var0 + rel2 * w[use, 4] ** 2, soft)
-        along = (w[use, :2] - origin) @ np.array([n[1], -n[0]])  # how the distance falls as the normal turns
+        along = (w[use, :2] - origin) @ np.array([n[1], -n[0]])  # the fall of the distance as the normal turns
         jacobian = np.column_stack([along, np.ones(len(g))])
         h = (jacobian.T * g) @ jacobian + np.diag([1e-9, 1e-12 / var0])
         delta = np.linalg.solve(h * np.array([[1.02, 1.0], [1.0, 1.02]]), jacobian.T @ (g * e[use]))

@@ -1,7 +1,7 @@
-"""Slow, readable oracle of what a polygon sends back, written with complex numbers from the acoustics.
+"""Slow, readable oracle of a polygon's echoes, written with complex numbers from the acoustics.
 
-A mirror answers from the foot of the perpendicular where that lies on a side and in the beam, and may answer from a
-corner where there is none. A cone answers from the nearest point in the beam, whatever it is.
+A mirror answers from the foot of the perpendicular where that lies on a side and in the beam; without such a foot it
+may answer from a corner. A cone answers from the nearest point in the beam.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ EDGE_PRICE = 3.0 / FT
 
 @dataclass(frozen=True)
 class Rule:
-    """A range, if there is an answer; whether it must be heard; and what it costs, nat."""
+    """An expected range, None without an answer; whether it must be heard; and the price of the answer, nat."""
 
     expected: float | None
     must: bool
     price: float = 0.0
 
     def worth(self, r: float, gate: float, miss: float, short: float, evidence: float) -> float:
-        """What a reading counts whose error has that evidence."""
+        """Return what a reading adds to the sum if its error has this evidence."""
         if self.expected is None:
             return 0.0
         if abs(r - self.expected) < gate:
@@ -39,14 +39,14 @@ class Rule:
 
 
 def angle_between(a: complex, b: complex) -> float:
-    """Unsigned angle between two vectors."""
+    """Return the unsigned angle between two vectors."""
     return abs(cmath.phase(a / b))
 
 
 def sides_faced(
     sensor: complex, vertices: Sequence[complex], *, closed: bool
 ) -> list[tuple[complex, complex, complex]]:
-    """Both ends and the outward normal of each side one faces; an open outline has no inside."""
+    """Return both ends and the outward normal of each side that faces the sensor; an open outline has no inside."""
     ends = list(zip(vertices, [*vertices[1:], vertices[0]], strict=True))
     faced = []
     for a, b in ends if closed else ends[:-1]:
@@ -58,7 +58,7 @@ def sides_faced(
 
 
 def met_at(sensor: complex, ray: complex, a: complex, b: complex, outward: complex) -> float | None:
-    """How far a ray goes to a side."""
+    """Return the distance along a ray to a side, None where it does not meet it."""
     towards = (ray * -outward.conjugate()).real
     if towards <= GRAZING:
         return None
@@ -70,7 +70,7 @@ def met_at(sensor: complex, ray: complex, a: complex, b: complex, outward: compl
 def predict(
     sensor: complex, axis: complex, vertices: Sequence[complex], *, closed: bool, may: float, must: float, half: float
 ) -> tuple[Rule, Rule]:
-    """What is heard of an outline by either rule; `may`, `must` and `half` are angles off the axis, rad."""
+    """Return the echo of an outline by either rule; `may`, `must` and `half` are angles off the axis, rad."""
     faced = sides_faced(sensor, vertices, closed=closed)
     feet = []
     for a, b, outward in faced:
@@ -82,7 +82,7 @@ def predict(
     ring = list(vertices)
 
     def price(corner: complex) -> float:
-        """A convex edge is weak, and from afar not heard; an open outline's has no inside to be convex to."""
+        """Return the price of a corner's echo: a convex edge of a closed outline is not heard from afar."""
         i = ring.index(corner)
         bend = ((ring[(i + 1) % len(ring)] - corner) / (corner - ring[i - 1])).imag
         return CORNER_PRICE + (
@@ -112,21 +112,21 @@ def predict(
 def score(
     readings: Sequence[tuple[float, tuple[Rule, Rule], tuple[float, float]]], gate: float, miss: float, short: float
 ) -> tuple[float, list[dict[str, float]]]:
-    """Evidence, and the counts of either rule; readings as range, both rules and the evidence of both errors."""
+    """Return the evidence, and the counts of either rule; a reading is a range, both rules and both evidences."""
     sums = []
     for rule in (0, 1):
         total = hits = sure = throughs = near = 0.0
         for r, both, evidence in readings:
-            said = both[rule]
-            value = said.worth(r, gate, miss, short, evidence[rule])
+            echo = both[rule]
+            value = echo.worth(r, gate, miss, short, evidence[rule])
             total += value
-            if said.expected is None:
+            if echo.expected is None:
                 continue
-            if abs(r - said.expected) < gate:
+            if abs(r - echo.expected) < gate:
                 near += 1
                 hits += value > 0.0
-                sure += value > 0.0 and said.must
-            elif said.must and r > said.expected:
+                sure += value > 0.0 and echo.must
+            elif echo.must and r > echo.expected:
                 throughs += 1
         surplus = throughs - 0.2 * (hits + throughs) - 1.0
         total -= 2.0 * max(0.0, surplus)

@@ -1,6 +1,6 @@
 """Slow, readable oracles of how the Bayesian method keeps its tracks, walls and noise: plain Python, in metres.
 
-Nothing here is called by the product, and nothing of the product is called here; constants are said once more.
+They share no code with the product; constants are repeated.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SILENT = 1e6
 
 
 def rows(readings: Iterable[Sequence[float] | Array]) -> list[tuple[float, ...]]:
-    """Return readings as sorted tuples: what is kept matters, not in which order."""
+    """Return readings as sorted tuples, to be compared without regard to their order."""
     return sorted(tuple(float(v) for v in row) for row in readings)
 
 
@@ -56,7 +56,7 @@ def gather(memory: Iterable[Array], centre: Array, rho: float, opt: float, reach
 
 
 def towards(w: Array, centre: Array, rho: float, gate: float) -> Array:
-    """Return the mean unit direction to a circle's centre from those that hear it."""
+    """Return the mean unit direction to a circle's centre from the sensors that hear it."""
     seen = naive_bayes.look(w, centre)
     total = seen.u[np.abs(w[:, 4] - (seen.d - rho)) < gate].sum(0)
     return np.asarray(total / np.hypot(*total)) if total.any() else np.zeros(2)
@@ -80,7 +80,7 @@ class Line:
         return np.array([-self.normal[1], self.normal[0]])
 
     def off(self, place: Array) -> float:
-        """How far a place lies before the line."""
+        """Return the distance of a place before the line."""
         return self.c - float(self.normal @ (place - self.origin))
 
     def foot(self, place: Array) -> float:
@@ -114,7 +114,7 @@ class Line:
 
 
 def same_line(known: Line, new: Line) -> bool:
-    """Return whether a new line is a known one: parallel, near, and beginning about where that one ends."""
+    """Return whether a new line is a known one: parallel, near, and not far beyond the ends of that one."""
     place = new.origin + new.c * new.normal
     return (
         float(known.normal @ new.normal) > 0.98
@@ -127,7 +127,7 @@ def update_line(
     line: Line, k: int, cur: Array, owner: list[int], sigma: tuple[float, float], half_box: float, half_angle: float,
     cosines: tuple[float, float, float], gate: float, length_min: float,
 ) -> Line | None:  # fmt: skip
-    """Return line k after it has followed the readings it explains; None if it is dropped."""
+    """Return line k after the readings that it explains have corrected it; None if it ends."""
     opt, half, inside = cosines
     for i, q in enumerate(cur):
         cos, d, r = float(line.normal @ q[2:4]), line.off(q[:2]), float(q[4])
@@ -161,7 +161,7 @@ def update_line(
 
 
 def stands_in_wall(lines: Iterable[Line], place: Array, rho: float) -> bool:
-    """Return whether a body's centre would lie in a long wall that was heard often, or its near part."""
+    """Return whether a body's centre lies in a long wall with many echoes, or close to its face."""
     return any(
         line.echoes > 10
         and line.high - line.low > 2 * FT
@@ -174,7 +174,7 @@ def stands_in_wall(lines: Iterable[Line], place: Array, rho: float) -> bool:
 def roughness(
     a: Array, b: Array, c: Array, now: float, gap: float, half_box: float, noises: Array, heard: Array
 ) -> Array:  # fmt: skip
-    """Return what is heard of each noise after three readings: the middle one against the chord of the outer two."""
+    """Return the evidence for each noise after three readings: the middle one against the chord of the outer two."""
     way = np.cumsum([0.0, math.dist(c[:2], b[:2]), math.dist(b[:2], a[:2])])
     if max(b[4], c[4]) >= SILENT or now - c[5] > gap or not 0 < way[2] <= FT:
         return heard
@@ -186,14 +186,14 @@ def roughness(
 
 
 def likeliest_noise(rough: Array, residual: Array, gate: float) -> int:
-    """Return the first of the likeliest noises that roughness leaves possible."""
+    """Return the likeliest of the noises that roughness does not rule out."""
     return int(np.argmax(np.where(rough > rough.max() - gate, rough + residual, -np.inf)))
 
 
 def residual_evidence(
     w: Array, centre: Array, rho: float, half: float, gate: float, noises: Sequence[Noise]
 ) -> list[float]:  # fmt: skip
-    """Return what an object's residuals say of each noise."""
+    """Return the evidence of an object's residuals for each noise."""
     seen = naive_bayes.look(w, centre)
     e = w[:, 4] - (seen.d - rho)
     use = (np.abs(e) < gate) & (seen.cos >= half)
@@ -204,7 +204,7 @@ def place_readings(
     last: dict[int, Array], mounts: Array, pose: tuple[float, float, float], ranges: Array, reach: float,
     half_box: float,
 ) -> list[tuple[float, ...]]:  # fmt: skip
-    """Return this firing's readings in the odometry's frame: x, y, axis, range, sensor; what is new."""
+    """Return the new readings of this firing in the odometry's frame: x, y, axis, range, sensor."""
     turn = np.array([[math.cos(pose[2]), -math.sin(pose[2])], [math.sin(pose[2]), math.cos(pose[2])]])
     new = []
     for i, (mount, r) in enumerate(zip(mounts, ranges, strict=True)):
@@ -230,7 +230,7 @@ def place_readings(
 def partners(
     i: int, cur: Array, memories: Sequence[list[Array]], now: float, gap: float
 ) -> list[Array]:  # fmt: skip
-    """Return what reading i is paired with: its own sensor's past at three baselines, then its neighbours."""
+    """Return the readings that reading i is paired with: its sensor's own past at three baselines, then neighbours."""
     q, sensor, found = cur[i], int(cur[i][5]), []
     wanted = [0.5 * FT, 1.0 * FT, 2.0 * FT]
     for old in reversed(memories[sensor]):
@@ -255,7 +255,7 @@ def partners(
 
 
 def remembered(memory: list[Array], q: Array, now: float, spacing: float, gap: float, room: int) -> list[Array]:
-    """Return a sensor's memory after a reading: spaced out in place unless time has passed; the newest `room`."""
+    """Return the newest `room` readings of a sensor after a reading, which is left out if near in place and time."""
     if memory and math.dist(memory[-1][:2], q[:2]) < spacing and now - memory[-1][5] < gap:
         return memory
     return [*memory, np.array([*q[:5], now])][-room:]
@@ -276,7 +276,7 @@ def bears_on(
 
 def claimed_by(q: Array, tracks: Iterable[tuple[int, Array, float, float]], opt: float, half_box: float,
                sigma: tuple[float, float]) -> int:  # fmt: skip
-    """Return which of the tracks (number, centre, radius, σ) explains a reading best; −1 none."""
+    """Return the track (number, centre, radius, σ) that explains a reading best, −1 without one."""
     fits = []
     for t, centre, rho, root in tracks:
         d, ahead = off_axis(q, centre)
@@ -319,17 +319,17 @@ def is_explained_elsewhere(
 
 
 def after_merging(
-    t: int, live: Array, place: Array, rho: Array, llr: Array, merge: float, said: Array, number: Array
+    t: int, live: Array, place: Array, rho: Array, llr: Array, merge: float, marked: Array, number: Array
 ) -> tuple[Array, Array]:
-    """Return which tracks live once t has met the others in turn, and their numbers.
+    """Return which tracks are left after t was compared with the others in turn, and their numbers.
 
-    Of two in one place the one stays that a person spoke of; else the one with more evidence, by the older number.
+    Of two in one place the one that a user marked stays, else the one with more evidence, with the older number.
     """
     live, number = live.copy(), number.copy()
     for k in np.flatnonzero(live):
         if k != t and math.dist(place[k], place[t]) < max(merge, 0.8 * max(rho[k], rho[t])):
-            loser = t if (bool(said[k]), float(llr[k])) > (bool(said[t]), float(llr[t])) else k
-            if not said[k] and not said[t]:
+            loser = t if (bool(marked[k]), float(llr[k])) > (bool(marked[t]), float(llr[t])) else k
+            if not marked[k] and not marked[t]:
                 number[k + t - loser] = min(number[k], number[t])
             live[loser] = False
             if loser == t:
@@ -341,10 +341,11 @@ def next_in_turn(
     live: Array, fresh: Array, kept: Array, sigma: Array, likely: Array, owed: Array, away: Array, passed: Array,
     threshold: float, reach: float,
 ) -> tuple[int, Array]:  # fmt: skip
-    """Return whose turn it is, −1 nobody's, and who waits.
+    """Return the track to refine, −1 without one, and which tracks wait.
 
-    Worth is unseen readings for an object's size, fourfold where unsure, raised above the threshold where work is
-    owed; half of it counts at the end of the reach. The one passed over more than sixty times comes first.
+    The value is the share of unseen readings, four times that where the track is uncertain, and above the threshold
+    where final refinements are due; at the end of the reach half of it counts. A track that was passed over more than
+    sixty times comes first.
     """
     worth = fresh / (kept + 8.0) * np.where((sigma > 0.03 * FT) | (likely < 0.95), 4.0, 1.0) + owed * (
         threshold + 1e-6
@@ -360,7 +361,7 @@ def probability(
     own: float, known: bool, prior: float, general: float, unknown: float, leads: dict[int, float], models: int,
     line: int, in_wall: bool,
 ) -> float:  # fmt: skip
-    """Return a track's share among all explanations, each as good as its evidence and its prior (soft maximum)."""
+    """Return a track's share among all explanations, each weighted by its evidence and its prior."""
 
     def weight(nat: float) -> float:
         return math.exp(float(np.clip(nat, -60.0, 60.0)))
@@ -377,7 +378,7 @@ def fate(
     state: int, llr: float, unknown: float, probability: float, hits: float, dispersion: float, sigma: float,
     spread: float,
 ) -> int:  # fmt: skip
-    """Return what becomes of a track: 0 forgotten, 1 tentative, 2 established."""
+    """Return a track's next status: 0 free, 1 tentative, 2 established."""
     if llr < 0 or llr < unknown - 6:
         return 0
     if state == 1:
@@ -390,7 +391,7 @@ def is_called(
     called: bool, established: bool, known: bool, probability: float, sure: float, near: float,
     rivals: Sequence[float], wall: float, dispersion: float, llr: float, unknown: float, variances: Sequence[float],
 ) -> bool:  # fmt: skip
-    """Return whether a circle is called by a model's name: given when sure, kept while likely and well placed."""
+    """Return whether a circle has a model's name: given when sure, kept while likely and well located."""
     share = 1.1 if max(rivals) < -20 else 1.25
     seen_round = dispersion >= 0.008
     possible = established and known and seen_round and llr > share * unknown and max(variances) < (0.17 * FT) ** 2
@@ -401,7 +402,7 @@ def is_called(
 def is_sure_polygon(
     established: bool, probability: float, least: float, hits: float, variances: Sequence[float], kept: Array
 ) -> bool:  # fmt: skip
-    """Return whether a polygon may be called by its name: seen from near, and from more than one direction."""
+    """Return whether a polygon is reported by its name: heard from near, and from more than one direction."""
     heard = kept[kept[:, 4] < SILENT]
     if not len(heard) or heard[:, 4].min() > 6.5 * FT:
         return False

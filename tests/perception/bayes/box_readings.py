@@ -9,10 +9,10 @@ import numpy as np
 from config.load import load_model, load_settings
 from perception.bayes.elements import POLYGON_BEARING_BINS
 from perception.bayes.kernel_settings import make_settings
-from perception.bayes.parameters import PolygonSide
 from perception.bayes.polygon_likelihood import score_polygon
 from perception.bayes.range_fit import FAR
 from perception.bayes.scratch import Score
+from perception.bayes.settings_record import PolygonSide
 from perception.bayes.state import Memory
 from perception.kernel import Floats
 from perception.records import Records, records, zeros

@@ -11,7 +11,7 @@ import numpy as np
 from perception.bayes import range_fit
 from perception.bayes.elements import Reading
 from perception.bayes.likelihood import build_levels, build_table
-from perception.bayes.parameters import RANGE_BINS_PER_M, TABLE_LEVELS, NoiseModel, SettingsRecord
+from perception.bayes.settings_record import RANGE_BINS_PER_M, TABLE_LEVELS, NoiseModel, SettingsRecord
 from perception.kernel import Floats
 from perception.records import Record, Records, array_of, records, zeros
 from tests import naive_bayes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from perception.bayes import elements
-from perception.bayes.parameters import CIRCLES_MAX
+from perception.bayes.settings_record import CIRCLES_MAX
 from perception.bayes.state import CircleTrack, PolygonTrack, State
 
 

@@ -10,7 +10,6 @@ import pytest
 
 from config.model import ModelConfig
 from perception.bayes.kernel_settings import (
-    RIVALS_M,
     apply_config,
     apply_library,
     circle_models,
@@ -19,7 +18,8 @@ from perception.bayes.kernel_settings import (
     make_settings,
     polygon_symmetry,
 )
-from perception.bayes.parameters import CIRCLES_MAX, NOISES, POLYGONS_MAX, SettingsRecord
+from perception.bayes.parameters import RIVAL_RADII_M
+from perception.bayes.settings_record import CIRCLES_MAX, NOISES, POLYGONS_MAX, SettingsRecord
 from perception.kernel import Floats
 from perception.records import array_of
 from tests.perception.bayes.tracks import BOXES, numbers, unit
@@ -63,7 +63,7 @@ def test_a_round_model_is_listed_once_for_each_radius_and_in_their_order() -> No
 
 
 def test_rivals_follow_the_models_except_those_near_a_model() -> None:
-    point, post, barrel = RIVALS_M
+    point, post, barrel = RIVAL_RADII_M
     for models, radii in (
         ((DRUM,), (DRUM_RADIUS_M, point, post, barrel)),
         ((DRUM, round_model("bollard", post + 0.02)), (post + 0.02, DRUM_RADIUS_M, point, barrel)),

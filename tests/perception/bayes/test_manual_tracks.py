@@ -9,6 +9,7 @@ import pytest
 
 from perception.bayes import manual_tracks, polygon_job
 from perception.bayes.kernel_settings import make_settings
+from perception.bayes.parameters import PLACED_STRAY_MAX_M, PLACED_STRAY_MAX_RAD
 from perception.bayes.state import CONFIRMED, PLACED, TENTATIVE, Memory
 from tests.perception.bayes.tracks import (
     BOXES,
@@ -36,10 +37,10 @@ def test_relaxation_from_a_users_pose_stays_near_it_whatever_lies_in_the_map(exa
             add_segment(memory, np.array([*rng.uniform(-0.7, 0.7, 2), math.cos(normal), math.sin(normal)]), number)
         at = memory.s[0].scratch.hypothesis
         manual_tracks.settle_circle(memory.s, BOX_P, 0, 0.1, -0.1)
-        assert math.hypot(at.x - 0.1, at.y + 0.1) <= manual_tracks.STRAYED_M
+        assert math.hypot(at.x - 0.1, at.y + 0.1) <= PLACED_STRAY_MAX_M
         manual_tracks.settle_polygon(memory.s, BOX_P, 0, 0.1, -0.1, 0.3)
-        assert math.hypot(at.x - 0.1, at.y + 0.1) <= manual_tracks.STRAYED_M
-        assert abs(at.heading - 0.3) <= manual_tracks.STRAYED_RAD
+        assert math.hypot(at.x - 0.1, at.y + 0.1) <= PLACED_STRAY_MAX_M
+        assert abs(at.heading - 0.3) <= PLACED_STRAY_MAX_RAD
         strayed += (at.x, at.y, at.heading) == (0.1, -0.1, 0.3)
     assert strayed > 0
 

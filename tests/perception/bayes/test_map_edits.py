@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from perception.bayes.elements import HISTORY
-from perception.bayes.map_edits import REJECTED_MAX_NAT, edit_memory, forget_hits, row_of
+from perception.bayes.map_edits import edit_memory, forget_hits, row_of
+from perception.bayes.parameters import REJECTED_MAX_NAT
 from perception.bayes.pinned_segments import Pins
 from perception.bayes.range_fit import FAR
 from perception.bayes.scratch import POLYGON
@@ -48,7 +49,7 @@ def test_the_last_places_of_a_bucket_cannot_be_pinned_and_the_user_is_told() -> 
         add_segment(memory, np.array([0.1, 0.1, 1.0, 0.0]), number)
     refused = edit_memory(memory, P, pins, (), (), PinSegments(tuple(range(1, 9)), pinned=True))
     assert refused is not None
-    assert refused.startswith("2 of these segments cannot be pinned")
+    assert refused.startswith("2 of 8 segments could not be pinned")
     assert pins.count == 6
 
 
@@ -96,9 +97,9 @@ def test_what_cannot_be_edited_is_refused_with_a_reason() -> None:
         assert reason in (edit(memory, change) or "")
     track = memory.tracks[0]
     track.status, track.kind, track.number = ESTABLISHED, int(P[0].model_count), 1
-    assert (edit(memory, ConfirmObject(1)) or "").startswith("object 1 looks like none of the models")
+    assert (edit(memory, ConfirmObject(1)) or "").startswith("object 1 matches no model")
     memory.circles["status"], memory.circles["marks"] = ESTABLISHED, CONFIRMED
-    assert (edit(memory, PlaceModel("semicircle", 0.0, 0.0, 0.0)) or "").startswith("as many objects are known")
+    assert (edit(memory, PlaceModel("semicircle", 0.0, 0.0, 0.0)) or "").startswith("no room for another object")
 
 
 def test_a_cleared_map_has_no_segments_objects_or_pins() -> None:

@@ -9,6 +9,8 @@ import pytest
 
 from perception.bayes import object_report, walls
 from perception.bayes.kernel_settings import make_settings
+from perception.bayes.parameters import PLACED_SIGMA_M, UNKNOWN_HITS_MIN
+from perception.bayes.polygon_parameters import POLYGON_INFLATION, POLYGON_TURN_SIGMA_RAD
 from perception.bayes.state import ESTABLISHED, FREE, PLACED, TENTATIVE
 from tests.naive_tracks import FT
 from tests.perception.bayes.tracks import (
@@ -67,7 +69,7 @@ def test_other_objects_are_walls_rivals_and_unknown_objects_that_no_model_stands
             (ESTABLISHED, edge, 0.0, 9.0, 0.95),
             (ESTABLISHED, edge, 2.0, 9.0, 0.5),
             (TENTATIVE, model, 4.0, 9.0, 0.25),
-            (ESTABLISHED, edge, 6.0, object_report.UNKNOWN_HITS - 1.0, 0.95),
+            (ESTABLISHED, edge, 6.0, UNKNOWN_HITS_MIN - 1.0, 0.95),
             (ESTABLISHED, edge, 8.1, 9.0, 0.95),
             (FREE, edge, 10.0, 9.0, 0.95),
         )
@@ -95,16 +97,14 @@ def test_a_polygon_is_reported_with_its_least_heading_and_an_uncertain_one_with_
     track.x, track.y, track.heading, track.number, track.marks = 1.0, 2.0, math.radians(170.0), 5, PLACED
     placed = object_report.polygon_object(track, box_settings, "box", 0.4)
     assert placed.theta == pytest.approx(math.radians(-10.0))
-    assert (placed.sigma, placed.covariance) == (object_report.PLACED_SIGMA_M, None)
+    assert (placed.sigma, placed.covariance) == (PLACED_SIGMA_M, None)
     assert (placed.number, placed.confirmed, placed.placed) == (5, False, True)
     held = track.covariance
     held.xx, held.yx, held.yy, held.hx, held.hy, held.hh = 4e-4, 1e-4, 1e-4, 2e-5, 1e-5, 1e-4
     full = object_report.polygon_covariance(track)
     assert (full == full.T).all()
-    expected = object_report.POLYGON_INFLATION * np.array(
-        [[4e-4, 1e-4, 2e-5], [1e-4, 1e-4, 1e-5], [2e-5, 1e-5, 1e-4]]
-    )
-    expected[2, 2] += object_report.POLYGON_TURN**2
+    expected = POLYGON_INFLATION * np.array([[4e-4, 1e-4, 2e-5], [1e-4, 1e-4, 1e-5], [2e-5, 1e-5, 1e-4]])
+    expected[2, 2] += POLYGON_TURN_SIGMA_RAD**2
     assert full == pytest.approx(expected, rel=1e-12)
     located = object_report.polygon_object(track, box_settings, "box", 0.4)
     assert located.covariance == (full[0, 0], full[0, 1], full[1, 1])

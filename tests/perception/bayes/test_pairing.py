@@ -7,6 +7,7 @@ import pytest
 
 from perception.bayes import noise_estimation, observe, pairing
 from perception.bayes.elements import HISTORY
+from perception.bayes.parameters import MAPPED_LENGTH_MIN_M
 from perception.bayes.range_fit import FAR
 from perception.bayes.scratch import PairSegment
 from perception.bayes.segment_list import mapped_segments
@@ -53,7 +54,7 @@ def test_segments_equal_their_oracle(examples: int) -> None:
         actual = np.array([row[:7] for row in got.tolist()]).reshape(made, 7)
         assert actual == pytest.approx(np.array([e[:7] for e in expected]).reshape(made, 7), rel=1e-12, abs=1e-12)
         assert got["reading"].tolist() == [e[7] for e in expected]
-        long = [e for e in expected if e[4] > pairing.MAPPED_MIN_M]
+        long = [e for e in expected if e[4] > MAPPED_LENGTH_MIN_M]
         assert memory.state["segments_numbered"][0] == numbered + len(long)
         segments += made
         assert memory.state["segments_made"][0] == segments

@@ -1,23 +1,22 @@
-"""The layout of the settings: the same for every library, with room for every ring."""
+"""Tuning numbers that only work in a certain relation to one another."""
 
 from __future__ import annotations
 
-from config.load import load_settings
-from perception.bayes.kernel_settings import ABSOLUTE_M, RELATIVE, make_settings
-from perception.bayes.parameters import NOISES, RANGE_BINS, RANGE_BINS_PER_M, RANGE_MAX_M, Settings
-from perception.records import array_of
+from perception.bayes import parameters as p
 
 
-def test_settings_of_different_libraries_have_one_layout_so_that_kernels_are_compiled_once() -> None:
-    shapes = set()
-    for models in (("semicircle",), ("box",), ("semicircle", "box")):
-        it = load_settings("hallway", models=models)
-        array = array_of(make_settings(it.ring, it.models, it.perception.bayes))
-        shapes.add((array.dtype, array.shape))
-    assert shapes == {(Settings.DTYPE, (1,))}
+def test_a_name_is_kept_at_a_lower_probability_than_it_is_given() -> None:
+    assert p.DOUBT_PROBABILITY < p.NAME_KEPT_PROBABILITY < p.ESTABLISH_PROBABILITY
 
 
-def test_every_range_of_the_longest_ring_has_a_bin_and_every_noise_a_place() -> None:
-    assert int(RANGE_MAX_M * RANGE_BINS_PER_M) in {RANGE_BINS - 1, RANGE_BINS}
-    assert RANGE_BINS >= RANGE_MAX_M * RANGE_BINS_PER_M
-    assert len(ABSOLUTE_M) * len(RELATIVE) == NOISES
+def test_a_longer_baseline_is_tried_than_the_longest_of_the_series() -> None:
+    assert p.BASELINE_MIN_M * 2 ** (p.BASELINES - 1) < p.BASELINE_MAX_M
+    assert p.NEIGHBOUR_BASELINE_MIN_M < p.NEIGHBOUR_BASELINE_MAX_M
+
+
+def test_a_grid_of_the_expected_width_is_not_laid_again() -> None:
+    assert p.GRID_THINNEST < p.GRID_NARROW < 1.0 < p.GRID_WIDE
+
+
+def test_the_noise_at_the_start_is_one_of_the_hypotheses() -> None:
+    assert 0 <= p.START_NOISE < len(p.NOISE_ABSOLUTE_M) * len(p.NOISE_RELATIVE)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from perception.bayes.elements import BUCKET_CAPACITY, BUCKETS
+from perception.bayes.parameters import CELL_M
 from perception.bayes.pinned_segments import Pins, delete, places_of
 from perception.bayes.segment_list import mapped_segments
 from perception.bayes.segment_pairs import bucket_index
 from perception.bayes.state import Memory
-from perception.bayes.track_initiation import CELL_M
 from tests.perception.bayes.tracks import TRACKS, add_segment, examples
 
 

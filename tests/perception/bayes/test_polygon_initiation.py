@@ -11,7 +11,8 @@ from config.load import load_model
 from perception.bayes import polygon_initiation as initiation
 from perception.bayes.elements import REQUESTS_MAX
 from perception.bayes.kernel_settings import make_settings
-from perception.bayes.polygon_job import INITIATION, NO_JOB, QUANTUM
+from perception.bayes.polygon_job import INITIATION, NO_JOB
+from perception.bayes.polygon_parameters import CHALLENGE_UNSEEN, QUANTUM_COST
 from perception.bayes.scratch import POLYGON
 from perception.bayes.state import ESTABLISHED, FREE, PLACED, TENTATIVE, Memory, PolygonTrack
 from perception.kernel import Floats
@@ -130,7 +131,7 @@ def run_job(memory: Memory, pose: Floats) -> None:
     assert initiation.request_polygon(memory.s, 0, face.real, face.imag, turn.real, turn.imag) == 1
     assert initiation.next_request(memory.s)
     while memory.s[0].job.kind != NO_JOB:
-        initiation.advance_initiation(memory.s, P, QUANTUM)
+        initiation.advance_initiation(memory.s, P, QUANTUM_COST)
 
 
 def test_a_box_is_started_where_its_readings_are_and_challenged_when_it_is_found_again() -> None:
@@ -147,7 +148,7 @@ def test_a_box_is_started_where_its_readings_are_and_challenged_when_it_is_found
     memory.state["requests"]["is_done"] = 1
     memory.state["job"]["requests_made"] = 0
     run_job(memory, pose)
-    assert (track.has_challenger, track.unseen) == (1, unseen + initiation.CHALLENGE_UNSEEN)
+    assert (track.has_challenger, track.unseen) == (1, unseen + CHALLENGE_UNSEEN)
     assert math.dist((track.challenger.x, track.challenger.y), pose[:2]) < 0.03
     assert np.count_nonzero(memory.polygons["status"]) == 1
 

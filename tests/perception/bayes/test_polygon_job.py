@@ -1,4 +1,4 @@
-"""Work on polygons in quanta: each is bounded, and what comes of it does not depend on where it was cut."""
+"""Work on polygons in quanta: each is bounded, and the result does not depend on where the work was cut."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def quantum(memory: Memory) -> bool:
 
 
 def memories() -> Iterator[Memory]:
-    """Memories of a drive past boxes, here and there on the way, between two jobs."""
+    """Yield memories from several moments of a drive past boxes, each between two jobs."""
     hall = next(h for h in halls("boxes", 0) if h.world.acoustics.model == "specular")
     perception = Perception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
     assert isinstance(perception.method, BayesPerception)
@@ -58,7 +58,7 @@ def memories() -> Iterator[Memory]:
 
 
 def finish(memory: Memory, left: int) -> list[int]:
-    """Finish the job in steps that may each cost `left`; return what they did cost."""
+    """Finish the job in steps that may each cost `left`; return what each did cost."""
     spent = []
     while memory.s[0].job.kind != NO_JOB:
         if memory.s[0].job.kind == REFINEMENT:
@@ -87,7 +87,7 @@ def test_a_step_costs_what_is_left_or_the_least_there_is() -> None:
     assert STEP_MAX < QUANTUM_COST
 
 
-def test_what_comes_of_a_job_does_not_depend_on_where_it_was_cut() -> None:
+def test_the_result_of_a_job_does_not_depend_on_where_it_was_cut() -> None:
     jobs = 0
     for memory in memories():
         for begin in BEGIN:

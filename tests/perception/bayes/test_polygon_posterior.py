@@ -10,12 +10,10 @@ import pytest
 
 from perception.bayes.object_report import polygon_covariance
 from perception.bayes.polygon_likelihood import begin_search, continue_search
+from perception.bayes.polygon_parameters import LATTICE_ATTEMPTS, LATTICE_CORRELATION_SHARE, LATTICE_PITCH
 from perception.bayes.polygon_posterior import (
-    ATTEMPTS,
-    CORRELATION_SHARE,
     CUT_OFF,
     LATTICE,
-    PITCH,
     THINNEST,
     advance_lattice,
     begin_lattice,
@@ -49,8 +47,8 @@ def test_the_moments_of_a_lattice_equal_numpys() -> None:
     rng = np.random.default_rng(5)
     ball = [z for z in itertools.product(range(-3, 4), repeat=3) if z[0] ** 2 + z[1] ** 2 + z[2] ** 2 <= 6]
     assert LATTICE.tolist() == [list(z) for z in ball]
-    normal = np.exp(-0.5 * PITCH**2 * np.sum(np.square(ball), axis=1))
-    assert pytest.approx(PITCH**2 * np.average(LATTICE[:, 0] ** 2, weights=normal)) == CUT_OFF
+    normal = np.exp(-0.5 * LATTICE_PITCH**2 * np.sum(np.square(ball), axis=1))
+    assert pytest.approx(LATTICE_PITCH**2 * np.average(LATTICE[:, 0] ** 2, weights=normal)) == CUT_OFF
     memory = Memory(24)
     job, state = memory.s[0].job, memory.state["job"]
     covariance_of, root_of = numbers(state["covariance"])[0], numbers(state["root"])[0]
@@ -63,7 +61,7 @@ def test_the_moments_of_a_lattice_equal_numpys() -> None:
         enter_job(memory, w, LEVEL)
         covariance_of[...] = covariance[np.tril_indices(3)]
         write_pitch(job.covariance, job.root)
-        assert root_of == pytest.approx(PITCH * np.linalg.cholesky(covariance)[np.tril_indices(3)], abs=1e-12)
+        assert root_of == pytest.approx(LATTICE_PITCH * np.linalg.cholesky(covariance)[np.tril_indices(3)], abs=1e-12)
         numbers(state["middle"])[0], job.middle_nat = pose, evidence(w, pose)
         state["moments"].view(np.uint8)[...] = 0
         half = int(rng.integers(0, len(ball)))
@@ -80,7 +78,7 @@ def test_the_moments_of_a_lattice_equal_numpys() -> None:
         assert moments == pytest.approx([*mean, *spread[np.tril_indices(3)]], abs=1e-9)
         leave_frame(job.middle, job.root, job.moments, job.covariance)
         assert numbers(state["middle"])[0] == pytest.approx(pose + lower @ mean, abs=1e-12)
-        shrunk = CORRELATION_SHARE * spread + (1.0 - CORRELATION_SHARE) * np.diag(np.diag(spread))
+        shrunk = LATTICE_CORRELATION_SHARE * spread + (1.0 - LATTICE_CORRELATION_SHARE) * np.diag(np.diag(spread))
         np.fill_diagonal(shrunk, np.maximum(np.diag(spread), THINNEST))
         assert covariance_of == pytest.approx((lower @ shrunk @ lower.T / CUT_OFF)[np.tril_indices(3)], abs=1e-15)
 
@@ -92,7 +90,7 @@ def spread_of(memory: Memory, w: Floats, pose: Floats, left: int, noise: int = L
     track, job = memory.s[0].polygons[0], memory.s[0].job
     track.x, track.y, track.heading = pose.tolist()
     begin_lattice(memory.s, P, 0, 0)
-    while job.lattices < ATTEMPTS:
+    while job.lattices < LATTICE_ATTEMPTS:
         advance_lattice(memory.s, P, 0, left)
     copy_triangle(job.covariance, track.covariance)
     return np.array([job.middle.x, job.middle.y, job.middle.heading]), polygon_covariance(track)

@@ -1,4 +1,4 @@
-"""Boxes that stand anyhow, and among drums, on seeds that nothing was tuned on; and their covariance's worth."""
+"""Boxes at random poses, and among drums, on seeds that were not used for tuning; and their covariance."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from perception.kernel import Floats
 from perception.pipeline import Perception
 from runtime.simulation.open_loop import HallOutcome, angle_error, match_objects, perceive, run_scene
 from runtime.simulation.scenes import PLACES_FT, Hall, readings
+from tests.perception.bayes.tracks import examples
 
 pytestmark = pytest.mark.compiled
 
 FT = 0.3048
 SETTINGS = load_settings("hallway", ["perception.method=bayes"], models=("semicircle", "box"))
-SEEDS = range(6000, 6016)
 
 
-def anyhow(seed: int, acoustics: AcousticsConfig) -> Hall:
-    """Six boxes, moved and turned by chance."""
+def random_boxes(seed: int, acoustics: AcousticsConfig) -> Hall:
+    """Return a hall of six boxes, moved and turned at random."""
     rng = np.random.default_rng(seed)
     boxes = tuple(
         BoxConfig(
@@ -34,11 +34,11 @@ def anyhow(seed: int, acoustics: AcousticsConfig) -> Hall:
         )
         for x, y in PLACES_FT
     )  # fmt: skip
-    return Hall("anyhow", WorldConfig(box=boxes, start=StartConfig(x_m=-6.0 * FT), acoustics=acoustics))
+    return Hall("random boxes", WorldConfig(box=boxes, start=StartConfig(x_m=-6.0 * FT), acoustics=acoustics))
 
 
 def squares(perception: Perception, world: WorldConfig) -> Iterator[tuple[float, float]]:
-    """Squared errors of the boxes found, in units of the covariance: of the place, and of the whole pose."""
+    """Yield the squared errors of the boxes found, in units of the covariance: of the position and of the pose."""
     assert isinstance(perception.method, BayesPerception)
     memory = perception.method.memory
     rows = match_objects(world, perception.objects(), SETTINGS.models)[1]
@@ -59,8 +59,8 @@ def squares(perception: Perception, world: WorldConfig) -> Iterator[tuple[float,
         )
 
 
-def test_boxes_that_stand_anyhow_are_found_and_the_covariance_is_honest() -> None:
-    """95 % ± 3 %, and three binomial standard deviations more: 96 boxes are few."""
+def test_boxes_at_random_poses_are_found_and_the_covariance_is_honest() -> None:
+    """The 95 % ellipses hold 92 to 98 %, and three binomial standard deviations more or less: 96 boxes are few."""
     actual = []
     wanted = false = 0
     for seed in range(8):
@@ -68,7 +68,7 @@ def test_boxes_that_stand_anyhow_are_found_and_the_covariance_is_honest() -> Non
             acoustics = AcousticsConfig(
                 model=model, noise_m=0.03 * FT, dropout=0.05, outliers=0.01, outlier_max_m=15.0 * FT
             )
-            hall = anyhow(6100 + seed, acoustics)
+            hall = random_boxes(6100 + seed, acoustics)
             perception = Perception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
             for firing in readings(SETTINGS.ring, hall, seed):
                 perceive(perception, firing)
@@ -83,13 +83,16 @@ def test_boxes_that_stand_anyhow_are_found_and_the_covariance_is_honest() -> Non
     assert 0.92 - slack <= whole <= 0.98 + slack
 
 
-def test_drums_in_random_halls_are_what_they_were_and_most_boxes_are_found() -> None:
-    outcomes: list[HallOutcome] = [outcome for seed in SEEDS for outcome in run_scene(SETTINGS, "halls", seed)]
+@examples(5, 16)
+@pytest.mark.boundscheck
+def test_drums_in_random_halls_are_found_as_without_boxes_and_most_boxes_too(examples: int) -> None:
+    seeds = range(6000, 6000 + examples)
+    outcomes: list[HallOutcome] = [outcome for seed in seeds for outcome in run_scene(SETTINGS, "halls", seed)]
     drums = [row["error"] for outcome in outcomes for row in outcome.drums]
     errors = [e / FT for e in drums if e is not None]
     assert len(errors) >= 0.98 * len(drums)
     assert np.mean(errors) <= 0.02
     assert sum(outcome.false for outcome in outcomes) <= 1
     boxes = [row["error"] for outcome in outcomes for row in outcome.boxes]
-    assert len(boxes) == len(SEEDS)
-    assert len([e for e in boxes if e is not None and e < 0.25 * FT]) >= 10
+    assert len(boxes) == examples
+    assert len([e for e in boxes if e is not None and e < 0.25 * FT]) >= 0.6 * examples

@@ -1,4 +1,4 @@
-"""Polygons of other forms than the box: hollow, without symmetry, oblong and open, found from a drive past them.
+"""Polygons of other forms than the box, found from a drive past them: hollow, without symmetry, oblong, open.
 
 They are placed so that the sides that distinguish their headings echo towards the path; for a mirror only those do.
 """
@@ -46,7 +46,7 @@ def placed(outline: ModelConfig, pose: Pose) -> list[tuple[float, float]]:
 
 
 def hall(outline: ModelConfig, poses: list[Pose], acoustics: Acoustics) -> Hall:
-    """Closed outlines are solid, an open one is a chain of thin walls."""
+    """Return a hall of these bodies: closed outlines are solid, an open one is a chain of thin walls."""
     corners = [placed(outline, pose) for pose in poses]
     thin = [
         WallConfig(x1_m=a[0], y1_m=a[1], x2_m=b[0], y2_m=b[1])
@@ -70,6 +70,7 @@ def drive(outline: ModelConfig, poses: list[Pose], acoustics: Acoustics) -> tupl
     return seen
 
 
+@pytest.mark.boundscheck
 @pytest.mark.parametrize("acoustics", ["cone", "specular"])
 @pytest.mark.parametrize(
     ("outline", "order", "headings"),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from perception.bayes import polygon_job, polygon_tracks
+from perception.bayes.polygon_parameters import QUANTUM_COST
 from perception.bayes.pose_restarts import ASSIGN, JUDGE, LATTICE
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE, Memory
 from tests.perception.bayes.box_readings import LEVEL, P, heard, keep_polygon_readings
@@ -101,7 +102,7 @@ def test_a_refinement_finds_a_box_from_beside_it_and_establishes_it() -> None:
     assert (job.kind, job.stage, job.track, job.reading_count) == (polygon_job.REFINEMENT, ASSIGN, 3, 24)
     assert (track.unseen, track.refinements) == (0, 1)
     while job.kind != polygon_job.NO_JOB:
-        polygon_tracks.advance_refinement(s, memory.tracks, P, polygon_job.QUANTUM)
+        polygon_tracks.advance_refinement(s, memory.tracks, P, QUANTUM_COST)
     assert track.status == ESTABLISHED
     assert track.reservoir == 24
     assert track.probability > 0.9

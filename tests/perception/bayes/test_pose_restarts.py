@@ -9,6 +9,7 @@ import pytest
 
 from perception.bayes import pose_restarts as restarts
 from perception.bayes.kernel_settings import make_settings
+from perception.bayes.polygon_parameters import NARROW_ROUNDS, NARROW_STEP_M, WIDE_ROUNDS, WIDE_STEP_M
 from perception.bayes.pose_restarts import JUDGE, RESTART, SEARCH_NEAR, SEARCH_WIDE
 from perception.bayes.state import Memory
 from tests.perception.bayes.box_readings import LEVEL, SETTINGS, P, S, enter_job
@@ -44,8 +45,8 @@ def test_the_search_is_wide_for_young_doubtful_or_challenged_tracks_else_near_or
     assert job.stage == stage
     assert (job.best.x, job.best.y, job.best.heading) == (0.1, 0.2, 0.3)
     if stage != JUDGE:
-        wide = (restarts.WIDE_STEP_M, restarts.WIDE_ROUNDS)
-        near = (restarts.NARROW_STEP_M, restarts.NARROW_ROUNDS)
+        wide = (WIDE_STEP_M, WIDE_ROUNDS)
+        near = (NARROW_STEP_M, NARROW_ROUNDS)
         assert (job.search.step_m, job.search.rounds_left) == (wide if stage == SEARCH_WIDE else near)
 
 

@@ -1,4 +1,4 @@
-"""Random halls, mirrors for walls and decoys among the drums, on seeds that nothing was tuned on.
+"""Random halls with mirrors for walls and decoys among the drums, on seeds that were not used for tuning.
 
 Sixteen here; `echolocate experiment hallway --scene halls --seeds 100` measures a hundred.
 """
@@ -36,14 +36,14 @@ def test_drums_are_found_and_nothing_else(outcomes: list[HallOutcome]) -> None:
 
 
 def test_the_covariance_is_honest(outcomes: list[HallOutcome]) -> None:
-    """95 % ± 3 %, and three binomial standard deviations more: 128 drums are few."""
+    """The 95 % ellipses hold 92 to 98 %, and three binomial standard deviations more or less: 128 drums are few."""
     inside = [actual for outcome in outcomes for actual in outcome.inside]
     slack = 3.0 * math.sqrt(0.95 * 0.05 / len(inside))
     assert len(inside) > 100
     assert 0.92 - slack <= np.mean(inside) <= 0.98 + slack
 
 
-def test_a_seed_is_a_hall_and_another_seed_another() -> None:
+def test_a_seed_determines_the_hall() -> None:
     assert random_hall(1) == random_hall(1)
     assert random_hall(1) != random_hall(2)
     for seed in range(20):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from perception.bayes import refine, reservoir, track_initiation
+from perception.bayes import refine, reservoir
+from perception.bayes.parameters import SWITCH_LEAD_NAT, SWITCH_UNSEEN
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE
 from tests import naive_tracks
 from tests.perception.bayes.tracks import (
@@ -98,11 +99,11 @@ def test_a_refinement_is_counted_and_its_result_determines_the_status(examples: 
         assert track.final_refinements == 3 - is_idle
         assert track.reservoir == n
         assert track.refinements in (0, count + 1)  # restarted as another kind
-        assert track.unseen == (refine.SWITCH_UNSEEN if track.refinements == 0 else 0)
+        assert track.unseen == (SWITCH_UNSEEN if track.refinements == 0 else 0)
         assert 0 <= track.alternative < ALTERNATIVES
         after = int(track.status)
         if track.probability < 0.0:  # too few readings, or a line
-            is_line = n >= 3 and track.leads[len(RADII)] > track_initiation.SWITCH_NAT
+            is_line = n >= 3 and track.leads[len(RADII)] > SWITCH_LEAD_NAT
             assert after == FREE
             assert n < 3 or is_line
         else:

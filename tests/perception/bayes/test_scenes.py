@@ -1,4 +1,4 @@
-"""The Bayesian method on the scenes it is held to, on seeds that nothing was tuned on; errors in feet."""
+"""The Bayesian method on the shipped scenes, with seeds that were not used for tuning; errors in feet."""
 
 from __future__ import annotations
 
@@ -21,13 +21,15 @@ from runtime.simulation.scene_names import SceneName
 from runtime.simulation.scenes import Hall, halls, readings
 from tests.perception.thread_time import median_ratio, thread_ms
 
+pytestmark = pytest.mark.compiled
+
 FT = 0.3048
 SETTINGS = load_settings("hallway", ["perception.method=bayes"])
 BOXES = load_settings("hallway", ["perception.method=bayes"], models=("semicircle", "box"))
 
 
 def result(outcomes: Iterable[HallOutcome]) -> tuple[int, int, int, list[float]]:
-    """Drums found, drums there, false ones, and errors in feet."""
+    """Return the number of drums found, of drums there, of false ones, and the errors in feet."""
     outcomes = list(outcomes)
     rows = [row for outcome in outcomes for row in outcome.drums]
     errors = [e / FT for row in rows if (e := row["error"]) is not None]
@@ -37,11 +39,11 @@ def result(outcomes: Iterable[HallOutcome]) -> tuple[int, int, int, list[float]]
 @pytest.mark.parametrize(
     ("scene", "seeds", "there", "mean", "worst"),
     [
-        ("clean", (0,), 6, 0.004, 0.006),
-        pytest.param("moved", (41,), 60, 0.004, 0.010, marks=pytest.mark.compiled),
-        pytest.param("noisy", tuple(range(40, 50)), 60, 0.0145, 0.06, marks=pytest.mark.compiled),
-        ("walls", (0,), 6, 0.004, 0.006),
-        pytest.param("jit10", (40, 41, 42, 43), 240, 0.0095, 0.04, marks=pytest.mark.compiled),
+        pytest.param("clean", (0,), 6, 0.004, 0.006, marks=pytest.mark.boundscheck),
+        ("moved", (41,), 60, 0.004, 0.010),
+        ("noisy", tuple(range(40, 50)), 60, 0.0145, 0.06),
+        pytest.param("walls", (0,), 6, 0.004, 0.006, marks=pytest.mark.boundscheck),
+        ("jit10", (40, 41, 42, 43), 240, 0.0095, 0.04),
     ],
 )
 def test_drums_are_found_to_a_few_thousandths_of_a_foot(
@@ -53,14 +55,14 @@ def test_drums_are_found_to_a_few_thousandths_of_a_foot(
     assert max(errors) <= worst
 
 
-def test_boxes_are_no_drums() -> None:
+def test_boxes_are_not_reported_as_drums() -> None:
     outcomes = run_scene(SETTINGS, "boxes", 0)
     assert len(outcomes) == 4
     assert [o.false for o in outcomes] == [0, 0, 0, 0]
 
 
-@pytest.mark.compiled
-def test_boxes_are_found_where_one_knows_what_a_box_is() -> None:
+@pytest.mark.boundscheck
+def test_boxes_are_found_by_their_model() -> None:
     for outcome in run_scene(BOXES, "boxes", 0):
         assert outcome.false == 0
         for row in outcome.boxes:
@@ -75,10 +77,10 @@ def test_boxes_are_found_where_one_knows_what_a_box_is() -> None:
     [
         ("clean", (0,), 4.0, 4.75, 1.0),
         ("walls", (0,), 4.0, 4.75, 1.0),
-        # Short of what is asked, and held where it is: two drums in three are fixed that early.
-        pytest.param("moved", (40,), 1.0, 4.5, 0.65, marks=pytest.mark.compiled),
-        pytest.param("noisy", tuple(range(40, 50)), 0.0, 4.0, 0.55, marks=pytest.mark.compiled),
-        pytest.param("jit10", (40,), 0.5, 4.0, 0.5, marks=pytest.mark.compiled),
+        # The aim is all drums; these limits keep what is reached: two drums in three are fixed that early.
+        ("moved", (40,), 1.0, 4.5, 0.65),
+        ("noisy", tuple(range(40, 50)), 0.0, 4.0, 0.55),
+        ("jit10", (40,), 0.5, 4.0, 0.5),
     ],
 )
 def test_the_first_sure_fix_is_four_feet_before_passing(
@@ -110,10 +112,9 @@ def drive(perception: Perception, world: WorldConfig, passed: int) -> None:
         perceive(perception, Firing(firing.robot_s + 100.0 * passed, firing.pose, 0.0, firing.ranges_m))
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("scene", ["clean", "jit10"])
 @pytest.mark.parametrize("change", [None, (0.0, 2.0), (0.35, 0.35), (0.2, 0.0)])
-def test_what_is_gone_is_forgotten_within_three_passes_and_what_moved_is_followed(
+def test_a_removed_drum_is_forgotten_and_a_moved_one_followed_within_three_passes(
     scene: SceneName, change: tuple[float, float] | None
 ) -> None:
     before = halls(scene, 7)[0].world
@@ -166,7 +167,7 @@ def test_the_cost_does_not_grow_with_the_mission() -> None:
     assert median_ratio(with_large, with_small) <= 2.0
 
 
-def test_everything_has_a_name() -> None:
+def test_every_object_has_a_label() -> None:
     hall = halls("walls")[0]
     perception = Perception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
     for firing in readings(SETTINGS.ring, hall, 0):
@@ -201,7 +202,7 @@ def test_circles_of_several_radii_are_distinguished() -> None:
         assert nearest.model == ("keg" if drum.radius_m == 0.2 else "semicircle")
 
 
-def test_forgetting_is_beginning_anew_to_the_bit() -> None:
+def test_after_a_reset_a_drive_gives_bit_identical_objects() -> None:
     hall = halls("noisy")[0]
     used, new = (Perception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception) for _ in range(2))
     for firing in readings(SETTINGS.ring, hall, 1):
@@ -214,11 +215,10 @@ def test_forgetting_is_beginning_anew_to_the_bit() -> None:
     for firing in readings(SETTINGS.ring, hall, 2):
         one, other = perceive(used, firing), perceive(new, firing)
         assert [replace(seen, number=None) for seen in one] == [replace(seen, number=None) for seen in other]
-        assert {seen.number for seen in one}.isdisjoint(known), "no number is used twice"
+        assert {seen.number for seen in one}.isdisjoint(known), "numbers are never reused"
 
 
-def test_standing_still_says_nothing_new() -> None:
-    """A thousand equal readings from one place leave everything as the first did."""
+def test_equal_readings_from_one_place_change_nothing() -> None:
     hall = halls("clean")[0]
     perception = Perception(SETTINGS.ring, SETTINGS.models, SETTINGS.perception)
     last = Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, np.zeros(24))

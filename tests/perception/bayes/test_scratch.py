@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from config.robot import SENSORS_MAX
 from perception.bayes.elements import MAX_LINES, MAX_POLYGONS, MAX_TRACKS, PAIRS_PER_SENSOR
-from perception.bayes.pairing import BASELINES
+from perception.bayes.parameters import BASELINES
 from perception.bayes.scratch import ON_LINE, POLYGON, PROPOSED, UNEXPLAINED, Scratch
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from perception.bayes.state import START_NOISE, START_NOISE_NAT, Memory
+from perception.bayes.parameters import START_NOISE, START_NOISE_NAT
+from perception.bayes.state import Memory
 
 
 def test_a_new_memory_is_empty_and_assumes_the_starting_noise() -> None:

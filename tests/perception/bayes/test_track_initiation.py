@@ -9,10 +9,10 @@ import pytest
 
 from perception.bayes import track_initiation
 from perception.bayes.elements import HISTORY
+from perception.bayes.parameters import CELL_M, NEW_LINE_HITS_MIN
 from perception.bayes.range_fit import FAR
 from perception.bayes.segment_pairs import add_to_map
 from perception.bayes.state import ESTABLISHED, FREE, PLACED, TENTATIVE, CircleTrack, Memory
-from perception.bayes.track_initiation import CELL_M
 from perception.records import records, zeros
 from tests.perception.bayes.tracks import (
     RADII,
@@ -141,7 +141,7 @@ def test_a_wall_is_entered_as_a_line_and_starts_no_drum() -> None:
     track_initiation.initiate_circle(memory.s, memory.tracks, P, 0, 0.4, 1.0, 0.0, 1.0)
     assert not memory.circles["status"].any()
     line = memory.s[0].lines[0]
-    assert line.echoes >= track_initiation.LINE_HITS_MIN
+    assert line.echoes >= NEW_LINE_HITS_MIN
     assert (line.normal_x, line.normal_y) == pytest.approx((0.0, 1.0), abs=1e-3)
     assert line.origin_y + line.distance == pytest.approx(1.0, abs=1e-3)
 

@@ -13,11 +13,11 @@ from config.load import load_settings
 from perception.bayes import reservoir
 from perception.bayes.elements import MAX_LINES, Reading
 from perception.bayes.kernel_settings import make_settings
-from perception.bayes.parameters import RANGE_BINS_PER_M, Settings, SettingsRecord
+from perception.bayes.parameters import CELL_M
 from perception.bayes.range_fit import FAR
 from perception.bayes.segment_pairs import add_to_map
+from perception.bayes.settings_record import RANGE_BINS_PER_M, Settings, SettingsRecord
 from perception.bayes.state import Memory
-from perception.bayes.track_initiation import CELL_M
 from perception.kernel import Floats
 from perception.records import Records, array_of, records, zeros
 from perception.sensor_mounts import mounts_array
