@@ -230,7 +230,7 @@ def place_readings(
 def partners(
     i: int, cur: Array, memories: Sequence[list[Array]], now: float, gap: float
 ) -> list[Array]:  # fmt: skip
-    """Return the readings that reading i is paired with: its sensor's own past at three baselines, then neighbours."""
+    """Return the readings paired with reading i: of its own sensor at three baselines, then of its neighbours."""
     q, sensor, found = cur[i], int(cur[i][5]), []
     wanted = [0.5 * FT, 1.0 * FT, 2.0 * FT]
     for old in reversed(memories[sensor]):
