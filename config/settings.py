@@ -243,16 +243,19 @@ class LogConfig(Strict):
 
 
 class RecordingConfig(Strict):
-    """The recording of every run, in a folder from which the oldest recordings are deleted."""
+    """The recording of every run, in a folder from which the oldest recordings are deleted.
+
+    A run deletes no more than it writes, and nothing that is bookmarked or beside which a file NAME.mcap.keep lies.
+    """
 
     enabled: bool = True
     """Record even if ``--record`` names no file."""
     folder: str | None = None
     """Folder of the recordings; by default echolocate/runs in the user's state folder."""
     cap_mb: float = Field(default=1000.0, ge=1.0, le=1e7)
-    """Largest size of all recordings in the folder, MB; an hour takes about 30 MB."""
+    """Largest size of all recordings in the folder that are not kept for good, MB; an hour takes about 30 MB."""
     keep: int = Field(default=100, ge=1, le=100_000)
-    """Largest number of recordings in the folder."""
+    """Largest number of runs in the folder whose recordings are not kept for good."""
     keyframe_period_s: float = Field(default=40.0, ge=0.1, le=3600.0)
     """Time between records of the whole state, from which a replay can start, s."""
 
@@ -270,6 +273,8 @@ class ConsoleConfig(Strict):
     """Allow monitoring without the token. Halting, changing and driving always require the token of the start URL."""
     clients_max: int = Field(default=16, ge=1, le=256)
     """Largest number of pages open at a time."""
+    command_age_max_s: float = Field(default=1.0, ge=0.3, le=60.0)
+    """A command of a page that can begin a motion is refused if it arrives later than this, s."""
 
 
 class Settings(RobotConfig):

@@ -118,10 +118,20 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "Compiled code is ours",
             "kernels are loaded only from a folder that this user owns and no other can write, or from a new one",
         ),
+        "P18": Promise(
+            "A late command moves nothing",
+            "what can begin a motion carries a challenge of the server; it is refused 1 s later, after any stop of "
+            "the robot, and without its sender's connection; HALT needs none",
+        ),
         "P19": Promise(
             "Nothing is left over",
             "a page closed while its recording opens; SIGINT, SIGTERM or SIGHUP at any moment of a start: no "
             "process, no folder, no traceback, exit code 128 + n",
+        ),
+        "P20": Promise(
+            "No run deletes the recordings of others",
+            "recording switched off and on 100 times, with and without content: a run removes at most as many bytes "
+            "as it has written, nothing pinned or bookmarked, and only what it has named before",
         ),
     }
 )  # fmt: skip

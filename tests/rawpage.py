@@ -42,6 +42,7 @@ class RawPage:
             f"Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
             f"Sec-WebSocket-Key: {key}\r\n\r\n".encode()
         )
+        self._challenge: int | None = None
         self._rest = b""
         while b"\r\n\r\n" not in self._rest:
             self._rest += self._more()
@@ -50,8 +51,10 @@ class RawPage:
             raise ConnectionError(head.decode("latin-1").splitlines()[0])
 
     def say(self, **message: Any) -> None:
-        """Send a message; its number is 1 where none is given."""
-        data = json.dumps({"id": 1, **message}).encode()
+        """Send a message with the newest challenge read; its number is 1 where none is given."""
+        if self._challenge is None:
+            self.next("challenge")
+        data = json.dumps({"id": 1, "challenge": self._challenge, **message}).encode()
         length = bytes([0x80 | len(data)]) if len(data) < 126 else b"\xfe" + struct.pack(">H", len(data))
         # A mask of zeros leaves the text as it is.
         self.socket.sendall(b"\x81" + length + bytes(4) + data)
@@ -71,21 +74,30 @@ class RawPage:
                 raise ConnectionError(f"closed: {payload!r}")
             if data[0] & 0x0F == 1:
                 message: dict[str, Any] = json.loads(payload)
+                if message["type"] == "challenge":
+                    self._challenge = message["number"]
                 if not kinds or message["type"] in kinds:
                     return message
 
     def ask(self, **message: Any) -> dict[str, Any]:
-        """Say something and return the next answer."""
-        self.say(**message)
-        return self.next("answer")
+        """Say something and return the next answer; say it again while it arrives late, as a person would."""
+        while True:
+            self.say(**message)
+            answer = self.next("answer")
+            if "press again" not in str(answer["error"]):
+                return answer
+            self.next("challenge")
 
     def read_on(self) -> threading.Thread:
         """Have everything that comes read and forgotten, from now on."""
 
+        if self._challenge is None:
+            self.next("challenge")
+
         def work() -> None:
             try:
-                while self.socket.recv(READ_BYTES):
-                    pass
+                while True:
+                    self.next()  # keeps the newest challenge
             except OSError:
                 pass
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from config.reload import Difference
 from config.settings import Settings
 from drivers.driver import RobotDriver
+from runtime.console.clients.challenges import PERIOD_S
 from runtime.console.clients.client import Client
 from runtime.console.clients.client_hub import ClientHub
 from runtime.console.commands.command import CommandContext
@@ -28,8 +29,10 @@ from runtime.console.http.server import Server, ServerContext
 from runtime.console.http.static_files import StaticFile, page_files
 from runtime.console.protocols import NOT_AVAILABLE, RecordingControl, ReplayControl, Run
 from runtime.console.timed_coroutine import timed_coroutine
-from runtime.cycle.callbacks import CONSOLE_RECEIVE
+from runtime.cycle.callbacks import CONSOLE_RECEIVE, CONSOLE_SEND
+from runtime.cycle.inputs import Request
 from runtime.cycle.live_settings import PrepareSettings
+from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord, State
 from runtime.support.length_format import Units
 from runtime.timing.cycle_stats import CycleStats
@@ -94,7 +97,9 @@ class Console:
         self._emulated = emulated
         self._units: Units = units
         self._config = settings.console
-        self._limits = Limits(clients=settings.console.clients_max) if limits is None else limits
+        config = settings.console
+        default = Limits(clients=config.clients_max, command_age_max_s=config.command_age_max_s)
+        self._limits = default if limits is None else limits
         self._console_log = ConsoleLog(log, clock)
         self._shown_models = settings.models
         self.hub = ClientHub(self._limits, clock, lambda: self.dispatcher.end_teleoperation())
@@ -103,6 +108,9 @@ class Console:
         self._commands = CommandContext(run, self.hub, self.tuning, clock, time, recording, replay)
         self.dispatcher = CommandDispatcher(self._commands, self._console_log, self._start_task)
         self._publisher = FramePublisher(run, self.hub, self._commands, settings, log, clock, self._on_stalled)
+        self._issue_challenge = run.timing_monitor.timed(CONSOLE_SEND, self._challenge)
+        self._challenge_timer: asyncio.TimerHandle | None = None
+        self._mode = run.state.mode
         self._tasks: set[asyncio.Task[None]] = set()
         self._server: Server | None = None
         self.url = ""
@@ -122,6 +130,9 @@ class Console:
         driver : RobotDriver
             Counts of the link.
         """
+        before, self._mode = self._mode, state.mode
+        if state.mode.entered_since(before) and state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT}:
+            self.hub.void_challenges()  # whatever stopped it, a command from before must not set it in motion again
         if self._publisher.failure is not None:
             return
         try:
@@ -169,6 +180,7 @@ class Console:
                 "the console accepts other machines: anyone with the token can drive, and nothing is encrypted"
             )
         self._publisher.open()
+        self._challenge()
         self._run.health.watch("console", self.probe)
         try:
             yield
@@ -201,6 +213,8 @@ class Console:
 
     async def _close(self, server: Server) -> None:
         self._publisher.close()
+        if self._challenge_timer is not None:
+            self._challenge_timer.cancel()
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -208,6 +222,11 @@ class Console:
         await server.close()
         if self._commands.replay is not None:
             await self._commands.replay.close()
+
+    def _challenge(self) -> None:
+        """Send every client a new challenge, now and after every period."""
+        self._challenge_timer = asyncio.get_running_loop().call_later(PERIOD_S, self._issue_challenge)
+        self.hub.issue_challenge()
 
     def _session(self) -> dict[str, Any]:
         """Return the session information; the first frame follows the next cycle."""
@@ -234,6 +253,10 @@ class Console:
     def _on_leave(self, client: Client) -> None:
         if client.task is not None:
             client.task.cancel()
+        if self._commands.armed_by is client:
+            self._commands.armed_by = None
+            if self._run.state.mode.arming_run_s is not None:
+                self._run.request(Request.DISARM)  # it would begin to drive with its operator gone
         if self._commands.replay is not None:
             self._commands.replay.leave(client)
 

@@ -5,6 +5,7 @@ Recording and replay are optional: commands that need a part which this run does
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Final, Protocol
 
 from perception.edits import Edit, Evidence
@@ -23,11 +24,11 @@ NOT_AVAILABLE: Final = "not available in this run"
 class Robot(Protocol):
     """The robot's process, as far as commands act on it."""
 
-    def request(self, request: Request) -> None:
-        """Pass a change of mode to the next cycle; HALT is sent at once."""
+    def request(self, request: Request, is_valid: Callable[[], bool] = ..., /) -> None:
+        """Pass a change of mode to the next cycle, which drops it if it is no longer valid; HALT is sent at once."""
 
-    def drive_request(self, drive_request: DriveRequest) -> None:
-        """Pass a drive request to the next cycle; the newest counts."""
+    def drive_request(self, drive_request: DriveRequest, is_valid: Callable[[], bool] = ..., /) -> None:
+        """Pass a drive request to the next cycle, which drops it if it is not valid any more; the newest counts."""
 
     def edit(self, edit: Edit) -> bool:
         """Pass an edit of the map to the next cycle; return False if too many are queued."""

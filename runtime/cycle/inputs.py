@@ -26,6 +26,11 @@ class Request(Enum):
     """From DRIVE back to READY: the robot stops, without the base's latch, and waits to be armed."""
 
 
+def always_valid() -> bool:
+    """Return True: a request that no sender or stop can void, as from a signal or a key of the terminal."""
+    return True
+
+
 @dataclass(frozen=True, slots=True)
 class Inputs:
     """The inputs of the cycle that begins at `run_s` of the run's clock."""

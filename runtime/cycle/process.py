@@ -22,7 +22,7 @@ from runtime.cycle.alerts import Alerts
 from runtime.cycle.callbacks import CALLBACKS, COLLECTION, LINE_LOST, LINE_OPENED, LINK_RECEIVE
 from runtime.cycle.connection import Connection
 from runtime.cycle.drive_requests import DriveRequest
-from runtime.cycle.inputs import Inputs, Request, command_gap_max_s, gather_inputs
+from runtime.cycle.inputs import Inputs, Request, always_valid, command_gap_max_s, gather_inputs
 from runtime.cycle.live_settings import LiveSettings
 from runtime.cycle.modes import Mode, ModeState
 from runtime.cycle.preparation import (
@@ -132,24 +132,26 @@ class RobotProcess:
         self._stop_reasons: list[str] = []
         self._alerts = Alerts()
         self._request: Request | None = None
+        self._is_request_valid = self._is_drive_request_valid = always_valid
         self._edits: list[Edit] = []
         self._drive_request: DriveRequest | None = None
         self._arm_when_ready = False
         self._stop = asyncio.Event()
 
-    def request(self, request: Request) -> None:
+    def request(self, request: Request, is_valid: Callable[[], bool] = always_valid) -> None:
         """Pass a request to the next cycle; a stop is not overridden by an ARM in the same cycle.
 
-        A HALT is sent to the base at once; the next cycle only changes the mode.
+        A HALT is sent to the base at once; the next cycle only changes the mode. The cycle drops a request whose
+        `is_valid` returns False by then.
         """
         if self._request is not Request.HALT and (self._request, request) != (Request.DISARM, Request.ARM):
-            self._request = request
+            self._request, self._is_request_valid = request, is_valid
         if request is Request.HALT:
             self._halt()
 
-    def drive_request(self, drive_request: DriveRequest) -> None:
-        """Pass a drive request to the next cycle; a later one replaces it."""
-        self._drive_request = drive_request
+    def drive_request(self, drive_request: DriveRequest, is_valid: Callable[[], bool] = always_valid) -> None:
+        """Pass a drive request to the next cycle, which drops it if `is_valid` is False; a later one replaces it."""
+        self._drive_request, self._is_drive_request_valid = drive_request, is_valid
 
     def edit(self, edit: Edit) -> bool:
         """Pass an edit of the map to the next cycle; return False where too many wait already."""
@@ -281,8 +283,9 @@ class RobotProcess:
         if self._arm_when_ready and self._state.mode.mode is Mode.READY:
             self._arm_when_ready = False
             self.request(Request.ARM)
-        request, self._request = self._request, None
-        drive_request, self._drive_request = self._drive_request, None
+        request = self._request if self._is_request_valid() else None
+        drive_request = self._drive_request if self._is_drive_request_valid() else None
+        self._request = self._drive_request = None
         edits, self._edits = tuple(self._edits), []
         return gather_inputs(
             self._driver,

@@ -139,6 +139,11 @@ class Recorder:
         """The last trouble with the disk, None if there was none."""
         return self._writer.last_error
 
+    @property
+    def notice(self) -> str | None:
+        """Which recording goes next, None while there is room."""
+        return self._writer.notice
+
     def probe(self) -> str | None:
         """Return how its thread ended; None while it runs. See `runtime.support.health`."""
         return self._writer.thread.probe()

@@ -1,9 +1,14 @@
-"""The storage of recordings: a file named by the user, or a folder from which the oldest are deleted."""
+"""The storage of recordings: a file named by the user, or a folder from which the oldest are deleted.
+
+What one run can displace is bounded, so no sequence of commands or restarts empties the folder.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import stat
+import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple, Protocol
@@ -11,9 +16,15 @@ from typing import Final, NamedTuple, Protocol
 import platformdirs
 
 from config.settings import RecordingConfig
+from runtime.recording.channels import BOOKMARK
 
 SUFFIX: Final = ".mcap"
 MEGABYTE: Final = 1_000_000
+PIN_SUFFIX: Final = ".keep"
+"""An empty file with this after a recording's name pins it."""
+PART_DIGITS: Final = 3
+WARN_SHARE: Final = 0.9
+"""Share of a limit at which a person is told what goes next."""
 PART_SHARE: Final = 0.25
 """Share of the folder's size limit that one file may take: the folder can then be kept within its limit."""
 
@@ -22,11 +33,22 @@ class RecordingTarget(Protocol):
     """Where the files of one recording are written."""
 
     def path(self, part: int) -> Path:
-        """Return the path of a file, numbered from 1; its folder exists and has room afterwards."""
+        """Return the path of a file, numbered from 1; its folder exists afterwards."""
         ...
 
-    def enforce_limits(self, current: Path) -> None:
-        """Keep the storage within its limits; called regularly while the file `current` grows."""
+    def enforce_limits(self, current: Path) -> str | None:
+        """Keep the storage within its limits; return what a person should know about it.
+
+        Called when the file `current` is opened, regularly while it grows, and once it is closed.
+        """
+        ...
+
+    def pin(self, current: Path) -> None:
+        """Keep a file: it has a bookmark."""
+        ...
+
+    def remove_empty(self, current: Path) -> bool:
+        """Remove a closed file in which nothing happened; return whether it was removed."""
         ...
 
     def is_part_full(self, part_bytes: int) -> bool:
@@ -41,20 +63,41 @@ class SingleFile:
     first: Path
 
     def path(self, part: int) -> Path:
-        """Return the path of a file, numbered from 1."""
-        return self.first if part == 1 else self.first.with_stem(f"{self.first.stem}-{part}")
+        """Return the path of a file, numbered from 1; only the first, which the user named, may exist already."""
+        path = self.first if part == 1 else self.first.with_stem(f"{self.first.stem}-{part}")
+        return self.path(part + 1) if part > 1 and path.exists() else path
 
     def enforce_limits(self, current: Path) -> None:
         """Do nothing: files that the user named are never deleted."""
+
+    def pin(self, current: Path) -> None:
+        """Do nothing: files that the user named are never deleted."""
+
+    def remove_empty(self, current: Path) -> bool:  # noqa: ARG002 - the user named it
+        """Return False."""
+        return False
 
     def is_part_full(self, part_bytes: int) -> bool:  # noqa: ARG002 - a file named by the user is not split
         """Return False."""
         return False
 
 
-@dataclass(frozen=True, slots=True)
+class StoredFile(NamedTuple):
+    """A file of the folder that counts towards its limits."""
+
+    modified_ns: int
+    bytes: int
+    path: Path
+
+
+@dataclass(slots=True)
 class RotatingFolder:
-    """A folder of recordings with limits on their number and on their total size.
+    """A folder of recordings with limits on the number of runs in it and on its total size.
+
+    The oldest files go first, one at each check, and only after an earlier check of this run has named them. A run
+    removes at most as many bytes of older runs as it has written itself; a file too large for that stays, and the
+    oldest that fits goes. Pinned files, beside which an empty `NAME.mcap.keep` lies, stay and do not count. A file
+    with a bookmark is pinned.
 
     Parameters
     ----------
@@ -69,38 +112,121 @@ class RotatingFolder:
     folder: Path
     run: str
     config: RecordingConfig
+    _removed_bytes: int = 0
+    """Of older runs."""
+    _own_removed_bytes: int = 0
+    _announced: Path | None = None
+    """The file that the last check has named."""
 
     def path(self, part: int) -> Path:
-        """Return the path of a file, numbered from 1, after deleting old recordings to make room for it."""
+        """Return the path of a file, numbered from 1."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        path = self.folder / f"{self.run}-{part:03d}{SUFFIX}"
-        self._delete_oldest(self.config.keep - 1, path)
-        return path
+        return self.folder / f"{self.run}-{part:0{PART_DIGITS}d}{SUFFIX}"
 
-    def enforce_limits(self, current: Path) -> None:
-        """Delete the oldest recordings, but never `current`, until the folder is within its limits."""
-        self._delete_oldest(self.config.keep, current)
+    def enforce_limits(self, current: Path) -> str | None:
+        """Remove the file that the last check named if the folder exceeds a limit, but never `current`.
+
+        Returns
+        -------
+        str or None
+            What goes next and how to keep it, once the folder comes within a tenth of a limit.
+        """
+        files = self._counted_files()
+        if self._fill(files) > 1.0 and self._announced is not None:
+            due = self._next(files, current)
+            if due is not None and due.path == self._announced:
+                self._remove(due)
+                files.remove(due)
+        fill = self._fill(files)
+        due = self._next(files, current) if fill > WARN_SHARE else None
+        self._announced = None if due is None else due.path
+        if due is None:
+            return None
+        return (
+            f"the folder of recordings is nearly full; {due.path.name} goes next: to keep it, move it, create "
+            f"{due.path.name}{PIN_SUFFIX} beside it, or raise recording.cap_mb and recording.keep"
+        )
+
+    def pin(self, current: Path) -> None:
+        """Create the file that pins a recording."""
+        pin_of(current).touch()
+
+    def remove_empty(self, current: Path) -> bool:
+        """Remove a closed file in which nothing happened, unless it is pinned; return whether it was removed."""
+        if pin_of(current).exists():
+            return False
+        current.unlink()
+        return True
 
     def is_part_full(self, part_bytes: int) -> bool:
         """Return whether a file of this size has reached its share of the limit."""
         return part_bytes > PART_SHARE * self.config.cap_mb * MEGABYTE
 
-    def _delete_oldest(self, number: int, current: Path) -> None:
+    def _counted_files(self) -> list[StoredFile]:
+        """Return the files that are not pinned, oldest first."""
         files = []
         for path in self.folder.glob(f"*{SUFFIX}"):
             with contextlib.suppress(OSError):  # another run has just deleted it
-                files.append((path.stat().st_mtime_ns, path.stat().st_size, path))
-        files.sort()
-        total = sum(size for _, size, _ in files)
-        count = len(files)
-        for _, size, path in files:
-            if count <= number and total <= self.config.cap_mb * MEGABYTE:
-                return
-            if path != current:
-                with contextlib.suppress(OSError):
-                    path.unlink()
-                count -= 1
-                total -= size
+                info = path.stat()
+                if not pin_of(path).exists():
+                    files.append(StoredFile(info.st_mtime_ns, info.st_size, path))
+        return sorted(files)
+
+    def _fill(self, files: Sequence[StoredFile]) -> float:
+        """Return the share of a limit that the folder has reached, by size or by number of runs."""
+        runs = len({_run_of(file.path) for file in files})
+        return max(sum(file.bytes for file in files) / (self.config.cap_mb * MEGABYTE), runs / self.config.keep)
+
+    def _next(self, files: Sequence[StoredFile], current: Path) -> StoredFile | None:
+        """Return the file that goes next, None if this run may remove none."""
+        own = [file for file in files if _run_of(file.path) == self.run]
+        written = self._own_removed_bytes + sum(file.bytes for file in own)
+        older = [file for file in files if _run_of(file.path) != self.run]
+        for file in older:
+            if self._removed_bytes + file.bytes <= written and not has_bookmark(file.path):
+                return file
+        too_large = sum(file.bytes for file in files) > self.config.cap_mb * MEGABYTE
+        finished = [file for file in own if file.path != current]
+        return finished[0] if too_large and finished else None
+
+    def _remove(self, file: StoredFile) -> None:
+        with contextlib.suppress(OSError):
+            file.path.unlink()
+        if _run_of(file.path) == self.run:
+            self._own_removed_bytes += file.bytes
+        else:
+            self._removed_bytes += file.bytes
+
+
+def pin_of(path: Path) -> Path:
+    """Return the path of the empty file that pins a recording."""
+    return path.with_name(f"{path.name}{PIN_SUFFIX}")
+
+
+def has_bookmark(path: Path) -> bool:
+    """Return whether the index of a recording lists bookmarks: those of older versions have no pin. Pins it if so."""
+    from mcap.exceptions import McapError
+    from mcap.reader import SeekingReader
+
+    try:
+        with path.open("rb") as file:
+            summary = SeekingReader(file).get_summary()
+    except (OSError, McapError, ValueError, struct.error):  # not closed properly, or no recording
+        return False
+    if summary is None or summary.statistics is None:
+        return False
+    counts = summary.statistics.channel_message_counts
+    found = any(channel.topic == BOOKMARK and counts.get(number) for number, channel in summary.channels.items())
+    if found:
+        with contextlib.suppress(OSError):
+            pin_of(path).touch()
+    return found
+
+
+def _run_of(path: Path) -> str:
+    """Return the run that a file belongs to: its name without the number of the part."""
+    run, _, part = path.stem.rpartition("-")
+    return run if run and part.isdigit() and len(part) == PART_DIGITS else path.stem
 
 
 class RecordingFile(NamedTuple):

@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from runtime.cycle.summary import object_row
 from runtime.recording.channels import CYCLE, KEYFRAME, MODE, OBJECTS, RUN_INFO, SEGMENTS, SETTINGS, encode
 from runtime.recording.mcap_file import McapFile
 from runtime.recording.schema import (
+    Bookmark,
     Cycle,
     MapChange,
     ModeChange,
@@ -107,6 +109,8 @@ class RecorderStatus:
     """The longest time the disk took to confirm."""
     is_writing: bool = False
     """Whether a file is open."""
+    notice: str | None = None
+    """What a person should know about the storage: which recording goes next."""
 
 
 class RecordingWriter:
@@ -151,6 +155,7 @@ class RecordingWriter:
         self._retry_s = self._flushed_s = self._synced_s = self._limited_s = 0.0
         self._bytes_before = 0
         self._unflushed = 0
+        self._is_empty = True
         self._mode: ModeState | None = None
         self._map: dict[bytes, int] = {}
         self._map_count = 0
@@ -186,6 +191,11 @@ class RecordingWriter:
         """As in `status`, at a fraction of its cost: asked after every cycle."""
         return self._status.last_error
 
+    @property
+    def notice(self) -> str | None:
+        """As in `status`, for the same reason."""
+        return self._status.notice
+
     def _drop(self, count: int) -> None:
         self._status = replace(self._status, dropped=self._status.dropped + count)
 
@@ -207,7 +217,7 @@ class RecordingWriter:
             self._synced_s = time.monotonic()
         if host_s - self._limited_s >= RETRY_S and self._file is not None:
             path = self._file.path
-            self._guarded(lambda: self._target.enforce_limits(path))
+            self._guarded(lambda: self._enforce_limits(path))
             self._limited_s = host_s
 
     def _guarded(self, act: Callable[[], None]) -> None:
@@ -236,6 +246,8 @@ class RecordingWriter:
         self._mode = None
         path, files = str(self._file.path), self._status.files + 1
         self._status = replace(self._status, file=path, files=files, is_writing=True)
+        self._is_empty = True
+        self._enforce_limits(self._file.path)
 
     def _finish(self) -> None:
         if self._file is not None:
@@ -246,8 +258,19 @@ class RecordingWriter:
                 size = self._bytes_before + file.path.stat().st_size
                 self._status = replace(self._status, bytes=size, is_writing=False)
                 self._unflushed = 0
+                self._enforce_limits(file.path)
             except OSError as error:
                 self._abandon(f"{file.path}: {error.strerror or error}")
+
+    def _enforce_limits(self, current: Path) -> None:
+        self._status = replace(self._status, notice=self._target.enforce_limits(current))
+
+    def _switch_off(self) -> None:
+        """Close the file; remove it if nothing happened in it, or else switching often would displace recordings."""
+        path, is_empty = None if self._file is None else self._file.path, self._is_empty
+        self._finish()
+        if path is not None and is_empty and self._target.remove_empty(path):
+            self._status = replace(self._status, file=None, files=self._status.files - 1, bytes=self._bytes_before)
 
     def _flush(self) -> None:
         if self._file is not None:
@@ -273,7 +296,7 @@ class RecordingWriter:
         if isinstance(item.content, RecordingSwitch):
             self._on, self._retry_s = item.content.on, 0.0
             if not self._on:
-                self._finish()
+                self._switch_off()
             return
         if item.topic == KEYFRAME:
             if self._file is not None and self._target.is_part_full(self._file.bytes):
@@ -292,6 +315,10 @@ class RecordingWriter:
                 self._enter_cycle(item.content, log_ns)
             case MapSnapshot():
                 self._enter_snapshot(item.content, item.run_s, log_ns)
+            case Bookmark():
+                self._is_empty = False
+                self._target.pin(self._file.path)
+                self._add(item.topic, item.content, log_ns)
             case SettingsReload(cycle, _):
                 change = SettingsChange.model_construct(run_s=item.run_s, cycle=cycle, settings=self._info.settings)
                 self._add(SETTINGS, change, log_ns)
@@ -316,6 +343,7 @@ class RecordingWriter:
         return self._info.unix_minus_host_ns + round(1e9 * host_s)
 
     def _enter_cycle(self, record: CycleRecord, log_ns: int) -> None:
+        self._is_empty = False
         self._add(CYCLE, Cycle.model_construct(record=record), log_ns, record.cycle)
         if record.mode != self._mode:
             self._mode = record.mode

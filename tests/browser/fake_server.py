@@ -95,7 +95,9 @@ class FakeServer:
                     await self._changed.wait()
         except TimeoutError:
             raise AssertionError(f"no {kind} came, only {[m['type'] for m in self.received]}") from None
-        return {key: value for key, value in self.of(kind)[count - 1].items() if key not in {"id", "type"}}
+        return {
+            key: value for key, value in self.of(kind)[count - 1].items() if key not in {"id", "type", "challenge"}
+        }
 
     def of(self, kind: str) -> list[dict[str, Any]]:
         """Return the messages of a kind received so far."""
@@ -244,7 +246,7 @@ class FakeServer:
             case "release_control":
                 self.controller = None
             case "legs" | "goal":
-                self.drive_request = {"kind": kind, **{k: v for k, v in message.items() if k not in {"id", "type"}}}
+                self.drive_request = {"kind": kind, **{k: message[k] for k in message.keys() & {"x", "y"}}}
             case "pause" | "resume":
                 self.paused = kind == "pause"
             case "single_step":

@@ -31,7 +31,16 @@ class Run:
 async def run(folder: Path, opener: Opener) -> AsyncIterator[Run]:
     """Start a run in a folder, and close all pages before it ends."""
     trace, recording = folder / "trace.csv", folder / "run.mcap"
-    more = ["--set", "console.port=0", "--trace", str(trace), "--record", str(recording)]
+    more = [
+        "--set",
+        "console.port=0",
+        "--set",
+        "console.command_age_max_s=60.0",
+        "--trace",
+        str(trace),
+        "--record",
+        str(recording),
+    ]
     with running(folder, "run", "run", *more) as command:
         url = await asyncio.to_thread(start_url, command)
         try:

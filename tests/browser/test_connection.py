@@ -38,6 +38,17 @@ async def test_a_wrong_token_is_reported_and_the_right_one_is_hidden(server: Fak
     assert "token" not in opened.page.url
 
 
+async def test_a_command_carries_the_newest_challenge(server: FakeServer, opener: Opener) -> None:
+    opened = await opener.open(server.url)
+    newest = 2**52 - 1
+    for number in (7, newest):
+        await server.send({"type": "challenge", "number": number})
+    await opened.sync()
+    await opened.world("connection.send({ type: 'arm' })")
+    await server.wait("arm")
+    assert server.of("arm")[0]["challenge"] == newest, "to the last bit"
+
+
 async def test_old_data_are_reported_as_old(server: FakeServer, opener: Opener) -> None:
     opened = await opener.open(server.url)
     await opened.run_for(1000)

@@ -53,6 +53,7 @@ class RunRecording:
         self._recorder = recorder
         self._ring_log = ring_log
         self._is_requested = is_requested
+        self._notice: str | None = None
         self._reported: dict[Recorder | RingLogWriter, str | None] = {}
 
     def on_log(self, event: Mapping[str, Any]) -> None:
@@ -73,6 +74,10 @@ class RunRecording:
                 if error != self._reported.get(writer):
                     self._reported[writer] = error
                     log.warning("the recording is incomplete", reason=error, dropped=writer.status.dropped)
+            notice = recorder.notice
+            if notice is not None and notice != self._notice:
+                self._notice = notice
+                log.warning(notice)
             if view is not None:
                 view(record, state, stats, driver)
 

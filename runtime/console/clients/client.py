@@ -1,4 +1,4 @@
-"""One client: a slot for the newest frame, a short queue for messages, and one task that sends both.
+"""One client: slots for the newest challenge and frame, a short queue for messages, and one task that sends them.
 
 The cycle never waits for a client. A frame that has not been sent is replaced by the next one, the queue is bounded,
 and a client that stops receiving is disconnected after a while.
@@ -102,6 +102,7 @@ class Client:
         self._transport = transport
         self._limits = limits
         self._clock = clock
+        self._challenge: int | None = None
         self._frame: Frame | None = None
         self._last_sent: tuple[object, int] = (None, 0)
         self._dropped = 0
@@ -153,6 +154,12 @@ class Client:
         if len(self._queue) < self._limits.queue_messages // 2:
             self.send_encoded(data)
 
+    def send_challenge(self, number: int) -> None:
+        """Send a challenge of the server before the next frame, in place of one that has not been sent yet."""
+        if self.has_token and not self.is_gone:
+            self._challenge = number
+            self._wake.set()
+
     def is_stalled(self, host_s: float) -> bool:
         """Return whether the client has received no data for longer than the limits allow."""
         since_s = self._sending_since_s
@@ -166,13 +173,13 @@ class Client:
     def leave(self) -> None:
         """Mark the client as gone and discard what is queued for it."""
         self.is_gone = True
-        self._frame = None
+        self._frame = self._challenge = None
         self._queue.clear()
         self._queue_bytes = 0
         self._wake.set()
 
     async def send_all(self) -> None:
-        """Send queued messages and then the newest frame, again and again until the client is gone."""
+        """Send queued messages, then the newest challenge and frame, again and again until the client is gone."""
         while not self.is_gone:
             data = self._next()
             if data is None:
@@ -191,6 +198,9 @@ class Client:
             data = self._queue.popleft()
             self._queue_bytes -= len(data)
             return data
+        challenge, self._challenge = self._challenge, None
+        if challenge is not None:
+            return b'{"type":"challenge","number":%d}' % challenge
         frame, self._frame = self._frame, None
         if frame is None:
             return None

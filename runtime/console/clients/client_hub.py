@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import orjson
 
+from runtime.console.clients.challenges import Challenges
 from runtime.console.clients.client import Client, Frame, Transport
 from runtime.console.clients.control import Control, Holder
 from runtime.console.http.client_limits import Limits
@@ -42,11 +43,14 @@ class ClientHub:
         Every connected client by its number.
     control
         Which of them has control of the robot.
+    challenges
+        Those that their commands carry.
     """
 
     def __init__(self, limits: Limits, clock: Callable[[], float], on_control_lost: Callable[[], None]) -> None:
         self.clients: dict[int, Client] = {}
         self.control = Control(self._send_role, lambda _client: on_control_lost())
+        self.challenges = Challenges(clock, limits.command_age_max_s)
         self._limits = limits
         self._clock = clock
         self._log_lines: deque[bytes] = deque(maxlen=LOG_LINES_KEPT)
@@ -91,6 +95,8 @@ class ClientHub:
         self._begin_session(client, session)
         for line in list(self._log_lines)[-LOG_LINES_SENT:]:
             client.send_if_room(line)
+        # Challenges are issued only while there are clients.
+        client.send_challenge(self.challenges.newest if len(self.clients) > 1 else self.challenges.issue())
         return client
 
     def leave(self, client: Client) -> None:
@@ -103,6 +109,15 @@ class ClientHub:
         for client in self.clients.values():
             if client.is_live:
                 client.show(frame)
+
+    def issue_challenge(self) -> None:
+        """Send every client a new challenge."""
+        if self.clients:
+            self._send_challenge(self.challenges.issue())
+
+    def void_challenges(self) -> None:
+        """Void every challenge, because the robot stops, and send every client a new one."""
+        self._send_challenge(self.challenges.void_all())
 
     def broadcast(self, message: Mapping[str, Any]) -> None:
         """Send every client the same message."""
@@ -143,6 +158,10 @@ class ClientHub:
         self._log_lines.append(data)
         for client in list(self.clients.values()):
             client.send_if_room(data)
+
+    def _send_challenge(self, number: int) -> None:
+        for client in self.clients.values():
+            client.send_challenge(number)
 
     def _begin_session(self, client: Client, session: Mapping[str, Any]) -> None:
         client.forget_frames()

@@ -52,6 +52,8 @@ class CommandContext:
     """In the order in which the cycle carries them out."""
     is_teleoperated: bool = False
     """Whether the last drive request was a velocity from a client's teleoperation."""
+    armed_by: Client | None = None
+    """The client that armed the robot last."""
 
 
 class Call(NamedTuple):
@@ -63,6 +65,22 @@ class Call(NamedTuple):
     """Of the message."""
     name: str
     """Of the command."""
+
+    def remains_valid(self) -> Callable[[], bool]:
+        """Return a function that returns False once the client has left or the robot has been stopped."""
+        challenges, client = self.context.hub.challenges, self.client
+        stops = challenges.stops
+        return lambda: not client.is_gone and challenges.stops == stops
+
+
+def never(_: object) -> bool:
+    """Return False."""
+    return False
+
+
+def always(_: object) -> bool:
+    """Return True."""
+    return True
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,3 +95,7 @@ class Command(Generic[Arguments]):
     handler: Callable[[Call, Arguments], Any]
     """Carries it out and returns the data of the answer; raises CommandError if it cannot. A coroutine function runs
     as a task of its own, one at a time for each client."""
+    can_begin_motion: Callable[[Arguments], bool] = never
+    """Whether the robot may begin to move by these arguments: the message must then carry a fresh challenge."""
+    survives_stop: bool = False
+    """Whether it may have been sent before the robot stopped: nothing moves by it before the robot is armed again."""

@@ -1,4 +1,4 @@
-"""The command dispatcher: reads a client's message, checks its permission, runs the handler, and answers."""
+"""The command dispatcher: reads a client's message, checks its permission and age, runs the handler, and answers."""
 
 from __future__ import annotations
 
@@ -87,6 +87,12 @@ class CommandDispatcher:
     def _run(self, client: Client, message: Message) -> Any:  # noqa: ANN401 - the data of any answer
         command = COMMANDS[message.name]
         self._check_permission(client, command)
+        if command.can_begin_motion(message.arguments):
+            reason = self._context.hub.challenges.refusal_reason(
+                message.challenge, survives_stop=command.survives_stop
+            )
+            if reason is not None:
+                raise CommandError(f"{message.name}: {reason}")
         call = Call(self._context, client, message.id, message.name)
         if iscoroutinefunction(command.handler):
             return self._start(call, command, message)

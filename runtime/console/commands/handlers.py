@@ -22,20 +22,27 @@ from runtime.cycle.inputs import Request
 
 def request_mode(call: Call, _: NoArguments) -> None:
     """Request HALT, ARM or DISARM, whichever the command is called."""
-    call.context.robot.request(Request(call.name))
+    request = Request(call.name)
+    if request is Request.ARM:
+        call.context.armed_by = call.client
+        call.context.robot.request(request, call.remains_valid())
+        return
+    if request is Request.HALT:
+        call.context.hub.void_challenges()
+    call.context.robot.request(request)
 
 
 def request_drive(call: Call, request: Legs | Goal) -> None:
     """Replace the drive request."""
     call.context.is_teleoperated = False
-    call.context.robot.drive_request(request)
+    call.context.robot.drive_request(request, call.remains_valid())
 
 
 def teleoperate(call: Call, request: Teleoperate) -> None:
     """Replace the drive request by a velocity, which expires unless it is repeated."""
     limit_s = call.context.tuning.current.behaviors.teleoperation.message_age_max_s
     call.context.is_teleoperated = True
-    call.context.robot.drive_request(replace(request, valid_s=limit_s))
+    call.context.robot.drive_request(replace(request, valid_s=limit_s), call.remains_valid())
 
 
 def take_control(call: Call, _: NoArguments) -> None:

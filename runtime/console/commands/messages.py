@@ -2,7 +2,7 @@
 
 A command's arguments are a frozen dataclass. Edits and drive requests are those of `perception.edits`,
 `behaviors.move_to_goal` and `behaviors.teleoperation`; the dataclasses below are the console's own. A message is a
-JSON object of `id`, `type` (the command's name) and the arguments.
+JSON object of `id`, `type` (the command's name) and the arguments, and of `challenge` where it can begin a motion.
 """
 
 from __future__ import annotations
@@ -141,6 +141,8 @@ class Message(NamedTuple):
     """Of the command."""
     arguments: Any
     """An instance of the command's type."""
+    challenge: int | None = None
+    """The newest one that the page had received."""
 
 
 class MalformedMessage(UserError):  # noqa: N818 - names the message, which the caller answers
@@ -168,6 +170,7 @@ class _Envelope(BaseModel):
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
     id: Number
+    challenge: Number | None = None
 
 
 class MessageReader:
@@ -204,7 +207,8 @@ class MessageReader:
         except ValidationError as error:
             raise _malformed(error, text) from None
         of = self._types[wire.type]
-        return Message(wire.id, wire.type, of(*(getattr(wire, name) for name in _arguments(of))))
+        arguments = of(*(getattr(wire, name) for name in _arguments(of)))
+        return Message(wire.id, wire.type, arguments, wire.challenge)
 
 
 def _arguments(of: type) -> Iterable[str]:

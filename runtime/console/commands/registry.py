@@ -18,37 +18,43 @@ from perception.edits import (
 )
 from runtime.console.commands import async_commands, handlers
 from runtime.console.commands import messages as arguments
-from runtime.console.commands.command import Command, Permission
+from runtime.console.commands.command import Command, Permission, always
 from runtime.console.commands.messages import MessageReader, NoArguments
 from runtime.cycle.drive_requests import Legs
+
+
+def _is_moving(request: Teleoperate) -> bool:
+    """Return whether a velocity is not zero: zero stops the robot, however late it comes."""
+    return request.v != 0.0 or request.w != 0.0
+
 
 TOKEN, CONTROL = Permission.TOKEN, Permission.CONTROL
 
 _ALL: Final[tuple[Command[Any], ...]] = (
     Command("halt", NoArguments, TOKEN, handlers.request_mode),
-    Command("arm", NoArguments, CONTROL, handlers.request_mode),
+    Command("arm", NoArguments, CONTROL, handlers.request_mode, always),
     Command("disarm", NoArguments, CONTROL, handlers.request_mode),
     Command("take_control", NoArguments, TOKEN, handlers.take_control),
     Command("release_control", NoArguments, CONTROL, handlers.release_control),
     Command("grant_control", arguments.GrantControl, CONTROL, handlers.grant_control),
-    Command("legs", Legs, CONTROL, handlers.request_drive),
-    Command("goal", Goal, CONTROL, handlers.request_drive),
-    Command("teleoperate", Teleoperate, CONTROL, handlers.teleoperate),
-    Command("clear_map", ClearMap, CONTROL, handlers.edit),
-    Command("delete_segments", DeleteSegments, CONTROL, handlers.edit),
-    Command("pin_segments", PinSegments, CONTROL, handlers.edit),
-    Command("place_model", PlaceModel, CONTROL, handlers.edit),
-    Command("move_object", MoveObject, CONTROL, handlers.edit),
-    Command("reject_object", RejectObject, CONTROL, handlers.edit),
-    Command("confirm_object", ConfirmObject, CONTROL, handlers.edit),
+    Command("legs", Legs, CONTROL, handlers.request_drive, always),
+    Command("goal", Goal, CONTROL, handlers.request_drive, always),
+    Command("teleoperate", Teleoperate, CONTROL, handlers.teleoperate, _is_moving),
+    Command("clear_map", ClearMap, CONTROL, handlers.edit, always, survives_stop=True),
+    Command("delete_segments", DeleteSegments, CONTROL, handlers.edit, always, survives_stop=True),
+    Command("pin_segments", PinSegments, CONTROL, handlers.edit, always, survives_stop=True),
+    Command("place_model", PlaceModel, CONTROL, handlers.edit, always, survives_stop=True),
+    Command("move_object", MoveObject, CONTROL, handlers.edit, always, survives_stop=True),
+    Command("reject_object", RejectObject, CONTROL, handlers.edit, always, survives_stop=True),
+    Command("confirm_object", ConfirmObject, CONTROL, handlers.edit, always, survives_stop=True),
     Command("evidence", arguments.GetEvidence, TOKEN, handlers.get_evidence),
-    Command("load_model", arguments.LoadModel, CONTROL, async_commands.load_model),
-    Command("set_parameter", arguments.SetParameter, CONTROL, handlers.set_parameter),
-    Command("undo_parameter", NoArguments, CONTROL, handlers.undo_parameter),
+    Command("load_model", arguments.LoadModel, CONTROL, async_commands.load_model, always, survives_stop=True),
+    Command("set_parameter", arguments.SetParameter, CONTROL, handlers.set_parameter, always, survives_stop=True),
+    Command("undo_parameter", NoArguments, CONTROL, handlers.undo_parameter, always, survives_stop=True),
     Command("save_toml", NoArguments, TOKEN, handlers.save_toml),
     Command("pause", NoArguments, CONTROL, async_commands.pause),
-    Command("resume", NoArguments, CONTROL, async_commands.resume),
-    Command("single_step", NoArguments, CONTROL, async_commands.single_step),
+    Command("resume", NoArguments, CONTROL, async_commands.resume, always),
+    Command("single_step", NoArguments, CONTROL, async_commands.single_step, always),
     Command("set_speed", arguments.SetSpeed, CONTROL, async_commands.set_speed),
     Command("record", arguments.Record, CONTROL, async_commands.record),
     Command("bookmark", arguments.AddBookmark, CONTROL, async_commands.add_bookmark),

@@ -31,6 +31,7 @@ export class Connection extends Emitter {
   #retry_ms = RETRY_FIRST_MS;
   #timer = null;
   #received_ms = 0;
+  #challenge = undefined; // the newest of the server; a command that can begin a motion is refused without a fresh one
   #halting = false;
   #probing = false;
   showsRecording = () => false;
@@ -65,6 +66,7 @@ export class Connection extends Emitter {
     socket.onclose = (event) => {
       if (this.#socket !== socket) return;
       this.#socket = null;
+      this.#challenge = undefined;
       for (const { refuse, timer } of this.#pending.values()) {
         clearTimeout(timer);
         refuse(new RequestError("the connection was lost before an answer came", { answered: false }));
@@ -126,7 +128,7 @@ export class Connection extends Emitter {
       return null;
     }
     const id = this.#next++;
-    const text = JSON.stringify({ id, ...message });
+    const text = JSON.stringify({ id, challenge: this.#challenge, ...message });
     if (text.length > MESSAGE_MAX) {
       refuse(new RequestError("the message is too long"));
       return null;
@@ -144,6 +146,7 @@ export class Connection extends Emitter {
       return;
     }
     if (message.type === "answer") this.#resolve(message);
+    else if (message.type === "challenge") this.#challenge = message.number;
     else this.emit(message.type, message);
   }
 

@@ -18,6 +18,7 @@ export class Teleoperation extends Emitter {
     addEventListener("pagehide", () => this.stop("the page was left"));
     document.addEventListener("visibilitychange", () => document.hidden && this.stop("the page was hidden"));
     connection.on("closed", () => this.stop("the connection was lost"));
+    connection.on("refused", (refusal) => this.stop(refusal.message)); // as of a velocity that arrived late
     run.on("mode", ({ mode }) => mode !== "DRIVE" && this.stop(`the mode is ${mode.replace("_", " ")}`));
   }
 

@@ -58,6 +58,8 @@ class StubRun:
     settings: Settings
     log: Any
     asked: list[object] = field(default_factory=list)
+    validity: list[Callable[[], bool]] = field(default_factory=list)
+    """Of each request, as the cycle would ask for it."""
     edits_max: int = 8
     name: str | None = "denning"
 
@@ -69,11 +71,13 @@ class StubRun:
         self.timing_monitor = TimingMonitor(self.stats, ClockSampler().read, callbacks=CALLBACKS)
         self.state = State(Perception(self.settings.ring, self.settings.models, self.settings.perception))
 
-    def request(self, request: Request) -> None:
+    def request(self, request: Request, is_valid: Callable[[], bool] = lambda: True) -> None:
         self.asked.append(request)
+        self.validity.append(is_valid)
 
-    def drive_request(self, drive_request: DriveRequest) -> None:
+    def drive_request(self, drive_request: DriveRequest, is_valid: Callable[[], bool] = lambda: True) -> None:
         self.asked.append(drive_request)
+        self.validity.append(is_valid)
 
     def edit(self, edit: Edit) -> bool:
         if self.edits_max == 0:
@@ -86,10 +90,11 @@ class StubRun:
 
 
 class Page:
-    """A page, reduced to its websocket."""
+    """A page, reduced to its websocket; each of its messages carries a challenge issued at that moment."""
 
-    def __init__(self, socket: aiohttp.ClientWebSocketResponse) -> None:
+    def __init__(self, socket: aiohttp.ClientWebSocketResponse, challenge: Callable[[], int]) -> None:
         self.socket = socket
+        self._challenge = challenge
         self.received: list[dict[str, Any]] = []
         self._id = 0
 
@@ -105,7 +110,7 @@ class Page:
 
     async def send(self, **message: Any) -> int:
         self._id += 1
-        await self.socket.send_str(orjson.dumps({"id": self._id, **message}).decode())
+        await self.socket.send_str(orjson.dumps({"id": self._id, "challenge": self._challenge(), **message}).decode())
         return self._id
 
     async def answer(self, number: int) -> dict[str, Any]:
@@ -158,7 +163,7 @@ class ConsoleCase:
         socket = await self.session.ws_connect(
             self.url.with_path("/ws").with_query(query), headers=headers, max_msg_size=0
         )
-        return Page(socket)
+        return Page(socket, self.console.hub.challenges.issue)
 
     async def page(self) -> Page:
         """Connect a page and wait for its session message."""

@@ -9,10 +9,12 @@ from collections.abc import Mapping, MutableMapping
 import pytest
 import structlog
 
+from behaviors.move_to_goal import Goal
 from drivers.denning.codec import Decoder
 from drivers.denning.frames import Echo
 from drivers.driver import RobotDriver
 from drivers.messages import Flags
+from runtime.cycle.drive_requests import Legs
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.process import Observers, RobotProcess
@@ -38,6 +40,29 @@ class Log:
     def _keep(self, _logger: object, _name: str, event: MutableMapping[str, object]) -> Mapping[str, object]:
         self.events.append(dict(event))
         raise structlog.DropEvent
+
+
+@pytest.mark.promise("P18")
+def test_a_request_that_is_void_when_the_cycle_takes_it_does_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of a page that has left, or of one that asked before a HALT."""
+    modes: set[Mode] = set()
+    valid = False
+
+    def on_cycle(record: CycleRecord, state: State, _stats: CycleStats, _driver: RobotDriver) -> None:
+        nonlocal valid
+        modes.add(state.mode.mode)
+        if record.cycle == 40:
+            assert Mode.DRIVE not in modes
+            assert state.drive_request == Legs()
+            valid = True
+        process.request(Request.ARM, lambda: valid)
+        process.drive_request(Goal(1.0, 0.0), lambda: valid)
+
+    with in_virtual_time(monkeypatch, "perception.method=paper") as (loop, settings, _robot, _links):
+        process = RobotProcess(settings, Log().log, Observers(on_cycle), loop.time)
+        loop.run_until_complete(process.run(arm=False, seconds=4.0))
+    assert Mode.DRIVE in modes
+    assert process.state.drive_request != Legs()
 
 
 def test_six_drums(monkeypatch: pytest.MonkeyPatch) -> None:

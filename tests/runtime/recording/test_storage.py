@@ -1,78 +1,189 @@
-"""Where recordings are written: names of parts, the limits of a folder, and the files that it offers."""
+"""Where recordings are written: what a run may remove is bounded, named before, and neither pinned nor bookmarked."""
 
 from __future__ import annotations
 
 import os
+import random
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from config.load import load_settings
 from config.settings import RecordingConfig
+from runtime.recording.recorder import Recorder
 from runtime.recording.storage import (
     MEGABYTE,
     RotatingFolder,
     SingleFile,
     find_recording,
+    has_bookmark,
     list_recordings,
+    pin_of,
     recordings_folder,
 )
+from tests.recorded import hall, until
 
-CONFIG = RecordingConfig(cap_mb=1.0, keep=3)
-
-
-def write(path: Path, size: int, modified_s: int) -> Path:
-    path.write_bytes(bytes(size))
-    os.utime(path, (modified_s, modified_s))
-    return path
+RUN = "20300101T000000Z-7"
 
 
-def names(folder: Path) -> list[str]:
-    return sorted(path.name for path in folder.iterdir())
+def config(*, cap_bytes: int = MEGABYTE, keep: int = 100) -> RecordingConfig:
+    settings = load_settings("hallway", [f"recording.keep={keep}"]).recording
+    return settings.model_copy(update={"cap_mb": cap_bytes / MEGABYTE})
+
+
+def older(folder: Path, *sizes: int) -> list[Path]:
+    """Write recordings of older runs, the oldest first."""
+    files = [folder / f"20200101T{k:06d}Z-1-001.mcap" for k in range(len(sizes))]
+    for k, (path, size) in enumerate(zip(files, sizes, strict=True)):
+        path.write_bytes(b"x" * size)
+        os.utime(path, (k, k))
+    return files
+
+
+def write(target: RotatingFolder, part: int, size: int) -> list[str | None]:
+    """Write a file as the recorder does, with a check at its opening and at its end; return the notices."""
+    path = target.path(part)
+    path.touch()
+    first = target.enforce_limits(path)
+    path.write_bytes(b"y" * size)
+    return [first, target.enforce_limits(path)]
+
+
+@pytest.mark.promise("P20")
+def test_switching_a_hundred_times_removes_no_more_than_was_written(
+    tmp_path: Path, measured: Callable[[str], None]
+) -> None:
+    files = older(tmp_path, *[10_000] * 90)
+    target = RotatingFolder(tmp_path, RUN, config(cap_bytes=900_000, keep=90))
+    for part in range(1, 101):
+        write(target, part, 110)
+    assert sum(not path.exists() for path in files) == 1, "11,000 bytes were written"
+    measured("100 parts of 110 bytes in a full folder of 90 recordings: 1 of 10,000 bytes removed")
+
+
+@pytest.mark.promise("P20")
+def test_any_run_removes_at_most_its_own_bytes_and_only_what_was_named(tmp_path: Path) -> None:
+    rng = random.Random(5)
+    for k in range(20):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        sizes = [rng.randrange(1, 40_000) for _ in range(30)]
+        files = older(folder, *sizes)
+        pinned = rng.sample(files, 5)
+        for path in pinned:
+            pin_of(path).touch()
+        keep = rng.choice((1, 10, 100))
+        target = RotatingFolder(folder, RUN, config(cap_bytes=rng.choice((1_000, 300_000, 10**6)), keep=keep))
+        named, written = "", 0
+        for part in range(1, 41):
+            before = {path for path in files if path.exists()}
+            size = rng.randrange(0, 60_000)
+            written += size
+            notices = write(target, part, size)
+            gone = before - {path for path in files if path.exists()}
+            named += "".join(str(notice) for notice in notices)
+            assert all(path.name in named for path in gone), "a person was told before"
+            removed = sum(size for path, size in zip(files, sizes, strict=True) if not path.exists())
+            assert removed <= written
+        assert all(path.exists() for path in pinned)
+
+
+def test_the_folder_stays_within_its_limits_while_it_is_written(tmp_path: Path) -> None:
+    """Beyond them it is by the largest file at most, once the run has written as much; its own oldest go last."""
+    files = older(tmp_path, *[50_000] * 6)
+    target = RotatingFolder(tmp_path, RUN, config(cap_bytes=300_000))
+    for part in range(1, 31):
+        write(target, part, 50_000)
+        write(target, part, 50_000)
+        assert sum(path.stat().st_size for path in tmp_path.iterdir()) <= 400_000
+    assert not any(path.exists() for path in files)
+    assert target.path(30).exists()
+
+
+def test_a_person_is_told_which_goes_next_and_how_to_keep_it(tmp_path: Path) -> None:
+    first, second = older(tmp_path, 400_000, 400_000)
+    target = RotatingFolder(tmp_path, RUN, config())
+    current = target.path(1)
+    current.write_bytes(b"y" * 50_000)
+    assert target.enforce_limits(current) is None, "a tenth is free"
+    current.write_bytes(b"y" * 450_000)
+    notice = target.enforce_limits(current)
+    assert notice is not None
+    assert f"{first.name} goes next" in notice
+    assert f"create {first.name}.keep beside it" in notice
+    assert first.exists()
+    (tmp_path / f"{first.name}.keep").touch()
+    assert target.enforce_limits(current) is None, "a pinned file does not count"
+    assert first.exists()
+    assert second.exists()
+
+
+@pytest.mark.promise("P20")
+def test_a_bookmark_pins_its_file(tmp_path: Path) -> None:
+    settings = hall("perception.method=paper")
+    with Recorder(settings, RotatingFolder(tmp_path, RUN, settings.recording), clock=lambda: 0.0) as recorder:
+        until(lambda: recorder.status.is_writing, "a file")
+        assert recorder.bookmark("here") is None
+    path = Path(str(recorder.status.file))
+    assert pin_of(path).exists()
+    pin_of(path).unlink()
+    assert has_bookmark(path), "by its index, as in recordings of older versions"
+    assert pin_of(path).exists()
+    another = RotatingFolder(tmp_path, "20310101T000000Z-8", config(cap_bytes=1000, keep=1))
+    for part in range(1, 5):
+        write(another, part, 10**6)
+    assert path.exists()
+
+
+@pytest.mark.promise("P20")
+def test_what_is_switched_off_without_content_is_removed(tmp_path: Path) -> None:
+    settings = hall("perception.method=paper")
+    with Recorder(settings, RotatingFolder(tmp_path, RUN, settings.recording), clock=lambda: 0.0) as recorder:
+        until(lambda: recorder.status.is_writing, "a file")
+        for _ in range(100):
+            recorder.set_enabled(on=False)
+            recorder.set_enabled(on=True)
+        recorder.set_enabled(on=False)
+    assert (recorder.status.file, recorder.status.files, recorder.status.bytes) == (None, 0, 0)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_only_the_file_that_the_user_named_is_replaced(tmp_path: Path) -> None:
+    target = SingleFile(tmp_path / "run.mcap")
+    assert target.path(1) == tmp_path / "run.mcap"
+    (tmp_path / "run.mcap").touch()
+    (tmp_path / "run-2.mcap").touch()
+    assert target.path(1) == tmp_path / "run.mcap"
+    assert target.path(2) == tmp_path / "run-3.mcap"
+
+
+def test_what_is_no_recording_has_no_bookmark(tmp_path: Path) -> None:
+    for content in (b"", b"x" * 1000, b"\x89MCAP0\r\n" * 40):
+        (tmp_path / "x.mcap").write_bytes(content)
+        assert not has_bookmark(tmp_path / "x.mcap")
+    assert not has_bookmark(tmp_path / "none.mcap")
 
 
 def test_a_file_of_the_user_is_never_split_or_deleted(tmp_path: Path) -> None:
     target = SingleFile(tmp_path / "run.mcap")
     assert [target.path(part).name for part in (1, 2, 11)] == ["run.mcap", "run-2.mcap", "run-11.mcap"]
     assert not target.is_part_full(10**15)
-    old = write(tmp_path / "old.mcap", 10, 1)
+    old = tmp_path / "old.mcap"
+    old.touch()
     target.enforce_limits(target.path(1))
     assert old.exists()
 
 
-def test_a_new_part_makes_room_by_deleting_the_oldest(tmp_path: Path) -> None:
-    folder = tmp_path / "runs"
-    target = RotatingFolder(folder, "run", CONFIG)
-    assert target.path(1) == folder / "run-001.mcap"
-    for k in range(5):
-        write(folder / f"{k}.mcap", 10, k)
-    (folder / "notes.txt").write_text("not a recording")
-    assert target.path(2).name == "run-002.mcap"
-    assert names(folder) == ["3.mcap", "4.mcap", "notes.txt"], "room for one more"
-
-
-def test_the_folder_stays_below_its_size_without_the_current_file(tmp_path: Path) -> None:
-    target = RotatingFolder(tmp_path, "run", CONFIG)
-    write(tmp_path / "old.mcap", 10, 1)
-    current = write(tmp_path / "run-001.mcap", 2 * MEGABYTE, 2)
-    new = write(tmp_path / "other.mcap", 10, 3)
-    target.enforce_limits(current)
-    assert current.exists()
-    assert names(tmp_path) == ["run-001.mcap"]
-    assert not new.exists()
-
-
-def test_within_the_limits_nothing_is_deleted(tmp_path: Path) -> None:
-    target = RotatingFolder(tmp_path, "run", CONFIG)
-    for k in range(3):
-        write(tmp_path / f"{k}.mcap", MEGABYTE // 3, k)
-    target.enforce_limits(tmp_path / "2.mcap")
-    assert len(names(tmp_path)) == 3
-
-
 def test_a_part_ends_at_its_share_of_the_limit(tmp_path: Path) -> None:
-    target = RotatingFolder(tmp_path, "run", CONFIG)
+    target = RotatingFolder(tmp_path, RUN, config())
     assert target.is_part_full(250_001)
     assert not target.is_part_full(250_000)
+
+
+def stored(path: Path, size: int, modified_s: int) -> None:
+    path.write_bytes(bytes(size))
+    os.utime(path, (modified_s, modified_s))
 
 
 def test_only_files_of_the_folder_are_recordings(tmp_path: Path) -> None:
@@ -80,9 +191,9 @@ def test_only_files_of_the_folder_are_recordings(tmp_path: Path) -> None:
     (tmp_path / "folder.mcap").mkdir()
     (tmp_path / "log.jsonl").touch()
     assert list_recordings(tmp_path) == []
-    write(tmp_path / "old.mcap", 3, 100)
-    write(tmp_path / "b.mcap", 0, 200)
-    write(tmp_path / "a.mcap", 7, 200)
+    stored(tmp_path / "old.mcap", 3, 100)
+    stored(tmp_path / "b.mcap", 0, 200)
+    stored(tmp_path / "a.mcap", 7, 200)
     assert list_recordings(tmp_path) == [("a.mcap", 7, 200.0), ("b.mcap", 0, 200.0), ("old.mcap", 3, 100.0)]
     assert find_recording(tmp_path, "old.mcap") == tmp_path / "old.mcap"
     for name in ("", "none.mcap", "folder.mcap", "../old.mcap", str(tmp_path / "old.mcap"), "log.jsonl"):
