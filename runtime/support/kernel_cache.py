@@ -63,7 +63,9 @@ def cache_folder() -> Path:
     cache; where that cannot be written or others can write into it, it is a new folder for this process and its
     children, which is removed at the end.
     """
-    folder = user_cache_path("echolocate") / "kernels" / kernels_key()
+    # Numba keeps the kernels of each place of the sources apart, so the marks of compiled parts must be, too.
+    place = hashlib.sha256(os.fsencode(Path(__file__))).hexdigest()[:8]
+    folder = user_cache_path("echolocate") / "kernels" / f"{kernels_key()}-{place}"
     try:
         folder.mkdir(mode=PRIVATE, parents=True, exist_ok=True)
         if all(_is_ours(place) for place in (folder, *folder.parents[:2])):

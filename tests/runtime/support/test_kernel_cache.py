@@ -70,6 +70,15 @@ def test_a_changed_byte_of_a_source_changes_the_folder(home: Path, monkeypatch: 
     assert kernels.cache_folder() not in {first, second}
 
 
+def test_two_installations_of_the_same_sources_do_not_share_marks(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Numba files kernels by the path of their source: what one has compiled, the other has not."""
+    first = kernels.cache_folder()
+    monkeypatch.setattr(kernels, "__file__", "/opt/echolocate/runtime/support/kernel_cache.py")
+    assert kernels.cache_folder() != first
+
+
 def test_kernels_with_checked_bounds_are_kept_apart(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Numba's own key does not hold this setting: it would load kernels without checks."""
     monkeypatch.delenv("NUMBA_BOUNDSCHECK", raising=False)
