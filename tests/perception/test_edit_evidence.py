@@ -131,7 +131,7 @@ def test_evidence_for_an_object_that_is_not_a_model(reached_drums: Perception) -
     assert evidence.model in {"post", "barrel", "edge", "inside corner"}
     refused = seen.edit(ConfirmObject(number))
     assert refused is not None
-    assert "none of the models" in refused
+    assert "matches no model" in refused
 
 
 # Snapshots and models.

@@ -19,26 +19,20 @@ from runtime.timing.refinement_budget import QuantumBudget
 SETTINGS = long_hall_settings(load_settings("irregular"))
 
 
-@pytest.fixture(scope="module")
-def sweep() -> dict[float, BudgetRow]:
-    """Return the results of a drive under each of several budgets in counted quanta."""
-    return {most: drive(SETTINGS, most, partial(QuantumBudget, most), (0,)) for most in (0.25, 1, 2, 50)}
-
-
 @pytest.mark.compiled
-def test_smaller_budgets_report_later(sweep: dict[float, BudgetRow]) -> None:
-    ways = [sweep[most]["way_m"] or 0.0 for most in (0.25, 1, 2, 50)]
+def test_smaller_budgets_report_later_and_end_no_worse() -> None:
+    """With budgets in counted quanta, one drive each."""
+    sweep: dict[float, BudgetRow] = {
+        most: drive(SETTINGS, most, partial(QuantumBudget, most), (0,)) for most in (0.25, 1, 50)
+    }
+    ways = [row["way_m"] or 0.0 for row in sweep.values()]
     assert ways[0] > ways[1], "a quarter of a quantum per cycle delays the reports"
     # The order of two objects can make one of them a reading earlier; the robot moves 15 mm per cycle.
     assert all(smaller >= larger - 0.03 for smaller, larger in pairwise(ways)), ways
-    cut = [sweep[most]["cut_short"] for most in (0.25, 1, 2, 50)]
+    cut = [row["cut_short"] for row in sweep.values()]
     assert cut == sorted(cut, reverse=True)
     assert cut[0] > 0.9
     assert cut[-1] == 0.0
-
-
-@pytest.mark.compiled
-def test_smaller_budgets_end_no_worse(sweep: dict[float, BudgetRow]) -> None:
     best = sweep[50]
     assert best["mean_error"] is not None
     for most, row in sweep.items():

@@ -70,9 +70,8 @@ def test_a_changed_byte_of_a_source_changes_the_folder(home: Path, monkeypatch: 
     assert kernels.cache_folder() not in {first, second}
 
 
-def test_two_installations_of_the_same_sources_do_not_share_marks(
-    home: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("home")
+def test_two_installations_of_the_same_sources_do_not_share_marks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Numba files kernels by the path of their source: what one has compiled, the other has not."""
     first = kernels.cache_folder()
     monkeypatch.setattr(kernels, "__file__", "/opt/echolocate/runtime/support/kernel_cache.py")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import shutil
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from runtime.console.clients.client import Frame
 from runtime.console.frames.frame_encoder import EncodedFrame
 from runtime.console.playback.replay_client import ReplayClient, ReplayError, make_report
 from runtime.recording.storage import find_recording, list_recordings
-from runtime.support.child_process import ECHOLOCATE, NICENESS, kill_child, start_child
+from runtime.support.child_process import ECHOLOCATE, kill_child, start_child
 from tests.hil.machine import TIMEOUT_S
 from tests.recorded import hall, record
 
@@ -35,8 +35,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def _patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Bear a busy machine: only what hangs takes so long to open."""
+def _at_usual_priority(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Start workers at the priority of the tests: at theirs they get no time beside other tests."""
+
+    async def start(
+        module: str, words: Sequence[str], *, pipes: bool, low_priority: bool
+    ) -> asyncio.subprocess.Process:
+        assert low_priority
+        return await start_child(module, words, pipes=pipes)
+
+    monkeypatch.setattr("runtime.console.playback.replay_client.start_child", start)
     monkeypatch.setattr("runtime.console.playback.replay_client.OPEN_MAX_S", TIMEOUT_S)
 
 
@@ -136,7 +144,6 @@ async def test_workers_are_limited_their_death_is_reported_and_none_outlives_the
         processes = [replay._process for replay in client._open.values()]
         pids = [process.pid for process in processes]
         assert len(set(pids)) == 2
-        assert all(os.getpriority(os.PRIO_PROCESS, pid) >= NICENESS for pid in pids)
         with pytest.raises(ReplayError, match="open already"):
             await client.open(Page(), "hall.mcap")
         replay = client._open[id(page)]
