@@ -24,7 +24,7 @@ PIN_SUFFIX: Final = ".keep"
 """An empty file with this after a recording's name pins it."""
 PART_DIGITS: Final = 3
 WARN_SHARE: Final = 0.9
-"""Share of a limit at which a person is told what goes next."""
+"""Share of a limit at which a person is warned of what goes next."""
 PART_SHARE: Final = 0.25
 """Share of the folder's size limit that one file may take: the folder can then be kept within its limit."""
 

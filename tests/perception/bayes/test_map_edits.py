@@ -43,7 +43,7 @@ def edit(memory: Memory, change: Edit, pins: Pins | None = None) -> str | None:
     return edit_memory(memory, settings, pins or Pins(), ["semicircle"], ["box"], change)
 
 
-def test_the_last_places_of_a_bucket_cannot_be_pinned_and_the_user_is_told() -> None:
+def test_the_last_places_of_a_bucket_cannot_be_pinned_and_the_user_is_warned() -> None:
     memory, pins = Memory(4, TRACKS), Pins()
     for number in range(1, 9):
         add_segment(memory, np.array([0.1, 0.1, 1.0, 0.0]), number)

@@ -42,7 +42,7 @@ def older(folder: Path, *sizes: int) -> list[Path]:
 
 
 def write(target: RotatingFolder, part: int, size: int) -> list[str | None]:
-    """Write a file as the recorder does, with a check at its opening and at its end; return the notices."""
+    """Write a file as the recorder does, with a check at its opening and at its end; return the warnings."""
     path = target.path(part)
     path.touch()
     first = target.enforce_limits(path)
@@ -80,10 +80,10 @@ def test_any_run_removes_at_most_its_own_bytes_and_only_what_was_named(tmp_path:
             before = {path for path in files if path.exists()}
             size = rng.randrange(0, 60_000)
             written += size
-            notices = write(target, part, size)
+            warnings = write(target, part, size)
             gone = before - {path for path in files if path.exists()}
-            named += "".join(str(notice) for notice in notices)
-            assert all(path.name in named for path in gone), "a person was told before"
+            named += "".join(str(warning) for warning in warnings)
+            assert all(path.name in named for path in gone), "a person was warned before"
             removed = sum(size for path, size in zip(files, sizes, strict=True) if not path.exists())
             assert removed <= written
         assert all(path.exists() for path in pinned)
@@ -101,7 +101,7 @@ def test_the_folder_stays_within_its_limits_while_it_is_written(tmp_path: Path) 
     assert target.path(30).exists()
 
 
-def test_a_person_is_told_which_goes_next_and_how_to_keep_it(tmp_path: Path) -> None:
+def test_a_person_is_warned_which_goes_next_and_how_to_keep_it(tmp_path: Path) -> None:
     first, second = older(tmp_path, 400_000, 400_000)
     target = RotatingFolder(tmp_path, RUN, config())
     current = target.path(1)
