@@ -32,7 +32,7 @@ class Limits:
     """Answers and lines of the log that may wait for a client."""
     queue_bytes: int = 1 << 20
     command_age_max_s: float = 1.0
-    """A command that can begin a motion is refused if it arrives later: the operator decided on what was shown before."""
+    """A command that can begin a motion is refused if it arrives later: what it was decided on is out of date."""
 
 
 class TokenBucket:
