@@ -1,21 +1,16 @@
-"""The scenes are what they are said to be: places, counts, chance, and noiseless ranges by the closed form."""
+"""Tests of the scenes: places, counts, chance, and noiseless ranges by the closed form."""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import get_args
 
 import numpy as np
-import orjson
 import pytest
 
-from config.load import load_model, load_robot
-from config.world import BoxConfig, WorldConfig
+from config.load import load_robot
+from config.world import WorldConfig
 from drivers.messages import Firing, Floats
-from perception.pipeline import DetectedObject
-from runtime.cli.app import run_command
-from runtime.simulation.open_loop import angle_error, match_objects
 from runtime.simulation.scene_names import SceneName
 from runtime.simulation.scenes import Hall, halls, readings
 
@@ -151,61 +146,6 @@ def test_walls_answer_from_the_side_and_from_the_end() -> None:
         assert firing.ranges_m[0] / FT == pytest.approx(17.0 - x - 1.25, abs=0.05 + 1e-9)
         if x > 9.5 or x < -1.5:
             assert firing.ranges_m[[6, 18]] / FT == pytest.approx([6.75, 6.75], abs=0.05 + 1e-9)
-
-
-def seen(model: str, x_ft: float, y_ft: float, theta: float = 0.0) -> DetectedObject:
-    return DetectedObject(model, x_ft * FT, y_ft * FT, theta, sigma=0.01, support=9, score=0.9)
-
-
-def test_a_drum_is_no_box_and_a_box_no_drum() -> None:
-    models = [load_model(name) for name in ("semicircle", "box")]
-    world = halls("boxes_45")[0].world
-    there = [seen("box", 1.1, 4.0, math.radians(139.0)), seen("semicircle", 4.0, 4.0), seen("wall", 0.0, 0.0)]
-    drums, boxes, false = match_objects(world, there, models)
-    assert drums == []
-    assert false == 1
-    assert [row["estimate"] is None for row in boxes] == [False] + [True] * 5
-    assert boxes[0]["error"] == pytest.approx(0.1 * FT)
-    assert boxes[0]["angle_error"] == pytest.approx(math.radians(4.0))
-
-    drums, boxes, false = match_objects(halls("clean")[0].world, there, models)
-    assert boxes == []
-    assert false == 1
-    assert sum(row["estimate"] is not None for row in drums) == 1
-
-
-def test_two_on_one_drum_are_one_and_a_false_one() -> None:
-    twice = [seen("semicircle", 1.2, 4.0), seen("semicircle", 1.0, 4.1), seen("semicircle", 1.0, 5.2)]
-    drums, _, false = match_objects(halls("clean")[0].world, twice, [load_model("semicircle")])
-    assert drums[0]["error"] == pytest.approx(0.1 * FT)
-    assert false == 2
-
-
-@pytest.mark.parametrize(("depth_m", "want_deg"), [(1.0, 5.0), (0.5, 85.0)])
-def test_a_square_looks_alike_after_a_quarter_turn_and_an_oblong_after_half(depth_m: float, want_deg: float) -> None:
-    box = BoxConfig(x_m=0.0, y_m=0.0, width_m=1.0, depth_m=depth_m, angle_deg=10.0)
-    assert math.degrees(angle_error(box, math.radians(10.0 + 85.0))) == pytest.approx(want_deg)
-    assert angle_error(box, math.radians(190.0)) == pytest.approx(0.0, abs=1e-12)
-
-
-def test_the_command_writes_the_contracts_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "clean.json"
-    assert run_command(["experiment", "hallway", "--scene", "clean", "--method", "paper", "--json", str(path)]) == 0
-    outcome = orjson.loads(path.read_bytes())
-    assert {"drums", "false", "mean_error", "max_error", "times_real_time"} <= outcome.keys()
-    assert [row["truth"] for row in outcome["drums"]] == [[d.x_m, d.y_m] for d in halls("clean")[0].world.drum]
-    assert outcome["false"] == 0
-    assert all(row["error"] < 0.25 * FT for row in outcome["drums"])
-    assert outcome["max_error"] == max(row["error"] for row in outcome["drums"])
-    assert "6 of 6 drums found, 0 false" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    "wrong", [["irregular", "--scene", "clean"], ["hallway", "--scene", "clean", "--world", "hallway"]], ids=" ".join
-)
-def test_a_scene_in_another_hall_is_refused(wrong: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert run_command(["experiment", *wrong]) == 2
-    assert "--scene" in capsys.readouterr().err
 
 
 def test_worlds_of_scenes_survive_a_world_file() -> None:

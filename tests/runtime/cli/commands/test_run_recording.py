@@ -1,4 +1,4 @@
-"""The recording of a run when the disk fails: nothing waits, memory is bounded, and losses are reported."""
+"""Tests of the recording of a run when the disk fails: nothing waits, memory is bounded, losses are reported."""
 
 from __future__ import annotations
 
@@ -31,9 +31,7 @@ def stuck(path: Path) -> int:
     return os.open(path, os.O_RDONLY | os.O_NONBLOCK)
 
 
-def test_a_ring_log_on_a_disk_that_stands_still_fills_no_memory(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_ring_log_on_a_blocked_disk_fills_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ringlog_writer, "QUEUE_MAX", 64)
     path, read = tmp_path / "log.csv", bytearray()
     out = stuck(path)
@@ -44,7 +42,7 @@ def test_a_ring_log_on_a_disk_that_stands_still_fills_no_memory(
         assert len(writer._thread._queue) <= 64
         assert writer.status.dropped > 0
         assert "faster than the disk takes them" in str(writer.status.last_error)
-        assert writer.probe() is None, "a slow disk is no part's end"
+        assert writer.probe() is None, "a slow disk does not end a part"
         os.set_blocking(out, True)
         reader = threading.Thread(target=lambda: read.extend(b"".join(iter(lambda: os.read(out, 65536), b""))))
         reader.start()
@@ -63,7 +61,7 @@ def test_a_full_disk_under_a_ring_log_is_reported_and_counted(tmp_path: Path) ->
         for number in range(2000):
             put(firing(number))
         until(lambda: recording.summary_row is not None and recording.summary_row["dropped"] > 0, "trouble")
-        assert recording.probe() is None, "the drive goes on"
+        assert recording.probe() is None, "the drive continues"
     with pytest.raises(
         UserError, match=r"--record: the ring log is incomplete: .*log\.csv.* No space left"
     ) as caught:

@@ -1,4 +1,4 @@
-"""The run's time under keys of the terminal."""
+"""Tests of the keys that control the time of a run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from runtime.timing.time_control import REAL_ROBOT, NoTimeControl
 
 
 class Control:
-    """Keeps what is asked for, and takes a while for each."""
+    """Notes each request, which takes a turn of the loop."""
 
     def __init__(self) -> None:
         self.is_paused = False
@@ -55,7 +55,7 @@ async def test_keys_control_time_one_after_the_other() -> None:
     assert control.asked == ["pause", "step", "step", "resume", "pause", "resume"]
 
 
-async def test_what_cannot_be_done_is_reported() -> None:
+async def test_a_refusal_is_logged() -> None:
     with capture_logs() as lines:
         keys = TimeKeys(NoTimeControl(), get_logger())
         for key in ("p", "s"):

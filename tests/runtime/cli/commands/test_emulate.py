@@ -1,0 +1,63 @@
+"""Tests of `echolocate emulate`: what it gives to the emulator, and when it says that it is ready."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from config.errors import DONE, WRONG_CALL
+from drivers.emulator.faults import Reboot
+from runtime.cli.app import run_command
+from runtime.cli.commands.emulate import PIPES
+
+FAULTS = "[[fault]]\nat_s = 1.0\nkind = 'reboot'\nduration_s = 0.5\n"
+
+
+@pytest.fixture
+def served(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+    """Put a stub in place of the emulator; return what it was given."""
+    calls: list[dict[str, Any]] = []
+
+    async def serve(settings: object, world: object, *, ready: Any, **options: Any) -> None:
+        calls.append({"settings": settings, "world": world, **options})
+        ready("/dev/pts/9")
+
+    monkeypatch.setattr("drivers.emulator.pty_transport.serve", serve)
+    return calls
+
+
+def test_every_option_reaches_the_emulator(
+    served: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "faults.toml").write_text(FAULTS, "utf-8")
+    words = [
+        "--link", "robot", "--faults", str(tmp_path / "faults.toml"), "--seed", "7", "--trace", "t.csv", "--latency",
+        "l.csv", "--clock", "4.5", "--control", "--end-with-parent", "--set", "cycle.rate_hz=10",
+    ]  # fmt: skip
+    assert run_command(["emulate", *words]) == DONE
+    assert capsys.readouterr().out == "ready on /dev/pts/9\n"
+    (call,) = served
+    assert call["settings"].cycle.rate_hz == 10.0
+    assert call["world"] == call["settings"].world
+    assert [type(fault) for fault in call["faults"]] == [Reboot]
+    options = ("link_path", "seed", "trace_path", "latency_path", "clock_start_us", "exit_with_parent", "control")
+    assert [call[name] for name in options] == ["robot", 7, "t.csv", "l.csv", 4_500_000, True, PIPES]
+
+
+def test_by_default_nothing_is_written_and_no_fault_is_planned(served: list[dict[str, Any]]) -> None:
+    assert run_command(["emulate", "--world", "irregular"]) == DONE
+    (call,) = served
+    assert len(call["world"].drum) == 8
+    options = ("link_path", "faults", "seed", "trace_path", "latency_path", "clock_start_us", "control")
+    assert [call[name] for name in options] == [None, (), 0, None, None, 0, None]
+
+
+@pytest.mark.parametrize("clock", ["-1", "4294.967296", "nan"])
+def test_the_robot_s_clock_has_32_bits_of_microseconds(
+    served: list[dict[str, Any]], clock: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command(["emulate", "--clock", clock]) == WRONG_CALL
+    assert "--clock" in capsys.readouterr().err
+    assert served == []

@@ -1,0 +1,77 @@
+"""Tests of `echolocate replay` of a recording: verification, spans, speed, and comparison with other settings."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from config.errors import DONE, WRONG_CALL, UserError
+from runtime.analysis.comparison import RunOutcome
+from runtime.cli.app import run_command
+from runtime.cli.commands import replay_recording
+from runtime.cli.commands.replay_recording import Span, errors_line
+
+
+@pytest.mark.parametrize(
+    ("span", "option"),
+    [
+        (Span(-1.0, None, None), "--from"), (Span(math.nan, None, None), "--from"),
+        (Span(0.0, math.inf, None), "--to"),
+        (Span(2.0, 2.0, None), "--to"), (Span(0.0, None, 0.0), "--speed"), (Span(0.0, None, -2.0), "--speed"),
+    ],
+)  # fmt: skip
+def test_an_invalid_span_is_refused(span: Span, option: str) -> None:
+    with pytest.raises(UserError, match=f"^{option} ") as caught:
+        span.validate()
+    assert caught.value.exit_code == WRONG_CALL
+    Span(1.0, 2.0, 0.5).validate()
+
+
+def test_a_verified_replay_has_no_differences(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    summary = tmp_path / "summary.json"
+    assert run_command(["replay", str(run), "--verify", "--json", str(summary)]) == DONE
+    read = json.loads(summary.read_bytes())
+    assert (read["cycles"], read["verify"]["differences"], read["verify"]["first"]) == (240, 0, None)
+    assert len(read["objects"]) >= 3
+    assert "240 cycles from cycle 1 on, 0 differences, " in capsys.readouterr().out
+
+
+def test_a_span_at_a_speed_is_paced(
+    run: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The sleeps add up to the span at that speed. It begins at the keyframe before, at most 2 s earlier."""
+    host_s = 0.0
+
+    def sleep(seconds: float) -> None:
+        nonlocal host_s
+        assert seconds > 0.0
+        host_s += seconds
+
+    class Clock:
+        monotonic = staticmethod(lambda: host_s)
+
+    Clock.sleep = staticmethod(sleep)  # type: ignore[attr-defined]
+    monkeypatch.setattr(replay_recording, "time", Clock)
+    assert run_command(["replay", str(run), "--from", "4", "--to", "8", "--speed", "2"]) == DONE
+    assert 1.9 < host_s < 3.1
+    assert ", 0 differences, " in capsys.readouterr().out
+
+
+def test_other_settings_are_compared(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(["replay", str(run), "--set", "perception.method=paper"]) == DONE
+    out = capsys.readouterr().out
+    assert out.index("as it was") < out.index("with the other settings")
+    assert out.count("of 6 drums") == 2
+    assert out.splitlines()[-1] == "240 cycles; 0 with another command"
+    assert run_command(["replay", str(run), "--verify", "--set", "perception.method=paper"]) == WRONG_CALL
+    assert "--verify compares with the recorded settings" in capsys.readouterr().err
+
+
+def test_errors_in_one_line() -> None:
+    run = RunOutcome(errors_m=[0.3048, None, 0.6096], false=1)
+    assert errors_line(run, "ft") == "2 of 3 drums, 1 false; mean error 1.5000 ft, worst 2.0000 ft"
+    assert errors_line(RunOutcome(errors_m=[None]), "m") == "0 of 1 drums, 0 false; mean error none m, worst none m"
+    assert errors_line(RunOutcome(), "m") == "0 objects"

@@ -1,0 +1,41 @@
+"""Tests of the command as a program of its own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from config.errors import FAILED, WRONG_CALL
+from tests.runtime.cli.user_errors import error_lines
+
+ROOT = Path(__file__).parents[3]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
+WITHOUT_MATPLOTLIB = """
+import sys, runtime.cycle.process, runtime.recording.recorder
+from runtime.cli.app import main
+assert "matplotlib" not in sys.modules
+main(["check", "hallway"])
+"""
+
+
+def test_a_wrong_call_as_a_program() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "runtime.cli", "check", "halway"], env=ENVIRONMENT, text=True, capture_output=True,
+        check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (WRONG_CALL, "")
+    assert len(error_lines(done.stderr)) == 1
+
+
+def test_a_closed_pipe_is_no_traceback_and_a_run_does_not_load_matplotlib() -> None:
+    """As in `echolocate check hallway | true`. Matplotlib takes half a second to load, and no cycle uses it."""
+    read, write = os.pipe()
+    os.close(read)
+    with os.fdopen(write, "w") as out:
+        done = subprocess.run(
+            [sys.executable, "-c", WITHOUT_MATPLOTLIB], env=ENVIRONMENT, stdout=out, stderr=subprocess.PIPE,
+            text=True, check=False,
+        )  # fmt: skip
+    assert (done.returncode, done.stderr) == (FAILED, "")

@@ -1,0 +1,86 @@
+"""Tests of the commands `run`, `emulate`, `check` and `service`: what a user can get wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from config.errors import FAILED, WRONG_CALL
+from tests.runtime.cli.user_errors import Calls, assert_refused, call_name
+
+pytestmark = pytest.mark.usefixtures("bad_files")
+
+WRONG: Calls = [
+    (["run", "--frobnicate"], "--frobnicate"),
+    (["run", "hallway", "irregular"], "irregular"),
+    (["run", "--port"], "--port"),
+    (["run", "--port", "nowhere"], "nowhere"),
+    (["run", "--port", "/dev/nowhere", "--headless"], "/dev/nowhere"),
+    (["run", "--port", "regular", "--headless"], "regular"),
+    (["run", "--port", "."], "."),
+    (["run", "--port", ""], "port"),
+    (["run", "--seconds", "0"], "--seconds 0"),
+    (["run", "--seconds", "-1"], "--seconds"),
+    (["run", "--seconds", "nan"], "--seconds nan"),
+    (["run", "--seconds", "soon"], "soon"),
+    (["run", "--seed", "x"], "--seed"),
+    (["run", "--units", "yards"], "yards"),
+    (["run", "--set"], "--set"),
+    (["run", "--set", "ring"], "ring"),
+    (["run", "--set", "ring.firing=octants"], "octants"),
+    (["run", "--set", "cycle.rate_hz=0"], "cycle.rate_hz"),
+    (["run", "--set", "cycle.rate=20"], "cycle.rate"),
+    (["run", "--set", "ring.firing.step_period_s=0.001"], "step_period_s"),
+    (["run", "--set", "log.file='regular/run.jsonl'", "--headless"], "regular/run.jsonl"),
+    (["run", "halway"], "halway"),
+    (["run", "./halway.toml"], "halway.toml"),
+    (["run", "broken.toml"], "broken.toml: line 3"),
+    (["run", "--world", "halway"], "halway"),
+    (["run", "--world", "./nowhere.toml"], "nowhere.toml"),
+    (["run", "--world", "broken.toml"], "broken.toml: line 3"),
+    (["run", "--world", "drum.toml"], "drum.0.y_m"),
+    (["run", "--world", "latin.toml"], "latin.toml"),
+    (["run", "--world", "."], "."),
+    (["run", "--headless", "--seconds", "1", "--faults", "fault_broken.toml"], "fault_broken.toml: line 1"),
+    (["run", "--headless", "--seed", "-1"], "-1"),
+    (["emulate", "--faults", "fault.toml"], "earthquake"),
+    (["emulate", "--faults", "fault_broken.toml"], "fault_broken.toml: line 1"),
+    (["emulate", "--faults", "nowhere.toml"], "nowhere.toml"),
+    (["emulate", "--world", "halway"], "halway"),
+    (["emulate", "--robot", "dening"], "dening"),
+    (["emulate", "--config", "halway"], "halway"),
+    (["emulate", "--seed", "1.5"], "1.5"),
+    (["emulate", "--seed", "-1"], "-1"),
+    (["check"], "CONFIG"),
+    (["check", "halway"], "halway"),
+    (["check", "broken.toml"], "broken.toml: line 3"),
+    (["check", "nowhere.toml"], "nowhere.toml"),
+    (["check", "drum.toml"], "y_m"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "cause"), WRONG, ids=call_name)
+def test_a_wrong_call(arguments: list[str], cause: str, capfd: pytest.CaptureFixture[str]) -> None:
+    assert_refused(arguments, cause, WRONG_CALL, capfd)
+
+
+FAILING: Calls = [
+    (["run", "--headless", "--json", "nowhere/x.json"], "nowhere/x.json"),
+    (["run", "--headless", "--record", "nowhere/x.csv"], "nowhere/x.csv"),
+    (["run", "--headless", "--record", "regular/x.csv"], "regular/x.csv"),
+    (["emulate", "--link", "regular"], "regular"),
+    (["emulate", "--link", "nowhere/robot"], "nowhere/robot"),
+    (["emulate", "--trace", "nowhere/x.csv"], "nowhere/x.csv"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "cause"), FAILING, ids=call_name)
+def test_work_that_failed(arguments: list[str], cause: str, capfd: pytest.CaptureFixture[str]) -> None:
+    assert_refused(arguments, cause, FAILED, capfd)
+    assert Path("regular").read_bytes() == b""
+
+
+@pytest.mark.parametrize("arguments", [["service"], ["service", "hallway"], ["service", "--port", "a\nb"]])
+def test_a_service_needs_a_printable_port(arguments: list[str], capfd: pytest.CaptureFixture[str]) -> None:
+    assert_refused(arguments, "printable" if "--port" in arguments else "--port", WRONG_CALL, capfd)
