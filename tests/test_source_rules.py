@@ -88,30 +88,6 @@ TESTED_ELSEWHERE: Final = MappingProxyType(
             "perception/bayes/track_initiation.py",
             "perception/bayes/track_labels.py",
         ),
-        "tests/runtime/cli/test_app.py calls its commands": (
-            "runtime/cli/commands/budget.py",
-            "runtime/cli/commands/check.py",
-            "runtime/cli/commands/emulate.py",
-            "runtime/cli/commands/experiment.py",
-            "runtime/cli/commands/offline_io.py",
-            "runtime/cli/commands/recover.py",
-            "runtime/cli/commands/replay_recording.py",
-            "runtime/cli/commands/replay_ring_log.py",
-            "runtime/cli/commands/report.py",
-            "runtime/cli/commands/serve_console.py",
-            "runtime/cli/experiment_commands.py",
-            "runtime/cli/options.py",
-            "runtime/cli/recording_commands.py",
-            "runtime/cli/robot_commands.py",
-            "runtime/cli/terminal/plan.py",
-        ),
-        "tests/runtime/simulation/test_evaluation.py and test_scenes.py run it": (
-            "runtime/simulation/closed_loop.py",
-            "runtime/simulation/emulator_process.py",
-            "runtime/simulation/first_fix.py",
-            "runtime/simulation/open_loop.py",
-            "runtime/simulation/random_halls.py",
-        ),
     }
 )
 """Modules that still lack a test of their own, by where they are tested; each that gets one is taken off."""

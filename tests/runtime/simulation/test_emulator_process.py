@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,11 +40,15 @@ class Children:
     def __init__(self) -> None:
         self.program = FOLLOWS
         self.arguments: list[str] = []
+        self.environment: dict[str, str] = {}
         self.started: list[asyncio.subprocess.Process] = []
 
-    async def start(self, _module: str, arguments: Sequence[str], *, pipes: bool) -> asyncio.subprocess.Process:
+    async def start(
+        self, _module: str, arguments: Sequence[str], *, pipes: bool, environment: Mapping[str, str]
+    ) -> asyncio.subprocess.Process:
         assert pipes
         self.arguments = list(arguments)
+        self.environment = dict(environment)
         pipe = asyncio.subprocess.PIPE
         child = await asyncio.create_subprocess_exec(
             sys.executable, "-S", "-c", self.program, *arguments, stdin=pipe, stdout=pipe, stderr=pipe
@@ -70,12 +74,18 @@ async def test_the_emulator_s_time_is_controlled_while_it_runs(
         assert children.arguments == [
             "emulate", "--link", emulator.port, "--end-with-parent", "--control", "--seed", "7",
         ]  # fmt: skip
+        assert children.environment == {}
         emulator.control.clock.expect(emulator.control.clock() + 0.05)
         assert await emulator.control.pause() is None
         assert emulator.control.is_paused
         assert emulator.control.clock.is_still, "its acknowledgement was read"
     assert children.started[0].returncode is not None
     assert not folder.exists()
+
+
+async def test_an_emulator_without_kernels_runs_in_plain_python(children: Children) -> None:
+    async with start_emulator([], compiled=False):
+        assert children.environment == {"NUMBA_DISABLE_JIT": "1"}
 
 
 async def test_an_emulator_that_does_not_end_is_killed(children: Children, monkeypatch: pytest.MonkeyPatch) -> None:
