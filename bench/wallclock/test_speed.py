@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from runtime.recording.ring_log import read_ring_log, write_ring_log
+from tests.runtime.cli.commands.test_experiment import experiment
 from tests.runtime.recording.test_ring_log import firing
-from tests.runtime.simulation.test_evaluation import experiment
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
