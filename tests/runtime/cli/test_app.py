@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+import signal
 
 import pytest
 
-from config.errors import DONE, FAILED, WRONG_CALL
+from config.errors import DONE, WRONG_CALL
 from runtime.cli.app import main, run_command
 from tests.runtime.cli.user_errors import error_lines
 
@@ -63,12 +64,12 @@ def test_main_exits_with_the_code(capsys: pytest.CaptureFixture[str]) -> None:
     assert len(error_lines(capsys.readouterr().err)) == 1
 
 
-def test_an_interrupt_is_a_failure_without_a_traceback(
+def test_an_interrupt_has_its_exit_code_and_no_traceback(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def interrupt(*_arguments: object, **_options: object) -> int:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("runtime.cli.commands.check.check_config", interrupt)
-    assert run_command(["check", "hallway"]) == FAILED
+    assert run_command(["check", "hallway"]) == 128 + signal.SIGINT
     assert capsys.readouterr() == ("", "")
