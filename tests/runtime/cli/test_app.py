@@ -71,5 +71,7 @@ def test_an_interrupt_has_its_exit_code_and_no_traceback(
         raise KeyboardInterrupt
 
     monkeypatch.setattr("runtime.cli.commands.check.check_config", interrupt)
-    assert run_command(["check", "hallway"]) == 128 + signal.SIGINT
+    with pytest.raises(SystemExit) as caught:
+        main(["check", "hallway"])
+    assert caught.value.code == 128 + signal.SIGINT
     assert capsys.readouterr() == ("", "")
