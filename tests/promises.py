@@ -133,6 +133,11 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "recording switched off and on 100 times, with and without content: a run removes at most as many bytes "
             "as it has written, nothing pinned or bookmarked, and only what it has named before",
         ),
+        "P21": Promise(
+            "A hostile recording does no harm",
+            "every number of a cycle × {NaN, ±Inf, ±1e308, −1, 2⁶³ − 1}: one line of error or a "
+            "harmless replay; nothing larger than 64 MiB, or than the settings' own state, is decompressed",
+        ),
     }
 )  # fmt: skip
 

@@ -7,6 +7,8 @@ from types import MappingProxyType
 from typing import Final, NamedTuple, TypeVar
 
 import orjson
+from pydantic import ValidationError
+from pydantic_core import PydanticCustomError
 
 from runtime.recording.schema import (
     Bookmark,
@@ -54,6 +56,9 @@ CHANNELS: Final[Mapping[str, type[Payload]]] = MappingProxyType(
 )
 """Payload type by topic. The order gives the channel numbers in a file, from 1; append new topics at the end."""
 
+MESSAGE_MAX: Final = 8 << 20
+"""Largest message other than a keyframe, bytes: parsed JSON takes up to sixteen times as much memory."""
+
 P = TypeVar("P", bound=Payload)
 
 
@@ -77,8 +82,11 @@ def decode(kind: type[P], data: bytes) -> P:
     Raises
     ------
     pydantic.ValidationError
-        `data` is no JSON of this type.
+        `data` is no JSON of this type, or one of its values is impossible.
     """
+    if len(data) > MESSAGE_MAX and kind is not Keyframe:
+        why = PydanticCustomError("too_large", "a message of {size} bytes", {"size": len(data)})
+        raise ValidationError.from_exception_data(kind.__name__, [{"type": why, "input": None}])
     return kind.model_validate_json(data)
 
 

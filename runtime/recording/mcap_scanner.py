@@ -30,8 +30,8 @@ RECORD_HEADER: Final = 9
 ZSTD: Final = b"\x04\x00\x00\x00zstd"
 ZSTD_AT: Final = RECORD_HEADER + 8 + 8 + 8 + 4
 """Offset of the compression's name in a chunk record."""
-CONTENT_MAX: Final = 1 << 30
-"""Largest plausible chunk, bytes. Ours have 256 KiB; a damaged length field can have any value."""
+CONTENT_MAX: Final = 64 << 20
+"""Largest chunk that is decompressed, bytes. Ours have 256 KiB, or one keyframe of up to a few MiB."""
 HEADER_MAX: Final = 4096
 OPCODES: Final = frozenset(int(code) for code in Opcode)
 UNREADABLE: Final = (McapError, zstandard.ZstdError, ValueError, struct.error, OverflowError, MemoryError)

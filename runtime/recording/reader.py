@@ -18,6 +18,7 @@ from config.settings import Settings
 from config.world import WorldConfig
 from runtime.cycle.step import CycleRecord
 from runtime.recording.channels import CYCLE, RUN_INFO, RawMessage, decode
+from runtime.recording.field_checks import TIME_MAX_S
 from runtime.recording.mcap_file import PROFILE
 from runtime.recording.mcap_scanner import CorruptRegion, McapScanner
 from runtime.recording.schema import FORMAT, Cycle, RunInfo
@@ -81,8 +82,32 @@ class Recording:
         scanner.corrupt_regions = regions  # a second pass over a part finds some of them again
 
     def cycle_records(self) -> Iterator[CycleRecord]:
-        """Yield the record of every readable cycle in file order."""
-        return (decode(Cycle, message.data).record for message in self.messages() if message.topic == CYCLE)
+        """Yield the record of every readable cycle in file order.
+
+        Raises
+        ------
+        RecordingError
+            A firing is of another ring.
+        """
+        return (self.decode_cycle(message) for message in self.messages() if message.topic == CYCLE)
+
+    def decode_cycle(self, message: RawMessage) -> CycleRecord:
+        """Return the record in a cycle's message.
+
+        Raises
+        ------
+        RecordingError
+            A firing is of another ring: compiled code would read beyond its arrays.
+        """
+        record = decode(Cycle, message.data).record
+        sensors = len(self.settings.ring.mounts)
+        for firing in record.inputs.received.firings:
+            if len(firing.ranges_m) != sensors:
+                raise RecordingError(
+                    f"{self.path}: cycle {record.cycle} has a firing of {len(firing.ranges_m)} ranges, but the ring "
+                    f"has {sensors} sensors: the recording is damaged, or was changed"
+                )
+        return record
 
     @property
     def corrupt_regions(self) -> list[CorruptRegion]:
@@ -104,7 +129,10 @@ def cycle_head(message: RawMessage) -> tuple[int, float]:
     """Return number and time (run's clock, s) of a cycle's message without decoding all of it, which takes long."""
     found = CYCLE_HEAD.match(message.data)
     if found is not None:
-        return int(found[1]), float(found[2])
+        with contextlib.suppress(ValueError):  # such a number as "1e-e+" is left to the decoder
+            run_s = float(found[2])
+            if abs(run_s) <= TIME_MAX_S:
+                return int(found[1]), run_s
     record = decode(Cycle, message.data).record
     return record.cycle, record.inputs.run_s
 

@@ -13,15 +13,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
+from config.reload import differences
 from config.settings import Settings
 from perception.pipeline import Perception
 from perception.snapshot import Snapshot
 from runtime.cycle.step import CycleRecord, State, apply_settings, step
 from runtime.recording import channels
 from runtime.recording.channels import CYCLE, KEYFRAME, RUN_INFO, SETTINGS, RawMessage, decode
-from runtime.recording.reader import Recording, cycle_head, parse_settings
+from runtime.recording.reader import Recording, RecordingError, cycle_head, parse_settings
 from runtime.recording.schema import (
-    Cycle,
     Keyframe,
     RunInfo,
     SettingsChange,
@@ -128,7 +128,7 @@ class Replayer:
             self._messages = self._since(None)
         elif isinstance(start, Checkpoint):
             self._apply_settings(start.settings)
-            self._restore(start.state, start.snapshot)
+            self._restore(fresh_state(self._settings), start.state, start.snapshot)
             self._messages = self._after_cycle(start)
         else:
             self._apply_settings(start.settings)
@@ -182,26 +182,51 @@ class Replayer:
         """Put other settings in force, as the run did at this point."""
         if data == self.settings_data:
             return
-        self.settings_data, self._settings = data, parse_settings(data)
+        settings = parse_settings(data)
+        fixed = next((d for d in differences(self._settings, settings) if not d.live), None)
+        if fixed is not None:
+            raise RecordingError(
+                f"{self._recording.path}: the settings change during the run, which no run can: {fixed}"
+            )
+        self.settings_data, self._settings = data, settings
         if self.state is not None:
             apply_settings(self.state, self._settings)
 
-    def _restore(self, fields: StateFields, snapshot: Snapshot) -> None:
-        self.state = fresh_state(self._settings)
-        self.state.perception.restore(snapshot)
+    def _restore(self, state: State, fields: StateFields, snapshot: Snapshot) -> None:
+        """Continue from a fresh state of the settings in force, with other content."""
+        state.perception.restore(snapshot)
         for name, value in fields.items():
-            setattr(self.state, name, value)
+            setattr(state, name, value)
+        self.state = state
 
     def _adopt(self, frame: Keyframe) -> None:
-        self._restore(state_fields(frame), perception_snapshot(frame))
+        """Continue from a keyframe.
+
+        Raises
+        ------
+        RecordingError
+            It is of other settings, or damaged.
+        """
+        state = fresh_state(self._settings)
+        try:
+            snapshot = perception_snapshot(frame, state.perception.snapshot())
+            self._restore(state, state_fields(frame), snapshot)
+        except ValueError as error:
+            raise RecordingError(f"{self._recording.path}: the keyframe of cycle {frame.cycle}: {error}") from error
 
     def _cycle(self, message: RawMessage) -> ReplayStep:
-        record = decode(Cycle, message.data).record
+        record = self._recording.decode_cycle(message)
         if self.state is None or record.cycle != self.state.cycle + 1:
             self.state = None
             return ReplayStep(message, record)
         started_s = time.perf_counter()
-        replayed = replay_cycle(self.state, record, self._settings)
+        try:
+            replayed = replay_cycle(self.state, record, self._settings)
+        except (ArithmeticError, LookupError, ValueError) as error:
+            raise RecordingError(
+                f"{self._recording.path}: cycle {record.cycle} cannot be replayed: its inputs or the state before it "
+                f"are impossible ({type(error).__name__}: {error})"
+            ) from error
         return ReplayStep(message, record, replayed, time.perf_counter() - started_s)
 
     def _keyframe(self, message: RawMessage) -> ReplayStep:

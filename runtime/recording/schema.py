@@ -6,27 +6,40 @@ recorded, described in the file's own schema and read back without a change here
 
 from __future__ import annotations
 
-import ast
 from dataclasses import fields
 from itertools import accumulate
-from typing import Any, Final, TypeAlias, get_type_hints
+from typing import Annotated, Any, Final, Self, TypeAlias, get_type_hints
 
 import numpy as np
 import zstandard
-from pydantic import BaseModel, ConfigDict, create_model
+from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from perception.snapshot import Snapshot
 from runtime.cycle.modes import ModeState
 from runtime.cycle.step import CycleRecord, State
+from runtime.recording.field_checks import (
+    COUNT_MAX,
+    TIME_MAX_S,
+    check_cycle,
+    check_mode,
+    check_object,
+    check_pieces,
+    check_segments,
+    check_state,
+)
 
 FORMAT: Final = 2
 """Version of the file format. Increase it with every change after which a recording cannot be read as before."""
 
 
+Count: TypeAlias = Annotated[int, Field(ge=0, le=COUNT_MAX)]
+Seconds: TypeAlias = Annotated[float, Field(ge=-TIME_MAX_S, le=TIME_MAX_S, allow_inf_nan=False)]
+
+
 class Payload(BaseModel):
-    """The content of one message."""
+    """The content of one message. Reading validates every value; writing does not, as the values are our own."""
 
     model_config = ConfigDict(frozen=True, ser_json_inf_nan="strings", ser_json_bytes="base64",
                               val_json_bytes="base64", use_attribute_docstrings=True)  # fmt: skip
@@ -42,9 +55,9 @@ class RunInfo(Payload):
     """Versions of program and libraries, the kernels' key, the processor: the last bits may depend on them."""
     started: str
     """Date and time of the start, UTC."""
-    unix_minus_host_ns: int
+    unix_minus_host_ns: Annotated[int, Field(ge=-(2**63), lt=2**63)]
     """A log time (Unix time) minus the host's monotonic clock at the same moment."""
-    part: int
+    part: Count
     """Number of this file: a long run, or one whose disk was full for a while, has several, numbered from 1."""
     emulated: bool = False
     """Whether the settings' world is the true one; a real robot's world is unknown."""
@@ -53,14 +66,14 @@ class RunInfo(Payload):
 class TimedPayload(Payload):
     """Content with a time of the run."""
 
-    run_s: float
+    run_s: Seconds
     """Time by the run's clock, s. It stops while a run is paused; log times do not."""
 
 
 class SettingsChange(TimedPayload):
     """New settings, in force from a cycle on. A replay needs them as much as the echoes."""
 
-    cycle: int
+    cycle: Count
     settings: dict[str, Any]
     """All settings, as in `RunInfo`, which repeats them from then on."""
 
@@ -76,12 +89,22 @@ class Cycle(Payload):
 
     record: CycleRecord
 
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        check_cycle(self.record)
+        return self
+
 
 class ModeChange(TimedPayload):
     """A new mode, or a new reason for the mode."""
 
-    cycle: int
+    cycle: Count
     mode: ModeState
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        check_mode(self.mode)
+        return self
 
 
 class SerialBytes(TimedPayload):
@@ -93,6 +116,11 @@ class SerialBytes(TimedPayload):
     """Number of bytes in each piece."""
     data: str
     """All pieces in hexadecimal, in which repetition stays visible to compression, unlike in base64."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        check_pieces(self.after_us, self.sizes, self.data)
+        return self
 
     def pieces(self) -> list[tuple[float, bytes]]:
         """Return the time (run's clock, s) and the bytes of each piece."""
@@ -114,7 +142,7 @@ class LogLine(TimedPayload):
 class Bookmark(TimedPayload):
     """An operator's note at a moment of the run. It has no effect on the run."""
 
-    cycle: int
+    cycle: Count
     """The last cycle before it."""
     text: str
 
@@ -122,22 +150,33 @@ class Bookmark(TimedPayload):
 class MapChange(TimedPayload):
     """Changes of the outline map since the previous message of this type."""
 
-    cycle: int
+    cycle: Count
     whole: bool
     """Whether `added` is the whole map, and all messages before do not count."""
-    first: int
+    first: Count
     """Number of the first segment in `added`; the others are numbered consecutively."""
     added: list[tuple[float, float, float, float, float]]
     """Ends x, y, x, y (m) and normal (rad) of each new segment, rounded to the millimetre."""
-    removed: list[int]
+    removed: list[Count]
     """Numbers of the segments that are gone."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        check_segments(self.added)
+        return self
 
 
 class ObjectList(TimedPayload):
     """The objects recognised at this moment, as in the run's summary."""
 
-    cycle: int
+    cycle: Count
     objects: list[dict[str, Any]]
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for row in self.objects:
+            check_object(row)
+        return self
 
 
 _HINTS: Final = get_type_hints(State)
@@ -161,11 +200,16 @@ class ArrayInfo(Payload):
 class Keyframe(TimedPayload):
     """The whole state after a cycle, from which a replay can start."""
 
-    cycle: int
+    cycle: Count
     state: CarriedState  # of the fields of `State`
     arrays: list[ArrayInfo]
     data: bytes
     """The arrays' bytes, little-endian, compressed by zstd."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        check_state(state_fields(self))
+        return self
 
 
 StateFields: TypeAlias = dict[str, Any]
@@ -207,18 +251,44 @@ def _dtype_text(dtype: np.dtype[Any]) -> str:
     return dtype.str if dtype.names is None else str(dtype.descr)
 
 
-def _parse_dtype(text: str) -> np.dtype[Any]:
-    return np.dtype(ast.literal_eval(text) if text.startswith("[") else text)
+def layout_difference(frame: Keyframe, layout: Snapshot) -> str | None:
+    """Return the first array that a keyframe holds and a layout does not, or the reverse; None if they agree."""
+    mine = {name: (_dtype_text(array.dtype), list(array.shape)) for name, array in layout.items()}
+    if [array.name for array in frame.arrays] != list(mine):
+        names = {array.name for array in frame.arrays}
+        return next(iter(sorted(names ^ mine.keys())), "the order of the arrays")
+    return next((a.name for a in frame.arrays if mine[a.name] != (a.dtype, a.shape)), None)
 
 
-def perception_snapshot(frame: Keyframe) -> Snapshot:
-    """Return perception's arrays of a keyframe, by name."""
-    raw, arrays, at = zstandard.decompress(frame.data), {}, 0
-    for array in frame.arrays:
-        dtype = _parse_dtype(array.dtype)
-        count = int(np.prod(array.shape, dtype=np.int64))
-        arrays[array.name] = np.frombuffer(raw, dtype, count, at).reshape(array.shape)
-        at += count * dtype.itemsize
+def perception_snapshot(frame: Keyframe, layout: Snapshot) -> Snapshot:
+    """Return perception's arrays of a keyframe, by name.
+
+    Parameters
+    ----------
+    frame : Keyframe
+        From a recording.
+    layout : Snapshot
+        Of perception with the settings in force; its arrays' dtypes and shapes must be those of the keyframe. Nothing
+        is decompressed before they are compared.
+
+    Raises
+    ------
+    ValueError
+        The keyframe has another layout, another size, or is damaged.
+    """
+    if (different := layout_difference(frame, layout)) is not None:
+        raise ValueError(f"the keyframe is of other settings or of another version: {different:.100} differs")
+    size = sum(array.nbytes for array in layout.values())
+    try:
+        if zstandard.frame_content_size(frame.data) != size:
+            raise ValueError(f"the keyframe's data do not expand to the {size} bytes of its arrays")
+        raw = zstandard.decompress(frame.data)
+    except zstandard.ZstdError as error:
+        raise ValueError(f"the keyframe's data are damaged: {error}") from error
+    arrays, at = {}, 0
+    for name, array in layout.items():
+        arrays[name] = np.frombuffer(raw, array.dtype, array.size, at).reshape(array.shape)
+        at += array.nbytes
     return arrays
 
 

@@ -16,7 +16,14 @@ from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import CYCLE, encode
 from runtime.recording.reader import Recording, cycle_head
 from runtime.recording.replayer import KeyframeFinder, KeyframePosition, Replayer, ReplayStep
-from runtime.recording.schema import CarriedState, Cycle, Keyframe, carried_state, perception_snapshot
+from runtime.recording.schema import (
+    CarriedState,
+    Cycle,
+    Keyframe,
+    carried_state,
+    layout_difference,
+    perception_snapshot,
+)
 from runtime.timing.cycle_stats import CycleStats
 
 ABSENT: Final = "nothing"
@@ -177,10 +184,15 @@ class Verifier:
 def _keyframe_difference(frame: Keyframe, state: State) -> tuple[str, object, object] | None:
     """Return where a keyframe differs from a state, and both values; None if they are equal."""
     arrays = state.perception.snapshot()
-    for name, array in perception_snapshot(frame).items():
-        if name not in arrays or array.tobytes() != arrays[name].tobytes():
-            other = arrays.get(name)
-            where = "" if other is None else str(np.argwhere(np.atleast_1d(other != array)).tolist()[:1])
+    if (layout := layout_difference(frame, arrays)) is not None:
+        return f"perception {layout}", "one layout", "another"
+    try:
+        recorded = perception_snapshot(frame, arrays)
+    except ValueError as error:
+        return "perception", f"damaged ({error})", "whole"
+    for name, array in recorded.items():
+        if array.tobytes() != arrays[name].tobytes():
+            where = str(np.argwhere(np.atleast_1d(arrays[name] != array)).tolist()[:1])
             return f"perception {name}{where}", "one value", "another"
     replayed = encode(CarriedState.model_construct(**carried_state(state)))
     return find_difference(orjson.loads(encode(frame.state)), orjson.loads(replayed), "state.")

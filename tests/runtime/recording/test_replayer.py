@@ -20,13 +20,14 @@ def test_a_restored_state_is_whole(run: Path) -> None:
     with open_recording(run) as recording:
         state = fresh_state(recording.settings)
         assert state.perception.objects() == ()
-        state.perception.restore(perception_snapshot(frames[-1]))
+        snapshot = perception_snapshot(frames[-1], state.perception.snapshot())
+        state.perception.restore(snapshot)
         assert len(state.perception.objects()) >= 3
         other = fresh_state(hall("perception.bayes.tracks_max=7"))
         with pytest.raises(ValueError, match="of other settings"):
-            other.perception.restore(perception_snapshot(frames[-1]))
+            other.perception.restore(snapshot)
         with pytest.raises(ValueError, match="another method"):
-            fresh_state(hall("perception.method=paper")).perception.restore(perception_snapshot(frames[-1]))
+            fresh_state(hall("perception.method=paper")).perception.restore(snapshot)
 
 
 @pytest.fixture(scope="module")

@@ -13,6 +13,7 @@ import pytest
 
 from config.errors import DONE
 from runtime.recording.channels import CYCLE, KEYFRAME, decode, encode
+from runtime.recording.replayer import fresh_state
 from runtime.recording.schema import Cycle, Keyframe, keyframe, perception_snapshot, state_fields
 from runtime.recording.verification import ABSENT, ReplayResult, find_difference
 from tests.recorded import SECONDS, entries_of, hall, record, rewrite, verify_file
@@ -101,7 +102,7 @@ def test_a_memory_that_differs_is_named(run: Path, tmp_path: Path) -> None:
     entries = entries_of(run)
     where = [i for i, entry in enumerate(entries) if entry.topic == KEYFRAME][2]
     frame = decode(Keyframe, entries[where].data)
-    memory = perception_snapshot(frame)
+    memory = perception_snapshot(frame, fresh_state(hall()).perception.snapshot())
     name = next(name for name in memory if name.endswith("memory.state"))
     changed = memory[name].copy()
     changed["sensors"]["history"]["range_m"][0, 0, 0] += 1e-9

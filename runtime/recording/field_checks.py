@@ -1,0 +1,177 @@
+"""Checks of the values that a recording holds, so that a damaged or hostile one does no harm.
+
+A recording is written by this program and read by anyone. The types of its fields are checked by pydantic; the checks
+here are for what a type does not say: times and places that arithmetic can bear, and sizes that belong together.
+Every check raises a ValueError that names the value.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from drivers.messages import Firing, Floats, Odometry, Pose, Twist
+from runtime.cycle.drive_requests import validate
+from runtime.cycle.modes import ModeState
+from runtime.cycle.step import CycleRecord
+from runtime.cycle.summary import ObjectRow
+
+TIME_MAX_S: Final = 1e9
+"""Greatest time, s: thirty years."""
+PLACE_MAX_M: Final = 1e6
+"""Greatest coordinate, m; also the greatest unwrapped angle, rad."""
+RANGE_MAX_M: Final = 1e3
+"""Greatest range, m; a sensor listens up to 100 m at most."""
+SPEED_MAX: Final = 1e6
+"""Greatest velocity, m/s and rad/s."""
+COUNT_MAX: Final = 2**53
+"""Greatest count or number; a float still holds it exactly."""
+PIECE_DELAY_MAX_US: Final = 10**15
+
+_OBJECT_TEXT: Final = ("model",)
+_OBJECT_COUNT: Final = ("support",)
+_OPTIONAL: Final = ("probability", "covariance")
+_COVARIANCE: Final = 3
+
+
+def _bounded(what: str, value: float, most: float) -> None:
+    if not -most <= value <= most:  # also refuses NaN
+        raise ValueError(f"{what} is {value!r:.40}, expected a number within ±{most:g}")
+
+
+def _time(what: str, value: float | None) -> None:
+    if value is not None:
+        _bounded(what, value, TIME_MAX_S)
+
+
+def _count(what: str, value: int) -> None:
+    if not 0 <= value <= COUNT_MAX:
+        raise ValueError(f"{what} is {value!r:.40}, expected a count")
+
+
+def _pose(what: str, pose: Pose) -> None:
+    for name, value in (("x", pose.x), ("y", pose.y), ("theta", pose.theta)):
+        _bounded(f"{what}.{name}", value, PLACE_MAX_M)
+
+
+def _ranges(what: str, ranges: Floats) -> None:
+    heard = ranges[~np.isnan(ranges) & (ranges != math.inf)]
+    if len(heard) and not (heard.min() >= 0.0 and heard.max() <= RANGE_MAX_M):
+        raise ValueError(f"{what} has a range of {heard.min():g} or {heard.max():g} m, expected 0 to {RANGE_MAX_M:g}")
+
+
+def _firing(what: str, firing: Firing) -> None:
+    _time(f"{what}.robot_s", firing.robot_s)
+    _pose(f"{what}.pose", firing.pose)
+    _bounded(f"{what}.ring_yaw", firing.ring_yaw, PLACE_MAX_M)
+    _ranges(f"{what}.ranges_m", firing.ranges_m)
+
+
+def _odometry(what: str, odometry: Odometry | None) -> None:
+    if odometry is None:
+        return
+    _time(f"{what}.robot_s", odometry.robot_s)
+    _pose(f"{what}.pose", odometry.pose)
+    _bounded(f"{what}.ring_yaw", odometry.ring_yaw, PLACE_MAX_M)
+    _twist(f"{what}.twist", odometry.twist)
+    _bounded(f"{what}.last_drive_seq", odometry.last_drive_seq, COUNT_MAX)
+    _count(f"{what}.flags", odometry.flags)
+
+
+def _twist(what: str, twist: Twist) -> None:
+    _bounded(f"{what}.v", twist.v, SPEED_MAX)
+    _bounded(f"{what}.w", twist.w, SPEED_MAX)
+
+
+def check_mode(mode: ModeState) -> None:
+    """Check the times of a mode."""
+    _time("mode.entered_run_s", mode.entered_run_s)
+    _time("mode.arming_run_s", mode.arming_run_s)
+
+
+def check_cycle(record: CycleRecord) -> None:
+    """Check the times, poses, ranges and counts of a cycle.
+
+    Drive requests and edits may hold any number: the cycle itself validates and refuses them.
+    """
+    inputs, received = record.inputs, record.inputs.received
+    for name, time_s in (
+        ("run_s", inputs.run_s), ("host_s", inputs.host_s), ("echo_age_s", inputs.echo_age_s),
+        ("gap_max_s", inputs.gap_max_s),
+    ):  # fmt: skip
+        _time(f"inputs.{name}", time_s)
+    for k, firing in enumerate(received.firings):
+        _firing(f"inputs.received.firings.{k}", firing)
+    _odometry("inputs.received.odometry", received.odometry)
+    check_mode(record.mode)
+    if isinstance(record.command, Twist):
+        _twist("command", record.command)
+    for name, count in (
+        ("cycle", record.cycle), ("new_segments", record.new_segments), ("segments", record.segments),
+        ("clusters", record.clusters), ("quanta", record.quanta), ("iterations", record.iterations),
+    ):  # fmt: skip
+        _count(name, count)
+
+
+def check_state(state: Mapping[str, Any]) -> None:
+    """Check a state without perception: the fields of `runtime.cycle.step.State`, by name."""
+    for name in ("run_s", "last_firing_robot_s", "requested_run_s"):
+        _time(f"state.{name}", state[name])
+    check_mode(state["mode"])
+    _odometry("state.odometry", state["odometry"])
+    _count("state.cycle", state["cycle"])
+    if state["leg"] is not None:
+        _bounded("state.leg.origin_x", state["leg"].origin_x, PLACE_MAX_M)
+        _bounded("state.leg.origin_y", state["leg"].origin_y, PLACE_MAX_M)
+    if (problem := validate(state["drive_request"])) is not None:
+        raise ValueError(f"state.drive_request: {problem}")
+    for response in state["vectors"]:
+        _bounded("state.vectors.x", response.x, PLACE_MAX_M)
+        _bounded("state.vectors.y", response.y, PLACE_MAX_M)
+
+
+def check_pieces(after_us: Sequence[int], sizes: Sequence[int], data: str) -> None:
+    """Check that the pieces of serial data have a time each and fill the data exactly."""
+    if len(after_us) != len(sizes):
+        raise ValueError(f"{len(sizes)} pieces of data with {len(after_us)} times")
+    if any(size < 0 for size in sizes) or 2 * sum(sizes) != len(data):
+        raise ValueError(f"pieces of {sum(sizes)} bytes together, and {len(data)} hexadecimal digits of data")
+    if any(abs(after) > PIECE_DELAY_MAX_US for after in after_us):
+        raise ValueError(f"a piece of data more than {1e-6 * PIECE_DELAY_MAX_US:g} s after the first one")
+    bytes.fromhex(data)
+
+
+def check_segments(added: Sequence[Sequence[float]]) -> None:
+    """Check the ends and normals of outline segments."""
+    for row in added:
+        for value in row:
+            _bounded("a segment's coordinate or direction", value, PLACE_MAX_M)
+
+
+def check_object(row: Mapping[str, Any]) -> None:
+    """Check one object of a list: the fields of `runtime.cycle.summary.ObjectRow`, finite.
+
+    Fields beyond those are numbers, flags or texts.
+    """
+    if missing := sorted(ObjectRow.__annotations__.keys() - {*_OPTIONAL, *row}):
+        raise ValueError(f"an object without {missing[0]}")
+    for name, value in row.items():
+        if name in _OBJECT_TEXT:
+            is_valid = isinstance(value, str)
+        elif name in _OBJECT_COUNT:
+            is_valid = type(value) is int and 0 <= value <= COUNT_MAX
+        elif name == "covariance":
+            is_valid = isinstance(value, list) and len(value) == _COVARIANCE and all(map(_is_finite, value))
+        elif name in ObjectRow.__annotations__:
+            is_valid = _is_finite(value)
+        else:
+            is_valid = value is None or isinstance(value, str | bool) or _is_finite(value)
+        if not is_valid:
+            raise ValueError(f"an object whose {name:.40} is {value!r:.40}")
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, int | float) and abs(value) <= COUNT_MAX
