@@ -21,6 +21,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from runtime.support import child_process
 from runtime.support.kernel_cache import use_kernel_cache
 from tests import promises
 from tests.compile_kernels import compile_all
@@ -115,6 +116,13 @@ def pytest_configure(config: pytest.Config) -> None:
     if getattr(config.option, "numprocesses", None):
         # Compile once here; otherwise every worker process would compile everything.
         compile_all()
+
+
+@pytest.fixture(autouse=True)
+def _children_at_usual_priority(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Start children at the priority of the tests: at the low one, a few tests at a time leave them no processor."""
+    if request.path.name != "test_child_process.py":
+        monkeypatch.setattr(child_process, "LOW_PRIORITY", "runpy")
 
 
 @pytest.fixture
