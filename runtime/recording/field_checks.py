@@ -117,7 +117,13 @@ def check_cycle(record: CycleRecord) -> None:
 
 
 def check_state(state: Mapping[str, Any]) -> None:
-    """Check a state without perception: the fields of `runtime.cycle.step.State`, by name."""
+    """Check a state without perception: the fields of `runtime.cycle.step.State`, by name.
+
+    Raises
+    ------
+    ValueError
+        A value is none that a run can have.
+    """
     for name in ("run_s", "last_firing_robot_s", "requested_run_s"):
         _time(f"state.{name}", state[name])
     check_mode(state["mode"])
@@ -134,7 +140,22 @@ def check_state(state: Mapping[str, Any]) -> None:
 
 
 def check_pieces(after_us: Sequence[int], sizes: Sequence[int], data: str) -> None:
-    """Check that the pieces of serial data have a time each and fill the data exactly."""
+    """Check that the pieces of serial data have a time each and fill the data exactly.
+
+    Parameters
+    ----------
+    after_us : list of int
+        Delay of each piece after the first one, µs.
+    sizes : list of int
+        Number of bytes in each piece.
+    data : str
+        All pieces in hexadecimal.
+
+    Raises
+    ------
+    ValueError
+        They do not add up.
+    """
     if len(after_us) != len(sizes):
         raise ValueError(f"{len(sizes)} pieces of data with {len(after_us)} times")
     if any(size < 0 for size in sizes) or 2 * sum(sizes) != len(data):
@@ -155,6 +176,11 @@ def check_object(row: Mapping[str, Any]) -> None:
     """Check one object of a list: the fields of `runtime.cycle.summary.ObjectRow`, finite.
 
     Fields beyond those are numbers, flags or texts.
+
+    Raises
+    ------
+    ValueError
+        A field is missing, or has another type than in `ObjectRow`.
     """
     if missing := sorted(ObjectRow.__annotations__.keys() - {*_OPTIONAL, *row}):
         raise ValueError(f"an object without {missing[0]}")
