@@ -183,7 +183,9 @@ class Replayer:
         if data == self.settings_data:
             return
         settings = parse_settings(data)
-        fixed = next((d for d in differences(self._settings, settings) if not d.live), None)
+        # An emulator's port is known only after the start. It has no effect on a replay.
+        changed = (d for d in differences(self._settings, settings) if not d.path.startswith("link."))
+        fixed = next((d for d in changed if not d.live), None)
         if fixed is not None:
             raise RecordingError(
                 f"{self._recording.path}: the settings change during the run, which no run can: {fixed}"
