@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from structlog.typing import FilteringBoundLogger
 
     from drivers.driver import RobotDriver
-    from runtime.cli.commands.run_recording import OnCycle
-    from runtime.cycle.process import RobotProcess
+    from runtime.cycle.process import OnCycle, RobotProcess
     from runtime.cycle.reloader import Reloader
     from runtime.cycle.step import CycleRecord, State
     from runtime.cycle.summary import RunSummary

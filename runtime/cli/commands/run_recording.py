@@ -21,14 +21,12 @@ if TYPE_CHECKING:
 
     from drivers.driver import RobotDriver
     from runtime.console.frames.frame_encoder import RecordingStatus
-    from runtime.cycle.process import Observers
+    from runtime.cycle.process import Observers, OnCycle
     from runtime.cycle.step import CycleRecord, State
     from runtime.cycle.summary import RecordingRow
     from runtime.recording.recorder import Recorder
     from runtime.recording.ring_log_writer import RingLogWriter
     from runtime.timing.cycle_stats import CycleStats
-
-    OnCycle = Callable[[CycleRecord, State, CycleStats, RobotDriver], None]
 
 RING_LOG: Final = ".csv"
 """Suffix of a file that is written as a ring log."""
