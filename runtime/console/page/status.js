@@ -39,6 +39,10 @@ export class Status {
     setAttribute(byId("mode-icon"), "href", `#m-${mode.toLowerCase()}`);
     setText(byId("mode-name"), `${this.#run.watchesRecording ? "then: " : ""}${mode.replace("_", " ")}`);
     setText(byId("reason"), reason ?? "");
+    // The bar has no room for the progress, which counts.
+    const preparing = mode === "CONNECTING" && Boolean(reason?.startsWith("recognition is being prepared"));
+    this.#notifications.banner("preparation", preparing ? "Recognition is being prepared." : null);
+    this.#notifications.updateBanner("preparation", `The robot stands: ${reason}.`);
     // A reason that counts is announced once, not each second.
     const kind = `${mode} ${reason ?? ""}`.replace(/\d+/g, "");
     if (kind !== this.#announced) setText(this.#announce, `Mode ${mode.replace("_", " ").toLowerCase()}${reason ? `: ${reason}` : ""}`);
