@@ -19,6 +19,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+from coverage import Coverage
 from hypothesis import HealthCheck, settings
 
 from runtime.support import child_process
@@ -116,6 +117,13 @@ def pytest_configure(config: pytest.Config) -> None:
     if getattr(config.option, "numprocesses", None):
         # Compile once here; otherwise every worker process would compile everything.
         compile_all()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """End the first of two measurements that pytest-cov 7.1 starts in a worker: `no_cover` ends the second only."""
+    while hasattr(session.config, "workerinput") and (measurement := Coverage.current()) is not None:
+        measurement.stop()
 
 
 @pytest.fixture(autouse=True)
