@@ -111,6 +111,8 @@ class ScaledClock(RunClock):
 
     def at(self, host_s: float) -> float:
         """Return the run's time at the present moment `host_s` of the host's clock; it never decreases."""
+        if self.time_scale is REAL_TIME:
+            return host_s  # time was never paused nor scaled
         self._latest_run_s = max(self._latest_run_s, min(self.time_scale.run_at(host_s), self._limit_run_s))
         return self._latest_run_s
 

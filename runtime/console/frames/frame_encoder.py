@@ -25,6 +25,8 @@ from runtime.cycle.drive_requests import DriveRequest
 from runtime.cycle.step import CycleRecord, State
 
 NO_LINK_COUNTS: Final = LinkCounts()
+WAITING_MAX: Final = 16
+"""Firings that wait for the next frame: what they say is gathered after the cycle, and at once for many of them."""
 NO_ECHO: Final = -1.0
 """The wire's form of an infinite range, for which JSON has no number."""
 
@@ -105,6 +107,7 @@ class FrameEncoder:
         self._ranges_m = np.full(count, np.nan)
         self._fired_s = np.full(count, np.nan)
         self._fired: set[int] = set()
+        self._waiting: list[Firing] = []
         self._segments = SegmentDelta()
         self._clusters = ClusterView(settings.perception)
         self._cluster_boxes: list[list[float]] = []
@@ -122,11 +125,13 @@ class FrameEncoder:
         heard = record.inputs.received
         if heard.rebooted:
             self._ranges_m[:] = self._fired_s[:] = np.nan
+            self._waiting.clear()
         if heard.rebooted or record.inputs.edits:
             # The segments may differ although their counts do not.
             self._is_stale = True
-        for firing in heard.firings:
-            self._take_firing(firing)
+        self._waiting += heard.firings
+        if len(self._waiting) > WAITING_MAX:
+            self._take_firings()
 
     def frame(self, state: State, record: CycleRecord | None, context: FrameContext) -> EncodedFrame:
         """Return the frame of the state after a cycle.
@@ -141,6 +146,7 @@ class FrameEncoder:
             What is not in the state.
         """
         self._number += 1
+        self._take_firings()
         segments = self._encode_segments(state)
         odometry = state.odometry
         robot_s = 0.0 if odometry is None else odometry.robot_s
@@ -189,11 +195,13 @@ class FrameEncoder:
         self._fired.clear()
         return EncodedFrame(self, self._number, orjson.dumps(head)[:-1], segments, self._segments.whole)
 
-    def _take_firing(self, firing: Firing) -> None:
-        fired = np.flatnonzero(~np.isnan(firing.ranges_m))
-        self._ranges_m[fired] = firing.ranges_m[fired]
-        self._fired_s[fired] = firing.robot_s
-        self._fired.update(fired.tolist())
+    def _take_firings(self) -> None:
+        for firing in self._waiting:
+            fired = np.flatnonzero(~np.isnan(firing.ranges_m))
+            self._ranges_m[fired] = firing.ranges_m[fired]
+            self._fired_s[fired] = firing.robot_s
+            self._fired.update(fired.tolist())
+        self._waiting.clear()
 
     def _encode_segments(self, state: State) -> bytes:
         """Return the changes of the map's segments; list them only if they may have changed."""
