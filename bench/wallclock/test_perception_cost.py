@@ -25,7 +25,7 @@ def test_cost_of_a_ring_reading(measured: Callable[[str], None]) -> None:
     settings = load_settings("hallway")
     perception = Perception(settings.ring, settings.models, settings.perception)
     costs_ms = [
-        thread_ms(lambda: take(perception, firing))  # noqa: B023
+        thread_ms(lambda: take(perception, firing))  # noqa: B023 - called at once
         for firing in readings(settings.ring, halls("clean")[0], 0, passes=4)
     ]
     median_ms, p99_ms = np.quantile(costs_ms, [0.5, 0.99])

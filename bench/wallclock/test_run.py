@@ -65,7 +65,8 @@ def test_six_drums_in_real_time_with_a_control_loop(tmp_path: Path, measured: Ca
     seen = [(o["x"], o["y"]) for o in summary["objects"]]
     assert len(seen) == len(drums) == 6
     errors = [min(math.dist(drum, place) for place in seen) for drum in drums]
-    assert len({min(range(6), key=lambda k, d=drum: math.dist(d, seen[k])) for drum in drums}) == 6  # type: ignore[misc]
+    nearest = {min((math.dist(drum, place), k) for k, place in enumerate(seen))[1] for drum in drums}
+    assert len(nearest) == 6
     assert sum(errors) / 6 <= 0.25 * FT
     assert max(errors) <= 0.35 * FT
 

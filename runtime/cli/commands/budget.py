@@ -11,6 +11,7 @@ from rich.console import Console
 
 from config.errors import DONE, WRONG_CALL, UserError
 from config.load import load_settings
+from runtime.cli.commands.offline_io import refuse_unwritable
 from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.progress import progress
 
@@ -45,6 +46,7 @@ def run_budgets(
         raise UserError("--budget-ms, --quanta: must be 0 or above", WRONG_CALL)
     settings = load_settings("irregular", sets, models=models)
     console = Console(stderr=True)
+    refuse_unwritable({"--json": json_file})
     prepare_kernels(settings, console)
     from runtime.cli.tables import budget_table
     from runtime.cycle.summary import write_json

@@ -12,7 +12,7 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings
 from config.settings import Settings
 from drivers.registry import make_driver
-from runtime.cli.commands.offline_io import make_output_folder, plain_console, read_timeline
+from runtime.cli.commands.offline_io import make_output_folder, plain_console, read_timeline, refuse_unwritable
 from runtime.cli.tables import boxes_table, outcome_line, scene_line, spread_line, table_2
 from runtime.simulation.scene_names import SceneName
 from runtime.support.kernel_cache import prepare_kernels
@@ -58,6 +58,7 @@ def run_experiment(
         raise UserError("the world has no drum: the experiment compares what is recognised with drums", WRONG_CALL)
     make_driver(settings)  # refuses what the robot cannot carry out
     console, output = Console(stderr=True), plain_console()
+    refuse_unwritable({"--json": json_file})
     prepare_kernels(settings, console)
     from runtime.cycle.summary import write_json
     from runtime.simulation.evaluation import run_seed, summarise
@@ -168,6 +169,7 @@ def run_scenes(
     """
     settings = load_settings("hallway", sets, models=models)
     console = Console(stderr=True)
+    refuse_unwritable({"--json": json_file})
     prepare_kernels(settings, console)
     from runtime.cycle.summary import write_json
     from runtime.simulation.open_loop import run_scene, summarise_scene

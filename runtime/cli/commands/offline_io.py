@@ -1,4 +1,4 @@
-"""Functions common to the commands on finished runs: reading a file with a progress bar, checking the output path."""
+"""Functions common to commands: reading a file with a progress bar, checking the files to be written."""
 
 from __future__ import annotations
 
@@ -38,6 +38,24 @@ def read_timeline(source: TimelineSource, console: Console) -> Timeline:
     if timeline.last is None:
         raise UserError(f"{source.file}: holds no echo and no odometry: nothing to show", FAILED)
     return timeline
+
+
+def refuse_unwritable(files: dict[str, str | None]) -> None:
+    """Check, before work or a drive begins, that the files of these options can be written.
+
+    Raises
+    ------
+    UserError
+        One cannot.
+    """
+    for option, path in files.items():
+        try:
+            if path is not None:
+                Path(path).open("ab").close()
+        except OSError as error:
+            raise UserError(
+                f"{option} {path}: cannot be written: {error.strerror}; choose another file", FAILED
+            ) from error
 
 
 @contextlib.contextmanager

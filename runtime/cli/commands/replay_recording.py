@@ -14,7 +14,7 @@ from rich.console import Console
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings, override_settings
-from runtime.cli.commands.offline_io import plain_console
+from runtime.cli.commands.offline_io import plain_console, refuse_unwritable
 from runtime.cli.tables import objects_table
 from runtime.cycle.summary import object_row, write_json
 from runtime.recording.replay_summary import ReplaySummary
@@ -135,6 +135,7 @@ def replay_again(
     from runtime.recording.recorder import software_versions
     from runtime.recording.verification import verify_recording
 
+    refuse_unwritable({"--json": json_file})
     prepare_kernels(recording.settings, console)
     now, then = software_versions(), recording.info.versions
     others = [f"{name} {then.get(name)} → {now[name]}" for name in now if then.get(name) != now[name]]

@@ -10,6 +10,7 @@ from rich.console import Console
 
 from config.errors import DONE
 from config.load import load_settings
+from runtime.cli.commands.offline_io import refuse_unwritable
 from runtime.cli.tables import objects_table
 from runtime.cycle.summary import write_json
 from runtime.support.kernel_cache import prepare_kernels
@@ -38,6 +39,7 @@ def replay_log(
     """
     settings = load_settings(None, sets, robot=robot, models=models)
     console = Console(stderr=True)
+    refuse_unwritable({"--json": json_file})
     prepare_kernels(settings, console)
     from runtime.recording.ring_log import read_ring_log
     from runtime.recording.ring_log_replay import replay_firings

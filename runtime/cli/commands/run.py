@@ -17,6 +17,7 @@ from config.load import ConfigError, load_settings
 from config.settings import Settings
 from drivers.registry import make_driver
 from runtime import VERSION
+from runtime.cli.commands.offline_io import refuse_unwritable
 from runtime.cli.commands.run_recording import RunRecording, open_run_recording
 from runtime.cli.start_signals import ending_the_start
 from runtime.cli.tables import objects_table, timing_line, timing_table
@@ -168,24 +169,6 @@ def run_robot(
         raise UserError(summary["stop_reasons"][-1], FAILED)
     recording.raise_if_incomplete()
     return DONE
-
-
-def refuse_unwritable(files: dict[str, str | None]) -> None:
-    """Check, before the robot moves, that the files of these options can be written.
-
-    Raises
-    ------
-    UserError
-        One cannot.
-    """
-    for option, path in files.items():
-        try:
-            if path is not None:
-                Path(path).open("ab").close()
-        except OSError as error:
-            raise UserError(
-                f"{option} {path}: cannot be written: {error.strerror}; choose another file", FAILED
-            ) from error
 
 
 def without_console(settings: Settings) -> Settings:

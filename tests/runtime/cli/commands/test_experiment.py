@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from config.errors import DONE, WRONG_CALL, UserError
+from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings
 from runtime.analysis.plots import animation
 from runtime.cli.app import run_command
@@ -31,6 +31,16 @@ def experiment(tmp_path: Path, *arguments: str) -> dict[str, Any]:
 
 def found(rows: list[dict[str, Any]]) -> int:
     return sum(row["estimate"] is not None for row in rows)
+
+
+@pytest.mark.parametrize("what", [["hallway"], ["hallway", "--scene", "clean"], ["budget"]])
+def test_a_summary_that_cannot_be_written_is_refused_before_the_first_drive(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, what: list[str]
+) -> None:
+    for module in ("experiment", "budget"):
+        monkeypatch.setattr(f"runtime.cli.commands.{module}.prepare_kernels", lambda *_: pytest.fail("it went on"))
+    assert run_command(["experiment", *what, "--json", str(tmp_path / "no" / "x")]) == FAILED
+    assert "cannot be written" in capsys.readouterr().err
 
 
 def test_the_papers_hallway(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

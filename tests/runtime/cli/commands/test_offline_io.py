@@ -15,6 +15,7 @@ from runtime.cli.commands.offline_io import (
     plain_console,
     read_timeline,
     refuse_overwriting,
+    refuse_unwritable,
     require_package,
     writing,
 )
@@ -52,6 +53,15 @@ def test_an_os_error_names_option_and_path() -> None:
         writing("--out", "x"),
     ):
         raise OSError(28, "No space left")
+    assert caught.value.exit_code == FAILED
+
+
+def test_a_file_is_tried_before_the_work_and_keeps_its_content(tmp_path: Path) -> None:
+    (tmp_path / "old.json").write_text("{}")
+    refuse_unwritable({"--json": str(tmp_path / "old.json"), "--record": None})
+    assert (tmp_path / "old.json").read_text() == "{}"
+    with pytest.raises(UserError, match=r"^--json .*/no/x: cannot be written: .*; choose another file$") as caught:
+        refuse_unwritable({"--json": str(tmp_path / "no" / "x")})
     assert caught.value.exit_code == FAILED
 
 
