@@ -138,6 +138,13 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "every number of a cycle × {NaN, ±Inf, ±1e308, −1, 2⁶³ − 1}: one line of error or a "
             "harmless replay; nothing larger than 64 MiB, or than the settings' own state, is decompressed",
         ),
+        "P22": Promise(
+            "Floods and lies are harmless",
+            "10⁵ commands, pings, endless fragments and headers, clients that never read; echoes far beyond the "
+            "pattern's rate, false acknowledgements, a clock 5 % off or backwards, odometry off by kilometres, "
+            "hostile names: bounded memory and work per turn, HALT of another client at once, a stop or a message "
+            "where it can be decided",
+        ),
     }
 )  # fmt: skip
 

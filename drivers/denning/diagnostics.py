@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 from config.robot import RobotConfig
 from drivers.denning.frames import VERSION, Ident, NakCode
+from drivers.messages import Twist
 
 _RADIUS_TOLERANCE_MM = 1.0
 """The robot reports whole millimetres."""
@@ -21,6 +22,11 @@ _MEANINGS = MappingProxyType(
         NakCode.VALUE_OUT_OF_RANGE: "a value is out of its range",
         NakCode.LATCHED: "it is latched",
     }
+)
+
+EXCESS_ECHOES = (
+    "the ring sends many more firings than its pattern has, and the excess is dropped; its firmware is faulty, or "
+    "another device sends on the line: restart the robot, and check what else is connected"
 )
 
 
@@ -148,4 +154,21 @@ def odometry_jump(off_m: float, turned_rad: float, ring_rad: float) -> str:
         f"{math.degrees(ring_rad):+.0f}: more than the wheels can have turned; a wheel slipped, or an "
         f"encoder or its counter failed: the jump is removed and the map stays valid; if it happens again, check "
         f"wheels and encoders"
+    )
+
+
+def wrong_clock_rate(error: float) -> str:
+    """Return the message for a robot's clock that is too fast, or where `error` is negative too slow."""
+    return (
+        f"the robot's clock runs {abs(error):.1%} too {'fast' if error > 0.0 else 'slow'}, and its ranges and speeds "
+        f"are measured by it, so objects are located wrongly; its oscillator or its configuration is faulty: restart "
+        f"the robot, and repair it if this message returns"
+    )
+
+
+def halt_ignored(twist: Twist) -> str:
+    """Return the message for a base that acknowledged HALT and moves, by its odometry, at this velocity."""
+    return (
+        f"the base acknowledged HALT and still moves at {twist.v:.2f} m/s and {twist.w:.2f} rad/s: HALT is sent "
+        f"again; stop it by its emergency switch, and repair it"
     )

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
 
+from config.files import one_line
 from config.robot import RingConfig, RobotConfig
 from drivers.denning import diagnostics
 from drivers.denning.codec import Decoder, encode
@@ -12,7 +14,7 @@ from drivers.denning.frames import Ack, Drive, Echo, Frame, Hello, Ident, Nak, N
 from drivers.denning.pending_command import PendingCommand, pending_command
 from drivers.denning.pose_stamping import PoseStamper
 from drivers.denning.robot_clock import Jump
-from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout
+from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout, HaltMonitor
 from drivers.denning.wire_units import identity_of, to_wire, wire_pattern
 from drivers.driver import LineState, Received
 from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
@@ -47,7 +49,7 @@ class DenningDriver:
         self._config = config
         self._pattern = wire_pattern(config.ring)
         self._stamper = PoseStamper(len(config.ring.mounts), config.body)
-        self._stamper.set_window(self._pattern.window)
+        self._stamper.set_pattern(self._pattern.window, self._pattern.step_period_ms)
         self._state = LineState.CLOSED
         self._problem: str | None = None
         self._identity: Identity | None = None
@@ -63,6 +65,7 @@ class DenningDriver:
         self._commands: dict[str, PendingCommand] = {}
         self._drive: Twist | None = None
         self._drive_acks = CommandAckMonitor()
+        self._halt_monitor = HaltMonitor()
         self._echo_timeout = EchoTimeout(
             config.link.silence_max_s + _MISSED_STEPS_MAX * 1e-3 * self._pattern.step_period_ms
         )
@@ -140,7 +143,7 @@ class DenningDriver:
         for frame in self._decoder.feed(data):
             self._last_frame_s = run_s
             self._take_frame(frame)
-        self._firings.extend(self._stamper.firings())
+        self._firings.extend(self._stamper.firings(self._run_s))
 
     def tick(self, run_s: float) -> None:
         """Let time pass: send unanswered commands again; go DOWN if the robot is silent for too long."""
@@ -161,7 +164,7 @@ class DenningDriver:
         if self._state is LineState.READY:
             self._check_timeouts()
             if "PATTERN" not in self._commands and run_s - self._pattern_acked_s > self._settling_s:
-                self._stamper.set_window(self._pattern.window)
+                self._stamper.set_pattern(self._pattern.window, self._pattern.step_period_ms)
 
     def drive(self, twist: Twist) -> None:
         """Request a velocity, clamped to the body's limits; sent only in state READY and while no HALT is pending.
@@ -186,6 +189,7 @@ class DenningDriver:
         """Clear the latch; without effect unless READY, so that the robot is never released later and unnoticed."""
         if self._state is LineState.READY:
             self._commands.pop("HALT", None)
+            self._halt_monitor.released()
             self._queue("RELEASE")
 
     def set_firing(self, ring: RingConfig) -> None:
@@ -200,7 +204,8 @@ class DenningDriver:
         if pattern == self._pattern:
             return
         # Until the robot uses the new pattern, echoes may belong to either; an echo names its own sensors.
-        self._stamper.set_window(max(self._pattern.window, pattern.window))
+        step_ms = min(self._pattern.step_period_ms, pattern.step_period_ms)
+        self._stamper.set_pattern(max(self._pattern.window, pattern.window), step_ms)
         self._settling_s = _SETTLING_STEPS * 1e-3 * max(self._pattern.step_period_ms, pattern.step_period_ms)
         self._pattern = pattern
         if self._state is LineState.READY or "PATTERN" in self._commands:
@@ -309,6 +314,7 @@ class DenningDriver:
                 pass  # an echo of a pattern that this driver has not set
 
     def _take_ident(self, ident: Ident) -> None:
+        ident = replace(ident, name=one_line(ident.name))  # it goes to terminals and logs
         wrong = diagnostics.wrong_robot(ident, self._config)
         if wrong is not None:
             self._go_down(wrong)
@@ -334,9 +340,11 @@ class DenningDriver:
 
     def _take_ack(self, ack: Ack) -> None:
         name = self._answered(ack.of)
-        if name is None:
+        if name is None or name == "HELLO":  # the answer to HELLO is IDENT
             return
         del self._commands[name]
+        if name == "HALT":
+            self._halt_monitor.acknowledged(self._run_s)
         if name == "PATTERN":
             self._state = LineState.READY
             self._odometry_s, self._bad_at_odometry = self._run_s, self._decoder.bad
@@ -380,7 +388,12 @@ class DenningDriver:
             return
         self._odometry_s, self._bad_at_odometry = self._run_s, self._decoder.bad
         self._odometry = sample
+        if (error := self._stamper.clock_error) is not None and error > 0.0:
+            self._go_down(diagnostics.wrong_clock_rate(error))
+        if self._halt_monitor.is_ignored(sample, self._run_s):
+            self._stamper.note(diagnostics.halt_ignored(sample.twist))
+            self.halt()
         self._drive_acks.acknowledged(odom.last_drive_seq)
         if sample.flags & Flags.LATCHED:
             self._drive_acks.forget()  # while latched, the robot refuses every DRIVE with a NAK
-        self._firings.extend(self._stamper.firings())
+        self._firings.extend(self._stamper.firings(self._run_s))

@@ -22,6 +22,7 @@ from drivers.denning.robot_clock import Jump, RobotClock
 from drivers.denning.wire_units import odometry_of, ranges_of
 from drivers.messages import Firing, Odometry, Pose, wrap_angle
 from drivers.odometry_history import OdometryHistory
+from drivers.token_bucket import TokenBucket
 
 _HISTORY_S = 2.5
 """Odometry kept, s: several times the longest window and its way over a busy line."""
@@ -42,6 +43,12 @@ _JUMP_M, _JUMP_RAD = 0.1, 0.1
 """Allowed difference of odometry from its own velocities, m and rad, besides a stop within one sample."""
 _STEADY_SAMPLES = 10
 """A deviation counts as a jump only after this many samples without one; otherwise it is how this base moves."""
+_FIRINGS_SHARE = 4.0
+"""Firings passed on are at most so many times as frequent as those of the pattern; more are none of it."""
+_FIRINGS_BURST = 64.0
+"""Firings at once, as after a delay on the way."""
+_EXCESS_NOTE_S = 10.0
+"""Time between notes about too many firings, s."""
 _IDENTITY = Pose(0.0, 0.0, 0.0)
 _NOTES_MAX = 16
 """Notes kept if they are not taken."""
@@ -63,6 +70,8 @@ class PoseStamper:
         Firings dropped: without odometry around them, duplicated, or older than one before.
     out_of_window
         Ranges dropped because they lie beyond the window of their firing.
+    excess_echoes
+        Firings dropped because the ring sends many more than its pattern has.
     jumps
         Jumps of the odometry that were removed.
     origin
@@ -72,6 +81,7 @@ class PoseStamper:
     def __init__(self, sensors: int, body: BodyConfig) -> None:
         self.late_echoes = 0
         self.out_of_window = 0
+        self.excess_echoes = 0
         self.jumps = 0
         self.origin = _IDENTITY
         self._sensors = sensors
@@ -85,11 +95,34 @@ class PoseStamper:
         self._steady = 0
         self._ring_offset = 0.0
         self._window = WINDOW_MAX
+        self._firing_limit = TokenBucket(math.inf, math.inf)
+        self._step_period_ms: int | None = None
+        self._excess_noted_s = -math.inf
         self._notes: deque[str] = deque(maxlen=_NOTES_MAX)
 
-    def set_window(self, tenths_ft: int) -> None:
-        """Set the window, in tenths of a foot, beyond which ranges are dropped."""
-        self._window = tenths_ft
+    def set_pattern(self, window: int, step_period_ms: int) -> None:
+        """Set what the firing pattern allows; more is dropped.
+
+        Parameters
+        ----------
+        window
+            Longest range, tenths of a foot.
+        step_period_ms
+            Time between firings.
+        """
+        self._window = window
+        if step_period_ms != self._step_period_ms:
+            self._step_period_ms = step_period_ms
+            self._firing_limit = TokenBucket(1e3 * _FIRINGS_SHARE / max(step_period_ms, 1), _FIRINGS_BURST)
+
+    @property
+    def clock_error(self) -> float | None:
+        """Relative error of the robot's clock, as found by the last odometry; None if nothing was found."""
+        return self._clock.rate_error
+
+    def note(self, text: str) -> None:
+        """Add a message for the operator."""
+        self._notes.append(text)
 
     def notes(self) -> tuple[str, ...]:
         """Return the messages about the odometry for the operator, and remove them."""
@@ -127,6 +160,9 @@ class PoseStamper:
         t_us = self._clock.read(odom.t_us, run_s)
         if isinstance(t_us, Jump):
             return t_us
+        if self._clock.rate_error is not None and self._clock.rate_error < 0.0:
+            # No reason to stop: objects seem nearer than they are, and an emulator on a busy machine is slow as well.
+            self.note(diagnostics.wrong_clock_rate(self._clock.rate_error))
         reported = odometry_of(odom, t_us)
         sample = self._from_origin(reported)
         newest = self._history.newest
@@ -146,7 +182,10 @@ class PoseStamper:
         return replace(reported, pose=pose, ring_yaw=reported.ring_yaw + self._ring_offset)
 
     def _without_jump(self, reported: Odometry, sample: Odometry) -> Odometry:
-        """Return `sample`, or the prediction from the wheels' speeds if they differ by a jump; then move `origin`."""
+        """Return `sample`, or the prediction from the wheels' speeds if they differ by a jump; then move `origin`.
+
+        A base may move otherwise than it says, as in steps; but none moves as far as after a reset of its odometry.
+        """
         last = self._last
         if last is None:
             return sample
@@ -162,7 +201,7 @@ class PoseStamper:
             self._steady += 1
             return sample
         steady, self._steady = self._steady, 0
-        if steady < _STEADY_SAMPLES:
+        if steady < _STEADY_SAMPLES and off_m <= _RESET_M + _RESET_M_S * dt_s:
             return sample
         self.jumps += 1
         self._notes.append(
@@ -187,8 +226,8 @@ class PoseStamper:
             self.late_echoes += 1
         self._held.append(echo)
 
-    def firings(self) -> list[Firing]:
-        """Return the waiting echoes whose pose is known now, in the order of their firing, and remove them."""
+    def firings(self, run_s: float) -> list[Firing]:
+        """Return the waiting echoes whose pose is known at `run_s`, in the order of their firing; remove them."""
         ready: list[Firing] = []
         newest = self._history.newest
         while self._held and newest is not None:
@@ -199,12 +238,25 @@ class PoseStamper:
             if 0 < ahead_us <= _FUTURE_MAX_US:
                 break
             echo = self._held.popleft()
-            place = self._history.at(t_us * 1e-6, self._gap_max_s)
             # Times passed on only grow: this drops firings older than the last one, and copies of it.
-            if place is None or (self._last_firing_us is not None and t_us <= self._last_firing_us):
+            if self._last_firing_us is not None and t_us <= self._last_firing_us:
+                self.late_echoes += 1
+                continue
+            if not self._firing_limit.take(run_s):
+                self._drop_excess(run_s)
+                continue
+            place = self._history.at(t_us * 1e-6, self._gap_max_s)
+            if place is None:
                 self.late_echoes += 1
                 continue
             self._last_firing_us = t_us
             pose, ring_yaw = place
             ready.append(Firing(t_us * 1e-6, pose, ring_yaw, ranges_of(echo, self._sensors)))
         return ready
+
+    def _drop_excess(self, run_s: float) -> None:
+        """Count a firing that is dropped because there are too many; note it for the operator now and then."""
+        self.excess_echoes += 1
+        if run_s - self._excess_noted_s >= _EXCESS_NOTE_S:
+            self._excess_noted_s = run_s
+            self.note(diagnostics.EXCESS_ECHOES)

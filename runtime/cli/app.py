@@ -13,6 +13,7 @@ import sys
 from cyclopts import App, CycloptsError, Group
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
+from config.files import one_line
 from runtime import VERSION
 from runtime.cli.experiment_commands import experiment
 from runtime.cli.recording_commands import export, figures, recover, replay, report
@@ -75,7 +76,7 @@ def run_command(arguments: list[str]) -> int:
 def print_error(text: str) -> None:
     """Print an error on stderr, each line of it with the name of the program."""
     for line in text.splitlines() or [""]:
-        sys.stderr.write(f"echolocate: {line}\n")
+        sys.stderr.write(f"echolocate: {one_line(line)}\n")
 
 
 if __name__ == "__main__":

@@ -237,7 +237,7 @@ class Console:
         return {**info, "recording": self._commands.recording is not None}
 
     def _on_tuned(self, changed: tuple[Difference, ...]) -> None:
-        self._log.info("configuration changed from the console", changed=[str(difference) for difference in changed])
+        self._console_log.note("configuration changed from the console", changed=[str(one) for one in changed])
 
     def _show_settings(self, settings: Settings) -> None:
         before, self._shown_models = self._shown_models, settings.models

@@ -1,21 +1,47 @@
-"""Alerts to the operator about sensors and odometry while the robot drives; each is sent once."""
+"""Alerts to the operator about sensors and odometry while the robot drives; each is sent once, at a bounded rate."""
 
 from __future__ import annotations
 
+from typing import Final
+
 from drivers.driver import Received
+from drivers.token_bucket import LineLimit
 from perception.pipeline import Perception
 from perception.sensor_report import SensorReport
+
+LINES_PER_S: Final = 1.0
+LINES_BURST: Final = 60.0
+"""Lines at once: two for each sensor of a ring, and some."""
 
 
 class Alerts:
     """Detects new facts from cycle to cycle."""
 
     def __init__(self) -> None:
+        self._limit = LineLimit(LINES_PER_S, LINES_BURST)
         self._changes = 0
         self._reported: dict[int, SensorReport] = {}
 
-    def update(self, received: Received, perception: Perception) -> list[str]:
-        """Return a line for each new fact: what happened, likely cause, next action."""
+    def update(self, received: Received, perception: Perception, run_s: float) -> list[str]:
+        """Return a line for each new fact: what happened, likely cause, next action.
+
+        Parameters
+        ----------
+        received : Received
+            From the robot in this cycle.
+        perception : Perception
+            After the cycle.
+        run_s : float
+            The cycle's beginning; a robot that causes too many lines has the excess counted in the next one.
+        """
+        lines = []
+        for line in self._new_facts(received, perception):
+            left_out = self._limit.take(run_s)
+            if left_out is not None:
+                lines.append(f"{line} ({left_out} such lines were left out before)" if left_out else line)
+        return lines
+
+    def _new_facts(self, received: Received, perception: Perception) -> list[str]:
         lines = list(received.notes)
         if perception.sensor_monitor.changes == self._changes:
             return lines

@@ -16,6 +16,9 @@ GAP_SHARE: Final = 0.9
 GAP_MAX_S: Final = GAP_SHARE * 0.5
 """That time, s, for the protocol's usual deadman of 0.5 s, until the robot reports its own."""
 
+DEADMAN_MAX_S: Final = 2.0
+"""A longer deadman that a robot reports is not relied on, s: what it sent before such a gap is out of date."""
+
 
 class Request(Enum):
     """A change of mode that an operator asks for."""
@@ -107,4 +110,4 @@ def gather_inputs(
 def command_gap_max_s(driver: RobotDriver) -> float:
     """Return the longest time between two commands that the base's deadman allows, s."""
     identity = driver.identity
-    return GAP_MAX_S if identity is None else GAP_SHARE * identity.deadman_s
+    return GAP_MAX_S if identity is None else GAP_SHARE * min(identity.deadman_s, DEADMAN_MAX_S)

@@ -24,6 +24,7 @@ from runtime.cycle.connection import Connection
 from runtime.cycle.drive_requests import DriveRequest
 from runtime.cycle.inputs import Inputs, Request, always_valid, command_gap_max_s, gather_inputs
 from runtime.cycle.live_settings import LiveSettings
+from runtime.cycle.mode_log import ModeLog
 from runtime.cycle.modes import Mode, ModeState
 from runtime.cycle.preparation import (
     Preparation,
@@ -129,7 +130,7 @@ class RobotProcess:
         )
         self._connection = Connection(self._link, self._driver, self._send, self._clock)
         self._memory = MemoryPolicy(timed(COLLECTION, collect_young))
-        self._stop_reasons: list[str] = []
+        self._mode_log = ModeLog(log, self._notifier)
         self._alerts = Alerts()
         self._request: Request | None = None
         self._is_request_valid = self._is_drive_request_valid = always_valid
@@ -220,7 +221,12 @@ class RobotProcess:
                 self._scheduler.close()
                 await self._shut_down(link_task)
         return run_summary(
-            self._state, self._scheduler.stats, self.timing_monitor, self._driver, process_row, self._stop_reasons
+            self._state,
+            self._scheduler.stats,
+            self.timing_monitor,
+            self._driver,
+            process_row,
+            self._mode_log.stop_reasons,
         )
 
     async def _prepare(self, preparation: Preparation) -> None:
@@ -316,8 +322,8 @@ class RobotProcess:
         """Record and show the cycle, and log what is new about mode, sensors and odometry."""
         received, on_firing = record.inputs.received, self._observers.on_firing
         if self._state.mode.entered_since(before):
-            self._report_mode()
-        for line in self._alerts.update(received, self._state.perception):
+            self._mode_log.entered(self._state, record.inputs.run_s)
+        for line in self._alerts.update(received, self._state.perception, record.inputs.run_s):
             self._log.warning(line)
         if on_firing is not None:
             for firing in received.firings:
@@ -327,21 +333,13 @@ class RobotProcess:
         if record.inputs.fault is None:
             self._notifier.alive(record.inputs.run_s)
 
-    def _report_mode(self) -> None:
-        """Log the mode that was entered, and report it to the service manager."""
-        state = self._state.mode
-        if state.mode in {Mode.SAFE_STOP, Mode.FAULT} and state.reason is not None:
-            self._stop_reasons.append(state.reason)
-        self._notifier.status(state.mode.value if state.reason is None else f"{state.mode.value}: {state.reason}")
-        self._log.info("mode", mode=state.mode.value, reason=state.reason, cycle=self._state.cycle)
-
     def _fail(self, error: Exception) -> None:
         """Halt before anything else, then enter FAULT, which is never left, and log the error."""
         self._halt()
         what = f"the cycle failed ({describe_exception(error)})"
         reason = f"{what}, likely through a program error: see the log, then restart the program"
         self._state.mode = self._state.mode.enter(Mode.FAULT, self._clock(), reason)
-        self._report_mode()
+        self._mode_log.entered(self._state, self._clock())
         self._log.error("the cycle failed", exc_info=error)
 
     def _carry_out(self, command: Command, stale_run_s: float) -> None:

@@ -18,6 +18,7 @@ import structlog
 from platformdirs import user_state_path
 
 from config.errors import WRONG_CALL, UserError
+from config.files import one_line
 from runtime.support.background_writer import BackgroundWriter
 
 if TYPE_CHECKING:
@@ -92,7 +93,15 @@ class _LineOutput:
         for listener in (*(() if self._listener is None else (self._listener,)), *self._status.listeners):
             listener({name: value for name, value in event.items() if name not in SECRET})
         if self._status.terminal is not None:
-            self._status.terminal.put((str(self._render(logger, name, dict(event))) + "\n").encode())
+            shown = {name: _printable(name, value) for name, value in event.items()}
+            self._status.terminal.put((str(self._render(logger, name, shown)) + "\n").encode(errors="replace"))
+
+
+def _printable(name: str, value: object) -> object:
+    """Return a field as it may go to a terminal, which obeys control characters wherever they come from."""
+    if not isinstance(value, str):
+        return value
+    return "\n".join(map(one_line, value.split("\n"))) if name == "exception" else one_line(value)
 
 
 def _json(event: Mapping[str, Any]) -> bytes:

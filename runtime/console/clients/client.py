@@ -13,7 +13,8 @@ from typing import Any, Protocol
 
 import orjson
 
-from runtime.console.http.client_limits import Limits, TokenBucket
+from drivers.token_bucket import TokenBucket
+from runtime.console.http.client_limits import Limits
 
 
 class Frame(Protocol):
@@ -108,6 +109,7 @@ class Client:
         self._dropped = 0
         self._queue: deque[bytes] = deque()
         self._queue_bytes = 0
+        self._newest: dict[str, bytes] = {}
         self._wake = asyncio.Event()
         self._sending_since_s: float | None = None
 
@@ -149,6 +151,18 @@ class Client:
         self._queue_bytes += len(data)
         self._wake.set()
 
+    def send_newest(self, kind: str, data: bytes) -> None:
+        """Queue a message in JSON in place of an earlier one of this kind that has not been sent yet.
+
+        What others do must not fill this client's queue: only the newest role and parameters are of use.
+        """
+        earlier = self._newest.get(kind)
+        if earlier is not None and earlier in self._queue:
+            self._queue.remove(earlier)
+            self._queue_bytes -= len(earlier)
+        self._newest[kind] = data
+        self.send_encoded(data)
+
     def send_if_room(self, data: bytes) -> None:
         """Queue a message in JSON that may be dropped; drop it if the queue is half full."""
         if len(self._queue) < self._limits.queue_messages // 2:
@@ -175,6 +189,7 @@ class Client:
         self.is_gone = True
         self._frame = self._challenge = None
         self._queue.clear()
+        self._newest.clear()
         self._queue_bytes = 0
         self._wake.set()
 

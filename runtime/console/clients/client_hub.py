@@ -120,10 +120,10 @@ class ClientHub:
         self._send_challenge(self.challenges.void_all())
 
     def broadcast(self, message: Mapping[str, Any]) -> None:
-        """Send every client the same message."""
+        """Send every client the same message, of which only the newest of its type is of use."""
         data = orjson.dumps(message)
         for client in list(self.clients.values()):
-            client.send_encoded(data)
+            client.send_newest(message["type"], data)
 
     def begin_session(self, session: Mapping[str, Any]) -> None:
         """Send every client new session information, and with its next frame all segments."""
@@ -172,14 +172,13 @@ class ClientHub:
         if client is None:
             return
         client.has_control = self.control.is_held_by(client)
-        client.send(
-            {
-                "type": "role",
-                "role": role_of(client),
-                "asked_by": None if requester is None else requester.name,
-                "client": None if requester is None else requester.number,
-            }
-        )
+        role = {
+            "type": "role",
+            "role": role_of(client),
+            "asked_by": None if requester is None else requester.name,
+            "client": None if requester is None else requester.number,
+        }
+        client.send_newest("role", orjson.dumps(role))
 
 
 def role_of(client: Client) -> str:

@@ -98,7 +98,7 @@ class CommandDispatcher:
             return self._start(call, command, message)
         data = command.handler(call, message.arguments)
         if message.name in LOGGED:
-            self._log.note(f"console command: {message.name}", client.name)
+            self._log.note(f"console command: {message.name}", client=client.name)
         return data
 
     def _check_permission(self, client: Client, command: Command[Any]) -> None:

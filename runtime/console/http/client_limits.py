@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from drivers.token_bucket import LineLimit
 from runtime.console.commands.messages import MESSAGE_MAX_BYTES
 
 if TYPE_CHECKING:
@@ -26,6 +27,14 @@ class Limits:
     message_bytes: int = MESSAGE_MAX_BYTES
     messages_per_s: float = 200.0
     """Ten times what a page sends while it teleoperates the robot."""
+    joins_per_s: float = 4.0
+    """New websockets, in a burst as many as there may be clients: each begins with the messages of a second."""
+    bytes_per_s: float = 65_536.0
+    """Of one connection, in whatever frames; a page sends a fiftieth of it."""
+    bytes_burst: float = 1_048_576.0
+    """A page that edits the map sends a tenth of it at once."""
+    loop_share: float = 0.2
+    """The messages of all clients together take at most this share of the loop's time."""
     stall_s: float = 10.0
     """A client that takes nothing for this long is disconnected."""
     queue_messages: int = 256
@@ -33,35 +42,6 @@ class Limits:
     queue_bytes: int = 1 << 20
     command_age_max_s: float = 1.0
     """A command that can begin a motion is refused if it arrives later: what it was decided on is out of date."""
-
-
-class TokenBucket:
-    """Limits a rate of events, on average and in a burst.
-
-    Parameters
-    ----------
-    rate_per_s : float
-        Tokens added each second.
-    burst : float
-        Tokens the bucket holds; it starts full.
-    """
-
-    def __init__(self, rate_per_s: float, burst: float) -> None:
-        self._rate_per_s = rate_per_s
-        self._burst = burst
-        self._tokens = burst
-        self._updated_s: float | None = None
-
-    def take(self, host_s: float) -> bool:
-        """Take a token and return True; return False if no token is left."""
-        if self._updated_s is not None:
-            added = self._rate_per_s * max(0.0, host_s - self._updated_s)
-            self._tokens = min(self._burst, self._tokens + added)
-        self._updated_s = host_s
-        if self._tokens < 1.0:
-            return False
-        self._tokens -= 1.0
-        return True
 
 
 class ConsoleLog:
@@ -83,8 +63,8 @@ class ConsoleLog:
     def __init__(self, log: FilteringBoundLogger, clock: Callable[[], float]) -> None:
         self._log = log
         self._clock = clock
-        self._buckets = {level: TokenBucket(LOG_LINES_PER_S, LOG_LINES_BURST) for level in ("info", "warning")}
-        self._suppressed = dict.fromkeys(self._buckets, 0)
+        self._limits: dict[str, LineLimit] = {}
+        """By event, of which there are few."""
         self.refusals = 0
 
     def refuse(self, reason: str, client: str) -> None:
@@ -92,14 +72,15 @@ class ConsoleLog:
         self.refusals += 1
         self._write("warning", "console refused", reason=reason, client=client)
 
-    def note(self, event: str, client: str) -> None:
+    def note(self, event: str, **fields: object) -> None:
         """Log what a client did."""
-        self._write("info", event, client=client)
+        self._write("info", event, **fields)
 
-    def _write(self, level: str, event: str, **fields: str) -> None:
-        if not self._buckets[level].take(self._clock()):
-            self._suppressed[level] += 1
+    def _write(self, level: str, event: str, **fields: object) -> None:
+        if event not in self._limits:
+            self._limits[event] = LineLimit(LOG_LINES_PER_S, LOG_LINES_BURST)
+        suppressed = self._limits[event].take(self._clock())
+        if suppressed is None:
             return
-        suppressed, self._suppressed[level] = self._suppressed[level], 0
         more = {"suppressed_before": suppressed} if suppressed else {}
         (self._log.warning if level == "warning" else self._log.info)(event, **fields, **more)

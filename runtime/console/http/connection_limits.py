@@ -13,7 +13,8 @@ from typing import Final
 
 from config.errors import WRONG_CALL, UserError
 from config.settings import ConsoleConfig
-from runtime.console.http.client_limits import TokenBucket
+from drivers.token_bucket import TokenBucket
+from runtime.console.http.client_limits import Limits
 from runtime.console.timed_coroutine import Timed
 from runtime.cycle.callbacks import CONSOLE_RECEIVE
 
@@ -21,7 +22,8 @@ PORTS_TRIED: Final = 20
 """How many successive ports are tried before any free one is taken."""
 ANY_FREE_PORT: Final = 0
 PORT_MAX: Final = 65_535
-BACKLOG: Final = 16
+BACKLOG: Final = 32
+"""Connections that wait, and that one turn of the loop accepts."""
 RECEIVE_BUFFER_BYTES: Final = 16 * 1024
 """The system doubles it for its own bookkeeping; nothing larger arrives in one piece."""
 SEND_BUFFER_BYTES: Final = 64 * 1024
@@ -80,18 +82,27 @@ class TimedProtocol(asyncio.Protocol):
         Handles the connection.
     timed : Timed
         Measures its callbacks.
+    accepts : callable
+        Gets the number of bytes that have come; returns whether the peer may send so many.
     on_lost : callable
         Called when the connection has ended.
     """
 
-    def __init__(self, inner: asyncio.Protocol, timed: Timed, on_lost: Callable[[TimedProtocol], None]) -> None:
+    def __init__(
+        self,
+        inner: asyncio.Protocol,
+        timed: Timed,
+        accepts: Callable[[int], bool],
+        on_lost: Callable[[TimedProtocol], None],
+    ) -> None:
         self._inner = inner
+        self._accepts = accepts
         self._on_lost = on_lost
         self._transport: asyncio.Transport | None = None
         self._is_aborted = False
         # asyncio looks its callbacks up on the object, so attributes can take the place of methods.
         self.connection_made = timed(CONSOLE_RECEIVE, self._made)  # type: ignore[method-assign]
-        self.data_received = timed(CONSOLE_RECEIVE, inner.data_received)  # type: ignore[method-assign]
+        self.data_received = timed(CONSOLE_RECEIVE, self._received)  # type: ignore[method-assign]
         self.connection_lost = timed(CONSOLE_RECEIVE, self._lost)  # type: ignore[method-assign]
         self.eof_received = inner.eof_received  # type: ignore[method-assign]
         self.pause_writing = inner.pause_writing  # type: ignore[method-assign]
@@ -108,6 +119,15 @@ class TimedProtocol(asyncio.Protocol):
         if isinstance(transport, asyncio.Transport):
             self._transport = transport
         if self._is_aborted:
+            self.abort()
+
+    def _received(self, data: bytes) -> None:
+        """Take bytes, before the HTTP library spends time on them; drop a peer that sends too many."""
+        if self._is_aborted:
+            return
+        if self._accepts(len(data)):
+            self._inner.data_received(data)
+        else:
             self.abort()
 
     def _lost(self, error: Exception | None) -> None:
@@ -133,8 +153,8 @@ class ConnectionLimiter:
     ----------
     make_protocol : callable
         Makes the protocol that handles a connection.
-    pending_max : int
-        How many connections there may be that are not websockets.
+    limits : Limits
+        How many connections there may be that are not websockets, and what each may send.
     timed : Timed
         Measures their callbacks.
     on_refused : callable
@@ -146,14 +166,14 @@ class ConnectionLimiter:
     def __init__(
         self,
         make_protocol: Callable[[], asyncio.Protocol],
-        pending_max: int,
+        limits: Limits,
         timed: Timed,
         on_refused: Callable[[str], None],
         clock: Callable[[], float],
     ) -> None:
         self._make_protocol = make_protocol
         self._pending: dict[TimedProtocol, None] = {}  # in the order in which they came
-        self._pending_max = pending_max
+        self._limits = limits
         self._timed = timed
         self._on_refused = on_refused
         self._clock = clock
@@ -164,12 +184,12 @@ class ConnectionLimiter:
         if not self._bucket.take(self._clock()):
             self._on_refused("too many new connections a second")
             return RejectingProtocol()
-        if len(self._pending) >= self._pending_max:
+        if len(self._pending) >= self._limits.connections:
             self._on_refused("too many connections: the oldest is dropped")
             oldest = next(iter(self._pending))
             self._remove(oldest)
             oldest.abort()
-        protocol = TimedProtocol(self._make_protocol(), self._timed, self._remove)
+        protocol = TimedProtocol(self._make_protocol(), self._timed, self._byte_limit(), self._remove)
         self._pending[protocol] = None
         return protocol
 
@@ -178,6 +198,19 @@ class ConnectionLimiter:
         protocol = transport.get_protocol()
         if isinstance(protocol, TimedProtocol):
             self._remove(protocol)
+
+    def _byte_limit(self) -> Callable[[int], bool]:
+        """Return a function that takes bytes of one connection and returns False for too many; that is logged."""
+        limits = self._limits
+        bucket = TokenBucket(limits.bytes_per_s, limits.bytes_burst)
+
+        def accepts(count: int) -> bool:
+            is_accepted = bucket.take(self._clock(), count)
+            if not is_accepted:
+                self._on_refused(f"more than {limits.bytes_per_s:g} bytes a second: the connection is dropped")
+            return is_accepted
+
+        return accepts
 
     def _remove(self, protocol: TimedProtocol) -> None:
         self._pending.pop(protocol, None)

@@ -16,12 +16,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
+from drivers.token_bucket import TokenBucket
 from runtime.console.clients.client import Client
 from runtime.console.clients.client_hub import ClientHub
 from runtime.console.commands.command_error import CommandError
 from runtime.console.http.auth import Auth
 from runtime.console.http.client_limits import ConsoleLog, Limits
-from runtime.console.http.connection_limits import ConnectionLimiter
+from runtime.console.http.connection_limits import BACKLOG, ConnectionLimiter
 from runtime.console.http.log_forwarder import LogForwarder
 from runtime.console.http.static_files import StaticFile, security_headers
 from runtime.console.timed_coroutine import Timed, timed_coroutine
@@ -38,6 +39,12 @@ REASON_MAX: Final = 200
 """Characters of a peer's words that go into the log."""
 HALT_MARK: Final = '"halt"'
 """A message with this near its beginning is read even if its client sends too many."""
+HALT_MAX: Final = 200
+"""Characters of such a message; only a short one is carried out before the messages of other clients."""
+JOINS_BURST: Final = 32
+"""New websockets at once: all pages of a run may be reloaded twice."""
+REST_MAX_S: Final = 0.1
+"""Longest pause after a message, s; longer work was this process being suspended."""
 WRONG_TOKEN: Final = "a wrong token, or none"  # noqa: S105 - a text
 
 
@@ -97,6 +104,9 @@ class Server:
         self._server: asyncio.Server | None = None
         self._limiter: ConnectionLimiter | None = None
         self._is_closing = False
+        self._joins = TokenBucket(context.limits.joins_per_s, JOINS_BURST)
+        self._turn = asyncio.Lock()
+        """Of the client whose message is carried out; clients get it in the order in which they ask."""
 
     async def open(self, listening: socket.socket) -> None:
         """Serve the connections of a listening socket."""
@@ -108,12 +118,12 @@ class Server:
         )
         self._limiter = ConnectionLimiter(
             web_server,
-            context.limits.connections,
+            context.limits,
             context.timed,
             lambda reason: context.log.refuse(reason, "a connection"),
             context.clock,
         )
-        self._server = await asyncio.get_running_loop().create_server(self._limiter, sock=listening)
+        self._server = await asyncio.get_running_loop().create_server(self._limiter, sock=listening, backlog=BACKLOG)
 
     @property
     def is_open(self) -> bool:
@@ -193,9 +203,12 @@ class Server:
             return self._refuse(request, HTTPStatus.FORBIDDEN, problem)
         if context.hub.is_full:
             return self._refuse(request, HTTPStatus.SERVICE_UNAVAILABLE, "too many pages are open")
+        if not self._joins.take(context.clock()):
+            return self._refuse(request, HTTPStatus.SERVICE_UNAVAILABLE, "too many pages are opened at a time")
         websocket = web.WebSocketResponse(
-            compress=False, max_msg_size=context.limits.message_bytes + 1, writer_limit=1, timeout=CLOSE_MAX_S
-        )
+            compress=False, max_msg_size=context.limits.message_bytes + 1, writer_limit=1, timeout=CLOSE_MAX_S,
+            autoping=False,
+        )  # fmt: skip
         await websocket.prepare(request)
         transport = request.transport
         if transport is None or self._is_closing:
@@ -207,7 +220,7 @@ class Server:
             _WebSocketTransport(websocket, transport), str(request.remote), context.session(), has_token=has_token
         )
         self._websockets[client] = websocket
-        context.log.note("console page opened", client.name)
+        context.log.note("console page opened", client=client.name)
         await timed_coroutine(context.timed, CONSOLE_RECEIVE, self._serve(client, websocket))
         return websocket
 
@@ -229,15 +242,16 @@ class Server:
             client.leave()
             context.hub.leave(client)
             context.on_leave(client)
-            context.log.note("console page closed", client.name)
+            context.log.note("console page closed", client=client.name)
             sender.cancel()
             await asyncio.gather(sender, return_exceptions=True)
 
     async def _receive(self, client: Client, websocket: web.WebSocketResponse) -> None:
+        """Take messages until the client leaves or is dropped; a ping counts as a message."""
         context = self._context
         while True:
             message = await websocket.receive()
-            if message.type is not WSMsgType.TEXT:
+            if message.type not in {WSMsgType.TEXT, WSMsgType.PING, WSMsgType.PONG}:
                 if message.type is WSMsgType.BINARY:
                     context.log.refuse("a binary message", client.name)
                     await websocket.close(code=WSCloseCode.UNSUPPORTED_DATA, message=b"text only")
@@ -245,12 +259,33 @@ class Server:
                     context.log.refuse(f"a malformed message: {message.data}"[:REASON_MAX], client.name)
                 return
             is_too_fast = not client.message_bucket.take(context.clock())
-            if not is_too_fast or HALT_MARK in message.data[:200]:
-                context.on_message(client, message.data)
+            if message.type is WSMsgType.TEXT:
+                if not is_too_fast or HALT_MARK in message.data[:HALT_MAX]:
+                    await self._carry_out(client, message.data)
+            elif message.type is WSMsgType.PING and not is_too_fast:
+                await websocket.pong(message.data)
             if is_too_fast:
                 context.log.refuse(f"more than {context.limits.messages_per_s:g} messages a second", client.name)
                 await websocket.close(code=WSCloseCode.POLICY_VIOLATION, message=b"too many messages")
                 return
+
+    async def _carry_out(self, client: Client, text: str) -> None:
+        """Carry out a message in this client's turn, and rest, so that clients cannot fill the loop's time.
+
+        A HALT waits for no turn. In each turn of the loop it is one of each client, and one other message of all.
+        """
+        context = self._context
+        if len(text) <= HALT_MAX and HALT_MARK in text:
+            context.on_message(client, text)
+            await asyncio.sleep(0.0)
+            return
+        async with self._turn:
+            if client.is_gone:
+                return
+            begin_s = context.clock()
+            context.on_message(client, text)
+            rest_s = (context.clock() - begin_s) * (1.0 / context.limits.loop_share - 1.0)
+            await asyncio.sleep(min(rest_s, REST_MAX_S))
 
     async def _send(self, client: Client) -> None:
         """Send to a client until it is gone; report every end but that one as a fault."""

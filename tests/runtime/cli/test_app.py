@@ -8,7 +8,7 @@ import signal
 import pytest
 
 from config.errors import DONE, WRONG_CALL
-from runtime.cli.app import main, run_command
+from runtime.cli.app import main, print_error, run_command
 from tests.runtime.cli.user_errors import error_lines
 
 
@@ -27,6 +27,15 @@ def test_each_problem_has_a_line_of_its_own(capfd: pytest.CaptureFixture[str]) -
     lines = error_lines(capfd.readouterr().err)
     assert len(lines) == len({*lines}) >= 2
     assert not [line for line in lines if sum(word in line for word in ("rate_hz", "half_angle", "nowhere")) != 1]
+
+
+@pytest.mark.promise("P22")
+def test_an_error_has_no_control_characters(capsys: pytest.CaptureFixture[str]) -> None:
+    print_error("the robot '\x1b[2J\x9b1A\u202e' is another one\nthe second line")
+    first, second = capsys.readouterr().err.splitlines()
+    assert first.isprintable()
+    assert "\\u001b[2J" in first
+    assert second == "echolocate: the second line"
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["-h"], [], ["run", "--help"], ["experiment", "--help"]])

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from types import SimpleNamespace
 from typing import Any
 
 from drivers.driver import Received
 from perception.sensor_report import SensorReport
-from runtime.cycle.alerts import Alerts
+from runtime.cycle.alerts import LINES_BURST, LINES_PER_S, Alerts
 
 NOTHING = Received((), None, rebooted=False)
 
@@ -35,19 +36,31 @@ def report(sensor: int, fault: str) -> SensorReport:
 def test_each_fact_is_reported_once() -> None:
     alerts, perception = Alerts(), StubPerception()
     seen: Any = perception
-    assert alerts.update(NOTHING, seen) == []
+    assert alerts.update(NOTHING, seen, 0.0) == []
     perception.report(report(7, "failing"))
-    assert alerts.update(NOTHING, seen) == ["sensor 7 is failing"]
-    assert alerts.update(NOTHING, seen) == []
+    assert alerts.update(NOTHING, seen, 0.0) == ["sensor 7 is failing"]
+    assert alerts.update(NOTHING, seen, 0.0) == []
     perception.report(report(7, "failing"), report(5, "stuck"))
-    assert alerts.update(NOTHING, seen) == ["sensor 5 is stuck"]
+    assert alerts.update(NOTHING, seen, 0.0) == ["sensor 5 is stuck"]
     perception.report(report(5, "crosstalk"))
-    assert alerts.update(NOTHING, seen) == ["sensor 5 is crosstalk", "sensor 7 works again and is used"]
+    assert alerts.update(NOTHING, seen, 0.0) == ["sensor 5 is crosstalk", "sensor 7 works again and is used"]
     perception.report(report(5, "crosstalk"), report(7, "failing"))
-    assert alerts.update(NOTHING, seen) == ["sensor 7 is failing"], "a fault that returned is a new fact"
+    assert alerts.update(NOTHING, seen, 0.0) == ["sensor 7 is failing"], "a fault that returned is a new fact"
 
 
 def test_notes_of_the_driver_are_passed_on() -> None:
     perception: Any = StubPerception()
     received = Received((), None, rebooted=False, notes=("the odometry jumped by 0.30 m",))
-    assert Alerts().update(received, perception) == ["the odometry jumped by 0.30 m"]
+    assert Alerts().update(received, perception, 0.0) == ["the odometry jumped by 0.30 m"]
+
+
+def test_a_robot_that_causes_line_after_line_has_the_excess_counted() -> None:
+    alerts, perception = Alerts(), StubPerception()
+    received = Received((), None, rebooted=False, notes=("it jumped",) * 16)
+    seen: Any = perception
+    lines = [line for k in range(2000) for line in alerts.update(received, seen, 0.05 * k)]
+    assert len(lines) <= LINES_BURST + LINES_PER_S * 100.0
+    left_out = sum(
+        int(re.findall(r"\((\d+) such lines were left out before\)", line)[0]) for line in lines if "(" in line
+    )
+    assert 0 <= 16 * 2000 - len(lines) - left_out < 16 * 20, "all but those since the last line are counted"

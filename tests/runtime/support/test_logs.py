@@ -105,3 +105,17 @@ def test_an_unwritable_state_folder_is_a_warning(
     assert "no log file is written" in warning
     assert str(tmp_path / "state") in warning
     assert "still here" in line
+
+
+@pytest.mark.promise("P22")
+def test_no_control_character_reaches_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Neither of a robot's name nor of an operator's text; the file has them in full, as JSON."""
+    path, hostile = tmp_path / "run.jsonl", "\x1b[2J\x9b1A\r\u202e\nFAULT"
+    with open_log(LogConfig(file=str(path)), terminal=True) as log:
+        log.info("robot ready", robot=hostile, known=[hostile])
+        log.warning(f"the robot {hostile} is another one")
+        log.error("the cycle failed", exc_info=ValueError(hostile))
+    shown = capsys.readouterr().err
+    assert all(line.isprintable() for line in shown.splitlines())
+    assert "\\u001b[2J" in shown
+    assert lines(path)[0]["robot"] == hostile

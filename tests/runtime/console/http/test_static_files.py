@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+
+import pytest
+
 from runtime.console.http.static_files import page_files, security_headers
 
 
@@ -19,3 +23,14 @@ def test_the_policy_allows_nothing_from_elsewhere() -> None:
     assert "default-src 'self'" in policy
     assert "ws://robot:8765" in policy
     assert "unsafe" not in policy
+
+
+@pytest.mark.promise("P22")
+def test_no_script_makes_markup_of_text() -> None:
+    """Names, reasons and lines of the log are put into the page as text."""
+    unsafe = re.compile(
+        rb"innerHTML|outerHTML|insertAdjacentHTML|document\.write|DOMParser|createContextualFragment|eval\("
+    )
+    scripts = {path: file.body for path, file in page_files().items() if path.endswith(".js")}
+    assert len(scripts) > 20
+    assert [path for path, body in scripts.items() if unsafe.search(body)] == []
