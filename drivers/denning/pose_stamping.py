@@ -151,7 +151,8 @@ class PoseStamper:
         self.drop_held()
 
     def drop_held(self) -> None:
-        """Drop the echoes that wait for odometry."""
+        """Drop the echoes that wait for odometry: the line or the robot's clock may be another from now on."""
+        self._clock.break_off()
         self.late_echoes += len(self._held)
         self._held.clear()
 

@@ -80,7 +80,7 @@ class RobotClock:
                 return Jump.BACK
             if t - expected > _AHEAD_MAX_US + _DRIFT * waited_us and not self._trusting:
                 return Jump.AHEAD
-        if self._rate is None or self._trusting:
+        if self._rate is None:
             self._rate = _ClockRate(t, run_s)
         self.rate_error = self._rate.error(t, run_s)
         self._t_us, self._read_s, self._trusting = t, run_s, False
@@ -94,7 +94,12 @@ class RobotClock:
         """Accept the next reading however far ahead it is: the robot has confirmed that it did not restart."""
         self._trusting = True
 
+    def break_off(self) -> None:
+        """Compare the clocks from the next reading on: what lies between is unknown, as after the line was lost."""
+        self._rate = self.rate_error = None
+
     def restart(self) -> None:
         """Discard all readings: the counter restarted at zero."""
-        self._t_us = self._rate = self.rate_error = None
+        self._t_us = None
         self._trusting = False
+        self.break_off()
