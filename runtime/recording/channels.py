@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Final, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple, TypeVar
 
 import orjson
 from pydantic import ValidationError
-from pydantic_core import PydanticCustomError
+from pydantic_core import PydanticCustomError, SchemaValidator
 
 from runtime.recording.schema import (
     Bookmark,
@@ -57,7 +58,7 @@ CHANNELS: Final[Mapping[str, type[Payload]]] = MappingProxyType(
 """Payload type by topic. The order gives the channel numbers in a file, from 1; append new topics at the end."""
 
 MESSAGE_MAX: Final = 8 << 20
-"""Largest message other than a keyframe, bytes: parsed JSON takes up to sixteen times as much memory."""
+"""Largest message other than a keyframe, bytes."""
 
 P = TypeVar("P", bound=Payload)
 
@@ -84,10 +85,30 @@ def decode(kind: type[P], data: bytes) -> P:
     pydantic.ValidationError
         `data` is no JSON of this type, or one of its values is impossible.
     """
-    if len(data) > MESSAGE_MAX and kind is not Keyframe:
-        why = PydanticCustomError("too_large", "a message of {size} bytes", {"size": len(data)})
+    values = sum(data.count(begin) for begin in (b",", b"[", b"{"))
+    if values > kind.VALUES_MAX or (len(data) > MESSAGE_MAX and kind is not Keyframe):
+        about = {"size": len(data), "values": values}
+        why = PydanticCustomError("too_large", "a message of {size} bytes and up to {values} values", about)
         raise ValidationError.from_exception_data(kind.__name__, [{"type": why, "input": None}])
-    return kind.model_validate_json(data)
+    payload: P = _validator(kind).validate_json(data)
+    return payload
+
+
+@functools.cache
+def _validator(kind: type[Payload]) -> SchemaValidator:
+    """Return the validator of a payload type; the type's own one collects the errors of all items of a list."""
+    return SchemaValidator(_ending_at_first_error(kind.__pydantic_core_schema__))
+
+
+def _ending_at_first_error(schema: Any) -> Any:  # noqa: ANN401 - a tree of dictionaries, lists and leaves
+    """Return a copy of a schema by which the validation of a list or tuple ends at its first wrong item."""
+    match schema:
+        case dict():
+            parts = {name: _ending_at_first_error(part) for name, part in schema.items()}
+            return {**parts, "fail_fast": True} if parts.get("type") in {"list", "tuple"} else parts
+        case list() | tuple():
+            return type(schema)(_ending_at_first_error(part) for part in schema)
+    return schema
 
 
 def schema_of(kind: type[Payload]) -> bytes:

@@ -260,7 +260,7 @@ def open_recording(path: Path) -> Iterator[Recording]:
 
 
 def _first_error(error: ValidationError) -> str:
-    first = error.errors(include_url=False)[0]
+    first = error.errors(include_url=False, include_input=False)[0]
     return f"{'.'.join(map(str, first['loc']))}: {' '.join(first['msg'].split())}"
 
 

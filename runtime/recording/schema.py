@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 from itertools import accumulate
-from typing import Annotated, Any, Final, Self, TypeAlias, get_type_hints
+from typing import Annotated, Any, ClassVar, Final, Self, TypeAlias, get_type_hints
 
 import numpy as np
 import zstandard
@@ -43,6 +43,10 @@ class Payload(BaseModel):
 
     model_config = ConfigDict(frozen=True, ser_json_inf_nan="strings", ser_json_bytes="base64",
                               val_json_bytes="base64", use_attribute_docstrings=True)  # fmt: skip
+
+    VALUES_MAX: ClassVar[int] = 300_000
+    """Most values in a message; one of more is not parsed, as each may take a kilobyte until the message is refused.
+    The largest cycle has 1,000 firings of 255 sensors."""
 
 
 class RunInfo(Payload):
@@ -150,6 +154,9 @@ class Bookmark(TimedPayload):
 class MapChange(TimedPayload):
     """Changes of the outline map since the previous message of this type."""
 
+    VALUES_MAX: ClassVar[int] = 800_000
+    """Of a map of 130,000 segments."""
+
     cycle: Count
     whole: bool
     """Whether `added` is the whole map, and all messages before do not count."""
@@ -199,6 +206,9 @@ class ArrayInfo(Payload):
 
 class Keyframe(TimedPayload):
     """The whole state after a cycle, from which a replay can start."""
+
+    VALUES_MAX: ClassVar[int] = 50_000
+    """It has about 1,000, as the arrays are one text."""
 
     cycle: Count
     state: CarriedState  # of the fields of `State`

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from collections.abc import Callable
+
 import jsonschema
 import orjson
 import pytest
@@ -44,3 +48,58 @@ def test_every_schema_is_valid_and_refuses_another_payload(kind: type[Payload]) 
 def test_data_of_another_form_is_refused(data: bytes) -> None:
     with pytest.raises(ValidationError):
         decode(Bookmark, data)
+
+
+MEMORY_MAX_MB = 500
+"""As for other files (P14)."""
+HOSTILE = [
+    ("Cycle", '{"record":{"inputs":{"received":{"firings":[', "{}", "]}}}}"),
+    ("Cycle", '{"record":{"inputs":{"edits":[', "{}", "]}}}"),
+    ("Keyframe", '{"run_s":0,"cycle":1,"state":{"vectors":[', "{}", "]}}"),
+    ("MapChange", '{"removed":[', "-1", "]}"),
+    ("Keyframe", '{"run_s":0,"cycle":1,"data":"', "", '"}'),
+]
+"""Messages of as many values as are allowed, each of them wrong; and a keyframe with 60 MiB of text in its arrays."""
+MEASURE = """
+import resource, sys
+import orjson
+from pydantic import ValidationError
+from runtime.recording import schema
+from runtime.recording.channels import decode
+
+def most_mb():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+before = most_mb()
+for name, begin, item, end in orjson.loads(sys.argv[1]):
+    kind = getattr(schema, name)
+    each = sum(item.count(mark) for mark in ",[{") + 1
+    many = ((item + ",") * ((kind.VALUES_MAX - 20) // each))[:-1].encode() if item else b"A" * (60 << 20)
+    data = b"".join([begin.encode(), many, end.encode()])
+    del many
+    try:
+        decode(kind, data)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        assert first["type"] not in {"too_large", "json_invalid"}, first
+    else:
+        raise AssertionError(begin)
+print(round(most_mb() - before))
+"""
+
+
+@pytest.mark.promise("P21")
+def test_the_memory_of_a_message_is_bounded(measured: Callable[[str], None]) -> None:
+    found = subprocess.run(
+        [sys.executable, "-c", MEASURE, orjson.dumps(HOSTILE).decode()], capture_output=True, check=True, text=True
+    )
+    assert int(found.stdout) < MEMORY_MAX_MB
+    measured(f"messages of as many values as are allowed, each of them wrong: {int(found.stdout)} MB at most")
+
+
+def test_a_message_of_too_many_values_is_not_parsed() -> None:
+    data = b'{"run_s":0,"cycle":1,"state":{},"arrays":[' + b"{}," * MapChange.VALUES_MAX + b"{}]}"
+    for kind in set(CHANNELS.values()):
+        with pytest.raises(ValidationError, match=r"up to \d+ values") as caught:
+            decode(kind, data)
+        assert caught.value.error_count() == 1
