@@ -10,6 +10,7 @@ from types import MappingProxyType
 from unittest import mock
 
 import numpy as np
+import orjson
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
@@ -21,7 +22,7 @@ from runtime.cycle.step import CycleRecord, State
 from runtime.recording.channels import CHANNELS, CYCLE, RawMessage, schema_of
 from runtime.recording.mcap_file import CHUNK_BYTES, INDEX, PROFILE
 from runtime.recording.mcap_scanner import McapScanner
-from runtime.recording.reader import open_recording
+from runtime.recording.reader import cycle_head, open_recording
 from runtime.recording.recorder import Recorder
 from runtime.recording.schema import FORMAT
 from runtime.recording.storage import RecordingTarget, SingleFile
@@ -173,6 +174,17 @@ def rewrite(
             if entry.topic == CYCLE and cycles % 10 == 0:
                 writer.flush()
         writer.finish()
+
+
+def write_with_gap(source: Path, path: Path, cycle: int, gap_s: float) -> None:
+    """Write a recording in which the cycles after one are later by `gap_s` s of the run."""
+    entries = entries_of(source)
+    for k, entry in enumerate(entries):
+        if entry.topic == CYCLE and cycle_head(entry)[0] > cycle:
+            found = orjson.loads(entry.data)
+            found["record"]["inputs"]["run_s"] += gap_s
+            entries[k] = entry._replace(data=orjson.dumps(found))
+    rewrite(entries, path)
 
 
 def verify_file(path: Path, **span: float) -> ReplayResult:

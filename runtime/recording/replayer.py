@@ -33,6 +33,9 @@ from runtime.recording.schema import (
 
 KEYFRAME_HEAD: Final = re.compile(rb'\{"run_s":[^,]+,"cycle":(\d{1,15}),')
 """The start of a keyframe's message, with its cycle's number."""
+GAP_MAX_S: Final = 3.0
+"""Longest time between two cycles, s of the run, that a replay shown at a speed waits for. A cycle takes 1 s at most
+(`config.settings.CycleConfig.rate_hz`), so a longer one is a gap in the recording, of any length."""
 
 
 class KeyframePosition(NamedTuple):

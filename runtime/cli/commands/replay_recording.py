@@ -220,6 +220,7 @@ def live_view(recording: Recording, speed: float, units: Units) -> Iterator[OnSt
     from drivers.registry import make_driver
     from runtime.cli.terminal.view import View
     from runtime.recording.channels import SERIAL, decode
+    from runtime.recording.replayer import GAP_MAX_S
     from runtime.recording.schema import SerialBytes
     from runtime.timing.cycle_stats import CycleStats
 
@@ -227,10 +228,11 @@ def live_view(recording: Recording, speed: float, units: Units) -> Iterator[OnSt
     view = View(settings, console, units) if console.is_terminal and not console.is_dumb_terminal else None
     driver, stats = make_driver(settings), CycleStats(late_after_s=math.inf)
     driver.line_opened(0.0)
-    begin_s: tuple[float, float] | None = None  # of the first cycle, by the run's clock and the host's
+    last_run_s: float | None = None
+    due_s = 0.0  # when the next cycle is due, by the host's clock
 
     def on_step(found: ReplayStep, replayer: Replayer) -> None:
-        nonlocal begin_s
+        nonlocal last_run_s, due_s
         if found.message.topic == SERIAL["in"]:
             for run_s, data in decode(SerialBytes, found.message.data).pieces():
                 driver.receive(data, run_s)
@@ -238,9 +240,15 @@ def live_view(recording: Recording, speed: float, units: Units) -> Iterator[OnSt
         if found.replayed is None or replayer.state is None:
             return
         run_s, host_s = found.replayed.inputs.run_s, time.monotonic()
-        if begin_s is None:
-            begin_s = (run_s, host_s)
-        due_s = begin_s[1] + (run_s - begin_s[0]) / speed
+        if last_run_s is None:
+            due_s = host_s
+        else:
+            gap_s = run_s - last_run_s
+            if gap_s > GAP_MAX_S:
+                console.print(f"no cycle for {gap_s:.0f} s before cycle {found.replayed.cycle}: "
+                              f"shown as {GAP_MAX_S:g} s")  # fmt: skip
+            due_s += min(max(gap_s, 0.0), GAP_MAX_S) / speed
+        last_run_s = run_s
         if due_s > host_s:
             time.sleep(due_s - host_s)
         stats.add_cycle(0.0, max(0.0, host_s - due_s))

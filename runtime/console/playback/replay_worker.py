@@ -22,6 +22,7 @@ from config.settings import Settings
 from runtime.console.playback.replay_cursor import ReplayCursor, ReplayedCycle
 from runtime.cycle.step import CycleRecord
 from runtime.recording.reader import RecordingError, open_recording, parse_settings
+from runtime.recording.replayer import GAP_MAX_S
 
 FRAME_PERIOD_S: Final = 0.05
 """Shortest time between frames, at any speed."""
@@ -136,7 +137,7 @@ class ReplayWorker:
         if self._playing_from is None:
             return math.inf
         since_s, from_s = self._playing_from
-        next_s = self._cursor.time_of(self._cursor.position + 1)
+        next_s = min(self._cursor.time_of(self._cursor.position + 1), self._cursor.t_s + GAP_MAX_S)
         return max(0.0, since_s + (next_s - from_s) / self._speed - self._clock())
 
     def advance(self) -> None:
@@ -180,7 +181,7 @@ class ReplayWorker:
             return
         self._take(replayed)
         host_s, t_s = self._clock(), self._cursor.t_s
-        if host_s - since_s - (t_s - from_s) / self._speed > LAG_MAX_S:
+        if abs(host_s - since_s - (t_s - from_s) / self._speed) > LAG_MAX_S:  # too slow, or after a gap
             self._playing_from = (host_s, t_s)
         if host_s - self._shown_s >= FRAME_PERIOD_S:
             self._shown_s = host_s

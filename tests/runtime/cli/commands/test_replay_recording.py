@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,8 @@ from runtime.analysis.comparison import RunOutcome
 from runtime.cli.app import run_command
 from runtime.cli.commands import replay_recording
 from runtime.cli.commands.replay_recording import Span, errors_line
+from runtime.recording.replayer import GAP_MAX_S
+from tests.recorded import SECONDS, write_with_gap
 
 
 @pytest.mark.parametrize(
@@ -39,25 +42,48 @@ def test_a_verified_replay_has_no_differences(run: Path, tmp_path: Path, capsys:
     assert "240 cycles from cycle 1 on, 0 differences, " in capsys.readouterr().out
 
 
-def test_a_span_at_a_speed_is_paced(
-    run: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """The sleeps add up to the span at that speed. It begins at the keyframe before, at most 2 s earlier."""
-    host_s = 0.0
+class VirtualTime:
+    """Stands for the module `time`: to sleep moves the clock."""
 
-    def sleep(seconds: float) -> None:
-        nonlocal host_s
+    def __init__(self) -> None:
+        self.host_s = 0.0
+
+    def monotonic(self) -> float:
+        return self.host_s
+
+    def sleep(self, seconds: float) -> None:
         assert seconds > 0.0
-        host_s += seconds
+        self.host_s += seconds
 
-    class Clock:
-        monotonic = staticmethod(lambda: host_s)
 
-    Clock.sleep = staticmethod(sleep)  # type: ignore[attr-defined]
-    monkeypatch.setattr(replay_recording, "time", Clock)
+@pytest.fixture
+def virtual_time(monkeypatch: pytest.MonkeyPatch) -> VirtualTime:
+    virtual = VirtualTime()
+    monkeypatch.setattr(replay_recording, "time", virtual)
+    return virtual
+
+
+def test_a_span_at_a_speed_is_paced(run: Path, virtual_time: VirtualTime, capsys: pytest.CaptureFixture[str]) -> None:
+    """The sleeps add up to the span at that speed. It begins at the keyframe before, at most 2 s earlier."""
     assert run_command(["replay", str(run), "--from", "4", "--to", "8", "--speed", "2"]) == DONE
-    assert 1.9 < host_s < 3.1
+    assert 1.9 < virtual_time.host_s < 3.1
     assert ", 0 differences, " in capsys.readouterr().out
+
+
+@pytest.mark.promise("P21")
+@pytest.mark.parametrize("gap_s", [6.0, 1e8, -1e8])
+def test_a_gap_in_time_is_told_and_shortened(
+    gap_s: float, run: Path, tmp_path: Path, virtual_time: VirtualTime, capsys: pytest.CaptureFixture[str],
+    measured: Callable[[str], None],
+) -> None:  # fmt: skip
+    """A run of 12 s at ten times the speed takes 1.2 s, and a gap 0.3 s."""
+    write_with_gap(run, tmp_path / "gap.mcap", 100, gap_s)
+    assert run_command(["replay", str(tmp_path / "gap.mcap"), "--speed", "10"]) == DONE
+    err = capsys.readouterr().err
+    assert (f"no cycle for {gap_s:.0f} s before cycle 101: shown as 3 s\n" in err) == (gap_s > 0.0), err
+    shown_s = SECONDS + (GAP_MAX_S if gap_s > 0.0 else 0.0)
+    assert virtual_time.host_s == pytest.approx(shown_s / 10.0, abs=0.02)
+    measured(f"{SECONDS:g} s with a gap of {gap_s:g} s, shown at 10 times the speed: {virtual_time.host_s:.2f} s")
 
 
 def test_other_settings_are_compared(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,7 +14,8 @@ import pytest
 from runtime.console.playback.replay_cursor import ReplayCursor
 from runtime.console.playback.replay_worker import FRAME_PERIOD_S, FrameParts, ReplayWorker
 from runtime.recording.reader import open_recording, parse_settings
-from tests.recorded import SECONDS
+from runtime.recording.replayer import GAP_MAX_S
+from tests.recorded import SECONDS, write_with_gap
 from tests.runtime.console.stub_frames import make_stub_frames
 
 pytestmark = pytest.mark.compiled
@@ -127,6 +128,19 @@ def test_a_slow_machine_plays_slower_and_does_not_catch_up(it: WorkerCase) -> No
     assert slow_s == pytest.approx(2.5, abs=0.3)
     it.run_for(0.1)
     assert it.last["s"] - slow_s <= 0.1 * 10.0 + 0.25 * 10.0 + 0.6
+
+
+@pytest.mark.promise("P21")
+def test_a_gap_in_time_is_shortened(run: Path, tmp_path: Path) -> None:
+    write_with_gap(run, tmp_path / "gap.mcap", 100, 1e8)
+    with open_recording(tmp_path / "gap.mcap") as recording:
+        case = WorkerCase(ReplayCursor(recording))
+        case.do(do="play", speed=1.0)
+        case.run_for(SECONDS + GAP_MAX_S + 0.5)
+    assert case.last["cycle"] == CYCLES
+    waits = [b - a for (a, *_), (b, *_) in itertools.pairwise(case.frames)]
+    assert max(waits) == pytest.approx(GAP_MAX_S, abs=0.06)
+    assert sum(wait > 0.5 for wait in waits) == 1
 
 
 def test_steps_forward_and_backward(it: WorkerCase) -> None:
