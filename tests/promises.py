@@ -136,7 +136,8 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         "P21": Promise(
             "A hostile recording does no harm",
             "every number of a cycle × {NaN, ±Inf, ±1e308, −1, 2⁶³ − 1}: one line of error or a "
-            "harmless replay; nothing larger than 64 MiB, or than the settings' own state, is decompressed",
+            "harmless replay; the same of every number of a keyframe; nothing larger than 64 MiB, or than the "
+            "settings' own state, is decompressed; a message takes at most 500 MB; a gap in time is shown as 3 s",
         ),
         "P22": Promise(
             "Floods and lies are harmless",

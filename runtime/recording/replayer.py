@@ -7,6 +7,7 @@ comparison, the timeline and the console's playback all consume this iterator.
 
 from __future__ import annotations
 
+import contextlib
 import re
 import time
 from collections.abc import Iterator
@@ -30,6 +31,7 @@ from runtime.recording.schema import (
     perception_snapshot,
     state_fields,
 )
+from runtime.recording.snapshot_bounds import check_snapshot
 
 KEYFRAME_HEAD: Final = re.compile(rb'\{"run_s":[^,]+,"cycle":(\d{1,15}),')
 """The start of a keyframe's message, with its cycle's number."""
@@ -195,7 +197,8 @@ class Replayer:
             )
         self.settings_data, self._settings = data, settings
         if self.state is not None:
-            apply_settings(self.state, self._settings)
+            with self._refusing(self.state.cycle + 1):
+                apply_settings(self.state, self._settings)
 
     def _restore(self, state: State, fields: StateFields, snapshot: Snapshot) -> None:
         """Continue from a fresh state of the settings in force, with other content."""
@@ -205,18 +208,21 @@ class Replayer:
         self.state = state
 
     def _adopt(self, frame: Keyframe) -> None:
-        """Continue from a keyframe.
+        """Continue from a keyframe, after every number in it was checked: compiled kernels check none.
 
         Raises
         ------
         RecordingError
-            It is of other settings, or damaged.
+            It is of other settings, a number in it is out of its bounds, or its objects cannot be listed.
         """
         state = fresh_state(self._settings)
         try:
-            snapshot = perception_snapshot(frame, state.perception.snapshot())
+            fresh = state.perception.snapshot()
+            snapshot = perception_snapshot(frame, fresh)
+            check_snapshot(snapshot, fresh, self._settings)
             self._restore(state, state_fields(frame), snapshot)
-        except ValueError as error:
+            state.perception.labelled_objects()
+        except (ArithmeticError, LookupError, ValueError) as error:
             raise RecordingError(f"{self._recording.path}: the keyframe of cycle {frame.cycle}: {error}") from error
 
     def _cycle(self, message: RawMessage) -> ReplayStep:
@@ -225,14 +231,26 @@ class Replayer:
             self.state = None
             return ReplayStep(message, record)
         started_s = time.perf_counter()
-        try:
+        with self._refusing(record.cycle):
             replayed = replay_cycle(self.state, record, self._settings)
+        return ReplayStep(message, record, replayed, time.perf_counter() - started_s)
+
+    @contextlib.contextmanager
+    def _refusing(self, cycle: int) -> Iterator[None]:
+        """Refuse the recording where a cycle's computation fails.
+
+        Raises
+        ------
+        RecordingError
+            It fails.
+        """
+        try:
+            yield
         except (ArithmeticError, LookupError, ValueError) as error:
             raise RecordingError(
-                f"{self._recording.path}: cycle {record.cycle} cannot be replayed: its inputs or the state before it "
+                f"{self._recording.path}: cycle {cycle} cannot be replayed: its inputs or the state before it "
                 f"are impossible ({type(error).__name__}: {error})"
             ) from error
-        return ReplayStep(message, record, replayed, time.perf_counter() - started_s)
 
     def _keyframe(self, message: RawMessage) -> ReplayStep:
         frame = decode(Keyframe, message.data)

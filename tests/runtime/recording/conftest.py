@@ -9,6 +9,7 @@ from unittest import mock
 import pytest
 
 from tests.recorded import WAIT_S, entries_of, rewrite
+from tests.runtime.recording.edited_run import record_edited
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -26,4 +27,12 @@ def chunked_run(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the recording of 240 cycles in chunks of ten, with a keyframe every two seconds."""
     path = tmp_path_factory.mktemp("chunked") / "hall.mcap"
     rewrite(entries_of(run), path)
+    return path
+
+
+@pytest.fixture(scope="session", params=["bayes", "paper"])
+def edited(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the recording of a run with every kind of edit, by each method."""
+    path = tmp_path_factory.mktemp("edited") / "hall.mcap"
+    record_edited(path, request.param)
     return path

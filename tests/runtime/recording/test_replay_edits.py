@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import orjson
 import pytest
@@ -13,7 +11,6 @@ import pytest
 from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import Teleoperate
 from config.errors import DONE
-from config.load import load_model
 from drivers.messages import Twist
 from perception.edits import (
     ClearMap,
@@ -25,72 +22,16 @@ from perception.edits import (
     RejectObject,
 )
 from runtime.cli.app import run_command
-from runtime.cycle.drive_requests import Legs
-from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
-from runtime.cycle.step import CycleRecord, Edit, State
+from runtime.cycle.step import CycleRecord
 from runtime.recording.channels import CYCLE, RawMessage, decode
 from runtime.recording.reader import open_recording
 from runtime.recording.schema import Cycle
 from runtime.recording.verification import verify_recording
-from runtime.simulation.closed_loop import OperatorInput
-from tests.recorded import entries_of, hall, record, rewrite
+from tests.recorded import entries_of, rewrite
+from tests.runtime.recording.edited_run import SECONDS
 
-SECONDS = 26.0
 CYCLES = round(20 * SECONDS)
-
-
-class Operator:
-    """An operator who arms, gives every kind of drive request, and makes every kind of edit."""
-
-    def __init__(self) -> None:
-        self.done: list[str] = []
-
-    def __call__(self, cycle: int, state: State) -> OperatorInput:
-        request = Request.ARM if cycle in {5, 400} else {370: Request.DISARM, 450: Request.HALT}.get(cycle)
-        drive_request: Any = {200: Goal(0.9, 0.2), 300: Legs(), 460: Goal(float("nan"), 0.0)}.get(cycle)
-        if 250 <= cycle < 280 and cycle % 2 == 0:
-            drive_request = Teleoperate(0.25, 0.1)
-        edits = tuple(self.edits(cycle, state))
-        self.done += [edit.kind for edit in edits]
-        return OperatorInput(request, drive_request, edits)
-
-    def edits(self, cycle: int, state: State) -> Iterator[Edit]:
-        seen = state.perception
-        numbers = sorted(seen.segments().numbers.tolist())
-        objects = sorted((o for o in seen.objects() if o.number is not None), key=lambda o: o.number or 0)
-        if cycle == 150:
-            yield PinSegments(tuple(numbers[:6]), pinned=True)
-            yield DeleteSegments(tuple(numbers[8:14]))
-        elif cycle == 170:
-            yield PlaceModel("semicircle", 0.4, 0.1, 0.5)
-            yield PlaceModel("box", -0.4, 0.2, 0.5)
-        elif cycle in {240, 320} and objects:
-            first = objects[0]
-            yield MoveObject(first.number or 0, first.x + 0.05, first.y - 0.05, first.theta + 0.1)
-            yield ConfirmObject(objects[-1].number or 0)
-        elif cycle == 330 and len(objects) > 1:
-            yield RejectObject(objects[1].number or 0)
-            yield PinSegments(tuple(numbers[:2]), pinned=False)
-            yield RejectObject(999_999)
-        elif cycle == 500:
-            yield ClearMap()
-
-
-@pytest.fixture(scope="module", params=["bayes", "paper"])
-def edited(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("edited") / "hall.mcap"
-    box = load_model("box")
-    before = hall(f"perception.method={request.param}")
-    before = before.model_copy(update={"models": (*before.models, box)})
-    # From cycle 350 on there is one model more.
-    more = before.model_copy(update={"models": (*before.models, box.model_copy(update={"name": "crate"}))})
-    person = Operator()
-    status = record(before, path, SECONDS, operator=person, reloads={350: more})
-    assert status.dropped == 0
-    kinds = "delete_segments pin_segments place_model move_object reject_object confirm_object clear_map"
-    assert set(person.done) == set(kinds.split()), "every kind of edit was tried"
-    return path
 
 
 def records_of(entries: list[RawMessage]) -> list[CycleRecord]:

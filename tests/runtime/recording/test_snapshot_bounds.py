@@ -1,0 +1,313 @@
+"""No number of a keyframe reaches a kernel unchecked: a poisoned one is refused, or is harmless."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from config.load import load_settings
+from config.settings import Settings
+from drivers.messages import Firing
+from perception.pipeline import Perception
+from perception.snapshot import Snapshot
+from runtime.cycle.step import CycleRecord, State
+from runtime.recording.channels import KEYFRAME, decode, encode
+from runtime.recording.reader import RecordingError, open_recording, parse_settings
+from runtime.recording.replayer import Replayer, fresh_state, replay_cycle
+from runtime.recording.schema import Keyframe, StateFields, carried_state, keyframe, perception_snapshot, state_fields
+from runtime.recording.snapshot_bounds import (
+    BOUNDS,
+    CONSTANTS,
+    FINITE,
+    SCRATCH,
+    check_snapshot,
+    end_of,
+    numbers_of,
+    settings_bounds,
+)
+from runtime.simulation.closed_loop import simulate
+from tests.perception.halls import drive
+from tests.recorded import entries_of, rewrite
+
+CHECKED_EVERY = 8
+"""Cycles from one check of an honest state to the next."""
+FOLLOWING = 7
+"""Cycles that are replayed from a poisoned state."""
+POISONED_CYCLE = 314
+"""Objects, pins, placements and a rejection exist by then; an edit follows 6 cycles later."""
+OUT_OF_BOUNDS = "index is out of bounds"
+"""What a compiled kernel raises where bounds are checked; numpy's own text goes on."""
+BOUNDS_CHECKED = os.environ.get("NUMBA_BOUNDSCHECK", "0") not in {"", "0"}
+JOB = "method.memory.state.job."
+RELATED = (JOB + "kind", JOB + "stage", JOB + "lattices", "method.outline.pinned", "method.outline.status")
+"""Fields that are compared with one another."""
+
+
+class Moment(NamedTuple):
+    """A state of a run, and the cycles that follow it."""
+
+    cycle: int
+    settings: Settings
+    fields: StateFields
+    snapshot: Snapshot
+    following: list[CycleRecord]
+
+    def perception(self) -> Perception:
+        """Return perception as a run with these settings starts."""
+        return fresh_state(self.settings).perception
+
+
+def is_honest(perception: Perception, fresh: Snapshot, settings: Settings) -> None:
+    check_snapshot(perception.snapshot(), fresh, settings)
+
+
+@pytest.mark.compiled
+@pytest.mark.promise("P21")
+def test_no_state_of_an_edited_run_is_refused(edited: Path, measured: Callable[[str], None]) -> None:
+    checked = 0
+    with open_recording(edited) as recording:
+        replayer = Replayer(recording)
+        for step in replayer:
+            if step.replayed is not None and step.replayed.cycle % CHECKED_EVERY == 0:
+                assert replayer.state is not None
+                settings = parse_settings(replayer.settings_data)
+                is_honest(replayer.state.perception, fresh_state(settings).perception.snapshot(), settings)
+                checked += 1
+    assert checked == 520 // CHECKED_EVERY
+    measured(f"{checked} states of a run with every kind of edit: 0 refused")
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("method", ["bayes", "paper"])
+def test_no_state_among_irregular_objects_is_refused(method: str) -> None:
+    settings = load_settings("irregular", [f"perception.method={method}"], models=("box", "semicircle"))
+    assert settings.world is not None
+    fresh, kinds = fresh_state(settings).perception.snapshot(), set()
+
+    def on_state(record: CycleRecord, state: State, _start: object) -> None:
+        if record.cycle % CHECKED_EVERY == 0:
+            is_honest(state.perception, fresh, settings)
+        if method == "bayes":
+            kinds.add(int(state.perception.snapshot()["method.memory.state"]["job"]["kind"][0]))
+
+    simulate(settings, settings.world, 1, 15.0, on_state=on_state)
+    assert method == "paper" or len(kinds) == 3, "polygons are initiated and refined"
+
+
+def faulty(firings: Iterator[Firing]) -> Iterator[Firing]:
+    """Let a sensor be dead, one stuck, one deaf and one hear crosstalk now and then."""
+    rng = np.random.default_rng(7)
+    for firing in firings:
+        ranges = firing.ranges_m.copy()
+        ranges[3] = math.nan
+        for sensor, value in ((5, 1.2), (8, math.inf), (11, 0.4 if rng.random() < 0.5 else ranges[11])):
+            if not math.isnan(ranges[sensor]):
+                ranges[sensor] = value
+        yield Firing(firing.robot_s, firing.pose, firing.ring_yaw, ranges)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("method", ["bayes", "paper"])
+def test_no_state_with_faulty_sensors_is_refused(method: str) -> None:
+    settings = load_settings("hallway", [f"perception.method={method}"], models=("box",))
+    assert settings.world is not None
+    perception = Perception(settings.ring, settings.models, settings.perception)
+    fresh = perception.snapshot()
+    for k, firing in enumerate(faulty(drive(settings.world))):
+        perception.observe(firing)
+        while perception.can_refine and perception.refine():
+            pass
+        if k == 300:
+            perception.reset()
+        if k % CHECKED_EVERY == 0:
+            is_honest(perception, fresh, settings)
+    assert {report.sensor for report in perception.sensor_reports()} >= {3, 5}
+
+
+def moments_of(path: Path) -> Iterator[Moment]:
+    """Yield a run's state after `POISONED_CYCLE`, and before it one for each stage of a job on polygons."""
+    with open_recording(path) as recording:
+        records = [record for record in recording.cycle_records() if record.cycle < 345]
+        replayer, stages = Replayer(recording), set[tuple[int, int]]()
+        for step in replayer:
+            state = replayer.state
+            if step.replayed is None or state is None or step.replayed.cycle > POISONED_CYCLE:
+                continue
+            at, snapshot = step.replayed.cycle, state.perception.snapshot()
+            job = snapshot["method.memory.state"]["job"][0] if "method.memory.state" in snapshot else None
+            stage = (0, 0) if job is None else (int(job["kind"]), int(job["stage"]))
+            if at == POISONED_CYCLE or (stage[0] and stage not in stages):
+                stages.add(stage)
+                settings = parse_settings(replayer.settings_data)
+                yield Moment(at, settings, carried_state(state), snapshot, records[at : at + FOLLOWING])
+
+
+def poisons(values: np.ndarray[Any, Any], name: str, settings: Settings) -> list[float]:
+    """Return what to put into a field: the ends of its bound, what lies beyond, and numbers of any size."""
+    bounds = {**BOUNDS, **settings_bounds(settings)}
+    end = end_of(name, bounds)
+    low, high = FINITE if end is None else bounds[end]
+    if values.dtype.kind == "f":
+        return [low, high, math.nan, math.inf, -math.inf, 1e308, -1e308]
+    if values.dtype.kind in "bu":
+        return [0, 1, 2, 255]
+    return [low, high, low - 1, high + 1, -1, -(2**63), 2**63 - 1]
+
+
+def poison_all(moment: Moment, is_replayed: Callable[[str], bool]) -> Counter[str]:
+    """Put each number into each field, everywhere and in its last place; replay what is not refused.
+
+    Return how often a number was refused, how often the replay ended in an error of one line, and how often not.
+    """
+    found = Counter[str]()
+    snapshot = {name: array.copy() for name, array in moment.snapshot.items()}
+    numbers, fresh = dict(numbers_of(snapshot)), dict(numbers_of(moment.perception().snapshot()))
+    for name, values in numbers.items():
+        if name.startswith(SCRATCH) and end_of(name, CONSTANTS) is None:
+            continue
+        some = {one: numbers[one] for one in (name, *RELATED) if one in numbers}
+        before, raw = values.copy(), values.view(np.uint8) if values.dtype.kind == "b" else values
+        places: tuple[Any, ...] = (..., (-1,) * values.ndim)
+        for number, place in itertools.product(poisons(values, name, moment.settings), places):
+            raw[place] = number
+            try:
+                check_snapshot(some, {one: fresh[one] for one in some}, moment.settings)
+            except ValueError:
+                found["refused"] += 1
+            else:
+                if place is ... and is_replayed(name):
+                    found["ended" if ends_in_error(moment, snapshot) else "harmless"] += 1
+            values[...] = before
+    return found
+
+
+def ends_in_error(moment: Moment, snapshot: Snapshot) -> bool:
+    """Restore a state and replay the cycles after it; return whether that ends as the replayer refuses it."""
+    state = fresh_state(moment.settings)
+    try:
+        state.perception.restore(snapshot)
+        for name, value in moment.fields.items():
+            setattr(state, name, value)
+        state.perception.labelled_objects()
+        for record in moment.following:
+            replay_cycle(state, record, moment.settings)
+            state.perception.labelled_objects()
+            state.perception.segments()
+    except (ArithmeticError, LookupError, ValueError) as error:
+        if str(error) == OUT_OF_BOUNDS:
+            raise
+        return True
+    return False
+
+
+def changed(moment: Moment, array: str, *changes: tuple[str, float]) -> Snapshot:
+    """Return a copy of a moment's state with other values of fields; "" stands for the array itself."""
+    snapshot = {name: values.copy() for name, values in moment.snapshot.items()}
+    for fields, value in changes:
+        at: Any = snapshot[array]
+        for field in filter(None, fields.split(".")):
+            at = at[field]
+        at[...] = value
+    return snapshot
+
+
+@pytest.fixture(scope="module")
+def moments(edited: Path) -> dict[int, Moment]:
+    return {moment.cycle: moment for moment in moments_of(edited)}
+
+
+@pytest.mark.compiled
+@pytest.mark.boundscheck
+@pytest.mark.promise("P21")
+def test_every_poisoned_number_is_refused_or_harmless(
+    moments: dict[int, Moment], measured: Callable[[str], None]
+) -> None:
+    """Where array bounds are checked, all fields are tried in a replay; else every seventh, to end no process."""
+    last = moments[POISONED_CYCLE]
+    replayed = [name for name, _ in numbers_of(last.snapshot)][:: 1 if BOUNDS_CHECKED else 7]
+    found = poison_all(last, lambda name: name in replayed)
+    for moment in moments.values():
+        assert not ends_in_error(moment, moment.snapshot)
+        if BOUNDS_CHECKED and moment is not last:
+            found += poison_all(moment, lambda name: name.startswith(JOB) and end_of(name, BOUNDS) is not None)
+    assert found["refused"] > 100
+    assert found["harmless"] > 10 * found["ended"]
+    measured(
+        f"{found.total():,} poisoned numbers: {found['refused']:,} refused, {found['harmless']} harmless, "
+        f"{found['ended']} end in a line of error"
+    )
+
+
+@pytest.mark.compiled
+@pytest.mark.boundscheck
+@pytest.mark.parametrize("number", [2**63 - 1, -(2**63), math.nan, 1e308])
+def test_a_poisoned_scratch_is_harmless(moments: dict[int, Moment], number: float) -> None:
+    for moment in moments.values():
+        snapshot = {name: array.copy() for name, array in moment.snapshot.items()}
+        for name, values in numbers_of(snapshot):
+            if name.startswith(SCRATCH) and end_of(name, CONSTANTS) is None:
+                values[...] = number if values.dtype.kind == "f" or isinstance(number, int) else -1
+        check_snapshot(snapshot, moment.perception().snapshot(), moment.settings)
+        assert not ends_in_error(moment, snapshot)
+
+
+@pytest.mark.boundscheck
+@pytest.mark.skipif(not BOUNDS_CHECKED, reason="detected only with array bounds checked: make boundscheck")
+def test_without_the_check_a_kernel_would_leave_an_array(moments: dict[int, Moment]) -> None:
+    """The test above detects what it is to detect."""
+    moment = moments[POISONED_CYCLE]
+    if "method.outline.start" in moment.snapshot:
+        bad = changed(moment, "method._extractor._sensors", ("newest", 10**9))
+    else:
+        bad = changed(moment, "method.memory.state", ("noise_level", 10**9))
+    with pytest.raises(IndexError, match=f"^{OUT_OF_BOUNDS}$"):
+        ends_in_error(moment, bad)
+
+
+@pytest.mark.compiled
+def test_contradictions_that_would_never_end_are_refused(moments: dict[int, Moment]) -> None:
+    moment = moments[POISONED_CYCLE]
+    if "method.outline.pinned" in moment.snapshot:
+        bad, match = changed(moment, "method.outline.status", ("", 2)), "segments are pinned"
+    else:
+        job = (("job.kind", 2), ("job.stage", 5), ("job.lattices", 5))
+        bad, match = changed(moment, "method.memory.state", *job), "the stage of lattices is not over"
+    with pytest.raises(ValueError, match=match):
+        check_snapshot(bad, moment.perception().snapshot(), moment.settings)
+
+
+@pytest.mark.compiled
+@pytest.mark.promise("P21")
+def test_the_replay_of_a_poisoned_keyframe_ends_in_one_line(edited: Path, tmp_path: Path) -> None:
+    entries = entries_of(edited)
+    chosen = next(k for k, entry in enumerate(entries) if entry.topic == KEYFRAME)
+    frame = decode(Keyframe, entries[chosen].data)
+    with open_recording(edited) as recording:
+        settings = recording.settings
+    fresh = fresh_state(settings).perception.snapshot()
+    moment = Moment(frame.cycle, settings, state_fields(frame), perception_snapshot(frame, fresh), [])
+    array, field = (
+        ("method.outline.start", "") if "method.outline.start" in fresh else ("method.memory.circles", "kind")
+    )
+    bad = keyframe(frame.cycle, frame.run_s, moment.fields, changed(moment, array, (field, 10**9)))
+    rewrite([entries[0], entries[chosen]._replace(data=encode(bad)), *entries[chosen + 1 :]], tmp_path / "x.mcap")
+    with open_recording(tmp_path / "x.mcap") as recording, pytest.raises(RecordingError) as caught:
+        list(Replayer(recording))
+    assert f"{array}.{field}".rstrip(".") + " is 1000000000, expected 0 to " in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_number_without_a_bound_is_refused() -> None:
+    settings = load_settings("hallway")
+    new = {"method.next_index": np.zeros(3, np.int64)}
+    with pytest.raises(ValueError, match=r"method\.next_index has no bound"):
+        check_snapshot(new, new, settings)
+    check_snapshot({"method.next_m": np.zeros(3)}, {"method.next_m": np.zeros(3)}, settings)
