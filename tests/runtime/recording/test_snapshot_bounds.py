@@ -157,7 +157,7 @@ def poisons(values: np.ndarray[Any, Any], name: str, settings: Settings) -> list
     low, high = FINITE if end is None else bounds[end]
     if values.dtype.kind == "f":
         return [low, high, math.nan, math.inf, -math.inf, 1e308, -1e308]
-    if values.dtype.kind in "bu":
+    if values.dtype.kind in {"b", "u"}:
         return [0, 1, 2, 255]
     return [low, high, low - 1, high + 1, -1, -(2**63), 2**63 - 1]
 
