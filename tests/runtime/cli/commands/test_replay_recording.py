@@ -72,7 +72,7 @@ def test_a_span_at_a_speed_is_paced(run: Path, virtual_time: VirtualTime, capsys
 
 @pytest.mark.promise("P21")
 @pytest.mark.parametrize("gap_s", [6.0, 1e8, -1e8])
-def test_a_gap_in_time_is_told_and_shortened(
+def test_a_gap_in_time_is_reported_and_shortened(
     gap_s: float, run: Path, tmp_path: Path, virtual_time: VirtualTime, capsys: pytest.CaptureFixture[str],
     measured: Callable[[str], None],
 ) -> None:  # fmt: skip
