@@ -69,7 +69,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if has_kernels:
             item.add_marker("kernels")
         # Tracing doubles the time of plain Python: too slow for real time, and long tests cover what short ones do.
-        if item.get_closest_marker("realtime") or (item.get_closest_marker("compiled") and not has_kernels):
+        if item.get_closest_marker("realtime") or item.get_closest_marker("compiled"):
             item.add_marker("no_cover")
     slow = slow_kernel_setting()
     if slow is None:

@@ -34,6 +34,7 @@ def test_straight_down_the_papers_hallway(wide: bool) -> None:
     assert run.clearance > 0.45
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("seed", range(3))
 def test_down_an_irregular_hallway_with_noise(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -49,6 +50,7 @@ def test_from_a_crooked_start(y: float, theta: float) -> None:
     assert abs(run.path[-1].y) < 0.1
 
 
+@pytest.mark.compiled
 def test_around_two_drums_in_the_way() -> None:
     world = World(((1.0, 0.25, FOOT), (3.0, -0.25, FOOT)))
     run = drive(world, START, SHIPPED, 40.0, wide=True)

@@ -214,6 +214,7 @@ def assert_one_line(setting: Setting, table: dict[str, Any], folder: Path, expec
     assert lines[0].startswith(expected), str(setting)
 
 
+@pytest.mark.compiled
 @pytest.mark.promise("P11")
 @pytest.mark.parametrize("root", ROOTS)
 def test_wrong_type(root: str, tmp_path: Path) -> None:
@@ -236,6 +237,7 @@ def test_missing(root: str, tmp_path: Path) -> None:
         assert refused(setting, table, tmp_path) == [f"{setting.path}: missing"]
 
 
+@pytest.mark.compiled
 @pytest.mark.promise("P11")
 @pytest.mark.parametrize("root", ROOTS)
 def test_misspelt(root: str, tmp_path: Path) -> None:
@@ -265,6 +267,7 @@ def bounds() -> Iterator[tuple[Setting, float, str]]:
                     yield setting, constraint.le + step, "must be at most "
 
 
+@pytest.mark.compiled
 @pytest.mark.promise("P11")
 def test_out_of_bounds(tmp_path: Path) -> None:
     for setting, value, wanted in bounds():
@@ -274,6 +277,7 @@ def test_out_of_bounds(tmp_path: Path) -> None:
 NUMBERS = [s for s in SETTINGS if s.kind is float]
 
 
+@pytest.mark.compiled
 def test_neither_infinite_nor_nan(tmp_path: Path) -> None:
     for setting in NUMBERS:
         for value in (float("inf"), float("-inf"), float("nan")):

@@ -155,6 +155,7 @@ def rendered(settings: Settings) -> str:
     return settings.model_dump_json()
 
 
+@pytest.mark.compiled
 @pytest.mark.promise("P11")
 def test_any_number_of_random_reloads_are_atomic(measured: Callable[[str], None]) -> None:
     check_reloads(RELOADS, 11, measured)

@@ -56,6 +56,7 @@ def cut_before_bytes(way: Way, outages_s: Sequence[float], stride: int = 1) -> s
     return f"cut before {len(places)} of {total} bytes {way}, for {shown} s: echoes ≤ {worst:.3f} s after reopening"
 
 
+@pytest.mark.compiled
 @pytest.mark.promise("P5")
 @pytest.mark.parametrize("way", WAYS)
 def test_cut_before_any_byte(way: Way, measured: Callable[[str], None]) -> None:

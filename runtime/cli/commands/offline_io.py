@@ -51,7 +51,10 @@ def refuse_unwritable(files: dict[str, str | None]) -> None:
     for option, path in files.items():
         try:
             if path is not None:
+                is_new = not Path(path).exists()
                 Path(path).open("ab").close()
+                if is_new:
+                    Path(path).unlink()
         except OSError as error:
             raise UserError(
                 f"{option} {path}: cannot be written: {error.strerror}; choose another file", FAILED

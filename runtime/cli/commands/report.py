@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from config.errors import DONE
-from runtime.cli.commands.offline_io import plain_console, read_timeline, refuse_overwriting, writing
+from runtime.cli.commands.offline_io import (
+    plain_console,
+    read_timeline,
+    refuse_overwriting,
+    refuse_unwritable,
+    writing,
+)
 from runtime.support.length_format import Units
 from runtime.support.progress import progress
 
@@ -28,6 +34,7 @@ def write_report(source: TimelineSource, out: str | None, *, units: Units) -> in
     console = plain_console(stderr=True)
     target = Path(source.file).with_suffix(".html") if out is None else Path(out)
     refuse_overwriting(source.file, target)
+    refuse_unwritable({"--out": str(target)})
     timeline = read_timeline(source, console)
     write_page(timeline, target, console, units=units)
     plain_console().print(str(target))

@@ -17,7 +17,7 @@ from drivers.denning.frames import Ack, Frame, Halt, Odom
 from tests.drivers.noise import blocks, framed
 from tests.drivers.vectors import Side
 
-pytestmark = pytest.mark.promise("P4")
+pytestmark = [pytest.mark.compiled, pytest.mark.promise("P4")]
 
 HELD_MAX = 1024
 SIDES: tuple[Side, ...] = ("host", "robot")

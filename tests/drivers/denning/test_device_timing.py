@@ -64,6 +64,7 @@ def test_same_seed_same_bytes() -> None:
     assert long_run(3, ()) != long_run(4, ())
 
 
+@pytest.mark.compiled
 @settings(max_examples=8, deadline=None)
 @given(steps=st.lists(st.floats(0, 1), max_size=12).map(sorted))
 def test_the_bytes_do_not_depend_on_how_time_is_split(steps: list[float]) -> None:

@@ -66,6 +66,7 @@ def test_no_reconnect_shortens_a_step(firings: int, measured: Callable[[str], No
     measured(f"{fired:,} firings, {reconnects:,} reconnects: never closer than {tightest:.2f} of a step")
 
 
+@pytest.mark.compiled
 def test_the_schedule_holds_through_a_real_conversation() -> None:
     """The same with the whole driver and robot, the line unplugged every few steps."""
     cable, rng = Cable(), np.random.default_rng(12)

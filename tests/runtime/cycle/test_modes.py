@@ -161,6 +161,7 @@ inputs_of_a_cycle = st.builds(
 )
 
 
+@pytest.mark.compiled
 @given(
     st.lists(inputs_of_a_cycle, min_size=5, max_size=40), st.sampled_from([CONNECTING, READY, DRIVE, STOPPED, FAULT])
 )

@@ -82,6 +82,7 @@ def played(
     return state, again
 
 
+@pytest.mark.compiled
 def test_the_same_inputs_give_the_same_records_to_the_bit(drive: Drive) -> None:
     state, again = played(drive.records)
     assert bits(again) == bits(drive.records)
@@ -102,6 +103,7 @@ def test_a_change_of_one_bit_is_detected(drive: Drive) -> None:
     assert left_behind(state) != left_behind(drive.state)
 
 
+@pytest.mark.compiled
 def test_one_seed_is_one_drive(drive: Drive) -> None:
     assert SETTINGS.world is not None
     records: list[CycleRecord] = []

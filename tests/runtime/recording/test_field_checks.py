@@ -74,6 +74,7 @@ def replayed(entries: list[RawMessage], path: Path) -> str:
     return ""
 
 
+@pytest.mark.compiled
 @pytest.mark.promise("P21")
 def test_every_number_of_a_cycle(small: list[RawMessage], tmp_path: Path) -> None:
     where = [k for k, entry in enumerate(small) if entry.topic == CYCLE]

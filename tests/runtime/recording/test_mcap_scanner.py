@@ -37,6 +37,7 @@ def test_the_chunks_are_those_of_the_stock_reader(small: bytes) -> None:
     assert (scanner.corrupt_regions, scanner.finished) == ([], True)
 
 
+@pytest.mark.compiled
 def test_a_file_cut_off_anywhere_gives_every_complete_chunk(small: bytes) -> None:
     ends = [end for _, end in chunks_at(small)]
     for cut in [*range(0, ends[-1] + 50, 3), *range(ends[-1] + 50, len(small), 101)]:  # beyond is the index
@@ -48,6 +49,7 @@ def test_a_file_cut_off_anywhere_gives_every_complete_chunk(small: bytes) -> Non
             assert found == [], (cut, found)
 
 
+@pytest.mark.compiled
 def test_one_flipped_bit_costs_a_chunk_at_most_and_is_reported(small: bytes) -> None:
     whole, _ = scanned(small)
     rng = random.Random(0)

@@ -188,6 +188,7 @@ def disk_of(size: int) -> Iterator[None]:
 WRITING = {name: command for name, command in COMMANDS.items() if "{out}" in command}
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("command", WRITING.values(), ids=WRITING)
 def test_a_disk_that_fills_up(
     command: tuple[str, ...], hall_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

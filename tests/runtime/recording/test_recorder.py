@@ -101,6 +101,7 @@ def test_the_stock_reader_reads_it_and_messages_fit_their_schemas(run: Path) -> 
         assert sum(1 for _ in NonSeekingReader(file, validate_crcs=True).iter_messages()) == sum(seen.values())
 
 
+@pytest.mark.compiled
 def test_what_does_not_fit_into_the_queue_is_dropped_and_counted(tmp_path: Path) -> None:
     path = tmp_path / "x.mcap"
     settings = hall()
@@ -168,6 +169,7 @@ def test_a_folder_that_cannot_be_created_is_reported(tmp_path: Path) -> None:
     assert status.file is None
 
 
+@pytest.mark.compiled
 def test_the_folder_keeps_its_cap_and_every_part_replays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Small chunks are written as soon as they are full, however late the writer's thread runs.
     monkeypatch.setattr("runtime.recording.mcap_file.CHUNK_BYTES", 16 * 1024)

@@ -14,6 +14,7 @@ from runtime.recording.schema import Cycle, Keyframe, perception_snapshot
 from tests.recorded import entries_of, hall, record, rewrite
 
 
+@pytest.mark.compiled
 def test_a_restored_state_is_whole(run: Path) -> None:
     """Also values that perception derives from its memory and caches."""
     frames = [decode(Keyframe, e.data) for e in entries_of(run) if e.topic == KEYFRAME]

@@ -50,6 +50,7 @@ def write(target: RotatingFolder, part: int, size: int) -> list[str | None]:
     return [first, target.enforce_limits(path)]
 
 
+@pytest.mark.compiled
 @pytest.mark.promise("P20")
 def test_switching_a_hundred_times_removes_no_more_than_was_written(
     tmp_path: Path, measured: Callable[[str], None]
@@ -62,6 +63,7 @@ def test_switching_a_hundred_times_removes_no_more_than_was_written(
     measured("100 parts of 110 bytes in a full folder of 90 recordings: 1 of 10,000 bytes removed")
 
 
+@pytest.mark.compiled
 @pytest.mark.promise("P20")
 def test_any_run_removes_at_most_its_own_bytes_and_only_what_was_named(tmp_path: Path) -> None:
     rng = random.Random(5)

@@ -12,8 +12,8 @@ from runtime.simulation.long_hall import WAY_M
 from runtime.timing.refinement_budget import QuantumBudget
 
 SETTINGS = long_hall_settings(load_settings("irregular"))
-BUDGETS = (0.25, 2, 50)
-"""Quanta per cycle: far too few, few, and more than are ever needed."""
+BUDGETS = (0.25, 50)
+"""Quanta per cycle: far too few, and more than are ever needed."""
 
 pytestmark = pytest.mark.compiled
 
@@ -25,8 +25,8 @@ def sweep() -> dict[float, BudgetRow]:
 
 
 def test_smaller_budgets_report_later_and_end_no_worse(sweep: dict[float, BudgetRow]) -> None:
-    least, few, most = (sweep[budget] for budget in BUDGETS)
-    for row in (least, few, most):
+    least, most = (sweep[budget] for budget in BUDGETS)
+    for row in (least, most):
         assert (row["drums"], row["found"], row["false"]) == (40, 40, 0), row["budget"]
         assert row["mean_error"] is not None
         assert most["mean_error"] is not None
@@ -34,11 +34,9 @@ def test_smaller_budgets_report_later_and_end_no_worse(sweep: dict[float, Budget
         assert row["first_m"] is not None
         assert row["way_m"] is not None
         assert 0.0 < row["first_m"] < row["way_m"] < WAY_M
-    # The order of two objects can make one of them a reading earlier; the robot moves 15 mm per cycle.
-    ways = [sweep[budget]["way_m"] or 0.0 for budget in BUDGETS]
-    assert ways[0] > ways[1] >= ways[2] - 0.03, "a quarter of a quantum per cycle delays the reports"
+    assert (least["way_m"] or 0.0) > (most["way_m"] or 0.0), "a quarter of a quantum per cycle delays the reports"
     assert least["cut_short"] > 0.9
-    assert least["cut_short"] >= few["cut_short"] >= most["cut_short"] == 0.0
+    assert most["cut_short"] == 0.0
     assert least["quanta"] <= 0.25
 
 

@@ -151,6 +151,7 @@ class Run:
         return start
 
 
+@pytest.mark.compiled
 def test_ten_thousand_delays_are_attributed_to_their_causes_and_none_is_invented() -> None:
     run = Run()
     run.begin()

@@ -33,6 +33,7 @@ def firing(robot_s: float) -> Firing:
     return Firing(robot_s, Pose(0.0, 0.0, 0.0), 0.0, np.array([1.0, np.nan, np.inf]))
 
 
+@pytest.mark.compiled
 def test_every_bit_of_every_firing_is_kept(hall_run: Path, tmp_path: Path) -> None:
     with open_recording(hall_run) as recording:
         heard = [f for record in recording.cycle_records() for f in record.inputs.received.firings]

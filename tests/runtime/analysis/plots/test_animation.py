@@ -23,6 +23,7 @@ def _no_ffmpeg(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("runtime.analysis.plots.animation.shutil.which", lambda _name: None)
 
 
+@pytest.mark.compiled
 def test_models_appear_in_the_animation(tmp_path: Path) -> None:
     drawn: list[None] = []
     with styled():

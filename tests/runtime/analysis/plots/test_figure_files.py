@@ -20,6 +20,7 @@ def figure() -> Figure:
     return pictures(synthetic_timeline(), "ft")["models"]
 
 
+@pytest.mark.compiled
 def test_every_format_is_valid_and_the_same_run_is_the_same_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

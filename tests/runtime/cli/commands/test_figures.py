@@ -14,6 +14,7 @@ from tests.runtime.analysis.plots.svg_ids import ids_in
 PICTURES = ("raw", "segments", "clusters", "models")
 
 
+@pytest.mark.compiled
 def test_every_figure_of_a_recording_and_its_animation(
     hall_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

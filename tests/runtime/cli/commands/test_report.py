@@ -10,6 +10,7 @@ from config.errors import DONE, FAILED, WRONG_CALL
 from runtime.cli.app import run_command
 
 
+@pytest.mark.compiled
 def test_the_page_is_written_beside_the_recording(
     hall_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
