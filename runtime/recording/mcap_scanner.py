@@ -10,7 +10,7 @@ import io
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import zstandard
@@ -32,6 +32,8 @@ ZSTD_AT: Final = RECORD_HEADER + 8 + 8 + 8 + 4
 """Offset of the compression's name in a chunk record."""
 CONTENT_MAX: Final = 64 << 20
 """Largest chunk that is decompressed, bytes. Ours have 256 KiB, or one keyframe of up to a few MiB."""
+RECORDS_MAX: Final = 1 << 16
+"""Most records in a chunk that is read; each takes half a kilobyte. Ours have up to a few thousand."""
 HEADER_MAX: Final = 4096
 OPCODES: Final = frozenset(int(code) for code in Opcode)
 UNREADABLE: Final = (McapError, zstandard.ZstdError, ValueError, struct.error, OverflowError, MemoryError)
@@ -179,7 +181,10 @@ class McapScanner:
                 return None
             if zstandard.frame_content_size(chunk.data) != chunk.uncompressed_size:
                 return None
-            records = breakup_chunk(chunk, validate_crc=True)
+            content = zstandard.decompress(chunk.data)
+            if not _has_few_records(content):
+                return None
+            records = breakup_chunk(replace(chunk, compression="", data=content), validate_crc=True)
         except UNREADABLE:
             return None
         if not chunk.uncompressed_crc:
@@ -220,6 +225,16 @@ class McapScanner:
             self._note(summary, "the index is damaged; the messages are whole")
         if end.data_section_crc != zlib.crc32(self._data[:at]) and not self.corrupt_regions:
             self._note(0, "a byte between the chunks is damaged; their messages are whole")
+
+
+def _has_few_records(content: bytes) -> bool:
+    """Return whether a chunk's content has `RECORDS_MAX` records at most."""
+    at = 0
+    for _ in range(RECORDS_MAX + 1):
+        if at + RECORD_HEADER > len(content):
+            return True
+        at += RECORD_HEADER + int(struct.unpack_from("<Q", content, at + 1)[0])
+    return False
 
 
 def _stream(data: memoryview) -> ReadDataStream:

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from config.errors import WRONG_CALL
 from runtime.cli.app import run_command
-from runtime.recording.channels import CYCLE, KEYFRAME, MESSAGE_MAX, RawMessage, decode, encode
+from runtime.recording.channels import CHANNELS, CYCLE, KEYFRAME, LOG, MESSAGE_MAX, RawMessage, decode, encode
 from runtime.recording.field_checks import check_object, check_pieces, check_segments
 from runtime.recording.mcap_scanner import CONTENT_MAX
 from runtime.recording.reader import RecordingError, cycle_head, open_recording
@@ -179,6 +179,17 @@ def test_a_chunk_that_expands_too_far_is_skipped(small: list[RawMessage], tmp_pa
     chunks, scanner = scanned(path.read_bytes())
     assert len(scanner.corrupt_regions) >= 1
     assert all(len(message.data) < CONTENT_MAX for chunk in chunks for message in chunk)
+
+
+@pytest.mark.promise("P21")
+@pytest.mark.parametrize("more", [0, 1])
+def test_a_chunk_of_too_many_messages_is_skipped(more: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A chunk begins with a schema and a channel for each topic that it is the first to have."""
+    monkeypatch.setattr("runtime.recording.mcap_scanner.RECORDS_MAX", 1000)
+    path, definitions = tmp_path / "x.mcap", 2 * len(CHANNELS)
+    rewrite([RawMessage(LOG, 7, b"")] * (1000 - definitions + more), path)
+    chunks, scanner = scanned(path.read_bytes())
+    assert (len(chunks), len(scanner.corrupt_regions)) == (1 - more, more)
 
 
 def test_a_message_that_is_too_large_is_not_parsed() -> None:
