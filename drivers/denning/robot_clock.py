@@ -12,10 +12,10 @@ _DRIFT = 1e-3
 """Greatest relative difference of the two clocks; that of two crystals is a tenth of it."""
 _RATE_ERROR_MAX = 0.01
 """Relative difference beyond which a clock is wrong; ranges and speeds, measured by it, are off by as much."""
-_DELAY_MAX_S = 1.0
-"""Difference of the two clocks that delays on the way may explain, s."""
-_RATE_SPAN_S = 60.0
-"""Clocks are compared over this time or up to twice as much, s: a clock that is 5 % off is found within 26 s."""
+_FIRST_DELAY_MAX_S, _DELAY_MAX_S = 3.0, 1.0
+"""Delay that the very first reading, and the least late one of a period, may have had on the way, s."""
+_FIRST_PERIOD_S, _PERIOD_S = 10.0, 60.0
+"""Clocks are compared from one period to the next, s: a clock that is 5 % fast is found within 36 s."""
 
 
 class Jump(Enum):
@@ -31,21 +31,36 @@ def _nearest(t_us: int, reference_us: int) -> int:
 
 
 class _ClockRate:
-    """Compares the speed of the robot's clock with that of the run's, since a reading up to two minutes ago."""
+    """Compares the speed of the robot's clock with that of the run's.
 
-    def __init__(self, t_us: int, run_s: float) -> None:
-        self._since = self._next = (t_us, run_s)
+    A reading is late by its way, by seconds where this process was stopped. So the least late reading of a period is
+    compared with that of the period before. What is gained on that one is no delay, but a fast clock; a slow clock
+    loses in two periods in a row, while a robot that stood still for a moment loses in one.
+    """
 
-    def error(self, t_us: int, run_s: float) -> float | None:
-        """Return the relative error of the robot's clock, None while it is explained by delays; then start anew."""
-        passed_s = run_s - self._since[1]
-        ahead_s = 1e-6 * (t_us - self._since[0]) - passed_s
-        if abs(ahead_s) > _DELAY_MAX_S + _RATE_ERROR_MAX * passed_s:
-            self._since = self._next = (t_us, run_s)
-            return ahead_s / max(passed_s, 1e-3)
-        if run_s - self._next[1] > _RATE_SPAN_S:
-            self._since, self._next = self._next, (t_us, run_s)
-        return None
+    def __init__(self, ahead_s: float, run_s: float) -> None:
+        self._before = self._least_late = (ahead_s, run_s)
+        self._is_first, self._was_slow = True, False
+        self._end_s = run_s + _FIRST_PERIOD_S
+
+    def error(self, ahead_s: float, run_s: float) -> float | None:
+        """Return the relative error of the robot's clock, `ahead_s` ahead of the run's now; None if it has none."""
+        gained_s, passed_s = ahead_s - self._before[0], run_s - self._before[1]
+        delay_max_s = _FIRST_DELAY_MAX_S if self._is_first else _DELAY_MAX_S
+        if gained_s > delay_max_s + _RATE_ERROR_MAX * passed_s:
+            return gained_s / max(passed_s, 1e-3)
+        self._least_late = max(self._least_late, (ahead_s, run_s))
+        return self._end_period(ahead_s, run_s) if run_s >= self._end_s else None
+
+    def _end_period(self, ahead_s: float, run_s: float) -> float | None:
+        was_slow, error = self._was_slow, 0.0
+        if not self._is_first:
+            passed_s = self._least_late[1] - self._before[1]
+            error = (self._least_late[0] - self._before[0]) / max(passed_s, 1e-3)
+            self._was_slow = error < -_RATE_ERROR_MAX
+        self._before, self._least_late = self._least_late, (ahead_s, run_s)
+        self._is_first, self._end_s = False, run_s + _PERIOD_S
+        return error if was_slow and self._was_slow else None
 
 
 class RobotClock:
@@ -80,9 +95,10 @@ class RobotClock:
                 return Jump.BACK
             if t - expected > _AHEAD_MAX_US + _DRIFT * waited_us and not self._trusting:
                 return Jump.AHEAD
+        ahead_s = 1e-6 * t - run_s
         if self._rate is None:
-            self._rate = _ClockRate(t, run_s)
-        self.rate_error = self._rate.error(t, run_s)
+            self._rate = _ClockRate(ahead_s, run_s)
+        self.rate_error = self._rate.error(ahead_s, run_s)
         self._t_us, self._read_s, self._trusting = t, run_s, False
         return t
 

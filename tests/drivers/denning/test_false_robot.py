@@ -94,7 +94,7 @@ def test_a_fast_clock_ends_the_drive(harness: DriverHarness, speed: float, measu
     """Its ranges and speeds are measured by it: it would see and go wrong by as much."""
     down_s, notes = drive_with_clock(harness, speed, 60.0)
     assert down_s is not None
-    assert down_s <= 26.0
+    assert down_s <= 36.0
     assert notes == []
     assert f"clock runs {speed - 1.0:.1%} too fast" in (harness.robot.problem or "")
     harness.robot.drive(DRIVEN)
@@ -103,9 +103,9 @@ def test_a_fast_clock_ends_the_drive(harness: DriverHarness, speed: float, measu
 
 
 def test_a_slow_clock_is_reported(harness: DriverHarness) -> None:
-    down_s, notes = drive_with_clock(harness, 0.95, 30.0)
+    down_s, notes = drive_with_clock(harness, 0.95, 140.0)
     assert down_s is None
-    assert len(notes) == 1
+    assert len(notes) == 1, "after two periods"
     assert "clock runs 5.0% too slow" in notes[0]
 
 
@@ -120,6 +120,28 @@ def test_a_clock_like_any_other_is_not_complained_about(speed: float, delay_s: f
             late_until_s = run_s + delay_s
         assert not isinstance(clock.read(round(1e6 * speed * run_s), max(run_s, late_until_s)), Jump)
         assert clock.rate_error is None
+
+
+@pytest.mark.parametrize("stop_s", [1.5, 3.0, 30.0, 200.0])
+@pytest.mark.parametrize("at_s", [0.0, 5.0, 30.0, 100.0])
+def test_readings_that_waited_for_a_stopped_process_are_late_and_not_fast(at_s: float, stop_s: float) -> None:
+    """All are read at once afterwards, the oldest first; of those before the very first one, 3 s are kept."""
+    clock, t_s = RobotClock(), 0.0
+    while t_s < at_s + stop_s + 300.0:
+        t_s += 0.02
+        waits = at_s < t_s <= at_s + stop_s
+        if waits and at_s == 0.0 and t_s < stop_s - 3.0:
+            continue
+        clock.read(round(1e6 * t_s), at_s + stop_s if waits else t_s)
+        assert clock.rate_error is None, t_s
+
+
+def test_a_robot_that_stood_still_for_a_moment_is_not_called_slow() -> None:
+    clock, lost_s = RobotClock(), 0.0
+    for k in range(20_000):
+        lost_s += 5.0 * (k in {3000, 12_000})
+        clock.read(round(1e6 * (0.02 * k)), 0.02 * k + lost_s)
+        assert clock.rate_error is None, k
 
 
 @pytest.mark.parametrize("step_us", [-PERIOD_US, -1, -3_000_000_000])

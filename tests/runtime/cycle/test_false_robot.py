@@ -115,7 +115,7 @@ def test_acknowledgements_of_all_numbers_arm_nothing() -> None:
 
 def test_a_drive_by_a_fast_clock_ends_in_a_stop_that_names_it() -> None:
     case = driving(FalseRobot(clock=1.05))
-    case.until(Mode.SAFE_STOP, 30.0)
+    case.until(Mode.SAFE_STOP, 40.0)
     assert "the robot's clock runs 5.0% too fast" in (case.mode.reason or "")
     stopped, drives = case.mode, case.drives
     for _ in range(100):
