@@ -54,7 +54,9 @@ Direction: TypeAlias = Literal["in", "out"]
 """Of bytes on the line, as this process sees it."""
 
 EDITS_MAX: Final = 64
-"""Most edits of the map that wait for one cycle: more than a person makes in its 50 ms."""
+"""Most edits of the map that wait: more than a person makes in a second."""
+EDITS_PER_CYCLE: Final = 2
+"""Most edits that one cycle carries out: each can take several milliseconds, in which no HALT is read."""
 
 OnCycle: TypeAlias = Callable[[CycleRecord, State, CycleStats, RobotDriver], None]
 """Gets a cycle, the state it left, the timing of all cycles, and the driver for the counts of its line."""
@@ -292,7 +294,7 @@ class RobotProcess:
         request = self._request if self._is_request_valid() else None
         drive_request = self._drive_request if self._is_drive_request_valid() else None
         self._request = self._drive_request = None
-        edits, self._edits = tuple(self._edits), []
+        edits, self._edits = tuple(self._edits[:EDITS_PER_CYCLE]), self._edits[EDITS_PER_CYCLE:]
         return gather_inputs(
             self._driver,
             run_s,

@@ -14,10 +14,11 @@ from drivers.denning.codec import Decoder
 from drivers.denning.frames import Echo
 from drivers.driver import RobotDriver
 from drivers.messages import Flags
+from perception.edits import Edit, PlaceModel
 from runtime.cycle.drive_requests import Legs
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
-from runtime.cycle.process import Observers, RobotProcess
+from runtime.cycle.process import EDITS_MAX, EDITS_PER_CYCLE, Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.stall_sampler import StackSample, StallSampler
@@ -63,6 +64,26 @@ def test_a_request_that_is_void_when_the_cycle_takes_it_does_nothing(monkeypatch
         loop.run_until_complete(process.run(arm=False, seconds=4.0))
     assert Mode.DRIVE in modes
     assert process.state.drive_request != Legs()
+
+
+@pytest.mark.promise("P22")
+def test_a_flood_of_edits_is_spread_over_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the order in which they came; what is too much is refused."""
+    taken: list[tuple[Edit, ...]] = []
+    accepted: list[bool] = []
+    flood = [PlaceModel("semicircle", 0.01 * k, 1.0, 0.0) for k in range(100)]
+
+    def on_cycle(record: CycleRecord, _state: State, _stats: CycleStats, _driver: RobotDriver) -> None:
+        taken.append(record.inputs.edits)
+        if record.cycle == 10:
+            accepted.extend(process.edit(edit) for edit in flood)
+
+    with in_virtual_time(monkeypatch, "perception.method=paper") as (loop, settings, _robot, _links):
+        process = RobotProcess(settings, Log().log, Observers(on_cycle), loop.time)
+        loop.run_until_complete(process.run(arm=False, seconds=4.0))
+    assert accepted == [True] * EDITS_MAX + [False] * (100 - EDITS_MAX)
+    assert [edit for edits in taken for edit in edits] == flood[:EDITS_MAX]
+    assert max(map(len, taken)) == EDITS_PER_CYCLE
 
 
 def test_six_drums(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,7 +34,7 @@ from tests.runtime.virtual_time import in_virtual_time
 TO_DISPATCHER, SOAK_TO_DISPATCHER = 5000, 70_000
 OVER_WEBSOCKET, SOAK_OVER_WEBSOCKET = 1000, 30_000
 IN_A_RUN = 2000
-BOUNDLESS = Limits(messages_per_s=1e9, queue_messages=10**9, queue_bytes=10**12)
+BOUNDLESS = Limits(messages_per_s=1e9, bytes_burst=1e12, queue_messages=10**9, queue_bytes=10**12)
 
 ODD: list[Any] = [
     None, True, -1, 0, 2**53, 2**70, 1e308, -0.0, "", "x", "\x00", "halt", "arm", "🤖" * 50, [], [[]], {},
