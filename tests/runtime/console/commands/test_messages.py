@@ -49,3 +49,28 @@ async def test_a_message_without_a_valid_id_is_answered_without_one(text: str) -
         answer = await page.next("answer")
         assert (answer["id"], answer["ok"]) == (None, False)
         assert case.run.asked == []
+
+
+NUMBERS = ["9" * 60_000, "1" + "0" * 400, "-" + "9" * 5000, "1e308", "1e400", "NaN", "-Infinity", "0." + "3" * 60_000]
+DEEP = ["[" * 60_000, '{"a":' * 10_000, '{"id":1,"type":"goal","x":' + "[" * 30_000, '{"id":' + "[" * 30_000]
+
+
+BEYOND = [
+    *(f'{{"id":1,"type":"goal","x":{n},"y":0}}' for n in NUMBERS),
+    *DEEP,
+    '{"id":1,"type":"bookmark","text":"' + "x" * 60_000 + '"}',
+    '{"id":1,"type":"' + "halt" * 15_000 + '"}',
+]
+
+
+@pytest.mark.promise("P22")
+@pytest.mark.parametrize("text", BEYOND, ids=lambda text: text[:34])
+async def test_numbers_depths_and_lengths_beyond_any_use(text: str) -> None:
+    """Answered in a few words, and without effect."""
+    async with open_console() as case:
+        page = await case.page()
+        await page.socket.send_str(text)
+        answer = await page.next("answer")
+        assert answer["ok"] is False
+        assert len(str(answer)) < 1000
+        assert case.run.asked == []
