@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 import os
@@ -16,6 +17,7 @@ import pytest
 from config.load import load_settings
 from config.settings import Settings
 from drivers.messages import Firing
+from perception.paper.outline_map import PINNED
 from perception.pipeline import Perception
 from perception.snapshot import Snapshot
 from runtime.cycle.step import CycleRecord, State
@@ -244,6 +246,37 @@ def test_every_poisoned_number_is_refused_or_harmless(
         f"{found.total():,} poisoned numbers: {found['refused']:,} refused, {found['harmless']} harmless, "
         f"{found['ended']} end in a line of error"
     )
+
+
+def randomised(moment: Moment, rng: np.random.Generator) -> Snapshot:
+    """Return a copy of a state with random numbers, each within its bound, in a random share of its fields."""
+    snapshot = {name: array.copy() for name, array in moment.snapshot.items()}
+    bounds = {**BOUNDS, **settings_bounds(moment.settings)}
+    fields_share, share, size = rng.choice([0.02, 0.1, 0.5]), rng.choice([0.05, 0.5, 1.0]), rng.choice([3, 1e3, 1e12])
+    for name, values in numbers_of(snapshot):
+        if name.startswith(SCRATCH) or end_of(name, CONSTANTS) is not None or rng.random() > fields_share:
+            continue
+        end = end_of(name, bounds)
+        low, high = np.clip(FINITE if end is None else bounds[end], -size, size)
+        new = rng.uniform(low, high, values.shape) if values.dtype.kind == "f" else rng.integers(
+            int(low), int(high), values.shape, endpoint=True
+        )  # fmt: skip
+        values[...] = np.where(rng.random(values.shape) < share, new, values)
+    if "method.outline.pinned" in snapshot:
+        snapshot["method.outline.pinned"][...] = np.count_nonzero(snapshot["method.outline.status"] == PINNED)
+    return snapshot
+
+
+@pytest.mark.compiled
+@pytest.mark.boundscheck
+def test_random_states_within_the_bounds_are_harmless(moments: dict[int, Moment]) -> None:
+    found, rng = Counter[bool](), np.random.default_rng(1)
+    for moment in itertools.islice(itertools.cycle(moments.values()), 90 if BOUNDS_CHECKED else 12):
+        snapshot = randomised(moment, rng)
+        with contextlib.suppress(ValueError):
+            check_snapshot(snapshot, moment.perception().snapshot(), moment.settings)
+            found[ends_in_error(moment, snapshot)] += 1
+    assert found[False] >= 6
 
 
 @pytest.mark.compiled
