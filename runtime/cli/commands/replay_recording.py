@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from rich.console import Console
 
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from runtime.recording.reader import Recording
     from runtime.recording.replayer import Replayer, ReplayStep
     from runtime.recording.verification import OnStep, ReplayResult
+
+SPEED_MIN: Final = 0.001
+"""Slowest replay: a cycle is shown for a minute."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +52,8 @@ class Span:
         for option, value in (("--from", self.since_s), ("--to", self.until_s), ("--speed", self.speed)):
             if value is not None and not (value >= 0.0 and math.isfinite(value)):
                 raise UserError(f"{option} {value}: must be a number, 0 or above", WRONG_CALL)
-        if self.speed == 0.0:
-            raise UserError("--speed 0: must be above 0", WRONG_CALL)
+        if self.speed is not None and self.speed < SPEED_MIN:
+            raise UserError(f"--speed {self.speed:g}: must be {SPEED_MIN} or above", WRONG_CALL)
         if self.until_s is not None and self.until_s <= self.since_s:
             raise UserError(f"--to {self.until_s}: must be after --from {self.since_s}", WRONG_CALL)
 

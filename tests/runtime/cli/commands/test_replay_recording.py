@@ -24,6 +24,7 @@ from tests.recorded import SECONDS, write_with_gap
         (Span(-1.0, None, None), "--from"), (Span(math.nan, None, None), "--from"),
         (Span(0.0, math.inf, None), "--to"),
         (Span(2.0, 2.0, None), "--to"), (Span(0.0, None, 0.0), "--speed"), (Span(0.0, None, -2.0), "--speed"),
+        (Span(0.0, None, 1e-300), "--speed"),
     ],
 )  # fmt: skip
 def test_an_invalid_span_is_refused(span: Span, option: str) -> None:
