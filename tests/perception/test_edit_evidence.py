@@ -189,6 +189,7 @@ def test_models_are_added_while_perception_runs(seen: Perception, firings: list[
     assert other.objects() == seen.objects(), "its state is that of a perception with all models from the start"
 
 
+@pytest.mark.compiled
 def test_every_edit_in_turn_on_the_first_objects(reached_drums: Perception, firings: list[Firing]) -> None:
     """The Bayesian method: each edit takes effect, and a restored snapshot reports the same objects."""
     drum = next(o for o in reached_drums.objects() if o.model == "semicircle")
