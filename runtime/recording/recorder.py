@@ -114,6 +114,7 @@ class Recorder:
         self._keyframe_s = settings.recording.keyframe_period_s
         info = run_info(settings, self._clock.host, emulated=emulated)
         self._writer = RecordingWriter(target, info, self._clock.host, queue_max, on=on)
+        self._run_at, self._queue_item = self._clock.at, self._writer.thread.put
         self._on = on
         self._is_starting = False
         self._last_keyframe_run_s: float | None = None
@@ -226,7 +227,8 @@ class Recorder:
         data : bytes
             What went over the line.
         """
-        self._put(QueuedItem(SERIAL[direction], host_s, self._clock.at(host_s), data))
+        if self._on and not self._is_starting:  # as `_put`, at less cost: several times a cycle
+            self._queue_item(QueuedItem(SERIAL[direction], host_s, self._run_at(host_s), data))
 
     def on_settings(self, settings: Settings) -> None:
         """Record settings in force from the next cycle on; never dropped, as every later cycle needs them."""
@@ -247,10 +249,10 @@ class Recorder:
         self._put(QueuedItem(LOG, host_s, run_s, line))
 
     def _put(self, item: QueuedItem) -> None:
-        if self._on and not self._is_starting and not self._writer.thread.put(item):
+        if self._on and not self._is_starting and not self._queue_item(item):
             self._has_gap = self._has_gap or item.topic == CYCLE
 
     def _put_now(self, topic: str, content: object) -> None:
         """Queue an item of this moment even if the queue is full."""
         run_s, host_s = self._clock.both()
-        self._writer.thread.put(QueuedItem(topic, host_s, run_s, content), always=True)
+        self._queue_item(QueuedItem(topic, host_s, run_s, content), always=True)
