@@ -153,10 +153,10 @@ class SensorMonitor:
 
     def reports(self) -> tuple[SensorReport, ...]:
         """Return a report on each faulty sensor, in the order of the sensors."""
+        faults, stuck_m = self._sensors["faults"], self._sensors["stuck_m"]
         return tuple(
-            describe_fault(i, int(sensor["faults"]), float(sensor["stuck_m"]), self._crosstalk_partners(i))
-            for i, sensor in enumerate(self._sensors)
-            if sensor["faults"]
+            describe_fault(i, int(faults[i]), float(stuck_m[i]), self._crosstalk_partners(i))
+            for i in np.flatnonzero(faults).tolist()
         )
 
     def _crosstalk_partners(self, i: int) -> list[int]:

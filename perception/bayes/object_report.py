@@ -166,10 +166,9 @@ def other_objects(
     found = [wall_object(line.item()) for line in known_walls(memory)]
     circles = memory.circles
     merge_m, models = float(p[0].merge_m), int(p[0].model_count)
-    for t in np.flatnonzero(circles["status"] != FREE).tolist():
+    for t in np.flatnonzero((circles["status"] != FREE) & (circles["hits"] >= UNKNOWN_HITS_MIN)).tolist():
         row = circle_row(memory, t)
-        x, y, hits = row[0], row[1], row[5]
-        if hits < UNKNOWN_HITS_MIN or any(math.dist((x, y), (o.x, o.y)) < merge_m for o in named):
+        if any(math.dist(row[:2], (o.x, o.y)) < merge_m for o in named):
             continue
         probability = float(circles["probability"][t])
         is_rival = circles["status"][t] == ESTABLISHED and circles["kind"][t] >= models and probability >= least
