@@ -11,6 +11,8 @@ WORKERS = $(shell expr 2 \* $$(nproc))
 
 # Python's compiled modules are kept whatever the environment says: a start without them takes twice the processor time.
 unexport PYTHONDONTWRITEBYTECODE
+# As pip does; a company's registry may have a certificate of its own.
+export UV_SYSTEM_CERTS ?= 1
 
 .PHONY: run test check lint kernels tests compiled interpreted boundscheck promises mutants soak bench clean
 
