@@ -104,7 +104,9 @@ def _item(hint: Any) -> Any:  # noqa: ANN401 - an annotation may be anything
         return hint.DTYPE
     if get_origin(hint) is Records:
         return get_args(hint)[0].DTYPE
-    return np.dtype(get_args(get_args(hint)[1])[0])  # of an NDArray
+    while inner := get_args(hint):  # of an NDArray, which numpy spells in several ways
+        hint = inner[-1]
+    return np.dtype(hint)
 
 
 class _RecordList(list[Any]):
