@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import resource
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -176,13 +177,18 @@ def entries_of_any(path: Path) -> list[RawMessage]:
 
 @contextmanager
 def disk_of(size: int) -> Iterator[None]:
-    """Limit the files of this process to `size` bytes, as on a disk that fills up."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    """Limit the files of this process to `size` bytes, as on a disk that fills up.
+
+    Python before 3.13.1 would leave the compiled form of a module cut off there, and every later import would fail.
+    """
+    before, kept = resource.getrlimit(resource.RLIMIT_FSIZE), sys.dont_write_bytecode
+    sys.dont_write_bytecode = True
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     try:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        sys.dont_write_bytecode = kept
 
 
 WRITING = {name: command for name, command in COMMANDS.items() if "{out}" in command}
