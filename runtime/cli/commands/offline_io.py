@@ -51,7 +51,7 @@ def refuse_unwritable(files: dict[str, str | None]) -> None:
     for option, path in files.items():
         try:
             if path is not None:
-                is_new = not Path(path).exists()
+                is_new = not (Path(path).exists() or Path(path).is_symlink())
                 Path(path).open("ab").close()
                 if is_new:
                     Path(path).unlink()
