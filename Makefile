@@ -8,23 +8,23 @@ UV     := $(shell command -v uv)
 COMMA  := ,
 PYTEST := $(BIN)/python -m pytest -q
 WORKERS = $(shell expr 2 \* $$(nproc))
+LINES  := $(VENV)/lines
 
 # Python's compiled modules are kept whatever the environment says: a start without them takes twice the processor time.
 unexport PYTHONDONTWRITEBYTECODE
 # As pip does; a company's registry may have a certificate of its own.
 export UV_SYSTEM_CERTS ?= 1
 
-.PHONY: run test check lint kernels tests compiled interpreted boundscheck promises mutants soak bench clean
+.PHONY: run test check lint kernels tests compiled interpreted coverage boundscheck promises mutants soak bench clean
 
 run: $(VENV)/run.stamp
 	@$(BIN)/echolocate run
 
-# Two at a time where one processor would wait: types are checked while kernels compile, array bounds beside the run
-# without compiled kernels.
+# First what needs no compiled kernels, two at a time. The longest begins.
 test: $(VENV)/test.stamp
-	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target lint kernels
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target boundscheck lint kernels interpreted
 	@$(MAKE) --no-print-directory compiled
-	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target interpreted boundscheck
+	@$(MAKE) --no-print-directory coverage
 
 # What answers within a minute while one edits: lint, types, and the tests of what changed since the last commit.
 check: lint
@@ -41,15 +41,22 @@ kernels: $(VENV)/test.stamp
 	$(BIN)/python -m tests.compile_kernels
 
 tests: compiled interpreted
+	@$(MAKE) --no-print-directory coverage
 
 # All tests. Many of them wait for the clock, so there are twice as many at a time as processors.
 compiled: $(VENV)/test.stamp
-	$(PYTEST) -n $(WORKERS) --dist worksteal -m "not soak" --cov --cov-report=
+	@rm -f $(LINES)/compiled-*
+	LINE_COVERAGE=$(LINES) $(PYTEST) -n $(WORKERS) --dist worksteal -m "not soak"
 
-# Kernels again as plain Python: coverage cannot trace compiled code.
+# Kernels again as plain Python: coverage cannot see into compiled code.
 interpreted: $(VENV)/test.stamp
-	NUMBA_DISABLE_JIT=1 $(PYTEST) -n auto --dist worksteal -m "kernels and not compiled and not realtime and not soak" \
-		--cov --cov-append --cov-report=term:skip-covered --cov-fail-under=90
+	@rm -f $(LINES)/interpreted-*
+	LINE_COVERAGE=$(LINES) NUMBA_DISABLE_JIT=1 $(PYTEST) -n auto --dist worksteal tests/perception tests/drivers/emulator \
+		-m "kernels and not compiled and not realtime and not soak"
+
+# The lines that neither of the two has executed.
+coverage: $(VENV)/test.stamp
+	$(BIN)/python -m slipcover --merge $(LINES)/*.json --out $(VENV)/lines.json --skip-covered --fail-under 95
 
 # Whole drives with array bounds checked, which compiled code does not do by default.
 boundscheck: $(VENV)/test.stamp

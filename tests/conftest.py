@@ -1,11 +1,11 @@
 """Setup of every test run: the kernel cache, reproducible examples, a neutral terminal, and the page of promises.
 
 Numba reads its settings on import, so the cache is configured here, before any test module is imported. A run with
-`NUMBA_DISABLE_JIT=1` (so that coverage can trace kernels) or `NUMBA_BOUNDSCHECK=1` is slower than real time; tests
+`NUMBA_DISABLE_JIT=1` (so that coverage can see into kernels) or `NUMBA_BOUNDSCHECK=1` is slower than real time; tests
 marked `realtime` are skipped there. Tests marked `soak` run only on request.
 
-`make tests` runs everything compiled and with coverage, then the tests of kernels (marker `kernels`) as plain Python,
-because coverage cannot trace compiled code; those marked `compiled` would be too slow there.
+`make tests` runs everything compiled, and the tests of kernels (marker `kernels`) as plain Python, because coverage
+(see tests/line_coverage.py) cannot see into compiled code; those marked `compiled` would be too slow there.
 
 The result of a run must depend on the sources alone: hypothesis generates the same examples in every run (`make soak`
 generates new ones), and the settings of the user's terminal are removed.
@@ -19,15 +19,18 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from coverage import Coverage
 from hypothesis import HealthCheck, settings
 
-from runtime.support import child_process
-from runtime.support.kernel_cache import use_kernel_cache
-from tests import promises
-from tests.compile_kernels import compile_all
+from tests import line_coverage
 
-use_kernel_cache()
+COVERAGE = line_coverage.start()  # before any module of the product is imported
+
+from runtime.support import child_process  # noqa: E402
+from runtime.support.kernel_cache import PARTS, uncompiled_parts, use_kernel_cache  # noqa: E402
+from tests import promises  # noqa: E402
+from tests.compile_kernels import compile_all  # noqa: E402
+
+KERNEL_CACHE = use_kernel_cache()
 
 TERMINAL = ("COLUMNS", "LINES", "FORCE_COLOR", "NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE", "TTY_COMPATIBLE",
             "TTY_INTERACTIVE", "PY_COLORS", "JUPYTER_COLUMNS", "JUPYTER_LINES")  # fmt: skip
@@ -68,9 +71,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         has_kernels = any(item.path.is_relative_to(folder) for folder in KERNEL_TESTS)
         if has_kernels:
             item.add_marker("kernels")
-        # Tracing doubles the time of plain Python: too slow for real time, and long tests cover what short ones do.
-        if item.get_closest_marker("realtime") or item.get_closest_marker("compiled"):
-            item.add_marker("no_cover")
     slow = slow_kernel_setting()
     if slow is None:
         return
@@ -114,16 +114,15 @@ class _PromisesPlugin:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(_PromisesPlugin(config), "promises")
-    if getattr(config.option, "numprocesses", None):
+    if getattr(config.option, "numprocesses", None) and uncompiled_parts(KERNEL_CACHE, PARTS):
         # Compile once here; otherwise every worker process would compile everything.
         compile_all()
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_sessionstart(session: pytest.Session) -> None:
-    """End the first of two measurements that pytest-cov 7.1 starts in a worker: `no_cover` ends the second only."""
-    while hasattr(session.config, "workerinput") and (measurement := Coverage.current()) is not None:
-        measurement.stop()
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish() -> None:
+    if COVERAGE is not None:
+        COVERAGE.write()
 
 
 @pytest.fixture(autouse=True)

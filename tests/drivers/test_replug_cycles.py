@@ -194,7 +194,6 @@ async def test_cut_for_real_within_what_the_robot_says(tmp_path: Path, measured:
     measured(f"{len(CUTS)} cuts on a pty, within the robot's frames: an echo after each replug")
 
 
-@pytest.mark.no_cover  # coverage remembers each of the threads that open the port
 @pytest.mark.promise("P5")
 async def test_unplugged_and_plugged_again_many_times(
     tmp_path: Path, measured: Callable[[str], None]

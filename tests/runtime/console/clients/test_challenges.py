@@ -56,10 +56,13 @@ async def test_every_client_gets_challenges_before_anything_is_cycled() -> None:
 async def test_an_unsent_challenge_is_replaced_by_the_newest() -> None:
     async with open_console() as case:
         sent: list[bytes] = []
+        newest: list[int] = []
+        challenges = case.console.hub.challenges
 
         class Slow:
             async def send(self, data: bytes) -> None:
                 sent.append(data)
+                newest.append(challenges.newest)  # the console's timer may have issued another one by now
 
             def abort(self) -> None:
                 raise AssertionError
@@ -67,10 +70,9 @@ async def test_an_unsent_challenge_is_replaced_by_the_newest() -> None:
         client = case.console.hub.join(Slow(), "slow", {}, has_token=True)
         for _ in range(50):
             case.console.hub.issue_challenge()
-        newest = case.console.hub.challenges.newest
         sender = asyncio.create_task(client.send_all())
-        await case.settled(lambda: len(sent) == 2, "session information and a challenge")
-        assert sent[1] == b'{"type":"challenge","number":%d}' % newest
+        await case.settled(lambda: len(sent) >= 2, "session information and a challenge")
+        assert sent[1] == b'{"type":"challenge","number":%d}' % newest[1]
         case.console.hub.leave(client)
         client.leave()
         await sender
