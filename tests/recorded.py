@@ -113,7 +113,7 @@ def record(
         def on_state(record: CycleRecord, state: State, _start: Pose) -> None:
             recorder.on_cycle(record, state)
             for way in ("in", "out"):
-                recorder.on_bytes(way, now[0], b"\x00bytes\xff")
+                recorder.on_bytes(way, now[0], now[0], b"\x00bytes\xff")
             now[0] += 0.05
             if record.cycle in after:
                 after[record.cycle](recorder)

@@ -157,7 +157,7 @@ async def test_halt_from_a_page_in_time(tmp_path: Path, measured: Callable[[str]
     operator = Operator(asyncio.get_running_loop())
     ears, settings = Decoder("host"), load_settings("hallway", ["console.port=0"])
 
-    def on_bytes(way: str, host_s: float, data: bytes) -> None:
+    def on_bytes(way: str, _run_s: float, host_s: float, data: bytes) -> None:
         is_halt = way == "out" and any(isinstance(frame, Halt) for frame in ears.feed(data))
         if is_halt and operator.asked_s is not None:
             operator.asked_s, operator.halted_s = None, host_s

@@ -166,20 +166,13 @@ def other_objects(
     found = [wall_object(line.item()) for line in known_walls(memory)]
     circles = memory.circles
     merge_m, models = float(p[0].merge_m), int(p[0].model_count)
-    for t in np.flatnonzero((circles["status"] != FREE) & (circles["hits"] >= UNKNOWN_HITS_MIN)).tolist():
-        row = circle_row(memory, t)
+    shown = np.flatnonzero((circles["status"] != FREE) & (circles["hits"] >= UNKNOWN_HITS_MIN))
+    names = (*CIRCLE_FIELDS, "probability", "status", "kind")
+    columns = (circles[name][shown].tolist() for name in names)  # at once: a value at a time takes five times as long
+    for t, *row, probability, status, kind in zip(shown, *columns, strict=True):
         if any(math.dist(row[:2], (o.x, o.y)) < merge_m for o in named):
             continue
-        probability = float(circles["probability"][t])
-        is_rival = circles["status"][t] == ESTABLISHED and circles["kind"][t] >= models and probability >= least
-        found.append(
-            circle_object(row, rival_label(memory, t), probability)
-            if is_rival
-            else circle_object(row, "unknown", 1.0 - probability)
-        )
+        is_rival = status == ESTABLISHED and kind >= models and probability >= least
+        label = rival_label(memory, t) if is_rival else "unknown"
+        found.append(circle_object(tuple(row), label, probability if is_rival else 1.0 - probability))
     return found
-
-
-def circle_row(memory: Memory, t: int) -> Row:
-    """Return the values of `CIRCLE_FIELDS` of circle `t`."""
-    return tuple(memory.circles[name][t].item() for name in CIRCLE_FIELDS)

@@ -68,8 +68,8 @@ class Observers:
 
     on_cycle: OnCycle | None = None
     on_firing: Callable[[Firing], None] | None = None
-    on_bytes: Callable[[Direction, float, bytes], None] | None = None
-    """Gets the direction, the moment by the host's clock, and the bytes that went over the line."""
+    on_bytes: Callable[[Direction, float, float, bytes], None] | None = None
+    """Gets the direction, the moment by the run's clock and by the host's, and the bytes that went over the line."""
     on_settings: Callable[[Settings], None] | None = None
     """Gets settings that changed while the robot runs, before the first cycle under them."""
     on_unprepared_cycle: OnCycle | None = None
@@ -362,7 +362,7 @@ class RobotProcess:
         if self._link.is_open and (data := self._driver.outgoing(writable=self._link.writable)):
             is_sent = self._link.send(data)
             if is_sent and self._observers.on_bytes is not None:
-                self._observers.on_bytes("out", self._clock.host(), data)
+                self._observers.on_bytes("out", *self._clock.both(), data)
 
     def _halt(self) -> None:
         """Send HALT now, whatever else is in progress; on a lost line, as soon as it is open again."""
@@ -379,7 +379,7 @@ class RobotProcess:
         if self._driver.firings_waiting > waiting:
             self._scheduler.on_echo(run_s)
         if self._observers.on_bytes is not None:
-            self._observers.on_bytes("in", host_s, data)
+            self._observers.on_bytes("in", run_s, host_s, data)
 
     def _on_closed(self, reason: str) -> None:
         self._driver.line_closed()

@@ -114,7 +114,7 @@ class Recorder:
         self._keyframe_s = settings.recording.keyframe_period_s
         info = run_info(settings, self._clock.host, emulated=emulated)
         self._writer = RecordingWriter(target, info, self._clock.host, queue_max, on=on)
-        self._run_at, self._queue_item = self._clock.at, self._writer.thread.put
+        self._queue_item = self._writer.thread.put
         self._on = on
         self._is_starting = False
         self._last_keyframe_run_s: float | None = None
@@ -215,20 +215,20 @@ class Recorder:
             objects = MapSnapshot(cycle, objects=perception.objects())
             self._put(QueuedItem(OBJECTS, host_s, run_s, objects))
 
-    def on_bytes(self, direction: str, host_s: float, data: bytes) -> None:
+    def on_bytes(self, direction: str, run_s: float, host_s: float, data: bytes) -> None:
         """Record bytes that were just received or sent over the serial line.
 
         Parameters
         ----------
         direction : {"in", "out"}
             As the program sees it.
-        host_s : float
-            The present moment by the host's clock.
+        run_s, host_s : float
+            The present moment by the run's clock and by the host's.
         data : bytes
             What went over the line.
         """
         if self._on and not self._is_starting:  # as `_put`, at less cost: several times a cycle
-            self._queue_item(QueuedItem(SERIAL[direction], host_s, self._run_at(host_s), data))
+            self._queue_item(QueuedItem(SERIAL[direction], host_s, run_s, data))
 
     def on_settings(self, settings: Settings) -> None:
         """Record settings in force from the next cycle on; never dropped, as every later cycle needs them."""

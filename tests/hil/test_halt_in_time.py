@@ -100,8 +100,8 @@ async def halts(folder: Path, monkeypatch: pytest.MonkeyPatch, trials: int) -> O
     ears, trace = Decoder("host"), folder / "trace.csv"
     settings = load_settings("hallway")
 
-    def on_bytes(way: str, host_s: float, data: bytes) -> None:
-        recorder.on_bytes(way, host_s, data)
+    def on_bytes(way: str, run_s: float, host_s: float, data: bytes) -> None:
+        recorder.on_bytes(way, run_s, host_s, data)
         is_halt = way == "out" and any(isinstance(frame, Halt) for frame in ears.feed(data))
         if is_halt and operator.asked_s is not None:
             operator.asked_s, operator.halted_s = None, host_s

@@ -117,9 +117,12 @@ def record_seed(settings: Settings, seed: int, path: Path) -> SeedOutcome:
             run_s = record.inputs.run_s
             recorder.on_cycle(record, state)
 
+        def on_bytes(direction: str, at_s: float, data: bytes) -> None:
+            recorder.on_bytes(direction, at_s, at_s, data)
+
         if settings.world is None:
             raise UserError("there is no world to drive through", WRONG_CALL)
-        outcome = run_seed(settings, settings.world, seed, on_state, recorder.on_bytes)
+        outcome = run_seed(settings, settings.world, seed, on_state, on_bytes)
         recorder.on_summary(outcome.end)
     if recorder.status.last_error is not None or recorder.status.dropped:
         why = recorder.status.last_error or "the disk was too slow"

@@ -27,6 +27,8 @@ from runtime.cycle.step import CycleRecord, State
 NO_LINK_COUNTS: Final = LinkCounts()
 NO_ECHO: Final = -1.0
 """The wire's form of an infinite range, for which JSON has no number."""
+SEGMENTS_EVERY: Final = 2
+"""While the robot runs, every so many frames show the map's new segments and clusters: half of a frame's cost."""
 
 
 class RecordingStatus(NamedTuple):
@@ -142,7 +144,8 @@ class FrameEncoder:
             What is not in the state.
         """
         self._number += 1
-        segments = self._encode_segments(state)
+        is_moving = not context.is_paused and context.playback is None
+        segments = self._encode_segments(state, may_wait=is_moving and self._number % SEGMENTS_EVERY > 0)
         odometry = state.odometry
         robot_s = 0.0 if odometry is None else odometry.robot_s
         link, phases_s = context.link, context.phases_s or {}
@@ -197,11 +200,11 @@ class FrameEncoder:
                 self._ranges_m[sensor], self._fired_s[sensor] = range_m, firing.robot_s
                 self._fired.add(sensor)
 
-    def _encode_segments(self, state: State) -> bytes:
-        """Return the changes of the map's segments; list them only if they may have changed."""
+    def _encode_segments(self, state: State, *, may_wait: bool) -> bytes:
+        """Return the changes of the map's segments; list them only if they may have changed and may not wait."""
         perception = state.perception
         counts = (perception.counts.segments_total, perception.counts.segments)
-        if counts == self._segment_counts and not self._is_stale:
+        if not self._is_stale and (may_wait or counts == self._segment_counts):
             return self._segments.unchanged()
         self._segment_counts, self._is_stale = counts, False
         now = perception.segments()

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from drivers.messages import Firing, Pose
 from perception.bayes import naming
 from perception.bayes.bayes_method import BayesPerception
-from perception.bayes.object_report import circle_object, circle_row
+from perception.bayes.object_report import CIRCLE_FIELDS, circle_object
 from perception.bayes.range_fit import FAR
 from perception.bayes.state import ESTABLISHED, FREE, TENTATIVE
 from perception.detected_object import DetectedObject
@@ -34,7 +34,13 @@ def fresh_report(perception: BayesPerception) -> list[DetectedObject]:
     n = naming.report_circles(memory.tracks, reported, sure)
     name = SETTINGS.models[0].name
     rows = [t if t >= 0 else ~t for t in sure[:n].tolist()]
-    seen = [circle_object(circle_row(memory, t), name, float(memory.circles["probability"][t])) for t in rows]
+    circles = memory.circles
+    seen = [
+        circle_object(
+            tuple(circles[field][t].item() for field in CIRCLE_FIELDS), name, float(circles["probability"][t])
+        )
+        for t in rows
+    ]
     return sorted(seen, key=lambda o: o.score, reverse=True)
 
 

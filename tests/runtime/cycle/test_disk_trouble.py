@@ -89,11 +89,11 @@ class Drive100:
         observers = recording.observers(on_cycle, log)
         record_bytes = observers.on_bytes
 
-        def on_bytes(way: Any, host_s: float, data: bytes) -> None:
+        def on_bytes(way: Any, run_s: float, host_s: float, data: bytes) -> None:
             if way == "out":
                 self.frames += ears.feed(data)
             if record_bytes is not None:
-                record_bytes(way, host_s, data)
+                record_bytes(way, run_s, host_s, data)
 
         return Observers(observers.on_cycle, observers.on_firing, on_bytes, observers.on_settings)
 

@@ -38,7 +38,7 @@ class Sent:
     decoder: Decoder = field(default_factory=lambda: Decoder("host"))
     frames: list[tuple[float, Frame]] = field(default_factory=list)
 
-    def take(self, way: str, at_s: float, data: bytes) -> None:
+    def take(self, way: str, at_s: float, _host_s: float, data: bytes) -> None:
         if way == "out":
             self.frames += [(at_s, frame) for frame in self.decoder.feed(data)]
 
@@ -110,9 +110,9 @@ def test_a_velocity_delayed_before_the_line_is_followed_by_a_halt(monkeypatch: p
     with in_virtual_time(monkeypatch) as (loop, settings, _robot, _links):
         sent, held = Sent(), list[float]()
 
-        def on_bytes(way: str, at_s: float, data: bytes) -> None:
+        def on_bytes(way: str, at_s: float, host_s: float, data: bytes) -> None:
             before = len(sent.frames)
-            sent.take(way, at_s, data)
+            sent.take(way, at_s, host_s, data)
             drove = any(isinstance(f, Drive) and f.v_mm_s > 0 for _, f in sent.frames[before:])
             if drove and not held:
                 held.append(loop.time())

@@ -111,7 +111,7 @@ def test_an_echo_waits_for_no_timer(monkeypatch: pytest.MonkeyPatch) -> None:
     """The cycle that takes an echo begins at the moment at which the echo's last byte was read from the line."""
     decoder, arrived, waits_s = Decoder("robot"), dict[int, float](), list[float]()
 
-    def on_bytes(way: str, at_s: float, data: bytes) -> None:
+    def on_bytes(way: str, at_s: float, _host_s: float, data: bytes) -> None:
         if way == "in":
             arrived.update((frame.t_us, at_s) for frame in decoder.feed(data) if isinstance(frame, Echo))
 

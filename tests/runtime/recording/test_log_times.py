@@ -50,7 +50,7 @@ def paused(tmp_path_factory: pytest.TempPathFactory) -> Path:
         def on_state(record: CycleRecord, state: State, _start: Pose) -> None:
             host.s += 0.05
             assert clock() == pytest.approx(record.inputs.run_s, abs=1e-6)
-            recorder.on_bytes("in", host.s, b"bytes")
+            recorder.on_bytes("in", clock(), host.s, b"bytes")
             recorder.on_cycle(replace(record, inputs=replace(record.inputs, host_s=host.s)), state)
             if record.cycle == PAUSED_AFTER:
                 clock.pause(0.0)

@@ -67,7 +67,7 @@ class Watched:
         """Run for `LAST` cycles and keep what there was."""
         decoder = Decoder("host")
 
-        def on_bytes(way: str, _host_s: float, data: bytes) -> None:
+        def on_bytes(way: str, _run_s: float, _host_s: float, data: bytes) -> None:
             if way == "out":
                 self.sent += [(len(self.modes), frame) for frame in decoder.feed(data)]
 

@@ -44,7 +44,7 @@ class Watched:
         self.records.append(record)
         self.spend(self.busy_s)
 
-    def on_bytes(self, way: str, host_s: float, _data: bytes) -> None:
+    def on_bytes(self, way: str, _run_s: float, host_s: float, _data: bytes) -> None:
         self.pieces.append((way, host_s))
 
     @property

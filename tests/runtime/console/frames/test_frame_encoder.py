@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from runtime.console.frames.frame_encoder import SEGMENTS_EVERY
 from tests.runtime.console.console_case import ConsoleCase, open_console
 
 Segments = dict[int, list[float]]
@@ -76,3 +77,14 @@ async def test_a_later_client_gets_all_segments() -> None:
         assert frame["segments"]["whole"]
         apply(segments, frame["segments"])
         assert_same_segments(segments, case)
+
+
+async def test_new_segments_come_with_every_second_frame() -> None:
+    async with open_console() as case:
+        page, with_segments = await case.page(), set[int]()
+        for k in range(60):
+            case.cycles()
+            frame = await page.next("state")
+            if frame["segments"]["added"]:
+                with_segments.add(k % SEGMENTS_EVERY)
+        assert with_segments == {SEGMENTS_EVERY - 1}
