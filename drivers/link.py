@@ -29,6 +29,14 @@ _BUFFER_MAX = 4096
 """Bytes waiting beyond which nothing is accepted; the room above `_WRITABLE_MAX` is for a HALT."""
 _OPEN_TIMEOUT_S = 3.0
 """Longest time to open a port, s; a good one takes milliseconds, some USB adapters a second."""
+_READ_MAX = 4096
+"""Most bytes of one read: as many as a terminal's buffer holds."""
+_HELD_BYTES_MAX = 1024
+"""Most bytes that may arrive while the line is not read: a quarter of what a terminal's buffer holds."""
+_BITS_PER_BYTE = 10
+"""On the line: a start bit, eight data bits, a stop bit."""
+_HOLD_MIN_S = 0.005
+"""Shortest hold, s: a shorter one costs more than it saves."""
 _FLUSH_S = 0.2
 """Longest time to send what is waiting when the line is closed, s."""
 _FLUSH_POLL_S = 0.002
@@ -106,6 +114,20 @@ class Link:
         if data:
             line.transport.write(data)
         return True
+
+    def hold(self, seconds: float) -> None:
+        """Read nothing for this long, so that one wake-up takes what arrives meanwhile; sending is not affected.
+
+        The line's own buffer keeps the bytes, so that a hold never lasts longer than it takes to fill a part of it.
+        """
+        seconds = min(seconds, _HELD_BYTES_MAX * _BITS_PER_BYTE / self._config.baud)
+        if self._line is not None and seconds > _HOLD_MIN_S:
+            self._line.transport.hold(seconds)
+
+    def release(self) -> None:
+        """Read again at once."""
+        if self._line is not None:
+            self._line.transport.release()
 
     async def open_once(self) -> None:
         """Open the line, unless it is already open.
@@ -186,12 +208,45 @@ class Link:
 
 
 class _Transport(serial_asyncio.SerialTransport):  # type: ignore[misc]  # the library has no types
-    """The library's transport with three changes.
+    """The library's transport with four changes.
 
     Bytes are written at once, as far as the line accepts them: if they waited for the loop's next turn, whatever
-    delays that turn would delay a command, which may then be wrong. An unplugged cable is not reported as a program
-    error. And every end is an abort.
+    delays that turn would delay a command, which may then be wrong. Bytes are read by one system call in place of
+    three, and not at all while the line is held. An unplugged cable is not reported as a program error. And every end
+    is an abort.
     """
+
+    _held: asyncio.TimerHandle | None = None
+
+    def hold(self, seconds: float) -> None:
+        """Read nothing for this long."""
+        if self._has_reader and not self._closing:
+            self._remove_reader()
+            self._held = self._loop.call_later(seconds, self.release)
+
+    def release(self) -> None:
+        """End a hold: read what has arrived, and whatever arrives from now on."""
+        if self._held is None:
+            return
+        self._held.cancel()
+        self._held = None
+        if not self._closing:
+            self._ensure_reader()
+            self._read_ready(is_certain=False)
+
+    def _read_ready(self, *, is_certain: bool = True) -> None:
+        """Read what has arrived; `is_certain` if the system reports that there is something."""
+        try:
+            data = os.read(self._serial.fileno(), _READ_MAX)
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError as e:
+            self._abort(e)
+            return
+        if data:
+            self._protocol.data_received(data)
+        elif is_certain:
+            self._abort(OSError("it reports data and has none"))
 
     def write(self, data: bytes) -> None:
         if self._closing:

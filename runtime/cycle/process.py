@@ -130,6 +130,7 @@ class RobotProcess:
             timed(LINK_RECEIVE, self._on_data),
             timed(LINE_LOST, self._on_closed),
         )
+        self._clock.on_change(self._link.release)
         self._connection = Connection(self._link, self._driver, self._send, self._clock)
         self._memory = MemoryPolicy(timed(COLLECTION, collect_young))
         self._mode_log = ModeLog(log, self._notifier)
@@ -259,8 +260,9 @@ class RobotProcess:
                     if seconds is not None and now.run_s - begin_run_s >= seconds:
                         return
                     self._cycle(now)
-                    slack_s = scheduler.end(self._clock())
-                    self._memory.cycle_done(slack_s)
+                    end_run_s = self._clock()
+                    self._memory.cycle_done(scheduler.end(end_run_s))
+                    self._link.hold(scheduler.quiet_s(end_run_s))
                 except Exception as error:  # noqa: BLE001 - whatever it is, the robot must stop first
                     self._fail(error)
                     return

@@ -99,6 +99,10 @@ class CycleScheduler:
         self.timing_monitor.end()
         return self._started().advance(run_s) - run_s
 
+    def quiet_s(self, run_s: float) -> float:
+        """Return for how long after `run_s` no echo is expected, s; zero while the run's time is scaled or paused."""
+        return self._started().quiet_until_s - run_s if self._clock.is_real_time else 0.0
+
     def close(self) -> None:
         """Release the timer; there is no further cycle."""
         self._waker.close()

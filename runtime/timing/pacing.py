@@ -18,6 +18,9 @@ EARLY: Final = 0.5
 ECHO_WAIT_SHARE: Final = 0.25
 """Wait this fraction of a step past the expected echo; then the cycle begins without it."""
 
+LISTEN_SHARE: Final = 0.25
+"""Before an echo is due by more than this fraction of a step, the line need not be read."""
+
 LOST_STEPS: Final = 2.5
 """Steps without an echo after which cycles return to their own grid."""
 
@@ -94,6 +97,15 @@ class Pacer:
     def is_locked(self) -> bool:
         """True while cycles follow the echoes."""
         return self._is_locked
+
+    @property
+    def quiet_until_s(self) -> float:
+        """Until when no echo is expected, so that the line need not be read; −inf where that is not known."""
+        if not self._is_locked or self._echo_s is None or self._last_begin_s is None:
+            return -math.inf
+        if self._last_begin_s - self._echo_s > EARLY * self._slot_s:
+            return -math.inf  # the cycle began without its echo, which may come at any time
+        return min(self._due_s, self._echo_s + self._step_s) - LISTEN_SHARE * self._slot_s
 
     def on_echo(self, run_s: float, busy_since_s: float | None = None) -> None:
         """Count an echo: it begins the next cycle at once unless it comes too early for that.

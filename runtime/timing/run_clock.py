@@ -49,6 +49,11 @@ class RunClock:
         host_s = self.host()
         return self.at(host_s), host_s
 
+    @property
+    def is_real_time(self) -> bool:
+        """Whether the run's time passes as the host's."""
+        return True
+
     def expect(self, due_s: float) -> float:
         """Announce the next cycle and return the time until it is due, by the host's clock; inf where unknown.
 
@@ -115,6 +120,11 @@ class ScaledClock(RunClock):
             return host_s  # time was never paused nor scaled
         self._latest_run_s = max(self._latest_run_s, min(self.time_scale.run_at(host_s), self._limit_run_s))
         return self._latest_run_s
+
+    @property
+    def is_real_time(self) -> bool:
+        """Whether the run's time passes as the host's."""
+        return self.time_scale.is_real_time
 
     def expect(self, due_s: float) -> float:
         """Announce the next cycle and return the time until it is due; inf while time is paused before it."""

@@ -25,20 +25,20 @@ class PtyPair:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.master = -1
-        self._slave = -1
+        self.slave = -1
         self.plug()
 
     def plug(self) -> None:
-        self.master, self._slave = os.openpty()
-        tty.setraw(self._slave)
+        self.master, self.slave = os.openpty()
+        tty.setraw(self.slave)
         os.set_blocking(self.master, False)
-        self.path.symlink_to(os.ttyname(self._slave))
+        self.path.symlink_to(os.ttyname(self.slave))
 
     def unplug(self) -> None:
         if self.master >= 0:
             self.path.unlink()
             os.close(self.master)
-            os.close(self._slave)
+            os.close(self.slave)
             self.master = -1
 
     async def read(self, count: int) -> bytes:
@@ -65,8 +65,11 @@ class Host:
         self.data: asyncio.Queue[bytes] = asyncio.Queue()
         self.closed: asyncio.Queue[str] = asyncio.Queue()
 
-    def link(self, path: Path | None, **options: Callable[[LinkConfig], serial.Serial] | float) -> Link:
-        config = LinkConfig(port=None if path is None else str(path), reopen_first_s=0.005, reopen_max_s=0.02)
+    def link(
+        self, path: Path | None, *, baud: int = 115200, **options: Callable[[LinkConfig], serial.Serial] | float
+    ) -> Link:
+        port = None if path is None else str(path)
+        config = LinkConfig(port=port, baud=baud, reopen_first_s=0.005, reopen_max_s=0.02)
         return Link(
             config,
             lambda: self.opened.put_nowait(None),

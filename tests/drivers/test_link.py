@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import os
 import select
 import threading
@@ -18,6 +19,9 @@ from tests.drivers.pty_pair import Host, PtyPair, running, soon
 from tests.hil.machine import TIMEOUT_S
 
 pytestmark = pytest.mark.usefixtures("loop_errors")
+
+LONG_S, SLOW_BAUD = 30.0, 300
+"""A hold that no test waits for, and a line slow enough for it."""
 
 
 async def test_bytes_go_both_ways(pty: PtyPair) -> None:
@@ -54,6 +58,71 @@ async def test_what_is_sent_leaves_though_the_loop_is_held_up_right_then(pty: Pt
         ready, _, _ = select.select([pty.master], [], [], TIMEOUT_S)
         assert ready, "it waits for a turn of the loop"
         assert os.read(pty.master, 64) == b"drive"
+
+
+async def test_while_the_line_is_held_nothing_is_read_and_everything_is_sent(pty: PtyPair) -> None:
+    host = Host()
+    link = host.link(pty.path, baud=SLOW_BAUD)
+    link.hold(1.0)
+    link.release()
+    async with running(link):
+        await soon(host.opened)
+        link.hold(LONG_S)
+        link.hold(LONG_S)
+        os.write(pty.master, b"here")
+        assert select.select([pty.slave], [], [], TIMEOUT_S)[0]
+        assert link.send(b"halt")
+        assert await pty.read(4) == b"halt"
+        assert host.data.empty()
+        link.release()
+        assert host.data.get_nowait() == b"here", "read at once"
+        link.hold(LONG_S)
+        link.release()
+        link.release()
+        assert host.data.empty()
+        os.write(pty.master, b"there")
+        assert await soon(host.data) == b"there"
+
+
+async def test_a_hold_ends_by_itself(pty: PtyPair) -> None:
+    host = Host()
+    link = host.link(pty.path)
+    async with running(link):
+        await soon(host.opened)
+        for seconds in (-math.inf, 0.0, 0.001, 0.02, math.inf):
+            link.hold(seconds)
+            os.write(pty.master, b"x")
+            assert await soon(host.data) == b"x"
+
+
+async def test_a_hold_ends_before_the_buffer_of_a_fast_line_is_full(
+    pty: PtyPair, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    delays: list[float] = []
+    monkeypatch.setattr("drivers.link._Transport.hold", lambda _, seconds: delays.append(seconds))
+    for baud in (115200, 921600):
+        host = Host()
+        link = host.link(pty.path, baud=baud)
+        async with running(link):
+            await soon(host.opened)
+            link.hold(1.0)
+    assert delays == pytest.approx([1024 * 10 / 115200, 1024 * 10 / 921600])
+
+
+@pytest.mark.parametrize("how", ["unplugged", "stopped"])
+async def test_a_line_that_ends_while_it_is_held_is_reported(pty: PtyPair, how: str) -> None:
+    host = Host()
+    link = host.link(pty.path)
+    async with running(link):
+        await soon(host.opened)
+        link.hold(0.05)
+        if how == "unplugged":
+            pty.unplug()
+            assert "was lost" in await soon(host.closed)
+        else:
+            await asyncio.wait_for(link.stop(), TIMEOUT_S)
+            assert host.closed.get_nowait() == "closed by this program"
+            await asyncio.sleep(0.06)  # until the end of the hold, which must not fail
 
 
 async def test_the_last_bytes_are_sent_before_the_line_closes(pty: PtyPair) -> None:

@@ -164,6 +164,15 @@ class LinkMachine(RuleBasedStateMachine):
         self.drain()
         self.start()
 
+    @rule(seconds=st.floats(0.0, 0.02))
+    def hold(self, seconds: float) -> None:
+        """Delays what is read and nothing else."""
+        self.link.hold(seconds)
+
+    @rule()
+    def release(self) -> None:
+        self.link.release()
+
     @rule()
     def let_time_pass(self) -> None:
         self.loop.run_until_complete(asyncio.sleep(0.002))

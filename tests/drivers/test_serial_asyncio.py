@@ -176,7 +176,7 @@ async def test_the_master_gets_eio_when_the_last_slave_closes_and_the_robot_live
     """A host that comes back finds the same line, also after the other end has seen it hang up."""
     host = Host()
     link = host.link(pty.path)
-    os.close(pty._slave)  # as the emulator does: the host's is the only one
+    os.close(pty.slave)  # as the emulator does: the host's is the only one
     for _ in range(3):
         await link.open_once()
         await soon(host.opened)
@@ -185,4 +185,4 @@ async def test_the_master_gets_eio_when_the_last_slave_closes_and_the_robot_live
         await link.stop()
         with pytest.raises(OSError, match="Input/output error"):
             os.read(pty.master, 100)
-    pty._slave = os.open(os.devnull, os.O_RDONLY)
+    pty.slave = os.open(os.devnull, os.O_RDONLY)

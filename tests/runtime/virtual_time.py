@@ -80,6 +80,8 @@ class MemoryLink:
         self._begin_s = loop.time()
         self._calls = (on_opened, on_data, on_closed)
         self._turn: asyncio.TimerHandle | None = None
+        self._arrived = b""
+        self._held_until_s = 0.0
 
     @property
     def writable(self) -> bool:
@@ -90,9 +92,16 @@ class MemoryLink:
         self._robot.receive(data)
         return True
 
+    def hold(self, seconds: float) -> None:
+        self._held_until_s = self._loop.time() + seconds
+
+    def release(self) -> None:
+        self._held_until_s = 0.0
+
     async def open_once(self) -> None:
         if not self.is_open and self.plugged:
             self.is_open = True
+            self._arrived = b""
             self.opened_s = self._loop.time()
             self._calls[0]()
             self._turn = self._loop.call_later(STEP_S, self._exchange)
@@ -129,7 +138,9 @@ class MemoryLink:
     def _exchange(self) -> None:
         if self.is_open:
             self._turn = self._loop.call_later(STEP_S, self._exchange)
-            if data := self.live():
+            self._arrived += self.live()
+            if self._arrived and self._loop.time() >= self._held_until_s:
+                data, self._arrived = self._arrived, b""
                 self._calls[1](data)
 
 

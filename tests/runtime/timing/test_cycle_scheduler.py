@@ -9,6 +9,7 @@ import pytest
 
 from config.load import load_settings
 from runtime.timing.cycle_scheduler import CycleScheduler
+from runtime.timing.run_clock import ScaledClock
 from runtime.timing.timing_monitor import OUTSIDE
 from runtime.timing.wake import LoopTimer
 from tests.runtime.virtual_time import VirtualLoop
@@ -73,6 +74,28 @@ def test_overruns_in_a_row_are_a_reason_to_stop_that_names_the_cause(loop: Virtu
     assert str(reasons[-1]).startswith(f"{SETTINGS.cycle.overruns_max + 1} cycles in a row left no time")
     # The callback spends no processor time here, so the system is blamed for the delay.
     assert f"mostly through {OUTSIDE}" in str(reasons[-1])
+
+
+@pytest.mark.parametrize("is_paused", [False, True])
+def test_no_echo_is_expected_directly_after_one_unless_time_is_paused(loop: VirtualLoop, is_paused: bool) -> None:
+    clock = ScaledClock(loop.time)
+    scheduler = CycleScheduler(SETTINGS, clock)
+
+    async def run() -> float:
+        with scheduler.start(loop.time(), 0.45):
+            for _ in range(4):
+                loop.call_later(0.9 * PERIOD_S, lambda: scheduler.on_echo(loop.time()))
+                while (now := await scheduler.wait()) is None:
+                    pass
+                scheduler.begin(now)
+                scheduler.end(loop.time())
+        if is_paused:
+            clock.pause(0.02)
+        return scheduler.quiet_s(loop.time())
+
+    quiet_s = loop.run_until_complete(run())
+    scheduler.close()
+    assert quiet_s == pytest.approx(0.0 if is_paused else 0.75 * PERIOD_S)
 
 
 def test_a_wake_ends_the_wait_without_a_cycle(loop: VirtualLoop) -> None:

@@ -87,9 +87,13 @@ def test_never_a_burst(delays_s: list[tuple[float, float]], period_s: float, beg
 
 
 class Ring:
-    """A loop in virtual time: it reads echoes as they come, unless something holds it."""
+    """A loop in virtual time: it reads echoes as they come, unless something holds it.
 
-    def __init__(self, pacer: Pacer, echoes_s: list[float]) -> None:
+    With `is_held` it reads nothing while the pacer expects no echo.
+    """
+
+    def __init__(self, pacer: Pacer, echoes_s: list[float], *, is_held: bool = False) -> None:
+        self.is_held = is_held
         self.pacer, self.echoes_s = pacer, deque(sorted(echoes_s))
         self.run_s = BEGIN
         self.starts: list[tuple[float, CycleStart]] = []
@@ -104,6 +108,11 @@ class Ring:
 
     def cycle(self, took_s: float = 0.001, held_s: float = 0.0) -> CycleStart:
         """Wait for a cycle, run it, and keep the loop busy for a while after it."""
+        held_until_s = max(self.run_s, self.pacer.quiet_until_s) if self.is_held else self.run_s
+        assert held_until_s <= max(self.run_s, self.pacer.deadline_s)
+        if held_until_s > self.run_s:
+            self.run_s = held_until_s
+            self._read(None)
         while self.pacer.deadline_s > self.run_s:
             next_echo_s = self.echoes_s[0] if self.echoes_s else math.inf
             self.run_s = min(next_echo_s, self.pacer.deadline_s)
@@ -129,10 +138,13 @@ def echoes(count: int, step_s: float, jitter_s: float = 0.0, begin_s: float = BE
     return [begin_s + k * step_s + chance.uniform(0.0, jitter_s) for k in range(count)]
 
 
+@pytest.mark.parametrize("is_held", [False, True], ids=["", "held"])
 @pytest.mark.parametrize("jitter_s", [0.0, 0.002, 0.01])
 @pytest.mark.parametrize("phase_s", [0.0, 0.001, 0.02, 0.025, 0.049])
-def test_at_the_rings_own_rate_every_echo_begins_a_cycle_at_once(jitter_s: float, phase_s: float) -> None:
-    ring = Ring(Pacer(BEGIN, PERIOD, PERIOD), echoes(400, PERIOD, jitter_s, BEGIN + phase_s))
+def test_at_the_rings_own_rate_every_echo_begins_a_cycle_at_once(
+    jitter_s: float, phase_s: float, is_held: bool
+) -> None:
+    ring = Ring(Pacer(BEGIN, PERIOD, PERIOD), echoes(400, PERIOD, jitter_s, BEGIN + phase_s), is_held=is_held)
     for _ in range(398):
         ring.cycle()
     locked = ring.starts[4:]
@@ -143,14 +155,17 @@ def test_at_the_rings_own_rate_every_echo_begins_a_cycle_at_once(jitter_s: float
     assert min(ring.gaps_s[4:]) >= PERIOD - jitter_s - TINY
 
 
+@pytest.mark.parametrize("is_held", [False, True], ids=["", "held"])
 @pytest.mark.parametrize(
     ("step_s", "period_s"),
     [(0.025, 0.05), (0.02, 0.05), (0.033, 0.05), (0.05, 0.05), (0.06, 0.05), (0.07, 0.05), (0.1, 0.05),
      (0.17, 0.05), (0.5, 0.05), (0.05, 0.2), (0.001, 0.05)],
 )  # fmt: skip
-def test_any_step_is_followed_at_a_rate_near_the_configured_one(step_s: float, period_s: float) -> None:
+def test_any_step_is_followed_at_a_rate_near_the_configured_one(
+    step_s: float, period_s: float, is_held: bool
+) -> None:
     count = math.ceil(20.0 / step_s)
-    ring = Ring(Pacer(BEGIN, period_s, step_s), echoes(count, step_s, 0.02 * step_s))
+    ring = Ring(Pacer(BEGIN, period_s, step_s), echoes(count, step_s, 0.02 * step_s), is_held=is_held)
     while ring.run_s < BEGIN + 19.0:
         ring.cycle(took_s=0.0001)
     locked_s = ring.pacer.period_s
@@ -167,6 +182,42 @@ def test_any_step_is_followed_at_a_rate_near_the_configured_one(step_s: float, p
         assert len(ages) > 10
         assert max(ages) == 0.0, "no echo waits"
     assert ring.pacer.missed == 0
+
+
+def test_no_echo_is_expected_until_a_quarter_step_before_it_is_due() -> None:
+    all_of_them = echoes(60, PERIOD)
+    ring = Ring(Pacer(BEGIN, PERIOD, PERIOD), all_of_them[:20] + all_of_them[21:])
+    assert ring.pacer.quiet_until_s == -math.inf, "no echo has come yet"
+    for _ in range(58):
+        ring.cycle()
+        (at_s, start), quiet_s = ring.starts[-1], ring.pacer.quiet_until_s
+        if start.echo_age_s is None:
+            assert quiet_s == -math.inf, "the echo may still come"
+        elif len(ring.starts) > 3:
+            assert quiet_s == pytest.approx(at_s + 0.75 * PERIOD)
+
+
+def test_the_first_of_several_echoes_of_a_cycle_is_not_read_late() -> None:
+    ring = Ring(Pacer(BEGIN, PERIOD, 0.02), echoes(100, 0.02))
+    for _ in range(20):
+        ring.cycle()
+    assert ring.pacer.quiet_until_s == pytest.approx(ring.starts[-1][0] + 0.75 * 0.02)
+
+
+@pytest.mark.parametrize("late_s", [0.005, 0.02, 0.024])
+def test_an_echo_read_late_delays_no_cycle_for_long_where_the_line_is_held(late_s: float) -> None:
+    """The next echo is then expected late as well; a quarter of a step of this is made up in each cycle."""
+    ring = Ring(Pacer(BEGIN, PERIOD, PERIOD), echoes(100, PERIOD), is_held=True)
+    for _ in range(20):
+        ring.cycle()
+    ring.cycle(held_s=PERIOD - 0.001 + late_s)
+    waited_s = []
+    for _ in range(4):
+        ring.cycle()
+        waited_s.append(ring.starts[-1][0] - ring.came_s[-1])
+    assert waited_s[0] == pytest.approx(late_s)
+    assert waited_s[1] <= max(0.0, late_s - 0.25 * PERIOD) + TINY
+    assert waited_s[2:] == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
 def test_echoes_that_stop_and_resume() -> None:

@@ -37,12 +37,17 @@ def is_still(clock: ScaledClock) -> bool:
     return clock.is_still
 
 
+def is_real_time(clock: ScaledClock) -> bool:
+    return clock.is_real_time
+
+
 def is_paused(clock: ScaledClock) -> bool:
     return clock.is_paused
 
 
 def test_the_host_s_clock_is_the_run_s() -> None:
     clock = RunClock(lambda: 7.0)
+    assert clock.is_real_time
     assert (clock(), clock.both(), clock.at(8.0), clock.expect(7.5)) == (7.0, (7.0, 7.0), 8.0, 0.5)
     assert run_clock(clock) is clock
     assert run_clock(lambda: 3.0)() == 3.0
@@ -62,7 +67,9 @@ def test_a_pause_stops_time_after_its_lead_and_begins_no_cycle() -> None:
     machine = Machine()
     clock = machine.clock
     clock.expect(100.05)
+    assert is_real_time(clock)
     clock.pause(0.02)
+    assert not is_real_time(clock)
     assert is_paused(clock)
     assert not is_still(clock), "the emulator has not acknowledged it"
     (sent,) = machine.sent
