@@ -14,6 +14,7 @@ import termios
 import threading
 import traceback
 from collections.abc import Callable
+from typing import ParamSpec
 
 import serial
 import serial_asyncio
@@ -22,6 +23,8 @@ from config.robot import LinkConfig
 from drivers.serial_port import OPENING_ERRORS, LinkError, OpenPort, open_port, opening_error
 
 __all__ = ["Link", "LinkError"]
+
+P = ParamSpec("P")
 
 _WRITABLE_MAX = 256
 """Bytes waiting in this process beyond which the line is not `writable`: the system's own buffer is then full."""
@@ -185,17 +188,17 @@ class Link:
         self._guard("opening", self._on_opened)
 
     def _received(self, data: bytes) -> None:
-        self._guard("received data", lambda: self._on_data(data))
+        self._guard("received data", self._on_data, data)
 
     def _lost(self, reason: str) -> None:
         self._line = None
         self._last_error = reason
-        self._guard("closing", lambda: self._on_closed(reason))
+        self._guard("closing", self._on_closed, reason)
 
-    def _guard(self, what: str, call: Callable[[], None]) -> None:
+    def _guard(self, what: str, call: Callable[P, None], *args: P.args, **kwargs: P.kwargs) -> None:
         """Call a handler; an exception in it ends the line, with its place in the reason."""
         try:
-            call()
+            call(*args, **kwargs)
         except Exception as e:  # noqa: BLE001 - a handler may raise anything, and the line must not stay open unread
             place = traceback.extract_tb(e.__traceback__)[-1]
             reason = (

@@ -143,7 +143,6 @@ class DenningDriver:
         for frame in self._decoder.feed(data):
             self._last_frame_s = run_s
             self._take_frame(frame)
-        self._firings.extend(self._stamper.firings(self._run_s))
 
     def tick(self, run_s: float) -> None:
         """Let time pass: send unanswered commands again; go DOWN if the robot is silent for too long."""
@@ -310,6 +309,7 @@ class DenningDriver:
             case Echo() if self._state is LineState.READY:
                 self._echo_timeout.restart(self._run_s, self._decoder.bad)
                 self._stamper.echo(frame)
+                self._firings.extend(self._stamper.firings(self._run_s))
             case _:
                 pass  # an echo of a pattern that this driver has not set
 

@@ -230,6 +230,8 @@ class PoseStamper:
     def firings(self, run_s: float) -> list[Firing]:
         """Return the waiting echoes whose pose is known at `run_s`, in the order of their firing; remove them."""
         ready: list[Firing] = []
+        if not self._held:
+            return ready
         newest = self._history.newest
         while self._held and newest is not None:
             t_us = self._clock.near_last(self._held[0].t_us)

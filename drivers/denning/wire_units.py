@@ -28,6 +28,8 @@ _ROUNDING = 1e-6
 """Slack before rounding up or down, in units of the protocol, for decimal fractions that float64 cannot hold."""
 _STEP_MAX_MS = 0xFFFF
 _I16_MAX = 0x7FFF
+_FLAGS = tuple(map(Flags, range(0x20)))
+"""The base's status by its bits on the wire."""
 
 
 class WirePattern(NamedTuple):
@@ -99,7 +101,7 @@ def odometry_of(odom: Odom, t_us: int) -> Odometry:
         pose=Pose(odom.x_0p1mm * 1e-4, odom.y_0p1mm * 1e-4, odom.heading_1em4rad * 1e-4),
         ring_yaw=odom.ring_yaw_1em4rad * 1e-4,
         twist=Twist(odom.v_mm_s * 1e-3, odom.w_mrad_s * 1e-3),
-        flags=Flags(odom.flags & 0x1F),
+        flags=_FLAGS[odom.flags & 0x1F],
         last_drive_seq=odom.last_drive_seq,
     )
 
@@ -109,11 +111,11 @@ def ranges_of(echo: Echo, count: int) -> Floats:
 
     Bits of the mask beyond the ring's sensors are ignored.
     """
-    ranges = np.full(count, np.nan)
+    ranges = [math.nan] * count
     for sensor, tenths in zip(sensors(echo.mask), echo.tenths_ft, strict=True):
         if sensor < count and tenths != FAULT:
             ranges[sensor] = math.inf if tenths == NO_ECHO else tenths * TENTH_FT_M
-    return ranges
+    return np.array(ranges)
 
 
 def echo_byte(range_m: float | None) -> int:
