@@ -170,7 +170,7 @@ class Recorder:
             return f"a bookmark has from 1 to {BOOKMARK_MAX} characters, not {len(words)}"
         run_s, host_s = self._clock.both()
         mark = Bookmark.model_construct(run_s=run_s, cycle=self._cycle, text=words)
-        self._put(QueuedItem(BOOKMARK, host_s, run_s, mark))
+        self._put((BOOKMARK, host_s, run_s, mark))
         return None
 
     def on_cycle(self, record: CycleRecord, state: State) -> None:
@@ -192,7 +192,7 @@ class Recorder:
             # The replay starts from the state that this cycle has left.
             self._is_starting, self._has_gap = False, True
         else:
-            self._put(QueuedItem(CYCLE, host_s, run_s, record))
+            self._put((CYCLE, host_s, run_s, record))
         if self._last_keyframe_run_s is None:
             self._last_keyframe_run_s = run_s
         is_due = self._has_gap or self._writer.wants_keyframe or run_s - self._last_keyframe_run_s >= self._keyframe_s
@@ -207,13 +207,13 @@ class Recorder:
                 carried_state(state),
                 perception.snapshot(),
             )
-            self._put(QueuedItem(KEYFRAME, host_s, run_s, snapshot))
+            self._put((KEYFRAME, host_s, run_s, snapshot))
         elif cycle % self._snapshot_cycles == 0:
             segments = MapSnapshot(cycle, segments=perception.segment_geometry())
-            self._put(QueuedItem(SEGMENTS, host_s, run_s, segments))
+            self._put((SEGMENTS, host_s, run_s, segments))
         elif cycle % self._snapshot_cycles == self._snapshot_cycles // 2:
             objects = MapSnapshot(cycle, objects=perception.objects())
-            self._put(QueuedItem(OBJECTS, host_s, run_s, objects))
+            self._put((OBJECTS, host_s, run_s, objects))
 
     def on_bytes(self, direction: str, run_s: float, host_s: float, data: bytes) -> None:
         """Record bytes that were just received or sent over the serial line.
@@ -228,7 +228,7 @@ class Recorder:
             What went over the line.
         """
         if self._on and not self._is_starting:  # as `_put`, at less cost: several times a cycle
-            self._queue_item(QueuedItem(SERIAL[direction], host_s, run_s, data))
+            self._queue_item((SERIAL[direction], host_s, run_s, data))
 
     def on_settings(self, settings: Settings) -> None:
         """Record settings in force from the next cycle on; never dropped, as every later cycle needs them."""
@@ -246,13 +246,13 @@ class Recorder:
             run_s=run_s, level=str(event.get("level", "info")), event=str(event.get("event", "")),
             fields={name: str(value) for name, value in fields.items()},
         )  # fmt: skip
-        self._put(QueuedItem(LOG, host_s, run_s, line))
+        self._put((LOG, host_s, run_s, line))
 
     def _put(self, item: QueuedItem) -> None:
         if self._on and not self._is_starting and not self._queue_item(item):
-            self._has_gap = self._has_gap or item.topic == CYCLE
+            self._has_gap = self._has_gap or item[0] == CYCLE
 
     def _put_now(self, topic: str, content: object) -> None:
         """Queue an item of this moment even if the queue is full."""
         run_s, host_s = self._clock.both()
-        self._queue_item(QueuedItem(topic, host_s, run_s, content), always=True)
+        self._queue_item((topic, host_s, run_s, content), always=True)

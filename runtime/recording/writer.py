@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -56,15 +56,11 @@ SEGMENT_DIGITS: Final = 3
 OBJECT_DIGITS: Final = 6
 
 
-class QueuedItem(NamedTuple):
-    """Something to record. Nothing in it may change any more."""
+QueuedItem: TypeAlias = tuple[str, float, float, Any]
+"""Something to record: its topic, when it happened by the host's clock and by the run's (s), and what it is.
 
-    topic: str
-    host_s: float
-    """When it happened, by the host's clock."""
-    run_s: float
-    """When it happened, by the run's clock."""
-    content: Any
+Nothing in it may change any more. A plain tuple, because the cycle makes several.
+"""
 
 
 class SettingsReload(NamedTuple):
@@ -159,7 +155,7 @@ class RecordingWriter:
         self._mode: ModeState | None = None
         self._map: dict[bytes, int] = {}
         self._map_count = 0
-        self._pieces: dict[str, list[tuple[QueuedItem, bytes]]] = {}
+        self._pieces: dict[str, list[QueuedItem]] = {}
         self.thread = BackgroundWriter[QueuedItem](
             "recorder", self._write, begin=self._begin, tick=self._tick, finish=lambda: self._guarded(self._finish),
             poll_s=POLL_S, capacity=queue_max, close_max_s=CLOSE_MAX_S,
@@ -293,49 +289,50 @@ class RecordingWriter:
 
     def _enter(self, item: QueuedItem) -> None:
         """Write one item; at a keyframe a new file can begin."""
-        if isinstance(item.content, RecordingSwitch):
-            self._on, self._retry_s = item.content.on, 0.0
+        topic, host_s, run_s, content = item
+        if isinstance(content, RecordingSwitch):
+            self._on, self._retry_s = content.on, 0.0
             if not self._on:
                 self._switch_off()
             return
-        if item.topic == KEYFRAME:
+        if topic == KEYFRAME:
             if self._file is not None and self._target.is_part_full(self._file.bytes):
                 self._finish()
             if self._file is None and time.monotonic() >= self._retry_s:
                 self._open()
-        if item.topic == SETTINGS:
-            settings = item.content.settings.model_dump(mode="json")
+        if topic == SETTINGS:
+            settings = content.settings.model_dump(mode="json")
             self._info = self._info.model_copy(update={"settings": settings})
         if self._file is None:
             self._drop(int(self._on))
             return
-        log_ns = self._log_ns(item.host_s)
-        match item.content:
+        log_ns = self._log_ns(host_s)
+        match content:
             case CycleRecord():
-                self._enter_cycle(item.content, log_ns)
+                self._enter_cycle(content, log_ns)
             case MapSnapshot():
-                self._enter_snapshot(item.content, item.run_s, log_ns)
+                self._enter_snapshot(content, run_s, log_ns)
             case Bookmark():
                 self._is_empty = False
                 self._target.pin(self._file.path)
-                self._add(item.topic, item.content, log_ns)
+                self._add(topic, content, log_ns)
             case SettingsReload(cycle, _):
-                change = SettingsChange.model_construct(run_s=item.run_s, cycle=cycle, settings=self._info.settings)
+                change = SettingsChange.model_construct(run_s=run_s, cycle=cycle, settings=self._info.settings)
                 self._add(SETTINGS, change, log_ns)
             case bytes():
-                self._pieces.setdefault(item.topic, []).append((item, item.content))
+                self._pieces.setdefault(topic, []).append(item)
             case _:
-                self._add(item.topic, item.content, log_ns)
+                self._add(topic, content, log_ns)
 
     def _enter_pieces(self) -> None:
         """Write the serial line's data since the last call."""
         for topic, pieces in self._pieces.items():
-            first = pieces[0][0]
+            _, first_host_s, first_run_s, _ = pieces[0]
             payload = SerialBytes.model_construct(
-                run_s=first.run_s, after_us=[round(1e6 * (item.run_s - first.run_s)) for item, _ in pieces],
-                sizes=[len(data) for _, data in pieces], data=b"".join(data for _, data in pieces).hex(),
+                run_s=first_run_s, after_us=[round(1e6 * (run_s - first_run_s)) for _, _, run_s, _ in pieces],
+                sizes=[len(data) for *_, data in pieces], data=b"".join(data for *_, data in pieces).hex(),
             )  # fmt: skip
-            self._add(topic, payload, self._log_ns(first.host_s))
+            self._add(topic, payload, self._log_ns(first_host_s))
         self._pieces.clear()
 
     def _log_ns(self, host_s: float) -> int:
