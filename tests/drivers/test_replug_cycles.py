@@ -132,6 +132,8 @@ async def replug(path: Path, cycles: int) -> str:
     config = fast_link(path)
     samples: list[Footprint] = []
     settled, between = max(SETTLED_CYCLES, cycles // 5), max(1, cycles // SAMPLES)
+    gc.collect()
+    gc.freeze()  # what other tests left is not looked at in each sample
     tracemalloc.start()
     try:
         async with hosted(config) as (driver, firings, lost):
@@ -147,6 +149,7 @@ async def replug(path: Path, cycles: int) -> str:
             samples.append(Footprint.now())
     finally:
         tracemalloc.stop()
+        gc.unfreeze()
         device.unplug()
     # What is released only now and then, as the loop's cancelled timers, is there in some samples; a leak is in all.
     half = len(samples) // 2
