@@ -83,6 +83,7 @@ async def test_only_changes_are_drawn(server: FakeServer, opener: Opener) -> Non
     opened = await still(server, opener)
     assert await opened.world("run.segments.size") == 500
     server.silent = True
+    await opened.sync()
     await opened.run_for(20 * FRAME_MS)
     await opened.probe("count_repaints")
     await opened.run_for(10 * FRAME_MS)
@@ -91,9 +92,10 @@ async def test_only_changes_are_drawn(server: FakeServer, opener: Opener) -> Non
         await change(opened, "scene.invalidate('front'); scene.invalidate('front');")
         await opened.drawn()
     assert await opened.page.evaluate("painted") == {"back": 0, "front": 10}, "once a frame, and the front alone"
-    server.silent = False
     for _ in range(3):
+        server.silent = False
         await server.advance()
+        server.silent = True  # a heartbeat while the page draws would be one more state
         await opened.sync()
         await opened.drawn()
     painted = await opened.page.evaluate("painted")
