@@ -6,8 +6,10 @@ thread.
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import termios
+import threading
 from collections.abc import Callable
 from typing import TypeAlias
 
@@ -70,3 +72,66 @@ def explain(config: LinkConfig, error: BaseException) -> str:
     if isinstance(error, ValueError | OverflowError):
         return f"{port} cannot be set to {config.baud} baud ({text}); correct link.baud"
     return f"cannot open {port} ({text}); check the cable and the port's name"
+
+
+async def open_off_loop(config: LinkConfig, opener: OpenPort, timeout_s: float) -> serial.Serial:
+    """Open the port in a thread of its own.
+
+    The thread is a daemon, so that a port that never opens blocks neither the loop nor the end of the process. A port
+    that opens after the timeout is closed again.
+
+    Parameters
+    ----------
+    config
+        Names the port.
+    opener
+        Opens it, in the thread.
+    timeout_s
+        Longest time that this may take.
+
+    Raises
+    ------
+    LinkError
+        The port cannot be opened, or not within `timeout_s`.
+    """
+    if config.port is None:
+        raise LinkError("no serial port is named; give it as --port or link.port")
+    loop = asyncio.get_running_loop()
+    opened: asyncio.Future[serial.Serial] = loop.create_future()
+
+    def hand_over(port: serial.Serial | None, error: BaseException | None) -> None:
+        if port is None:
+            if not opened.done():
+                opened.set_exception(error or OSError("the opener returned no port"))
+        elif opened.done():
+            port.close()
+        else:
+            opened.set_result(port)
+
+    def work() -> None:
+        port, error = None, None
+        try:
+            port = opener(config)
+        except OPENING_ERRORS as e:
+            error = e
+        try:
+            loop.call_soon_threadsafe(hand_over, port, error)
+        except RuntimeError:  # the loop has been closed meanwhile
+            if port is not None:
+                port.close()
+
+    threading.Thread(target=work, name=f"open {config.port}", daemon=True).start()
+    taken = False
+    try:
+        # Not `wait_for`: before Python 3.12 it swallows a cancellation that comes together with the result.
+        async with asyncio.timeout(timeout_s):
+            port = await opened
+        taken = True
+    except TimeoutError as e:
+        raise opening_error(config, TimeoutError(f"{timeout_s:g} s so far")) from e
+    except OPENING_ERRORS as e:
+        raise opening_error(config, e) from e
+    finally:
+        if not taken and opened.done() and not opened.cancelled() and opened.exception() is None:
+            opened.result().close()
+    return port

@@ -81,6 +81,7 @@ def _drive_and_edit(settings: Settings, method: str, models: Sequence[ModelConfi
     ClusterView(settings.perception).boxes(perception.segments().geometry)  # the console shows them for either method
     numbers = tuple(perception.segments().numbers[:2].tolist())
     perception.edit(PinSegments(numbers, pinned=True))
+    _drive(settings, perception)  # its segments overwrite the pinned ones, which are put back
     for model in models:
         perception.edit(PlaceModel(model.name, 1.0, 2.5, 0.0))
     for seen in perception.objects():
