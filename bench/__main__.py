@@ -1,4 +1,4 @@
-"""Command line of the measurements (`make bench`): comparison, timing, recording, console, wake-ups."""
+"""Command line of the measurements (`make bench`): comparison, timing, recording, console, wake-ups, localisation."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from bench.waking import figures, waking_table
 from bench.waking import measure as measure_waking
 from config.errors import UserError
 from config.load import load_settings
-from runtime.support.kernel_cache import PARTS, prepare_kernels, use_kernel_cache
+from runtime.support.kernel_cache import EMULATOR, PARTS, prepare_kernels, use_kernel_cache
 
 OURS: Final = (
     Method("echolocate, bayes", ("perception.method=bayes",)),
@@ -202,6 +202,37 @@ def waking(*, json: str = "waking.json", turns: int = WAKING_TURNS, busy: int = 
         console.print(f"bench: {error}", markup=False)
         return error.exit_code
     _wide().print(waking_table(by_load))
+    return 0
+
+
+@app.command
+def localization(*, json: str = "localization.json", rooms: int = 100, first: int = 0) -> int:
+    """Measure global localisation from one stand of the ring in random known rooms.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    rooms
+        Number of rooms.
+    first
+        Seed of the first room.
+    """
+    use_kernel_cache()
+    from bench.localization import localization_table, measure
+    from runtime.cycle.summary import write_json
+
+    console = Console(stderr=True)
+    settings = load_settings("hallway")
+    prepare_kernels(settings, console, (EMULATOR,))
+    with console.status("bench") as status:
+        rows = measure(settings.ring, range(first, first + max(1, rooms)), status.update)
+    try:
+        write_json(json, rows)
+    except UserError as error:
+        console.print(f"bench: {error}", markup=False)
+        return error.exit_code
+    _wide().print(localization_table(rows))
     return 0
 
 

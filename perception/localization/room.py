@@ -1,0 +1,99 @@
+"""A known room: its walls, and the sectors between them at every corner."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from perception.kernel import Floats
+
+JOIN_M: Final = 1e-3
+"""Ends of walls nearer than this to each other, or to a wall, meet there."""
+FLAT_RAD: Final = 1e-3
+"""Two walls that differ from a straight continuation by less than this make no corner."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Room:
+    """The walls of a room in the map frame.
+
+    Attributes
+    ----------
+    walls : (w, 4) float
+        Both ends x1, y1, x2, y2 of each wall, m. A wall reflects on both sides.
+    normals : (w, 2) float
+        Unit normal of each wall: its direction turned counter-clockwise by a quarter.
+    offsets : (w,) float
+        Normal · point for the points of each wall, m.
+    corners : (c, 4) float
+        One row for each sector between two walls that meet: x, y (m), the direction in which the sector starts, and
+        its opening counter-clockwise (rad). Below π it is a concave corner, above a convex edge.
+    """
+
+    walls: Floats
+    normals: Floats
+    offsets: Floats
+    corners: Floats
+
+    @property
+    def area_m2(self) -> float:
+        """Area of the rectangle around the room, m²."""
+        ends = self.walls.reshape(-1, 2)
+        return float(np.prod(np.ptp(ends, axis=0)))
+
+
+def make_room(walls: Floats) -> Room:
+    """Return the room with these walls.
+
+    Parameters
+    ----------
+    walls : (w, 4) float
+        Both ends of each wall, m. Walls that cross should be split at the crossing; otherwise it is no corner.
+
+    Raises
+    ------
+    ValueError
+        The array has another shape or no row, a value is not finite, or a wall is shorter than `JOIN_M`.
+    """
+    walls = np.array(walls, dtype=np.float64)
+    if walls.ndim != 2 or walls.shape[1] != 4 or not len(walls) or not np.isfinite(walls).all():
+        raise ValueError("expected at least one wall as a row of four finite numbers: x1, y1, x2, y2")
+    along = walls[:, 2:] - walls[:, :2]
+    length = np.hypot(along[:, 0], along[:, 1])
+    if length.min() < JOIN_M:
+        raise ValueError(f"wall {int(length.argmin())} is shorter than {JOIN_M} m")
+    normals = np.column_stack([-along[:, 1], along[:, 0]]) / length[:, None]
+    offsets = (normals * walls[:, :2]).sum(axis=1)
+    return Room(walls, normals, offsets, _sectors(walls, normals, offsets))
+
+
+def _sectors(walls: Floats, normals: Floats, offsets: Floats) -> Floats:
+    """Return the sectors at the ends of all walls; arguments and result as in `Room`."""
+    rows: list[tuple[float, float, float, float]] = []
+    seen: list[tuple[float, float]] = []
+    for x, y in walls.reshape(-1, 2).tolist():
+        if all(math.dist((x, y), other) > JOIN_M for other in seen):
+            seen.append((x, y))
+            directions = _directions(x, y, walls, normals, offsets)
+            for start, end in zip(directions, [*directions[1:], directions[0]], strict=True):
+                opening = (end - start) % (2.0 * math.pi) or 2.0 * math.pi
+                if abs(opening - math.pi) > FLAT_RAD:
+                    rows.append((x, y, start, opening))
+    return np.array(rows).reshape(-1, 4)
+
+
+def _directions(x: float, y: float, walls: Floats, normals: Floats, offsets: Floats) -> list[float]:
+    """Return the directions in which a wall leaves a point, ascending, each once."""
+    along = np.column_stack([normals[:, 1], -normals[:, 0]])
+    begin = ((walls[:, :2] - (x, y)) * along).sum(axis=1)
+    end = ((walls[:, 2:] - (x, y)) * along).sum(axis=1)
+    touches = (np.abs(normals @ (x, y) - offsets) < JOIN_M) & (begin < JOIN_M) & (end > -JOIN_M)
+    leaving = np.concatenate([along[touches & (end > JOIN_M)], -along[touches & (begin < -JOIN_M)]])
+    found: list[float] = []
+    for direction in sorted(np.arctan2(leaving[:, 1], leaving[:, 0]).tolist()):
+        if not found or (direction - found[-1] > FLAT_RAD and direction - found[0] < 2.0 * math.pi - FLAT_RAD):
+            found.append(direction)
+    return found
