@@ -16,7 +16,10 @@ from runtime.simulation.localization_trials import figures, localize_once
 from runtime.simulation.random_rooms import ACOUSTICS
 
 COLUMNS: Final = ("trials", "right", "offered", "wrong_alone", "confidently_wrong", "lost", "median_m", "max_m",
-                  "median_deg", "max_deg", "cpu_ms_p50", "cpu_ms_max")  # fmt: skip
+                  "median_deg", "max_deg", "cpu_ms_p50", "cpu_ms_max", "other_maps", "answers_there")  # fmt: skip
+
+OTHER_MAPS: Final = 4
+"""Every so many rooms, one is also tried with the map of another room."""
 
 
 def measure(ring: RingConfig, seeds: Iterable[int], report: Callable[[str], None]) -> dict[str, dict[str, float]]:
@@ -43,7 +46,9 @@ def measure(ring: RingConfig, seeds: Iterable[int], report: Callable[[str], None
             trials.append(localize_once(ring, seed, acoustics))
             cpu_ms.append(1e3 * (time.process_time() - begin_s))
         cpu = {"cpu_ms_p50": float(np.median(cpu_ms)), "cpu_ms_max": max(cpu_ms)}
-        rows[reflection] = asdict(figures(trials)) | cpu
+        elsewhere = [localize_once(ring, seed, acoustics, map_seed=seed + 1) for seed in seeds[::OTHER_MAPS]]
+        there = {"other_maps": len(elsewhere), "answers_there": sum(bool(trial.candidates) for trial in elsewhere)}
+        rows[reflection] = asdict(figures(trials)) | cpu | there
     return rows
 
 

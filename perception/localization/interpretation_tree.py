@@ -26,7 +26,9 @@ LENGTH_SLACK_M: Final = 0.3
 DISTANCE_SLACK_M: Final = 0.1
 """Tolerance of distances beyond the segments' own, m."""
 SLIDE_M: Final = 0.15
-"""Distance of the places that are tried along parallel walls, m."""
+"""Distance of the places that are tried along a wall, m."""
+WALLS_MIN: Final = 2
+"""Least number of walls of a leaf; two that are not parallel fix a place."""
 CROSSING_MIN: Final = math.sin(math.radians(20.0))
 """Sine of the least angle between two walls that fix a pose."""
 
@@ -52,7 +54,7 @@ class _Sides(NamedTuple):
     length: Floats
 
 
-def interpretations(segments: Sequence[ContourSegment], room: Room, walls_min: int) -> tuple[Interpretation, ...]:
+def interpretations(segments: Sequence[ContourSegment], room: Room) -> tuple[Interpretation, ...]:
     """Return the poses that the leaves of the tree give: most assigned segments first.
 
     Parameters
@@ -61,15 +63,8 @@ def interpretations(segments: Sequence[ContourSegment], room: Room, walls_min: i
         Those that enter the tree; each is a level.
     room : Room
         The walls.
-    walls_min : int
-        Least number of segments with a wall. With 2, only leaves whose walls fix a place count; with 1, a wall alone
-        or parallel walls give a row of places along them.
     """
-    ends = np.concatenate([room.walls.reshape(-1, 2, 2)] * 2)
-    sides = _Sides(
-        np.concatenate([room.normals, -room.normals]), np.concatenate([room.offsets, -room.offsets]), ends,
-        np.hypot(*(ends[:, 1] - ends[:, 0]).T),
-    )  # fmt: skip
+    sides = _sides(room)
     allowed = _binary_masks(segments, sides)
     whole = [
         sum(1 << i for i, length in enumerate(sides.length) if s.length <= length + LENGTH_SLACK_M) for s in segments
@@ -81,8 +76,9 @@ def interpretations(segments: Sequence[ContourSegment], room: Room, walls_min: i
         level, chosen, masks = stack.pop()
         nodes += 1
         if level == len(segments):
-            if len(chosen) >= walls_min:
-                leaves += _poses([(segments[k], i) for k, i in chosen], sides, walls_min)
+            leaf = _pose([(segments[k], i) for k, i in chosen], sides)
+            if leaf is not None:
+                leaves.append(leaf)
             continue
         stack.append((level + 1, chosen, masks))  # to none; visited last
         mask, side = masks[level], 0
@@ -121,25 +117,52 @@ def _binary_masks(segments: Sequence[ContourSegment], sides: _Sides) -> list[lis
     ]
 
 
-def _poses(chosen: Sequence[tuple[ContourSegment, int]], sides: _Sides, walls_min: int) -> list[Interpretation]:
-    """Return the poses of a leaf: heading from directions, place by least squares over the walls' normals.
-
-    Where all walls are parallel, the place along them is free: places at every `SLIDE_M` are returned.
-    """
+def _pose(chosen: Sequence[tuple[ContourSegment, int]], sides: _Sides) -> Interpretation | None:
+    """Return the pose of a leaf: heading from directions, place by least squares over the walls' normals."""
+    if len(chosen) < WALLS_MIN:
+        return None
     index = [i for _, i in chosen]
     normals, weight = sides.normals[index], np.array([1.0 / s.alpha_slack**2 for s, _ in chosen])
     turn = np.arctan2(normals[:, 1], normals[:, 0]) - [s.alpha for s, _ in chosen]
     theta = math.atan2(float(weight @ np.sin(turn)), float(weight @ np.cos(turn)))
     distance = sides.offsets[index] - [s.offset for s, _ in chosen]
     information = normals.T @ normals
-    if np.linalg.det(information) >= CROSSING_MIN**2:
-        places = np.linalg.solve(information, normals.T @ distance)[None, :]
-    elif walls_min > 1:
-        return []
-    else:
-        nx, ny = normals[0]
-        along = np.array([-ny, nx])
-        reach = sides.ends.reshape(-1, 2) @ along
-        steps = np.arange(reach.min(), reach.max(), SLIDE_M)
-        places = normals[0] * float((normals @ normals[0]) @ distance / len(chosen)) + steps[:, None] * along
-    return [Interpretation(len(chosen), x, y, theta) for x, y in places.tolist()]
+    if np.linalg.det(information) < CROSSING_MIN**2:
+        return None
+    x, y = np.linalg.solve(information, normals.T @ distance).tolist()
+    return Interpretation(len(chosen), x, y, theta)
+
+
+def poses_along_walls(segments: Sequence[ContourSegment], room: Room) -> Floats:
+    """Return poses from which one segment is on one wall: what remains where the tree finds no two walls.
+
+    Parameters
+    ----------
+    segments : sequence of ContourSegment
+        Each is put on each side of each wall that is long enough.
+    room : Room
+        The walls.
+
+    Returns
+    -------
+    (n, 3) float
+        x, y (m), heading (rad): the middle of the segment is at each `SLIDE_M` of the wall.
+    """
+    sides = _sides(room)
+    rows = [np.empty((0, 3))]
+    for (nx, ny), ends, length in zip(sides.normals.tolist(), sides.ends, sides.length.tolist(), strict=True):
+        steps = np.arange(0.5 * SLIDE_M, length, SLIDE_M)[:, None] / length
+        points = ends[0] + steps * (ends[1] - ends[0])
+        for segment in segments:
+            if segment.length <= length + LENGTH_SLACK_M:
+                theta = math.atan2(ny, nx) - segment.alpha
+                cos, sin = math.cos(theta), math.sin(theta)
+                middle = (cos * segment.x - sin * segment.y, sin * segment.x + cos * segment.y)
+                rows.append(np.column_stack([points - middle, np.full(len(points), theta)]))
+    return np.concatenate(rows)
+
+
+def _sides(room: Room) -> _Sides:
+    ends = np.concatenate([room.walls.reshape(-1, 2, 2)] * 2)
+    normals, offsets = np.concatenate([room.normals, -room.normals]), np.concatenate([room.offsets, -room.offsets])
+    return _Sides(normals, offsets, ends, np.hypot(*(ends[:, 1] - ends[:, 0]).T))

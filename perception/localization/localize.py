@@ -22,7 +22,7 @@ from perception.kernel import Floats
 from perception.localization.barrier import blocked_share
 from perception.localization.contour import contour_segments
 from perception.localization.expected_ranges import Reflection
-from perception.localization.interpretation_tree import interpretations
+from perception.localization.interpretation_tree import interpretations, poses_along_walls
 from perception.localization.panorama import all_readings, panoramas
 from perception.localization.pose_fit import Stand, beams_at, fit_poses
 from perception.localization.range_likelihood import RangeModel, log_ratio_of_true_pose
@@ -34,24 +34,27 @@ BLOCKED_MAX: Final = 0.4
 """Largest share of echoes from behind walls: outliers are mostly long, and on mirrors eight echoes may be all."""
 CELL_M: Final = 0.1
 CELL_RAD: Final = math.radians(3.0)
-"""Of the poses from the tree in one cell of this size, one is tried."""
+"""Of the poses in one cell of this size, one is tried."""
 BATCH: Final = 256
 """Poses that are tried in one call; bounds the memory."""
 POSES_MAX: Final = 4096
-"""Poses from the tree that are tried; what is beyond is left out."""
+"""Poses that are tried; what is beyond is left out."""
 TURNS_RAD: Final = tuple(math.radians(turn) for turn in range(-6, 7, 3))
 """Headings that are tried around that of a leaf, which is good to some degrees."""
+WIDE_TURNS_RAD: Final = tuple(math.radians(turn) for turn in range(-12, 13, 3))
+"""The same around the heading from one segment, which may be anywhere in a beam."""
 FINE_TURN_RAD: Final = math.radians(1.0)
 FINE_TURNS: Final = 13
 """Step and number of the headings over which a pose's evidence is summed."""
 FIT_STEPS: Final = 4
+"""Steps of the fine fit."""
 REFINED_MAX: Final = 24
 """Poses that are fitted finely."""
 MERGE_M: Final = 0.2
 MERGE_RAD: Final = math.radians(7.0)
 """Poses nearer to each other than this are one."""
 WIDEN_SIGMAS: Final = 1.0
-LOST_SIGMAS: Final = 3.0
+LOST_SIGMAS: Final = 2.0
 """A true pose's likelihood in standard deviations below its mean: if the best is less than the first, the search is
 widened; the second stands for a pose that the search has missed."""
 LOST_PROBABILITY: Final = 0.5
@@ -116,14 +119,12 @@ def localize(
     stand = Stand(room, all_readings(parts), half_angle, reflection, model)
     segments = [contour_segments(part, half_angle, reflection, model)[:SEGMENTS_MAX] for part in parts]
     mean, sigma = log_ratio_of_true_pose(model, stand.readings.range_m)
-    starts = np.empty((0, 3))
-    modes: list[_Mode] = []
-    for walls_min in (2, 1):
-        leaves = [leaf for part in segments for leaf in interpretations(part, room, walls_min)]
-        starts = np.concatenate([starts, _promising(stand, np.array([leaf[1:] for leaf in leaves]).reshape(-1, 3))])
-        modes = _refined(stand, starts)
-        if modes and max(mode.log_ratio for mode in modes) > mean - WIDEN_SIGMAS * sigma:
-            break
+    leaves = [leaf[1:] for part in segments for leaf in interpretations(part, room)]
+    starts = _promising(stand, np.array(leaves).reshape(-1, 3), TURNS_RAD)
+    modes = _refined(stand, starts)
+    if not modes or max(mode.log_ratio for mode in modes) < mean - WIDEN_SIGMAS * sigma:
+        rows = np.concatenate([poses_along_walls(part, room) for part in segments])
+        modes = _refined(stand, np.concatenate([starts, _promising(stand, rows, WIDE_TURNS_RAD)]))
     if not modes:
         return ()
     missed = modes[0].log_evidence - modes[0].log_ratio + mean - LOST_SIGMAS * sigma
@@ -149,8 +150,8 @@ class _Mode(NamedTuple):
     """Of each heading, nat."""
 
 
-def _promising(stand: Stand, poses: Floats) -> Floats:
-    """Return those of the tree's poses that pass the barrier test, coarsely fitted, the best few, shape (m, 3)."""
+def _promising(stand: Stand, poses: Floats, turns: Sequence[float]) -> Floats:
+    """Return those of many poses that pass the barrier test, fitted coarsely, the best few, shape (m, 3)."""
     cells = np.rint(poses / (CELL_M, CELL_M, CELL_RAD))
     first = np.sort(np.unique(cells, axis=0, return_index=True)[1])[:POSES_MAX]
     fitted, score = [np.empty((0, 3))], [np.empty(0)]
@@ -158,7 +159,7 @@ def _promising(stand: Stand, poses: Floats) -> Floats:
         batch = poses[first[begin : begin + BATCH]]
         beams = beams_at(stand.readings, *batch.T)
         batch = batch[blocked_share(stand.room, beams, stand.readings.range_m, stand.half_angle) <= BLOCKED_MAX]
-        fit = fit_poses(stand, batch, np.array(TURNS_RAD), 1)
+        fit = fit_poses(stand, batch, np.array(turns), 1)
         best = (np.arange(len(batch)), fit.log_ratio.argmax(axis=1))
         fitted.append(np.column_stack([fit.x[best], fit.y[best], fit.theta[best]]))
         score.append(fit.log_ratio[best])

@@ -35,13 +35,10 @@ class Trial:
         The ring's pose.
     candidates : tuple of PoseCandidate
         The answer.
-    heard : int
-        Sensors with an echo.
     """
 
     truth: Pose
     candidates: tuple[PoseCandidate, ...]
-    heard: int
 
     def is_right(self, candidate: PoseCandidate) -> bool:
         """Return whether a candidate is the true pose."""
@@ -76,7 +73,9 @@ def room_of(scene: Scene) -> Room:
     return make_room(np.column_stack([walls[name] for name in ("x1", "y1", "x2", "y2")]))
 
 
-def localize_once(ring: RingConfig, seed: int, acoustics: AcousticsConfig = ACOUSTICS) -> Trial:
+def localize_once(
+    ring: RingConfig, seed: int, acoustics: AcousticsConfig = ACOUSTICS, map_seed: int | None = None
+) -> Trial:
     """Return what one stand in a random room gives.
 
     Parameters
@@ -87,12 +86,15 @@ def localize_once(ring: RingConfig, seed: int, acoustics: AcousticsConfig = ACOU
         Which room, and which errors of the ranges.
     acoustics : AcousticsConfig
         The model of reflection and the errors.
+    map_seed : int, optional
+        The room that the map shows, if it is another one: then every answer is wrong.
     """
     world, truth = random_room(seed, acoustics)
     scene = compile_scene(world)
     ranges = Sonar(ring, scene, acoustics, np.random.default_rng(seed)).fire(truth, truth.theta)
     firing = Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, ranges)
-    return Trial(truth, localize([firing], room_of(scene), ring, acoustics.model), int(np.isfinite(ranges).sum()))
+    known = scene if map_seed is None else compile_scene(random_room(map_seed)[0])
+    return Trial(truth, localize([firing], room_of(known), ring, acoustics.model))
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,10 @@ from perception.localization.interpretation_tree import (
     ANGLE_SLACK_RAD,
     DISTANCE_SLACK_M,
     LENGTH_SLACK_M,
+    SLIDE_M,
     Interpretation,
     interpretations,
+    poses_along_walls,
 )
 from perception.localization.range_likelihood import RangeModel
 from perception.localization.room import Room, make_room
@@ -79,7 +81,7 @@ def test_leaves_equal_an_enumeration_of_all_assignments() -> None:
         world, truth = random_room(seed, AcousticsConfig(model="specular"))
         room, firing = stand(world, truth)
         segments = list(contour_segments(panorama_of(firing), HALF_ANGLE, "specular", RangeModel.of_ring(RING))[:3])
-        found = [leaf.assigned for leaf in interpretations(segments, room, 2)]
+        found = [leaf.assigned for leaf in interpretations(segments, room)]
         assert found == enumerated(segments, room)
         leaves += len(found)
     assert leaves > 20
@@ -92,7 +94,7 @@ def is_near(leaf: Interpretation, pose: Pose) -> bool:
 
 def test_a_square_gives_its_four_symmetric_poses_first() -> None:
     segments = [seen(angle, offset) for angle, offset in ((0.0, 3.0), (90.0, 2.5), (180.0, 1.0), (270.0, 1.5))]
-    leaves = [leaf for leaf in interpretations(segments, make_room(SQUARE), 2) if leaf.assigned == 4]
+    leaves = [leaf for leaf in interpretations(segments, make_room(SQUARE)) if leaf.assigned == 4]
     poses = [Pose(1.0, 1.5, 0.0), Pose(2.5, 1.0, math.pi / 2), Pose(3.0, 2.5, math.pi), Pose(1.5, 3.0, -math.pi / 2)]
     assert len(leaves) == 4
     assert all(any(is_near(leaf, pose) for leaf in leaves) for pose in poses)
@@ -101,25 +103,32 @@ def test_a_square_gives_its_four_symmetric_poses_first() -> None:
 def test_a_segment_is_not_on_a_shorter_wall() -> None:
     room = make_room(np.array([(0, 0, 4, 0), (4, 0, 4, 1), (4, 1, 0, 1), (0, 1, 0, 0)], dtype=float))
     segments = [seen(0.0, 3.0), seen(90.0, 0.5, length=2.0)]
-    leaves = interpretations(segments, room, 2)
+    leaves = interpretations(segments, room)
     assert any(is_near(leaf, Pose(1.0, 0.5, 0.0)) for leaf in leaves)
     assert all(abs(math.sin(leaf.theta)) < 0.5 for leaf in leaves), "the long segment is on a long wall"
 
 
-def test_parallel_walls_give_a_row_of_places_where_asked() -> None:
-    segments = [seen(0.0, 3.0), seen(180.0, 1.0)]
-    assert interpretations(segments, make_room(SQUARE), 2) == ()
-    rows = [leaf for leaf in interpretations(segments, make_room(SQUARE), 1) if leaf.assigned == 2]
-    along = sorted(leaf.y for leaf in rows if abs(leaf.x - 1.0) < 1e-6 and abs(leaf.theta) < 1e-6)
-    assert np.diff(along) == pytest.approx(interpretation_tree.SLIDE_M)
-    assert along[0] == pytest.approx(0.0)
-    assert along[-1] > 3.8
+def test_parallel_walls_fix_no_place() -> None:
+    assert interpretations([seen(0.0, 3.0), seen(180.0, 1.0)], make_room(SQUARE)) == ()
+
+
+def test_one_wall_gives_a_row_of_poses_that_see_it() -> None:
+    room = make_room(SQUARE)
+    segment = seen(30.0, 1.5)
+    poses = poses_along_walls([segment], room)
+    row = poses[(np.abs(poses[:, 0] - 2.5) < 1e-9) & (np.abs(np.sin(poses[:, 2] + segment.alpha)) < 1e-9)]
+    row = row[np.cos(row[:, 2] + segment.alpha) > 0]
+    assert np.diff(np.sort(row[:, 1])) == pytest.approx(SLIDE_M)
+    assert 0.0 < row[:, 1].min() < SLIDE_M
+    assert 4.0 - SLIDE_M < row[:, 1].max() < 4.0
+    assert len(poses) == 8 * len(row), "as much on either side of each wall"
+    assert len(poses_along_walls([seen(30.0, 1.5, length=4.5)], room)) == 0
 
 
 def test_the_number_of_nodes_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     segments = [seen(angle, 2.0) for angle in (0.0, 90.0, 180.0, 270.0)]
-    whole = interpretations(segments, make_room(SQUARE), 2)
+    whole = interpretations(segments, make_room(SQUARE))
     monkeypatch.setattr(interpretation_tree, "NODES_MAX", 50)
-    cut = interpretations(segments, make_room(SQUARE), 2)
+    cut = interpretations(segments, make_room(SQUARE))
     assert 0 < len(cut) < len(whole)
     assert set(cut) <= set(whole)

@@ -6,9 +6,10 @@ import math
 
 import pytest
 
+from config.load import load_settings
 from drivers.messages import Pose
 from perception.localization.localize import PoseCandidate
-from runtime.simulation.localization_trials import RIGHT_M, RIGHT_RAD, Trial, figures
+from runtime.simulation.localization_trials import RIGHT_M, RIGHT_RAD, Trial, figures, localize_once
 
 TRUTH = Pose(1.0, 2.0, math.pi - 0.01)
 RIGHT = Pose(1.0, 2.0 + 0.5 * RIGHT_M, -math.pi + 0.01)
@@ -18,7 +19,13 @@ AWAY = Pose(1.0 + 1.1 * RIGHT_M, 2.0, TRUTH.theta)
 
 def trial(*candidates: tuple[Pose, float]) -> Trial:
     """A trial with these candidates."""
-    return Trial(TRUTH, tuple(PoseCandidate(*one) for one in candidates), 24)
+    return Trial(TRUTH, tuple(PoseCandidate(*one) for one in candidates))
+
+
+def test_a_trial_takes_the_map_of_the_room_or_of_another() -> None:
+    ring = load_settings("hallway").ring
+    assert localize_once(ring, 1).first_is_right
+    assert not localize_once(ring, 1, map_seed=2).candidates
 
 
 def test_figures_count_each_kind_of_answer() -> None:
