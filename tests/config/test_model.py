@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from config.load import ConfigError, list_shipped, load_model
-from config.model import ModelConfig
+from config.model import NAME_MAX, ModelConfig
 from tests.examples import examples
 
 SQUARE = [(0.3, 0.3), (-0.3, 0.3), (-0.3, -0.3), (0.3, -0.3)]
@@ -48,6 +48,13 @@ def test_it_is_refused_with_file_and_vertex(
     assert "post.toml" in text
     assert "\n" not in text
     assert all(word in text for word in words), text
+
+
+def test_a_name_longer_than_a_list_shows_is_refused(tmp_path: Path) -> None:
+    path = Path(write(tmp_path, SQUARE))
+    path.write_text(path.read_text().replace("post", "p" * (NAME_MAX + 1)))
+    with pytest.raises(ConfigError, match=rf"post\.toml.*name.*{NAME_MAX}"):
+        load_model(str(path))
 
 
 def test_shipped_models_and_plain_shapes_are_accepted(tmp_path: Path) -> None:

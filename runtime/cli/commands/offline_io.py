@@ -49,16 +49,12 @@ def refuse_unwritable(files: dict[str, str | None]) -> None:
         One cannot.
     """
     for option, path in files.items():
-        try:
-            if path is not None:
+        if path is not None:
+            with writing(option, path):
                 is_new = not (Path(path).exists() or Path(path).is_symlink())
                 Path(path).open("ab").close()
                 if is_new:
                     Path(path).unlink()
-        except OSError as error:
-            raise UserError(
-                f"{option} {path}: cannot be written: {error.strerror}; choose another file", FAILED
-            ) from error
 
 
 @contextlib.contextmanager

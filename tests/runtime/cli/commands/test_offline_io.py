@@ -62,7 +62,9 @@ def test_a_file_is_tried_before_the_work_and_keeps_its_content(tmp_path: Path) -
     assert (tmp_path / "old.json").read_text() == "{}"
     refuse_unwritable({"--json": str(tmp_path / "new.json")})
     assert not (tmp_path / "new.json").exists()
-    with pytest.raises(UserError, match=r"^--json .*/no/x: cannot be written: .*; choose another file$") as caught:
+    with pytest.raises(
+        UserError, match=r"^--json .*/no/x: cannot be written: .*; choose another place or make room$"
+    ) as caught:
         refuse_unwritable({"--json": str(tmp_path / "no" / "x")})
     assert caught.value.exit_code == FAILED
 
