@@ -53,10 +53,8 @@ REFINED_MAX: Final = 24
 MERGE_M: Final = 0.2
 MERGE_RAD: Final = math.radians(7.0)
 """Poses nearer to each other than this are one."""
-WIDEN_SIGMAS: Final = 1.0
 LOST_SIGMAS: Final = 2.0
-"""A true pose's likelihood in standard deviations below its mean: if the best is less than the first, the search is
-widened; the second stands for a pose that the search has missed."""
+"""A pose that the search has missed is given a true pose's likelihood, so many standard deviations below its mean."""
 LOST_PROBABILITY: Final = 0.5
 """The robot is lost where it is more likely than this that the search has missed its pose."""
 HEADING_CELL_RAD: Final = math.radians(4.0)
@@ -122,7 +120,7 @@ def localize(
     leaves = [leaf[1:] for part in segments for leaf in interpretations(part, room)]
     starts = _promising(stand, np.array(leaves).reshape(-1, 3), TURNS_RAD)
     modes = _refined(stand, starts)
-    if not modes or max(mode.log_ratio for mode in modes) < mean - WIDEN_SIGMAS * sigma:
+    if not modes or max(mode.log_ratio for mode in modes) < mean:
         rows = np.concatenate([poses_along_walls(part, room) for part in segments])
         modes = _refined(stand, np.concatenate([starts, _promising(stand, rows, WIDE_TURNS_RAD)]))
     if not modes:
