@@ -140,6 +140,8 @@ class ConsoleCase:
     session: aiohttp.ClientSession
     log: list[dict[str, Any]]
     clock: list[float]
+    sockets: list[aiohttp.ClientWebSocketResponse] = field(default_factory=list)
+    """Of every page that was connected."""
     cycle: int = 0
 
     @property
@@ -163,6 +165,7 @@ class ConsoleCase:
         socket = await self.session.ws_connect(
             self.url.with_path("/ws").with_query(query), headers=headers, max_msg_size=0
         )
+        self.sockets.append(socket)
         return Page(socket, self.console.hub.challenges.issue)
 
     async def page(self) -> Page:
@@ -241,8 +244,12 @@ async def open_console(
         run.health.catching_unhandled_errors(),
         mock.patch("runtime.console.frames.frame_publisher.IDLE_PERIOD_S", idle_period_s),
     ):
-        async with aiohttp.ClientSession() as session, console.open():
-            yield ConsoleCase(run, console, session, lines, clock)
+        async with aiohttp.ClientSession() as session:
+            case = ConsoleCase(run, console, session, lines, clock)
+            async with console.open():
+                yield case
+            for socket in case.sockets:
+                await socket.close()  # else its collection may fail a later test
         left = [task for task in asyncio.all_tasks() - before if "aiohttp.connector" not in repr(task)]
         assert not left, "a task outlived the console"
     assert run.health.fault() is None
