@@ -49,7 +49,15 @@ class FittedPoses(NamedTuple):
 
 
 def beams_at(panorama: Panorama, x: Floats, y: Floats, theta: Floats) -> Beams:
-    """Return the sensors of a panorama in the map frame, shape (poses, n), for poses of shape (poses,)."""
+    """Return the sensors of a panorama in the map frame, shape (poses, n).
+
+    Parameters
+    ----------
+    panorama : Panorama
+        The sensors in the ring's frame.
+    x, y, theta : (poses,) float
+        The ring's poses in the map frame, m and rad.
+    """
     cos, sin = np.cos(theta)[:, None], np.sin(theta)[:, None]
     return Beams(
         x[:, None] + cos * panorama.x - sin * panorama.y,
