@@ -11,6 +11,8 @@ from typing import Final
 import numpy as np
 
 from config.world import AcousticsConfig, PolygonConfig, WorldConfig
+from drivers.emulator.acoustics import clearance
+from drivers.emulator.scene import compile_scene
 from drivers.messages import Floats, Pose
 
 ACOUSTICS: Final = AcousticsConfig(model="specular", noise_relative=0.01, dropout=0.05, outliers=0.03)
@@ -42,11 +44,12 @@ def random_room(seed: int, acoustics: AcousticsConfig = ACOUSTICS) -> tuple[Worl
             continue
         turn = rng.uniform(-math.pi, math.pi)
         vertices = vertices @ np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
+        corners = tuple((float(a), float(b)) for a, b in vertices)
+        world = WorldConfig(polygon=(PolygonConfig(vertices_m=corners),), acoustics=acoustics)
+        scene = compile_scene(world)
         for _ in range(50):
             x, y = rng.uniform(vertices.min(axis=0), vertices.max(axis=0)).tolist()
-            if _is_inside(vertices, x, y) and _clearance(vertices, x, y) > CLEAR_MIN_M:
-                corners = tuple((float(a), float(b)) for a, b in vertices)
-                world = WorldConfig(polygon=(PolygonConfig(vertices_m=corners),), acoustics=acoustics)
+            if _is_inside(vertices, x, y) and clearance(x, y, scene.circles, scene.segments) > CLEAR_MIN_M:
                 return world, Pose(x, y, float(rng.uniform(-math.pi, math.pi)))
 
 
@@ -84,11 +87,3 @@ def _is_inside(vertices: Floats, x: float, y: float) -> bool:
     bx, by = np.roll(ax, -1), np.roll(ay, -1)
     turns = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
     return bool(abs(turns.sum()) > math.pi)
-
-
-def _clearance(vertices: Floats, x: float, y: float) -> float:
-    """Return the distance from a point to the nearest wall, m."""
-    a = vertices - (x, y)
-    v = np.roll(a, -1, axis=0) - a
-    share = np.clip(-(a * v).sum(axis=1) / (v * v).sum(axis=1), 0.0, 1.0)
-    return float(np.hypot(*(a + share[:, None] * v).T).min())
