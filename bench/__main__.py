@@ -79,11 +79,7 @@ def bench(
         return 2
     with console.status("bench") as status:
         results = measure(selected, settings.ring, plan, status.update)
-    try:
-        write_json(json, {"repetitions": plan.repetitions, "passes": plan.passes, "results": results})
-    except UserError as error:
-        console.print(f"bench: {error}", markup=False)
-        return error.exit_code
+    write_json(json, {"repetitions": plan.repetitions, "passes": plan.passes, "results": results})
     _wide().print(results_table(results, plan))
     return 0
 
@@ -164,14 +160,10 @@ def console(*, json: str = "console.json", seconds: float = 30.0, rounds: int = 
 
     out = Console(stderr=True)
     seconds, rounds = max(5.0, seconds), max(1, rounds)
-    try:
-        prepare_kernels(load_settings("hallway"), out)
-        with out.status("bench") as status:
-            rows = figures_of(measure_console(seconds, rounds, status.update))
-        write_json(json, {"seconds": seconds, "rounds": rounds, "rows": rows})
-    except UserError as error:
-        out.print(f"bench: {error}", markup=False)
-        return error.exit_code
+    prepare_kernels(load_settings("hallway"), out)
+    with out.status("bench") as status:
+        rows = figures_of(measure_console(seconds, rounds, status.update))
+    write_json(json, {"seconds": seconds, "rounds": rounds, "rows": rows})
     _wide().print(console_table(rows, seconds, rounds))
     return 0
 
@@ -196,11 +188,7 @@ def waking(*, json: str = "waking.json", turns: int = WAKING_TURNS, busy: int = 
         by_load = {
             f"{count} busy": figures(measure_waking(max(1, turns), count, status.update)) for count in (0, busy)
         }
-    try:
-        write_json(json, by_load)
-    except UserError as error:
-        console.print(f"bench: {error}", markup=False)
-        return error.exit_code
+    write_json(json, by_load)
     _wide().print(waking_table(by_load))
     return 0
 
@@ -227,11 +215,7 @@ def localization(*, json: str = "localization.json", rooms: int = 100, first: in
     prepare_kernels(settings, console, (EMULATOR,))
     with console.status("bench") as status:
         rows = measure(settings.ring, range(first, first + max(1, rooms)), status.update)
-    try:
-        write_json(json, rows)
-    except UserError as error:
-        console.print(f"bench: {error}", markup=False)
-        return error.exit_code
+    write_json(json, rows)
     _wide().print(localization_table(rows))
     return 0
 
@@ -242,15 +226,11 @@ def _measured(measure: Measure, plan: TimingPlan, sets: tuple[str, ...], json: s
     from runtime.cycle.summary import write_json
 
     console = Console(stderr=True)
-    try:
-        earlier = None if against is None else read_earlier(against)
-        prepare_kernels(load_settings("hallway"), console)
-        with console.status("bench") as status:
-            result = measure(plan, sets, status.update)
-        write_json(json, result.as_json())
-    except UserError as error:
-        console.print(f"bench: {error}", markup=False)
-        return error.exit_code
+    earlier = None if against is None else read_earlier(against)
+    prepare_kernels(load_settings("hallway"), console)
+    with console.status("bench") as status:
+        result = measure(plan, sets, status.update)
+    write_json(json, result.as_json())
     wide = _wide()
     wide.print(quantiles_table(result, earlier))
     wide.print(figures_table(result, earlier))
@@ -280,5 +260,14 @@ def load_peers() -> tuple[Peer, ...]:
     return tuple(module.PEER for module in peers)
 
 
+def main() -> None:
+    """Run the command line; what a person has caused is told in one line."""
+    try:
+        sys.exit(app(result_action="return_value"))
+    except UserError as error:
+        Console(stderr=True).print(f"bench: {error}", markup=False)
+        sys.exit(error.exit_code)
+
+
 if __name__ == "__main__":
-    sys.exit(app(result_action="return_value"))
+    main()
