@@ -261,7 +261,7 @@ def load_peers() -> tuple[Peer, ...]:
 
 
 def main() -> None:
-    """Run the command line; what a person has caused is told in one line."""
+    """Run the command line; report an error that a person has caused in one line."""
     try:
         sys.exit(app(result_action="return_value"))
     except UserError as error:
