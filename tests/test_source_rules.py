@@ -46,6 +46,7 @@ WITHOUT_TEST: Final = MappingProxyType(
         "config/units.py": "one constant",
         "perception/bayes/parameters.py": "constants",
         "perception/bayes/polygon_parameters.py": "constants",
+        "perception/localization/landmark_state.py": "records and constants",
         "runtime/console/commands/command.py": "dataclasses and an enumeration",
         "runtime/console/commands/command_error.py": "an exception with one attribute",
         "runtime/console/protocols.py": "protocol classes",

@@ -34,7 +34,7 @@ from perception.bayes.polygon_parameters import POLYGON_PROBABILITY
 from perception.bayes.polygon_tracks import polygon_quantum
 from perception.bayes.refine import quantum
 from perception.bayes.segment_list import count_made, count_segments, drawn, mapped_segments
-from perception.bayes.state import Memory
+from perception.bayes.state import FREE, Memory
 from perception.bayes.state_migration import migrate
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import Edit, Evidence, Segments
@@ -200,6 +200,25 @@ class BayesPerception:
             kind = memory.circles["kind"][row]
             name = self._round[kind] if kind < p[0].model_count else rival_label(memory, row)
         return evidence_of(memory, p, row, number, name, alternative_labels(p, self._round))
+
+    def shift_circle(self, number: int, dx: float, dy: float) -> None:
+        """Move a round object and the readings kept for it, after its place in the map was corrected.
+
+        Parameters
+        ----------
+        number : int
+            The object's; nothing moves if it has gone.
+        dx, dy : float
+            m
+        """
+        circles = self.memory.circles
+        kept = circles["bins"]["readings"]
+        for row in np.flatnonzero((circles["number"] == number) & (circles["status"] != FREE)):
+            circles["x"][row] += dx
+            circles["y"][row] += dy
+            kept["x"][row] += dx
+            kept["y"][row] += dy
+        self._objects = None
 
     def reset(self) -> None:
         """Clear the memory, as after a reset of the odometry."""

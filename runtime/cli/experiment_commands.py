@@ -10,7 +10,7 @@ from runtime.simulation.scene_names import SceneName
 
 
 def experiment(
-    name: Literal["hallway", "irregular", "budget"],
+    name: Literal["hallway", "irregular", "budget", "drift"],
     /,
     *,
     method: Literal["paper", "bayes"] = "bayes",
@@ -30,8 +30,8 @@ def experiment(
     Parameters
     ----------
     name
-        The simulated hallway, the irregular hallway of the real run, or the effect of smaller time budgets for
-        perception in a hall of 40 drums.
+        The simulated hallway, the irregular hallway of the real run, the effect of smaller time budgets for
+        perception in a hall of 40 drums, or rounds among drums with drifting odometry.
     method
         How objects are recognised.
     scene
@@ -77,6 +77,13 @@ def experiment(
         return run_budgets(
             sets, budgets_ms=budget_ms, quanta=quanta, models=model, seeds=seeds, json_file=json, units=units
         )
+    if name == "drift":
+        from runtime.cli.commands.drift import run_drift
+
+        if scene is not None or world is not None or out is not None:
+            raise UserError("experiment drift has a hall of its own and records nothing: leave out --scene, --world "
+                            "and --out", WRONG_CALL)  # fmt: skip
+        return run_drift(sets, models=model, seeds=seeds, json_file=json, units=units)
     if scene is not None:
         if name != "hallway" or world is not None:
             raise UserError("--scene is a hallway of its own: call `experiment hallway`, without --world", WRONG_CALL)

@@ -54,6 +54,8 @@ def replay(
     since: Annotated[float, Parameter(name="--from", show_default=False)] = 0.0,
     until: Annotated[float | None, Parameter(name="--to")] = None,
     speed: float | None = None,
+    localize: Annotated[bool, Flag] = False,
+    trajectory: str | None = None,
     robot: RobotFile = None,
     model: ModelFiles = (),
     json: JsonFile = None,
@@ -76,6 +78,11 @@ def replay(
         End this many seconds after the first recorded cycle.
     speed
         Show the run this many times as fast as it was; by default it is replayed as fast as possible.
+    localize
+        Correct the drift of a ring log's odometry by what is recognised; objects are then in the map frame, which is
+        the odometry's at the first row.
+    trajectory
+        With --localize, a file for the robot's poses in the map frame (CSV), one row a firing.
     robot
         Robot file for a ring log; a recording contains its robot.
     model
@@ -96,6 +103,10 @@ def replay(
 
     from runtime.recording.reader import is_recording
 
+    if trajectory is not None and not localize:
+        raise UserError("--trajectory gives poses in the map frame: give --localize too", WRONG_CALL)
+    if localize and is_recording(Path(log)):
+        raise UserError(f"{log}: is a recording; --localize applies to ring logs only", WRONG_CALL)
     if is_recording(Path(log)):
         from runtime.cli.commands.replay_recording import Span, replay_recording
 
@@ -110,7 +121,9 @@ def replay(
         )
     from runtime.cli.commands.replay_ring_log import replay_log
 
-    return replay_log(log, sets, robot=robot, models=model, json_file=json, units=units)
+    return replay_log(
+        log, sets, robot=robot, models=model, json_file=json, units=units, localize=localize, trajectory=trajectory
+    )  # fmt: skip
 
 
 def recover(recording: str, /, *, out: str | None = None) -> int:

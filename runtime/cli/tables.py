@@ -14,7 +14,9 @@ from runtime.support.length_format import Units, format_length, format_point
 if TYPE_CHECKING:
     # The robot's own process has tables too, and shall not load the emulator for them.
     from runtime.cycle.summary import ObjectRow, RunSummary
+    from runtime.recording.replay_summary import PoseRow
     from runtime.simulation.budget_sweep import BudgetRow
+    from runtime.simulation.drift_trials import DriftRow
     from runtime.simulation.evaluation import DrumRow, Outcome, Spread
     from runtime.simulation.open_loop import BoxRow, SceneOutcome
 
@@ -101,9 +103,9 @@ def _summary_line(found: str, outcome: Outcome, units: Units) -> str:
     )
 
 
-def objects_table(objects: list[ObjectRow], units: Units) -> Table:
-    """Return what was seen, in the odometry's frame."""
-    table = Table(title="objects, in the odometry's frame", title_justify="left")
+def objects_table(objects: list[ObjectRow], units: Units, frame: str = "odometry") -> Table:
+    """Return what was seen, in the frame of this name."""
+    table = Table(title=f"objects, in the {frame}'s frame", title_justify="left")
     for heading in ("model", f"x ({units})", f"y ({units})", "heading (°)", "support", "score"):
         table.add_column(heading, justify="right")
     for seen in objects:
@@ -116,6 +118,16 @@ def objects_table(objects: list[ObjectRow], units: Units) -> Table:
             f"{seen['score']:.2f}",
         )
     return table
+
+
+def pose_line(pose: PoseRow, units: Units) -> str:
+    """Return where the robot is in the map frame, in one line."""
+    sigma_x, sigma_y, sigma_theta = (math.sqrt(pose["covariance"][i][i]) for i in range(3))
+    return (
+        f"{pose['status']}: the robot is at {format_point(pose['x'], pose['y'], units)} {units}, "
+        f"± {format_length(max(sigma_x, sigma_y), units, 3)} {units}, heading {math.degrees(pose['theta']):.1f}° "
+        f"± {math.degrees(sigma_theta):.1f}°"
+    )
 
 
 def budget_table(rows: Sequence[BudgetRow], unit: str, units: Units) -> Table:
@@ -146,6 +158,41 @@ def budget_table(rows: Sequence[BudgetRow], unit: str, units: Units) -> Table:
         cut = f"{row['cut_short']:.1%}"
         table.add_row(
             f"{row['budget']:g}", f"{row['quanta']:.2f}", cut, first, way, found, str(row["false"]), mean, worst
+        )
+    return table
+
+
+def drift_table(rows: Sequence[DriftRow], units: Units) -> Table:
+    """Return what rounds with drifting odometry gave, with and without correction.
+
+    Parameters
+    ----------
+    rows : sequence of DriftRow
+        The results, one level of errors each; lengths in metres.
+    units : {"m", "ft"}
+        Units of the printed lengths.
+    """
+    title = "three rounds among eight drums: errors at the end, with and without correction of the drift"
+    caption = "error: of the drums, as seen from the robot; place, heading: of the robot; NEES: expected 3 and 2"
+    table = Table(title=title, title_justify="left", caption=caption, caption_justify="left")
+    names = ("scale", "walk", "corrected", "found", "false", "error", "place", "heading", "NEES", "NEES", "odometer",
+             "range")  # fmt: skip
+    of_units = ("", "°/√m", "", "", "", units, units, "°", "pose", "drums", "", "")
+    for heading, of in zip(names, of_units, strict=True):
+        table.add_column(f"{heading}\n{of}", justify="right", no_wrap=True)
+    for row in rows:
+        nees, shares = (row["nees"], row["object_nees"]), (row["odometer_error"], row["range_error"])
+        table.add_row(
+            f"{row['scale']:.2f}",
+            f"{row['heading_deg_per_sqrt_m']:.1f}",
+            "yes" if row["corrected"] else "no",
+            f"{row['drums'] - row['missed']}/{row['drums']}",
+            str(row["false"]),
+            "" if row["mean_error"] is None else format_length(row["mean_error"], units, 3),
+            format_length(row["place"], units, 3),
+            f"{row['heading_deg']:.2f}",
+            *("" if one is None else f"{one:.2f}" for one in nees),
+            *("" if one is None else f"{one:.2%}" for one in shares),
         )
     return table
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NotRequired, TypedDict
+from typing import Literal, NotRequired, TypedDict
 
+from perception.localization.drift_correction import Status
 from runtime.cycle.summary import ObjectRow
 from runtime.timing.cycle_stats import Quantiles
 
@@ -22,10 +23,27 @@ class VerifyRow(TypedDict):
     damage: list[str]
 
 
+class PoseRow(TypedDict):
+    """The robot in the map frame; m and rad."""
+
+    x: float
+    y: float
+    theta: float
+    covariance: list[list[float]]
+    """Of x, y and theta."""
+    status: Status
+    probability: float
+
+
 class ReplaySummary(TypedDict):
     """Summary of ``echolocate replay``."""
 
     verify: NotRequired[VerifyRow]
+
+    pose: NotRequired[PoseRow]
+    """Of a replay that corrects drift: the robot at the end."""
+    frame: NotRequired[Literal["map"]]
+    """The frame of pose and objects, where it is not odometry's."""
 
     objects: list[ObjectRow]
     segments: int

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from config.settings import Settings
 from drivers.messages import Firing
+from perception.localization.drift_correction import LocalizedPose
+from perception.localization.localized_perception import LocalizedPerception
 from perception.pipeline import Perception
 from runtime.cycle.summary import object_row
 from runtime.recording.replay_summary import ReplaySummary
@@ -16,6 +18,8 @@ from runtime.timing.refinement_budget import within_quanta_per_cycle
 
 class FiringReplayer:
     """An iterator over firings that runs perception on each of them before it yields it.
+
+    Drift is not corrected.
 
     Parameters
     ----------
@@ -57,6 +61,50 @@ class FiringReplayer:
             "cycles": self._cycle_stats.cycles,
             "cycle_us": self._cycle_stats.cycle_us(),
         }
+
+
+def replay_localized(
+    settings: Settings, firings: Iterable[Firing], on_pose: Callable[[float, LocalizedPose], None]
+) -> ReplaySummary:  # fmt: skip
+    """Run perception over firings, correct drift by what it recognises, and return what it perceived.
+
+    Parameters
+    ----------
+    settings : Settings
+        Ring, models and constants.
+    firings : iterable of Firing
+        In order of time.
+    on_pose : callable
+        Called after each firing with its time (s) and the robot's pose as known then.
+    """
+    localized = LocalizedPerception(settings.ring, settings.models, settings.perception)
+    cycle_stats = CycleStats(late_after_s=float("inf"))
+    for firing in firings:
+        started_s = time.perf_counter()
+        localized.observe(firing)
+        quanta = 0
+        while localized.can_refine and within_quanta_per_cycle(quanta):
+            localized.refine()
+            quanta += 1
+        cycle_stats.add_cycle(time.perf_counter() - started_s)
+        on_pose(firing.robot_s, localized.localized())
+    here, counts = localized.localized(), localized.perception.counts
+    return {
+        "frame": "map",
+        "pose": {
+            "x": here.pose.x,
+            "y": here.pose.y,
+            "theta": here.pose.theta,
+            "covariance": here.covariance.tolist(),
+            "status": here.status,
+            "probability": here.probability,
+        },
+        "objects": [object_row(seen) for seen in localized.objects()],
+        "segments": counts.segments_total,
+        "clusters": counts.hypotheses,
+        "cycles": cycle_stats.cycles,
+        "cycle_us": cycle_stats.cycle_us(),
+    }
 
 
 def replay_firings(settings: Settings, firings: Iterable[Firing]) -> ReplaySummary:

@@ -29,7 +29,13 @@ if TYPE_CHECKING:
 
     from config.settings import Settings
 
-PACKAGES: Final = ("perception", "perception.paper", "perception.bayes", "drivers.emulator")
+PACKAGES: Final = (
+    "perception",
+    "perception.paper",
+    "perception.bayes",
+    "perception.localization",
+    "drivers.emulator",
+)
 """Packages that hold kernels."""
 
 PAPER: Final = "paper"

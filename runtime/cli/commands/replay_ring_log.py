@@ -4,21 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from rich.console import Console
 
 from config.errors import DONE
 from config.load import load_settings
 from runtime.cli.commands.offline_io import refuse_unwritable
-from runtime.cli.tables import objects_table
+from runtime.cli.tables import objects_table, pose_line
 from runtime.cycle.summary import write_json
 from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.length_format import Units
 from runtime.support.progress import progress
 
+TRAJECTORY_HEADER: Final = "t,x,y,theta,sxx,sxy,syy,stt,status"
+
 if TYPE_CHECKING:
     from drivers.messages import Firing
+    from perception.localization.drift_correction import LocalizedPose
 
 
 def replay_log(
@@ -29,34 +32,59 @@ def replay_log(
     models: Sequence[str],
     json_file: str | None,
     units: Units,
+    localize: bool = False,
+    trajectory: str | None = None,
 ) -> int:
     """Run perception over a ring log, print the objects and return the exit code.
 
     Parameters
     ----------
-    log, sets, robot, models, json_file, units
+    log, sets, robot, models, json_file, units, localize, trajectory
         As of `runtime.cli.recording_commands.replay`.
     """
     settings = load_settings(None, sets, robot=robot, models=models)
     console = Console(stderr=True)
-    refuse_unwritable({"--json": json_file})
+    refuse_unwritable({"--json": json_file, "--trajectory": trajectory})
     prepare_kernels(settings, console)
     from runtime.recording.ring_log import read_ring_log
-    from runtime.recording.ring_log_replay import replay_firings
+    from runtime.recording.ring_log_replay import replay_firings, replay_localized
 
+    rows: list[str] = []
     with progress(console, "replaying") as step:
-        firings = read_ring_log(Path(log), sensors=len(settings.ring.mounts))
-        summary = replay_firings(settings, _each(firings, step))
+        firings = _each(read_ring_log(Path(log), sensors=len(settings.ring.mounts)), step)
+        if localize:
+            summary = replay_localized(settings, firings, lambda t, here: rows.append(trajectory_row(t, here)))
+        else:
+            summary = replay_firings(settings, firings)
+    if trajectory is not None:
+        Path(trajectory).write_text("\n".join([TRAJECTORY_HEADER, *rows, ""]), "utf-8")
     if json_file is not None:
         write_json(json_file, summary)
     output = Console()
-    output.print(objects_table(summary["objects"], units))
+    output.print(objects_table(summary["objects"], units, frame="map" if localize else "odometry"))
+    if "pose" in summary:
+        output.print(pose_line(summary["pose"], units))
     cycle_us = summary["cycle_us"]
     output.print(
         f"{summary['cycles']} firings, {summary['segments']} outline segments, {summary['clusters']} clusters; "
         f"a firing takes {cycle_us['p50'] / 1e3:.2f} ms, p99 {cycle_us['p99'] / 1e3:.2f} ms"
     )
     return DONE
+
+
+def trajectory_row(t: float, here: LocalizedPose) -> str:
+    """Return a row of the trajectory, with the columns of `TRAJECTORY_HEADER`.
+
+    Parameters
+    ----------
+    t : float
+        Time of the firing, s.
+    here : LocalizedPose
+        The robot in the map frame, as known then.
+    """
+    p, pose = here.covariance, here.pose
+    numbers = (t, pose.x, pose.y, pose.theta, p[0, 0], p[0, 1], p[1, 1], p[2, 2])
+    return ",".join((*(f"{float(number):.9g}" for number in numbers), here.status))
 
 
 def _each(firings: Iterable[Firing], step: Callable[[], None]) -> Iterator[Firing]:

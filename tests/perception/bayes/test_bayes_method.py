@@ -121,6 +121,21 @@ def test_an_empty_map_has_no_objects_and_nothing_to_refine() -> None:
     assert perception.segments().geometry.shape == (0, 5)
 
 
+def test_an_object_is_shifted_with_the_readings_kept_for_it() -> None:
+    perception = perception_of_both_models()
+    assert perception.edit(PlaceModel("semicircle", 1.0, 0.0, 0.0)) is None
+    (number,) = (o.number for o in perception.objects())
+    (row,) = np.flatnonzero(perception.memory.circles["number"] == number)
+    kept = perception.memory.circles["bins"]["readings"][row]
+    kept["x"], kept["y"] = 2.0, 3.0
+    perception.shift_circle(number or 0, 0.1, -0.2)
+    perception.shift_circle(99, 5.0, 5.0)
+    assert [(o.x, o.y) for o in perception.objects()] == [pytest.approx((1.1, -0.2))]
+    kept = perception.memory.circles["bins"]["readings"][row]
+    assert np.unique(kept["x"]) == pytest.approx(2.1)
+    assert np.unique(kept["y"]) == pytest.approx(2.8)
+
+
 def test_a_placed_object_is_reported_until_the_map_is_reset() -> None:
     perception = perception_of_both_models()
     assert perception.edit(PlaceModel("semicircle", 1.0, 0.0, 0.0)) is None

@@ -8,9 +8,30 @@ from pathlib import Path
 
 import pytest
 
-from config.errors import DONE
+from config.errors import DONE, WRONG_CALL
 from runtime.analysis.timeline_sources import TimelineSource, load_timeline
 from runtime.cli.app import run_command
+
+
+@pytest.mark.usefixtures("bad_files")
+def test_a_localized_replay_gives_the_pose_in_the_map_frame(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["replay", "good.csv", "--model", "drum", "--localize", "--trajectory", "path.csv", "--json", "x.json"]
+    assert run_command(words) == DONE
+    assert "localizing: the robot is at" in capsys.readouterr().out
+    result = json.loads(Path("x.json").read_bytes())
+    assert result["frame"] == "map"
+    assert result["pose"]["status"] == "localizing"
+    assert len(result["pose"]["covariance"]) == 3
+    header, row = Path("path.csv").read_text("utf-8").splitlines()
+    assert header == "t,x,y,theta,sxx,sxy,syy,stt,status"
+    assert row.split(",")[-1] == "localizing"
+    assert [float(v) for v in row.split(",")[1:4]] == [result["pose"][name] for name in ("x", "y", "theta")]
+
+
+@pytest.mark.usefixtures("bad_files")
+def test_a_trajectory_needs_the_map_frame(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(["replay", "good.csv", "--trajectory", "path.csv"]) == WRONG_CALL
+    assert "--localize" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("bad_files")

@@ -1,0 +1,274 @@
+"""Ranges as measurements of the landmark filter: which landmark each is from, gates, and the corrections.
+
+A reading is entered at once and only once, so the evidence of two readings is independent. Perception's own
+estimates, which average many readings at poses taken as exact, enter only as the first guess of a landmark's place.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from perception.kernel import Floats, kernel
+from perception.localization.landmark_filter import correct, innovation_variance, rows_used
+from perception.localization.landmark_state import FIRST, EstimateRecord
+
+GATE: Final = 10.8
+"""χ² of one degree of freedom that a true reading exceeds in one of a thousand cases."""
+SOFT: Final = 6.25
+"""Normalised squared innovation from which on a reading's weight is reduced: its tails are heavier than a bell's."""
+OWN_M: Final = 0.15
+"""A range farther than this from a landmark's is of something else, however uncertain the landmark is."""
+NEAR_M: Final = 0.5
+"""A range this near to a landmark's, but outside the gate, is a failure of that landmark."""
+FRESH_M: Final = 0.02
+FRESH_RAD: Final = math.radians(1.0)
+"""A sensor's readings that are nearer together repeat one error of rounding; only the first is used."""
+MARGIN_RAD: Final = math.radians(3.0)
+"""This far inside the beam a landmark must answer."""
+NOISE_MEMORY: Final = 0.005
+"""Share of one reading in the estimate of the noise."""
+NOISE_MIN: Final = 0.02
+NOISE_MAX: Final = 25.0
+FIT_MEMORY: Final = 0.03
+"""Share of one expected echo in `Estimate.fit_share`."""
+NONE: Final = -1
+EDGE_RAD: Final = math.radians(0.4)
+"""Standard deviation of where a beam ends."""
+EDGE_SIGMAS: Final = 3.0
+"""A landmark farther from the beam's edge than this says nothing about its bearing."""
+DROP_OUT: Final = 0.1
+"""Share of the expected echoes that a sensor misses."""
+STRAY: Final = 0.02
+"""Share of the echoes that are heard from outside the beam."""
+HIDING_RADII: Final = 1.1
+"""A line of sight this near to a landmark's centre is hidden by it."""
+BEHIND_M: Final = 0.3
+"""A range this much beyond a landmark's has passed it."""
+
+
+@kernel
+def has_moved(e: EstimateRecord, i: int, x: float, y: float, axis: float) -> bool:
+    """Return whether a sensor has moved or turned enough since its last reading that was used; note its place.
+
+    Parameters
+    ----------
+    e : (1,) Estimate
+        Updated.
+    i : int
+        The sensor.
+    x, y, axis : float
+        Its place (m) and direction (rad) by odometry.
+    """
+    last = e[0].sensors[i]
+    if last.is_known == 1 and abs(axis - last.axis) < FRESH_RAD and math.hypot(x - last.x, y - last.y) < FRESH_M:
+        return False
+    last.x, last.y, last.axis, last.is_known = x, y, axis, 1
+    return True
+
+
+@kernel
+def is_hidden(e: EstimateRecord, i: int, x: float, y: float) -> bool:
+    """Return whether another landmark stands between a sensor at (x, y) (m) and the centre of landmark `i`."""
+    est = e[0]
+    dx, dy = est.landmarks[i].x - x, est.landmarks[i].y - y
+    d = math.sqrt(dx * dx + dy * dy)
+    for k in range(est.count):
+        other = est.landmarks[k]
+        ox, oy = other.x - x, other.y - y
+        along = (ox * dx + oy * dy) / d
+        if k != i and 0.0 < along < d and abs(ox * dy - oy * dx) < HIDING_RADII * other.radius * d:
+            return True
+    return False
+
+
+@kernel
+def update_with_edge(
+    e: EstimateRecord, covariance: Floats, i: int, dx: float, dy: float, ax: float, ay: float, half_angle: float,
+    is_heard: bool,
+) -> None:  # fmt: skip
+    """Enter that a sensor heard a landmark, which is inside the beam, or did not, so that it is rather outside.
+
+    With t the angle from the landmark to the nearer edge of the beam, positive inside, and q² the sum of its variance
+    and the edge's, an echo has the probability Φ(t/q); the posterior's moments are those of the probit model. Ranges
+    hardly depend on the heading, but what is heard by which sensor does.
+
+    Parameters
+    ----------
+    e : (1,) Estimate
+        Updated.
+    covariance : (rows, rows) float
+        Updated.
+    i : int
+        The landmark.
+    dx, dy : float
+        From the sensor to its centre, m.
+    ax, ay : float
+        The sensor's axis.
+    half_angle : float
+        Half the beam's width, rad.
+    is_heard : bool
+        Whether the sensor heard it.
+    """
+    est = e[0]
+    d = math.sqrt(dx * dx + dy * dy)
+    off = math.atan2(ax * dy - ay * dx, ax * dx + ay * dy)
+    side = 1.0 if off > 0.0 else -1.0
+    t = half_angle - abs(off)
+    if abs(t) > half_angle:
+        return
+    # t falls as the landmark moves along (-dy, dx) on the left side.
+    u, v = side * dy / (d * d), -side * dx / (d * d)
+    variance = innovation_variance(covariance, rows_used(e), FIRST + 2 * i, u, v, 0.0, est.gain)
+    q = math.sqrt(variance + EDGE_RAD * EDGE_RAD)
+    z = t / q
+    if abs(z) > EDGE_SIGMAS:
+        return
+    inside = 0.5 * math.erfc(-z / math.sqrt(2.0))
+    density = math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
+    share = 1.0 - STRAY if is_heard else DROP_OUT - 1.0
+    total = STRAY + share * inside if is_heard else 1.0 + share * inside
+    slope = share * density / (total * q)
+    curvature = -slope * z / q - slope * slope
+    if curvature < 0.0:
+        # The posterior's mean is t + σ² slope, its variance σ² + σ⁴ curvature.
+        correct(e, covariance, -slope / curvature, -1.0 / curvature)
+
+
+@kernel
+def update_with_range(
+    e: EstimateRecord, covariance: Floats, mx: float, my: float, axis: float, r: float, var0: float, rel2: float,
+    half_angle: float, range_max: float,
+) -> int:  # fmt: skip
+    """Enter the range of one sensor; return the landmark that it is from, or `NONE`.
+
+    The reading is from the landmark in the beam whose predicted range is nearest in standard deviations. Where two
+    explain it, it is not used.
+
+    Parameters
+    ----------
+    e : (1,) Estimate
+        Updated.
+    covariance : (rows, rows) float
+        Updated.
+    mx, my, axis : float
+        The sensor's mount in the ring's frame, m and rad.
+    r : float
+        Range, m; inf: no echo.
+    var0, rel2 : float
+        Nominal variance of a range: var0 (m²) + rel2 · r².
+    half_angle, range_max : float
+        Half the beam's width, rad; greatest range of the ring, m.
+    """
+    est = e[0]
+    n = rows_used(e)
+    c, s = math.cos(est.heading), math.sin(est.heading)
+    x = est.x + c * mx - s * my
+    y = est.y + s * mx + c * my
+    ax, ay = math.cos(est.heading + axis), math.sin(est.heading + axis)
+    cos_may, cos_must = math.cos(half_angle + MARGIN_RAD), math.cos(max(0.0, half_angle - MARGIN_RAD))
+    best = second = first = NONE
+    best_nis = second_nis = GATE
+    nearest = math.inf
+    is_expected = False
+    for i in range(est.count):
+        landmark = est.landmarks[i]
+        dx, dy = landmark.x - x, landmark.y - y
+        d = math.sqrt(dx * dx + dy * dy)
+        ahead = dx * ax + dy * ay
+        if d <= landmark.radius or ahead < cos_may * d:
+            continue
+        predicted = est.range_scale * (d - landmark.radius)
+        if predicted < nearest:
+            nearest, first, is_expected = predicted, i, ahead > cos_must * d
+        if abs(r - predicted) > OWN_M:
+            continue
+        u, v = est.range_scale * dx / d, est.range_scale * dy / d
+        variance = innovation_variance(covariance, n, FIRST + 2 * i, u, v, d - landmark.radius, est.gain)
+        nis = (r - predicted) ** 2 / (variance + est.noise * (var0 + rel2 * predicted * predicted))
+        if nis < best_nis:
+            second, second_nis = best, best_nis
+            best, best_nis = i, nis
+        elif nis < second_nis:
+            second, second_nis = i, nis
+    if is_expected:
+        est.fit_share += FIT_MEMORY * ((1.0 if best != NONE else 0.0) - est.fit_share)
+    if best == NONE:
+        if first != NONE and r > nearest + BEHIND_M and nearest < range_max and not is_hidden(e, first, x, y):
+            update_with_edge(
+                e,
+                covariance,
+                first,
+                est.landmarks[first].x - x,
+                est.landmarks[first].y - y,
+                ax,
+                ay,
+                half_angle,
+                is_heard=False,
+            )
+        elif is_expected and abs(r - nearest) <= NEAR_M:
+            est.landmarks[first].failures += 1
+        return NONE
+    if second != NONE:
+        return NONE
+    landmark = est.landmarks[best]
+    dx, dy = landmark.x - x, landmark.y - y
+    d = math.sqrt(dx * dx + dy * dy)
+    u, v = est.range_scale * dx / d, est.range_scale * dy / d
+    innovation = r - est.range_scale * (d - landmark.radius)
+    variance = innovation_variance(covariance, n, FIRST + 2 * best, u, v, d - landmark.radius, est.gain)
+    nominal = var0 + rel2 * r * r
+    noise = est.noise * nominal
+    if best_nis > SOFT:
+        noise *= math.sqrt(best_nis / SOFT)
+    correct(e, covariance, innovation, variance + noise)
+    seen = (innovation * innovation - variance) / nominal
+    est.noise = min(NOISE_MAX, max(NOISE_MIN, est.noise + NOISE_MEMORY * (seen - est.noise)))
+    landmark.failures = 0
+    landmark.hits += 1
+    c, s = math.cos(est.heading), math.sin(est.heading)
+    x = est.x + c * mx - s * my
+    y = est.y + s * mx + c * my
+    ax, ay = math.cos(est.heading + axis), math.sin(est.heading + axis)
+    update_with_edge(e, covariance, best, landmark.x - x, landmark.y - y, ax, ay, half_angle, is_heard=True)
+    return best
+
+
+@kernel
+def update_with_firing(
+    e: EstimateRecord, covariance: Floats, mounts: Floats, ranges: Floats, px: float, py: float, yaw: float,
+    var0: float, rel2: float, half_angle: float, range_min: float, range_max: float,
+) -> int:  # fmt: skip
+    """Enter the ranges of a firing; return how many were used.
+
+    Parameters
+    ----------
+    e : (1,) Estimate
+        Updated.
+    covariance : (rows, rows) float
+        Updated.
+    mounts : (n, 3) float
+        x, y (m), direction (rad) of each sensor in the ring's frame.
+    ranges : (n,) float
+        m; NaN: the sensor did not fire, inf: no echo.
+    px, py, yaw : float
+        The ring's pose by odometry, m and rad.
+    var0, rel2, half_angle
+        As for `update_with_range`.
+    range_min, range_max : float
+        Ranges of the ring; one at either end is no measurement, m.
+    """
+    used = 0
+    c, s = math.cos(yaw), math.sin(yaw)
+    for i in range(len(ranges)):
+        r = ranges[i]
+        if not r > range_min or e[0].count == 0:  # also true for NaN
+            continue
+        mx, my, axis = mounts[i, 0], mounts[i, 1], mounts[i, 2]
+        if not has_moved(e, i, px + c * mx - s * my, py + s * mx + c * my, yaw + axis):
+            continue
+        if r >= range_max:
+            r = math.inf
+        if update_with_range(e, covariance, mx, my, axis, r, var0, rel2, half_angle, range_max) != NONE:
+            used += 1
+    return used

@@ -1,0 +1,50 @@
+"""`echolocate experiment drift`: rounds among drums with drifting odometry, with and without correction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from config.errors import DONE
+from config.load import load_settings
+from runtime.cli.commands.offline_io import refuse_unwritable
+from runtime.support.kernel_cache import prepare_kernels
+from runtime.support.progress import progress
+
+if TYPE_CHECKING:
+    from runtime.support.length_format import Units
+
+
+def run_drift(
+    sets: Sequence[str], *, models: Sequence[str], seeds: int, json_file: str | None, units: Units
+) -> int:  # fmt: skip
+    """Drive the rounds at each level of errors, print a table and return the exit code.
+
+    Parameters
+    ----------
+    sets, models, seeds, json_file, units
+        As of `runtime.cli.experiment_commands.experiment`.
+    """
+    settings = load_settings("hallway", sets, models=models)
+    console = Console(stderr=True)
+    refuse_unwritable({"--json": json_file})
+    prepare_kernels(settings, console)
+    from runtime.cli.tables import drift_table
+    from runtime.cycle.summary import write_json
+    from runtime.simulation.drift_trials import LEVELS, drive, summarise_drives
+
+    rows = []
+    with progress(console, "driving", 2 * len(LEVELS) * seeds) as step:
+        for errors in LEVELS:
+            for corrected in (False, True):
+                outcomes = []
+                for seed in range(seeds):
+                    outcomes.append(drive(settings, errors, seed, corrected=corrected))
+                    step()
+                rows.append(summarise_drives(errors, outcomes))
+    if json_file is not None:
+        write_json(json_file, {"levels": rows})
+    Console().print(drift_table(rows, units))
+    return DONE
