@@ -85,6 +85,7 @@ bench: $(VENV)/bench.stamp
 	@$(BIN)/python -m bench timing $(TIMING)
 	@$(BIN)/python -m bench waking
 	@$(BIN)/python -m bench localization
+	@$(BIN)/python -m bench map
 	@$(BIN)/python -m bench recording
 	@$(BIN)/python -m bench console
 	$(BIN)/python -m pytest -q bench/wallclock

@@ -1,4 +1,4 @@
-"""Command line of the measurements (`make bench`): comparison, timing, recording, console, wake-ups, localisation."""
+"""Command line of the measurements (`make bench`): comparison, timing, recording, console, wake-ups, places, maps."""
 
 from __future__ import annotations
 
@@ -217,6 +217,33 @@ def localization(*, json: str = "localization.json", rooms: int = 100, first: in
         rows = measure(settings.ring, range(first, first + max(1, rooms)), status.update)
     write_json(json, rows)
     _wide().print(localization_table(rows))
+    return 0
+
+
+@app.command(name="map")
+def map_size(*, json: str = "map.json", drums: tuple[int, ...] = (40, 200), seed: int = 0) -> int:
+    """Measure what a firing costs in halls of more and more drums, driven through once and back.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    drums
+        Number of drums of each hall.
+    seed
+        Of their places and of the noise.
+    """
+    use_kernel_cache()
+    from bench.map_size import map_table, measure
+    from runtime.cycle.summary import write_json
+
+    console = Console(stderr=True)
+    settings = load_settings("hallway")
+    prepare_kernels(settings, console)
+    with console.status("bench") as status:
+        rows = measure(settings, drums, seed, status.update)
+    write_json(json, rows)
+    _wide().print(map_table(rows))
     return 0
 
 

@@ -44,4 +44,8 @@ class MapCounts(NamedTuple):
     segments_total: int
     """Outline segments completed since the start."""
     hypotheses: int
-    """Places where an object may be: clusters (paper), or tracks, tentative ones included (bayes)."""
+    """Places where an object may be: clusters (paper), or tracks near the robot, tentative ones included (bayes)."""
+    archived: int = 0
+    """Objects that the robot has left behind."""
+    waiting: int = 0
+    """Of these, objects near the robot for which the arrays have no room."""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 F = TypeVar("F", bound=Callable[..., object])
 
-BORROWING: Final[Mapping[str, Any]] = MappingProxyType({"cache": True, "_nrt": False})
+BORROWING: Final[Mapping[str, Any]] = MappingProxyType({"cache": True, "_nrt": False, "no_cfunc_wrapper": True})
 """NRT is numba's run time: its allocator and its reference counts."""
 
 Floats = NDArray[np.float64]

@@ -54,11 +54,19 @@ class Method(Protocol):
         ...
 
     def objects(self) -> tuple[DetectedObject, ...]:
-        """Return the models recognised now, best first."""
+        """Return the models recognised so far: those near the robot, best first, then those left behind."""
+        ...
+
+    def near_objects(self) -> tuple[DetectedObject, ...]:
+        """Return the models recognised near the robot, best first; the cost does not depend on the map's size."""
         ...
 
     def labelled_objects(self) -> tuple[DetectedObject, ...]:
-        """Return the models recognised now and everything else that has a label."""
+        """Return the models recognised near the robot and everything else there that has a label."""
+        ...
+
+    def archived_objects(self) -> tuple[DetectedObject, ...]:
+        """Return what has a label and was left behind; the same tuple until it changes."""
         ...
 
     def segment_geometry(self) -> Floats:
@@ -173,12 +181,20 @@ class Perception:
         return self.method.refine()
 
     def objects(self) -> tuple[DetectedObject, ...]:
-        """Return the models recognised now, best first."""
+        """Return the models recognised so far: those near the robot, best first, then those left behind."""
         return self.method.objects()
 
+    def near_objects(self) -> tuple[DetectedObject, ...]:
+        """Return the models recognised near the robot, best first; the cost does not depend on the map's size."""
+        return self.method.near_objects()
+
     def labelled_objects(self) -> tuple[DetectedObject, ...]:
-        """Return the models recognised now and everything else that has a label: walls, corners, posts, unknowns."""
+        """Return what has a label near the robot: models, walls, corners, posts, unknowns."""
         return self.method.labelled_objects()
+
+    def archived_objects(self) -> tuple[DetectedObject, ...]:
+        """Return what has a label and was left behind; the same tuple until it changes."""
+        return self.method.archived_objects()
 
     def segment_geometry(self) -> Floats:
         """Return a copy of the outline segments: end points x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""

@@ -7,6 +7,7 @@ are overwritten before each use.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -15,6 +16,8 @@ from numpy.typing import NDArray
 Snapshot: TypeAlias = dict[str, NDArray[Any]]
 """Copies of the memory's values, by dotted name; a number is an array of no dimension."""
 
+GROWING: Final = "archived_rows"
+"""An array of this name may have another length in a snapshot: what is archived grows with the map."""
 CONFIGURED: Final = "settings"
 OURS: Final = "perception."
 
@@ -41,7 +44,7 @@ def put_back(owner: object, snapshot: Snapshot) -> None:
     for name, array in mine.items():
         if array.dtype != snapshot[name].dtype:
             raise ValueError(f"the snapshot is of another version: {name} has other fields")
-        if array.shape != snapshot[name].shape:
+        if fixed_shape(name, array.shape) != fixed_shape(name, snapshot[name].shape):
             raise ValueError(
                 f"the snapshot is of other settings: {name} is {snapshot[name].shape}, not {array.shape}"
             )
@@ -60,12 +63,19 @@ def _take(owner: object, path: str, taken: Snapshot) -> None:
 
 def _put(owner: object, path: str, snapshot: Snapshot) -> None:
     for name, value in _parts(owner):
-        if isinstance(value, np.ndarray):
+        if name == GROWING:
+            setattr(owner, name, snapshot[path + name].copy())
+        elif isinstance(value, np.ndarray):
             value[...] = snapshot[path + name]
         elif isinstance(value, bool | int | float):
             setattr(owner, name, type(value)(snapshot[path + name].item()))
         else:
             _put(value, f"{path}{name}.", snapshot)
+
+
+def fixed_shape(name: str, shape: Sequence[int]) -> tuple[int, ...]:
+    """Return what is fixed of the shape of a snapshot's array; the length of a growing one is not."""
+    return tuple(shape[1:]) if name.endswith(f".{GROWING}") else tuple(shape)
 
 
 def _parts(owner: object) -> list[tuple[str, object]]:

@@ -23,7 +23,9 @@ from perception.bayes.map_edits import edit_memory, row_of
 from perception.bayes.naming import Reported, report_circles, sure_polygons
 from perception.bayes.object_report import (
     alternative_labels,
+    archived_models,
     circle_object,
+    other_circles,
     other_objects,
     polygon_object,
     rival_label,
@@ -36,8 +38,18 @@ from perception.bayes.refine import quantum
 from perception.bayes.segment_list import count_made, count_segments, drawn, mapped_segments
 from perception.bayes.state import FREE, Memory
 from perception.bayes.state_migration import migrate
+from perception.bayes.track_archive import TrackArchive
 from perception.detected_object import DetectedObject, MapCounts
-from perception.edits import Edit, Evidence, Segments
+from perception.edits import (
+    ClearMap,
+    ConfirmObject,
+    Edit,
+    Evidence,
+    MoveObject,
+    PlaceModel,
+    RejectObject,
+    Segments,
+)
 from perception.kernel import Floats
 from perception.records import records, zeros
 from perception.sensor_mounts import mounts_array
@@ -69,6 +81,7 @@ class BayesPerception:
         """The settings that kernels read."""
         self.memory = Memory(len(self._mounts), config.tracks_max)
         """The memory that kernels read and write."""
+        self._archive = TrackArchive()
         self._pins = Pins()
         self._name_models(models)
         self._sure = np.zeros(max(config.tracks_max, MAX_POLYGONS), np.int64)
@@ -80,6 +93,8 @@ class BayesPerception:
         self._forget_derived()
         self._circles: dict[int, DetectedObject] = {}
         self._objects: tuple[DetectedObject, ...] | None = None
+        self._archived: tuple[DetectedObject, ...] | None = None
+        self._archived_labels: tuple[DetectedObject, ...] | None = None
         self._left = 0
         self._polygons_left = 0
         self._circles_pending = False
@@ -103,7 +118,10 @@ class BayesPerception:
         if made != self._counted_at or self._pins.count > 0:
             # Beside new segments, only an edit or the renewal of a pin changes the map.
             self._counted_at, self._segment_count = made, count_segments(self.memory.s)
-        return MapCounts(self._segment_count, made, tracks)
+        archive = self._archive
+        return MapCounts(
+            self._segment_count, made, tracks, archive.circles.count + archive.polygons.count, archive.waiting
+        )
 
     def observe(self, firing: Firing) -> int:
         """Process one firing; return the number of outline segments that it completed."""
@@ -119,6 +137,8 @@ class BayesPerception:
         self._polygons_pending = len(self._outlines) > 0
         if self._pins.count > 0:
             self._pins.renew(self.memory)
+        if self._archive.update(self.memory, self.settings, self._sure_polygon):
+            self._objects = self._archived = self._archived_labels = None
         return made
 
     def refine(self) -> int:
@@ -141,18 +161,29 @@ class BayesPerception:
         return 0
 
     def objects(self) -> tuple[DetectedObject, ...]:
-        """Return the models that are reported, best first; only refinement changes them."""
+        """Return the models that are reported: those near the robot, best first, then those left behind."""
+        if self._archived is None:
+            self._archived = tuple(archived_models(self._archive, self.settings, self._round, self._outlines))
+        near = self.near_objects()
+        return (*near, *self._archived) if self._archived else near
+
+    def near_objects(self) -> tuple[DetectedObject, ...]:
+        """Return the models near the robot that are reported, best first."""
         if self._objects is None:
             self._objects = self._sure_objects()
         return self._objects
+
+    @property
+    def _sure_polygon(self) -> float:
+        """Least probability with which a polygon is reported."""
+        return min(self._config.report_probability, POLYGON_PROBABILITY)
 
     def _sure_objects(self) -> tuple[DetectedObject, ...]:
         memory = self.memory
         n = report_circles(memory.tracks, self._reported, self._sure)
         seen = [self._circles[t] if t >= 0 else self._report_circle(~t) for t in self._sure[:n].tolist()]
         if self._outlines:
-            least = min(self._config.report_probability, POLYGON_PROBABILITY)
-            n = sure_polygons(memory.s, least, self._sure)
+            n = sure_polygons(memory.s, self._sure_polygon, self._sure)
             polygons = memory.s[0].polygons
             seen += [
                 polygon_object(track, self.settings, self._outlines[track.model], float(track.probability))
@@ -167,9 +198,18 @@ class BayesPerception:
         return seen
 
     def labelled_objects(self) -> tuple[DetectedObject, ...]:
-        """Return the reported models, then all other objects that have a label."""
-        named = self.objects()
+        """Return the reported models near the robot, then all other objects there that have a label."""
+        named = self.near_objects()
         return (*named, *other_objects(self.memory, self.settings, self._config.report_probability, named))
+
+    def archived_objects(self) -> tuple[DetectedObject, ...]:
+        """Return all objects left behind that have a label; the same tuple until they change."""
+        if self._archived_labels is None:
+            models = archived_models(self._archive, self.settings, self._round, self._outlines)
+            others, least = self._archive.circles.held(), self._config.report_probability
+            others = others[others["is_reported"] == 0]
+            self._archived_labels = (*models, *other_circles(others, self.memory, self.settings, least, ()))
+        return self._archived_labels
 
     def segment_geometry(self) -> Floats:
         """Return the mapped segments: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""
@@ -184,22 +224,31 @@ class BayesPerception:
 
     def edit(self, edit: Edit) -> str | None:
         """Apply a user's edit; return None, or the reason why it cannot be done."""
-        self._objects, self._counted_at = None, UNKNOWN
+        self._objects = self._archived = self._archived_labels = None
+        self._counted_at = UNKNOWN
+        match edit:
+            case MoveObject(number) | ConfirmObject(number) | RejectObject(number):
+                self._archive.take_up(self.memory, self.settings, self._sure_polygon, number)
+            case PlaceModel(name) if name in {*self._round, *self._outlines}:
+                self._archive.make_room(self.memory, self.settings, self._sure_polygon)
+            case ClearMap():
+                self._archive.clear()
         return edit_memory(self.memory, self.settings, self._pins, self._round, self._outlines, edit)
 
     def evidence(self, number: int) -> Evidence | None:
         """Return the evidence of each reading kept for an object; None for an unknown number."""
         memory, p = self.memory, self.settings
-        row = row_of(memory, number)
-        if row is None:
-            return None
-        t = row - len(memory.circles)
-        if t >= 0:
-            name = self._outlines[memory.polygons["model"][t]]
-        else:
-            kind = memory.circles["kind"][row]
-            name = self._round[kind] if kind < p[0].model_count else rival_label(memory, row)
-        return evidence_of(memory, p, row, number, name, alternative_labels(p, self._round))
+        with self._archive.borrowed(memory, p, number):
+            row = row_of(memory, number)
+            if row is None:
+                return None
+            t = row - len(memory.circles)
+            if t >= 0:
+                name = self._outlines[memory.polygons["model"][t]]
+            else:
+                x, y, radius, kind = (memory.circles[field][row].item() for field in ("x", "y", "radius", "kind"))
+                name = self._round[kind] if kind < p[0].model_count else rival_label(memory, x, y, radius)
+            return evidence_of(memory, p, row, number, name, alternative_labels(p, self._round))
 
     def shift_circle(self, number: int, dx: float, dy: float) -> None:
         """Move a round object and the readings kept for it, after its place in the map was corrected.
@@ -224,7 +273,8 @@ class BayesPerception:
         """Clear the memory, as after a reset of the odometry."""
         self.memory.clear()
         self._pins.clear()
-        self._objects, self._counted_at = (), UNKNOWN
+        self._archive.clear()
+        self._forget_derived()
         self._left = 0
         self._polygons_left = 0
         self._circles_pending = self._polygons_pending = self._polygons_turn = False
@@ -239,17 +289,18 @@ class BayesPerception:
         """Add models to the library, after the present ones."""
         before, self.settings = self.settings, copied(self.settings)
         apply_library(self.settings, models)
-        migrate(self.memory, before, self.settings)
+        migrate(self.memory, self._archive.circles.archived_rows, before, self.settings)
         self._name_models(models)
         self._forget_derived()
 
     def drop_caches(self) -> None:
         """Drop what was derived from the memory, after the memory was restored from a snapshot."""
+        self._archive.drop_caches()
         self._forget_derived()
 
     def _forget_derived(self) -> None:
         self._last_reported["x"] = np.nan
-        self._objects = None
+        self._objects = self._archived = self._archived_labels = None
         self._counted_at = UNKNOWN
 
     def _name_models(self, models: Sequence[ModelConfig]) -> None:

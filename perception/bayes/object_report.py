@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -21,6 +21,7 @@ from perception.bayes.parameters import (
 from perception.bayes.polygon_parameters import POLYGON_INFLATION, POLYGON_TURN_SIGMA_RAD
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, Memory, PolygonTrack
+from perception.bayes.track_archive import TrackArchive
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
 
@@ -100,6 +101,28 @@ def polygon_object(track: PolygonTrack, p: SettingsRecord, label: str, probabili
     )  # fmt: skip
 
 
+def archived_models(
+    archive: TrackArchive, p: SettingsRecord, rounds: Sequence[str], outlines: Sequence[str]
+) -> Iterator[DetectedObject]:  # fmt: skip
+    """Yield the archived objects that were reported as models, circles first.
+
+    Parameters
+    ----------
+    archive, p
+        The archive and the settings.
+    rounds, outlines : sequence of str
+        Names of the round models and of the polygons, in the order of their numbers.
+    """
+    circles = archive.circles.held()
+    circles = circles[(circles["is_reported"] == 1) & (circles["kind"] < len(rounds))]
+    columns = (circles[name].tolist() for name in (*CIRCLE_FIELDS, "probability", "kind"))
+    for *row, probability, kind in zip(*columns, strict=True):
+        yield circle_object(tuple(row), rounds[kind], probability)
+    polygons = archive.polygons.held()
+    for track in polygons[polygons["is_reported"] == 1]:
+        yield polygon_object(track, p, outlines[track.model], float(track.probability))
+
+
 def known_walls(memory: Memory) -> NDArray[Any]:
     """Return the lines that count as walls, as records of `state.Line`."""
     lines = memory.state["lines"][0]
@@ -127,9 +150,16 @@ def round_label(radius: float) -> str:
     return "edge" if radius == 0.0 else "post" if radius < POST_RADIUS_M else "barrel"
 
 
-def rival_label(memory: Memory, t: int) -> str:
-    """Return the label of circle `t`, which is not a model."""
-    x, y, radius = (float(memory.circles[name][t]) for name in ("x", "y", "radius"))
+def rival_label(memory: Memory, x: float, y: float, radius: float) -> str:
+    """Return the label of a circle that is not a model.
+
+    Parameters
+    ----------
+    memory : Memory
+        Its walls tell a corner from an edge.
+    x, y, radius : float
+        The circle, m.
+    """
     if radius > 0.0:
         return round_label(radius)
     for line in known_walls(memory):
@@ -163,16 +193,31 @@ def other_objects(
     named : sequence of DetectedObject
         The models.
     """
-    found = [wall_object(line.item()) for line in known_walls(memory)]
-    circles = memory.circles
+    walls = [wall_object(line.item()) for line in known_walls(memory)]
+    return walls + other_circles(memory.circles, memory, p, least, named)
+
+
+def other_circles(
+    circles: NDArray[Any], memory: Memory, p: SettingsRecord, least: float, named: Sequence[DetectedObject]
+) -> list[DetectedObject]:  # fmt: skip
+    """Return the circles without a model's name.
+
+    Parameters
+    ----------
+    circles : (n,) record of `CircleTrack` or of `archived_tracks.archived_dtype`
+        The circles.
+    memory, p, least, named
+        As for `other_objects`.
+    """
+    found: list[DetectedObject] = []
     merge_m, models = float(p[0].merge_m), int(p[0].model_count)
     shown = np.flatnonzero((circles["status"] != FREE) & (circles["hits"] >= UNKNOWN_HITS_MIN))
-    names = (*CIRCLE_FIELDS, "probability", "status", "kind")
+    names = (*CIRCLE_FIELDS, "probability", "status", "kind", "radius")
     columns = (circles[name][shown].tolist() for name in names)  # at once: a value at a time takes five times as long
-    for t, *row, probability, status, kind in zip(shown, *columns, strict=True):
+    for *row, probability, status, kind, radius in zip(*columns, strict=True):
         if any(math.dist(row[:2], (o.x, o.y)) < merge_m for o in named):
             continue
         is_rival = status == ESTABLISHED and kind >= models and probability >= least
-        label = rival_label(memory, t) if is_rival else "unknown"
+        label = rival_label(memory, row[0], row[1], radius) if is_rival else "unknown"
         found.append(circle_object(tuple(row), label, probability if is_rival else 1.0 - probability))
     return found

@@ -6,16 +6,17 @@ explanation move to the explanation's new index, and are compared with the new e
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from perception.bayes.elements import REJECTIONS_MAX
 from perception.bayes.parameters import RADIUS_CHANGED_UNSEEN
 from perception.bayes.scratch import POLYGON
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import FREE, Memory
-from perception.kernel import Floats
+from perception.kernel import Floats, Ints
 from perception.records import column
 
 SAME_M: Final = 1e-9
@@ -27,19 +28,31 @@ def radii_of(p: SettingsRecord) -> Floats:
     return column(p, "circles")["radius_m"][0, : p[0].circle_count]
 
 
-def migrate(memory: Memory, before: SettingsRecord, after: SettingsRecord) -> None:
+def migrate(
+    memory: Memory, archived: NDArray[Any], before: SettingsRecord, after: SettingsRecord
+) -> None:  # fmt: skip
     """Move values indexed by explanation to the indices of other settings.
 
     Parameters
     ----------
     memory : Memory
         Updated.
+    archived : (n,) record of `archived_tracks.archived_dtype`
+        Archived circles; updated.
     before, after : (1,) Settings
         Of the models in `after` the polygons of `before` are the first.
     """
     old, new = radii_of(before), radii_of(after)
     index = np.abs(new[None] - old[:, None]).argmin(axis=1)
-    circles, rejections = memory.circles, memory.state["rejections"][0]
+    for circles in (memory.circles, archived):
+        _migrate_circles(circles, old, new, index)
+    rejections = memory.state["rejections"][0]
+    for k in range(REJECTIONS_MAX):
+        if rejections["what"][k] < POLYGON:
+            rejections["what"][k] = index[rejections["what"][k]]
+
+
+def _migrate_circles(circles: NDArray[Any], old: Floats, new: Floats, index: Ints) -> None:
     leads = np.zeros_like(circles["leads"])
     for k, to in enumerate(index.tolist()):
         leads[:, to] = circles["leads"][:, k]
@@ -54,6 +67,3 @@ def migrate(memory: Memory, before: SettingsRecord, after: SettingsRecord) -> No
             circles["unseen"][t] += RADIUS_CHANGED_UNSEEN
         leads[t, index[kind]] = 0.0
     circles["leads"] = leads
-    for k in range(REJECTIONS_MAX):
-        if rejections["what"][k] < POLYGON:
-            rejections["what"][k] = index[rejections["what"][k]]

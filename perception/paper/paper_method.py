@@ -134,9 +134,17 @@ class PaperPerception:
                 detected.append(candidate)
         return tuple(sorted(detected, key=lambda o: o.score, reverse=True))
 
+    def near_objects(self) -> tuple[DetectedObject, ...]:
+        """Return the objects: this method archives none."""
+        return self.objects()
+
     def labelled_objects(self) -> tuple[DetectedObject, ...]:
         """Return the objects: this method has no other labels."""
         return self.objects()
+
+    def archived_objects(self) -> tuple[DetectedObject, ...]:
+        """Return nothing: this method archives none."""
+        return ()
 
     def reset(self) -> None:
         """Start again with an empty map, as after a reset of the odometry."""

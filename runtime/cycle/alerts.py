@@ -20,6 +20,7 @@ class Alerts:
     def __init__(self) -> None:
         self._limit = LineLimit(LINES_PER_S, LINES_BURST)
         self._changes = 0
+        self._waiting = 0
         self._reported: dict[int, SensorReport] = {}
 
     def update(self, received: Received, perception: Perception, run_s: float) -> list[str]:
@@ -42,7 +43,7 @@ class Alerts:
         return lines
 
     def _new_facts(self, received: Received, perception: Perception) -> list[str]:
-        lines = list(received.notes)
+        lines = [*received.notes, *self._new_waiting(perception)]
         if perception.sensor_monitor.changes == self._changes:
             return lines
         self._changes = perception.sensor_monitor.changes
@@ -51,3 +52,12 @@ class Alerts:
         lines += [f"sensor {sensor} works again and is used" for sensor in self._reported if sensor not in now]
         self._reported = now
         return lines
+
+    def _new_waiting(self, perception: Perception) -> list[str]:
+        before, self._waiting = self._waiting, perception.counts.waiting
+        if before or not self._waiting:
+            return []
+        return [
+            f"{self._waiting} objects near the robot have no room: more are near than perception can work on at a "
+            "time; the farthest wait, their places are kept; raise perception.bayes.tracks_max"
+        ]

@@ -64,7 +64,7 @@ class NoMethod:
         """Return no objects."""
         return ()
 
-    labelled_objects = objects
+    near_objects = labelled_objects = archived_objects = objects
 
     def segment_geometry(self) -> Floats:
         """Return no segments, shape (0, 5)."""

@@ -212,7 +212,7 @@ class Recorder:
             segments = MapSnapshot(cycle, segments=perception.segment_geometry())
             self._put((SEGMENTS, host_s, run_s, segments))
         elif cycle % self._snapshot_cycles == self._snapshot_cycles // 2:
-            objects = MapSnapshot(cycle, objects=perception.objects())
+            objects = MapSnapshot(cycle, objects=perception.near_objects())
             self._put((OBJECTS, host_s, run_s, objects))
 
     def on_bytes(self, direction: str, run_s: float, host_s: float, data: bytes) -> None:

@@ -222,6 +222,7 @@ class Replayer:
             check_snapshot(snapshot, fresh, self._settings)
             self._restore(state, state_fields(frame), snapshot)
             state.perception.labelled_objects()
+            state.perception.archived_objects()
         except (ArithmeticError, LookupError, ValueError) as error:
             raise RecordingError(f"{self._recording.path}: the keyframe of cycle {frame.cycle}: {error}") from error
 

@@ -6,6 +6,7 @@ recorded, described in the file's own schema and read back without a change here
 
 from __future__ import annotations
 
+import math
 from dataclasses import fields
 from itertools import accumulate
 from typing import Annotated, Any, ClassVar, Final, Self, TypeAlias, get_type_hints
@@ -16,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from perception.snapshot import Snapshot
+from perception.snapshot import Snapshot, fixed_shape
 from runtime.cycle.modes import ModeState
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.field_checks import (
@@ -32,6 +33,8 @@ from runtime.recording.field_checks import (
 
 FORMAT: Final = 2
 """Version of the file format. Increase it with every change after which a recording cannot be read as before."""
+GROWN_MAX: Final = 100_000
+"""Greatest length of a keyframe's array, which bounds the memory that a hostile file can take."""
 
 
 Count: TypeAlias = Annotated[int, Field(ge=0, le=COUNT_MAX)]
@@ -174,7 +177,7 @@ class MapChange(TimedPayload):
 
 
 class ObjectList(TimedPayload):
-    """The objects recognised at this moment, as in the run's summary."""
+    """The models recognised near the robot at this moment, as in the run's summary; beside a keyframe all of them."""
 
     cycle: Count
     objects: list[dict[str, Any]]
@@ -263,11 +266,13 @@ def _dtype_text(dtype: np.dtype[Any]) -> str:
 
 def layout_difference(frame: Keyframe, layout: Snapshot) -> str | None:
     """Return the first array that a keyframe holds and a layout does not, or the reverse; None if they agree."""
-    mine = {name: (_dtype_text(array.dtype), list(array.shape)) for name, array in layout.items()}
+    mine = {name: (_dtype_text(array.dtype), fixed_shape(name, array.shape)) for name, array in layout.items()}
     if [array.name for array in frame.arrays] != list(mine):
         names = {array.name for array in frame.arrays}
         return next(iter(sorted(names ^ mine.keys())), "the order of the arrays")
-    return next((a.name for a in frame.arrays if mine[a.name] != (a.dtype, a.shape)), None)
+    has_room = all(0 <= length <= GROWN_MAX for a in frame.arrays for length in a.shape)
+    named = ((a.name, (a.dtype, fixed_shape(a.name, a.shape))) for a in frame.arrays)
+    return next((name for name, found in named if mine[name] != found or not has_room), None)
 
 
 def perception_snapshot(frame: Keyframe, layout: Snapshot) -> Snapshot:
@@ -278,8 +283,8 @@ def perception_snapshot(frame: Keyframe, layout: Snapshot) -> Snapshot:
     frame : Keyframe
         From a recording.
     layout : Snapshot
-        Of perception with the settings in force; its arrays' dtypes and shapes must be those of the keyframe. Nothing
-        is decompressed before they are compared.
+        Of perception with the settings in force; its arrays' dtypes and shapes must be those of the keyframe, but for
+        the length of what is archived. Nothing is decompressed before they are compared.
 
     Raises
     ------
@@ -288,7 +293,8 @@ def perception_snapshot(frame: Keyframe, layout: Snapshot) -> Snapshot:
     """
     if (different := layout_difference(frame, layout)) is not None:
         raise ValueError(f"the keyframe is of other settings or of another version: {different:.100} differs")
-    size = sum(array.nbytes for array in layout.values())
+    shapes = {array.name: tuple(array.shape) for array in frame.arrays}
+    size = sum(array.dtype.itemsize * math.prod(shapes[name]) for name, array in layout.items())
     try:
         if zstandard.frame_content_size(frame.data) != size:
             raise ValueError(f"the keyframe's data do not expand to the {size} bytes of its arrays")
@@ -297,8 +303,8 @@ def perception_snapshot(frame: Keyframe, layout: Snapshot) -> Snapshot:
         raise ValueError(f"the keyframe's data are damaged: {error}") from error
     arrays, at = {}, 0
     for name, array in layout.items():
-        arrays[name] = np.frombuffer(raw, array.dtype, array.size, at).reshape(array.shape)
-        at += array.nbytes
+        arrays[name] = np.frombuffer(raw, array.dtype, math.prod(shapes[name]), at).reshape(shapes[name])
+        at += arrays[name].nbytes
     return arrays
 
 

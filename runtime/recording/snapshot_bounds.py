@@ -17,6 +17,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from config.settings import Settings
+from perception.bayes.archived_tracks import READINGS_KEPT as READINGS_ARCHIVED
 from perception.bayes.elements import (
     BUCKETS,
     MAX_POLYGONS,
@@ -35,7 +36,7 @@ from perception.paper.outline_map import PINNED
 from perception.paper.parameters import PINNED_SHARE_MAX, PLACEMENTS_MAX, READINGS_KEPT
 from perception.sensor_memory import SETS_MAX
 from perception.sensor_report import CROSSTALK, FAILING, SILENT, STUCK
-from perception.snapshot import Snapshot
+from perception.snapshot import GROWING, Snapshot
 
 
 class Bound(NamedTuple):
@@ -69,18 +70,21 @@ _CONSTANTS: Final = (
 CONSTANTS: Final = frozenset(_CONSTANTS.split())
 """Numbers that the settings give and no cycle changes."""
 
-MAY_BE_INFINITE: Final = frozenset({"_sensors.last_m", "before_last_m", "run_m", "stuck_m", "job.best_nat"})
-"""Floats for which an infinity stands for no echo, or for no evidence yet."""
+MAY_BE_INFINITE: Final = frozenset(
+    {"_sensors.last_m", "before_last_m", "run_m", "stuck_m", "job.best_nat", "_looked_x", "_looked_y"}
+)
+"""Floats for which an infinity stands for no echo, for no evidence yet, or for a place where nobody was."""
 
 _COUNTS: Final = (
     "_numbers.last _rejections.total _ring.firings sets_seen bins.count buckets.count number candidates._sizes _turn "
     "changes idle_firings passed_over refinements reservoir unseen clusters.sizes requests_made leaps missed "
     "near_echoes newest_segment objects_numbered off_stuck outline.numbers outline.total _sensors.readings "
-    "rejection_count run_firing run_length segments_made segments_numbered sensors.kept members_sum"
+    "rejection_count run_firing run_length segments_made segments_numbered sensors.kept members_sum "
+    "_archive.circles.count _archive.polygons.count _numbered waiting"
 )
 _FLAGS: Final = (
     "_sets has_rested is_named has_gained refines_next is_confirmed has_challenger is_done is_crossed "
-    "_circles_pending _polygons_pending _polygons_turn _placement_was_last _expected _heard"
+    "_is_due is_reported _circles_pending _polygons_pending _polygons_turn _placement_was_last _expected _heard"
 )
 
 BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
@@ -115,6 +119,11 @@ BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
         "moments.mass": Bound(0.0, FINITE.high),
         "noise_level": Bound(0, NOISES - 1),
         "outline.status": Bound(0, PINNED),
+        "archived_rows.alternative": Bound(0, CIRCLES_MAX + 1),
+        "archived_rows.kept": Bound(0, READINGS_ARCHIVED),
+        "archived_rows.kind": Bound(0, CIRCLES_MAX - 1),
+        "archived_rows.radius": Bound(0.0, 1e3),
+        "archived_rows.status": Bound(FREE, ESTABLISHED),
         "placements.count": Bound(0, PLACEMENTS_MAX),
         "range_m": Bound(0.0, 1e7),
         "rejections.what": Bound(0, POLYGON + POLYGONS_MAX - 1),
@@ -148,6 +157,7 @@ def settings_bounds(settings: Settings) -> dict[str, Bound]:
         "polygons.model": polygon,
         "polygons.status": Bound(FREE, ESTABLISHED if polygons else FREE),
         "requests.model": polygon,
+        "archived_rows.model": polygon,
     }
 
 
@@ -223,6 +233,10 @@ def _check_contradictions(numbers: Mapping[str, np.ndarray[Any, Any]]) -> None:
         kind, stage, lattices = (int(numbers[job + name][0]) for name in ("kind", "stage", "lattices"))
         if kind == REFINEMENT and stage == LATTICE and lattices >= LATTICE_ATTEMPTS:
             raise ValueError(f"{job}lattices is {lattices}, but the stage of lattices is not over")
+    for count_name in (name for name in numbers if name.startswith("method._archive.") and name.endswith(".count")):
+        count, archived = int(numbers[count_name]), numbers[f"{count_name.removesuffix('count')}{GROWING}.number"]
+        if len(np.unique(archived[:count])) < count:
+            raise ValueError(f"{count_name} is {count}, but not as many objects have a number of their own")
     outline = "method.outline."
     if f"{outline}pinned" in numbers:
         pinned, held = int(numbers[outline + "pinned"]), int(np.count_nonzero(numbers[outline + "status"] == PINNED))

@@ -1,6 +1,6 @@
-"""A hall of forty drums: more than refinement under a small budget can keep up with.
+"""A long hall, by default of forty drums: more than refinement under a small budget can keep up with.
 
-Two columns of twenty, each drum moved a little along the hall and across it, ranges with 1 % noise.
+Two columns, each drum moved a little along the hall and across it, ranges with 1 % noise.
 """
 
 from __future__ import annotations
@@ -22,15 +22,30 @@ ACROSS_MOVE_FT: Final = 0.4
 FROM_FT: Final = -6.0
 BEYOND_FT: Final = 6.0
 
+START: Final = StartConfig(x_m=FROM_FT * FOOT_M)
+ACOUSTICS: Final = AcousticsConfig(model="specular", noise_relative=0.01)
 WAY_M: Final = (A_SIDE * PITCH_FT - FROM_FT + BEYOND_FT) * FOOT_M
 """Distance from the start to beyond the last drum, m."""
 
 
 def long_hall(seed: int) -> WorldConfig:
-    """Return the hall; the seed determines the positions of the drums."""
+    """Return the hall of forty drums; the seed determines their positions."""
+    return WorldConfig(drum=tuple(long_hall_drums(seed)), start=START, acoustics=ACOUSTICS)
+
+
+def long_hall_drums(seed: int, a_side: int = A_SIDE) -> list[DrumConfig]:
+    """Return the drums of a hall.
+
+    Parameters
+    ----------
+    seed : int
+        Determines their positions.
+    a_side : int
+        Drums on each side.
+    """
     rng = np.random.default_rng(np.random.SeedSequence([seed, 4]))
-    moves = rng.uniform(-1.0, 1.0, (2, A_SIDE, 2)).tolist()
-    drums = [
+    moves = rng.uniform(-1.0, 1.0, (2, a_side, 2)).tolist()
+    return [
         DrumConfig(
             x_m=(1.0 + k * PITCH_FT + along * ALONG_MOVE_FT) * FOOT_M,
             y_m=side * (ACROSS_FT + across * ACROSS_MOVE_FT) * FOOT_M,
@@ -39,8 +54,3 @@ def long_hall(seed: int) -> WorldConfig:
         for side, column in zip((1.0, -1.0), moves, strict=True)
         for k, (along, across) in enumerate(column)
     ]
-    return WorldConfig(
-        drum=tuple(drums),
-        start=StartConfig(x_m=FROM_FT * FOOT_M),
-        acoustics=AcousticsConfig(model="specular", noise_relative=0.01),
-    )

@@ -29,7 +29,7 @@ from rich.text import Text
 from config.settings import Settings
 from drivers.driver import RobotDriver
 from drivers.messages import Floats, LinkCounts, Pose
-from perception.pipeline import DetectedObject
+from perception.detected_object import DetectedObject, MapCounts
 from runtime.cli.tables import objects_table
 from runtime.cli.terminal.plan import draw_plan
 from runtime.cycle.inputs import Request
@@ -62,7 +62,7 @@ class Snapshot:
     pose: Pose | None
     trail: list[tuple[float, float]]
     segments: Floats
-    clusters: int
+    map_counts: MapCounts
     objects: tuple[DetectedObject, ...]
     ranges: Floats
     counts: LinkCounts
@@ -132,7 +132,7 @@ class View:
             self._trail.append((pose.x, pose.y))
         mode = record.mode if state.hold_reason is None else replace(record.mode, reason=state.hold_reason)
         self._slot = Snapshot(
-            mode, pose, list(self._trail), state.perception.segment_geometry(), record.clusters,
+            mode, pose, list(self._trail), state.perception.segment_geometry(), state.perception.counts,
             state.perception.labelled_objects(), self._ranges.copy(), driver.counts,
             stats.cycles, stats.late, stats.cycle_us(), stats.lag_us(), stats.missed, tuple(stats.causes.items()),
             tuple(report.reason for report in state.perception.sensor_reports()),
@@ -188,7 +188,7 @@ class View:
     def _numbers(self, snapshot: Snapshot) -> Table:
         grid = Table.grid(padding=(0, 2))
         grid.add_row("ring", self._ring(snapshot.ranges))
-        grid.add_row("map", f"{len(snapshot.segments)} segments, {snapshot.clusters} hypotheses")
+        grid.add_row("map", map_text(snapshot.map_counts))
         for reason in snapshot.sensors:
             grid.add_row("masked", reason)
         counts = snapshot.counts
@@ -211,6 +211,14 @@ class View:
             near = 0.0 if not np.isfinite(r) else 1.0 - min(float(r) / self._reach_m, 1.0)
             bars.append("·" if not np.isfinite(r) else BARS[max(1, round(near * (len(BARS) - 1)))])
         return "".join(bars)
+
+
+def map_text(counts: MapCounts) -> str:
+    """Return what the map holds, as one line."""
+    text = f"{counts.segments} segments, {counts.hypotheses} hypotheses"
+    if counts.archived:
+        text += f", {counts.archived} objects left behind"
+    return f"{text}; {counts.waiting} near ones have no room" if counts.waiting else text
 
 
 def millis(quantiles: Quantiles) -> str:

@@ -69,11 +69,11 @@ class EncodedFrame(NamedTuple):
     number: int
     """Of the frame in its source."""
     head: bytes
-    """Everything but the segments and what differs between clients, without the closing brace."""
+    """Everything but the map and what differs between clients, without the closing brace."""
     changes: bytes
-    """The segments that were added or removed since the previous frame."""
+    """The map's fields: segments added or removed since the previous frame, objects left behind if they changed."""
     whole: Callable[[], bytes]
-    """Returns all segments; valid while this is the newest frame of its source."""
+    """Returns the map's fields whole; valid while this is the newest frame of its source."""
 
     def encode(self, *, follows: bool, dropped: int, controls: bool) -> bytes:
         """Return the message for one client.
@@ -87,10 +87,13 @@ class EncodedFrame(NamedTuple):
         controls : bool
             Whether the client has control.
         """
-        segments = self.changes if follows else self.whole()
-        return b'%b,"segments":%b,"dropped":%d,"controller":%b}' % (
-            self.head, segments, dropped, b"true" if controls else b"false"
-        )  # fmt: skip
+        fields = self.changes if follows else self.whole()
+        return b'%b,%b,"dropped":%d,"controller":%b}' % (
+            self.head,
+            fields,
+            dropped,
+            b"true" if controls else b"false",
+        )
 
 
 class FrameEncoder:
@@ -113,6 +116,9 @@ class FrameEncoder:
         self._segment_counts: tuple[int, int] | None = None
         self._is_stale = True
         self._number = 0
+        self._archived: tuple[DetectedObject, ...] = ()
+        self._archived_rows: dict[DetectedObject, bytes] = {}
+        self._archived_json = b"[]"
 
     def adopt(self, settings: Settings) -> None:
         """Use other settings from the next frame on."""
@@ -177,6 +183,7 @@ class FrameEncoder:
             "quanta": 0 if record is None else record.quanta,
             "refinement": "nothing" if record is None else record.refinement,
             "link": {"frames": link.frames, "bad": link.bad, "lost": link.lost},
+            "waiting": state.perception.counts.waiting,
             "sensors": [[r.sensor, r.fault, r.reason] for r in state.perception.sensor_reports()],
             "clients": context.clients,
             "recording": None if context.recording is None else context.recording._asdict(),
@@ -191,7 +198,10 @@ class FrameEncoder:
             head["twist"] = [round(twist.v, 4), round(twist.w, 4)]
             head["flags"] = [flag.name for flag in odometry.flags]
         self._fired.clear()
-        return EncodedFrame(self, self._number, orjson.dumps(head)[:-1], segments, self._segments.whole)
+        changes = b'"segments":%b' % segments
+        if self._encode_archived(state.perception.archived_objects()):
+            changes += b',"archived":%b' % self._archived_json
+        return EncodedFrame(self, self._number, orjson.dumps(head)[:-1], changes, self._whole)
 
     def _take_firing(self, firing: Firing) -> None:
         # A list of 24 numbers: numpy's calls would take ten times as long, within the cycle.
@@ -199,6 +209,18 @@ class FrameEncoder:
             if not math.isnan(range_m):
                 self._ranges_m[sensor], self._fired_s[sensor] = range_m, firing.robot_s
                 self._fired.add(sensor)
+
+    def _encode_archived(self, objects: tuple[DetectedObject, ...]) -> bool:
+        """Encode the objects left behind; return whether any came or went since the last frame."""
+        if objects is self._archived:
+            return False
+        before, self._archived = self._archived_rows, objects
+        self._archived_rows = {seen: before.get(seen) or orjson.dumps(_object(seen)) for seen in objects}
+        self._archived_json = b"[%b]" % b",".join(self._archived_rows.values())
+        return self._archived_rows.keys() != before.keys()
+
+    def _whole(self) -> bytes:
+        return b'"segments":%b,"archived":%b' % (self._segments.whole(), self._archived_json)
 
     def _encode_segments(self, state: State, *, may_wait: bool) -> bytes:
         """Return the changes of the map's segments; list them only if they may have changed and may not wait."""

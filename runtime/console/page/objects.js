@@ -28,8 +28,8 @@ export class Objects {
   }
 
   refresh() {
-    const { objects } = this.run.state;
-    setText(byId("objects-count"), `${objects.length}`);
+    const { objects, waiting } = this.run.state;
+    setText(byId("objects-count"), waiting > 0 ? `${objects.length}, ${waiting} near ones have no room` : `${objects.length}`);
     byId("objects-empty").hidden = objects.length > 0;
     const seen = new Set();
     objects.forEach((object, index) => {

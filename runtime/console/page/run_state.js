@@ -11,7 +11,7 @@ const CHART_MAX = 600;
 const EMPTY = {
   cycle: 0, robot_s: 0, mode: "no data", reason: null, hold_reason: null, arming: false, pose: [0, 0, 0], ring_yaw: 0, twist: [0, 0], flags: [], firing: [],
   ranges: [], age: [], clusters: [], objects: [], vectors: [], drive_request: null, phases: {}, cycle_us: 0, late_us: 0,
-  missed: 0, late: 0, quanta: 0, refinement: "", link: null, sensors: [], dropped: 0, clients: 0, controller: false,
+  waiting: 0, missed: 0, late: 0, quanta: 0, refinement: "", link: null, sensors: [], dropped: 0, clients: 0, controller: false,
   recording: null, paused: false, speed: 1, playback: null,
 };
 
@@ -20,6 +20,7 @@ export class RunState extends Emitter {
   state = EMPTY;
   fresh = false; // whether a state has arrived since the session began
   received_ms = 0;
+  archived = []; // objects left behind; a frame lists them when they have changed
   segments = new Map();
   segmentsVersion = 0;
   trail = [];
@@ -63,7 +64,8 @@ export class RunState extends Emitter {
     const before = this.state;
     const state = { ...EMPTY, ...frame };
     const jumped = state.robot_s < before.robot_s - 1e-9 || (state.playback === null) !== (before.playback === null);
-    state.objects = [...state.objects].sort((a, b) => (a.number ?? Infinity) - (b.number ?? Infinity)); // frames list them by score, which changes
+    this.archived = frame.archived ?? this.archived;
+    state.objects = [...state.objects, ...this.archived].sort((a, b) => (a.number ?? Infinity) - (b.number ?? Infinity)); // frames list them by score, which changes
     this.state = state;
     this.received_ms = now_ms;
     if (jumped) this.#forgetTime();

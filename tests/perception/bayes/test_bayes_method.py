@@ -19,7 +19,7 @@ from perception.bayes.bayes_method import BayesPerception
 from perception.bayes.object_report import CIRCLE_FIELDS, circle_object
 from perception.bayes.range_fit import FAR
 from perception.bayes.state import ESTABLISHED, FREE, TENTATIVE
-from perception.detected_object import DetectedObject
+from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import ConfirmObject, PinSegments, PlaceModel
 from perception.kernel import Floats, kernel
 from perception.records import records, zeros
@@ -117,7 +117,7 @@ def test_an_empty_map_has_no_objects_and_nothing_to_refine() -> None:
     perception = perception_of_both_models()
     assert perception.objects() == perception.labelled_objects() == ()
     assert (perception.can_refine, perception.converged, perception.refine()) == (False, True, 0)
-    assert perception.counts == (0, 0, 0)
+    assert perception.counts == MapCounts(0, 0, 0)
     assert perception.segments().geometry.shape == (0, 5)
 
 

@@ -56,7 +56,10 @@ def test_greatest_deviation_walls_and_names_of_rivals_equal_their_oracles(exampl
             for k in long
         )  # fmt: skip
         corner = "inside corner" if by_wall else "edge"
-        assert object_report.rival_label(memory, 0) == {0.0: corner, 0.1: "post", 0.6: "barrel"}[radius]
+        assert (
+            object_report.rival_label(memory, float(place[0]), float(place[1]), radius)
+            == {0.0: corner, 0.1: "post", 0.6: "barrel"}[radius]
+        )
         corners += by_wall
     assert corners > 0.05 * examples
 
@@ -79,7 +82,7 @@ def test_other_objects_are_walls_rivals_and_unknown_objects_that_no_model_stands
         track.radius = float(P[0].circles[kind].radius_m)
     named = [object_report.circle_object((8.0, 0.0, 0.1, 0.0, 0.1, 9.0, 1.0, 0.0), "semicircle", 0.9)]
     found = object_report.other_objects(memory, P, 0.9, named)
-    label = object_report.rival_label(memory, 0)
+    label = object_report.rival_label(memory, 0.0, 0.0, memory.tracks[0].radius)
     assert [(o.model, o.x, o.probability) for o in found] == [
         (label, 0.0, 0.95), ("unknown", 2.0, 0.5), ("unknown", 4.0, 0.75),
     ]  # fmt: skip

@@ -27,7 +27,9 @@ def test_a_rival_that_has_become_a_model_is_tracked_as_that_model() -> None:
         circles["leads"][t, kind] = 0.0
     memory.state["rejections"][0, 0] = (1.0, 1.0, 0.3, 0, 40.0)
     memory.state["rejection_count"] = 1
-    migrate(memory, P, after)
+    archived = circles[:3].copy()
+    migrate(memory, archived, P, after)
+    assert all(np.array_equal(archived[name], circles[name][:3]) for name in ("kind", "radius", "leads", "unseen"))
     leads = circles["leads"]
     assert not leads[:, len(new) + 2 :].any()
     found = circles["kind"][:3].tolist()

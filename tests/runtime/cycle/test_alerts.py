@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from drivers.driver import Received
+from perception.detected_object import MapCounts
 from perception.sensor_report import SensorReport
 from runtime.cycle.alerts import LINES_BURST, LINES_PER_S, Alerts
 
@@ -19,6 +20,7 @@ class StubPerception:
     def __init__(self) -> None:
         self.sensor_monitor = SimpleNamespace(changes=0)
         self.reports: list[SensorReport] = []
+        self.counts = MapCounts(0, 0, 0)
 
     def report(self, *reports: SensorReport) -> None:
         self.reports = list(reports)
@@ -46,6 +48,20 @@ def test_each_fact_is_reported_once() -> None:
     assert alerts.update(NOTHING, seen, 0.0) == ["sensor 5 is crosstalk", "sensor 7 works again and is used"]
     perception.report(report(5, "crosstalk"), report(7, "failing"))
     assert alerts.update(NOTHING, seen, 0.0) == ["sensor 7 is failing"], "a fault that returned is a new fact"
+
+
+def test_objects_without_room_are_reported_once() -> None:
+    alerts, perception = Alerts(), StubPerception()
+    seen: Any = perception
+    perception.counts = MapCounts(9, 9, 9, archived=70, waiting=4)
+    (line,) = alerts.update(NOTHING, seen, 0.0)
+    assert line.startswith("4 objects near the robot have no room")
+    perception.counts = MapCounts(9, 9, 9, archived=70, waiting=6)
+    assert alerts.update(NOTHING, seen, 0.1) == []
+    perception.counts = MapCounts(9, 9, 9, archived=70, waiting=0)
+    assert alerts.update(NOTHING, seen, 0.2) == []
+    perception.counts = MapCounts(9, 9, 9, archived=70, waiting=1)
+    assert len(alerts.update(NOTHING, seen, 0.3)) == 1, "again, after all had found room"
 
 
 def test_notes_of_the_driver_are_passed_on() -> None:

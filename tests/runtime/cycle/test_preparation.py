@@ -17,7 +17,7 @@ from perception.edits import ClearMap
 from perception.pipeline import Perception
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
-from runtime.cycle.preparation import REFUSED, NoMethod, prepared_state, unprepared_state
+from runtime.cycle.preparation import NOTHING, REFUSED, NoMethod, prepared_state, unprepared_state
 from runtime.cycle.process import Observers, RobotProcess
 from runtime.cycle.step import CycleRecord, State
 from runtime.timing.cycle_stats import CycleStats
@@ -140,7 +140,7 @@ def test_the_empty_map_refuses_edits_and_changes_with_nothing() -> None:
     perception.method.drop_caches()
     assert perception.segment_geometry().shape == (0, 5)
     assert len(before.numbers) == len(before.times) == len(before.pinned) == 0
-    assert (perception.counts, perception.objects(), perception.evidence(1)) == ((0, 0, 0), (), None)
+    assert (perception.counts, perception.objects(), perception.evidence(1)) == (NOTHING, (), None)
     assert (perception.can_refine, perception.refine(), perception.converged) == (False, 0, True)
 
 

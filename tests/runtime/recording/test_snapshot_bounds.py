@@ -49,7 +49,12 @@ OUT_OF_BOUNDS = "index is out of bounds"
 """What a compiled kernel raises where bounds are checked; numpy's own text goes on."""
 BOUNDS_CHECKED = os.environ.get("NUMBA_BOUNDSCHECK", "0") not in {"", "0"}
 JOB = "method.memory.state.job."
-RELATED = (JOB + "kind", JOB + "stage", JOB + "lattices", "method.outline.pinned", "method.outline.status")
+ARCHIVED = tuple(
+    f"method._archive.{kind}.{name}" for kind in ("circles", "polygons") for name in ("count", "archived_rows.number")
+)
+RELATED = (
+    JOB + "kind", JOB + "stage", JOB + "lattices", "method.outline.pinned", "method.outline.status", *ARCHIVED,
+)  # fmt: skip
 """Fields that are compared with one another."""
 
 
@@ -158,7 +163,8 @@ def poisons(values: np.ndarray[Any, Any], name: str, settings: Settings) -> list
     end = end_of(name, bounds)
     low, high = FINITE if end is None else bounds[end]
     if values.dtype.kind == "f":
-        return [low, high, math.nan, math.inf, -math.inf, 1e308, -1e308]
+        largest = 1e308 if values.itemsize == np.dtype(np.float64).itemsize else 1e38
+        return [low, high, math.nan, math.inf, -math.inf, largest, -largest]
     if values.dtype.kind in {"b", "u"}:
         return [0, 1, 2, 255]
     return [low, high, low - 1, high + 1, -1, -(2**63), 2**63 - 1]

@@ -22,7 +22,7 @@ from rich.console import Console
 from config.load import load_settings
 from drivers.messages import Floats, LinkCounts, Pose
 from drivers.registry import make_driver
-from perception.pipeline import DetectedObject
+from perception.detected_object import DetectedObject, MapCounts
 from runtime.cli.terminal.view import EVERY_CYCLES, SWITCH_INTERVAL_S, Snapshot, View, keys
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode, ModeState
@@ -33,7 +33,7 @@ from runtime.timing.cycle_stats import CycleStats
 SETTINGS = load_settings("hallway")
 NO_SEGMENTS: Floats = np.zeros((0, 5))
 EMPTY = Snapshot(
-    ModeState(), None, [], NO_SEGMENTS, 0, (), np.full(24, np.nan), LinkCounts(), 0, 0,
+    ModeState(), None, [], NO_SEGMENTS, MapCounts(0, 0, 0), (), np.full(24, np.nan), LinkCounts(), 0, 0,
     {"p50": 0.0, "p99": 0.0, "max": 0.0}, {"p50": 0.0, "p99": 0.0, "max": 0.0},
 )  # fmt: skip
 
@@ -63,7 +63,8 @@ def test_a_picture_shows_mode_reason_objects_ring_and_numbers() -> None:
     snapshot = replace(
         EMPTY,
         mode=ModeState(Mode.SAFE_STOP, 1.0, "bumper contact: free the robot, then re-arm"),
-        pose=Pose(1.0, 0.0, 0.0), trail=[(0.0, 0.0)], segments=np.array([[0.9, 1.0, 1.1, 1.0, 0.0]]), clusters=7,
+        pose=Pose(1.0, 0.0, 0.0), trail=[(0.0, 0.0)], segments=np.array([[0.9, 1.0, 1.1, 1.0, 0.0]]),
+        map_counts=MapCounts(1, 1, 7, 12, 3),
         objects=(seen(0.3048, 1.2192),),
         ranges=np.array([np.nan, np.inf, 0.0, SETTINGS.ring.range_max_m] + [1.0] * 20),
         counts=LinkCounts(1832, 3, 2), cycles=520, late=9,
@@ -72,7 +73,8 @@ def test_a_picture_shows_mode_reason_objects_ring_and_numbers() -> None:
     )  # fmt: skip
     text = printed(snapshot)
     for piece in (
-        "SAFE_STOP", "bumper contact: free the robot", "→", "•", "1 segments, 7 hypotheses",
+        "SAFE_STOP", "bumper contact: free the robot", "→", "•",
+        "1 segments, 7 hypotheses, 12 objects left behind; 3 near ones have no room",
         "1832 frames, 3 bad, 2 lost",
         "520, 9 late, 4 missed", "outside the process: 7, refine: 2",
         "0.48 ms (p99 2.96)", "0.91 ms (p99 5.42)", "semicircle", "1.00", "4.00", "··█▁",
