@@ -1,8 +1,8 @@
 """Which tracks are worked on: those near the robot. What lies behind is archived until the robot returns.
 
 The limit of the arrays is never met in silence: before they are full the farthest object is archived, and where more
-is near than fits, the farthest objects wait, and are counted. An object that is archived does not start twice: a track
-that starts in its place becomes that object. Tentative tracks are no objects, and are not archived.
+is near than fits, the farthest wait and are counted. No object starts twice: a track that starts in the place
+of an archived object becomes that object. Tentative tracks are no objects, and are not archived.
 """
 
 from __future__ import annotations

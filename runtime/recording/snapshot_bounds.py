@@ -73,7 +73,7 @@ CONSTANTS: Final = frozenset(_CONSTANTS.split())
 MAY_BE_INFINITE: Final = frozenset(
     {"_sensors.last_m", "before_last_m", "run_m", "stuck_m", "job.best_nat", "_looked_x", "_looked_y"}
 )
-"""Floats for which an infinity stands for no echo, for no evidence yet, or for a place where the robot has not been."""
+"""Floats for which an infinity stands for no echo, for no evidence yet, or for no place yet."""
 
 _COUNTS: Final = (
     "_numbers.last _rejections.total _ring.firings sets_seen bins.count buckets.count number candidates._sizes _turn "

@@ -53,7 +53,7 @@ class StubFrames:
             "speed": position.speed, "fired": int(self._fired.sum()),
             "x": math.nan if odometry is None else odometry.pose.x,
         }  # fmt: skip
-        return FrameParts(orjson.dumps(head)[:-1], b'{"whole":false}', b'{"whole":true}')
+        return FrameParts(orjson.dumps(head)[:-1], b'"segments":{"whole":false}', b'"segments":{"whole":true}')
 
 
 def make_stub_frames(settings: Settings, *, emulated: bool) -> StubFrames:
