@@ -117,12 +117,21 @@ class BayesConfig(Strict):
     """Most refinements of polygons after each firing, counted separately so that drums do not delay boxes."""
 
 
+class LocalizationConfig(Strict):
+    """Where the robot is: the drift of its odometry."""
+
+    correct_drift: bool = False
+    """Correct the drift of odometry by the round objects that the Bayesian method recognises. The robot drives in the
+    odometry's frame all the same, which stays continuous; objects move in it."""
+
+
 class PerceptionConfig(Strict):
-    """Perception: the method and its settings; the sections after `bayes` are the paper's steps."""
+    """Perception: the method and its settings; the sections after `localization` are the paper's steps."""
 
     method: Literal["paper", "bayes"] = "bayes"
     """How objects are recognised: `paper` as Santamaría & Arkin do, `bayes` by comparing raw ranges."""
     bayes: BayesConfig = BayesConfig()
+    localization: LocalizationConfig = LocalizationConfig()
 
     segments: SegmentsConfig = SegmentsConfig()
     map: MapConfig = MapConfig()

@@ -18,6 +18,8 @@ from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import Edit, Evidence, MoveObject, PlaceModel, Segments, invalid_number, invalid_pose
 from perception.fresh_echoes import FreshEchoes
 from perception.kernel import Floats
+from perception.localization.drift_correction import LocalizedPose
+from perception.localization.map_frame import MapFrame
 from perception.paper.paper_method import PaperPerception
 from perception.sensor_monitor import SensorMonitor
 from perception.sensor_mounts import mounts_array
@@ -85,6 +87,10 @@ class Method(Protocol):
         """Return the evidence for an object, None if no object has this number; changes nothing."""
         ...
 
+    def shift_object(self, number: int, dx: float, dy: float) -> None:
+        """Move an object and what is kept for it by a vector (m), after its place in the map was corrected."""
+        ...
+
     def reset(self) -> None:
         """Start again with an empty map, as after a reset of the odometry."""
         ...
@@ -143,6 +149,9 @@ class Perception:
     ) -> None:
         self.method = make_method(ring, models, config) if method is None else method
         self.sensor_monitor = SensorMonitor(ring)
+        corrects = config.localization.correct_drift
+        self.map_frame = MapFrame(ring, models) if corrects else None
+        """Corrects drift, where the settings say so; what `method` holds is in the map frame then."""
         self._echoes = FreshEchoes(mounts_array(ring.mounts))
         self._sensors = len(ring.mounts)
         self._models = tuple(models)
@@ -174,6 +183,10 @@ class Perception:
             raise ValueError(f"a firing of {len(firing.ranges_m)} ranges, but the ring has {self._sensors} sensors")
         trusted, possible = self.sensor_monitor.filter(firing)
         self._echoes.update(possible)
+        if self.map_frame is not None:
+            trusted = self.map_frame.follow(trusted, self.method.near_objects())
+            for number, dx, dy in self.map_frame.shifts():
+                self.method.shift_object(number, dx, dy)
         return self.method.observe(trusted)
 
     def refine(self) -> int:
@@ -182,27 +195,44 @@ class Perception:
 
     def objects(self) -> tuple[DetectedObject, ...]:
         """Return the models recognised so far: those near the robot, best first, then those left behind."""
-        return self.method.objects()
+        return self._in_odometry(self.method.objects())
+
+    def mapped_objects(self) -> tuple[DetectedObject, ...]:
+        """Return the same objects in the map frame; without correction of drift that is odometry's."""
+        seen = self.method.objects()
+        return seen if self.map_frame is None else self.map_frame.with_landmarks(seen)
+
+    def localized(self) -> LocalizedPose | None:
+        """Return where the robot was at the last firing in the map frame; None without correction of drift."""
+        return None if self.map_frame is None else self.map_frame.localized()
 
     def near_objects(self) -> tuple[DetectedObject, ...]:
         """Return the models recognised near the robot, best first; the cost does not depend on the map's size."""
-        return self.method.near_objects()
+        return self._in_odometry(self.method.near_objects())
 
     def labelled_objects(self) -> tuple[DetectedObject, ...]:
         """Return what has a label near the robot: models, walls, corners, posts, unknowns."""
-        return self.method.labelled_objects()
+        return self._in_odometry(self.method.labelled_objects())
 
     def archived_objects(self) -> tuple[DetectedObject, ...]:
-        """Return what has a label and was left behind; the same tuple until it changes."""
-        return self.method.archived_objects()
+        """Return what has a label and was left behind; without correction the same tuple until it changes."""
+        return self._in_odometry(self.method.archived_objects())
+
+    def _in_odometry(self, seen: tuple[DetectedObject, ...]) -> tuple[DetectedObject, ...]:
+        """Return what the method holds in odometry's frame."""
+        return seen if self.map_frame is None else self.map_frame.objects_in_odometry(seen)
 
     def segment_geometry(self) -> Floats:
         """Return a copy of the outline segments: end points x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""
-        return self.method.segment_geometry()
+        geometry = self.method.segment_geometry()
+        return geometry if self.map_frame is None else self.map_frame.segments_in_odometry(geometry)
 
     def segments(self) -> Segments:
         """Return copies of the outline segments with their numbers, times and pins."""
-        return self.method.segments()
+        held = self.method.segments()
+        if self.map_frame is None:
+            return held
+        return held._replace(geometry=self.map_frame.segments_in_odometry(held.geometry))
 
     def edit(self, edit: Edit) -> str | None:
         """Apply an operator's edit; return None, or why it cannot be applied, as text for the operator.
@@ -212,11 +242,14 @@ class Perception:
         refused = invalid_number(edit)
         if refused is None and isinstance(edit, PlaceModel | MoveObject):
             refused = invalid_pose(edit.x, edit.y, edit.theta)
-        return self.method.edit(edit) if refused is None else refused
+        if refused is not None:
+            return refused
+        return self.method.edit(edit if self.map_frame is None else self.map_frame.edit_in_map(edit))
 
     def evidence(self, number: int) -> Evidence | None:
         """Return the evidence for an object, None if no object has this number; changes nothing."""
-        return self.method.evidence(number)
+        found = self.method.evidence(number)
+        return found if self.map_frame is None else self.map_frame.evidence_in_odometry(found)
 
     def obstacles(self, robot_s: float, age_max_s: float) -> Floats:
         """Return each sensor's last echo if no older than `age_max_s` at the robot's time: shape (k, 2), m."""
@@ -225,6 +258,8 @@ class Perception:
     def reset(self) -> None:
         """Start again with an empty map, as after a reset of the odometry."""
         self.method.reset()
+        if self.map_frame is not None:
+            self.map_frame.reset()
         self.sensor_monitor.reset()
         self._echoes.clear()
 
@@ -237,6 +272,8 @@ class Perception:
         if tuple(models) != self._models:
             self._models = tuple(models)
             self.method.set_models(models)
+            if self.map_frame is not None:
+                self.map_frame.set_models(models)
 
     def set_firing_pattern(self, ring: RingConfig) -> None:
         """Expect another firing pattern of the same sensors."""

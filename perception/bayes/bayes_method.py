@@ -250,7 +250,7 @@ class BayesPerception:
                 name = self._round[kind] if kind < p[0].model_count else rival_label(memory, x, y, radius)
             return evidence_of(memory, p, row, number, name, alternative_labels(p, self._round))
 
-    def shift_circle(self, number: int, dx: float, dy: float) -> None:
+    def shift_object(self, number: int, dx: float, dy: float) -> None:
         """Move a round object and the readings kept for it, after its place in the map was corrected.
 
         Parameters

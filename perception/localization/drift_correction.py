@@ -80,6 +80,9 @@ CATCHING_UP: Final = 8
 """Waiting firings that are entered with each new one: bounds the work."""
 POSE: Final = 4
 """Numbers of a waiting firing before its ranges: the pose of the base, and the ring's direction."""
+NOT_FIRED: Final = -1.0
+SILENT_M: Final = 1e6
+"""What a waiting firing holds in place of NaN and infinity: numbers, as everything that a recording holds."""
 TURNED_RAD: Final = 1e-9
 """A ring that turns otherwise than the wheels, by more than this, is one of a synchro drive."""
 
@@ -173,7 +176,7 @@ class DriftCorrection:
             self._enter_next()
         row = self._waiting[self._arrived % WAITING_MAX]
         row[:POSE] = firing.pose.x, firing.pose.y, firing.pose.theta, firing.ring_yaw
-        row[POSE:] = firing.ranges_m
+        row[POSE:] = np.nan_to_num(firing.ranges_m, nan=NOT_FIRED, posinf=SILENT_M, neginf=NOT_FIRED)
         if self._arrived > 0:
             before = self._waiting[(self._arrived - 1) % WAITING_MAX]
             self._way_m += math.hypot(row[0] - before[0], row[1] - before[1])
@@ -212,6 +215,14 @@ class DriftCorrection:
         """Return the firing that was observed last, at its pose in the map frame and with ranges in true metres."""
         pose, ring_yaw = self._pose_of(firing.pose, firing.ring_yaw)
         return Firing(firing.robot_s, pose, ring_yaw, firing.ranges_m / self.e[0].range_scale)
+
+    def odometry_from_map(self) -> Pose:
+        """Return the pose of the map frame in odometry's frame, at the last firing."""
+        if self._arrived == 0:
+            return Pose(0.0, 0.0, 0.0)
+        x, y, theta, yaw = self._waiting[(self._arrived - 1) % WAITING_MAX, :POSE].tolist()
+        here, here_yaw = self._pose_of(Pose(x, y, theta), yaw)
+        return Pose(x, y, yaw).compose(Pose(here.x, here.y, here_yaw).inverse())
 
     def localized(self) -> LocalizedPose:
         """Return where the robot was at the last firing."""

@@ -146,6 +146,9 @@ class PaperPerception:
         """Return nothing: this method archives none."""
         return ()
 
+    def shift_object(self, number: int, dx: float, dy: float) -> None:
+        """Move nothing: this method's objects are no landmarks, because they have no covariance."""
+
     def reset(self) -> None:
         """Start again with an empty map, as after a reset of the odometry."""
         self._extractor.reset()

@@ -83,6 +83,9 @@ class NoMethod:
         """Return None: there are no objects."""
         return None
 
+    def shift_object(self, number: int, dx: float, dy: float) -> None:
+        """Move nothing: there are no objects."""
+
     def reset(self) -> None:
         """Leave the empty map as it is."""
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator
 
-from config.settings import Settings
+from config.settings import LocalizationConfig, Settings
 from drivers.messages import Firing
 from perception.localization.drift_correction import LocalizedPose
-from perception.localization.localized_perception import LocalizedPerception
 from perception.pipeline import Perception
 from runtime.cycle.summary import object_row
 from runtime.recording.replay_summary import ReplaySummary
@@ -18,8 +17,6 @@ from runtime.timing.refinement_budget import within_quanta_per_cycle
 
 class FiringReplayer:
     """An iterator over firings that runs perception on each of them before it yields it.
-
-    Drift is not corrected.
 
     Parameters
     ----------
@@ -77,34 +74,26 @@ def replay_localized(
     on_pose : callable
         Called after each firing with its time (s) and the robot's pose as known then.
     """
-    localized = LocalizedPerception(settings.ring, settings.models, settings.perception)
-    cycle_stats = CycleStats(late_after_s=float("inf"))
-    for firing in firings:
-        started_s = time.perf_counter()
-        localized.observe(firing)
-        quanta = 0
-        while localized.can_refine and within_quanta_per_cycle(quanta):
-            localized.refine()
-            quanta += 1
-        cycle_stats.add_cycle(time.perf_counter() - started_s)
-        on_pose(firing.robot_s, localized.localized())
-    here, counts = localized.localized(), localized.perception.counts
-    return {
-        "frame": "map",
-        "pose": {
+    config = settings.perception.model_copy(update={"localization": LocalizationConfig(correct_drift=True)})
+    replayer = FiringReplayer(settings.model_copy(update={"perception": config}), firings)
+    perception = replayer.perception
+    for firing in replayer:
+        here = perception.localized()
+        if here is not None:
+            on_pose(firing.robot_s, here)
+    summary, here = replayer.summary(), perception.localized()
+    summary["frame"] = "map"
+    summary["objects"] = [object_row(seen) for seen in perception.mapped_objects()]
+    if here is not None:
+        summary["pose"] = {
             "x": here.pose.x,
             "y": here.pose.y,
             "theta": here.pose.theta,
             "covariance": here.covariance.tolist(),
             "status": here.status,
             "probability": here.probability,
-        },
-        "objects": [object_row(seen) for seen in localized.objects()],
-        "segments": counts.segments_total,
-        "clusters": counts.hypotheses,
-        "cycles": cycle_stats.cycles,
-        "cycle_us": cycle_stats.cycle_us(),
-    }
+        }
+    return summary
 
 
 def replay_firings(settings: Settings, firings: Iterable[Firing]) -> ReplaySummary:

@@ -32,6 +32,7 @@ from perception.bayes.pose_restarts import LATTICE
 from perception.bayes.scratch import POLYGON
 from perception.bayes.settings_record import CIRCLES_MAX, NOISES, POLYGONS_MAX
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED
+from perception.localization.landmark_state import LANDMARKS_MAX
 from perception.paper.outline_map import PINNED
 from perception.paper.parameters import PINNED_SHARE_MAX, PLACEMENTS_MAX, READINGS_KEPT
 from perception.sensor_memory import SETS_MAX
@@ -54,6 +55,8 @@ FINITE: Final = Bound(-1e12, 1e12)
 """Of a float; places, times and evidence are far below, and squares and products of a few are finite."""
 STEPS: Final = Bound(0, 4096)
 """Of the progress of a polygon's job; its longest stage has a few hundred steps."""
+SCALE: Final = Bound(0.5, 2.0)
+"""Of a scale by which something is divided."""
 QUANTA: Final = Bound(0, 1000)
 """As `config.settings.BayesConfig.quanta_per_firing`, which a running process may change."""
 ITERATIONS: Final = Bound(0, 1_000_000)
@@ -65,7 +68,7 @@ UNHEARD: Final = "method.memory.state.sensors.last."
 
 _CONSTANTS: Final = (
     "_mounts _half_angle _sensors _segments_min _reach_m sensor_monitor._axes sensor_monitor._neighbours "
-    "sensor_monitor._tolerance sensor_monitor._near state.sensor_count scratch.attracting_rows"
+    "sensor_monitor._tolerance sensor_monitor._near state.sensor_count scratch.attracting_rows drift._ring"
 )
 CONSTANTS: Final = frozenset(_CONSTANTS.split())
 """Numbers that the settings give and no cycle changes."""
@@ -79,18 +82,32 @@ _COUNTS: Final = (
     "_numbers.last _rejections.total _ring.firings sets_seen bins.count buckets.count number candidates._sizes _turn "
     "changes idle_firings passed_over refinements reservoir unseen clusters.sizes requests_made leaps missed "
     "near_echoes newest_segment objects_numbered off_stuck outline.numbers outline.total _sensors.readings "
+<<<<<<< HEAD
     "rejection_count run_firing run_length segments_made segments_numbered sensors.kept members_sum "
     "_archive.circles.count _archive.polygons.count _numbered waiting"
 )
 _FLAGS: Final = (
     "_sets has_rested is_named has_gained refines_next is_confirmed has_challenger is_done is_crossed "
     "_is_due is_reported _circles_pending _polygons_pending _polygons_turn _placement_was_last _expected _heard"
+=======
+    "drift._arrived drift._entered drift._windows landmarks.failures landmarks.hits "
+    "rejection_count run_firing run_length segments_made segments_numbered sensors.kept members_sum"
+)
+_FLAGS: Final = (
+    "_sets has_rested is_named has_gained refines_next is_confirmed has_challenger is_done is_crossed "
+    "drift._has_started drift._is_synchro sensors.is_known "
+    "_circles_pending _polygons_pending _polygons_turn _placement_was_last _expected _heard"
+>>>>>>> bc12954 (Correct drift in a live run too: perception.localization.correct_drift, off by default; its state is recorded and bounded)
 )
 
 BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
     dict.fromkeys(_COUNTS.split(), COUNT)
     | dict.fromkeys(_FLAGS.split(), FLAG)
     | {
+        "_estimate.count": Bound(0, LANDMARKS_MAX),
+        "_estimate.noise": Bound(0.0, 1e3),
+        "_estimate.odometer_scale": SCALE,
+        "_estimate.range_scale": SCALE,
         "_extractor._sensors.count": Bound(0, READINGS_KEPT),
         "_extractor._sensors.newest": Bound(0, READINGS_KEPT - 1),
         "_left": QUANTA,
@@ -114,6 +131,7 @@ BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
         "job.reading_step": Bound(0, JOB_READINGS),
         "job.stage": Bound(0, LATTICE),
         "job.track": Bound(0, MAX_POLYGONS - 1),
+        "landmarks.radius": Bound(0.0, 1e3),
         "lines.log_odds": Bound(-700.0, 700.0),
         "marks": Bound(0, CONFIRMED | PLACED),
         "moments.mass": Bound(0.0, FINITE.high),

@@ -15,13 +15,12 @@ from typing import Final, TypedDict
 
 import numpy as np
 
-from config.settings import Settings
+from config.settings import LocalizationConfig, Settings
 from config.units import FOOT_M
 from config.world import DrumConfig, OdometryConfig, WorldConfig
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose, wrap_angle
-from perception.localization.localized_perception import LocalizedPerception
 from perception.pipeline import Perception
 from runtime.simulation.random_halls import ACOUSTICS
 from runtime.simulation.scenes import OCTET, SPEED_M_S
@@ -202,18 +201,19 @@ def drive(
         As for `firings`.
     """
     world, path = drum_hall(seed), oval()
-    kind = LocalizedPerception if corrected else Perception
-    perception = kind(settings.ring, settings.models, settings.perception)
+    config = settings.perception.model_copy(update={"localization": LocalizationConfig(correct_drift=corrected)})
+    perception = Perception(settings.ring, settings.models, config)
     pose = path[0]
     for firing in firings(settings, world, path, errors, seed, synchro=synchro):
         perception.observe(firing)
         while perception.can_refine and perception.refine():
             pass
         pose = firing.pose
-    robot = perception.localized().pose if isinstance(perception, LocalizedPerception) else pose
+    localized = perception.localized()
+    robot = pose if localized is None else localized.pose
     true = path[-1]
     names = {model.name for model in settings.models if model.arc_radius_m is not None}
-    seen = [one for one in perception.objects() if one.model in names]
+    seen = [one for one in perception.mapped_objects() if one.model in names]
     drums = [(drum.x_m, drum.y_m) for drum in world.drum]
     views = [_from(robot, one.x, one.y) for one in seen]
     pairs = _pairs([_from(true, *drum) for drum in drums], views)
@@ -221,14 +221,14 @@ def drive(
         tuple(error for _, _, error in pairs), len(drums) - len(pairs), len(seen) - len(pairs),
         math.dist((robot.x, robot.y), (true.x, true.y)), abs(wrap_angle(robot.theta - true.theta)),
     )  # fmt: skip
-    if not isinstance(perception, LocalizedPerception):
+    if localized is None or perception.map_frame is None:
         return outcome
     off = np.array([robot.x - true.x, robot.y - true.y, wrap_angle(robot.theta - true.theta)])
     object_nees = [_nees(seen[k].x - drums[i][0], seen[k].y - drums[i][1], seen[k].covariance) for i, k, _ in pairs]
-    estimate = perception.drift.e[0]
+    estimate = perception.map_frame.drift.e[0]
     return DriftOutcome(
         outcome.errors, outcome.missed, outcome.false, outcome.place, outcome.heading,
-        float(off @ np.linalg.solve(perception.localized().covariance, off)),
+        float(off @ np.linalg.solve(localized.covariance, off)),
         mean(object_nees) if object_nees else None,
         estimate.odometer_scale / errors.scale - 1.0,
         estimate.range_scale * world.acoustics.sound_speed_scale - 1.0,

@@ -42,9 +42,10 @@ PAPER: Final = "paper"
 BAYES: Final = "bayes"
 POLYGONS: Final = "polygons"
 EMULATOR: Final = "emulator"
-PARTS: Final = (EMULATOR, BAYES, POLYGONS, PAPER)
-"""What is compiled separately: a method by its name, what the Bayesian method needs beyond it for polygons, and the
-emulator. A file with the name of a part in the cache folder says that it is compiled."""
+LOCALIZATION: Final = "localization"
+PARTS: Final = (EMULATOR, BAYES, POLYGONS, PAPER, LOCALIZATION)
+"""What is compiled separately: a method by its name, what the Bayesian method needs beyond it for polygons, the
+emulator, and the correction of drift. A file with the name of a part in the cache folder says that it is compiled."""
 
 PRIVATE: Final = 0o700
 OTHERS_WRITE: Final = stat.S_IWGRP | stat.S_IWOTH
@@ -104,7 +105,8 @@ def needed_parts(settings: Settings) -> tuple[str, ...]:
     """Return the parts that a run needs. Polygons take half of the time to compile, and many runs have none."""
     has_polygons = any(model.arc_radius_m is None for model in settings.models)
     polygons = (POLYGONS,) if has_polygons and settings.perception.method == BAYES else ()
-    return (EMULATOR, settings.perception.method, *polygons)
+    localization = (LOCALIZATION,) if settings.perception.localization.correct_drift else ()
+    return (EMULATOR, settings.perception.method, *polygons, *localization)
 
 
 def uncompiled_parts(folder: Path, parts: Iterable[str]) -> list[str]:

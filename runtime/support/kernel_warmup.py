@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import math
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,7 +18,15 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from runtime.support.child_process import child_environment
-from runtime.support.kernel_cache import BAYES, EMULATOR, PAPER, POLYGONS, compile_parts, use_kernel_cache
+from runtime.support.kernel_cache import (
+    BAYES,
+    EMULATOR,
+    LOCALIZATION,
+    PAPER,
+    POLYGONS,
+    compile_parts,
+    use_kernel_cache,
+)
 
 if TYPE_CHECKING:
     from config.model import ModelConfig
@@ -126,8 +135,23 @@ def _emulator(settings: Settings) -> None:
         make_device(settings, world, seed=0).advance(0.5)
 
 
+def _localization(settings: Settings) -> None:
+    """Drive past objects that become landmarks and vanish; corrections and every kind of range are entered."""
+    import numpy as np
+
+    from drivers.messages import Firing, Pose
+    from perception.localization.drift_correction import DriftCorrection, SeenObject
+
+    drift = DriftCorrection(settings.ring)
+    objects = [SeenObject(k, 2.0 * math.cos(k), 2.0 * math.sin(k), 0.3) for k in range(1, 5)]
+    for k in range(FIRINGS):
+        ranges = np.full(len(settings.ring.mounts), 1.3 if k % 2 else math.inf)
+        drift.learn(objects[k // 12 :])
+        drift.observe(Firing(0.1 * k, Pose(0.1 * k, 0.0, 0.1 * k), 0.0, ranges))
+
+
 RUN_ONCE: Final[Mapping[str, Callable[[Settings], None]]] = MappingProxyType(
-    {EMULATOR: _emulator, BAYES: _circles, POLYGONS: _polygons, PAPER: _paper}
+    {EMULATOR: _emulator, BAYES: _circles, POLYGONS: _polygons, PAPER: _paper, LOCALIZATION: _localization}
 )
 """Runs each part once."""
 

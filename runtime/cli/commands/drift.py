@@ -10,7 +10,7 @@ from rich.console import Console
 from config.errors import DONE
 from config.load import load_settings
 from runtime.cli.commands.offline_io import refuse_unwritable
-from runtime.support.kernel_cache import prepare_kernels
+from runtime.support.kernel_cache import LOCALIZATION, needed_parts, prepare_kernels
 from runtime.support.progress import progress
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def run_drift(
     settings = load_settings("hallway", sets, models=models)
     console = Console(stderr=True)
     refuse_unwritable({"--json": json_file})
-    prepare_kernels(settings, console)
+    prepare_kernels(settings, console, (*needed_parts(settings), LOCALIZATION))
     from runtime.cli.tables import drift_table
     from runtime.cycle.summary import write_json
     from runtime.simulation.drift_trials import LEVELS, drive, summarise_drives

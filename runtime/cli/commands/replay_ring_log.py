@@ -13,7 +13,7 @@ from config.load import load_settings
 from runtime.cli.commands.offline_io import refuse_unwritable
 from runtime.cli.tables import objects_table, pose_line
 from runtime.cycle.summary import write_json
-from runtime.support.kernel_cache import prepare_kernels
+from runtime.support.kernel_cache import LOCALIZATION, needed_parts, prepare_kernels
 from runtime.support.length_format import Units
 from runtime.support.progress import progress
 
@@ -45,7 +45,7 @@ def replay_log(
     settings = load_settings(None, sets, robot=robot, models=models)
     console = Console(stderr=True)
     refuse_unwritable({"--json": json_file, "--trajectory": trajectory})
-    prepare_kernels(settings, console)
+    prepare_kernels(settings, console, (*needed_parts(settings), *([LOCALIZATION] if localize else [])))
     from runtime.recording.ring_log import read_ring_log
     from runtime.recording.ring_log_replay import replay_firings, replay_localized
 

@@ -128,8 +128,8 @@ def test_an_object_is_shifted_with_the_readings_kept_for_it() -> None:
     (row,) = np.flatnonzero(perception.memory.circles["number"] == number)
     kept = perception.memory.circles["bins"]["readings"][row]
     kept["x"], kept["y"] = 2.0, 3.0
-    perception.shift_circle(number or 0, 0.1, -0.2)
-    perception.shift_circle(99, 5.0, 5.0)
+    perception.shift_object(number or 0, 0.1, -0.2)
+    perception.shift_object(99, 5.0, 5.0)
     assert [(o.x, o.y) for o in perception.objects()] == [pytest.approx((1.1, -0.2))]
     kept = perception.memory.circles["bins"]["readings"][row]
     assert np.unique(kept["x"]) == pytest.approx(2.1)

@@ -122,6 +122,23 @@ def faulty(firings: Iterator[Firing]) -> Iterator[Firing]:
 
 
 @pytest.mark.compiled
+def test_no_state_with_correction_of_drift_is_refused() -> None:
+    settings = load_settings("hallway", ["perception.localization.correct_drift=true"])
+    assert settings.world is not None
+    perception = Perception(settings.ring, settings.models, settings.perception)
+    fresh = perception.snapshot()
+    for k, firing in enumerate(faulty(drive(settings.world))):
+        perception.observe(firing)
+        while perception.can_refine and perception.refine():
+            pass
+        if k % CHECKED_EVERY == 0:
+            is_honest(perception, fresh, settings)
+    localized = perception.localized()
+    assert localized is not None
+    assert localized.status == "tracking"
+
+
+@pytest.mark.compiled
 @pytest.mark.parametrize("method", ["bayes", "paper"])
 def test_no_state_with_faulty_sensors_is_refused(method: str) -> None:
     settings = load_settings("hallway", [f"perception.method={method}"], models=("box",))

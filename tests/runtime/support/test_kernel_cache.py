@@ -173,6 +173,8 @@ def test_a_run_compiles_only_the_parts_that_it_needs() -> None:
     assert kernels.needed_parts(boxes) == (kernels.EMULATOR, kernels.BAYES, kernels.POLYGONS)
     paper = load_settings("hallway", ["perception.method=paper"], models=["box"])
     assert kernels.needed_parts(paper) == (kernels.EMULATOR, kernels.PAPER)
+    corrected = load_settings("hallway", ["perception.localization.correct_drift=true"])
+    assert kernels.needed_parts(corrected) == (kernels.EMULATOR, kernels.BAYES, kernels.LOCALIZATION)
     assert set(warming.RUN_ONCE) == set(kernels.PARTS)
 
 
@@ -199,7 +201,7 @@ def test_each_part_is_compiled_once_and_then_warmed_up(home: Path, monkeypatch: 
     kernels.prepare_kernels(load_settings("hallway", models=["box"]), console)
     assert happened == ["compile polygons", "bayes"]
     (home / kernels.BAYES).unlink()
-    assert kernels.uncompiled_parts(home, kernels.PARTS) == [kernels.BAYES, kernels.PAPER]
+    assert kernels.uncompiled_parts(home, kernels.PARTS) == [kernels.BAYES, kernels.PAPER, kernels.LOCALIZATION]
     happened.clear()
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     kernels.prepare_kernels(settings, console)

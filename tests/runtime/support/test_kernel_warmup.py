@@ -11,6 +11,7 @@ import pytest
 
 from config.load import load_settings
 from perception.bayes import polygon_tracks, refine
+from perception.localization import drift_correction
 from perception.pipeline import Perception
 from runtime.support import kernel_cache as kernels
 from runtime.support import kernel_warmup
@@ -38,6 +39,23 @@ def test_a_second_process_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) 
     with kernel_warmup.compile_in_parallel(kernels.BAYES):
         assert started[0].poll() is None
     assert started[0].returncode is not None
+
+
+def test_the_warm_up_of_localization_runs_every_kernel_that_corrects_drift(monkeypatch: pytest.MonkeyPatch) -> None:
+    done = set[str]()
+
+    def note(name: str, call: Callable[..., Any]) -> Callable[..., Any]:
+        def noted(*arguments: Any) -> Any:
+            done.add(name)
+            return call(*arguments)
+
+        return noted
+
+    names = {"add_landmark", "propagate", "remove_landmark", "update_with_firing"}
+    for name in names:
+        monkeypatch.setattr(drift_correction, name, note(name, getattr(drift_correction, name)))
+    kernel_warmup.RUN_ONCE[kernels.LOCALIZATION](load_settings("hallway"))
+    assert done == names
 
 
 @pytest.mark.parametrize("part", [kernels.BAYES, kernels.PAPER])

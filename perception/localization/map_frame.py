@@ -1,0 +1,148 @@
+"""The map frame of perception: firings are entered at corrected poses, results are turned back to odometry's frame.
+
+What perception holds is in the map frame, so that drift does not smear it. Odometry's frame, in which the robot
+drives, stays continuous whatever is corrected: there, the objects move.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Final, TypeVar
+
+import numpy as np
+
+from config.model import ModelConfig
+from config.robot import RingConfig
+from drivers.messages import Firing, Pose
+from perception.bayes.object_report import worst_sigma
+from perception.detected_object import DetectedObject
+from perception.edits import Edit, Evidence, MoveObject, PlaceModel
+from perception.kernel import Floats
+from perception.localization.drift_correction import DriftCorrection, LocalizedPose, SeenObject
+
+SHIFT_MIN_M: Final = 0.002
+"""An object moves with its landmark once that has moved this far."""
+AnyEdit = TypeVar("AnyEdit", bound=Edit)
+
+
+class MapFrame:
+    """Poses corrected by what is recognised, and conversions between the frames.
+
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
+    models : sequence of ModelConfig
+        The objects to recognise; the round ones become landmarks.
+
+    Attributes
+    ----------
+    drift : DriftCorrection
+        The landmark filter.
+    """
+
+    def __init__(self, ring: RingConfig, models: Sequence[ModelConfig]) -> None:
+        self.drift = DriftCorrection(ring)
+        self.set_models(models)
+
+    def set_models(self, models: Sequence[ModelConfig]) -> None:
+        """Make landmarks of the round ones of these models."""
+        self._radii = {model.name: model.arc_radius_m for model in models if model.arc_radius_m is not None}
+
+    def reset(self) -> None:
+        """Start again: the next firing's odometry defines the map frame."""
+        self.drift.reset()
+
+    def follow(self, firing: Firing, objects: Iterable[DetectedObject]) -> Firing:
+        """Return a firing at its pose in the map frame.
+
+        Parameters
+        ----------
+        firing : Firing
+            With its pose by odometry.
+        objects : iterable of DetectedObject
+            Recognised before it, in the map frame.
+        """
+        self.drift.learn(
+            SeenObject(seen.number, seen.x, seen.y, self._radii[seen.model])
+            for seen in objects
+            if seen.covariance is not None
+            and seen.model in self._radii
+            and not seen.placed
+            and seen.number is not None
+        )
+        self.drift.observe(firing)
+        return self.drift.corrected(firing)
+
+    def shifts(self) -> list[tuple[int, float, float]]:
+        """Return number and displacement (m) of the objects that are to move, because their landmarks moved."""
+        return list(self.drift.moved_landmarks(SHIFT_MIN_M))
+
+    def localized(self) -> LocalizedPose:
+        """Return where the robot was at the last firing."""
+        return self.drift.localized()
+
+    def with_landmarks(self, objects: Iterable[DetectedObject]) -> tuple[DetectedObject, ...]:
+        """Return objects in the map frame; those that are landmarks with the place that the filter gives them."""
+        return tuple(self._placed(seen) for seen in objects)
+
+    def objects_in_odometry(self, objects: Iterable[DetectedObject]) -> tuple[DetectedObject, ...]:
+        """Return objects of the map frame in odometry's frame."""
+        to = self.drift.odometry_from_map()
+        return tuple(_turned(to, seen) for seen in self.with_landmarks(objects))
+
+    def segments_in_odometry(self, geometry: Floats) -> Floats:
+        """Return segments of the map frame in odometry's: ends x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""
+        to = self.drift.odometry_from_map()
+        c, s = math.cos(to.theta), math.sin(to.theta)
+        turned = geometry.copy()
+        for x, y in ((0, 1), (2, 3)):
+            turned[:, x] = to.x + c * geometry[:, x] - s * geometry[:, y]
+            turned[:, y] = to.y + s * geometry[:, x] + c * geometry[:, y]
+        turned[:, 4] += to.theta
+        return turned
+
+    def evidence_in_odometry(self, evidence: Evidence | None) -> Evidence | None:
+        """Return the evidence for an object of the map frame in odometry's frame."""
+        if evidence is None:
+            return None
+        to = self.drift.odometry_from_map()
+        arcs = [(arc, to.compose(Pose(arc.x, arc.y, arc.direction))) for arc in evidence.arcs]
+        lines = [
+            (line, to.compose(Pose(line.x1, line.y1, 0.0)), to.compose(Pose(line.x2, line.y2, 0.0)))
+            for line in evidence.lines
+        ]
+        return replace(
+            evidence,
+            arcs=tuple(replace(arc, x=at.x, y=at.y, direction=at.theta) for arc, at in arcs),
+            lines=tuple(replace(line, x1=a.x, y1=a.y, x2=b.x, y2=b.y) for line, a, b in lines),
+        )
+
+    def edit_in_map(self, edit: AnyEdit) -> AnyEdit:
+        """Return an operator's edit, whose places are in odometry's frame, in the map frame."""
+        if not isinstance(edit, PlaceModel | MoveObject):
+            return edit
+        place = self.drift.odometry_from_map().inverse().compose(Pose(edit.x, edit.y, edit.theta))
+        return replace(edit, x=place.x, y=place.y, theta=place.theta)
+
+    def _placed(self, seen: DetectedObject) -> DetectedObject:
+        place = None if seen.number is None else self.drift.place(seen.number)
+        if place is None:
+            return seen
+        sigma = worst_sigma(*place.covariance)
+        return replace(seen, x=place.x, y=place.y, sigma=sigma, covariance=place.covariance)
+
+
+def _turned(to: Pose, seen: DetectedObject) -> DetectedObject:
+    """Return an object in another frame, in which the present origin lies at `to`."""
+    place = to.compose(Pose(seen.x, seen.y, seen.theta))
+    if seen.covariance is None:
+        return replace(seen, x=place.x, y=place.y, theta=place.theta)
+    xx, xy, yy = seen.covariance
+    c, s = math.cos(to.theta), math.sin(to.theta)
+    turn = np.array([[c, -s], [s, c]])
+    turned = turn @ np.array([[xx, xy], [xy, yy]]) @ turn.T
+    covariance = (float(turned[0, 0]), float(turned[0, 1]), float(turned[1, 1]))
+    return replace(seen, x=place.x, y=place.y, theta=place.theta, covariance=covariance)
