@@ -9,8 +9,8 @@ begin at the first one: otherwise the drift of that way would turn the map for g
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from typing import Final, Literal, NamedTuple, TypeAlias
+from collections.abc import Iterable
+from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -22,7 +22,6 @@ from perception.localization.landmark_ranges import update_with_firing
 from perception.localization.landmark_state import (
     FIRST,
     HEADING,
-    LANDMARKS_MAX,
     ODOMETER,
     OFFSET,
     RANGE,
@@ -188,7 +187,6 @@ class DriftCorrection:
 
     def learn(self, seen: Iterable[SeenObject]) -> None:
         """Make landmarks of recognised objects that are none yet; drop those that are no longer recognised."""
-        e = self.e[0]
         objects = {one.number: one for one in seen}
         if self._has_started and self._arrived > self._entered:
             return  # what perception sees now is later than the filter
@@ -196,19 +194,15 @@ class DriftCorrection:
             return
         if self._entered == 0:
             self._enter_next()
-        moved = set()
-        for i in range(e.count - 1, -1, -1):
-            landmark = e.landmarks[i]
-            has_moved = landmark.failures >= FAILURES_MAX and e.fit_share > SLIP_SHARE
-            if has_moved:
-                moved.add(landmark.number)
-            if has_moved or landmark.number not in objects:
+        numbers, failures = self._landmarks("number", "failures")
+        has_slipped = self.e[0].fit_share <= SLIP_SHARE
+        moved = {n for n, failed in zip(numbers, failures, strict=True) if failed >= FAILURES_MAX and not has_slipped}
+        for i in range(len(numbers) - 1, -1, -1):
+            if numbers[i] in moved or numbers[i] not in objects:
                 remove_landmark(self.e, self.covariance, i)
-        known = {e.landmarks[i].number for i in range(e.count)}
-        for number, one in objects.items():
-            if number not in known and e.count < LANDMARKS_MAX:
-                sigma = MOVED_SIGMA_M if number in moved else NEW_SIGMA_M if self._has_started else FIRST_SIGMA_M
-                self._add(one, sigma)
+        for number in sorted(objects.keys() - (set(numbers) - moved)):
+            sigma = MOVED_SIGMA_M if number in moved else NEW_SIGMA_M if self._has_started else FIRST_SIGMA_M
+            self._add(objects[number], sigma)
         self._has_started = True
 
     def corrected(self, firing: Firing) -> Firing:
@@ -240,38 +234,43 @@ class DriftCorrection:
         status: Status = "lost" if share < LOST_SHARE else "tracking" if is_caught_up else "localizing"
         return LocalizedPose(pose, ring_yaw, covariance, status, share)
 
-    def place(self, number: int) -> LandmarkPlace | None:
-        """Return where an object is, None if it is no landmark."""
-        e = self.e[0]
-        for i in range(e.count):
-            landmark = e.landmarks[i]
-            if landmark.number == number:
-                rows = [HEADING, FIRST + 2 * i, FIRST + 2 * i + 1]
-                to = np.array([[-landmark.y, 1.0, 0.0], [landmark.x, 0.0, 1.0]])
-                (xx, xy), (_, yy) = (to @ self.covariance[np.ix_(rows, rows)] @ to.T).tolist()
-                return LandmarkPlace(float(landmark.x), float(landmark.y), (xx, xy, yy))
-        return None
+    def places(self) -> dict[int, LandmarkPlace]:
+        """Return where the landmarks are, by the objects' numbers."""
+        found = {}
+        for i, (number, x, y) in enumerate(zip(*self._landmarks("number", "x", "y"), strict=True)):
+            rows = [HEADING, FIRST + 2 * i, FIRST + 2 * i + 1]
+            to = np.array([[-y, 1.0, 0.0], [x, 0.0, 1.0]])
+            (xx, xy), (_, yy) = (to @ self.covariance[np.ix_(rows, rows)] @ to.T).tolist()
+            found[number] = LandmarkPlace(x, y, (xx, xy, yy))
+        return found
 
-    def moved_landmarks(self, least_m: float) -> Iterator[tuple[int, float, float]]:
-        """Yield number and displacement (m) of each landmark that moved so far since it was last yielded."""
-        e = self.e[0]
-        for i in range(e.count):
-            landmark = e.landmarks[i]
-            dx, dy = landmark.x - landmark.anchor_x, landmark.y - landmark.anchor_y
+    def moved_landmarks(self, least_m: float) -> list[tuple[int, float, float]]:
+        """Return number and displacement (m) of each landmark that moved so far since it was last returned."""
+        moved = []
+        columns = self._landmarks("number", "x", "y", "anchor_x", "anchor_y")
+        for i, (number, x, y, anchor_x, anchor_y) in enumerate(zip(*columns, strict=True)):
+            dx, dy = x - anchor_x, y - anchor_y
             if math.hypot(dx, dy) >= least_m:
-                landmark.anchor_x, landmark.anchor_y = landmark.x, landmark.y
-                yield int(landmark.number), float(dx), float(dy)
+                landmark = self.e[0].landmarks[i]
+                landmark.anchor_x, landmark.anchor_y = x, y
+                moved.append((number, dx, dy))
+        return moved
+
+    def _landmarks(self, *names: str) -> list[list[Any]]:
+        """Return fields of all landmarks as lists of numbers."""
+        landmarks = self._estimate["landmarks"][0, : int(self._estimate["count"][0])]
+        return [landmarks[name].tolist() for name in names]
 
     def _pose_of(self, pose: Pose, ring_yaw: float) -> tuple[Pose, float]:
         """Return pose and ring direction in the map frame for those by odometry, at a firing that may still wait."""
-        e = self.e[0]
         if self._entered == 0:
             return pose, ring_yaw
         x, y, _, yaw = self._entered_at.tolist()
-        off = e.heading - yaw
+        mean_x, mean_y, heading, offset = (float(self._estimate[name][0]) for name in ("x", "y", "heading", "offset"))
+        off = heading - yaw
         c, s = math.cos(off), math.sin(off)
         dx, dy = pose.x - x, pose.y - y
-        here = Pose(e.x + c * dx - s * dy, e.y + s * dx + c * dy, pose.theta + off + e.offset)
+        here = Pose(mean_x + c * dx - s * dy, mean_y + s * dx + c * dy, pose.theta + off + offset)
         return here, ring_yaw + off
 
     def _enter_next(self) -> None:
@@ -333,6 +332,8 @@ class DriftCorrection:
         c, s = math.cos(e.heading), math.sin(e.heading)
         dx, dy = seen.x - e.x, seen.y - e.y
         i = add_landmark(self.e, self.covariance, c * dx + s * dy, c * dy - s * dx, sigma_m**2, 0.0, sigma_m**2)
+        if i < 0:
+            return
         landmark = e.landmarks[i]
         landmark.radius, landmark.number = seen.radius, seen.number
         landmark.anchor_x, landmark.anchor_y = seen.x, seen.y

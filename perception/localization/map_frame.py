@@ -20,7 +20,7 @@ from perception.bayes.object_report import worst_sigma
 from perception.detected_object import DetectedObject
 from perception.edits import Edit, Evidence, MoveObject, PlaceModel
 from perception.kernel import Floats
-from perception.localization.drift_correction import DriftCorrection, LocalizedPose, SeenObject
+from perception.localization.drift_correction import DriftCorrection, LandmarkPlace, LocalizedPose, SeenObject
 
 SHIFT_MIN_M: Final = 0.002
 """An object moves with its landmark once that has moved this far."""
@@ -78,7 +78,7 @@ class MapFrame:
 
     def shifts(self) -> list[tuple[int, float, float]]:
         """Return number and displacement (m) of the objects that are to move, because their landmarks moved."""
-        return list(self.drift.moved_landmarks(SHIFT_MIN_M))
+        return self.drift.moved_landmarks(SHIFT_MIN_M)
 
     def localized(self) -> LocalizedPose:
         """Return where the robot was at the last firing."""
@@ -86,7 +86,8 @@ class MapFrame:
 
     def with_landmarks(self, objects: Iterable[DetectedObject]) -> tuple[DetectedObject, ...]:
         """Return objects in the map frame; those that are landmarks with the place that the filter gives them."""
-        return tuple(self._placed(seen) for seen in objects)
+        places = self.drift.places()
+        return tuple(_placed(seen, places.get(seen.number or 0)) for seen in objects)
 
     def objects_in_odometry(self, objects: Iterable[DetectedObject]) -> tuple[DetectedObject, ...]:
         """Return objects of the map frame in odometry's frame."""
@@ -127,12 +128,13 @@ class MapFrame:
         place = self.drift.odometry_from_map().inverse().compose(Pose(edit.x, edit.y, edit.theta))
         return replace(edit, x=place.x, y=place.y, theta=place.theta)
 
-    def _placed(self, seen: DetectedObject) -> DetectedObject:
-        place = None if seen.number is None else self.drift.place(seen.number)
-        if place is None:
-            return seen
-        sigma = worst_sigma(*place.covariance)
-        return replace(seen, x=place.x, y=place.y, sigma=sigma, covariance=place.covariance)
+
+def _placed(seen: DetectedObject, place: LandmarkPlace | None) -> DetectedObject:
+    """Return an object at the place of its landmark, if it is one."""
+    if place is None:
+        return seen
+    sigma = worst_sigma(*place.covariance)
+    return replace(seen, x=place.x, y=place.y, sigma=sigma, covariance=place.covariance)
 
 
 def _turned(to: Pose, seen: DetectedObject) -> DetectedObject:

@@ -90,10 +90,10 @@ def test_scale_errors_of_the_odometer_are_found_and_corrected() -> None:
     assert drift.e[0].odometer_scale == pytest.approx(1.03, abs=0.01)
     assert drift.covariance[ODOMETER, ODOMETER] < 0.01**2
     assert np.linalg.eigvalsh(here.covariance).min() > 0.0
-    place = drift.place(1)
+    place = drift.places().get(1)
     assert place is not None
     assert (place.x, place.y) == pytest.approx(PLACES[0], abs=0.03)
-    assert drift.place(99) is None
+    assert drift.places().get(99) is None
 
 
 def test_a_landmark_that_is_no_longer_recognised_is_dropped() -> None:
@@ -101,22 +101,22 @@ def test_a_landmark_that_is_no_longer_recognised_is_dropped() -> None:
     drift.observe(firing(0))
     drift.learn(SEEN)
     drift.learn(SEEN[1:])
-    assert drift.place(1) is None
-    assert drift.place(2) is not None
+    assert drift.places().get(1) is None
+    assert drift.places().get(2) is not None
 
 
 def test_a_landmark_that_moved_is_placed_anew_and_the_others_are_kept() -> None:
     drift = DriftCorrection(RING)
     drift.observe(firing(0))
     drift.learn(SEEN)
-    before = drift.place(2)
+    before = drift.places().get(2)
     drift.e[0].landmarks[0].failures = FAILURES_MAX
     drift.learn([SEEN[0]._replace(x=2.5), *SEEN[1:]])
-    moved = drift.place(1)
+    moved = drift.places().get(1)
     assert moved is not None
     assert moved.x == pytest.approx(2.5)
     assert moved.covariance[0] == pytest.approx(drift_correction.MOVED_SIGMA_M**2)
-    assert drift.place(2) == before
+    assert drift.places().get(2) == before
 
 
 def test_while_no_echo_fits_odometry_is_trusted_less_and_the_robot_is_lost() -> None:
@@ -165,7 +165,7 @@ def test_landmarks_that_moved_are_yielded_once() -> None:
     drift.learn(SEEN)
     drift.e[0].landmarks[1].x += 0.01
     assert [(number, round(dx, 6), dy) for number, dx, dy in drift.moved_landmarks(0.002)] == [(2, 0.01, 0.0)]
-    assert list(drift.moved_landmarks(0.002)) == []
+    assert drift.moved_landmarks(0.002) == []
 
 
 def test_a_reset_forgets_everything() -> None:

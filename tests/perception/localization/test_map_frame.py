@@ -62,13 +62,15 @@ def test_recognised_drums_become_landmarks_and_have_their_places() -> None:
     frame, here = map_frame(perception), perception.localized()
     assert here is not None
     assert here.status == "tracking"
-    places = [(seen, frame.drift.place(seen.number or 0)) for seen in perception.mapped_objects()]
+    places = [(seen, frame.drift.places().get(seen.number or 0)) for seen in perception.mapped_objects()]
     landmarks = [(seen, place) for seen, place in places if place is not None]
     assert len(landmarks) >= 3
     assert all((seen.x, seen.y, seen.covariance) == tuple(place) for seen, place in landmarks)
     true = oval(1)[FIRINGS - 1]
     assert (here.pose.x, here.pose.y) == pytest.approx((true.x, true.y), abs=0.1)
     assert (here.pose.x, here.pose.y) != (entered[-1].pose.x, entered[-1].pose.y)
+    assert {type(v) for seen in perception.objects() for v in (seen.x, seen.y, seen.theta, seen.sigma)} == {float}
+    assert {type(v) for v in (here.pose.x, here.pose.theta, here.ring_yaw, here.probability)} == {float}
     for mapped, seen in zip(perception.mapped_objects(), perception.objects(), strict=True):
         from_map = Pose(here.pose.x, here.pose.y, here.ring_yaw).inverse().compose(Pose(mapped.x, mapped.y, 0.0))
         at = entered[-1]

@@ -303,6 +303,7 @@ sys.exit(" ".join(late))
     [
         ("perception.method=bayes", "semicircle", "drum"),
         ("perception.method=bayes", "semicircle box", "hexagon.toml"),
+        ("perception.localization.correct_drift=true", "semicircle", "drum"),
         ("perception.method=paper", "semicircle", "box"),
     ],
 )
