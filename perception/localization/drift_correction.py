@@ -9,7 +9,7 @@ begin at the first one: otherwise the drift of that way would turn the map for g
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -186,7 +186,13 @@ class DriftCorrection:
                 self._enter_next()
 
     def learn(self, seen: Iterable[SeenObject]) -> None:
-        """Make landmarks of recognised objects that are none yet; drop those that are no longer recognised."""
+        """Make landmarks of recognised objects that are none yet; drop those that are no longer recognised.
+
+        Parameters
+        ----------
+        seen : iterable of SeenObject
+            Near the robot. A landmark beyond the sensors' range stays: perception has archived its object.
+        """
         objects = {one.number: one for one in seen}
         if self._has_started and self._arrived > self._entered:
             return  # what perception sees now is later than the filter
@@ -194,11 +200,13 @@ class DriftCorrection:
             return
         if self._entered == 0:
             self._enter_next()
-        numbers, failures = self._landmarks("number", "failures")
-        has_slipped = self.e[0].fit_share <= SLIP_SHARE
+        numbers, failures, xs, ys = self._landmarks("number", "failures", "x", "y")
+        e, range_max = self.e[0], float(self._ring[-1])
+        is_near = [math.hypot(x - e.x, y - e.y) < range_max for x, y in zip(xs, ys, strict=True)]
+        has_slipped = e.fit_share <= SLIP_SHARE
         moved = {n for n, failed in zip(numbers, failures, strict=True) if failed >= FAILURES_MAX and not has_slipped}
         for i in range(len(numbers) - 1, -1, -1):
-            if numbers[i] in moved or numbers[i] not in objects:
+            if numbers[i] in moved or (is_near[i] and numbers[i] not in objects):
                 remove_landmark(self.e, self.covariance, i)
         for number in sorted(objects.keys() - (set(numbers) - moved)):
             sigma = MOVED_SIGMA_M if number in moved else NEW_SIGMA_M if self._has_started else FIRST_SIGMA_M
@@ -244,13 +252,21 @@ class DriftCorrection:
             found[number] = LandmarkPlace(x, y, (xx, xy, yy))
         return found
 
-    def moved_landmarks(self, least_m: float) -> list[tuple[int, float, float]]:
-        """Return number and displacement (m) of each landmark that moved so far since it was last returned."""
+    def moved_landmarks(self, least_m: float, among: Container[int]) -> list[tuple[int, float, float]]:
+        """Return number and displacement (m) of each landmark that moved so far since it was last returned.
+
+        Parameters
+        ----------
+        least_m : float
+            Least displacement, m.
+        among : container of int
+            Numbers of the objects that perception can move: those that it has not archived.
+        """
         moved = []
         columns = self._landmarks("number", "x", "y", "anchor_x", "anchor_y")
         for i, (number, x, y, anchor_x, anchor_y) in enumerate(zip(*columns, strict=True)):
             dx, dy = x - anchor_x, y - anchor_y
-            if math.hypot(dx, dy) >= least_m:
+            if number in among and math.hypot(dx, dy) >= least_m:
                 landmark = self.e[0].landmarks[i]
                 landmark.anchor_x, landmark.anchor_y = x, y
                 moved.append((number, dx, dy))

@@ -45,6 +45,7 @@ class MapFrame:
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig]) -> None:
         self.drift = DriftCorrection(ring)
+        self._near: set[int] = set()
         self.set_models(models)
 
     def set_models(self, models: Sequence[ModelConfig]) -> None:
@@ -55,16 +56,17 @@ class MapFrame:
         """Start again: the next firing's odometry defines the map frame."""
         self.drift.reset()
 
-    def follow(self, firing: Firing, objects: Iterable[DetectedObject]) -> Firing:
+    def follow(self, firing: Firing, objects: Sequence[DetectedObject]) -> Firing:
         """Return a firing at its pose in the map frame.
 
         Parameters
         ----------
         firing : Firing
             With its pose by odometry.
-        objects : iterable of DetectedObject
-            Recognised before it, in the map frame.
+        objects : sequence of DetectedObject
+            Recognised near the robot before it, in the map frame.
         """
+        self._near = {seen.number for seen in objects if seen.number is not None}
         self.drift.learn(
             SeenObject(seen.number, seen.x, seen.y, self._radii[seen.model])
             for seen in objects
@@ -78,7 +80,7 @@ class MapFrame:
 
     def shifts(self) -> list[tuple[int, float, float]]:
         """Return number and displacement (m) of the objects that are to move, because their landmarks moved."""
-        return self.drift.moved_landmarks(SHIFT_MIN_M)
+        return self.drift.moved_landmarks(SHIFT_MIN_M, self._near)
 
     def localized(self) -> LocalizedPose:
         """Return where the robot was at the last firing."""

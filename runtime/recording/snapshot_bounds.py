@@ -82,22 +82,14 @@ _COUNTS: Final = (
     "_numbers.last _rejections.total _ring.firings sets_seen bins.count buckets.count number candidates._sizes _turn "
     "changes idle_firings passed_over refinements reservoir unseen clusters.sizes requests_made leaps missed "
     "near_echoes newest_segment objects_numbered off_stuck outline.numbers outline.total _sensors.readings "
-<<<<<<< HEAD
     "rejection_count run_firing run_length segments_made segments_numbered sensors.kept members_sum "
-    "_archive.circles.count _archive.polygons.count _numbered waiting"
+    "_archive.circles.count _archive.polygons.count _numbered waiting "
+    "drift._arrived drift._entered drift._windows landmarks.failures landmarks.hits"
 )
 _FLAGS: Final = (
     "_sets has_rested is_named has_gained refines_next is_confirmed has_challenger is_done is_crossed "
-    "_is_due is_reported _circles_pending _polygons_pending _polygons_turn _placement_was_last _expected _heard"
-=======
-    "drift._arrived drift._entered drift._windows landmarks.failures landmarks.hits "
-    "rejection_count run_firing run_length segments_made segments_numbered sensors.kept members_sum"
-)
-_FLAGS: Final = (
-    "_sets has_rested is_named has_gained refines_next is_confirmed has_challenger is_done is_crossed "
-    "drift._has_started drift._is_synchro sensors.is_known "
-    "_circles_pending _polygons_pending _polygons_turn _placement_was_last _expected _heard"
->>>>>>> bc12954 (Correct drift in a live run too: perception.localization.correct_drift, off by default; its state is recorded and bounded)
+    "_is_due is_reported _circles_pending _polygons_pending _polygons_turn _placement_was_last _expected _heard "
+    "drift._has_started drift._is_synchro sensors.is_known"
 )
 
 BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(

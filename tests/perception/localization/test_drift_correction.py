@@ -105,6 +105,14 @@ def test_a_landmark_that_is_no_longer_recognised_is_dropped() -> None:
     assert drift.places().get(2) is not None
 
 
+def test_a_landmark_beyond_the_sensors_range_stays_though_perception_has_archived_it() -> None:
+    drift = DriftCorrection(RING)
+    drift.observe(firing(0))
+    drift.learn([*SEEN, SeenObject(9, RING.range_max_m + 1.0, 0.0, RADIUS_M)])
+    drift.learn(SEEN)
+    assert drift.places().get(9) is not None
+
+
 def test_a_landmark_that_moved_is_placed_anew_and_the_others_are_kept() -> None:
     drift = DriftCorrection(RING)
     drift.observe(firing(0))
@@ -164,8 +172,10 @@ def test_landmarks_that_moved_are_yielded_once() -> None:
     drift.observe(firing(0))
     drift.learn(SEEN)
     drift.e[0].landmarks[1].x += 0.01
-    assert [(number, round(dx, 6), dy) for number, dx, dy in drift.moved_landmarks(0.002)] == [(2, 0.01, 0.0)]
-    assert drift.moved_landmarks(0.002) == []
+    assert [(number, round(dx, 6), dy) for number, dx, dy in drift.moved_landmarks(0.002, {1, 2})] == [(2, 0.01, 0.0)]
+    assert drift.moved_landmarks(0.002, {1, 2}) == []
+    drift.e[0].landmarks[1].x += 0.01
+    assert drift.moved_landmarks(0.002, {1}) == []
 
 
 def test_a_reset_forgets_everything() -> None:
