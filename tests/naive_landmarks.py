@@ -26,8 +26,9 @@ def rotation(a: float) -> Array:
 
 def left_jacobian(a: float) -> Array:
     """Return V(a), the integral of the rotations from 0 to 1 times `a`, by the midpoint rule."""
-    steps = (np.arange(2000) + 0.5) / 2000
-    return np.asarray(np.mean([rotation(a * t) for t in steps], axis=0))
+    steps = a * (np.arange(2000) + 0.5) / 2000
+    c, s = np.cos(steps).mean(), np.sin(steps).mean()
+    return np.array([[c, -s], [s, c]])
 
 
 @dataclass
