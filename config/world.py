@@ -8,7 +8,7 @@ from pydantic import Field
 
 from config.strict import Coordinate, Point, Strict, TomlList
 
-ITEMS_MAX: Final = 1000
+ITEMS_MAX: Final = 20_000
 """Largest number of objects of one kind in a world, and of corners of a polygon."""
 
 Turn: TypeAlias = Annotated[float, Field(ge=-360.0, le=360.0)]

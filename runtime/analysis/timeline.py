@@ -115,6 +115,8 @@ class Timeline:
     """Evenly over the run; the last one is its end."""
     segments: Floats = field(default_factory=_no_rows)
     """(n, 7): the run's own map: first and last seen (s), ends x, y, x, y (m), normal (rad)."""
+    walls: Floats = field(default_factory=lambda: np.zeros((0, 4)))
+    """(n, 4): ends x, y, x, y (m) of the walls recognised at the end."""
     modes: list[ModeEntry] = field(default_factory=list)
     log: list[LogEntry] = field(default_factory=list)
     bookmarks: list[BookmarkEntry] = field(default_factory=list)

@@ -16,7 +16,7 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.files import one_line
 from runtime import VERSION
 from runtime.cli.experiment_commands import experiment
-from runtime.cli.recording_commands import export, figures, recover, replay, report
+from runtime.cli.recording_commands import export, figures, map_command, recover, replay, report
 from runtime.cli.robot_commands import check, emulate, run, service
 from runtime.cli.start_signals import EXIT_CODE_BASE, ending_in_order
 
@@ -31,12 +31,12 @@ app = App(
 )
 for title, commands in (
     ("Robot", (run, emulate, check, service)),
-    ("Recordings", (replay, report, figures, export, recover)),
+    ("Recordings", (replay, report, figures, export, map_command, recover)),
     ("Simulation", (experiment,)),
 ):
     group = Group.create_ordered(title)
     for command in commands:
-        app.command(command, group=group)
+        app.command(command, name=command.__name__.removesuffix("_command"), group=group)
 general = Group.create_ordered("General")
 for flag in ("--help", "--version"):
     app[flag].group = general

@@ -1,4 +1,4 @@
-"""The commands that read the recording of a finished run: `replay`, `recover`, `figures`, `report`, `export`."""
+"""The commands that read the recording of a finished run: replay, recover, figures, report, export, map."""
 
 from __future__ import annotations
 
@@ -230,3 +230,32 @@ def export(
     from runtime.cli.commands.export import export_run
 
     return export_run(options.timeline_source(file, sets), to, out)
+
+
+def map_command(
+    file: File,
+    /,
+    *,
+    out: str,
+    grid: str | None = None,
+    options: SourceOptions = NO_OPTIONS,
+    sets: Sets = (),
+) -> int:
+    """Write the map of a run as a world file, and as an occupancy image with the YAML of ROS's map_server.
+
+    Parameters
+    ----------
+    out
+        World file to write (TOML).
+    grid
+        Image to write (PGM); its YAML is written beside it.
+    file
+        Recording or ring log of the run.
+    options
+        Settings that a recording contains and a ring log does not.
+    sets
+        Single settings, each `path=value`, that override the others.
+    """
+    from runtime.cli.commands.map_run import map_run
+
+    return map_run(options.timeline_source(file, sets), out, grid)

@@ -1,0 +1,86 @@
+"""A finished run's map as a world file: drums, polygons and walls, in the frame of the run's odometry.
+
+The map of one run can be the world of the emulator, and the known room of the next run.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+import tomli_w
+
+from config.model import ModelConfig
+from config.world import DrumConfig, PolygonConfig, WallConfig, WorldConfig
+from drivers.messages import Floats
+from perception.detected_object import DetectedObject
+
+DIGITS: Final = 4
+"""Decimals of a length, m."""
+
+
+def world_of(objects: Sequence[DetectedObject], walls: Floats, models: Sequence[ModelConfig]) -> WorldConfig:
+    """Return the world of what was recognised.
+
+    A model with an arc becomes a drum, a closed polygon a polygon, and each side of an open one a wall.
+
+    Parameters
+    ----------
+    objects : sequence of DetectedObject
+        Those that are not models are left out.
+    walls : (n, 4) float
+        Ends x, y, x, y, m.
+    models : sequence of ModelConfig
+        The models.
+    """
+    by_name = {model.name: model for model in models}
+    drums, polygons, sides = list[DrumConfig](), list[PolygonConfig](), [tuple(row) for row in walls.tolist()]
+    for seen in objects:
+        model = by_name.get(seen.model)
+        if model is None:
+            continue
+        if model.arc_radius_m is not None:
+            drums.append(
+                DrumConfig(x_m=round(seen.x, DIGITS), y_m=round(seen.y, DIGITS), radius_m=model.arc_radius_m)
+            )
+            continue
+        corners = [(round(x, DIGITS), round(y, DIGITS)) for x, y in placed(model, seen).tolist()]
+        if model.closed:
+            polygons.append(PolygonConfig(vertices_m=tuple(corners)))
+        else:
+            sides += [(*a, *b) for a, b in itertools.pairwise(corners)]
+    return WorldConfig(
+        drum=tuple(drums),
+        polygon=tuple(polygons),
+        wall=tuple(
+            WallConfig(
+                **{name: round(v, DIGITS) for name, v in zip(("x1_m", "y1_m", "x2_m", "y2_m"), side, strict=True)}
+            )
+            for side in sides
+        ),
+    )
+
+
+def placed(model: ModelConfig, seen: DetectedObject) -> Floats:
+    """Return a model's vertices where it was recognised, shape (n, 2), m."""
+    c, s = math.cos(seen.theta), math.sin(seen.theta)
+    turned: Floats = np.asarray(model.vertices_m) @ np.array([[c, s], [-s, c]]) + (seen.x, seen.y)
+    return turned
+
+
+def world_text(world: WorldConfig, head: Sequence[str]) -> str:
+    """Return a world file as TOML, after lines of comment.
+
+    Parameters
+    ----------
+    world : WorldConfig
+        What differs from the defaults is written.
+    head : sequence of str
+        The comment's lines.
+    """
+    table: dict[str, Any] = world.model_dump(mode="json", exclude_defaults=True)
+    comment = "".join(f"# {line}\n" for line in head)
+    return f"{comment}\n{tomli_w.dumps(table)}"

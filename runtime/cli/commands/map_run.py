@@ -1,0 +1,69 @@
+"""`echolocate map`: the map of a finished run as a world file, and as an occupancy image."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from config.errors import DONE, FAILED, UserError
+from config.world import ITEMS_MAX
+from runtime.cli.commands.offline_io import (
+    plain_console,
+    read_timeline,
+    refuse_overwriting,
+    refuse_unwritable,
+    writing,
+)
+
+if TYPE_CHECKING:
+    from runtime.analysis.timeline_sources import TimelineSource
+
+
+def map_run(source: TimelineSource, out: str, grid: str | None) -> int:
+    """Write the map of a run and return the exit code.
+
+    Parameters
+    ----------
+    source, out, grid
+        As of `runtime.cli.recording_commands.map_command`.
+
+    Raises
+    ------
+    UserError
+        The input cannot be read, an output cannot be written, or the map is too large for one.
+    """
+    from runtime.analysis.export.occupancy_image import occupancy_image
+    from runtime.analysis.export.shapes import firing_scans
+    from runtime.analysis.export.world_file import world_of, world_text
+
+    for target in (out, grid):
+        if target is not None:
+            refuse_overwriting(source.file, Path(target))
+    refuse_unwritable({"--out": out, "--grid": grid})
+    console, output = plain_console(stderr=True), plain_console()
+    timeline = read_timeline(source, console)
+    if len(timeline.objects) + len(timeline.walls) > ITEMS_MAX:
+        raise UserError(f"{source.file}: a world file holds at most {ITEMS_MAX} objects of a kind", FAILED)
+    settings = timeline.settings
+    world = world_of(timeline.objects, timeline.walls, settings.models)
+    head = (f"Map of {Path(source.file).name}: what was recognised, in the frame of its odometry (m).",)
+    with writing("--out", out):
+        Path(out).write_text(world_text(world, head), encoding="utf-8")
+    output.print(f"{out}: {len(world.drum)} drums, {len(world.polygon)} polygons, {len(world.wall)} walls")
+    if grid is not None:
+        try:
+            way = np.array([(scan.x, scan.y) for scan in firing_scans(timeline)]).reshape(-1, 2)
+            half_angle_rad = math.radians(settings.ring.beam_half_angle_deg)
+            image = occupancy_image(world, timeline.echoes, half_angle_rad, way, settings.body.radius_m)
+        except ValueError as error:
+            raise UserError(f"--grid {grid}: {error}; the robot's way is too wide for one", FAILED) from error
+        with writing("--grid", grid):
+            beside = image.write(Path(grid))
+        rows, columns = image.pixels.shape
+        output.print(f"{grid}: {columns} × {rows} pixels, described by {beside}")
+    for note in timeline.notes:
+        console.print(note)
+    return DONE
