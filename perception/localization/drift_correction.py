@@ -15,7 +15,7 @@ from typing import Any, Final, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from config.robot import RingConfig
-from drivers.messages import Firing, Pose
+from drivers.messages import Firing, Pose, wrap_angle
 from perception.kernel import Floats
 from perception.localization.landmark_filter import add_landmark, propagate, remove_landmark
 from perception.localization.landmark_ranges import update_with_firing
@@ -307,8 +307,8 @@ class DriftCorrection:
         x_before, y_before, theta_before, yaw_before = self._entered_at.tolist()
         c, s = math.cos(theta_before), math.sin(theta_before)
         dx, dy = x - x_before, y - y_before
-        ring_turn, travel_turn = yaw - yaw_before, theta - theta_before
-        self._is_synchro = self._is_synchro or abs(travel_turn - ring_turn) > TURNED_RAD
+        ring_turn, travel_turn = wrap_angle(yaw - yaw_before), wrap_angle(theta - theta_before)  # a log may wrap them
+        self._is_synchro = self._is_synchro or abs(wrap_angle(travel_turn - ring_turn)) > TURNED_RAD
         way = math.hypot(dx, dy)
         self._renew_walk(way)
         turn_variance, place_variance = self._walk * way, PLACE_WALK * way

@@ -123,10 +123,10 @@ def objects_table(objects: list[ObjectRow], units: Units, frame: str = "odometry
 def pose_line(pose: PoseRow, units: Units) -> str:
     """Return where the robot is in the map frame, in one line."""
     sigma_x, sigma_y, sigma_theta = (math.sqrt(pose["covariance"][i][i]) for i in range(3))
+    heading, error = math.degrees(pose["theta"]) % 360.0, math.degrees(sigma_theta)
     return (
         f"{pose['status']}: the robot is at {format_point(pose['x'], pose['y'], units)} {units}, "
-        f"± {format_length(max(sigma_x, sigma_y), units, 3)} {units}, heading {math.degrees(pose['theta']):.1f}° "
-        f"± {math.degrees(sigma_theta):.1f}°"
+        f"± {format_length(max(sigma_x, sigma_y), units, 3)} {units}, heading {heading:.1f}° ± {error:.1f}°"
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from config.load import load_settings
-from drivers.messages import Firing, Pose
+from drivers.messages import Firing, Pose, wrap_angle
 from perception.localization import drift_correction
 from perception.localization.drift_correction import (
     CATCHING_UP,
@@ -155,6 +155,19 @@ def test_without_any_landmark_the_filter_follows_odometry_after_a_while() -> Non
     here = drift.localized()
     assert (here.pose.x, here.pose.theta) == pytest.approx((9.9, 0.99), abs=1e-9)
     assert here.covariance[2, 2] > 0.0
+
+
+def test_a_log_may_wrap_its_headings() -> None:
+    drift, wrapped = DriftCorrection(RING), DriftCorrection(RING)
+    silent = np.full(len(MOUNTS), np.nan)
+    for k in range(120):
+        theta = 0.06 * k
+        shown = wrap_angle(theta)
+        drift.observe(Firing(0.1 * k, Pose(0.1 * k, 0.0, theta), theta, silent))
+        wrapped.observe(Firing(0.1 * k, Pose(0.1 * k, 0.0, shown), shown, silent))
+    turn = wrap_angle(wrapped.localized().pose.theta - drift.localized().pose.theta)
+    assert turn == pytest.approx(0.0, abs=1e-9)
+    assert wrapped.localized().covariance == pytest.approx(drift.localized().covariance, abs=1e-9)
 
 
 def test_a_synchro_drives_ring_keeps_its_direction() -> None:
