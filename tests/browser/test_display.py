@@ -210,3 +210,17 @@ async def test_segments_go_when_the_robot_drops_them(server: FakeServer, opener:
     await opened.sync()
     assert not await opened.world("run.segments.has(5) || run.segments.has(6)"), "a whole map replaces the old one"
     assert await opened.world("run.segments.has(7)")
+
+
+async def test_objects_left_behind_stay_until_the_robot_lists_them_anew(server: FakeServer, opener: Opener) -> None:
+    opened = await still(server, opener)
+    near = await opened.world("run.state.objects.length")
+    behind = server.frame(next(iter(server.clients)))["objects"][0] | {"number": 901, "x": 9.0, "y": 9.0}
+    await server.send(server.frame(next(iter(server.clients))) | {"archived": [behind]})
+    await opened.sync()
+    assert await opened.world("run.state.objects.length") == near + 1, "kept by frames that do not list them"
+    assert await opened.world("run.object(901).x") == 9.0
+    await opened.says("#objects", "901")
+    await server.send(server.frame(next(iter(server.clients))) | {"archived": []})
+    await opened.sync()
+    assert await opened.world("run.state.objects.length") == near
