@@ -146,6 +146,12 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "hostile names: bounded memory and work per turn, HALT of another client at once, a stop or a message "
             "where it can be decided",
         ),
+        "P23": Promise(
+            "Nothing is lost for want of room",
+            "a hall of twice as many drums as perception has tracks, there and back: all are reported, none twice, "
+            "each with its number; where more is near than fits, the farthest wait and are counted; what was left "
+            "behind can be edited, and a restored state goes on the same",
+        ),
     }
 )  # fmt: skip
 
