@@ -211,6 +211,8 @@ class DriftCorrection:
         for number in sorted(objects.keys() - (set(numbers) - moved)):
             sigma = MOVED_SIGMA_M if number in moved else NEW_SIGMA_M if self._has_started else FIRST_SIGMA_M
             self._add(objects[number], sigma)
+        if not self._has_started:
+            self._turn_landmarks(HEADING_WALK * self._way_m)
         self._has_started = True
 
     def corrected(self, firing: Firing) -> Firing:
@@ -341,6 +343,17 @@ class DriftCorrection:
             self._walk = max(HEADING_WALK_MIN, self._walk + share * (found - self._walk))
         self._window_m, self._window_variance = 0.0, variance
         e.offset_correction = e.heading_correction = 0.0
+
+    def _turn_landmarks(self, variance: float) -> None:
+        """Add to all landmarks the error of a common turn about the robot's present place, of this variance (rad²).
+
+        Perception sees the first ones from a way whose heading drifts.
+        """
+        x, y = self._waiting[(self._arrived - 1) % WAITING_MAX, :2].tolist()
+        xs, ys = (np.array(values) for values in self._landmarks("x", "y"))
+        lever = np.column_stack([y - ys, xs - x]).reshape(-1)
+        end = FIRST + len(lever)
+        self.covariance[FIRST:end, FIRST:end] += variance * np.outer(lever, lever)
 
     def _add(self, seen: SeenObject, sigma_m: float) -> None:
         """Add a landmark that stands where perception sees it, relative to the ring, with this standard deviation."""

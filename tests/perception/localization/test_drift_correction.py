@@ -76,6 +76,18 @@ def test_the_filter_begins_at_the_first_firing_and_catches_up() -> None:
     assert drift.localized().pose.x == pytest.approx(firing(k - 1).pose.x, abs=0.01)
 
 
+def test_the_first_landmarks_share_an_error_of_the_heading() -> None:
+    drift = DriftCorrection(RING)
+    for k in range(40):
+        drift.observe(firing(k))
+    drift.learn(SEEN)
+    way = firing(39).pose.x
+    for seen in SEEN:
+        xx, _, yy = drift.places()[seen.number].covariance
+        shared = drift_correction.HEADING_WALK * way * ((seen.x - way) ** 2 + seen.y**2)
+        assert xx + yy == pytest.approx(2.0 * drift_correction.FIRST_SIGMA_M**2 + shared)
+
+
 @pytest.mark.compiled
 def test_scale_errors_of_the_odometer_are_found_and_corrected() -> None:
     drift = DriftCorrection(RING)
