@@ -86,6 +86,7 @@ bench: $(VENV)/bench.stamp
 	@$(BIN)/python -m bench waking
 	@$(BIN)/python -m bench localization
 	@$(BIN)/python -m bench map
+	@$(BIN)/python -m bench walls --seeds 10
 	@$(BIN)/python -m bench recording
 	@$(BIN)/python -m bench console
 	$(BIN)/python -m pytest -q bench/wallclock

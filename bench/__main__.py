@@ -37,6 +37,8 @@ QUICK: Final = Plan(repetitions=1, halls_max=2, passes=4)
 TIMING: Final = TimingPlan(seconds=20.0, rounds=3, busy=0)
 RECORDING: Final = TimingPlan(seconds=60.0, rounds=1, busy=0)
 WAKING_TURNS: Final = 10
+STEPS_FT: Final = (0.05, 0.2, 0.5, 1.0)
+"""Distances between two firings of one sensor in the rooms with walls, ft."""
 
 Measure: TypeAlias = Callable[[TimingPlan, tuple[str, ...], Callable[[str], None]], Timing]
 
@@ -244,6 +246,35 @@ def map_size(*, json: str = "map.json", drums: tuple[int, ...] = (40, 200), seed
         rows = measure(settings, drums, seed, status.update)
     write_json(json, rows)
     _wide().print(map_table(rows))
+    return 0
+
+
+@app.command
+def walls(*, json: str = "walls.json", seeds: int = 100, first: int = 0, steps: tuple[float, ...] = STEPS_FT) -> int:
+    """Measure the walls found in random rooms with doorways and drums, at several distances between firings.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    seeds
+        Number of rooms.
+    first
+        Seed of the first room.
+    steps
+        Distances between two firings of one sensor, ft.
+    """
+    use_kernel_cache()
+    from bench.walls import measure, walls_table
+    from runtime.cycle.summary import write_json
+
+    console = Console(stderr=True)
+    settings = load_settings("hallway", ("perception.method=bayes",))
+    prepare_kernels(settings, console)
+    with console.status("bench") as status:
+        rows = measure(settings, range(first, first + max(1, seeds)), steps, status.update)
+    write_json(json, rows)
+    _wide().print(walls_table(rows))
     return 0
 
 

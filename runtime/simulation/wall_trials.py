@@ -1,0 +1,243 @@
+"""The walls that perception reports in random rooms, compared with the truth.
+
+Truth is what answered: of each wall the 5 cm places from which an echo came, and what lies between two of them that
+are near each other. Reported length is right where it lies on a wall in its direction, and false elsewhere.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.settings import Settings
+from config.units import FOOT_M
+from drivers.emulator.scene import compile_scene
+from drivers.emulator.sonar import Sonar
+from drivers.firing_pattern import firing_pattern, sensors
+from drivers.messages import Firing, Floats, Pose
+from perception.detected_object import DetectedObject
+from perception.pipeline import Perception
+from runtime.simulation.furnished_rooms import FurnishedRoom, drive
+
+Places: TypeAlias = NDArray[np.bool_]
+PLACE_M: Final = 0.05
+"""Length of the places that answer or do not."""
+BETWEEN_M: Final = 0.35
+"""What lies between two places that answered counts if it is shorter than this."""
+WALL_MIN_M: Final = 2.2 * FOOT_M
+PLACES_MIN: Final = 4
+"""A wall counts if this length, and so many places, answered."""
+RIGHT_M: Final = 0.05
+RIGHT_RAD: Final = math.radians(3.0)
+"""Reported length is right within this of a wall and of its direction."""
+ON_WALL_M: Final = 1e-3
+"""An echo comes from a wall if its point lies this near."""
+DRIVE_M: Final = 25.0
+DENSE_DRIVE_M: Final = 12.0
+DENSE_STEP_M: Final = 0.15 * FOOT_M
+"""Length of a drive; the shorter one if a sensor fires again within this step."""
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A straight piece of wall, from end to end, m."""
+
+    begin: Floats
+    end: Floats
+
+    @property
+    def length_m(self) -> float:
+        """Distance between the ends."""
+        return float(np.hypot(*(self.end - self.begin)))
+
+    @property
+    def direction(self) -> Floats:
+        """Unit vector from begin to end."""
+        return np.asarray((self.end - self.begin) / self.length_m)
+
+    def off_and_along(self, points: Floats) -> tuple[Floats, Floats]:
+        """Return how far points (n, 2) lie left of the line, and how far along it from its beginning, m."""
+        tx, ty = self.direction
+        delta = points - self.begin
+        return tx * delta[:, 1] - ty * delta[:, 0], delta @ self.direction
+
+    def distance(self, points: Floats) -> Floats:
+        """Return the distances of points (n, 2) from the segment, m."""
+        off, along = self.off_and_along(points)
+        return np.hypot(off, along - np.clip(along, 0.0, self.length_m))
+
+
+@dataclass(frozen=True, slots=True)
+class WallTrial:
+    """Lengths (m), counts and errors of one drive; errors are of the reported walls that lie on a true one."""
+
+    walls: int
+    answered_m: float
+    found_m: float
+    reported_m: float
+    false_m: float
+    lines: int
+    offsets_m: tuple[float, ...]
+    angles_rad: tuple[float, ...]
+
+
+def reported_walls(objects: Iterable[DetectedObject]) -> list[Segment]:
+    """Return the walls among reported objects: a wall's covariance along it is that of its length, evenly filled."""
+    walls = []
+    for wall in objects:
+        if wall.model == "wall" and wall.covariance is not None:
+            tx, ty = math.cos(wall.theta), math.sin(wall.theta)
+            xx, xy, yy = wall.covariance
+            half = 0.5 * math.sqrt(12.0 * (xx * tx * tx + 2.0 * xy * tx * ty + yy * ty * ty)) * np.array([tx, ty])
+            middle = np.array([wall.x, wall.y])
+            walls.append(Segment(middle - half, middle + half))
+    return walls
+
+
+def try_room(settings: Settings, room: FurnishedRoom, seed: int, step_m: float) -> WallTrial:
+    """Drive through a room and return how the reported walls compare with those that answered.
+
+    Parameters
+    ----------
+    settings : Settings
+        Ring, models and perception.
+    room : FurnishedRoom
+        The room, with its acoustics.
+    seed : int
+        Of the drive and of the noise.
+    step_m : float
+        Distance between two firings of one sensor.
+    """
+    perception, ring = Perception(settings.ring, settings.models, settings.perception), settings.ring
+    sonar = Sonar(ring, compile_scene(room.world), room.world.acoustics, np.random.default_rng([seed, 9]))
+    pattern = firing_pattern(ring)
+    length_m = DENSE_DRIVE_M if step_m < DENSE_STEP_M else DRIVE_M
+    walls = [Segment(np.array([w.x1_m, w.y1_m]), np.array([w.x2_m, w.y2_m])) for w in room.world.wall]
+    answered = [np.zeros(math.ceil(wall.length_m / PLACE_M), dtype=np.bool_) for wall in walls]
+    for k, (x, y, yaw) in enumerate(drive(room, seed, step_m / len(pattern.masks), length_m).tolist()):
+        fired = sensors(pattern.masks[k % len(pattern.masks)])
+        pose = Pose(x, y, yaw)
+        mask = np.isin(np.arange(len(ring.mounts)), fired)
+        _mark(walls, answered, sonar, pose, mask, ring.window_m)
+        ranges = sonar.fire(pose, yaw, fired)
+        perception.observe(Firing(k * ring.firing.step_period_s, pose, yaw, ranges))
+        while perception.can_refine and perception.refine():
+            pass
+    return compare(walls, answered, reported_walls(perception.labelled_objects()))
+
+
+def _mark(
+    walls: Sequence[Segment], answered: Sequence[Places], sonar: Sonar, pose: Pose, fired: Places, window_m: float
+) -> None:  # fmt: skip
+    """Mark the places of the walls that answer a firing."""
+    echoes = sonar.true_echoes(pose, pose.theta, fired)
+    heard = echoes[fired & (echoes["distance"] < window_m)]
+    points = np.column_stack([heard["x"], heard["y"]])
+    for wall, places in zip(walls, answered, strict=True):
+        off, along = wall.off_and_along(points)
+        is_on = (np.abs(off) < ON_WALL_M) & (along > -ON_WALL_M) & (along < wall.length_m + ON_WALL_M)
+        places[np.clip((along[is_on] / PLACE_M).astype(np.int64), 0, len(places) - 1)] = True
+
+
+def compare(walls: Sequence[Segment], answered: Sequence[Places], found: Sequence[Segment]) -> WallTrial:
+    """Return how reported walls compare with the true ones.
+
+    Parameters
+    ----------
+    walls : sequence of Segment
+        The true walls.
+    answered : sequence of (n,) bool
+        Which places of each wall answered, from its beginning.
+    found : sequence of Segment
+        The reported walls.
+    """
+    owners: list[int] = []
+    offsets: list[float] = []
+    angles: list[float] = []
+    false_m = 0.0
+    for line in found:
+        middles = line.begin + ((np.arange(_pieces(line)) + 0.5) / _pieces(line))[:, None] * (line.end - line.begin)
+        turns = np.array([abs(_sine(wall.direction, line.direction)) for wall in walls])
+        distances = np.array([wall.distance(middles) for wall in walls])
+        right = (distances < RIGHT_M) & (turns < math.sin(RIGHT_RAD))[:, None]
+        false_m += line.length_m * (1.0 - right.any(axis=0).mean())
+        owner = int(right.sum(axis=1).argmax()) if right.any() else -1
+        owners.append(owner)
+        if owner >= 0:
+            offsets.append(float(abs(walls[owner].off_and_along(0.5 * (line.begin + line.end)[None])[0][0])))
+            angles.append(math.asin(min(1.0, float(turns[owner]))))
+    count, answered_m, found_m = 0, 0.0, 0.0
+    for k, (wall, places) in enumerate(zip(walls, answered, strict=True)):
+        truth = _with_gaps_filled(places)
+        if places.sum() < PLACES_MIN or truth.sum() * PLACE_M < WALL_MIN_M:
+            continue
+        covered = np.zeros(len(truth), dtype=np.bool_)
+        for line, owner in zip(found, owners, strict=True):
+            if owner == k:
+                low, high = np.sort(wall.off_and_along(np.array([line.begin, line.end]))[1]) / PLACE_M
+                covered[max(0, round(low)) : max(0, round(high))] = True
+        count += 1
+        answered_m += float(truth.sum()) * PLACE_M
+        found_m += float((truth & covered).sum()) * PLACE_M
+    return WallTrial(
+        count, answered_m, found_m, sum(line.length_m for line in found), false_m,
+        sum(owner >= 0 for owner in owners), tuple(offsets), tuple(angles),
+    )  # fmt: skip
+
+
+def _sine(a: Floats, b: Floats) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])
+
+
+def _pieces(line: Segment) -> int:
+    return max(2, int(line.length_m / PLACE_M))
+
+
+def _with_gaps_filled(places: Places) -> Places:
+    """Return the places that answered, and those between two of them that are near each other."""
+    filled, at = places.copy(), np.flatnonzero(places)
+    for low, high in itertools.pairwise(at.tolist()):
+        if (high - low) * PLACE_M < BETWEEN_M:
+            filled[low:high] = True
+    return filled
+
+
+@dataclass(frozen=True, slots=True)
+class WallFigures:
+    """Figures of many drives: shares of length, lines for each wall, and errors (m, degrees)."""
+
+    rooms: int
+    walls: int
+    found: float
+    false: float
+    lines_a_wall: float
+    offset_mean_m: float
+    offset_p95_m: float
+    angle_mean_deg: float
+    angle_p95_deg: float
+
+
+def figures(trials: Sequence[WallTrial]) -> WallFigures:
+    """Return the figures of these drives; errors are NaN where nothing right was reported."""
+    offsets = np.array([offset for trial in trials for offset in trial.offsets_m])
+    angles = np.degrees([angle for trial in trials for angle in trial.angles_rad])
+    walls = sum(trial.walls for trial in trials)
+    reported_m = sum(trial.reported_m for trial in trials)
+    is_any = len(offsets) > 0
+    return WallFigures(
+        rooms=len(trials),
+        walls=walls,
+        found=sum(trial.found_m for trial in trials) / max(sum(trial.answered_m for trial in trials), PLACE_M),
+        false=sum(trial.false_m for trial in trials) / max(reported_m, PLACE_M),
+        lines_a_wall=sum(trial.lines for trial in trials) / max(walls, 1),
+        offset_mean_m=float(offsets.mean()) if is_any else math.nan,
+        offset_p95_m=float(np.percentile(offsets, 95.0)) if is_any else math.nan,
+        angle_mean_deg=float(angles.mean()) if is_any else math.nan,
+        angle_p95_deg=float(np.percentile(angles, 95.0)) if is_any else math.nan,
+    )

@@ -1,0 +1,70 @@
+"""Reported walls compared with the truth: found and false length, lines, offset and angle."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from perception.detected_object import DetectedObject
+from runtime.simulation.wall_trials import PLACE_M, Segment, compare, figures, reported_walls
+
+
+def segment(x1: float, y1: float, x2: float, y2: float) -> Segment:
+    """A segment from end to end."""
+    return Segment(np.array([x1, y1]), np.array([x2, y2]))
+
+
+WALL = segment(0.0, 0.0, 4.0, 0.0)
+PLACES = np.zeros(80, dtype=np.bool_)
+PLACES[20:60] = True
+PLACES[40:44] = False
+"""What answered: from 1 to 3 m, but for a short gap."""
+
+
+def test_a_wall_found_whole_with_its_offset_and_angle() -> None:
+    turn = math.radians(1.0)
+    along = np.array([math.cos(turn), math.sin(turn)])
+    middle = np.array([2.0, 0.01])
+    trial = compare([WALL], [PLACES], [Segment(middle - 1.02 * along, middle + 1.02 * along)])
+    assert (trial.walls, trial.lines) == (1, 1)
+    assert trial.answered_m == pytest.approx(2.0)
+    assert trial.found_m == pytest.approx(2.0)
+    assert trial.false_m == 0.0
+    assert trial.offsets_m == pytest.approx((0.01,))
+    assert trial.angles_rad == pytest.approx((turn,))
+
+
+def test_length_off_the_wall_or_across_it_is_false() -> None:
+    beyond, across = segment(3.0, 0.0, 5.0, 0.0), segment(2.0, -0.5, 2.0, 0.5)
+    trial = compare([WALL], [PLACES], [beyond, across])
+    assert trial.false_m == pytest.approx(2.0, abs=2 * PLACE_M)
+    assert trial.reported_m == pytest.approx(3.0)
+    assert trial.found_m == 0.0
+    assert trial.lines == 1
+
+
+def test_a_wall_that_hardly_answered_does_not_count() -> None:
+    few = np.zeros(80, dtype=np.bool_)
+    few[:8] = True
+    trial = compare([WALL], [few], [])
+    assert (trial.walls, trial.answered_m) == (0, 0.0)
+
+
+def test_a_reported_wall_ends_where_its_covariance_says() -> None:
+    xx, xy, yy = 9.0 / 12.0 * 0.5, 9.0 / 12.0 * 0.5, 9.0 / 12.0 * 0.5
+    wall = DetectedObject("wall", 1.0, 2.0, math.radians(45.0), 0.0, 9, 1.0, 1.0, (xx, xy, yy))
+    (found,) = reported_walls([wall, DetectedObject("drum", 0.0, 0.0, 0.0, 0.1, 9, 1.0)])
+    assert found.length_m == pytest.approx(3.0)
+    assert 0.5 * (found.begin + found.end) == pytest.approx([1.0, 2.0])
+    assert found.direction == pytest.approx([math.sqrt(0.5)] * 2)
+
+
+def test_figures_of_several_drives() -> None:
+    found = figures([compare([WALL], [PLACES], [segment(1.0, 0.02, 3.0, 0.02)]), compare([WALL], [PLACES], [])])
+    assert (found.rooms, found.walls) == (2, 2)
+    assert found.found == pytest.approx(0.5)
+    assert found.lines_a_wall == 0.5
+    assert found.offset_mean_m == pytest.approx(0.02)
+    assert figures([compare([WALL], [PLACES], [])]).false == 0.0
