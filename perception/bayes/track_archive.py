@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
@@ -149,7 +150,7 @@ class TrackArchive:
         return kinds
 
 
-class _Kind:
+class _Kind(ABC):
     """The tracks of one kind and their archive."""
 
     def __init__(self, archive: Archive, memory: Memory, tracks: NDArray[Any]) -> None:
@@ -166,10 +167,11 @@ class _Kind:
         evidence = self.tracks["log_likelihood_ratio"][tentative]
         return int(tentative[evidence.argmin()]) if len(tentative) else -1
 
+    @abstractmethod
     def is_reported(self, t: int) -> bool:
         """Return whether a track is reported as a model."""
-        raise NotImplementedError
 
+    @abstractmethod
     def leave(self, t: int) -> None:
         """End what is computed for a track."""
 
@@ -250,6 +252,9 @@ class _Circles(_Kind):
     def is_reported(self, t: int) -> bool:
         track = self.tracks[t]
         return bool((track["status"] == ESTABLISHED and track["is_named"]) or track["marks"] != 0)
+
+    def leave(self, t: int) -> None:
+        """Nothing: a circle's refinement ends with its quantum."""
 
 
 class _Polygons(_Kind):
