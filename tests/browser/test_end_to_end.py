@@ -15,7 +15,7 @@ from playwright.async_api import expect
 
 from drivers.messages import Flags
 from tests.browser.fake_server import TIMEOUT_S
-from tests.browser.open_page import Opened, Opener
+from tests.browser.open_page import Opened, Opener, until
 from tests.browser.real_run import Run, run
 from tests.browser.test_drive import press_pad
 from tests.hil.running import running
@@ -26,6 +26,8 @@ pytestmark = [
 
 REFUSED = r"WebSocket connection to .* failed|Failed to load resource"
 BACKWARDS_M_S = -0.05
+PATIENCE_S = 5.0
+"""An operator who sees nothing change for so long tries again."""
 NEAR_M = 0.1
 KNOWN_DRUMS = f"""run.state.objects.filter((o) => o.model === 'semicircle'
     && run.session.truth.drums.some(([x, y]) => Math.hypot(o.x - x, o.y - y) < {NEAR_M})).length"""
@@ -56,6 +58,23 @@ async def drive_backwards(robot: Run, opened: Opened) -> None:
         assert time.monotonic() < end_s, "the base never drove backwards"
 
 
+async def delete(opened: Opened, chosen: list[int]) -> None:
+    """Delete segments, again where a page that was kept waiting lost its connection, and with it the selection."""
+
+    again_s = time.monotonic()
+
+    async def are_gone() -> bool:
+        nonlocal again_s
+        left = await opened.world(f"{json.dumps(chosen)}.filter((n) => run.segments.has(n))")
+        if left and time.monotonic() >= again_s:
+            again_s = time.monotonic() + PATIENCE_S
+            await opened.world(f"selection.choose({json.dumps(left)})")
+            await opened.page.keyboard.press("Delete")
+        return not left
+
+    await until(are_gone, "segments that are gone")
+
+
 async def edit_the_map(opened: Opened) -> None:
     """Delete and pin segments, confirm and reject an object, and place a model."""
     page = opened.page
@@ -67,8 +86,7 @@ async def edit_the_map(opened: Opened) -> None:
     await opened.world(f"selection.choose({json.dumps(chosen)})")
     await page.keyboard.press("p")
     await opened.until(f"{json.dumps(chosen)}.some((n) => run.segments.get(n)?.pinned)", "pins")
-    await page.keyboard.press("Delete")
-    await opened.until(f"{json.dumps(chosen)}.every((n) => !run.segments.has(n))", "segments that are gone")
+    await delete(opened, chosen)
 
     await page.locator("#objects li").first.click()
     await opened.says("#evidence", "for it")
