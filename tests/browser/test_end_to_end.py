@@ -26,8 +26,8 @@ pytestmark = [
 
 REFUSED = r"WebSocket connection to .* failed|Failed to load resource"
 BACKWARDS_M_S = -0.05
-PATIENCE_S = 5.0
-"""An operator who sees nothing change for so long tries again."""
+AGAIN_S = 5.0
+"""After so long without a change an operator tries again, s."""
 NEAR_M = 0.1
 KNOWN_DRUMS = f"""run.state.objects.filter((o) => o.model === 'semicircle'
     && run.session.truth.drums.some(([x, y]) => Math.hypot(o.x - x, o.y - y) < {NEAR_M})).length"""
@@ -67,7 +67,7 @@ async def delete(opened: Opened, chosen: list[int]) -> None:
         nonlocal again_s
         left = await opened.world(f"{json.dumps(chosen)}.filter((n) => run.segments.has(n))")
         if left and time.monotonic() >= again_s:
-            again_s = time.monotonic() + PATIENCE_S
+            again_s = time.monotonic() + AGAIN_S
             await opened.world(f"selection.choose({json.dumps(left)})")
             await opened.page.keyboard.press("Delete")
         return not left
