@@ -156,6 +156,8 @@ class Hall:
             "clusters": clusters, "objects": self.seen(cycle),
             "vectors": [["move_ahead", 1.0, 0.0], ["avoid_static_obstacle", -0.25, 0.3], ["sum", 0.75, 0.3]],
             "phases": phases, "cycle_us": round(sum(phases.values())), "late_us": round(abs(rng.normal(120, 60))),
+            "localized": {"pose": pose, "covariance": [4e-4, 1e-4, 2e-4, 1e-4], "status": "tracking",
+                          "probability": 0.9, "frame": [0.05, -0.02, 0.03]},
             "missed": missed, "late": cycle // 90, "quanta": 3, "refinement": "budget",
             "link": {"frames": 24 * cycle, "bad": 1 if cycle > 60 else 0, "lost": 0},
             "sensors": [[17, "weak", "hears less than its neighbours"]],

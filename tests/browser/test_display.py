@@ -42,7 +42,7 @@ async def test_every_layer_draws_something_and_can_be_switched(server: FakeServe
     server.silent = True
     boxes = opened.page.locator("#layers input")
     names = await opened.page.locator("#layers label").all_inner_texts()
-    assert len(names) == 15
+    assert len(names) == 16
     assert [name for name in names if "arc" in name or "beam" in name] == [
         "arcs of recent echoes",
         "beams firing now",

@@ -78,6 +78,8 @@ async def test_ring_charts_and_facts(server: FakeServer, opener: Opener) -> None
     await opened.says("#fact-link", "1 / 0")
     server.flags = ["BUMPER"]
     await opened.says("#fact-flags", "bumper")
+    await opened.says("#fact-place", "± 0.6°, tracking")
+    await expect(opened.page.locator("#place")).to_be_visible()
     await opened.says("#fact-recording", "2 lost")
     await opened.says("#mode-name", "DRIVE")
 

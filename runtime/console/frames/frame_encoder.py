@@ -17,9 +17,10 @@ import orjson
 from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import Teleoperate
 from config.settings import Settings
-from drivers.messages import Firing, LinkCounts
+from drivers.messages import Firing, LinkCounts, Pose
 from perception.detected_object import DetectedObject
 from perception.paper.cluster_view import ClusterView
+from perception.pipeline import Perception
 from runtime.console.frames.segment_delta import SegmentDelta
 from runtime.cycle.drive_requests import DriveRequest
 from runtime.cycle.step import CycleRecord, State
@@ -184,6 +185,7 @@ class FrameEncoder:
             "refinement": "nothing" if record is None else record.refinement,
             "link": {"frames": link.frames, "bad": link.bad, "lost": link.lost},
             "waiting": state.perception.counts.waiting,
+            "localized": _localized(state.perception),
             "sensors": [[r.sensor, r.fault, r.reason] for r in state.perception.sensor_reports()],
             "clients": context.clients,
             "recording": None if context.recording is None else context.recording._asdict(),
@@ -192,8 +194,8 @@ class FrameEncoder:
             "playback": context.playback,
         }
         if odometry is not None:
-            pose, twist = odometry.pose, odometry.twist
-            head["pose"] = [round(pose.x, 4), round(pose.y, 4), round(pose.theta, 5)]
+            twist = odometry.twist
+            head["pose"] = _rounded(odometry.pose)
             head["ring_yaw"] = round(odometry.ring_yaw, 5)
             head["twist"] = [round(twist.v, 4), round(twist.w, 4)]
             head["flags"] = [flag.name for flag in odometry.flags]
@@ -255,6 +257,25 @@ def _object(detected: DetectedObject) -> dict[str, Any]:
         "confirmed": detected.confirmed,
         "placed": detected.placed,
     }
+
+
+def _localized(perception: Perception) -> dict[str, Any] | None:
+    """Return the robot in the map frame and that frame in odometry's; None where they are the same."""
+    here = perception.localized()
+    if here is None or perception.map_frame is None:
+        return None
+    covariance = here.covariance
+    return {
+        "pose": _rounded(here.pose),
+        "covariance": [float(covariance[row, column]) for row, column in ((0, 0), (0, 1), (1, 1), (2, 2))],
+        "status": here.status,
+        "probability": round(here.probability, 3),
+        "frame": _rounded(perception.map_frame.drift.odometry_from_map()),
+    }
+
+
+def _rounded(pose: Pose) -> list[float]:
+    return [round(pose.x, 4), round(pose.y, 4), round(pose.theta, 5)]
 
 
 def _drive_request(drive_request: DriveRequest) -> dict[str, Any]:

@@ -1,9 +1,11 @@
 // The robot and what moves it: body and heading, the trail, each schema's vector with its name, their sum, the goal.
 
+import { ellipseOf } from "./draw_objects.js";
 import { textWithHalo, overlap } from "./scene.js";
 
 const UNIT_PX = 70; // a vector of magnitude one; longer where the robot is large, so that it shows beyond the rim
 const LENGTH_MAX = 2; // in units
+const AXIS_PX = 40;
 const DASHES = [[7, 4], [2, 3], [10, 3, 2, 3], [4, 6]];
 
 export function trailDrawer() {
@@ -55,6 +57,31 @@ export function drawRobot(f) {
   ctx.lineTo(x + 1.12 * r * Math.cos(yaw), y + 1.12 * r * Math.sin(yaw));
   ctx.lineWidth = 4 * px;
   ctx.stroke();
+}
+
+// The axes of the map frame, which lies askew in odometry's where odometry has drifted, and the ellipse of the robot's place.
+export function drawMapFrame(f) {
+  const { ctx, run, px, theme } = f;
+  if (!run.fresh || run.state.localized === null) return;
+  const { frame: [x, y, turn], covariance } = run.state.localized;
+  const length = AXIS_PX * px;
+  f.inWorld();
+  ctx.strokeStyle = theme.drive;
+  ctx.lineWidth = 2 * px;
+  ctx.beginPath();
+  ctx.moveTo(x + length * Math.cos(turn), y + length * Math.sin(turn));
+  ctx.lineTo(x, y);
+  ctx.lineTo(x - length * Math.sin(turn), y + length * Math.cos(turn));
+  ctx.stroke();
+  const { major, minor, angle } = ellipseOf(covariance), times = f.options.ellipseScale;
+  ctx.beginPath();
+  ctx.ellipse(run.state.pose[0], run.state.pose[1], times * major, times * minor, angle + turn, 0, 2 * Math.PI);
+  ctx.stroke();
+  const at = f.view.toScreen(x, y);
+  f.onScreen();
+  ctx.font = theme.font(11, 600);
+  ctx.textAlign = "left";
+  textWithHalo(f, "map", at[0] + 5, at[1] - 5, theme.drive);
 }
 
 function arrow(ctx, x, y, dx, dy, head) {

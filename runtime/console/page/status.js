@@ -1,6 +1,7 @@
 // The status bar: mode and reason, age of the data, line counters; announces changes of mode to screen readers.
 
 import { byId, setAttribute, setText } from "./dom.js";
+import { degrees } from "./units.js";
 
 const STALE_S = 2.5; // while the robot does not answer, updates come once a second
 const RECENT_MS = 5000;
@@ -50,9 +51,11 @@ export class Status {
   }
 
   #facts() {
-    const { twist, flags, link, dropped, late, missed, clients, controller, recording } = this.#run.state;
+    const { twist, localized, flags, link, dropped, late, missed, clients, controller, recording } = this.#run.state;
     const turn = Math.round((twist[1] * 180) / Math.PI);
     fact("twist", `${this.#units.number(twist[0])} ${this.#units.name}/s ${turn < 0 ? "↻" : turn > 0 ? "↺" : ""} ${Math.abs(turn)}°/s`);
+    byId("place").hidden = localized === null;
+    if (localized !== null) fact("place", this.#place(localized), localized.status === "lost");
     fact("link", link ? `${link.bad} / ${link.lost}` : "none", this.#hasGrown("link", link ? link.bad + link.lost : 0));
     fact("flags", flags.join(", ").toLowerCase() || "none", flags.length > 0);
     fact("dropped", String(dropped), this.#hasGrown("dropped", dropped));
@@ -61,6 +64,13 @@ export class Status {
     fact("role", controller ? "control" : "watch");
     const size = recording ? `${(recording.bytes / 1e6).toFixed(1)} MB${recording.dropped ? `, ${recording.dropped} lost` : ""}` : "off";
     fact("recording", recording ? `● ${size}` : size, recording?.dropped > 0);
+  }
+
+  // With one standard deviation: of the place in its worst direction, and of the heading.
+  #place({ pose: [x, y, theta], covariance: [xx, xy, yy, heading], status }) {
+    const sigma = Math.sqrt((xx + yy) / 2 + Math.hypot((xx - yy) / 2, xy));
+    const place = `${this.#units.number(x)}, ${this.#units.number(y)} ± ${this.#units.length(sigma, 3)}`;
+    return `${place}, ${degrees(theta)} ± ${((Math.sqrt(heading) * 180) / Math.PI).toFixed(1)}°, ${status}`;
   }
 
   // Whether a count has grown recently: one bad frame an hour ago does not matter now.

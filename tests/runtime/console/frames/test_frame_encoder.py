@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
 
+from drivers.messages import Pose
+from perception.localization.drift_correction import SeenObject
 from runtime.console.frames.frame_encoder import SEGMENTS_EVERY
 from tests.runtime.console.console_case import ConsoleCase, open_console
 
@@ -51,6 +54,29 @@ async def test_the_fields_of_a_frame() -> None:
         assert frame["clients"] == 1
         assert frame["recording"] is None
         assert frame["paused"] is False
+
+
+async def test_the_place_in_the_map_and_its_frame_are_shown_where_drift_is_corrected() -> None:
+    async with open_console() as case:
+        page = await case.page()
+        case.cycles()
+        assert (await page.next("state"))["localized"] is None
+    async with open_console("perception.method=bayes", "perception.localization.correct_drift=true") as case:
+        page = await case.page()
+        case.cycles()
+        first = (await page.next("state"))["localized"]
+        assert (first["status"], first["pose"], first["frame"]) == ("localizing", [0.02, 0.0, 0.0], [0.0, 0.0, 0.0])
+
+        frame = case.run.state.perception.map_frame
+        assert frame is not None
+        frame.drift.learn(SeenObject(k, 3.0 * math.cos(k), 3.0 * math.sin(k), 0.3) for k in (1, 2, 3))
+        frame.drift.e[0].x += 0.5
+        case.cycles()
+        then = (await page.next("state"))["localized"]
+        assert then["pose"][0] == pytest.approx(0.54, abs=0.1)
+        assert len(then["covariance"]) == 4
+        in_odometry = Pose(*then["frame"]).compose(Pose(*then["pose"]))
+        assert (in_odometry.x, in_odometry.y, in_odometry.theta) == pytest.approx((0.04, 0.0, 0.0), abs=1e-3)
 
 
 async def test_changes_add_up_to_all_segments() -> None:
