@@ -222,6 +222,33 @@ def localization(*, json: str = "localization.json", rooms: int = 100, first: in
     return 0
 
 
+@app.command
+def known_room(*, json: str = "known_room.json", rooms: int = 20, first: int = 1000) -> int:
+    """Measure tracking, global localisation and recovery from kidnapping in furnished rooms that are known.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    rooms
+        Number of rooms.
+    first
+        Seed of the first room.
+    """
+    use_kernel_cache()
+    from bench.known_room import known_room_table, measure
+    from runtime.cycle.summary import write_json
+
+    console = Console(stderr=True)
+    settings = load_settings("hallway")
+    prepare_kernels(settings, console, (EMULATOR,))
+    with console.status("bench") as status:
+        rows = measure(settings.ring, range(first, first + max(1, rooms)), status.update)
+    write_json(json, rows)
+    _wide().print(known_room_table(rows))
+    return 0
+
+
 @app.command(name="map")
 def map_size(*, json: str = "map.json", drums: tuple[int, ...] = (40, 200), seed: int = 0) -> int:
     """Measure what a firing costs in halls of more and more drums, driven through once and back.

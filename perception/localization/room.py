@@ -1,4 +1,4 @@
-"""A known room: its walls, and the sectors between them at every corner."""
+"""A known room: its walls, the sectors between them at every corner, and its round objects."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FLAT_RAD: Final = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Room:
-    """The walls of a room in the map frame.
+    """The surfaces of a room in the map frame.
 
     Attributes
     ----------
@@ -31,43 +31,60 @@ class Room:
     corners : (c, 4) float
         One row for each sector between two walls that meet: x, y (m), the direction in which the sector starts, and
         its opening counter-clockwise (rad). Below π it is a concave corner, above a convex edge.
+    circles : (k, 3) float
+        Centre x, y and radius of each round object, m.
     """
 
     walls: Floats
     normals: Floats
     offsets: Floats
     corners: Floats
+    circles: Floats
 
     @property
     def area_m2(self) -> float:
         """Area of the rectangle around the room, m²."""
+        low, high = self.bounds
+        return float(np.prod(high - low))
+
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """The lower left and the upper right corner of the rectangle around the room, m, shape (2,) each."""
         ends = self.walls.reshape(-1, 2)
-        return float(np.prod(np.ptp(ends, axis=0)))
+        centres, radii = self.circles[:, :2], self.circles[:, 2:]
+        points = np.concatenate([ends, centres - radii, centres + radii])
+        return points.min(axis=0), points.max(axis=0)
 
 
-def make_room(walls: Floats) -> Room:
-    """Return the room with these walls.
+def make_room(walls: Floats, circles: Floats | None = None) -> Room:
+    """Return the room with these walls and round objects.
 
     Parameters
     ----------
     walls : (w, 4) float
         Both ends of each wall, m. Walls that cross should be split at the crossing; otherwise it is no corner.
+    circles : (k, 3) float, optional
+        Centre and radius of each round object, m.
 
     Raises
     ------
     ValueError
-        The array has another shape or no row, a value is not finite, or a wall is shorter than `JOIN_M`.
+        An array has another shape, there is no row at all, a value is not finite, a radius is not positive, or a wall
+        is shorter than `JOIN_M`.
     """
     walls = np.array(walls, dtype=np.float64)
-    if walls.ndim != 2 or walls.shape[1] != 4 or not len(walls) or not np.isfinite(walls).all():
+    circles = np.empty((0, 3)) if circles is None else np.array(circles, dtype=np.float64)
+    if walls.ndim != 2 or walls.shape[1] != 4 or not np.isfinite(walls).all() or not len(walls) + len(circles):
         raise ValueError("expected at least one wall as a row of four finite numbers: x1, y1, x2, y2")
+    if circles.ndim != 2 or circles.shape[1] != 3 or not np.isfinite(circles).all() or (circles[:, 2] <= 0.0).any():
+        raise ValueError("expected each circle as a row of three finite numbers: x, y, radius > 0")
     along = walls[:, 2:] - walls[:, :2]
     length = np.hypot(along[:, 0], along[:, 1])
-    if length.min() < JOIN_M:
+    if len(walls) and length.min() < JOIN_M:
         raise ValueError(f"wall {int(length.argmin())} is shorter than {JOIN_M} m")
     normals = np.column_stack([-along[:, 1], along[:, 0]]) / length[:, None]
     offsets = (normals * walls[:, :2]).sum(axis=1)
-    return Room(walls, normals, offsets, _sectors(walls, normals, offsets))
+    return Room(walls, normals, offsets, _sectors(walls, normals, offsets), circles)
 
 
 def _sectors(walls: Floats, normals: Floats, offsets: Floats) -> Floats:

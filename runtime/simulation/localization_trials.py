@@ -68,9 +68,12 @@ class Trial:
 
 
 def room_of(scene: Scene) -> Room:
-    """Return the straight surfaces of an emulated scene as a known room."""
-    walls = scene.segments
-    return make_room(np.column_stack([walls[name] for name in ("x1", "y1", "x2", "y2")]))
+    """Return the surfaces of an emulated scene as a known room."""
+    walls, circles = scene.segments, scene.circles
+    return make_room(
+        np.column_stack([walls[name] for name in ("x1", "y1", "x2", "y2")]),
+        np.column_stack([circles[name] for name in ("x", "y", "radius")]),
+    )
 
 
 def localize_once(

@@ -7,24 +7,34 @@ import math
 import numpy as np
 import pytest
 
+from config.world import WorldConfig
 from drivers.emulator.acoustics import SIGHT_SLACK_M
 from drivers.emulator.scene import compile_scene
 from drivers.messages import Pose
 from perception.localization.expected_ranges import EDGE_REACH_M, Beams, Reflection, crossed, expected_ranges
 from perception.localization.room import make_room
+from runtime.simulation.furnished_rooms import drive, furnished_room
 from runtime.simulation.localization_trials import room_of
 from runtime.simulation.random_rooms import random_room
 from tests import naive_acoustics
 from tests.perception.localization.rooms import HALF_ANGLE, RING, beams_of, panorama_of, stand
 
 
+def places(rooms: int = 6) -> list[tuple[WorldConfig, Pose]]:
+    """Rooms of walls with a stand each, and rooms with drums in them."""
+    with_drums = [(seed, furnished_room(seed)) for seed in range(3 * rooms) if furnished_room(seed).world.drum][
+        :rooms
+    ]
+    clear = [(room.world, Pose(*drive(room, seed, 0.5, 1.0)[0].tolist())) for seed, room in with_drums]
+    return [*(random_room(seed) for seed in range(rooms)), *clear]
+
+
 @pytest.mark.parametrize("reflection", ["cone", "specular"])
 def test_ranges_equal_their_oracle(reflection: Reflection) -> None:
     silent = 0
-    for seed in range(6):
-        world, truth = random_room(seed)
+    for world, truth in places():
         shapes, room = naive_acoustics.shapes_of(world), room_of(compile_scene(world))
-        beams = beams_of(panorama_of(stand(world, truth)[1]), truth, Pose(truth.x + 0.3, truth.y, 1.0))
+        beams = beams_of(panorama_of(stand(world, truth)[1]), truth, Pose(truth.x + 0.1, truth.y, 1.0))
         found = expected_ranges(room, beams, HALF_ANGLE, reflection).range_m
         for place, x, y, axis in zip(np.ndindex(found.shape), *(part.flat for part in beams), strict=True):
             sensor = complex(x, y)
@@ -34,14 +44,13 @@ def test_ranges_equal_their_oracle(reflection: Reflection) -> None:
                 expected = naive_acoustics.specular(shapes, sensor, axis, HALF_ANGLE, EDGE_REACH_M, SIGHT_SLACK_M)
             silent += math.isinf(expected)
             assert found[place] == pytest.approx(expected, abs=1e-9)
-    assert (silent > 0) == (reflection == "specular")
+    assert silent > 0
 
 
 @pytest.mark.parametrize("reflection", ["cone", "specular"])
 def test_gradients_are_those_of_the_range(reflection: Reflection) -> None:
     step = 1e-6
-    for seed in range(6):
-        world, truth = random_room(seed)
+    for world, truth in places():
         room, firing = stand(world, truth)
         beams = beams_of(panorama_of(firing), truth)
         found = expected_ranges(room, beams, HALF_ANGLE, reflection)

@@ -1,0 +1,107 @@
+"""The robot in a known room: found, tracked, kidnapped, in a symmetric room, and in another one.
+
+`python -m bench known-room` measures more rooms.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from drivers.emulator.scene import compile_scene
+from drivers.emulator.sonar import Sonar
+from drivers.messages import Firing, Pose
+from perception.localization.expected_ranges import Reflection
+from perception.localization.known_room import KnownRoom
+from runtime.simulation.furnished_rooms import ACOUSTICS
+from runtime.simulation.known_room_trials import KnownDrive, figures, follow, furnished_drive
+from runtime.simulation.localization_trials import room_of
+from tests.perception.localization.rooms import CROOKED, RECTANGLE, RING, world_of
+
+pytestmark = pytest.mark.compiled
+
+
+def driven(corners: tuple[tuple[float, float], ...], length_m: float = 2.0) -> KnownDrive:
+    """A straight drive through a room of these corners; odometry has its own origin and no error."""
+    world = world_of(corners, ACOUSTICS)
+    scene = compile_scene(world)
+    sonar = Sonar(RING, scene, ACOUSTICS, np.random.default_rng(3))
+    steps = np.arange(0.0, length_m, 0.05)
+    truth = np.column_stack([1.2 + steps, 1.1 + 0.2 * steps, np.full(len(steps), 0.3)])
+    origin = Pose(4.0, -3.0, 2.0)
+    firings = []
+    for k, row in enumerate(truth.tolist()):
+        odometry = origin.compose(Pose(*row))
+        firings.append(Firing(0.1 * k, odometry, odometry.theta, sonar.fire(Pose(*row), row[2], range(k % 2, 24, 2))))
+    return KnownDrive(room_of(scene), firings, truth)
+
+
+@pytest.mark.parametrize("reflection", ["cone", "specular"])
+def test_a_kidnapped_robot_is_found_tracked_lost_and_found_again(reflection: Reflection) -> None:
+    acoustics = ACOUSTICS.model_copy(update={"model": reflection})
+    drive = furnished_drive(RING, 2000, acoustics, length_m=2.0, kidnapped=True)
+    found = figures([follow(KnownRoom(drive.room, RING), drive)])
+    assert (found.found, found.recovered) == (1, 1)
+    assert found.noticed_max_m < 1.0
+    assert found.said_wrong == 0
+    assert found.median_m < 0.03
+    assert found.median_deg < 1.5
+    assert found.lost_share > 0.0
+
+
+def test_a_symmetric_room_shares_the_probability() -> None:
+    drive = driven(RECTANGLE)
+    trace = follow(KnownRoom(drive.room, RING), drive)
+    assert trace.probability.max() <= 0.9
+    assert trace.probability[-1] == pytest.approx(0.5, abs=0.2)
+    assert set(trace.status) == {"localizing"}
+
+
+def test_in_another_room_the_robot_is_lost() -> None:
+    drive = driven(CROOKED, 1.5)
+    other = furnished_drive(RING, 2002, length_m=0.5).room
+    trace = follow(KnownRoom(other, RING), drive)
+    assert trace.status[-1] == "lost"
+    assert trace.probability.max() <= 0.9
+
+
+def test_the_same_firings_give_the_same_answers_and_odometry_never_jumps() -> None:
+    drive = driven(CROOKED, 1.4)
+    one, other = (follow(KnownRoom(drive.room, RING, seed=4), drive) for _ in range(2))
+    assert np.array_equal(one.error_m, other.error_m)
+    assert np.array_equal(one.probability, other.probability)
+    localizer = KnownRoom(drive.room, RING)
+    for firing in drive.firings:
+        localizer.observe(firing)
+        while localizer.can_refine:
+            localizer.refine()
+        here, at = localizer.localized(), firing.pose
+        mapped = localizer.map_from_odometry().compose(Pose(at.x, at.y, firing.ring_yaw))
+        assert (mapped.x, mapped.y) == pytest.approx((here.pose.x, here.pose.y))
+    assert here.status == "tracking"
+    assert math.dist((here.pose.x, here.pose.y), drive.truth[-1, :2].tolist()) < 0.05
+    assert math.sqrt(here.covariance[0, 0]) < 0.05
+
+
+def test_firings_far_apart_are_keyframes_of_their_own() -> None:
+    """A log may have gaps longer than the way over which odometry compounds readings."""
+    drive = driven(CROOKED, 1.2)
+    localizer = KnownRoom(drive.room, RING)
+    for k, firing in enumerate(drive.firings):
+        far = Pose(firing.pose.x + 7.0 * (k // 6), firing.pose.y, firing.pose.theta)
+        localizer.observe(Firing(firing.robot_s, far, firing.ring_yaw, firing.ranges_m))
+        while localizer.can_refine:
+            localizer.refine()
+    assert np.isfinite(localizer.localized().probability)
+
+
+def test_a_robot_that_stands_keeps_localizing() -> None:
+    drive = driven(CROOKED)
+    localizer = KnownRoom(drive.room, RING)
+    for _ in range(300):
+        localizer.observe(drive.firings[0])
+    assert not localizer.can_refine
+    assert localizer.localized().status == "localizing"
+    assert np.isinf(localizer.localized().covariance[0, 0])
