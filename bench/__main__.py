@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated, Final, TypeAlias
 
 from cyclopts import App, Parameter
@@ -246,6 +247,30 @@ def known_room(*, json: str = "known_room.json", rooms: int = 20, first: int = 1
         rows = measure(settings.ring, range(first, first + max(1, rooms)), status.update)
     write_json(json, rows)
     _wide().print(known_room_table(rows))
+    return 0
+
+
+@app.command
+def beacons(recording: Path, *, json: str = "beacons.json") -> int:
+    """Measure the landmark filter on recorded ranges to beacons at unknown places.
+
+    Parameters
+    ----------
+    recording
+        `Plaza1_.mat`, from the examples of gtsam.
+    json
+        File to write.
+    """
+    use_kernel_cache()
+    from bench.beacons import beacons_table, figures, read_plaza, track
+    from runtime.cycle.summary import write_json
+
+    if not recording.is_file():
+        raise UserError(f"{recording}: there is no such file; Plaza1_.mat comes with the examples of gtsam")
+    data = read_plaza(recording)
+    row = figures(data, track(data))
+    write_json(json, row)
+    _wide().print(beacons_table(row))
     return 0
 
 
