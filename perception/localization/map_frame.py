@@ -94,7 +94,7 @@ class MapFrame:
     def objects_in_odometry(self, objects: Iterable[DetectedObject]) -> tuple[DetectedObject, ...]:
         """Return objects of the map frame in odometry's frame."""
         to = self.drift.odometry_from_map()
-        return tuple(_turned(to, seen) for seen in self.with_landmarks(objects))
+        return tuple(turned_object(to, seen) for seen in self.with_landmarks(objects))
 
     def segments_in_odometry(self, geometry: Floats) -> Floats:
         """Return segments of the map frame in odometry's: ends x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""
@@ -139,7 +139,7 @@ def _placed(seen: DetectedObject, place: LandmarkPlace | None) -> DetectedObject
     return replace(seen, x=place.x, y=place.y, sigma=sigma, covariance=place.covariance)
 
 
-def _turned(to: Pose, seen: DetectedObject) -> DetectedObject:
+def turned_object(to: Pose, seen: DetectedObject) -> DetectedObject:
     """Return an object in another frame, in which the present origin lies at `to`."""
     place = to.compose(Pose(seen.x, seen.y, seen.theta))
     if seen.covariance is None:

@@ -56,6 +56,7 @@ def replay(
     speed: float | None = None,
     localize: Annotated[bool, Flag] = False,
     trajectory: str | None = None,
+    map_file: Annotated[str | None, Parameter(name="--map")] = None,
     robot: RobotFile = None,
     model: ModelFiles = (),
     json: JsonFile = None,
@@ -81,6 +82,9 @@ def replay(
     localize
         Correct the drift of a ring log's odometry by what is recognised; objects are then in the map frame, which is
         the odometry's at the first row.
+    map_file
+        With --localize, the known room: a world file, or the name of a shipped one. The start is then unknown, and
+        the map frame is the file's.
     trajectory
         With --localize, a file for the robot's poses in the map frame (CSV), one row a firing.
     robot
@@ -105,6 +109,8 @@ def replay(
 
     if trajectory is not None and not localize:
         raise UserError("--trajectory gives poses in the map frame: give --localize too", WRONG_CALL)
+    if map_file is not None and not localize:
+        raise UserError("--map names the room in which the robot is: give --localize too", WRONG_CALL)
     if localize and is_recording(Path(log)):
         raise UserError(f"{log}: is a recording; --localize applies to ring logs only", WRONG_CALL)
     if is_recording(Path(log)):
@@ -122,7 +128,8 @@ def replay(
     from runtime.cli.commands.replay_ring_log import replay_log
 
     return replay_log(
-        log, sets, robot=robot, models=model, json_file=json, units=units, localize=localize, trajectory=trajectory
+        log, sets, robot=robot, models=model, json_file=json, units=units, localize=localize, trajectory=trajectory,
+        map_file=map_file,
     )  # fmt: skip
 
 

@@ -41,7 +41,7 @@ class ReplaySummary(TypedDict):
     verify: NotRequired[VerifyRow]
 
     pose: NotRequired[PoseRow]
-    """Of a replay that corrects drift: the robot at the end."""
+    """Of a replay that corrects drift or has a map: the robot at the end."""
     frame: NotRequired[Literal["map"]]
     """The frame of pose and objects, where it is not odometry's."""
 

@@ -8,9 +8,12 @@ from collections.abc import Callable, Iterable, Iterator
 from config.settings import LocalizationConfig, Settings
 from drivers.messages import Firing
 from perception.localization.drift_correction import LocalizedPose
+from perception.localization.known_room import KnownRoom
+from perception.localization.map_frame import turned_object
+from perception.localization.room import Room
 from perception.pipeline import Perception
 from runtime.cycle.summary import object_row
-from runtime.recording.replay_summary import ReplaySummary
+from runtime.recording.replay_summary import PoseRow, ReplaySummary
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.refinement_budget import within_quanta_per_cycle
 
@@ -85,15 +88,53 @@ def replay_localized(
     summary["frame"] = "map"
     summary["objects"] = [object_row(seen) for seen in perception.mapped_objects()]
     if here is not None:
-        summary["pose"] = {
-            "x": here.pose.x,
-            "y": here.pose.y,
-            "theta": here.pose.theta,
-            "covariance": here.covariance.tolist(),
-            "status": here.status,
-            "probability": here.probability,
-        }
+        summary["pose"] = _pose_row(here)
     return summary
+
+
+def replay_in_known_room(
+    settings: Settings, firings: Iterable[Firing], room: Room, on_pose: Callable[[float, LocalizedPose], None]
+) -> ReplaySummary:  # fmt: skip
+    """Run perception over firings, find the robot in a known room, and return what was perceived.
+
+    The objects are in the map frame if the robot's place is known at the end, otherwise in odometry's.
+
+    Parameters
+    ----------
+    settings : Settings
+        Ring, models and constants.
+    firings : iterable of Firing
+        In order of time.
+    room : Room
+        The map.
+    on_pose : callable
+        Called after each firing with its time (s) and the robot's pose as known then.
+    """
+    replayer, localizer = FiringReplayer(settings, firings), KnownRoom(room, settings.ring)
+    for firing in replayer:
+        localizer.observe(firing)
+        while localizer.can_refine:
+            localizer.refine()
+        on_pose(firing.robot_s, localizer.localized())
+    summary, here = replayer.summary(), localizer.localized()
+    summary["pose"] = _pose_row(here)
+    if here.status == "tracking":
+        to = localizer.map_from_odometry()
+        summary["frame"] = "map"
+        summary["objects"] = [object_row(turned_object(to, seen)) for seen in replayer.perception.objects()]
+    return summary
+
+
+def _pose_row(here: LocalizedPose) -> PoseRow:
+    """Return the robot's pose as JSON has it."""
+    return {
+        "x": here.pose.x,
+        "y": here.pose.y,
+        "theta": here.pose.theta,
+        "covariance": here.covariance.tolist(),
+        "status": here.status,
+        "probability": here.probability,
+    }
 
 
 def replay_firings(settings: Settings, firings: Iterable[Firing]) -> ReplaySummary:

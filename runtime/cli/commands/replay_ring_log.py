@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final
 
 from rich.console import Console
 
-from config.errors import DONE
-from config.load import load_settings
+from config.errors import DONE, WRONG_CALL, UserError
+from config.load import load_settings, load_world
 from runtime.cli.commands.offline_io import refuse_unwritable
 from runtime.cli.tables import objects_table, pose_line
 from runtime.cycle.summary import write_json
@@ -22,6 +22,7 @@ TRAJECTORY_HEADER: Final = "t,x,y,theta,sxx,sxy,syy,stt,status"
 if TYPE_CHECKING:
     from drivers.messages import Firing
     from perception.localization.drift_correction import LocalizedPose
+    from perception.localization.room import Room
 
 
 def replay_log(
@@ -34,26 +35,36 @@ def replay_log(
     units: Units,
     localize: bool = False,
     trajectory: str | None = None,
+    map_file: str | None = None,
 ) -> int:
     """Run perception over a ring log, print the objects and return the exit code.
 
     Parameters
     ----------
-    log, sets, robot, models, json_file, units, localize, trajectory
+    log, sets, robot, models, json_file, units, localize, trajectory, map_file
         As of `runtime.cli.recording_commands.replay`.
     """
     settings = load_settings(None, sets, robot=robot, models=models)
+    room = None if map_file is None else known_room_of(map_file)
     console = Console(stderr=True)
     refuse_unwritable({"--json": json_file, "--trajectory": trajectory})
-    prepare_kernels(settings, console, (*needed_parts(settings), *([LOCALIZATION] if localize else [])))
+    prepare_kernels(
+        settings, console, (*needed_parts(settings), *([LOCALIZATION] if localize and room is None else []))
+    )
     from runtime.recording.ring_log import read_ring_log
-    from runtime.recording.ring_log_replay import replay_firings, replay_localized
+    from runtime.recording.ring_log_replay import replay_firings, replay_in_known_room, replay_localized
 
     rows: list[str] = []
+
+    def on_pose(t: float, here: LocalizedPose) -> None:
+        rows.append(trajectory_row(t, here))
+
     with progress(console, "replaying") as step:
         firings = _each(read_ring_log(Path(log), sensors=len(settings.ring.mounts)), step)
-        if localize:
-            summary = replay_localized(settings, firings, lambda t, here: rows.append(trajectory_row(t, here)))
+        if room is not None:
+            summary = replay_in_known_room(settings, firings, room, on_pose)
+        elif localize:
+            summary = replay_localized(settings, firings, on_pose)
         else:
             summary = replay_firings(settings, firings)
     if trajectory is not None:
@@ -61,7 +72,7 @@ def replay_log(
     if json_file is not None:
         write_json(json_file, summary)
     output = Console()
-    output.print(objects_table(summary["objects"], units, frame="map" if localize else "odometry"))
+    output.print(objects_table(summary["objects"], units, frame=summary.get("frame", "odometry")))
     if "pose" in summary:
         output.print(pose_line(summary["pose"], units))
     cycle_us = summary["cycle_us"]
@@ -70,6 +81,23 @@ def replay_log(
         f"a firing takes {cycle_us['p50'] / 1e3:.2f} ms, p99 {cycle_us['p99'] / 1e3:.2f} ms"
     )
     return DONE
+
+
+def known_room_of(map_file: str) -> Room:
+    """Return the walls and round objects of a world file as a known room.
+
+    Raises
+    ------
+    UserError
+        The file cannot be read, is invalid, or has no surface.
+    """
+    from drivers.emulator.scene import compile_scene
+    from runtime.simulation.localization_trials import room_of
+
+    try:
+        return room_of(compile_scene(load_world(map_file)))
+    except ValueError as error:
+        raise UserError(f"{map_file}: {error}", WRONG_CALL) from error
 
 
 def trajectory_row(t: float, here: LocalizedPose) -> str:

@@ -9,8 +9,10 @@ import pytest
 
 from config.load import load_settings
 from config.units import FOOT_M
+from perception.localization.drift_correction import LocalizedPose
 from runtime.recording.ring_log import read_ring_log
-from runtime.recording.ring_log_replay import FiringReplayer, replay_firings
+from runtime.recording.ring_log_replay import FiringReplayer, replay_firings, replay_in_known_room
+from runtime.simulation.known_room_trials import furnished_drive
 
 PAPER = load_settings("hallway", ["perception.method=paper"])
 START_FT = -6.0
@@ -44,3 +46,16 @@ def test_the_summary_names_the_drums(hall_log: Path) -> None:
 def test_no_firing_gives_an_empty_summary() -> None:
     summary = replay_firings(PAPER, [])
     assert (summary["objects"], summary["segments"], summary["cycles"]) == ([], 0, 0)
+
+
+@pytest.mark.compiled
+def test_a_replay_in_a_known_room_gives_objects_and_pose_in_its_frame() -> None:
+    settings = load_settings("hallway", ("perception.method=paper",))
+    drive = furnished_drive(settings.ring, 2000, length_m=1.5)
+    poses: list[LocalizedPose] = []
+    summary = replay_in_known_room(settings, drive.firings, drive.room, lambda _t, here: poses.append(here))
+    assert len(poses) == summary["cycles"] == len(drive.firings)
+    assert poses[0].status == "localizing"
+    assert (summary["pose"]["status"], summary["frame"]) == ("tracking", "map")
+    x, y, _ = drive.truth[-1].tolist()
+    assert (summary["pose"]["x"], summary["pose"]["y"]) == pytest.approx((x, y), abs=0.05)

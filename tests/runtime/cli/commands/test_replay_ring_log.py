@@ -35,6 +35,25 @@ def test_a_trajectory_needs_the_map_frame(capsys: pytest.CaptureFixture[str]) ->
 
 
 @pytest.mark.usefixtures("bad_files")
+def test_a_map_needs_localize_and_a_surface(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(["replay", "good.csv", "--map", "hallway"]) == WRONG_CALL
+    assert "--localize" in capsys.readouterr().err
+    Path("empty.toml").write_text("[start]\nx_m = 0.0\n", "utf-8")
+    assert run_command(["replay", "good.csv", "--localize", "--map", "empty.toml"]) == WRONG_CALL
+    assert "empty.toml: expected at least one wall" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("bad_files")
+def test_a_replay_in_a_known_room_starts_without_a_pose() -> None:
+    words = ["replay", "good.csv", "--localize", "--map", "hallway", "--trajectory", "path.csv", "--json", "x.json"]
+    assert run_command(words) == DONE
+    result = json.loads(Path("x.json").read_bytes())
+    assert "frame" not in result  # the robot's place is not known yet: objects are in odometry's frame
+    assert (result["pose"]["status"], result["pose"]["probability"]) == ("localizing", 0.0)
+    assert Path("path.csv").read_text("utf-8").splitlines()[1].split(",")[-1] == "localizing"
+
+
+@pytest.mark.usefixtures("bad_files")
 def test_a_replay_of_one_firing(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command(["replay", "good.csv", "--model", "drum", "--model", "box", "--json", "x.json"]) == DONE
     captured = capsys.readouterr()
