@@ -123,11 +123,15 @@ class Page:
         return await self.answer(await self.send(**message))
 
     async def closed(self) -> int | None:
-        """Wait until the server has closed the connection; return its code."""
+        """Wait until the server has closed the connection; return the code that it gave.
+
+        Where its connection is gone before this client's answer to it, as on a busy machine, aiohttp forgets that code.
+        """
         while True:
             message = await asyncio.wait_for(self.socket.receive(), TIMEOUT_S)
-            if message.type in {aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSED, aiohttp.WSMsgType.CLOSING,
-                                aiohttp.WSMsgType.ERROR}:  # fmt: skip
+            if message.type is aiohttp.WSMsgType.CLOSE:
+                return int(message.data)
+            if message.type in {aiohttp.WSMsgType.CLOSED, aiohttp.WSMsgType.CLOSING, aiohttp.WSMsgType.ERROR}:
                 return self.socket.close_code
 
 
