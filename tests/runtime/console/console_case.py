@@ -125,7 +125,7 @@ class Page:
     async def closed(self) -> int | None:
         """Wait until the server has closed the connection; return the code that it gave.
 
-        Where its connection is gone before this client's answer to it, as on a busy machine, aiohttp forgets that code.
+        Where its connection is gone before this client answers it, as on a busy machine, aiohttp forgets that code.
         """
         while True:
             message = await asyncio.wait_for(self.socket.receive(), TIMEOUT_S)
