@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Final, TypeAlias
 
 from cyclopts import App, Parameter
 from rich.console import Console
+from rich.table import Table
 
 from bench.console import console_table
 from bench.console import figures as figures_of
@@ -24,6 +25,7 @@ from bench.waking import figures, waking_table
 from bench.waking import measure as measure_waking
 from config.errors import UserError
 from config.load import load_settings
+from config.robot import RingConfig
 from runtime.support.kernel_cache import EMULATOR, PARTS, prepare_kernels, use_kernel_cache
 
 OURS: Final = (
@@ -196,6 +198,28 @@ def waking(*, json: str = "waking.json", turns: int = WAKING_TURNS, busy: int = 
     return 0
 
 
+Rows: TypeAlias = dict[str, dict[str, float]]
+
+
+def _try_in_rooms(
+    measure: Callable[[RingConfig, Iterable[int], Callable[[str], None]], Rows],
+    table: Callable[[Rows], Table],
+    json: str,
+    seeds: Iterable[int],
+) -> int:
+    """Write and print what is measured in the rooms of some seeds."""
+    from runtime.cycle.summary import write_json
+
+    console = Console(stderr=True)
+    settings = load_settings("hallway")
+    prepare_kernels(settings, console, (EMULATOR,))
+    with console.status("bench") as status:
+        rows = measure(settings.ring, seeds, status.update)
+    write_json(json, rows)
+    _wide().print(table(rows))
+    return 0
+
+
 @app.command
 def localization(*, json: str = "localization.json", rooms: int = 100, first: int = 0) -> int:
     """Measure global localisation from one stand of the ring in random known rooms.
@@ -211,16 +235,8 @@ def localization(*, json: str = "localization.json", rooms: int = 100, first: in
     """
     use_kernel_cache()
     from bench.localization import localization_table, measure
-    from runtime.cycle.summary import write_json
 
-    console = Console(stderr=True)
-    settings = load_settings("hallway")
-    prepare_kernels(settings, console, (EMULATOR,))
-    with console.status("bench") as status:
-        rows = measure(settings.ring, range(first, first + max(1, rooms)), status.update)
-    write_json(json, rows)
-    _wide().print(localization_table(rows))
-    return 0
+    return _try_in_rooms(measure, localization_table, json, range(first, first + max(1, rooms)))
 
 
 @app.command
@@ -238,16 +254,8 @@ def known_room(*, json: str = "known_room.json", rooms: int = 20, first: int = 1
     """
     use_kernel_cache()
     from bench.known_room import known_room_table, measure
-    from runtime.cycle.summary import write_json
 
-    console = Console(stderr=True)
-    settings = load_settings("hallway")
-    prepare_kernels(settings, console, (EMULATOR,))
-    with console.status("bench") as status:
-        rows = measure(settings.ring, range(first, first + max(1, rooms)), status.update)
-    write_json(json, rows)
-    _wide().print(known_room_table(rows))
-    return 0
+    return _try_in_rooms(measure, known_room_table, json, range(first, first + max(1, rooms)))
 
 
 @app.command
