@@ -1,4 +1,4 @@
-"""The probability of ranges in a room of which it is not known how it reflects: a mixture of both models.
+"""The probability of a range in a room of which it is not known how it reflects: a mixture of both models.
 
 Rough surfaces answer from the nearest point in the beam (`cone`), smooth ones from the foot of the perpendicular
 (`specular`). Most rooms have both. Each reading is from one model with a probability that is learned on the way.
@@ -6,77 +6,81 @@ Rough surfaces answer from the nearest point in the beam (`cone`), smooth ones f
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
 
-import numpy as np
-
-from perception.kernel import Floats
-from perception.localization.expected_ranges import Beams, Expected, expected_ranges
-from perception.localization.range_likelihood import HEARD_SHARE, RangeModel
-from perception.localization.room import Room
+from perception.kernel import kernel
+from perception.localization.range_likelihood import HEARD_SHARE
+from perception.localization.surroundings import SensorModel
+from perception.records import Records
 
 
-class Expectations(NamedTuple):
-    """What the sensors should read, by either model of reflection."""
-
-    cone: Expected
-    specular: Expected
-
-
-class MixedRatio(NamedTuple):
-    """How well readings fit, each an array of the sensors' shape."""
-
-    log_ratio: Floats
-    """Log likelihood ratio to a reading from anywhere, nat."""
-    fits_cone: Floats
-    """Probability that the echo is the one that `cone` expects, …"""
-    fits_specular: Floats
-    """… and the one that `specular` expects; 0 for silence."""
-    prefers_specular: Floats
-    """Probability that the reading, silence too, is from the specular model."""
+@kernel
+def range_variance(sensor: Records[SensorModel], range_m: float) -> float:
+    """Return the variance of a range, m²; at silence, that of the farthest range."""
+    r = min(range_m, sensor[0].window_m) * sensor[0].noise_relative
+    return sensor[0].variance + r * r
 
 
-def expect_both(room: Room, beams: Beams, half_angle: float) -> Expectations:
-    """Return what sensors should read by both models; arguments as of `expected_ranges`."""
-    return Expectations(
-        expected_ranges(room, beams, half_angle, "cone"), expected_ranges(room, beams, half_angle, "specular")
-    )
-
-
-def mixed_ratio(
-    model: RangeModel,
-    measured: Floats,
-    expected: Expectations,
-    specular_share: float,
-    variance: tuple[Floats, Floats],
-) -> MixedRatio:
-    """Return how well readings fit to what either model expects.
+@kernel
+def range_density(
+    sensor: Records[SensorModel], measured: float, expected: float, variance: float
+) -> tuple[float, float]:  # fmt: skip
+    """Return the density (1/m) of a reading by one model, or its probability for silence, and the echo's part of it.
 
     Parameters
     ----------
-    model : RangeModel
+    sensor : (1,) SensorModel
         Errors of a range.
-    measured : (n,) float
-        Ranges, m; inf for silence.
-    expected : Expectations
-        Arrays of shape (poses, n).
+    measured, expected : float
+        Ranges, m; inf for silence. An expected range beyond the window is silence.
+    variance : float
+        Of the expected range, from the pose's, m².
+    """
+    model = sensor[0]
+    answers = expected <= model.window_m
+    if measured == math.inf:
+        return (model.dropout if answers else 1.0 - model.outliers), 0.0
+    echo = 0.0
+    if answers:
+        total = range_variance(sensor, expected) + variance
+        error = measured - expected
+        peak = (1.0 - model.dropout - model.outliers) / math.sqrt(2.0 * math.pi * total)
+        echo = peak * math.exp(-0.5 * error * error / total)
+    return echo + model.outliers / model.window_m, echo
+
+
+@kernel
+def mixed_ratio(
+    sensor: Records[SensorModel], measured: float, cone_m: float, cone_variance: float, specular_m: float,
+    specular_variance: float, specular_share: float,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Return how well a reading fits.
+
+    Parameters
+    ----------
+    sensor : (1,) SensorModel
+        Errors of a range.
+    measured : float
+        Range, m; inf for silence.
+    cone_m, specular_m : float
+        Expected by either model, m; inf for silence.
+    cone_variance, specular_variance : float
+        Of the expected ranges, from the pose's, m².
     specular_share : float
         Probability that a reading is from the specular model.
-    variance : (float, float)
-        Variance of the expected ranges of either model that comes from the pose, m²; of the same shape.
+
+    Returns
+    -------
+    tuple of float
+        Log likelihood ratio to a reading from anywhere, nat; probabilities that the echo is the one that `cone`
+        expects, and the one that `specular` expects, 0 for silence; and that the reading, silence too, is from the
+        specular model.
     """
-    heard = np.isfinite(measured)
-    wild = model.outliers / model.window_m
-    likely, fits = [], []
-    for one, extra, share in zip(expected, variance, (1.0 - specular_share, specular_share), strict=True):
-        answers = one.range_m <= model.window_m
-        sigma = np.sqrt(model.sigma(one.range_m) ** 2 + extra)
-        with np.errstate(invalid="ignore"):
-            error = np.where(heard & answers, measured - one.range_m, 0.0) / sigma
-        echo = np.where(heard & answers, model.peak(sigma) * np.exp(-0.5 * error * error), 0.0)
-        silent = np.where(answers, model.dropout, 1.0 - model.outliers)
-        likely.append(share * np.where(heard, echo + wild, silent))
-        fits.append(share * echo)
-    total = likely[0] + likely[1]
-    anywhere = np.where(heard, HEARD_SHARE / model.window_m, 1.0 - HEARD_SHARE)
-    return MixedRatio(np.log(total / anywhere), fits[0] / total, fits[1] / total, likely[1] / total)
+    cone, cone_echo = range_density(sensor, measured, cone_m, cone_variance)
+    specular, specular_echo = range_density(sensor, measured, specular_m, specular_variance)
+    total = (1.0 - specular_share) * cone + specular_share * specular
+    anywhere = 1.0 - HEARD_SHARE if measured == math.inf else HEARD_SHARE / sensor[0].window_m
+    return (
+        math.log(total / anywhere), (1.0 - specular_share) * cone_echo / total,
+        specular_share * specular_echo / total, specular_share * specular / total,
+    )  # fmt: skip

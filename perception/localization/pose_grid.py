@@ -2,226 +2,362 @@
 
 The expected range of each cell and direction is computed once, coarsely. A search then compares readings of a short
 drive with this table, shifted and turned. It yields starts for a finer fit: places that a tree of segments would miss
-where maps are large, walls short and echoes few.
+where maps are large, walls short and echoes few. Both go on quantum by quantum. The table follows from the room, so
+it belongs to no snapshot: after a snapshot was restored, what is missing of it is computed again.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Iterator
-from typing import Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.kernel import Floats
-from perception.localization.expected_ranges import SIGHT_SLACK_M, Reflection, crossed, mirror_points, surfaces_near
-from perception.localization.panorama import Panorama
-from perception.localization.range_likelihood import HEARD_SHARE, RangeModel
+from perception.kernel import Floats, kernel
+from perception.localization.expected_ranges import Reflection
+from perception.localization.range_likelihood import HEARD_SHARE
 from perception.localization.room import Room
+from perception.localization.surroundings import Surroundings, expect_cone, expect_specular, look_around
+from perception.records import Record, Records, records, zeros
 
 CELL_M: Final = 0.2
 DIRECTIONS: Final = 60
 STEP_RAD: Final = 2.0 * math.pi / DIRECTIONS
+CELLS_PER_QUANTUM: Final = 4
+"""Cells of the table that one quantum computes."""
 BLOCK: Final = 16
-"""Cells of a block's side: the unit in which the table is computed."""
+"""Cells of a block's side: a quantum of a search compares one block at one heading."""
+READINGS_MAX: Final = 72
+"""Readings that are compared."""
 SIGMA_M: Final = 0.12
 SIGMA_SHARE: Final = 0.03
 """Standard deviation of a range from the table: of half a cell, and a share of the range."""
 DROPOUT: Final = 0.3
 OUTLIERS: Final = 0.2
 """Shares of expected echoes that are not heard, and of readings that are anything: the table knows no more."""
-OUTSIDE: Final = np.float32(0.125)
+OUTSIDE: Final = 0.125
 """Likelihood ratio of a reading that would be taken outside the table."""
-FACTORS: Final = 8
-"""Ratios that are multiplied before their logarithm is taken: neither too small nor too large for float32."""
+FACTORS: Final = 24
+"""Ratios that are multiplied before their logarithm is taken: neither too small nor too large for a float."""
 SILENT: Final = 255
-"""Code of silence in the table."""
-STARTS_MAX: Final = 100
+"""Code of silence in the table; a range is a share of 254 of the window."""
+STARTS_MAX: Final = 200
+APART_M: Final = 1.5 * CELL_M
+APART_RAD: Final = 1.5 * STEP_RAD
+"""Starts nearer to each other than this, on each axis, are one."""
+NONE: Final = -1
+
+Bytes = NDArray[np.uint8]
+
+
+class Start(Record):
+    """A pose (m, rad) and how well the readings fit there, nat."""
+
+    x: float
+    y: float
+    heading: float
+    score: float
+
+
+class Starts(Record):
+    """The best poses found so far, in any order."""
+
+    count: int
+    starts: Annotated[Records[Start], STARTS_MAX]
+
+
+class ScoreScratch(Record):
+    """Overwritten before each use: of the cells of a block, row by row."""
+
+    product: Annotated[Floats, BLOCK * BLOCK]
+    score: Annotated[Floats, BLOCK * BLOCK]
+
+
+@kernel
+def fill_cell(
+    s: Surroundings, table: Bytes, free: Bytes, i: int, j: int, x: float, y: float, clear_m: float
+) -> None:  # fmt: skip
+    """Write the expected ranges of one cell into the table, and whether the ring may be there.
+
+    Parameters
+    ----------
+    s : Surroundings
+        `near` is overwritten.
+    table : (2, DIRECTIONS, n, m) uint8
+        Codes of the ranges by `cone` and by `specular`.
+    free : (n, m) uint8
+        1 where the ring's centre may be.
+    i, j : int
+        The cell.
+    x, y : float
+        Its middle, m.
+    clear_m : float
+        The ring's centre is farther than this from any surface, m.
+    """
+    look_around(s, x, y, 0.0)
+    near, window_m = s.near[0], s.sensor[0].window_m
+    is_free = near.wall_count == 0 or near.wall_m[0] > clear_m
+    free[i, j] = 1 if is_free and (near.circle_count == 0 or near.circle_m[0] > clear_m) else 0
+    for d in range(DIRECTIONS):
+        cos, sin = math.cos(STEP_RAD * d), math.sin(STEP_RAD * d)
+        cone_m, _, _ = expect_cone(s, x, y, cos, sin)
+        specular_m, _, _ = expect_specular(s, x, y, cos, sin)
+        table[0, d, i, j] = int(cone_m * (254.0 / window_m) + 0.5) if cone_m <= window_m else SILENT
+        table[1, d, i, j] = int(specular_m * (254.0 / window_m) + 0.5) if specular_m <= window_m else SILENT
+
+
+@kernel
+def offer(to: Records[Starts], x: float, y: float, heading: float, score: float) -> None:
+    """Add a start, unless a better one is near it or all are better; it replaces a worse one near it.
+
+    Parameters
+    ----------
+    to : (1,) Starts
+        Updated.
+    x, y, heading, score : float
+        As of `Start`.
+    """
+    starts, worst = to[0].starts, 0
+    for k in range(to[0].count):
+        other = starts[k]
+        turn = abs((heading - other.heading + math.pi) % (2.0 * math.pi) - math.pi)
+        if abs(x - other.x) < APART_M and abs(y - other.y) < APART_M and turn < APART_RAD:
+            if score > other.score:
+                other.x, other.y, other.heading, other.score = x, y, heading, score
+            return
+        if other.score < starts[worst].score:
+            worst = k
+    if to[0].count < STARTS_MAX:
+        worst = to[0].count
+        to[0].count += 1
+    elif starts[worst].score >= score:
+        return
+    at = starts[worst]
+    at.x, at.y, at.heading, at.score = x, y, heading, score
+
+
+@kernel
+def score_block(
+    table: Bytes, free: Bytes, likely: Floats, readings: Floats, count: int, direction: int, begin_i: int,
+    begin_j: int, scratch: Records[ScoreScratch],
+) -> None:  # fmt: skip
+    """Sum the log ratios of the readings at each cell of a block with one heading; -inf where the ring cannot be.
+
+    Parameters
+    ----------
+    table, free : uint8
+        As of `fill_cell`.
+    likely : (n, 2, 256) float
+        Each reading's likelihood ratio at each code of either model's table.
+    readings : (n, 5) float
+        As of `perception.localization.particle_update`.
+    count : int
+        How many of them.
+    direction : int
+        The heading, in steps.
+    begin_i, begin_j : int
+        First cell of the block.
+    scratch : (1,) ScoreScratch
+        Gets the scores.
+    """
+    product, score = scratch[0].product, scratch[0].score
+    rows, columns = len(free), len(free[0])
+    cos, sin = math.cos(STEP_RAD * direction), math.sin(STEP_RAD * direction)
+    product[:] = 1.0
+    score[:] = 0.0
+    for n in range(count):
+        x, y, c, s, _ = readings[n]
+        shift_i = math.floor((cos * x - sin * y) / CELL_M + 0.5)
+        shift_j = math.floor((sin * x + cos * y) / CELL_M + 0.5)
+        d = math.floor((STEP_RAD * direction + math.atan2(s, c)) / STEP_RAD + 0.5) % DIRECTIONS
+        for a in range(BLOCK):
+            i = begin_i + a + shift_i
+            for b in range(BLOCK):
+                j = begin_j + b + shift_j
+                ratio = OUTSIDE
+                if 0 <= i < rows and 0 <= j < columns:
+                    ratio = likely[n, 0, table[0, d, i, j]] + likely[n, 1, table[1, d, i, j]]
+                product[BLOCK * a + b] *= ratio
+        if n % FACTORS == FACTORS - 1 or n == count - 1:
+            for k in range(BLOCK * BLOCK):
+                score[k] += math.log(product[k])
+                product[k] = 1.0
+    for a in range(BLOCK):
+        for b in range(BLOCK):
+            i, j = begin_i + a, begin_j + b
+            if i >= rows or j >= columns or not free[i, j]:
+                score[BLOCK * a + b] = -math.inf
+
+
+@kernel
+def offer_peaks(
+    to: Records[Starts], scratch: Records[ScoreScratch], x: float, y: float, heading: float
+) -> None:  # fmt: skip
+    """Offer the cells of a block that fit at least as well as all their neighbours in it.
+
+    Parameters
+    ----------
+    to : (1,) Starts
+        Updated.
+    scratch : (1,) ScoreScratch
+        From `score_block`.
+    x, y : float
+        Middle of the block's first cell, m.
+    heading : float
+        rad
+    """
+    score = scratch[0].score
+    for a in range(BLOCK):
+        for b in range(BLOCK):
+            here = score[BLOCK * a + b]
+            is_peak = here > -math.inf
+            for i in range(max(0, a - 1), min(BLOCK, a + 2)):
+                for j in range(max(0, b - 1), min(BLOCK, b + 2)):
+                    is_peak = is_peak and here >= score[BLOCK * i + j]
+            if is_peak:
+                offer(to, x + CELL_M * a, y + CELL_M * b, heading, here)
 
 
 class PoseGrid:
-    """The table of one room.
+    """The table of one room, and a search in it.
 
     Parameters
     ----------
     room : Room
         The surfaces.
-    half_angle : float
-        Half the beam's opening, rad.
-    window_m : float
-        Greatest range, m.
+    surroundings : Surroundings
+        Of this room.
     clear_m : float
         The ring's centre is farther than this from any surface, m.
+
+    Attributes
+    ----------
+    starts : (1,) Starts
+        What the last search found.
     """
 
-    def __init__(self, room: Room, half_angle: float, window_m: float, clear_m: float) -> None:
-        self._room, self._half_angle, self._window_m, self._clear_m = room, half_angle, window_m, clear_m
+    SCRATCH: Final = ("_origin", "_table", "_free", "_filled", "_scratch", "_likely", "_likely_search", "starts")
+    """What follows from the room, what is overwritten before each use, and a view of other memory."""
+
+    def __init__(self, room: Room, surroundings: Surroundings, clear_m: float) -> None:
+        self._surroundings, self._clear_m = surroundings, clear_m
         low, high = room.bounds
         self.shape = tuple(max(1, math.ceil(side / CELL_M)) for side in (high - low).tolist())
         # Symmetric about the room's middle: the answers of a symmetric room are then exactly alike.
         self._origin = 0.5 * (low + high) - 0.5 * CELL_M * (np.array(self.shape) - 1.0)
         self._table = np.full((2, DIRECTIONS, *self.shape), SILENT, dtype=np.uint8)
-        self._free = np.zeros(self.shape, dtype=np.bool_)
-        self._building = self._build()
+        self._free = np.zeros(self.shape, dtype=np.uint8)
+        self._filled = 0
+        """Cells whose part of the table is filled."""
+        self._due = 0
+        """Cells whose part is needed: quanta count on this, not on what memory holds after a restored snapshot."""
+        self._found = zeros(Starts, 1)
+        self.starts = records(Starts, self._found)
+        self._scratch = records(ScoreScratch, zeros(ScoreScratch, 1))
+        self._readings = np.zeros((READINGS_MAX, 5))
+        self._count = self._searches = 0
+        self._specular_share = 0.5
+        self._quantum = NONE
+        """Of the search; `NONE` without one."""
+        self._likely = np.zeros((READINGS_MAX, 2, SILENT + 1))
+        self._likely_search = 0
+        """Number of the search that the likelihoods are of."""
 
-    def _build(self) -> Iterator[None]:
-        """Fill the table block by block."""
-        half_m = 0.5 * CELL_M * BLOCK
-        for i in range(0, self.shape[0], BLOCK):
-            for j in range(0, self.shape[1], BLOCK):
-                block = (slice(i, i + BLOCK), slice(j, j + BLOCK))
-                shape = self._free[block].shape
-                cells = np.argwhere(np.ones(shape, dtype=np.bool_)) + np.array([i, j])
-                middle_x, middle_y = (self._origin + CELL_M * np.array([i, j]) + half_m - 0.5 * CELL_M).tolist()
-                room = surfaces_near(self._room, middle_x, middle_y, math.sqrt(2.0) * half_m, self._window_m)
-                x, y = (self._origin + CELL_M * cells).T
-                self._free[block] = (_clearance(room, x, y) > self._clear_m).reshape(shape)
-                for k, ranges in enumerate((self._cone(room, x, y), self._specular(room, x, y))):
-                    code = np.where(ranges <= self._window_m, ranges * (254.0 / self._window_m), SILENT)
-                    self._table[(k, slice(None), *block)] = np.rint(code).reshape(DIRECTIONS, *shape)
-                yield
+    @property
+    def is_searching(self) -> bool:
+        """Whether a search has work left."""
+        return self._quantum != NONE
 
-    def _specular(self, room: Room, x: Floats, y: Floats) -> Floats:
-        """Return the expected ranges of mirrors at some places, shape (directions, n)."""
-        px, py, distance = mirror_points(room, x, y)
-        cell, point = np.nonzero(distance <= self._window_m)
-        px, py, distance = px[cell, point], py[cell, point], distance[cell, point]
-        seen = ~crossed(room, x[cell], y[cell], x[cell] + px, y[cell] + py, SIGHT_SLACK_M)
-        return self._nearest(len(x), cell[seen], px[seen], py[seen], distance[seen])
-
-    def _cone(self, room: Room, x: Floats, y: Floats) -> Floats:
-        """Return the distances of the nearest points in the beams at some places, shape (directions, n)."""
-        px, py, distance = mirror_points(room, x, y)
-        ends = room.walls.reshape(-1, 2)
-        end_x, end_y = ends[:, 0] - x[:, None], ends[:, 1] - y[:, None]
-        px, py = np.hstack([px, end_x]), np.hstack([py, end_y])
-        distance = np.hstack([distance, np.hypot(end_x, end_y)])
-        cell, point = np.nonzero(distance <= self._window_m)
-        found = self._nearest(len(x), cell, px[cell, point], py[cell, point], distance[cell, point])
-        rays = np.stack([_ray(room, x, y, theta) for theta in (STEP_RAD * np.arange(DIRECTIONS)).tolist()])
-        edge = max(1, round(self._half_angle / STEP_RAD))
-        return np.minimum(found, np.minimum(np.roll(rays, edge, axis=0), np.roll(rays, -edge, axis=0)))
-
-    def _nearest(self, cells: int, cell: NDArray[np.int64], px: Floats, py: Floats, distance: Floats) -> Floats:
-        """Return the nearest of the points that each cell has in each direction's beam, shape (directions, cells)."""
-        nearest = np.full((DIRECTIONS, cells), np.inf)
-        bearing = np.arctan2(py, px)
-        width = math.ceil(self._half_angle / STEP_RAD)
-        for off in range(-width, width + 1):
-            direction = np.rint(bearing / STEP_RAD).astype(np.int64) + off
-            in_beam = np.abs(direction * STEP_RAD - bearing) <= self._half_angle
-            at = (direction[in_beam] % DIRECTIONS, cell[in_beam])
-            np.minimum.at(nearest, at, distance[in_beam])
-        return nearest
-
-    def expected(self, reflection: Reflection) -> Floats:
-        """Return the ranges of one model's table, m; inf for silence, shape (directions, cells, cells)."""
-        for _ in self._building:
-            pass
-        codes = self._table[("cone", "specular").index(reflection)]
-        return np.where(codes == SILENT, np.inf, codes * (self._window_m / 254.0))
-
-    def places(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> Floats:
-        """Return the middles of cells, m, shape (n, 2)."""
-        return np.asarray(self._origin + CELL_M * np.column_stack([i, j]))
-
-    def search(self, readings: Panorama, model: RangeModel, specular_share: float) -> Generator[None, None, Floats]:
-        """Search step by step; return the poses of the frame of the readings that fit best, shape (n, 3).
+    def begin(self, readings: Floats, specular_share: float) -> None:
+        """Begin a search.
 
         Parameters
         ----------
-        readings : Panorama
-            Of a short drive, in one frame; none is NaN.
-        model : RangeModel
-            For the window.
+        readings : (n, 5) float
+            Of a short drive, in one frame, as of `perception.localization.particle_update`; at most `READINGS_MAX`.
         specular_share : float
             Probability that a reading is from the specular model.
         """
-        yield from self._building
-        likely = self._likely(readings.range_m, model, specular_share)
-        score = np.full((DIRECTIONS, *self.shape), -np.inf, dtype=np.float32)
-        for h in range(DIRECTIONS):
-            score[h][self._free] = self._score(h, readings, likely)[self._free]
-            yield
-        peaks = np.flatnonzero(_is_peak(score))
-        best = peaks[np.argsort(-score.reshape(-1)[peaks], kind="stable")[:STARTS_MAX]]
-        heading, i, j = np.unravel_index(best, score.shape)
-        return np.column_stack([self.places(i, j), heading * STEP_RAD])
+        self._count = len(readings)
+        self._readings[: self._count] = readings
+        self._specular_share = specular_share
+        self._searches += 1
+        self._quantum = 0
+        self._found["count"] = 0
 
-    def _likely(self, measured: Floats, model: RangeModel, specular_share: float) -> NDArray[np.float32]:
+    def cancel(self) -> None:
+        """End a search without an answer."""
+        self._quantum = NONE
+
+    def refine(self) -> None:
+        """Do one quantum of a search: part of the table if it is not complete, otherwise a block at one heading."""
+        cells = self.shape[0] * self.shape[1]
+        if self._due < cells:
+            self._due = min(cells, self._due + CELLS_PER_QUANTUM)
+            self._fill()
+            return
+        if self._likely_search != self._searches:
+            self._fill()
+            self._likely[: self._count] = self._likelihoods()
+            self._likely_search = self._searches
+        blocks_i, blocks_j = (math.ceil(side / BLOCK) for side in self.shape)
+        direction, block = divmod(self._quantum, blocks_i * blocks_j)
+        i, j = BLOCK * (block // blocks_j), BLOCK * (block % blocks_j)
+        score_block(
+            self._table, self._free, self._likely, self._readings, self._count, direction, i, j, self._scratch
+        )
+        x, y = (self._origin + CELL_M * np.array([i, j])).tolist()
+        offer_peaks(self.starts, self._scratch, x, y, direction * STEP_RAD)
+        self._quantum += 1
+        if self._quantum >= DIRECTIONS * blocks_i * blocks_j:
+            self._quantum = NONE
+
+    def best_starts(self, most: int) -> Floats:
+        """Return the poses that fit best: x, y (m), heading (rad), shape (n, 3), the best first."""
+        found = self._found["starts"][0, : int(self._found["count"][0])]
+        order = np.argsort(-found["score"], kind="stable")[:most]
+        return np.column_stack([found[name][order] for name in ("x", "y", "heading")])
+
+    def drop_caches(self) -> None:
+        """Discard what was computed for a search, after another state was restored."""
+        self._likely_search = 0
+
+    def expected(self, reflection: Reflection) -> Floats:
+        """Return the ranges of one model's table, m; inf for silence, shape (directions, cells, cells)."""
+        self._due = self.shape[0] * self.shape[1]
+        self._fill()
+        codes = self._table[("cone", "specular").index(reflection)]
+        return np.where(codes == SILENT, np.inf, codes * (self._window_m / 254.0))
+
+    def places(self, i: NDArray[Any], j: NDArray[Any]) -> Floats:
+        """Return the middles of cells, m, shape (n, 2)."""
+        return np.asarray(self._origin + CELL_M * np.column_stack([i, j]))
+
+    @property
+    def _window_m(self) -> float:
+        return float(self._surroundings.sensor[0].window_m)
+
+    def _fill(self) -> None:
+        """Compute the cells that are needed and missing."""
+        origin_x, origin_y = self._origin.tolist()
+        while self._filled < min(self._due, self.shape[0] * self.shape[1]):
+            i, j = divmod(self._filled, self.shape[1])
+            x, y = origin_x + CELL_M * i, origin_y + CELL_M * j
+            fill_cell(self._surroundings, self._table, self._free, i, j, x, y, self._clear_m)
+            self._filled += 1
+
+    def _likelihoods(self) -> Floats:
         """Return each reading's likelihood ratio at each code of either model's table, shape (n, 2, 256)."""
+        measured = self._readings[: self._count, 4]
         expected = np.append(np.arange(SILENT) * (self._window_m / 254.0), np.inf)
         sigma = np.hypot(SIGMA_M, SIGMA_SHARE * np.minimum(expected, self._window_m))
         heard = np.isfinite(measured)[:, None]
         with np.errstate(invalid="ignore"):
             error = (np.where(heard, measured[:, None], 0.0) - expected) / sigma
         echo = (1.0 - DROPOUT - OUTLIERS) / (sigma * math.sqrt(2.0 * math.pi)) * np.exp(-0.5 * error**2)
-        echo = np.where(np.isfinite(expected), echo, 0.0) + OUTLIERS / model.window_m
+        echo = np.where(np.isfinite(expected), echo, 0.0) + OUTLIERS / self._window_m
         silent = np.where(np.isfinite(expected), DROPOUT, 1.0 - OUTLIERS)
-        ratio = np.where(heard, echo / (HEARD_SHARE / model.window_m), silent / (1.0 - HEARD_SHARE))
-        return np.stack([(1.0 - specular_share) * ratio, specular_share * ratio], axis=1).astype(np.float32)
-
-    def _score(self, h: int, readings: Panorama, likely: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the summed log ratio of the readings at each cell with heading number h."""
-        theta = STEP_RAD * h
-        c, s = math.cos(theta), math.sin(theta)
-        shift_i = np.rint((c * readings.x - s * readings.y) / CELL_M).astype(int).tolist()
-        shift_j = np.rint((s * readings.x + c * readings.y) / CELL_M).astype(int).tolist()
-        axis = np.rint((theta + readings.axis) / STEP_RAD).astype(int) % DIRECTIONS
-        total, product = np.zeros(self.shape, dtype=np.float32), np.ones(self.shape, dtype=np.float32)
-        for n, (di, dj, d) in enumerate(zip(shift_i, shift_j, axis.tolist(), strict=True)):
-            (to_i, from_i), (to_j, from_j) = _slices(di, self.shape[0]), _slices(dj, self.shape[1])
-            cone, specular = self._table[0, d, from_i, from_j], self._table[1, d, from_i, from_j]
-            product *= OUTSIDE
-            product[to_i, to_j] *= (likely[n, 0][cone] + likely[n, 1][specular]) * (1.0 / OUTSIDE)
-            if n % FACTORS == FACTORS - 1:
-                total += np.log(product)
-                product[...] = 1.0
-        return total + np.log(product)
-
-
-def _slices(shift: int, size: int) -> tuple[slice, slice]:
-    """Return which cells of a row have a cell so far on, and those cells."""
-    shift = max(-size, min(size, shift))
-    return slice(max(0, -shift), size - max(0, shift)), slice(max(0, shift), size - max(0, -shift))
-
-
-def _ray(room: Room, x: Floats, y: Floats, theta: float) -> Floats:
-    """Return how far a ray from each place in one direction runs until it meets a surface, m; inf if never."""
-    ux, uy = math.cos(theta), math.sin(theta)
-    best = np.full(x.shape, np.inf)
-    if len(room.walls):
-        vx, vy = (room.walls[:, 2:] - room.walls[:, :2]).T
-        ax, ay = room.walls[:, 0] - x[:, None], room.walls[:, 1] - y[:, None]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            slope = 1.0 / (ux * vy - uy * vx)
-            share, way = (uy * ax - ux * ay) * slope, (ax * vy - ay * vx) * slope
-            best = np.where((share >= 0.0) & (share <= 1.0) & (way > 0.0), way, np.inf).min(axis=1)
-    for cx, cy, radius in room.circles.tolist():
-        along, off = (cx - x) * ux + (cy - y) * uy, (cx - x) * uy - (cy - y) * ux
-        into = along - np.sqrt(np.maximum(radius**2 - off**2, 0.0))
-        best = np.minimum(best, np.where((np.abs(off) < radius) & (into > 0.0), into, np.inf))
-    return best
-
-
-def _clearance(room: Room, x: Floats, y: Floats) -> Floats:
-    """Return the distance of places from the nearest surface, m; negative inside a circle."""
-    best = np.full(x.shape, np.inf)
-    for x1, y1, x2, y2 in room.walls.tolist():
-        along_x, along_y = x2 - x1, y2 - y1
-        share = np.clip(((x - x1) * along_x + (y - y1) * along_y) / (along_x**2 + along_y**2), 0.0, 1.0)
-        best = np.minimum(best, np.hypot(x - x1 - share * along_x, y - y1 - share * along_y))
-    for cx, cy, radius in room.circles.tolist():
-        best = np.minimum(best, np.hypot(x - cx, y - cy) - radius)
-    return best
-
-
-def _is_peak(score: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Return which poses fit at least as well as all their neighbours in place and heading."""
-    best = np.maximum(score, np.maximum(np.roll(score, 1, axis=0), np.roll(score, -1, axis=0)))
-    for axis in (1, 2):
-        padded = np.pad(best, [(1, 1) if k == axis else (0, 0) for k in range(3)], constant_values=-np.inf)
-        middle = np.moveaxis(padded, axis, 0)
-        best = np.moveaxis(np.maximum(np.maximum(middle[:-2], middle[1:-1]), middle[2:]), 0, axis)
-    return np.asarray((score >= best) & np.isfinite(score))
+        ratio = np.where(heard, echo / (HEARD_SHARE / self._window_m), silent / (1.0 - HEARD_SHARE))
+        share = self._specular_share
+        return np.stack([(1.0 - share) * ratio, share * ratio], axis=1)

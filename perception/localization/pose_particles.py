@@ -5,28 +5,21 @@ a turn moves echoes into beams and out of them. So each particle is one history 
 the scale of the odometer as a Gaussian that is updated in closed form (Doucet, de Freitas, Murphy and Russell,
 "Rao-Blackwellised particle filtering for dynamic Bayesian networks", 2000). Particles are grouped into hypotheses:
 one for each place at which the robot may be. They are resampled within a hypothesis only, so that chance never
-decides between two places that look alike.
+decides between two places that look alike. `perception.localization.particle_update` enters readings.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final, TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
-from drivers.messages import Pose
-from perception.kernel import Floats
-from perception.localization.mixed_reflection import expect_both, mixed_ratio
-from perception.localization.panorama import Panorama
-from perception.localization.pose_fit import beams_at
-from perception.localization.range_likelihood import RangeModel
-from perception.localization.room import Room
+from perception.kernel import Floats, Ints, kernel
+from perception.localization.surroundings import insert_nearest
+from perception.records import Record, Records
 
 HEADINGS: Final = 13
 """Particles of a hypothesis."""
+HYPOTHESES_MAX: Final = 100
 SCALE_SIGMA: Final = 0.03
 """Standard deviation of the odometer's scale at the start."""
 PLACE_WALK: Final = 0.02**2
@@ -37,10 +30,6 @@ HEADING_WALK: Final = math.radians(1.0) ** 2
 """Variance of the heading by odometry, rad²/m."""
 TURN_SHARE: Final = 0.03
 """Standard deviation of a turn by odometry as a share of it."""
-FIT_STEPS: Final = 2
-"""Linear solutions of an update."""
-TEMPER: Final = 0.5
-"""Weight of a reading's log likelihood: errors of the map are common to readings of one wall."""
 RESAMPLE_SHARE: Final = 0.5
 """Particles are resampled where fewer than this share of them carry the weight."""
 MERGE_M: Final = 0.3
@@ -48,199 +37,289 @@ MERGE_RAD: Final = math.radians(10.0)
 """Hypotheses nearer to each other than this are one."""
 
 
-@dataclass(frozen=True, slots=True)
-class Fit:
-    """How hypotheses explain the readings of one update; arrays of shape (h,)."""
+class Particle(Record):
+    """A heading (rad), and the Gaussian of place (m) and scale of the odometer at it."""
 
-    log_ratio: Floats
-    """Summed log likelihood ratio to readings from anywhere, nat."""
-    specular: Floats
-    """Mean probability of a reading to be from the specular model."""
+    heading: float
+    x: float
+    y: float
+    scale: float
+    xx: float
+    xy: float
+    xs: float
+    yy: float
+    ys: float
+    ss: float
+    log_weight: float
+    """nat; not normalised."""
+    log_ratio: float
+    """Log likelihood ratio of the readings of the last update to readings from anywhere, nat."""
+    specular: float
+    """Mean probability of a reading of the last update to be from the specular model."""
 
 
-class PoseParticles:
-    """Hypotheses with their particles.
+class Hypothesis(Record):
+    """A place at which the robot may be: its log evidence (nat) and mean pose (m, rad) when last summarised."""
+
+    log_evidence: float
+    x: float
+    y: float
+    heading: float
+    particles: Annotated[Records[Particle], HEADINGS]
+
+
+class Best(Record):
+    """The most likely hypothesis after an update: its share of the probability, mean and covariance."""
+
+    share: float
+    x: float
+    y: float
+    heading: float
+    xx: float
+    xy: float
+    xh: float
+    yy: float
+    yh: float
+    hh: float
+    log_ratio: float
+    specular: float
+    """Mean over its particles of their fields of the same name."""
+
+
+class Hypotheses(Record):
+    """All hypotheses; those beyond `count` are zero."""
+
+    count: int
+    best: Best
+    hypotheses: Annotated[Records[Hypothesis], HYPOTHESES_MAX]
+
+
+class ParticleScratch(Record):
+    """Overwritten before each use."""
+
+    weights: Annotated[Floats, HEADINGS]
+    drawn: Annotated[Records[Particle], HEADINGS]
+    order: Annotated[Ints, HYPOTHESES_MAX]
+    keys: Annotated[Floats, HYPOTHESES_MAX]
+    is_kept: Annotated[Ints, HYPOTHESES_MAX]
+
+
+HypothesesRecord: TypeAlias = Records[Hypotheses]
+"""As kernels take it: one record."""
+
+
+@kernel
+def add_hypothesis(
+    of: HypothesesRecord, x: float, y: float, heading: float, place_sigma_m: float, heading_half_rad: float
+) -> None:  # fmt: skip
+    """Add a hypothesis around a pose of the ring; where there are too many already, do nothing.
 
     Parameters
     ----------
-    starts : (h, 3) float
-        Poses of the ring x, y (m), heading (rad).
+    of : (1,) Hypotheses
+        Updated.
+    x, y, heading : float
+        The pose, m and rad.
     place_sigma_m, heading_half_rad : float
-        Standard deviation of the places; half the width of the row of headings around each start.
-
-    Attributes
-    ----------
-    mean : (h, p, 3) float
-        x, y (m) and odometer scale of the particles.
-    covariance : (h, p, 3, 3) float
-    heading : (h, p) float
-        rad
-    log_weight : (h, p) float
-        nat; not normalised.
+        Standard deviation of the place; half the width of the row of headings.
     """
+    count = of[0].count
+    if count == HYPOTHESES_MAX:
+        return
+    particles = of[0].hypotheses[count].particles
+    for i in range(HEADINGS):
+        p = particles[i]
+        p.heading = heading + heading_half_rad * (2.0 * i / (HEADINGS - 1) - 1.0)
+        p.x, p.y, p.scale = x, y, 1.0
+        p.xx, p.xy, p.xs = place_sigma_m * place_sigma_m, 0.0, 0.0
+        p.yy, p.ys, p.ss = place_sigma_m * place_sigma_m, 0.0, SCALE_SIGMA * SCALE_SIGMA
+        p.log_weight, p.log_ratio, p.specular = -math.log(HEADINGS), 0.0, 0.0
+    of[0].count = count + 1
 
-    def __init__(self, starts: Floats, place_sigma_m: float, heading_half_rad: float) -> None:
-        count = len(starts)
-        self.mean = np.ones((count, HEADINGS, 3))
-        self.mean[:, :, :2] = starts[:, None, :2]
-        self.heading = starts[:, 2:] + np.linspace(-heading_half_rad, heading_half_rad, HEADINGS)
-        self.covariance = np.zeros((count, HEADINGS, 3, 3))
-        self.covariance[:, :] = np.diag([place_sigma_m**2, place_sigma_m**2, SCALE_SIGMA**2])
-        self.log_weight = np.full((count, HEADINGS), -math.log(HEADINGS))
 
-    def __len__(self) -> int:
-        return len(self.mean)
+@kernel
+def move(of: HypothesesRecord, forward_m: float, left_m: float, turn_rad: float, noise: Floats) -> None:
+    """Follow odometry: a displacement in the ring's frame before it, and a turn of the ring.
 
-    def move(self, forward_m: float, left_m: float, turn_rad: float, rng: np.random.Generator) -> None:
-        """Follow odometry: a displacement in the ring's frame before it, and a turn of the ring.
+    All hypotheses take the same random numbers, so that chance does not decide between two that are alike.
 
-        All hypotheses draw the same random numbers, so that chance does not decide between two that are alike.
-        """
-        way = math.hypot(forward_m, left_m)
-        noise = math.sqrt(HEADING_WALK * way + (TURN_SHARE * turn_rad) ** 2)
-        wander = noise * rng.standard_normal(HEADINGS)
-        along = self.heading + 0.5 * wander
-        c, s = np.cos(along), np.sin(along)
-        step = np.stack([c * forward_m - s * left_m, s * forward_m + c * left_m], axis=2)
-        self.mean[:, :, :2] += self.mean[:, :, 2:] * step
-        across = self.covariance[:, :, :2, 2] + 0.0
-        cov = self.covariance
-        scale = cov[:, :, 2, 2]
-        cov[:, :, :2, :2] += (
-            step[..., :, None] * across[..., None, :]
-            + across[..., :, None] * step[..., None, :]
-            + scale[..., None, None] * step[..., :, None] * step[..., None, :]
-        )
-        cov[:, :, :2, 2] += scale[..., None] * step
-        cov[:, :, 2, :2] = cov[:, :, :2, 2]
-        cov[:, :, 0, 0] += PLACE_WALK * way
-        cov[:, :, 1, 1] += PLACE_WALK * way
-        cov[:, :, 2, 2] += SCALE_WALK * way
-        self.heading += wander + turn_rad
+    Parameters
+    ----------
+    of : (1,) Hypotheses
+        Updated.
+    forward_m, left_m, turn_rad : float
+        By odometry.
+    noise : (HEADINGS,) float
+        From the standard normal distribution.
+    """
+    way = math.hypot(forward_m, left_m)
+    turn_sigma = TURN_SHARE * turn_rad
+    sigma = math.sqrt(HEADING_WALK * way + turn_sigma * turn_sigma)
+    for h in range(of[0].count):
+        particles = of[0].hypotheses[h].particles
+        for i in range(HEADINGS):
+            p, wander = particles[i], sigma * noise[i]
+            c, s = math.cos(p.heading + 0.5 * wander), math.sin(p.heading + 0.5 * wander)
+            dx, dy = c * forward_m - s * left_m, s * forward_m + c * left_m
+            p.x += p.scale * dx
+            p.y += p.scale * dy
+            p.xx += 2.0 * dx * p.xs + p.ss * dx * dx + PLACE_WALK * way
+            p.xy += dx * p.ys + dy * p.xs + p.ss * dx * dy
+            p.yy += 2.0 * dy * p.ys + p.ss * dy * dy + PLACE_WALK * way
+            p.xs += p.ss * dx
+            p.ys += p.ss * dy
+            p.ss += SCALE_WALK * way
+            p.heading += wander + turn_rad
 
-    def update(
-        self,
-        which: NDArray[np.int64],
-        room: Room,
-        readings: Panorama,
-        half_angle: float,
-        model: RangeModel,
-        specular_share: float,
-    ) -> Fit:
-        """Enter readings: fit the place of each particle to them, and weigh it by how likely they are.
 
-        Parameters
-        ----------
-        which : (h,) int
-            The hypotheses.
-        room : Room
-            The surfaces near them.
-        readings : Panorama
-            In the frame of the ring; none is NaN.
-        half_angle : float
-            Half the beam's opening, rad.
-        model : RangeModel
-            Errors of a range.
-        specular_share : float
-            Probability that a reading is from the specular model.
-        """
-        start, before = self.mean[which].reshape(-1, 3), self.covariance[which].reshape(-1, 3, 3)
-        theta, measured = self.heading[which].reshape(-1), readings.range_m
-        prior = np.linalg.inv(before)
-        mean, covariance = start, before
-        for step in range(FIT_STEPS + 1):
-            expected = expect_both(room, beams_at(readings, mean[:, 0], mean[:, 1], theta), half_angle)
-            place = covariance[:, None, :2, :2]
-            extra = [
-                place[..., 0, 0] * one.grad_x**2
-                + 2.0 * place[..., 0, 1] * one.grad_x * one.grad_y
-                + place[..., 1, 1] * one.grad_y**2
-                for one in expected
-            ]
-            variance = (np.zeros(1), np.zeros(1)) if step == FIT_STEPS else (extra[0], extra[1])
-            fit = mixed_ratio(model, measured, expected, specular_share, variance)
-            if step == FIT_STEPS:
-                break
-            information, rhs = prior.copy(), np.einsum("pij,pj->pi", prior, start - mean)
-            for one, fits in zip(expected, (fit.fits_cone, fit.fits_specular), strict=True):
-                weight = fits / model.sigma(one.range_m) ** 2
-                with np.errstate(invalid="ignore"):
-                    error = np.where(fits > 0.0, measured - one.range_m, 0.0) * weight
-                gx, gy = one.grad_x, one.grad_y
-                information[:, 0, 0] += (weight * gx * gx).sum(axis=1)
-                information[:, 1, 1] += (weight * gy * gy).sum(axis=1)
-                cross = (weight * gx * gy).sum(axis=1)
-                information[:, 0, 1] += cross
-                information[:, 1, 0] += cross
-                rhs[:, 0] += (error * gx).sum(axis=1)
-                rhs[:, 1] += (error * gy).sum(axis=1)
-            covariance = np.linalg.inv(information)
-            mean = mean + np.einsum("pij,pj->pi", covariance, rhs)
-        off = mean - start
-        ratio = fit.log_ratio.sum(axis=1)
-        log_evidence = (
-            TEMPER * ratio
-            - 0.5 * np.einsum("pi,pij,pj->p", off, prior, off)
-            + 0.5 * (np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(before)[1])
-        )
-        shape = (len(which), HEADINGS)
-        self.mean[which] = mean.reshape(*shape, 3)
-        self.covariance[which] = covariance.reshape(*shape, 3, 3)
-        self.log_weight[which] += log_evidence.reshape(shape)
-        weight = self._weights()[which]
-        specular = fit.prefers_specular.mean(axis=1).reshape(shape)
-        return Fit((weight * ratio.reshape(shape)).sum(axis=1), (weight * specular).sum(axis=1))
+@kernel
+def normalise(of: HypothesesRecord, h: int, scratch: Records[ParticleScratch]) -> float:
+    """Write the particles' weights within hypothesis `h` into the scratch; return its log evidence, nat."""
+    particles, weights = of[0].hypotheses[h].particles, scratch[0].weights
+    most, total = -math.inf, 0.0
+    for i in range(HEADINGS):
+        most = max(most, particles[i].log_weight)
+    for i in range(HEADINGS):
+        weights[i] = math.exp(particles[i].log_weight - most)
+        total += weights[i]
+    for i in range(HEADINGS):
+        weights[i] /= total
+    return most + math.log(total)
 
-    def _weights(self) -> Floats:
-        """Return the particles' weights within each hypothesis, shape (h, p)."""
-        weight = np.exp(self.log_weight - self.log_weight.max(axis=1, keepdims=True))
-        return np.asarray(weight / weight.sum(axis=1, keepdims=True))
 
-    def resample(self) -> None:
-        """Draw particles anew within each hypothesis whose weight lies on few of them."""
-        weight = self._weights()
-        few = np.flatnonzero(1.0 / (weight**2).sum(axis=1) < RESAMPLE_SHARE * HEADINGS)
-        steps = (np.arange(HEADINGS) + 0.5) / HEADINGS
-        for h in few.tolist():
-            chosen = np.searchsorted(np.cumsum(weight[h]), steps).clip(max=HEADINGS - 1)
-            for part in (self.mean, self.covariance, self.heading):
-                part[h] = part[h, chosen]
-            self.log_weight[h] = np.logaddexp.reduce(self.log_weight[h]) - math.log(HEADINGS)
+@kernel
+def summarise(of: HypothesesRecord, scratch: Records[ParticleScratch]) -> int:
+    """Compute log evidence and mean pose of each hypothesis; return the number of the most likely one."""
+    best = 0
+    for h in range(of[0].count):
+        hypothesis = of[0].hypotheses[h]
+        hypothesis.log_evidence = normalise(of, h, scratch)
+        hypothesis.x = hypothesis.y = hypothesis.heading = 0.0
+        for i in range(HEADINGS):
+            p, weight = hypothesis.particles[i], scratch[0].weights[i]
+            hypothesis.x += weight * p.x
+            hypothesis.y += weight * p.y
+            hypothesis.heading += weight * p.heading
+        if hypothesis.log_evidence > of[0].hypotheses[best].log_evidence:
+            best = h
+    return best
 
-    def keep(self, which: NDArray[np.int64]) -> None:
-        """Keep these hypotheses only."""
-        self.mean, self.covariance = self.mean[which], self.covariance[which]
-        self.heading, self.log_weight = self.heading[which], self.log_weight[which]
 
-    def prune(self, least_log: float, most: int) -> None:
-        """Drop hypotheses that repeat a better one, or are less likely than the best by more than `least_log` nat."""
-        log_evidence, poses = self.log_evidence(), self.poses()
-        kept: list[int] = []
-        for i in np.argsort(-log_evidence, kind="stable").tolist():
-            if log_evidence[i] < log_evidence.max() - least_log or len(kept) == most:
-                break
-            off = poses[kept] - poses[i]
-            turned = np.abs((off[:, 2] + math.pi) % (2.0 * math.pi) - math.pi)
-            if ((np.hypot(off[:, 0], off[:, 1]) > MERGE_M) | (turned > MERGE_RAD)).all():
-                kept.append(i)
-        self.keep(np.array(kept, dtype=np.int64))
+@kernel
+def copy_particle(source: Records[Particle], i: int, target: Records[Particle], k: int) -> None:
+    """Copy a particle."""
+    p, q = source[i], target[k]
+    q.heading, q.x, q.y, q.scale = p.heading, p.x, p.y, p.scale
+    q.xx, q.xy, q.xs, q.yy, q.ys, q.ss = p.xx, p.xy, p.xs, p.yy, p.ys, p.ss
+    q.log_weight, q.log_ratio, q.specular = p.log_weight, p.log_ratio, p.specular
 
-    def log_evidence(self) -> Floats:
-        """Return the log weight of each hypothesis, nat, shape (h,)."""
-        return np.asarray(np.logaddexp.reduce(self.log_weight, axis=1))
 
-    def poses(self) -> Floats:
-        """Return the mean pose of each hypothesis: x, y (m), heading (rad), shape (h, 3)."""
-        weight = self._weights()
-        place = np.einsum("hp,hpi->hi", weight, self.mean[:, :, :2])
-        middle = self.heading[:, :1]
-        return np.column_stack([place, middle[:, 0] + (weight * (self.heading - middle)).sum(axis=1)])
+@kernel
+def keep_marked(of: HypothesesRecord, scratch: Records[ParticleScratch]) -> None:
+    """Keep the hypotheses that `is_kept` marks, in their order, and zero the others."""
+    found, count = of[0].hypotheses, 0
+    for h in range(of[0].count):
+        if scratch[0].is_kept[h]:
+            if count < h:
+                for i in range(HEADINGS):
+                    copy_particle(found[h].particles, i, found[count].particles, i)
+                a, b = found[h], found[count]
+                b.log_evidence, b.x, b.y, b.heading = a.log_evidence, a.x, a.y, a.heading
+            count += 1
+    for h in range(count, of[0].count):
+        found[h].log_evidence = found[h].x = found[h].y = found[h].heading = 0.0
+        for i in range(HEADINGS):
+            p = found[h].particles[i]
+            p.heading = p.x = p.y = p.scale = p.log_weight = p.log_ratio = p.specular = 0.0
+            p.xx = p.xy = p.xs = p.yy = p.ys = p.ss = 0.0
+    of[0].count = count
 
-    def estimate(self, hypothesis: int) -> tuple[Pose, Floats]:
-        """Return mean and covariance (x, y, heading) of the ring's pose in one hypothesis."""
-        x, y, theta = self.poses()[hypothesis].tolist()
-        weight = self._weights()[hypothesis]
-        off = np.column_stack([self.mean[hypothesis, :, :2] - (x, y), self.heading[hypothesis] - theta])
-        covariance = np.einsum("p,pi,pj->ij", weight, off, off)
-        covariance[:2, :2] += np.einsum("p,pij->ij", weight, self.covariance[hypothesis, :, :2, :2])
-        return Pose(x, y, theta), np.asarray(covariance)
+
+@kernel
+def prune(of: HypothesesRecord, least_log: float, most: int, scratch: Records[ParticleScratch]) -> None:
+    """Drop hypotheses that repeat a better one, or are less likely than the best by more than `least_log` nat.
+
+    Parameters
+    ----------
+    of : (1,) Hypotheses
+        Summarised; updated.
+    least_log : float
+        nat.
+    most : int
+        So many are kept at most.
+    scratch : (1,) ParticleScratch
+        Overwritten.
+    """
+    order, keys, is_kept = scratch[0].order, scratch[0].keys, scratch[0].is_kept
+    found, ordered, kept = of[0].hypotheses, 0, 0
+    for h in range(of[0].count):
+        ordered = insert_nearest(order, keys, ordered, h, -found[h].log_evidence)
+        is_kept[h] = 0
+    for k in range(ordered):
+        h = order[k]
+        if keys[k] > keys[0] + least_log or kept == most:
+            break
+        is_new = True
+        for j in range(k):
+            other = order[j]
+            turn = (found[h].heading - found[other].heading + math.pi) % (2.0 * math.pi) - math.pi
+            away = math.hypot(found[h].x - found[other].x, found[h].y - found[other].y)
+            is_new = is_new and not (is_kept[other] and away <= MERGE_M and abs(turn) <= MERGE_RAD)
+        if is_new:
+            is_kept[h] = 1
+            kept += 1
+    keep_marked(of, scratch)
+
+
+@kernel
+def resample(of: HypothesesRecord, scratch: Records[ParticleScratch]) -> None:
+    """Draw particles anew within each hypothesis whose weight lies on few of them."""
+    weights, drawn = scratch[0].weights, scratch[0].drawn
+    for h in range(of[0].count):
+        log_evidence, squares = normalise(of, h, scratch), 0.0
+        for i in range(HEADINGS):
+            squares += weights[i] * weights[i]
+        if 1.0 / squares >= RESAMPLE_SHARE * HEADINGS:
+            continue
+        particles, i, below = of[0].hypotheses[h].particles, 0, weights[0]
+        for k in range(HEADINGS):
+            while i < HEADINGS - 1 and below < (k + 0.5) / HEADINGS:
+                i += 1
+                below += weights[i]
+            copy_particle(particles, i, drawn, k)
+        for k in range(HEADINGS):
+            copy_particle(drawn, k, particles, k)
+            particles[k].log_weight = log_evidence - math.log(HEADINGS)
+
+
+@kernel
+def conclude(of: HypothesesRecord, least_log: float, most: int, scratch: Records[ParticleScratch]) -> None:
+    """After an update of all hypotheses, drop unlikely ones, resample, and write the most likely one to `best`.
+
+    Arguments as of `prune`; there must be a hypothesis.
+    """
+    h, best = summarise(of, scratch), of[0].best
+    normalise(of, h, scratch)
+    best.log_ratio = best.specular = 0.0
+    for i in range(HEADINGS):
+        p, weight = of[0].hypotheses[h].particles[i], scratch[0].weights[i]
+        best.log_ratio += weight * p.log_ratio
+        best.specular += weight * p.specular
+    prune(of, least_log, most, scratch)
+    resample(of, scratch)
+    h, total = summarise(of, scratch), 0.0
+    middle = of[0].hypotheses[h]
+    for k in range(of[0].count):
+        total += math.exp(of[0].hypotheses[k].log_evidence - middle.log_evidence)
+    normalise(of, h, scratch)
+    best.share, best.x, best.y, best.heading = 1.0 / total, middle.x, middle.y, middle.heading
+    best.xx = best.xy = best.xh = best.yy = best.yh = best.hh = 0.0
+    for i in range(HEADINGS):
+        p, weight = middle.particles[i], scratch[0].weights[i]
+        dx, dy, turn = p.x - middle.x, p.y - middle.y, p.heading - middle.heading
+        best.xx += weight * (p.xx + dx * dx)
+        best.xy += weight * (p.xy + dx * dy)
+        best.yy += weight * (p.yy + dy * dy)
+        best.xh += weight * dx * turn
+        best.yh += weight * dy * turn
+        best.hh += weight * turn * turn

@@ -119,7 +119,7 @@ def replay_in_known_room(
     summary, here = replayer.summary(), localizer.localized()
     summary["pose"] = _pose_row(here)
     if here.status == "tracking":
-        to = localizer.map_from_odometry()
+        to = localizer.odometry_from_map().inverse()
         summary["frame"] = "map"
         summary["objects"] = [object_row(turned_object(to, seen)) for seen in replayer.perception.objects()]
     return summary

@@ -43,9 +43,11 @@ BAYES: Final = "bayes"
 POLYGONS: Final = "polygons"
 EMULATOR: Final = "emulator"
 LOCALIZATION: Final = "localization"
-PARTS: Final = (EMULATOR, BAYES, POLYGONS, PAPER, LOCALIZATION)
+KNOWN_ROOM: Final = "known_room"
+PARTS: Final = (EMULATOR, BAYES, POLYGONS, PAPER, LOCALIZATION, KNOWN_ROOM)
 """What is compiled separately: a method by its name, what the Bayesian method needs beyond it for polygons, the
-emulator, and the correction of drift. A file with the name of a part in the cache folder says that it is compiled."""
+emulator, the correction of drift, and finding the robot in a known room. A file with the name of a part in the cache
+folder says that it is compiled."""
 
 PRIVATE: Final = 0o700
 OTHERS_WRITE: Final = stat.S_IWGRP | stat.S_IWOTH

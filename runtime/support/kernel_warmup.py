@@ -21,6 +21,7 @@ from runtime.support.child_process import child_environment
 from runtime.support.kernel_cache import (
     BAYES,
     EMULATOR,
+    KNOWN_ROOM,
     LOCALIZATION,
     PAPER,
     POLYGONS,
@@ -150,9 +151,28 @@ def _localization(settings: Settings) -> None:
         drift.observe(Firing(0.1 * k, Pose(0.1 * k, 0.0, 0.1 * k), 0.0, ranges))
 
 
-RUN_ONCE: Final[Mapping[str, Callable[[Settings], None]]] = MappingProxyType(
-    {EMULATOR: _emulator, BAYES: _circles, POLYGONS: _polygons, PAPER: _paper, LOCALIZATION: _localization}
-)
+def _known_room(settings: Settings) -> None:
+    """Drive through a small room until a search of it is over."""
+    import numpy as np
+
+    from drivers.messages import Firing, Pose
+    from perception.localization.known_room import SEARCH_M, KnownRoom
+    from perception.localization.room import make_room
+
+    walls = np.array([[-1.0, -1.0, 2.0, -1.0], [2.0, -1.0, 2.0, 1.0], [2.0, 1.0, -1.0, 1.0]])
+    known_room = KnownRoom(make_room(walls, np.array([[1.0, 0.5, 0.2]])), settings.ring)
+    for k in range(FIRINGS):
+        ranges = np.full(len(settings.ring.mounts), 0.7 if k % 2 else math.inf)
+        known_room.observe(Firing(0.1 * k, Pose(2.0 * SEARCH_M[0] * k / FIRINGS, 0.0, 0.0), 0.0, ranges))
+        while known_room.can_refine:
+            known_room.refine()
+    known_room.localized()
+
+
+RUN_ONCE: Final[Mapping[str, Callable[[Settings], None]]] = MappingProxyType({
+    EMULATOR: _emulator, BAYES: _circles, POLYGONS: _polygons, PAPER: _paper, LOCALIZATION: _localization,
+    KNOWN_ROOM: _known_room,
+})  # fmt: skip
 """Runs each part once."""
 
 

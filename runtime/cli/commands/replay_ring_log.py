@@ -13,7 +13,7 @@ from config.load import load_settings, load_world
 from runtime.cli.commands.offline_io import refuse_unwritable
 from runtime.cli.tables import objects_table, pose_line
 from runtime.cycle.summary import write_json
-from runtime.support.kernel_cache import LOCALIZATION, needed_parts, prepare_kernels
+from runtime.support.kernel_cache import KNOWN_ROOM, LOCALIZATION, needed_parts, prepare_kernels
 from runtime.support.length_format import Units
 from runtime.support.progress import progress
 
@@ -48,9 +48,8 @@ def replay_log(
     room = None if map_file is None else known_room_of(map_file)
     console = Console(stderr=True)
     refuse_unwritable({"--json": json_file, "--trajectory": trajectory})
-    prepare_kernels(
-        settings, console, (*needed_parts(settings), *([LOCALIZATION] if localize and room is None else []))
-    )
+    localization = (LOCALIZATION if room is None else KNOWN_ROOM,) if localize else ()
+    prepare_kernels(settings, console, (*needed_parts(settings), *localization))
     from runtime.recording.ring_log import read_ring_log
     from runtime.recording.ring_log_replay import replay_firings, replay_in_known_room, replay_localized
 

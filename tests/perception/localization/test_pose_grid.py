@@ -9,20 +9,40 @@ import pytest
 
 from drivers.emulator.scene import compile_scene
 from drivers.messages import Pose, wrap_angle
+from perception.kernel import Floats
 from perception.localization.expected_ranges import Beams, Reflection, expected_ranges
-from perception.localization.pose_grid import CELL_M, STARTS_MAX, STEP_RAD, PoseGrid
+from perception.localization.pose_grid import APART_M, CELL_M, STARTS_MAX, STEP_RAD, PoseGrid, Starts, offer
 from perception.localization.range_likelihood import RangeModel
+from perception.localization.room import Room
+from perception.localization.surroundings import make_surroundings
+from perception.records import array_of, records, zeros
+from perception.snapshot import put_back, snapshot_of
 from runtime.simulation.furnished_rooms import furnished_room
 from runtime.simulation.localization_trials import room_of
 from runtime.simulation.random_rooms import ACOUSTICS
 from tests.perception.localization.rooms import CROOKED, HALF_ANGLE, RING, panorama_of, stand, world_of
+
+pytestmark = pytest.mark.compiled
+TRUTH = Pose(1.5, 2.2, 0.5)
+
+
+def grid_of(room: Room) -> PoseGrid:
+    """The grid of a room."""
+    return PoseGrid(room, make_surroundings(room, RangeModel.of_ring(RING), HALF_ANGLE), 0.2)
+
+
+def crooked() -> tuple[PoseGrid, Floats]:
+    """The grid of a small room, and the readings of a stand in it."""
+    room, firing = stand(world_of(CROOKED, ACOUSTICS), TRUTH)
+    found = panorama_of(firing)
+    return grid_of(room), np.column_stack([found.x, found.y, np.cos(found.axis), np.sin(found.axis), found.range_m])
 
 
 @pytest.mark.parametrize("reflection", ["cone", "specular"])
 def test_the_table_holds_the_expected_ranges(reflection: Reflection) -> None:
     seed = next(seed for seed in range(10) if furnished_room(seed).world.drum)
     room = room_of(compile_scene(furnished_room(seed).world))
-    grid = PoseGrid(room, HALF_ANGLE, RING.window_m, 0.2)
+    grid = grid_of(room)
     x, y = np.array([(i, j) for i in range(0, grid.shape[0], 3) for j in range(0, grid.shape[1], 3)]).T
     direction = np.arange(len(x)) % 60
     table = grid.expected(reflection)[direction, x, y]
@@ -30,26 +50,56 @@ def test_the_table_holds_the_expected_ranges(reflection: Reflection) -> None:
     beams = Beams(place_x, place_y, direction.astype(np.float64) * STEP_RAD)
     exact = expected_ranges(room, beams, HALF_ANGLE, reflection).range_m
     silent = exact > RING.window_m
-    assert (np.isinf(table) == silent).mean() > 0.99  # at the beam's very edge, rounding decides
-    both = ~silent & np.isfinite(table)
-    assert (np.abs(table[both] - exact[both]) < 0.02).mean() > 0.99
+    assert (np.isinf(table) == silent).all()
+    assert table[~silent] == pytest.approx(exact[~silent], abs=0.02)
 
 
-def test_a_search_offers_the_pose() -> None:
-    truth = Pose(1.5, 2.2, 0.5)
-    room, firing = stand(world_of(CROOKED, ACOUSTICS), truth)
-    grid = PoseGrid(room, HALF_ANGLE, RING.window_m, 0.3)
-    search = grid.search(panorama_of(firing), RangeModel.of_ring(RING), 0.5)
-    quanta = 0
-    while True:
-        try:
-            next(search)
-        except StopIteration as stop:
-            starts = stop.value
-            break
-        quanta += 1
-    assert quanta > 60
-    assert len(starts) <= STARTS_MAX
-    near = np.hypot(starts[:, 0] - truth.x, starts[:, 1] - truth.y) < 1.5 * CELL_M
-    turned = np.array([abs(wrap_angle(theta - truth.theta)) for theta in starts[:, 2].tolist()])
+def test_a_search_offers_the_pose_and_another_one_needs_no_table() -> None:
+    grid, readings = crooked()
+    quanta = []
+    for _ in range(2):
+        grid.begin(readings, 0.5)
+        quanta.append(0)
+        while grid.is_searching:
+            grid.refine()
+            quanta[-1] += 1
+    assert quanta[0] > quanta[1] > 60
+    starts = grid.best_starts(100)
+    assert len(starts) <= 100
+    near = np.hypot(starts[:, 0] - TRUTH.x, starts[:, 1] - TRUTH.y) < 1.5 * CELL_M
+    turned = np.array([abs(wrap_angle(theta - TRUTH.theta)) for theta in starts[:, 2].tolist()])
     assert np.flatnonzero(near & (turned < math.radians(7.0)))[0] < 5
+
+
+@pytest.mark.parametrize("quanta", [10, 200])
+def test_a_search_goes_on_from_a_snapshot_with_the_same_result(quanta: int) -> None:
+    grid, readings = crooked()
+    grid.begin(readings, 0.4)
+    for _ in range(quanta):
+        grid.refine()
+    other = crooked()[0]
+    put_back(other, snapshot_of(grid))
+    for one in (grid, other):
+        one.drop_caches()
+        while one.is_searching:
+            one.refine()
+    assert np.array_equal(grid.best_starts(50), other.best_starts(50))
+
+
+def test_a_cancelled_search_is_over() -> None:
+    grid, readings = crooked()
+    grid.begin(readings, 0.5)
+    grid.cancel()
+    assert not grid.is_searching
+
+
+def test_of_starts_side_by_side_the_best_is_kept_and_of_too_many_the_best() -> None:
+    found = records(Starts, zeros(Starts, 1))
+    scores = np.random.default_rng(0).permutation(STARTS_MAX + 50).astype(np.float64)
+    for k, score in enumerate(scores.tolist()):
+        offer(found, 1.0 * k, 0.0, 0.0, score)
+        offer(found, 1.0 * k + 0.9 * APART_M, 0.0, 2.0 * math.pi - 0.01, score - 0.5)
+        offer(found, 1.0 * k + 0.9 * APART_M, 0.0, 0.01, score + 0.5)
+    kept = array_of(found)["starts"][0]
+    assert found[0].count == STARTS_MAX
+    assert np.sort(kept["score"]) == pytest.approx(np.arange(50, STARTS_MAX + 50) + 0.5)

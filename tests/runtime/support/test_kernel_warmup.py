@@ -5,13 +5,14 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 import pytest
 
 from config.load import load_settings
 from perception.bayes import polygon_tracks, refine
-from perception.localization import drift_correction
+from perception.localization import drift_correction, pose_grid, pose_track
 from perception.pipeline import Perception
 from runtime.support import kernel_cache as kernels
 from runtime.support import kernel_warmup
@@ -41,7 +42,21 @@ def test_a_second_process_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) 
     assert started[0].returncode is not None
 
 
-def test_the_warm_up_of_localization_runs_every_kernel_that_corrects_drift(monkeypatch: pytest.MonkeyPatch) -> None:
+DRIFT = frozenset({"add_landmark", "propagate", "remove_landmark", "update_with_firing"})
+GRID = frozenset({"fill_cell", "score_block", "offer_peaks"})
+TRACK = frozenset({"add_hypothesis", "move", "update_particles", "conclude"})
+
+
+@pytest.mark.parametrize(
+    ("part", "names"),
+    [
+        (kernels.LOCALIZATION, {drift_correction: DRIFT}),
+        (kernels.KNOWN_ROOM, {pose_grid: GRID, pose_track: TRACK}),
+    ],
+)
+def test_the_warm_up_of_localization_runs_every_kernel_that_it_calls(
+    part: str, names: dict[ModuleType, frozenset[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
     done = set[str]()
 
     def note(name: str, call: Callable[..., Any]) -> Callable[..., Any]:
@@ -51,11 +66,11 @@ def test_the_warm_up_of_localization_runs_every_kernel_that_corrects_drift(monke
 
         return noted
 
-    names = {"add_landmark", "propagate", "remove_landmark", "update_with_firing"}
-    for name in names:
-        monkeypatch.setattr(drift_correction, name, note(name, getattr(drift_correction, name)))
-    kernel_warmup.RUN_ONCE[kernels.LOCALIZATION](load_settings("hallway"))
-    assert done == names
+    for module, called in names.items():
+        for name in called:
+            monkeypatch.setattr(module, name, note(name, getattr(module, name)))
+    kernel_warmup.RUN_ONCE[part](load_settings("hallway"))
+    assert done == frozenset().union(*names.values())
 
 
 @pytest.mark.parametrize("part", [kernels.BAYES, kernels.PAPER])
