@@ -8,21 +8,45 @@ as plain Python.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
-from typing import Any, Final, TypeVar, cast
+from typing import Final, TypeVar, cast
 
-import numba
 import numpy as np
+from numba.core import types
+from numba.core.registry import CPUDispatcher
 from numpy.typing import NDArray
+
+from perception.records import INTERPRETED
 
 F = TypeVar("F", bound=Callable[..., object])
 
-BORROWING: Final[Mapping[str, Any]] = MappingProxyType({"cache": True, "_nrt": False, "no_cfunc_wrapper": True})
+BORROWING: Final[Mapping[str, object]] = MappingProxyType({"_nrt": False, "no_cfunc_wrapper": True})
 """NRT is numba's run time: its allocator and its reference counts."""
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+
+_unliteral: Final[Callable[[object], object]] = types.unliteral
+
+
+class _Dispatcher(CPUDispatcher):
+    """Compiles a kernel once for each type of its arguments; numba's own does so for each constant in a call."""
+
+    def get_call_template(  # type: ignore[override]  # versions of numba differ
+        self, args: Iterable[object], kws: Mapping[str, object]
+    ) -> object:
+        named = {name: _unliteral(kind) for name, kind in kws.items()}
+        return super().get_call_template(tuple(map(_unliteral, args)), named)
+
+
+def _compiled(function: F, **options: object) -> F:
+    if INTERPRETED:
+        return function
+    dispatcher = _Dispatcher(function, targetoptions={"nopython": True, **options})
+    dispatcher.enable_caching()
+    return cast("F", dispatcher)
 
 
 def kernel(function: F) -> F:
@@ -32,9 +56,9 @@ def kernel(function: F) -> F:
     reference counts, which cost two atomic additions for each array of each call. An allocation in a kernel is an
     error when it is compiled.
     """
-    return cast("F", numba.njit(**BORROWING)(function))
+    return _compiled(function, **BORROWING)
 
 
 def owning_kernel(function: F) -> F:
     """Compile `function` as `kernel` does, with reference counts: for what allocates or takes numba's objects."""
-    return cast("F", numba.njit(cache=True)(function))
+    return _compiled(function)

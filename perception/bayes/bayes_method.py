@@ -30,8 +30,9 @@ from perception.bayes.object_report import (
     polygon_object,
     rival_label,
 )
-from perception.bayes.observe import observe
+from perception.bayes.observe import associate, observe
 from perception.bayes.pinned_segments import Pins
+from perception.bayes.polygon_association import associate_polygons
 from perception.bayes.polygon_parameters import POLYGON_PROBABILITY
 from perception.bayes.polygon_tracks import polygon_quantum
 from perception.bayes.refine import quantum
@@ -125,11 +126,16 @@ class BayesPerception:
 
     def observe(self, firing: Firing) -> int:
         """Process one firing; return the number of outline segments that it completed."""
-        pose = firing.pose
-        made, self._circles_pending = observe(
-            self.memory.s, self.memory.tracks, self.settings, self._mounts, float(pose.x), float(pose.y),
-            float(firing.ring_yaw), float(firing.robot_s), firing.ranges_m, self._config.fresh_share,
+        s, tracks, settings = self.memory.s, self.memory.tracks, self.settings
+        pose, time_s = firing.pose, float(firing.robot_s)
+        readings = associate(
+            s, tracks, settings, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), time_s,
+            firing.ranges_m,
         )  # fmt: skip
+        if len(self._outlines) > 0:
+            # Not in the kernel: where all models are round, it need not be compiled.
+            associate_polygons(s, tracks, settings, readings)
+        made, self._circles_pending = observe(s, tracks, settings, readings, time_s, self._config.fresh_share)
         # Polygons come after the circles, unless the time ran out before.
         self._polygons_turn = self._polygons_pending and self._polygons_left > 0 and not self._polygons_turn
         self._left = self._config.quanta_per_firing

@@ -18,7 +18,6 @@ from perception.bayes.parameters import (
     STILL_COS,
     STILL_M,
 )
-from perception.bayes.polygon_association import associate_polygons
 from perception.bayes.polygon_initiation import request_polygon
 from perception.bayes.range_fit import FAR
 from perception.bayes.reservoir import copy_reading, keep_reading
@@ -46,7 +45,7 @@ def place_readings(
     Parameters
     ----------
     s, p, mounts, px, py, yaw, ranges
-        As for `observe`.
+        As for `associate`.
     """
     if not (abs(px) < COORDINATE_MAX_M and abs(py) < COORDINATE_MAX_M and math.isfinite(yaw)):
         return 0
@@ -265,11 +264,11 @@ def propose(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, made: int) 
 
 
 @kernel
-def observe(
+def associate(
     s: StateRecord, tracks: CircleTracks, p: SettingsRecord, mounts: Floats, px: float, py: float, yaw: float,
-    time_s: float, ranges: Floats, threshold: float,
-) -> tuple[int, bool]:  # fmt: skip
-    """Process one firing, without refinement; return the segments made, and whether a circle waits for refinement.
+    time_s: float, ranges: Floats,
+) -> int:  # fmt: skip
+    """Place the readings of one firing, associate them with circles, and return how many they are.
 
     Parameters
     ----------
@@ -281,6 +280,29 @@ def observe(
         Position (m) and direction (rad) of the ring, and the time (s).
     ranges : (n,) float
         Ranges, m; NaN: the sensor did not fire, inf: no echo.
+    """
+    m = place_readings(s, p, mounts, px, py, yaw, ranges) if math.isfinite(time_s) else 0
+    if m > 0:
+        s[0].ring_x = px
+        s[0].ring_y = py
+    associate_circles(s, tracks, p, m)
+    return m
+
+
+@kernel
+def observe(
+    s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int, time_s: float, threshold: float
+) -> tuple[int, bool]:
+    """Process associated readings, without refinement; return the segments made, and whether a circle waits for it.
+
+    Parameters
+    ----------
+    s, tracks, p
+        Memory and circles, updated, and settings.
+    m : int
+        Readings of this firing.
+    time_s : float
+        Its time, s.
     threshold : float
         Unseen evidence for an object's size from which on it waits for refinement.
 
@@ -289,14 +311,6 @@ def observe(
     (int, bool)
         Outline segments made, and whether a circle waits for refinement.
     """
-    m = place_readings(s, p, mounts, px, py, yaw, ranges) if math.isfinite(time_s) else 0
-    if m > 0:
-        s[0].ring_x = px
-        s[0].ring_y = py
-    associate_circles(s, tracks, p, m)
-    if p[0].polygon_count > 0:
-        var0, _ = noise_variance(s, p)
-        associate_polygons(s, tracks, p, m, tolerance_m(p[0].half_resolution_m, var0))
     update_lines(s, p, m)
     keep_readings(s, tracks, p, m)
     made = make_segments(s, p, m, time_s)

@@ -43,7 +43,7 @@ def range_error(
 
 
 @kernel
-def associate_polygons(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int, tight: float) -> None:
+def associate_polygons(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int) -> None:
     """Associate fired readings with the established polygons that explain them, and fill the polygons' reservoirs.
 
     Parameters
@@ -52,9 +52,9 @@ def associate_polygons(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, 
         Memory, updated, circles and settings.
     m : int
         Fired readings.
-    tight : float
-        Greatest error of an explained range, m.
     """
+    var0, _ = noise_variance(s, p)
+    tight = tolerance_m(p[0].half_resolution_m, var0)
     for t in range(MAX_POLYGONS):
         track = s[0].polygons[t]
         if track.status == FREE:

@@ -1,9 +1,9 @@
 """Run every kernel once, part by part: this compiles a kernel that was never compiled, and loads one that was.
 
 Two processes that compile the same kernel do the same work twice. So the second process begins with what the first
-one compiles last: `python -m runtime.support.kernel_warmup bayes` compiles the refinement of circles, `… polygons`
-that of polygons, and `… bayes,emulator whole` everything that these parts need, in this order, for a robot whose
-process has already started.
+one compiles last: `python -m runtime.support.kernel_warmup bayes` compiles the refinement of circles and the edits,
+`… polygons` the refinement of polygons, and `… bayes,emulator whole` everything that these parts need, in this order,
+for a robot whose process has already started.
 """
 
 from __future__ import annotations
@@ -73,8 +73,8 @@ def _square() -> ModelConfig:
     return ModelConfig(name="warm-up", closed=True, vertices_m=corners)
 
 
-def _drive_and_edit(settings: Settings, method: str, models: Sequence[ModelConfig]) -> None:
-    """Drive past a wall, then do every kind of edit with each model: the operator's first must not delay a cycle."""
+def _edit(settings: Settings, perception: Perception, models: Sequence[ModelConfig], firings: int) -> None:
+    """Do every kind of edit with each model, and drive in between: the operator's first must not delay a cycle."""
     from perception.edits import (
         ClearMap,
         ConfirmObject,
@@ -86,12 +86,10 @@ def _drive_and_edit(settings: Settings, method: str, models: Sequence[ModelConfi
     )
     from perception.paper.cluster_view import ClusterView
 
-    perception = _perception(settings, method, models)
-    _drive(settings, perception)
     ClusterView(settings.perception).boxes(perception.segments().geometry)  # the console shows them for either method
     numbers = tuple(perception.segments().numbers[:2].tolist())
     perception.edit(PinSegments(numbers, pinned=True))
-    _drive(settings, perception)  # its segments overwrite the pinned ones, which are put back
+    _drive(settings, perception, firings)  # its segments overwrite the pinned ones, which are put back
     for model in models:
         perception.edit(PlaceModel(model.name, 1.0, 2.5, 0.0))
     for seen in perception.objects():
@@ -103,6 +101,12 @@ def _drive_and_edit(settings: Settings, method: str, models: Sequence[ModelConfi
             perception.edit(RejectObject(seen.number))
     perception.edit(DeleteSegments(numbers))
     perception.edit(ClearMap())
+
+
+def _drive_and_edit(settings: Settings, method: str, models: Sequence[ModelConfig]) -> None:
+    perception = _perception(settings, method, models)
+    _drive(settings, perception)
+    _edit(settings, perception, models, FIRINGS)
 
 
 def observe_once(settings: Settings) -> None:
@@ -195,7 +199,7 @@ def compile_in_parallel(part: str) -> Iterator[None]:
 
 
 def compile_refinement(part: str) -> None:
-    """Compile the refinement of a part by a call on an empty state, which does nothing."""
+    """Compile the refinement of a part by a call on an empty state, which does nothing, and edits after circles."""
     from config.load import load_settings
     from perception.bayes.kernel_settings import make_settings
     from perception.bayes.polygon_tracks import polygon_quantum
@@ -207,6 +211,8 @@ def compile_refinement(part: str) -> None:
     memory = Memory(len(settings.ring.mounts), bayes.tracks_max)
     refine = {BAYES: quantum, POLYGONS: polygon_quantum}[part]
     refine(memory.s, memory.tracks, make_settings(settings.ring, settings.models, bayes), bayes.fresh_share)
+    if part == BAYES:
+        _edit(settings, _perception(settings, BAYES, settings.models), settings.models, 0)
 
 
 def compile_whole(parts: Sequence[str]) -> None:

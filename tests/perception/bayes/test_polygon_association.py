@@ -56,7 +56,7 @@ def test_an_established_polygon_takes_the_readings_it_explains_and_keeps_all_tha
         explained_by = scratch["explained_by"][0, :12]
         explained_by[...] = UNEXPLAINED
         explained_by[2] = 0  # a circle of a model took it
-        association.associate_polygons(memory.s, memory.tracks, P, 12, 0.03)
+        association.associate_polygons(memory.s, memory.tracks, P, 12)
         track = memory.s[0].polygons[2]
         bears = [bears_on_polygon(q, track.x, track.y, bound, P) for q in readings_of(w)]
         count = sum(bears) - bears[2]
@@ -76,7 +76,7 @@ def test_a_polygon_without_new_readings_becomes_idle() -> None:
     memory = Memory(SENSORS, TRACKS)
     place(memory, 0, np.zeros(3))
     for firings in (1, 2):
-        association.associate_polygons(memory.s, memory.tracks, P, 0, 0.03)
+        association.associate_polygons(memory.s, memory.tracks, P, 0)
         assert memory.polygons["idle_firings"].tolist() == [firings] + [0] * (MAX_POLYGONS - 1)
 
 

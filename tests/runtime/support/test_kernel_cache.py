@@ -341,7 +341,7 @@ def test_a_kernel_that_comes_to_life_is_counted_once() -> None:
     def doubled(values: decorator.Floats) -> float:
         return 2.0 * float(values[0])
 
-    relaxation.doubled = compiled = decorator.numba.njit(doubled)  # type: ignore[attr-defined]
+    relaxation.doubled = compiled = decorator.kernel(doubled)  # type: ignore[attr-defined]
     try:
         assert kernels.compiled_signatures() == before
         compiled(np.ones(1))

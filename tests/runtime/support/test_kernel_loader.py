@@ -186,12 +186,14 @@ def test_progress_counts_kernels_and_shows_the_time_left(monkeypatch: pytest.Mon
     count = kernel_loader.KERNEL_COUNTS[BAYES]
     (tmp_path / "room").mkdir()
     assert preparation.progress == f"recognition is being prepared: 0 of {count} kernels"
-    for k in range(count // 5):
+    done = count // 5
+    for k in range(done):
         (tmp_path / "room" / f"kernel{k}.nbi").touch()
     host_s = 100.5
     assert "0 of" in preparation.progress, "counted once a second"
     host_s = 110.0
-    assert preparation.progress == f"recognition is being prepared: {count // 5} of {count} kernels, about 40 s left"
+    left_s = round(10.0 * (count - done) / done)
+    assert preparation.progress == f"recognition is being prepared: {done} of {count} kernels, about {left_s} s left"
     for k in range(count + 5):
         (tmp_path / "room" / f"kernel{k}.nbi").touch()
     host_s = 120.0
