@@ -16,7 +16,7 @@ from tests.perception.thread_time import REPETITIONS_MAX, always_beyond, control
 pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("warm_kernels")]
 
 SETTINGS = load_settings("hallway", ["behaviors.move_ahead.at_end=turn_back"])
-CYCLES = 2000
+CYCLES = 1400
 NEVER_S = 10.0
 """A budget that no cycle spends, whatever the machine does."""
 QUANTUM_MAX = 5.0

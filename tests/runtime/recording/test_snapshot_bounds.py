@@ -39,7 +39,7 @@ from runtime.simulation.closed_loop import simulate
 from tests.perception.halls import drive
 from tests.recorded import entries_of, rewrite
 
-CHECKED_EVERY = 8
+CHECKED_EVERY = 16
 """Cycles from one check of an honest state to the next."""
 FOLLOWING = 7
 """Cycles that are replayed from a poisoned state."""

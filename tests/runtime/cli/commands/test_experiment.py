@@ -67,17 +67,17 @@ def test_an_experiment_leaves_recording_figures_and_page(
     monkeypatch.setattr(animation, "FRAMES_MAX", 2)
     monkeypatch.setattr("runtime.analysis.plots.figure_files.FORMATS", ("svg",))
     out = tmp_path / "out"
-    outcome = experiment(tmp_path, "irregular", "--seeds", "3", "--out", str(out))
+    outcome = experiment(tmp_path, "irregular", "--seeds", "2", "--out", str(out))
     reported = capsys.readouterr().out
-    by_seed = [outcome["drums"][8 * k : 8 * k + 8] for k in range(3)]
+    by_seed = [outcome["drums"][8 * k : 8 * k + 8] for k in range(2)]
     assert all(found(rows) >= 7 for rows in by_seed)
     spread = outcome["spread"]
-    assert spread["seeds"] == 3
+    assert spread["seeds"] == 2
     assert spread["mean"] == pytest.approx(outcome["mean_error"], rel=0.2)
     assert spread["worst"] == outcome["max_error"]
     assert max(row["error"] or 0.0 for row in by_seed[spread["worst_seed"]]) == spread["worst"]
     assert 0.0 < spread["deviation"] < spread["worst"]
-    assert "3 seeds: mean error" in reported
+    assert "2 seeds: mean error" in reported
     files = {path.name for path in out.iterdir()}
     figures = {f"{name}.svg" for name in ("raw", "segments", "clusters", "models")}
     assert files >= {"irregular.mcap", "irregular.html", "overview.gif", *figures}
