@@ -107,9 +107,7 @@ def test_the_bayesian_method_is_right_again_within_twenty_readings(lie: str, mea
 @pytest.mark.parametrize("lie", LIES)
 def test_the_paper_s_method_keeps_no_false_object(lie: str, measured: Callable[[str], None]) -> None:
     worst_ft = worst_by_paper(lie, PAPER_SEEDS)
-    measured(
-        f"the paper's method, {lie}: after 10 s every object within {worst_ft:.2f} ft of a drum"
-    )
+    measured(f"the paper's method, {lie}: after 10 s every object within {worst_ft:.2f} ft of a drum")
 
 
 @promise
