@@ -32,6 +32,7 @@ __all__ = [
     "load_world",
     "override_settings",
     "parse_model",
+    "with_known_room",
     "with_value",
 ]
 
@@ -195,6 +196,19 @@ def override_settings(settings: Settings, name: str, overrides: Sequence[str]) -
     if problems:
         raise ConfigError(*problems)
     return _validated(Settings, layers)
+
+
+def with_known_room(settings: Settings, name_or_path: str | os.PathLike[str]) -> Settings:
+    """Return the settings with the surfaces of a world as the known room.
+
+    Raises
+    ------
+    ConfigError
+        The world cannot be read, is invalid, or has no surface; or drift is to be corrected otherwise.
+    """
+    surfaces = load_world(name_or_path).model_dump(mode="json", include={"drum", "wall", "box", "polygon"})
+    location = ("perception", "localization", "known_room")
+    return with_value(settings, f"map {os.fspath(name_or_path)}", location, surfaces)
 
 
 def with_value(settings: Settings, name: str, location: Location, value: object) -> Settings:

@@ -118,11 +118,24 @@ class BayesConfig(Strict):
 
 
 class LocalizationConfig(Strict):
-    """Where the robot is: the drift of its odometry."""
+    """Where the robot is: the drift of its odometry, and its place in a known room."""
 
     correct_drift: bool = False
     """Correct the drift of odometry by the round objects that the Bayesian method recognises. The robot drives in the
     odometry's frame all the same, which stays continuous; objects move in it."""
+    known_room: WorldConfig | None = None
+    """The map of the room in which the robot finds itself, as ``run --map`` sets it: walls, boxes, polygons, drums.
+    The map frame is the room's; the robot drives in the odometry's all the same."""
+
+    @model_validator(mode="after")
+    def _one_map_frame(self) -> LocalizationConfig:
+        if self.known_room is None:
+            return self
+        if self.correct_drift:
+            raise ValueError("correct_drift and known_room exclude each other: each has a map frame of its own")
+        if not self.known_room.sides_m() and not self.known_room.drum:
+            raise ValueError("known_room has no surface: give it a wall, box, polygon or drum")
+        return self
 
 
 class PerceptionConfig(Strict):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Final, Literal, TypeAlias
 
 from pydantic import Field
@@ -40,6 +41,13 @@ class BoxConfig(Strict):
     width_m: float = Field(gt=0.0, le=100.0)
     depth_m: float = Field(gt=0.0, le=100.0)
     angle_deg: Turn = 0.0
+
+    def corners_m(self) -> list[tuple[float, float]]:
+        """Return its corners counter-clockwise, m."""
+        c, s = math.cos(math.radians(self.angle_deg)), math.sin(math.radians(self.angle_deg))
+        half = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
+        local = [(i * self.width_m, j * self.depth_m) for i, j in half]
+        return [(self.x_m + c * x - s * y, self.y_m + s * x + c * y) for x, y in local]
 
 
 class PolygonConfig(Strict):
@@ -96,3 +104,11 @@ class WorldConfig(Strict):
     start: StartConfig = StartConfig()
     acoustics: AcousticsConfig = AcousticsConfig()
     odometry: OdometryConfig = OdometryConfig()
+
+    def sides_m(self) -> list[tuple[float, float, float, float]]:
+        """Return both ends of each wall, and of each side of the boxes and polygons, m."""
+        sides = [(wall.x1_m, wall.y1_m, wall.x2_m, wall.y2_m) for wall in self.wall]
+        outlines = [box.corners_m() for box in self.box] + [list(polygon.vertices_m) for polygon in self.polygon]
+        for outline in outlines:
+            sides += [(*a, *b) for a, b in zip(outline, outline[1:] + outline[:1], strict=True)]
+        return sides

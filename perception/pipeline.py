@@ -12,14 +12,16 @@ from typing import Protocol
 from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import PerceptionConfig
-from drivers.messages import Firing
+from drivers.messages import Firing, Pose
 from perception.bayes.bayes_method import BayesPerception
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import Edit, Evidence, MoveObject, PlaceModel, Segments, invalid_number, invalid_pose
 from perception.fresh_echoes import FreshEchoes
 from perception.kernel import Floats
 from perception.localization.drift_correction import LocalizedPose
+from perception.localization.known_room import KnownRoom
 from perception.localization.map_frame import MapFrame
+from perception.localization.room import room_of
 from perception.paper.paper_method import PaperPerception
 from perception.sensor_monitor import SensorMonitor
 from perception.sensor_mounts import mounts_array
@@ -152,6 +154,9 @@ class Perception:
         corrects = config.localization.correct_drift
         self.map_frame = MapFrame(ring, models) if corrects else None
         """Corrects drift, where the settings say so; what `method` holds is in the map frame then."""
+        known_room = config.localization.known_room
+        self.known_room = None if known_room is None else KnownRoom(room_of(known_room), ring)
+        """Finds the robot in the room of the settings, where there is one."""
         self._echoes = FreshEchoes(mounts_array(ring.mounts))
         self._sensors = len(ring.mounts)
         self._models = tuple(models)
@@ -159,12 +164,16 @@ class Perception:
     @property
     def can_refine(self) -> bool:
         """Whether `refine` has anything to improve now."""
-        return self.method.can_refine
+        return self.method.can_refine or self._can_localize
 
     @property
     def converged(self) -> bool:
         """Whether nothing is left to improve, now or with the next firing."""
-        return self.method.converged
+        return self.method.converged and not self._can_localize
+
+    @property
+    def _can_localize(self) -> bool:
+        return self.known_room is not None and self.known_room.can_refine
 
     @property
     def counts(self) -> MapCounts:
@@ -183,6 +192,8 @@ class Perception:
             raise ValueError(f"a firing of {len(firing.ranges_m)} ranges, but the ring has {self._sensors} sensors")
         trusted, possible = self.sensor_monitor.filter(firing)
         self._echoes.update(possible)
+        if self.known_room is not None:
+            self.known_room.observe(trusted)
         if self.map_frame is not None:
             trusted = self.map_frame.follow(trusted, self.method.near_objects())
             for number, dx, dy in self.map_frame.shifts():
@@ -190,8 +201,16 @@ class Perception:
         return self.method.observe(trusted)
 
     def refine(self) -> int:
-        """Do one quantum of refinement and return its iterations, zero if nothing is left to improve."""
-        return self.method.refine()
+        """Do one quantum of refinement and return its iterations, zero if nothing is left to improve.
+
+        The method comes first: its quanta of a firing are few, while the search of a known room has hundreds.
+        """
+        if self.known_room is None or self.method.can_refine:
+            return self.method.refine()
+        if not self.known_room.can_refine:
+            return 0
+        self.known_room.refine()
+        return 1
 
     def objects(self) -> tuple[DetectedObject, ...]:
         """Return the models recognised so far: those near the robot, best first, then those left behind."""
@@ -203,8 +222,16 @@ class Perception:
         return seen if self.map_frame is None else self.map_frame.with_landmarks(seen)
 
     def localized(self) -> LocalizedPose | None:
-        """Return where the robot was at the last firing in the map frame; None without correction of drift."""
+        """Return where the robot was at the last firing in the map frame; None where that is odometry's."""
+        if self.known_room is not None:
+            return self.known_room.localized()
         return None if self.map_frame is None else self.map_frame.localized()
+
+    def odometry_from_map(self) -> Pose:
+        """Return the pose of the map frame in odometry's frame, at the last firing."""
+        if self.known_room is not None:
+            return self.known_room.odometry_from_map()
+        return Pose(0.0, 0.0, 0.0) if self.map_frame is None else self.map_frame.drift.odometry_from_map()
 
     def near_objects(self) -> tuple[DetectedObject, ...]:
         """Return the models recognised near the robot, best first; the cost does not depend on the map's size."""
@@ -260,6 +287,8 @@ class Perception:
         self.method.reset()
         if self.map_frame is not None:
             self.map_frame.reset()
+        if self.known_room is not None:
+            self.known_room.reset()
         self.sensor_monitor.reset()
         self._echoes.clear()
 
@@ -297,3 +326,5 @@ class Perception:
         """
         put_back(self, snapshot)
         self.method.drop_caches()
+        if self.known_room is not None:
+            self.known_room.drop_caches()

@@ -50,17 +50,18 @@ def until(done: Callable[[], bool], what: str) -> None:
 
 
 class FiveInSix:
-    """A refinement budget that refuses every sixth quantum, at random."""
+    """A refinement budget that refuses every sixth quantum, at random, or another share."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, refused: float = 1.0 / 6.0) -> None:
         self._rng = np.random.default_rng(seed)
+        self._refused = refused
 
     def begin(self) -> None:
         """Begin a cycle."""
 
     def __call__(self, _done: int) -> bool:
         """Return whether another quantum may begin."""
-        return bool(self._rng.random() > 1.0 / 6.0)
+        return bool(self._rng.random() > self._refused)
 
 
 def record(
@@ -74,6 +75,7 @@ def record(
     after: Mapping[int, Callable[[Recorder], None]] = MappingProxyType({}),
     *,
     on: bool = True,
+    refused: float = 1.0 / 6.0,
 ) -> RecorderStatus:
     """Record a run in virtual time in which every sixth quantum of refinement is refused; return the final status.
 
@@ -99,6 +101,8 @@ def record(
         Actions on the recorder, by the cycle that they follow.
     on
         Whether to record from the start.
+    refused
+        Share of the quanta that are refused; each ends a cycle's refinement.
     """
     world = settings.world
     assert world is not None
@@ -126,8 +130,8 @@ def record(
             return reloads.get(cycle)
 
         simulate(
-            settings, world, seed, seconds, on_state=on_state, refinement_budget=FiveInSix(seed), reload=reload,
-            operator=operator,
+            settings, world, seed, seconds, on_state=on_state, refinement_budget=FiveInSix(seed, refused),
+            reload=reload, operator=operator,
         )  # fmt: skip
         recorder.on_summary({"mode": "DRIVE", "cycles": 20 * seconds})
     return recorder.status

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from config.world import BoxConfig, PolygonConfig, WorldConfig
+from config.world import WorldConfig
 from drivers.emulator.acoustics import CIRCLE, CORNER, SEGMENT, Records
 
 JOIN_M = 1e-4
@@ -46,27 +46,13 @@ class Scene:
 
 def compile_scene(world: WorldConfig) -> Scene:
     """Return the surfaces of `world`; a surface shorter than `JOIN_M` is left out."""
-    sides = [((wall.x1_m, wall.y1_m), (wall.x2_m, wall.y2_m)) for wall in world.wall]
-    for outline in [*map(_box_outline, world.box), *map(_polygon_outline, world.polygon)]:
-        sides += zip(outline, outline[1:] + outline[:1], strict=True)
+    sides = [((x1, y1), (x2, y2)) for x1, y1, x2, y2 in world.sides_m()]
     sides = [(a, b) for a, b in sides if math.dist(a, b) > JOIN_M]
     return Scene(
         circles=np.array([(drum.x_m, drum.y_m, drum.radius_m) for drum in world.drum], dtype=CIRCLE),
         segments=np.array([(*a, *b) for a, b in sides], dtype=SEGMENT),
         corners=np.array(_sectors(sides), dtype=CORNER),
     )
-
-
-def _box_outline(box: BoxConfig) -> list[_Point]:
-    angle = math.radians(box.angle_deg)
-    c, s = math.cos(angle), math.sin(angle)
-    half = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
-    local = [(i * box.width_m, j * box.depth_m) for i, j in half]
-    return [(box.x_m + c * x - s * y, box.y_m + s * x + c * y) for x, y in local]
-
-
-def _polygon_outline(polygon: PolygonConfig) -> list[_Point]:
-    return list(polygon.vertices_m)
 
 
 def _sectors(sides: list[tuple[_Point, _Point]]) -> list[tuple[float, ...]]:

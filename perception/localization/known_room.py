@@ -17,7 +17,7 @@ from config.robot import RingConfig
 from drivers.messages import Firing, Pose, wrap_angle
 from perception.localization.drift_correction import LocalizedPose, Status
 from perception.localization.keyframes import Keyframes
-from perception.localization.pose_grid import CELL_M, DIRECTIONS, READINGS_MAX, PoseGrid
+from perception.localization.pose_grid import CELL_M, READINGS_MAX, STEP_RAD, PoseGrid
 from perception.localization.pose_particles import HYPOTHESES_MAX
 from perception.localization.pose_track import RECENT_M, RECENT_READINGS, PoseTrack, heading_noise
 from perception.localization.range_likelihood import RangeModel
@@ -119,10 +119,8 @@ class KnownRoom:
             return
         keyframes = self._keyframes
         if self._stage in {IDLE, DUE}:
-            while (
-                keyframes.way_since(self._window_begin) > WINDOW_M
-                or keyframes.count - self._window_begin > WINDOW_MAX
-            ):
+            self._window_begin = max(self._window_begin, keyframes.count - WINDOW_MAX)
+            while keyframes.way_since(self._window_begin) > WINDOW_M:
                 self._window_begin += 1
         is_due = keyframes.driven_m - self._searched_at_m >= self._pause_m
         if self._stage == IDLE and self._status != TRACKING and is_due:
@@ -148,7 +146,7 @@ class KnownRoom:
             self._grid.refine()
             if not self._grid.is_searching:
                 starts = self._grid.best_starts(HYPOTHESES_MAX)
-                self._candidates.start(starts, CELL_M, math.pi / DIRECTIONS, self._keyframes, self._window_begin)
+                self._candidates.start(starts, CELL_M, STEP_RAD, self._keyframes, self._window_begin)
                 self._stage = WEIGHING if len(starts) else IDLE
         elif self._stage == WEIGHING:
             self._enter(self._candidates)

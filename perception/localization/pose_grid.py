@@ -24,6 +24,8 @@ from perception.records import Record, Records, records, zeros
 CELL_M: Final = 0.2
 DIRECTIONS: Final = 60
 STEP_RAD: Final = 2.0 * math.pi / DIRECTIONS
+OPEN_M: Final = 3.0
+"""The grid reaches so far beyond the surfaces of a room without walls."""
 CELLS_PER_QUANTUM: Final = 4
 """Cells of the table that one quantum computes."""
 BLOCK: Final = 16
@@ -243,6 +245,8 @@ class PoseGrid:
     def __init__(self, room: Room, surroundings: Surroundings, clear_m: float) -> None:
         self._surroundings, self._clear_m = surroundings, clear_m
         low, high = room.bounds
+        if not len(room.walls):
+            low, high = low - OPEN_M, high + OPEN_M
         self.shape = tuple(max(1, math.ceil(side / CELL_M)) for side in (high - low).tolist())
         # Symmetric about the room's middle: the answers of a symmetric room are then exactly alike.
         self._origin = 0.5 * (low + high) - 0.5 * CELL_M * (np.array(self.shape) - 1.0)

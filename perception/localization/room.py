@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from config.world import WorldConfig
 from perception.kernel import Floats
 
 JOIN_M: Final = 1e-3
@@ -85,6 +86,19 @@ def make_room(walls: Floats, circles: Floats | None = None) -> Room:
     normals = np.column_stack([-along[:, 1], along[:, 0]]) / length[:, None]
     offsets = (normals * walls[:, :2]).sum(axis=1)
     return Room(walls, normals, offsets, _sectors(walls, normals, offsets), circles)
+
+
+def room_of(world: WorldConfig) -> Room:
+    """Return the surfaces of a world as a known room; a side shorter than `JOIN_M` is left out.
+
+    Raises
+    ------
+    ValueError
+        It has no surface.
+    """
+    sides = [side for side in world.sides_m() if math.dist(side[:2], side[2:]) >= JOIN_M]
+    circles = [(drum.x_m, drum.y_m, drum.radius_m) for drum in world.drum]
+    return make_room(np.array(sides).reshape(-1, 4), np.array(circles).reshape(-1, 3))
 
 
 def _sectors(walls: Floats, normals: Floats, offsets: Floats) -> Floats:

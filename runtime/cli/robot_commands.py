@@ -21,6 +21,7 @@ def run(
     no_record: Annotated[bool, Flag] = False,
     no_console: Annotated[bool, Flag] = False,
     json: JsonFile = None,
+    map_file: Annotated[str | None, Parameter(name="--map")] = None,
     world: str | None = None,
     seed: Count = 0,
     trace: str | None = None,
@@ -48,6 +49,8 @@ def run(
         Record nothing.
     no_console
         Do not serve the operator console.
+    map_file
+        The known room in which the robot finds itself: a world file, or the name of a shipped one.
     world
         Emulated robot: world file, or the name of a shipped one.
     seed
@@ -69,7 +72,7 @@ def run(
 
     emulator = EmulatorOptions(world=world, seed=seed, trace=trace, faults=faults)
     return run_robot(
-        config, sets, port=port, arm=arm, seconds=seconds, headless=headless, record=record,
+        config, sets, port=port, arm=arm, seconds=seconds, headless=headless, record=record, map_file=map_file,
         no_record=no_record, no_console=no_console, json_file=json, emulator=emulator, units=units,
     )  # fmt: skip
 

@@ -8,9 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from config.settings import LocalizationConfig, Settings
 from drivers.messages import Firing
 from perception.localization.drift_correction import LocalizedPose
-from perception.localization.known_room import KnownRoom
 from perception.localization.map_frame import turned_object
-from perception.localization.room import Room
 from perception.pipeline import Perception
 from runtime.cycle.summary import object_row
 from runtime.recording.replay_summary import PoseRow, ReplaySummary
@@ -93,8 +91,8 @@ def replay_localized(
 
 
 def replay_in_known_room(
-    settings: Settings, firings: Iterable[Firing], room: Room, on_pose: Callable[[float, LocalizedPose], None]
-) -> ReplaySummary:  # fmt: skip
+    settings: Settings, firings: Iterable[Firing], on_pose: Callable[[float, LocalizedPose], None]
+) -> ReplaySummary:
     """Run perception over firings, find the robot in a known room, and return what was perceived.
 
     The objects are in the map frame if the robot's place is known at the end, otherwise in odometry's.
@@ -102,24 +100,29 @@ def replay_in_known_room(
     Parameters
     ----------
     settings : Settings
-        Ring, models and constants.
+        Ring, models, constants and the known room.
     firings : iterable of Firing
         In order of time.
-    room : Room
-        The map.
     on_pose : callable
         Called after each firing with its time (s) and the robot's pose as known then.
+
+    Raises
+    ------
+    ValueError
+        The settings name no known room.
     """
-    replayer, localizer = FiringReplayer(settings, firings), KnownRoom(room, settings.ring)
+    replayer = FiringReplayer(settings, firings)
+    known_room = replayer.perception.known_room
+    if known_room is None:
+        raise ValueError("the settings name no known room")
     for firing in replayer:
-        localizer.observe(firing)
-        while localizer.can_refine:
-            localizer.refine()
-        on_pose(firing.robot_s, localizer.localized())
-    summary, here = replayer.summary(), localizer.localized()
+        while known_room.can_refine:  # a log has time for a whole search
+            known_room.refine()
+        on_pose(firing.robot_s, known_room.localized())
+    summary, here = replayer.summary(), known_room.localized()
     summary["pose"] = _pose_row(here)
     if here.status == "tracking":
-        to = localizer.odometry_from_map().inverse()
+        to = known_room.odometry_from_map().inverse()
         summary["frame"] = "map"
         summary["objects"] = [object_row(turned_object(to, seen)) for seen in replayer.perception.objects()]
     return summary

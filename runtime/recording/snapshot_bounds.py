@@ -32,7 +32,13 @@ from perception.bayes.pose_restarts import LATTICE
 from perception.bayes.scratch import POLYGON
 from perception.bayes.settings_record import CIRCLES_MAX, NOISES, POLYGONS_MAX
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED
+from perception.localization.known_room import IDLE, STATUSES, WEIGHING
 from perception.localization.landmark_state import LANDMARKS_MAX
+from perception.localization.pose_grid import NONE as NO_QUANTUM
+from perception.localization.pose_grid import READINGS_MAX, STARTS_MAX
+from perception.localization.pose_particles import HYPOTHESES_MAX
+from perception.localization.pose_track import QUANTA as QUANTA_OF_HYPOTHESIS
+from perception.localization.pose_track import RECENT_MAX
 from perception.paper.outline_map import PINNED
 from perception.paper.parameters import PINNED_SHARE_MAX, PLACEMENTS_MAX, READINGS_KEPT
 from perception.sensor_memory import SETS_MAX
@@ -57,6 +63,7 @@ STEPS: Final = Bound(0, 4096)
 """Of the progress of a polygon's job; its longest stage has a few hundred steps."""
 SCALE: Final = Bound(0.5, 2.0)
 """Of a scale by which something is divided."""
+SHARE: Final = Bound(0.0, 1.0)
 QUANTA: Final = Bound(0, 1000)
 """As `config.settings.BayesConfig.quanta_per_firing`, which a running process may change."""
 ITERATIONS: Final = Bound(0, 1_000_000)
@@ -73,9 +80,10 @@ _CONSTANTS: Final = (
 CONSTANTS: Final = frozenset(_CONSTANTS.split())
 """Numbers that the settings give and no cycle changes."""
 
-MAY_BE_INFINITE: Final = frozenset(
-    {"_sensors.last_m", "before_last_m", "run_m", "stuck_m", "job.best_nat", "_looked_x", "_looked_y"}
-)
+MAY_BE_INFINITE: Final = frozenset({
+    "_sensors.last_m", "before_last_m", "run_m", "stuck_m", "job.best_nat", "_looked_x", "_looked_y",
+    "_keyframes._latest", "_keyframes.readings", "_grid._readings",
+})  # fmt: skip
 """Floats for which an infinity stands for no echo, for no evidence yet, or for no place yet."""
 
 _COUNTS: Final = (
@@ -84,18 +92,30 @@ _COUNTS: Final = (
     "near_echoes newest_segment objects_numbered off_stuck outline.numbers outline.total _sensors.readings "
     "rejection_count run_firing run_length segments_made segments_numbered sensors.kept members_sum "
     "_archive.circles.count _archive.polygons.count _numbered waiting "
-    "drift._arrived drift._entered drift._windows landmarks.failures landmarks.hits"
+    "drift._arrived drift._entered drift._windows landmarks.failures landmarks.hits "
+    "_keyframes.count _keyframes._firings entered known_room._window_begin _grid._due _grid._searches"
 )
 _FLAGS: Final = (
     "_sets has_rested is_named has_gained refines_next is_confirmed has_challenger is_done is_crossed "
     "_is_due is_reported _circles_pending _polygons_pending _polygons_turn _placement_was_last _expected _heard "
-    "drift._has_started drift._is_synchro sensors.is_known"
+    "drift._has_started drift._is_synchro sensors.is_known _has_fired _is_started _has_stood"
 )
 
 BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
     dict.fromkeys(_COUNTS.split(), COUNT)
     | dict.fromkeys(_FLAGS.split(), FLAG)
     | {
+        "_grid._count": Bound(0, READINGS_MAX),
+        "_grid._found.count": Bound(0, STARTS_MAX),
+        "_grid._quantum": Bound(NO_QUANTUM, COUNT.high),
+        "_grid._specular_share": SHARE,
+        "_memory.count": Bound(0, HYPOTHESES_MAX),
+        "_recent_count": Bound(0, RECENT_MAX),
+        "_step": Bound(0, QUANTA_OF_HYPOTHESIS * HYPOTHESES_MAX - 1),
+        "known_room.probability": SHARE,
+        "known_room.specular_share": SHARE,
+        "known_room._stage": Bound(IDLE, WEIGHING),
+        "known_room._status": Bound(0, len(STATUSES) - 1),
         "_estimate.count": Bound(0, LANDMARKS_MAX),
         "_estimate.noise": Bound(0.0, 1e3),
         "_estimate.odometer_scale": SCALE,
@@ -154,6 +174,7 @@ def settings_bounds(settings: Settings) -> dict[str, Bound]:
         "_rejections.rows.model": model,
         "candidates._count": Bound(0, clusters),
         "candidates._predecessor": Bound(-1, clusters - 1),
+        "_keyframes.counts": Bound(0, len(settings.ring.mounts)),
         "clusters._labels": Bound(-1, clusters - 1),
         "clusters._members": Bound(0, capacity - 1),
         "clusters._offsets": Bound(0, capacity),

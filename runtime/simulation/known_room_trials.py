@@ -18,9 +18,8 @@ from drivers.firing_pattern import firing_pattern, sensors
 from drivers.messages import Firing, Floats, Pose, wrap_angle
 from perception.localization.drift_correction import Status
 from perception.localization.known_room import KnownRoom
-from perception.localization.room import Room
+from perception.localization.room import Room, room_of
 from runtime.simulation.furnished_rooms import ACOUSTICS, drive, furnished_room
-from runtime.simulation.localization_trials import room_of
 
 STEP_M: Final = 0.03
 """Way between two firings of a part of the ring."""
@@ -105,7 +104,7 @@ def furnished_drive(
         pose = Pose(*row)
         ranges = sonar.fire(pose, pose.theta, sensors(pattern.masks[k % len(pattern.masks)]))
         firings.append(Firing(k * ring.firing.step_period_s, odometry, odometry.theta, ranges))
-    return KnownDrive(room_of(scene), firings, truth, carried_at)
+    return KnownDrive(room_of(room.world), firings, truth, carried_at)
 
 
 def _path(poses: Floats, seed: int) -> Floats:

@@ -12,11 +12,11 @@ import numpy as np
 from config.robot import RingConfig
 from config.units import FOOT_M
 from config.world import AcousticsConfig
-from drivers.emulator.scene import Scene, compile_scene
+from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose, wrap_angle
 from perception.localization.localize import PoseCandidate, localize
-from perception.localization.room import Room, make_room
+from perception.localization.room import room_of
 from runtime.simulation.random_rooms import ACOUSTICS, random_room
 
 RIGHT_M: Final = 0.3 * FOOT_M
@@ -67,15 +67,6 @@ class Trial:
         return bool(self.candidates) and not self.first_is_right and self.candidates[0].probability > CONFIDENT
 
 
-def room_of(scene: Scene) -> Room:
-    """Return the surfaces of an emulated scene as a known room."""
-    walls, circles = scene.segments, scene.circles
-    return make_room(
-        np.column_stack([walls[name] for name in ("x1", "y1", "x2", "y2")]),
-        np.column_stack([circles[name] for name in ("x", "y", "radius")]),
-    )
-
-
 def localize_once(
     ring: RingConfig, seed: int, acoustics: AcousticsConfig = ACOUSTICS, map_seed: int | None = None
 ) -> Trial:
@@ -96,7 +87,7 @@ def localize_once(
     scene = compile_scene(world)
     ranges = Sonar(ring, scene, acoustics, np.random.default_rng(seed)).fire(truth, truth.theta)
     firing = Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, ranges)
-    known = scene if map_seed is None else compile_scene(random_room(map_seed)[0])
+    known = world if map_seed is None else random_room(map_seed)[0]
     return Trial(truth, localize([firing], room_of(known), ring, acoustics.model))
 
 

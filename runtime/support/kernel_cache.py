@@ -108,7 +108,8 @@ def needed_parts(settings: Settings) -> tuple[str, ...]:
     has_polygons = any(model.arc_radius_m is None for model in settings.models)
     polygons = (POLYGONS,) if has_polygons and settings.perception.method == BAYES else ()
     localization = (LOCALIZATION,) if settings.perception.localization.correct_drift else ()
-    return (EMULATOR, settings.perception.method, *polygons, *localization)
+    known_room = () if settings.perception.localization.known_room is None else (KNOWN_ROOM,)
+    return (EMULATOR, settings.perception.method, *polygons, *localization, *known_room)
 
 
 def uncompiled_parts(folder: Path, parts: Iterable[str]) -> list[str]:

@@ -60,6 +60,7 @@ def greeting(role: str = "control", **changes: Any) -> dict[str, Any]:
                    {"name": "box", "vertices": [[half, -half], [half, half], [-half, half], [-half, -half]],
                     "closed": True, "arc_radius_m": None}],
         "truth": {"drums": [[x, y, RADIUS] for x, y in DRUMS], "walls": [], "polygons": []},
+        "known_room": {"drums": [], "walls": [[-2.0, -2.0, 4.0, -2.0]], "polygons": []},
         "parameters": [dict(p) for p in PARAMETERS], "budget_s": 0.005, "period_s": PERIOD_S,
     } | changes  # fmt: skip
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from config.load import ConfigError, load_any, load_model, load_robot, load_settings, load_world
+from config.load import ConfigError, load_any, load_model, load_robot, load_settings, load_world, with_known_room
 from config.model import ModelConfig
 from config.settings import Settings
-from config.world import WorldConfig
+from config.world import StartConfig, WorldConfig
 from tests.config.loading import problem, problems, write
 from tests.config.toml_text import MODEL, ROBOT, WORLD, irregular
 
@@ -177,6 +177,20 @@ def test_the_kind_of_a_file_follows_from_its_keys(tmp_path: Path) -> None:
     assert isinstance(load_any(write(tmp_path / "r.toml", ROBOT)), Settings)
     with pytest.raises(ConfigError, match=r"w\.toml: drum\.0\.x: unknown key"):
         load_any(write(tmp_path / "w.toml", "[[drum]]\nx = 1\nx_m=1\ny_m=2\nradius_m=1"))
+
+
+def test_a_world_becomes_the_known_room(tmp_path: Path) -> None:
+    settings = load_settings("hallway")
+    found = with_known_room(settings, "irregular").perception.localization.known_room
+    assert found is not None
+    assert found.drum == load_world("irregular").drum
+    assert found.start == StartConfig()
+    empty = write(tmp_path / "empty.toml", "[start]\nx_m = 1.0\n")
+    with pytest.raises(ConfigError, match=r"empty\.toml: .*known_room has no surface"):
+        with_known_room(settings, empty)
+    corrected = load_settings("hallway", ["perception.localization.correct_drift=true"])
+    with pytest.raises(ConfigError, match="exclude each other"):
+        with_known_room(corrected, "irregular")
 
 
 @pytest.mark.parametrize(

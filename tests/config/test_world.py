@@ -26,6 +26,17 @@ def test_every_kind_of_object_is_read() -> None:
     assert world.polygon[0].vertices_m == ((5.0, 5.0), (6.0, 5.0), (6.0, 6.0))
 
 
+def test_the_sides_of_walls_boxes_and_polygons_are_listed() -> None:
+    world = WorldConfig.model_validate(WORLD | {"box": [{"x_m": 1.0, "y_m": 2.0, "width_m": 4.0, "depth_m": 2.0}]})
+    wall = world.wall[0]
+    sides = world.sides_m()
+    assert sides[0] == (wall.x1_m, wall.y1_m, wall.x2_m, wall.y2_m)
+    assert sides[1:5] == [(-1.0, 1.0, 3.0, 1.0), (3.0, 1.0, 3.0, 3.0), (3.0, 3.0, -1.0, 3.0), (-1.0, 3.0, -1.0, 1.0)]
+    assert sides[5:] == [(5.0, 5.0, 6.0, 5.0), (6.0, 5.0, 6.0, 6.0), (6.0, 6.0, 5.0, 5.0)]
+    turned = world.box[0].model_copy(update={"angle_deg": 90.0})
+    assert turned.corners_m()[0] == pytest.approx((2.0, 0.0))
+
+
 @pytest.mark.parametrize(
     "table",
     [

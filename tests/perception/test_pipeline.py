@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from config.load import load_model, load_settings, load_world
+from config.load import load_model, load_settings, load_world, with_known_room
 from drivers.messages import Firing, Pose
 from perception.bayes.bayes_method import BayesPerception
 from perception.paper.paper_method import PaperPerception
@@ -29,6 +29,33 @@ def test_a_firing_of_another_ring_is_refused(count: int) -> None:
     perception = Perception(chosen.ring, chosen.models, chosen.perception)
     with pytest.raises(ValueError, match=f"a firing of {count} ranges, but the ring has 24 sensors"):
         perception.observe(Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, np.full(count, 2.0)))
+
+
+@pytest.mark.compiled
+def test_in_a_known_room_the_place_is_found_and_a_snapshot_continues_to_the_bit() -> None:
+    chosen = with_known_room(settings(), "irregular")
+    perception, other = (Perception(chosen.ring, chosen.models, chosen.perception) for _ in range(2))
+    for k, firing in enumerate(drive(load_world("irregular"), (-5.0, 4.0))):
+        for one in (perception,) if k <= 75 else (perception, other):
+            one.observe(firing)
+            quanta = 0
+            while one.can_refine and quanta < 50 + k % 7:
+                quanta += one.refine() > 0
+        if k == 75:
+            assert perception.known_room is not None
+            assert perception.known_room.can_refine, "in the midst of the search"
+            other.restore(perception.snapshot())
+    here, at = perception.localized(), other.localized()
+    assert here is not None
+    assert repr(here) == repr(at)
+    assert here.status == "tracking"
+    assert (firing.pose.x, firing.pose.y) == pytest.approx((here.pose.x, here.pose.y), abs=0.1)
+    assert perception.odometry_from_map().x == pytest.approx(0.0, abs=0.1)
+    assert perception.objects() == perception.mapped_objects(), "what the method holds is in odometry's frame"
+    perception.reset()
+    again = perception.localized()
+    assert again is not None
+    assert again.status == "localizing"
 
 
 @pytest.mark.compiled

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Final
 
 from rich.console import Console
 
-from config.errors import DONE, WRONG_CALL, UserError
-from config.load import load_settings, load_world
+from config.errors import DONE
+from config.load import load_settings, with_known_room
 from runtime.cli.commands.offline_io import refuse_unwritable
 from runtime.cli.tables import objects_table, pose_line
 from runtime.cycle.summary import write_json
-from runtime.support.kernel_cache import KNOWN_ROOM, LOCALIZATION, needed_parts, prepare_kernels
+from runtime.support.kernel_cache import LOCALIZATION, needed_parts, prepare_kernels
 from runtime.support.length_format import Units
 from runtime.support.progress import progress
 
@@ -22,7 +22,6 @@ TRAJECTORY_HEADER: Final = "t,x,y,theta,sxx,sxy,syy,stt,status"
 if TYPE_CHECKING:
     from drivers.messages import Firing
     from perception.localization.drift_correction import LocalizedPose
-    from perception.localization.room import Room
 
 
 def replay_log(
@@ -45,11 +44,12 @@ def replay_log(
         As of `runtime.cli.recording_commands.replay`.
     """
     settings = load_settings(None, sets, robot=robot, models=models)
-    room = None if map_file is None else known_room_of(map_file)
+    if map_file is not None:
+        settings = with_known_room(settings, map_file)
     console = Console(stderr=True)
     refuse_unwritable({"--json": json_file, "--trajectory": trajectory})
-    localization = (LOCALIZATION if room is None else KNOWN_ROOM,) if localize else ()
-    prepare_kernels(settings, console, (*needed_parts(settings), *localization))
+    corrects_drift = localize and map_file is None
+    prepare_kernels(settings, console, (*needed_parts(settings), *([LOCALIZATION] if corrects_drift else [])))
     from runtime.recording.ring_log import read_ring_log
     from runtime.recording.ring_log_replay import replay_firings, replay_in_known_room, replay_localized
 
@@ -60,9 +60,9 @@ def replay_log(
 
     with progress(console, "replaying") as step:
         firings = _each(read_ring_log(Path(log), sensors=len(settings.ring.mounts)), step)
-        if room is not None:
-            summary = replay_in_known_room(settings, firings, room, on_pose)
-        elif localize:
+        if map_file is not None:
+            summary = replay_in_known_room(settings, firings, on_pose)
+        elif corrects_drift:
             summary = replay_localized(settings, firings, on_pose)
         else:
             summary = replay_firings(settings, firings)
@@ -80,23 +80,6 @@ def replay_log(
         f"a firing takes {cycle_us['p50'] / 1e3:.2f} ms, p99 {cycle_us['p99'] / 1e3:.2f} ms"
     )
     return DONE
-
-
-def known_room_of(map_file: str) -> Room:
-    """Return the walls and round objects of a world file as a known room.
-
-    Raises
-    ------
-    UserError
-        The file cannot be read, is invalid, or has no surface.
-    """
-    from drivers.emulator.scene import compile_scene
-    from runtime.simulation.localization_trials import room_of
-
-    try:
-        return room_of(compile_scene(load_world(map_file)))
-    except ValueError as error:
-        raise UserError(f"{map_file}: {error}", WRONG_CALL) from error
 
 
 def trajectory_row(t: float, here: LocalizedPose) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
-from config.load import ConfigError, load_settings
+from config.load import ConfigError, load_settings, with_known_room
 from config.settings import Settings
 from drivers.registry import make_driver
 from runtime import VERSION
@@ -73,6 +73,7 @@ def run_robot(
     seconds: float | None,
     headless: bool,
     record: str | None,
+    map_file: str | None,
     no_record: bool,
     no_console: bool,
     json_file: str | None,
@@ -83,7 +84,7 @@ def run_robot(
 
     Parameters
     ----------
-    config, sets, port, arm, seconds, headless, record, no_record, no_console, json_file, units
+    config, sets, port, arm, seconds, headless, record, map_file, no_record, no_console, json_file, units
         As of `runtime.cli.robot_commands.run`.
     emulator : EmulatorOptions
         Used without a port.
@@ -94,6 +95,8 @@ def run_robot(
         An option is wrong, a file cannot be written, the run ended in FAULT, or the recording is incomplete.
     """
     settings = load_settings(config, sets, world=emulator.world)
+    if map_file is not None:
+        settings = with_known_room(settings, map_file)
     make_driver(settings)  # refuses what the robot cannot carry out
     if no_console:
         settings = without_console(settings)
@@ -143,7 +146,7 @@ def run_robot(
                     emulated=port is None, preparation=preparation,
                     reload=lambda: reload_settings(
                         config, sets, emulator.world, port_option, None if port else run_settings.link.port,
-                        no_console=no_console,
+                        map_file=map_file, no_console=no_console,
                     ),
                 )  # fmt: skip
 
@@ -188,13 +191,14 @@ def reload_settings(
     port: str | None,
     emulator_port: str | None,
     *,
+    map_file: str | None = None,
     no_console: bool = False,
 ) -> Settings:
     """Return the settings as the files are now, for a run on the same port as before.
 
     Parameters
     ----------
-    config, sets, world, port, no_console
+    config, sets, world, port, map_file, no_console
         As of `runtime.cli.robot_commands.run`.
     emulator_port : str, optional
         Port of the emulator, which is used if the settings name none.
@@ -205,6 +209,8 @@ def reload_settings(
         The settings are wrong, or no robot can carry them out.
     """
     settings = load_settings(config, sets, world=world)
+    if map_file is not None:
+        settings = with_known_room(settings, map_file)
     try:
         make_driver(settings)
     except UserError as error:

@@ -30,6 +30,7 @@ from config.settings import Settings
 from drivers.driver import RobotDriver
 from drivers.messages import Floats, LinkCounts, Pose
 from perception.detected_object import DetectedObject, MapCounts
+from perception.localization.drift_correction import LocalizedPose
 from runtime.cli.tables import objects_table
 from runtime.cli.terminal.plan import draw_plan
 from runtime.cycle.inputs import Request
@@ -37,7 +38,7 @@ from runtime.cycle.modes import ModeState
 from runtime.cycle.step import CycleRecord, State
 from runtime.cycle.summary import object_row
 from runtime.support.health import Worker
-from runtime.support.length_format import Units
+from runtime.support.length_format import Units, format_length, format_point
 from runtime.timing.cycle_stats import CycleStats, Quantiles
 
 EVERY_CYCLES: Final = 5
@@ -75,6 +76,8 @@ class Snapshot:
     """Causes of late and overrun cycles, with the number of cycles."""
     sensors: tuple[str, ...] = ()
     """Why sensors are masked."""
+    localized: LocalizedPose | None = None
+    """The robot in the map frame; None where that is odometry's."""
 
 
 class View:
@@ -135,7 +138,7 @@ class View:
             mode, pose, list(self._trail), state.perception.segment_geometry(), state.perception.counts,
             state.perception.labelled_objects(), self._ranges.copy(), driver.counts,
             stats.cycles, stats.late, stats.cycle_us(), stats.lag_us(), stats.missed, tuple(stats.causes.items()),
-            tuple(report.reason for report in state.perception.sensor_reports()),
+            tuple(report.reason for report in state.perception.sensor_reports()), state.perception.localized(),
         )  # fmt: skip
         self._wake.set()
 
@@ -189,6 +192,8 @@ class View:
         grid = Table.grid(padding=(0, 2))
         grid.add_row("ring", self._ring(snapshot.ranges))
         grid.add_row("map", map_text(snapshot.map_counts))
+        if snapshot.localized is not None:
+            grid.add_row("place", place_text(snapshot.localized, self._units))
         for reason in snapshot.sensors:
             grid.add_row("masked", reason)
         counts = snapshot.counts
@@ -219,6 +224,19 @@ def map_text(counts: MapCounts) -> str:
     if counts.archived:
         text += f", {counts.archived} objects left behind"
     return f"{text}; {counts.waiting} near ones have no room" if counts.waiting else text
+
+
+def place_text(here: LocalizedPose, units: Units) -> str:
+    """Return the robot's place in the map frame, as one line."""
+    said = f"{here.status} {here.probability:.0%}"
+    sigma_x, sigma_y, sigma_theta = np.sqrt(np.diag(here.covariance)).tolist()
+    if not np.isfinite(sigma_x):
+        return f"unknown, {said}"
+    place, sigma = format_point(here.pose.x, here.pose.y, units), format_length(max(sigma_x, sigma_y), units, 3)
+    return (
+        f"{place} ± {sigma} {units}, "
+        f"{np.degrees(here.pose.theta) % 360.0:.1f}° ± {np.degrees(sigma_theta):.1f}°, {said}"
+    )
 
 
 def millis(quantiles: Quantiles) -> str:

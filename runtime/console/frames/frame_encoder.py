@@ -262,15 +262,15 @@ def _object(detected: DetectedObject) -> dict[str, Any]:
 def _localized(perception: Perception) -> dict[str, Any] | None:
     """Return the robot in the map frame and that frame in odometry's; None where they are the same."""
     here = perception.localized()
-    if here is None or perception.map_frame is None:
+    if here is None:
         return None
-    covariance = here.covariance
+    covariance = [float(here.covariance[row, column]) for row, column in ((0, 0), (0, 1), (1, 1), (2, 2))]
     return {
         "pose": _rounded(here.pose),
-        "covariance": [float(covariance[row, column]) for row, column in ((0, 0), (0, 1), (1, 1), (2, 2))],
+        "covariance": covariance if math.isfinite(sum(covariance)) else None,
         "status": here.status,
         "probability": round(here.probability, 3),
-        "frame": _rounded(perception.map_frame.drift.odometry_from_map()),
+        "frame": _rounded(perception.odometry_from_map()),
     }
 
 

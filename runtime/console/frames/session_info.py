@@ -1,4 +1,4 @@
-"""Session information: the first message to the page, with the robot, its models and an emulator's true world."""
+"""Session information, the first message to the page: robot, models, an emulator's true world, a known room."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def session_info(settings: Settings, *, name: str | None, emulated: bool, units:
     units : {"m", "ft"}
         In which the page shows lengths at first.
     """
-    ring, body = settings.ring, settings.body
+    ring, body, known_room = settings.ring, settings.body, settings.perception.localization.known_room
     return {
         "type": "session",
         "version": VERSION,
@@ -45,26 +45,24 @@ def session_info(settings: Settings, *, name: str | None, emulated: bool, units:
             {"name": m.name, "vertices": m.vertices_m, "closed": m.closed, "arc_radius_m": m.arc_radius_m}
             for m in settings.models
         ],
-        "truth": true_world(settings.world) if emulated and settings.world is not None else None,
+        "truth": surfaces(settings.world, settings.world.start) if emulated and settings.world is not None else None,
+        "known_room": None if known_room is None else surfaces(known_room, StartConfig()),
         "parameters": parameters(settings),
         "budget_s": settings.cycle.perception_budget_s,
         "period_s": 1.0 / settings.cycle.rate_hz,
     }
 
 
-def true_world(world: WorldConfig) -> dict[str, Any]:
-    """Return the drums, walls and polygons of a world, m, in the frame of an odometry that begins at its start."""
-    odom_from_world = _pose(world.start).inverse()
+def surfaces(world: WorldConfig, start: StartConfig) -> dict[str, Any]:
+    """Return the drums, walls and polygons of a world, m, in the frame of an odometry that begins at this start."""
+    odom_from_world = _pose(start).inverse()
 
     def in_odom(x: float, y: float) -> tuple[float, float]:
         place = odom_from_world.compose(Pose(x, y, 0.0))
         return place.x, place.y
 
     polygons = [[in_odom(*vertex) for vertex in polygon.vertices_m] for polygon in world.polygon]
-    for box in world.box:
-        w, d, centre = 0.5 * box.width_m, 0.5 * box.depth_m, Pose(box.x_m, box.y_m, math.radians(box.angle_deg))
-        corners = [centre.compose(Pose(x, y, 0.0)) for x, y in ((w, -d), (w, d), (-w, d), (-w, -d))]
-        polygons.append([in_odom(corner.x, corner.y) for corner in corners])
+    polygons += [[in_odom(*corner) for corner in box.corners_m()] for box in world.box]
     return {
         "drums": [[*in_odom(drum.x_m, drum.y_m), drum.radius_m] for drum in world.drum],
         "walls": [[*in_odom(wall.x1_m, wall.y1_m), *in_odom(wall.x2_m, wall.y2_m)] for wall in world.wall],

@@ -59,13 +59,40 @@ export function drawRobot(f) {
   ctx.stroke();
 }
 
+// The surfaces of the known room, where the robot's place has them.
+function drawKnownRoom({ ctx, run, px, theme }, { drums, walls, polygons }) {
+  const [x, y, turn] = run.state.localized.frame, lines = new Path2D();
+  for (const [x1, y1, x2, y2] of walls) {
+    lines.moveTo(x1, y1);
+    lines.lineTo(x2, y2);
+  }
+  for (const polygon of polygons) {
+    polygon.forEach(([cornerX, cornerY], i) => (i === 0 ? lines.moveTo(cornerX, cornerY) : lines.lineTo(cornerX, cornerY)));
+    lines.closePath();
+  }
+  for (const [cx, cy, r] of drums) {
+    lines.moveTo(cx + r, cy);
+    lines.arc(cx, cy, r, 0, 2 * Math.PI);
+  }
+  ctx.save();
+  ctx.translate(x, y);
+  ctx.rotate(turn);
+  ctx.strokeStyle = theme.drive;
+  ctx.lineWidth = 1.2 * px;
+  ctx.setLineDash(run.state.localized.status === "tracking" ? [] : [4 * px, 5 * px]);
+  ctx.stroke(lines);
+  ctx.restore();
+}
+
 // The axes of the map frame, which lies askew in odometry's where odometry has drifted, and the ellipse of the robot's place.
 export function drawMapFrame(f) {
   const { ctx, run, px, theme } = f;
   if (!run.fresh || run.state.localized === null) return;
   const { frame: [x, y, turn], covariance } = run.state.localized;
+  if (covariance === null) return; // the place in the known room is not found yet
   const length = AXIS_PX * px;
   f.inWorld();
+  if (run.session?.known_room) drawKnownRoom(f, run.session.known_room);
   ctx.strokeStyle = theme.drive;
   ctx.lineWidth = 2 * px;
   ctx.beginPath();

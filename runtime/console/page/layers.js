@@ -21,7 +21,7 @@ const TABLE = [
   ["ellipses", "front", "95 % ellipses of their positions", drawEllipses, true, "M8 12c2-6 22-10 24-4s-22 10-24 4Z", "ellipse"],
   ["trail", "front", "trail", trailDrawer(), true, "M4 15c8-12 14 6 32-9", "robot"],
   ["robot", "front", "robot", drawRobot, true, "M20 2a8 8 0 1 1-.1 0Zm8 8-12-4 3 4-3 4z", "robot"],
-  ["map_frame", "front", "map frame, and where the robot is in it: 95 % ellipse", drawMapFrame, true, "M8 17V4m0 13h13M24 10a6 4 0 1 1-.1 0Z", "drive"],
+  ["map_frame", "front", "map frame, known room, and where the robot is: 95 % ellipse", drawMapFrame, true, "M8 17V4m0 13h13M24 10a6 4 0 1 1-.1 0Z", "drive"],
   ["drive_request", "front", "goal", drawGoal, true, "M14 18V3l14 4-14 4", "drive"],
   ["vectors", "front", "schema vectors and their sum", drawVectors, true, "M4 16 30 5m0 0-8 0m8 0-5 6", "vector"],
   ["labels", "front", "labels and probability", drawLabels, true, "M14 17 20 3l6 14m-9.5-5h7", "model"],

@@ -67,10 +67,13 @@ export class Status {
   }
 
   // With one standard deviation: of the place in its worst direction, and of the heading.
-  #place({ pose: [x, y, theta], covariance: [xx, xy, yy, heading], status }) {
+  #place({ pose: [x, y, theta], covariance, status, probability }) {
+    const said = `${status} ${Math.round(100 * probability)} %`;
+    if (covariance === null) return `unknown, ${said}`;
+    const [xx, xy, yy, heading] = covariance;
     const sigma = Math.sqrt((xx + yy) / 2 + Math.hypot((xx - yy) / 2, xy));
     const place = `${this.#units.number(x)}, ${this.#units.number(y)} ± ${this.#units.length(sigma, 3)}`;
-    return `${place}, ${degrees(theta)} ± ${((Math.sqrt(heading) * 180) / Math.PI).toFixed(1)}°, ${status}`;
+    return `${place}, ${degrees(theta)} ± ${((Math.sqrt(heading) * 180) / Math.PI).toFixed(1)}°, ${said}`;
   }
 
   // Whether a count has grown recently: one bad frame an hour ago does not matter now.

@@ -16,8 +16,7 @@ from perception.kernel import Floats
 from perception.localization.expected_ranges import Beams
 from perception.localization.panorama import Panorama, panoramas
 from perception.localization.pose_fit import beams_at
-from perception.localization.room import Room
-from runtime.simulation.localization_trials import room_of
+from perception.localization.room import Room, room_of
 
 RING: RingConfig = load_settings("hallway").ring
 HALF_ANGLE = math.radians(RING.beam_half_angle_deg)
@@ -36,7 +35,7 @@ def stand(world: WorldConfig, truth: Pose, seed: int = 0, ring: RingConfig = RIN
     """The room, and one firing of the whole ring at a pose that odometry calls the origin."""
     scene = compile_scene(world)
     ranges = Sonar(ring, scene, world.acoustics, np.random.default_rng(seed)).fire(truth, truth.theta)
-    return room_of(scene), Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, ranges)
+    return room_of(world), Firing(0.0, Pose(0.0, 0.0, 0.0), 0.0, ranges)
 
 
 def panorama_of(firing: Firing) -> Panorama:

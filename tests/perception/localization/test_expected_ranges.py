@@ -9,12 +9,10 @@ import pytest
 
 from config.world import WorldConfig
 from drivers.emulator.acoustics import SIGHT_SLACK_M
-from drivers.emulator.scene import compile_scene
 from drivers.messages import Pose
 from perception.localization.expected_ranges import EDGE_REACH_M, Beams, Reflection, crossed, expected_ranges
-from perception.localization.room import make_room
+from perception.localization.room import make_room, room_of
 from runtime.simulation.furnished_rooms import drive, furnished_room
-from runtime.simulation.localization_trials import room_of
 from runtime.simulation.random_rooms import random_room
 from tests import naive_acoustics
 from tests.perception.localization.rooms import HALF_ANGLE, RING, beams_of, panorama_of, stand
@@ -33,7 +31,7 @@ def places(rooms: int = 6) -> list[tuple[WorldConfig, Pose]]:
 def test_ranges_equal_their_oracle(reflection: Reflection) -> None:
     silent = 0
     for world, truth in places():
-        shapes, room = naive_acoustics.shapes_of(world), room_of(compile_scene(world))
+        shapes, room = naive_acoustics.shapes_of(world), room_of(world)
         beams = beams_of(panorama_of(stand(world, truth)[1]), truth, Pose(truth.x + 0.1, truth.y, 1.0))
         found = expected_ranges(room, beams, HALF_ANGLE, reflection).range_m
         for place, x, y, axis in zip(np.ndindex(found.shape), *(part.flat for part in beams), strict=True):

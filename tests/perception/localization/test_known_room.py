@@ -15,10 +15,10 @@ from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose
 from perception.localization.expected_ranges import Reflection
 from perception.localization.known_room import KnownRoom
+from perception.localization.room import room_of
 from perception.snapshot import put_back, snapshot_of
 from runtime.simulation.furnished_rooms import ACOUSTICS
 from runtime.simulation.known_room_trials import KnownDrive, figures, follow, furnished_drive
-from runtime.simulation.localization_trials import room_of
 from tests.perception.localization.rooms import CROOKED, RECTANGLE, RING, world_of
 
 pytestmark = pytest.mark.compiled
@@ -36,7 +36,7 @@ def driven(corners: tuple[tuple[float, float], ...], length_m: float = 2.0) -> K
     for k, row in enumerate(truth.tolist()):
         odometry = origin.compose(Pose(*row))
         firings.append(Firing(0.1 * k, odometry, odometry.theta, sonar.fire(Pose(*row), row[2], range(k % 2, 24, 2))))
-    return KnownDrive(room_of(scene), firings, truth)
+    return KnownDrive(room_of(world), firings, truth)
 
 
 @pytest.mark.parametrize("reflection", ["cone", "specular"])

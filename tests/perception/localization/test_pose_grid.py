@@ -7,18 +7,16 @@ import math
 import numpy as np
 import pytest
 
-from drivers.emulator.scene import compile_scene
 from drivers.messages import Pose, wrap_angle
 from perception.kernel import Floats
 from perception.localization.expected_ranges import Beams, Reflection, expected_ranges
 from perception.localization.pose_grid import APART_M, CELL_M, STARTS_MAX, STEP_RAD, PoseGrid, Starts, offer
 from perception.localization.range_likelihood import RangeModel
-from perception.localization.room import Room
+from perception.localization.room import Room, room_of
 from perception.localization.surroundings import make_surroundings
 from perception.records import array_of, records, zeros
 from perception.snapshot import put_back, snapshot_of
 from runtime.simulation.furnished_rooms import furnished_room
-from runtime.simulation.localization_trials import room_of
 from runtime.simulation.random_rooms import ACOUSTICS
 from tests.perception.localization.rooms import CROOKED, HALF_ANGLE, RING, panorama_of, stand, world_of
 
@@ -41,7 +39,7 @@ def crooked() -> tuple[PoseGrid, Floats]:
 @pytest.mark.parametrize("reflection", ["cone", "specular"])
 def test_the_table_holds_the_expected_ranges(reflection: Reflection) -> None:
     seed = next(seed for seed in range(10) if furnished_room(seed).world.drum)
-    room = room_of(compile_scene(furnished_room(seed).world))
+    room = room_of(furnished_room(seed).world)
     grid = grid_of(room)
     x, y = np.array([(i, j) for i in range(0, grid.shape[0], 3) for j in range(0, grid.shape[1], 3)]).T
     direction = np.arange(len(x)) % 60

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from perception.localization.room import make_room
+from config.world import WorldConfig
+from perception.localization.room import make_room, room_of
 
 SQUARE = np.array([(0, 0, 2, 0), (2, 0, 2, 2), (2, 2, 0, 2), (0, 2, 0, 0)], dtype=float)
 
@@ -53,3 +54,14 @@ def test_sectors_between_walls(walls: list[tuple[float, ...]], openings: list[fl
 def test_invalid_walls_are_refused(walls: np.ndarray, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make_room(walls)
+
+
+def test_the_surfaces_of_a_world_are_a_room_without_those_too_short_to_be_one() -> None:
+    box = {"x_m": 1.0, "y_m": 1.0, "width_m": 2.0, "depth_m": 2.0}
+    speck = {"x1_m": 5.0, "y1_m": 0.0, "x2_m": 5.0005, "y2_m": 0.0}
+    drum = {"x_m": 7.0, "y_m": 0.0, "radius_m": 0.3}
+    room = room_of(WorldConfig.model_validate({"box": [box], "wall": [speck], "drum": [drum]}))
+    assert room.walls == pytest.approx(SQUARE)
+    assert room.circles == pytest.approx(np.array([[7.0, 0.0, 0.3]]))
+    with pytest.raises(ValueError, match="expected at least one wall"):
+        room_of(WorldConfig())

@@ -7,10 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from drivers.emulator.scene import compile_scene
 from perception.localization.expected_ranges import Beams, Reflection, expected_ranges
 from perception.localization.range_likelihood import RangeModel
-from perception.localization.room import make_room
+from perception.localization.room import make_room, room_of
 from perception.localization.surroundings import (
     NEAR_MAX,
     expect_cone,
@@ -20,7 +19,6 @@ from perception.localization.surroundings import (
     make_surroundings,
 )
 from runtime.simulation.furnished_rooms import furnished_room
-from runtime.simulation.localization_trials import room_of
 from tests.perception.localization.rooms import HALF_ANGLE, RING
 
 MODEL = RangeModel.of_ring(RING)
@@ -30,7 +28,7 @@ BEAMS = 40
 @pytest.mark.parametrize("reflection", ["cone", "specular"])
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_expected_ranges_are_numpys(seed: int, reflection: Reflection) -> None:
-    room = room_of(compile_scene(furnished_room(seed).world))
+    room = room_of(furnished_room(seed).world)
     around = make_surroundings(room, MODEL, HALF_ANGLE)
     expect = expect_cone if reflection == "cone" else expect_specular
     rng = np.random.default_rng(seed)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from config.load import load_settings, with_known_room
 from runtime.recording.channels import CYCLE, KEYFRAME, decode, encode
 from runtime.recording.reader import open_recording
 from runtime.recording.replayer import KeyframeFinder, Replayer, ReplayStep, fresh_state, keyframe_cycle
@@ -55,6 +56,30 @@ def test_every_cycle_is_replayed_from_the_beginning(paper_run: Path) -> None:
         assert replayer.settings_data == recording.info.settings
     assert [step.recorded.cycle for step in found if step.recorded is not None] == list(range(1, 121))
     assert all(is_equal(step) for step in found)
+
+
+@pytest.mark.compiled
+def test_a_run_in_a_known_room_is_replayed_to_the_bit_and_drives_as_without_the_map(tmp_path: Path) -> None:
+    """From the beginning and from each keyframe, one of them in the midst of a search."""
+    plain = load_settings("irregular", ["recording.keyframe_period_s=2.0", "perception.method=paper"])
+    commands = {}
+    for name, settings in (("plain", plain), ("mapped", with_known_room(plain, "irregular"))):
+        record(settings, tmp_path / name, 8.0, refused=0.02)
+        with open_recording(tmp_path / name) as recording:
+            commands[name] = [one.command for one in recording.cycle_records()]
+    assert commands["mapped"] == commands["plain"], "no correction of the place makes the drive jump"
+    with open_recording(tmp_path / "mapped") as recording:
+        finder = KeyframeFinder(recording)
+        positions = [found for at, chunk in recording.chunks() for m in chunk if (found := finder.find(at, m))]
+        statuses = []
+        for start in (None, *positions[1::2]):
+            replayer = Replayer(recording, start)
+            steps = cycles(replayer)
+            assert all(is_equal(step) for step in steps)
+            assert replayer.state is not None
+            statuses.append(repr(replayer.state.perception.localized()))
+    assert len(set(statuses)) == 1
+    assert "status='tracking'" in statuses[0]
 
 
 def test_a_replay_continues_from_a_checkpoint_and_from_a_keyframe(paper_run: Path) -> None:

@@ -12,6 +12,7 @@ from config.units import FOOT_M
 from perception.localization.drift_correction import LocalizedPose
 from runtime.recording.ring_log import read_ring_log
 from runtime.recording.ring_log_replay import FiringReplayer, replay_firings, replay_in_known_room
+from runtime.simulation.furnished_rooms import furnished_room
 from runtime.simulation.known_room_trials import furnished_drive
 
 PAPER = load_settings("hallway", ["perception.method=paper"])
@@ -53,7 +54,13 @@ def test_a_replay_in_a_known_room_gives_objects_and_pose_in_its_frame() -> None:
     settings = load_settings("hallway", ("perception.method=paper",))
     drive = furnished_drive(settings.ring, 2000, length_m=1.5)
     poses: list[LocalizedPose] = []
-    summary = replay_in_known_room(settings, drive.firings, drive.room, lambda _t, here: poses.append(here))
+    with pytest.raises(ValueError, match="no known room"):
+        replay_in_known_room(settings, [], lambda _t, _here: None)
+    known_room = furnished_room(2000).world
+    localization = settings.perception.localization.model_copy(update={"known_room": known_room})
+    perception = settings.perception.model_copy(update={"localization": localization})
+    settings = settings.model_copy(update={"perception": perception})
+    summary = replay_in_known_room(settings, drive.firings, lambda _t, here: poses.append(here))
     assert len(poses) == summary["cycles"] == len(drive.firings)
     assert poses[0].status == "localizing"
     assert (summary["pose"]["status"], summary["frame"]) == ("tracking", "map")

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from config.load import load_settings
+from config.load import load_settings, with_known_room
 from config.settings import Settings
 from drivers.messages import Firing
 from perception.paper.outline_map import PINNED
@@ -133,6 +133,37 @@ def test_no_state_with_correction_of_drift_is_refused() -> None:
             pass
         if k % CHECKED_EVERY == 0:
             is_honest(perception, fresh, settings)
+    localized = perception.localized()
+    assert localized is not None
+    assert localized.status == "tracking"
+
+
+@pytest.mark.compiled
+@pytest.mark.boundscheck
+def test_no_state_in_a_known_room_is_refused_and_a_poisoned_one_is_harmless() -> None:
+    settings = with_known_room(load_settings("irregular", ["perception.method=paper"]), "irregular")
+    assert settings.world is not None
+    perception, rng = Perception(settings.ring, settings.models, settings.perception), np.random.default_rng(3)
+    fresh, firings = perception.snapshot(), faulty(drive(settings.world, (-6.0, 2.0)))
+    stages, last = set(), State(perception)
+    for k, firing in enumerate(firings):
+        perception.observe(firing)
+        for _ in range(40):
+            perception.refine()
+        if k % CHECKED_EVERY == 0:
+            is_honest(perception, fresh, settings)
+            moment = Moment(k, settings, carried_state(last), perception.snapshot(), [])
+            stages.add(int(moment.snapshot["known_room._stage"]))
+            poisoned = randomised(moment, rng)
+            other = moment.perception()
+            with contextlib.suppress(ArithmeticError, LookupError, ValueError):
+                check_snapshot(poisoned, fresh, settings)
+                other.restore(poisoned)
+                other.observe(firing)
+                for _ in range(40):
+                    other.refine()
+                other.localized()
+    assert len(stages) >= 2
     localized = perception.localized()
     assert localized is not None
     assert localized.status == "tracking"

@@ -16,7 +16,7 @@ import pytest
 from rich.console import Console
 
 import runtime.support.kernel_cache as kernels
-from config.load import load_settings
+from config.load import load_settings, with_known_room
 from config.settings import Settings
 from runtime.support import kernel_warmup as warming
 
@@ -175,6 +175,8 @@ def test_a_run_compiles_only_the_parts_that_it_needs() -> None:
     assert kernels.needed_parts(paper) == (kernels.EMULATOR, kernels.PAPER)
     corrected = load_settings("hallway", ["perception.localization.correct_drift=true"])
     assert kernels.needed_parts(corrected) == (kernels.EMULATOR, kernels.BAYES, kernels.LOCALIZATION)
+    mapped = with_known_room(load_settings("hallway"), "irregular")
+    assert kernels.needed_parts(mapped) == (kernels.EMULATOR, kernels.BAYES, kernels.KNOWN_ROOM)
     assert set(warming.RUN_ONCE) == set(kernels.PARTS)
 
 

@@ -40,7 +40,7 @@ def test_a_map_needs_localize_and_a_surface(capsys: pytest.CaptureFixture[str]) 
     assert "--localize" in capsys.readouterr().err
     Path("empty.toml").write_text("[start]\nx_m = 0.0\n", "utf-8")
     assert run_command(["replay", "good.csv", "--localize", "--map", "empty.toml"]) == WRONG_CALL
-    assert "empty.toml: expected at least one wall" in capsys.readouterr().err
+    assert "empty.toml: perception.localization: known_room has no surface" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("bad_files")

@@ -23,6 +23,7 @@ from config.load import load_settings
 from drivers.messages import Floats, LinkCounts, Pose
 from drivers.registry import make_driver
 from perception.detected_object import DetectedObject, MapCounts
+from perception.localization.drift_correction import LocalizedPose
 from runtime.cli.terminal.view import EVERY_CYCLES, SWITCH_INTERVAL_S, Snapshot, View, keys
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode, ModeState
@@ -92,6 +93,14 @@ def until(done: Callable[[], bool]) -> None:
     while not done():
         assert time.monotonic() < end_s, "timed out"
         time.sleep(0.005)
+
+
+def test_the_place_in_the_map_is_shown_and_that_it_is_unknown() -> None:
+    assert "place" not in printed(EMPTY)
+    unknown = LocalizedPose(Pose(0.0, 0.0, 0.0), 0.0, np.diag([np.inf] * 3), "lost", 0.02)
+    assert "unknown, lost 2%" in printed(replace(EMPTY, localized=unknown))
+    known = LocalizedPose(Pose(3.048, 0.3048, np.pi), 0.0, np.diag([4e-4, 1e-4, 1e-4]), "tracking", 0.97)
+    assert "(10.00, 1.00) ± 0.066 ft, 180.0° ± 0.6°, tracking 97%" in printed(replace(EMPTY, localized=known))
 
 
 def test_a_drive_is_drawn_by_the_thread_and_the_loop_never_waits_for_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -79,6 +79,17 @@ async def test_the_place_in_the_map_and_its_frame_are_shown_where_drift_is_corre
         assert (in_odometry.x, in_odometry.y, in_odometry.theta) == pytest.approx((0.04, 0.0, 0.0), abs=1e-3)
 
 
+async def test_in_a_known_room_the_place_is_unknown_at_first() -> None:
+    async with open_console(
+        "perception.localization.known_room.drum=[{x_m = 3.0, y_m = 1.0, radius_m = 0.3}]"
+    ) as case:
+        page = await case.page()
+        case.cycles()
+        here = (await page.next("state"))["localized"]
+        assert (here["status"], here["covariance"], here["probability"]) == ("localizing", None, 0.0)
+        assert here["frame"] == [0.0, 0.0, 0.0]
+
+
 async def test_changes_add_up_to_all_segments() -> None:
     async with open_console() as case:
         page, segments = await case.page(), Segments()

@@ -21,6 +21,15 @@ async def test_the_session_message_describes_robot_models_and_world() -> None:
         assert (await case.page()).received[0]["role"] == "watch"
 
 
+async def test_the_known_room_is_sent_in_its_own_frame() -> None:
+    drum = "[{x_m = 3.0, y_m = 1.0, radius_m = 0.3}]"
+    async with open_console(f"perception.localization.known_room.drum={drum}") as case:
+        page = await case.page()
+        assert page.received[0]["known_room"] == {"drums": [[3.0, 1.0, 0.3]], "walls": [], "polygons": []}
+    async with open_console() as case:
+        assert (await case.page()).received[0]["known_room"] is None
+
+
 async def test_a_real_robot_has_no_true_world() -> None:
     async with open_console(emulated=False) as case:
         assert (await case.page()).received[0]["truth"] is None
