@@ -282,6 +282,34 @@ def beacons(recording: Path, *, json: str = "beacons.json") -> int:
     return 0
 
 
+@app.command
+def sightings(folder: Path, *, robot: int = 1, json: str = "sightings.json") -> int:
+    """Measure the landmark filter on recorded sightings of posts at unknown places.
+
+    Parameters
+    ----------
+    folder
+        MRCLAM's data set 1, unpacked.
+    robot
+        Whose drive.
+    json
+        File to write.
+    """
+    use_kernel_cache()
+    from bench.sightings import figures, read_mrclam, sightings_table, track
+    from runtime.cycle.summary import write_json
+
+    if not (folder / f"Robot{robot}_Odometry.dat").is_file():
+        raise UserError(
+            f"{folder}: there is no Robot{robot}_Odometry.dat; it is in the first data set of UTIAS MRCLAM"
+        )
+    data = read_mrclam(folder, robot)
+    row = figures(data, track(data))
+    write_json(json, row)
+    _wide().print(sightings_table(row))
+    return 0
+
+
 @app.command(name="map")
 def map_size(*, json: str = "map.json", drums: tuple[int, ...] = (40, 200), seed: int = 0) -> int:
     """Measure what a firing costs in halls of more and more drums, driven through once and back.

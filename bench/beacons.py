@@ -144,9 +144,9 @@ def figures(recording: Recording, found: Track) -> dict[str, float]:
     truth = np.column_stack([np.interp(t, recording.truth[:, 0], recording.truth[:, k]) for k in (1, 2)])
     path = _path(recording.odometry)
     odometry = np.column_stack([np.interp(t, path[:, 0], path[:, k]) for k in (1, 2)])
-    errors, by_odometry = _errors(found.places[:, 1:], truth), _errors(odometry, truth)
+    errors, by_odometry = errors_when_aligned(found.places[:, 1:], truth), errors_when_aligned(odometry, truth)
     there = {int(n): (x, y) for n, x, y in recording.beacons.tolist()}
-    beacons = _errors(np.array(list(found.beacons.values())), np.array([there[n] for n in found.beacons]))
+    beacons = errors_when_aligned(np.array(list(found.beacons.values())), np.array([there[n] for n in found.beacons]))
     return {
         "ranges": len(t),
         "beacons": len(beacons),
@@ -214,8 +214,8 @@ def _enter(e: EstimateRecord, covariance: Floats, landmark: int, range_m: float)
     return float(squared)
 
 
-def _errors(points: Floats, truth: Floats) -> Floats:
-    """Return the distances of points from the truth after the best rigid motion, m."""
+def errors_when_aligned(points: Floats, truth: Floats) -> Floats:
+    """Return the distances of points (n, 2) from the truth after the best rigid motion, m."""
     a, b = points - points.mean(axis=0), truth - truth.mean(axis=0)
     u, _, v = np.linalg.svd(a.T @ b)
     turn = u @ np.diag([1.0, np.linalg.det(u @ v)]) @ v
