@@ -27,6 +27,7 @@ PAGE = ROOT / "docs" / "mutants.md"
 TARGETS: dict[str, tuple[str, ...]] = {
     "drivers/denning/codec.py": (
         "tests/drivers/denning/test_codec.py",
+        "tests/drivers/denning/test_frames.py",
         "tests/drivers/denning/test_driver.py",
         "tests/drivers/denning/test_driver_commands.py",
         "tests/drivers/denning/test_pose_stamping.py",
