@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Final, TypeAlias
 
@@ -284,7 +285,7 @@ def beacons(recording: Path, *, json: str = "beacons.json") -> int:
 
 @app.command
 def sightings(folder: Path, *, robot: int = 1, json: str = "sightings.json") -> int:
-    """Measure the landmark filter on recorded sightings of posts at unknown places.
+    """Measure the landmark filter, beside gtsam's iSAM2, on recorded sightings of posts at unknown places.
 
     Parameters
     ----------
@@ -304,9 +305,14 @@ def sightings(folder: Path, *, robot: int = 1, json: str = "sightings.json") -> 
             f"{folder}: there is no Robot{robot}_Odometry.dat; it is in the first data set of UTIAS MRCLAM"
         )
     data = read_mrclam(folder, robot)
-    row = figures(data, track(data))
-    write_json(json, row)
-    _wide().print(sightings_table(row))
+    found = track(data)
+    rows = {"ours": figures(data, found)}
+    if find_spec("gtsam"):
+        from bench.peers import gtsam_sightings
+
+        rows["gtsam iSAM2"] = gtsam_sightings.figures(data, found.odometer_scale, found.turn_scale)
+    write_json(json, rows)
+    _wide().print(sightings_table(rows))
     return 0
 
 

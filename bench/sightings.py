@@ -6,8 +6,9 @@ multi-robot cooperative localization and mapping dataset", 2011). It is not part
 
 from __future__ import annotations
 
-import itertools
 import math
+import time
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -52,14 +53,39 @@ class Recording(NamedTuple):
     """Number, x and y, shape (b, 3)."""
 
 
+class Step(NamedTuple):
+    """Odometry since the sighting before: half of a turn (rad), a displacement (m) in the frame there, the rest."""
+
+    forward: float
+    left: float
+    turn: float
+    way: float
+    """Driven, ahead and back."""
+    turned: float
+    """To the left and to the right."""
+
+    @property
+    def turn_variance(self) -> float:
+        """Of the turn's error, rad²."""
+        return TURN_WALK * self.turned + TURN_WALK_M * self.way
+
+    @property
+    def place_variance(self) -> float:
+        """Of the displacement on each axis, m²."""
+        return PLACE_WALK * self.way
+
+
 class Found(NamedTuple):
     """What the filter finds."""
 
     landmarks: dict[int, tuple[float, float]]
     """Their places at the end, m."""
+    took_ms: Floats
+    """Thread time of each sighting, with the step to it."""
     squared_innovations: Floats
-    """Of each sighting, over their covariance: two degrees of freedom."""
+    """Of each sighting but the first of a post, over their covariance: two degrees of freedom."""
     odometer_scale: float
+    turn_scale: float
 
 
 def read_mrclam(folder: Path, robot: int) -> Recording:
@@ -76,75 +102,93 @@ def read_mrclam(folder: Path, robot: int) -> Recording:
     return Recording(np.loadtxt(folder / f"Robot{robot}_Odometry.dat"), np.array(rows), landmarks)
 
 
+def steps_between(recording: Recording) -> Iterator[Step]:
+    """Yield the step by odometry to each sighting."""
+    odometry, i = recording.odometry.tolist(), 0
+    at_s = odometry[0][0]
+    for until_s in recording.sightings[:, 0].tolist():
+        x = y = heading = way = turned = 0.0
+        while at_s < until_s:
+            while i + 1 < len(odometry) and odometry[i + 1][0] <= at_s:
+                i += 1
+            _, v, w = odometry[i]
+            end_s = min(until_s, odometry[i + 1][0]) if i + 1 < len(odometry) else until_s
+            distance, turn = v * (end_s - at_s), w * (end_s - at_s)
+            x += distance * math.cos(heading + 0.5 * turn)
+            y += distance * math.sin(heading + 0.5 * turn)
+            heading, way, turned, at_s = heading + turn, way + abs(distance), turned + abs(turn), end_s
+        c, s = math.cos(0.5 * heading), math.sin(0.5 * heading)
+        yield Step(c * x + s * y, c * y - s * x, heading, way, turned)
+
+
 def track(recording: Recording) -> Found:
     """Return what the filter of `perception.localization` finds from odometry and sightings."""
     array = zeros(Estimate, 1)
     e, covariance = records(Estimate, array), np.zeros((ROWS_MAX, ROWS_MAX))
     e[0].odometer_scale = e[0].range_scale = 1.0
     covariance[ODOMETER, ODOMETER], covariance[TURN, TURN] = ODOMETER_SIGMA**2, TURN_SIGMA**2
-    index, squared, k = dict[int, int](), list[float](), 0
-    odometry, sightings = recording.odometry.tolist(), recording.sightings.tolist()
-    for (t, v, w), (until_s, _, _) in itertools.pairwise(odometry):
-        while k < len(sightings) and sightings[k][0] < until_s:
-            at_s, number, distance, bearing = sightings[k]
-            k += 1
-            _move(e, covariance, v, w, max(0.0, at_s - t))
-            t = max(t, at_s)
-            if number in index:
-                squared.append(_enter(e, covariance, index[number], distance, bearing))
-            else:
-                index[int(number)] = _place(e, covariance, distance, bearing)
-        _move(e, covariance, v, w, until_s - t)
+    index, squared, took_ms = dict[int, int](), list[float](), list[float]()
+    for step, (_, number, distance, bearing) in zip(
+        steps_between(recording), recording.sightings.tolist(), strict=True
+    ):
+        begin_s = time.thread_time()
+        half, variance = 0.5 * step.turn, 0.5 * step.turn_variance
+        propagate(e, covariance, 0.0, 0.0, 0.0, half, half, variance, 0.0, 0.0)
+        propagate(e, covariance, step.forward, step.left, 0.0, half, half, variance, 0.0, step.place_variance)
+        if number in index:
+            squared.append(_enter(e, covariance, index[number], distance, bearing))
+        else:
+            index[int(number)] = _place(e, covariance, distance, bearing)
+        took_ms.append(1e3 * (time.thread_time() - begin_s))
     places = {n: (float(e[0].landmarks[i].x), float(e[0].landmarks[i].y)) for n, i in index.items()}
-    return Found(places, np.array(squared), float(e[0].odometer_scale))
+    return Found(
+        places, np.array(took_ms), np.array(squared), float(e[0].odometer_scale), 1.0 + float(e[0].turn_scale)
+    )
+
+
+def errors(recording: Recording, places: Mapping[int, tuple[float, float]]) -> Floats:
+    """Return how far the places are from the truth after the best rigid motion, m."""
+    there = {int(n): (x, y) for n, x, y in recording.landmarks.tolist()}
+    return errors_when_aligned(np.array(list(places.values())), np.array([there[n] for n in places]))
 
 
 def figures(recording: Recording, found: Found) -> dict[str, float]:
-    """Return the errors of the landmarks, laid rigidly on the truth as well as possible, and the innovations."""
-    there = {int(n): (x, y) for n, x, y in recording.landmarks.tolist()}
-    errors = errors_when_aligned(
-        np.array(list(found.landmarks.values())), np.array([there[n] for n in found.landmarks])
-    )
-    used = found.squared_innovations[found.squared_innovations <= GATE_SIGMAS**2]
+    """Return the errors of the landmarks, the innovations and the time."""
+    off, squared = errors(recording, found.landmarks), found.squared_innovations
+    used = squared[squared <= GATE_SIGMAS**2]
     return {
-        "sightings": len(found.squared_innovations),
-        "landmarks": len(errors),
-        "rms_m": float(np.sqrt(np.mean(errors**2))),
-        "max_m": float(errors.max()),
+        "landmarks": len(off),
+        "rms_m": float(np.sqrt(np.mean(off**2))),
+        "max_m": float(off.max()),
         "nis_mean": float(used.mean()),
-        "nis_median": float(np.median(found.squared_innovations)),
-        "ignored": 1.0 - len(used) / len(found.squared_innovations),
+        "nis_median": float(np.median(squared)),
+        "ignored": 1.0 - len(used) / len(squared),
         "odometer_scale": found.odometer_scale,
+        "turn_scale": found.turn_scale,
+        "median_ms": float(np.median(found.took_ms)),
+        "mean_ms": float(found.took_ms.mean()),
     }
 
 
-def sightings_table(row: dict[str, float]) -> Table:
-    """Return the table of figures."""
+def sightings_table(rows: Mapping[str, dict[str, float]]) -> Table:
+    """Return the table of figures, a row for each method; a figure that a method does not have is left empty."""
     table = Table(title="landmark filter on sightings of posts at unknown places", title_justify="left")
-    for column in row:
-        table.add_column(column, justify="right")
-    table.add_row(*(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row.values()))
+    columns = next(iter(rows.values()))
+    for column in ("method", *columns):
+        table.add_column(column, justify="left" if column == "method" else "right")
+    for method, row in rows.items():
+        table.add_row(method, *(f"{row[column]:.3g}" if column in row else "" for column in columns))
     return table
 
 
-def _move(e: EstimateRecord, covariance: Floats, v: float, w: float, dt_s: float) -> None:
-    """Follow odometry for a while: half of the turn, the way, the other half."""
-    way, turn = v * dt_s, w * dt_s
-    if way == 0.0 and turn == 0.0:
-        return
-    walk = 0.5 * (TURN_WALK * abs(turn) + TURN_WALK_M * abs(way))
-    propagate(e, covariance, 0.0, 0.0, 0.0, 0.5 * turn, 0.5 * turn, walk, 0.0, 0.0)
-    propagate(e, covariance, way, 0.0, 0.0, 0.5 * turn, 0.5 * turn, walk, 0.0, PLACE_WALK * abs(way))
-
-
-def _noise(distance: float) -> tuple[float, float]:
+def noise(distance: float) -> tuple[float, float]:
     """Return the variances of a sighting along and across its direction, m²."""
     return (RANGE_SIGMA * distance) ** 2, (BEARING_SIGMA * distance) ** 2
 
 
 def _place(e: EstimateRecord, covariance: Floats, distance: float, bearing: float) -> int:
     """Add a landmark where it is seen; return its index."""
-    along, across = _noise(distance)
+    along, across = noise(distance)
     c, s = math.cos(e[0].heading + bearing), math.sin(e[0].heading + bearing)
     ahead, left = distance * math.cos(bearing), distance * math.sin(bearing)
     return add_landmark(
@@ -162,7 +206,7 @@ def _enter(e: EstimateRecord, covariance: Floats, landmark: int, distance: float
     """
     est = e[0]
     row, axis = FIRST + 2 * landmark, est.heading + bearing
-    along, across = _noise(distance)
+    along, across = noise(distance)
     axes = (along, math.cos(axis), math.sin(axis), distance), (across, -math.sin(axis), math.cos(axis), 0.0)
 
     def look(ux: float, uy: float, seen: float) -> tuple[float, float]:
@@ -171,12 +215,12 @@ def _enter(e: EstimateRecord, covariance: Floats, landmark: int, distance: float
         return seen - off, innovation_variance(covariance, rows_used(e), row, ux, uy, 0.0, est.gain)
 
     squared = 0.0
-    for noise, *direction in axes:
+    for variance, *direction in axes:
         innovation, predicted = look(*direction)
-        squared += innovation**2 / (predicted + noise)
+        squared += innovation**2 / (predicted + variance)
     if squared <= GATE_SIGMAS**2:
         excess = max(1.0, math.sqrt(squared) / ROBUST_SIGMAS) ** 2
-        for noise, *direction in axes:
+        for variance, *direction in axes:
             innovation, predicted = look(*direction)
-            correct(e, covariance, innovation, predicted + excess * noise)
+            correct(e, covariance, innovation, predicted + excess * variance)
     return squared
