@@ -12,8 +12,9 @@ from rich.table import Table
 from config.robot import RingConfig
 from perception.localization.expected_ranges import Reflection
 from perception.localization.known_room import KnownRoom
-from runtime.simulation.furnished_rooms import ACOUSTICS
-from runtime.simulation.known_room_trials import KnownDrive, figures, follow, furnished_drive
+from perception.localization.room import room_of
+from runtime.simulation.furnished_rooms import ACOUSTICS, furnished_room
+from runtime.simulation.known_room_trials import SURE, KnownDrive, figures, follow, furnished_drive
 
 LENGTH_M: Final = 10.0
 """Way before the robot is carried, and after."""
@@ -21,7 +22,8 @@ Rows = dict[str, dict[str, float]]
 
 
 def measure(ring: RingConfig, seeds: Iterable[int], report: Callable[[str], None]) -> Rows:
-    """Return the figures of one drive in each furnished room, by model of reflection.
+    """Return the figures of one drive in each furnished room, by model of reflection; also of a stand in each, and of
+    a drive with the map of another room.
 
     Parameters
     ----------
@@ -32,11 +34,25 @@ def measure(ring: RingConfig, seeds: Iterable[int], report: Callable[[str], None
     report
         Called with a line on what is running.
     """
-    rows = {}
+    rows, seeds = {}, tuple(seeds)
     for reflection in get_args(Reflection):
         acoustics = ACOUSTICS.model_copy(update={"model": reflection})
         drives = (furnished_drive(ring, seed, acoustics, LENGTH_M, kidnapped=True) for seed in seeds)
-        rows[f"furnished, {reflection}"] = _figures_of(ring, drives, report)
+        figures_of = _figures_of(ring, drives, report)
+        stands, maps = [], []
+        for seed in seeds:
+            report(f"known room: stand and wrong map {seed}")
+            stand = furnished_drive(ring, seed, acoustics, LENGTH_M, standing=True)
+            stands.append(follow(KnownRoom(stand.room, ring), stand))
+            drive = furnished_drive(ring, seed, acoustics, LENGTH_M)
+            maps.append(follow(KnownRoom(room_of(furnished_room(seed + 1).world), ring), drive))
+        said = [(trace.probability > SURE, trace.right) for trace in stands]
+        rows[f"furnished, {reflection}"] = figures_of | {
+            "standing_right": sum(bool(sure[-1] and right[-1]) for sure, right in said),
+            "standing_wrong": sum(bool(sure[-1] and not right[-1]) for sure, right in said),
+            "wrong_map_drives_said": sum(bool((trace.probability > SURE).any()) for trace in maps),
+            "wrong_map_share_said": sum(float((trace.probability > SURE).mean()) for trace in maps) / len(maps),
+        }
     return rows
 
 

@@ -74,7 +74,21 @@ class ClearMap:
     kind: Literal["clear_map"] = "clear_map"
 
 
-Edit: TypeAlias = DeleteSegments | PinSegments | PlaceModel | MoveObject | RejectObject | ConfirmObject | ClearMap
+@dataclass(frozen=True, slots=True)
+class PlaceRobot:
+    """Say where the robot is in a known room (m, rad, the map frame); readings confirm or refute it."""
+
+    x: float
+    y: float
+    theta: float
+    """Direction of travel."""
+    kind: Literal["place_robot"] = "place_robot"
+
+
+MapEdit: TypeAlias = DeleteSegments | PinSegments | PlaceModel | MoveObject | RejectObject | ConfirmObject | ClearMap
+"""An edit of what was recognised."""
+
+Edit: TypeAlias = MapEdit | PlaceRobot
 
 NUMBER_MAX: Final = 2**53
 """Numbers of objects and segments are below this: a browser stores them as floats."""
@@ -148,19 +162,19 @@ def invalid_pose(x: float, y: float, theta: float) -> str | None:
     Parameters
     ----------
     x, y : float
-        Position in the odometry's frame, m; may be NaN or infinite, which is invalid.
+        Position in the edit's frame, m; may be NaN or infinite, which is invalid.
     theta : float
         Heading, rad; it need not be wrapped.
     """
     if abs(x) <= COORDINATE_MAX_M and abs(y) <= COORDINATE_MAX_M and abs(theta) <= COORDINATE_MAX_M:
         return None
     return (
-        f"invalid pose ({x:g} m, {y:g} m, {theta:g} rad): expected metres and radians in the odometry's frame, "
+        f"invalid pose ({x:g} m, {y:g} m, {theta:g} rad): expected metres and radians, "
         f"each finite and within ±{COORDINATE_MAX_M:g}"
     )
 
 
-def invalid_number(edit: Edit) -> str | None:
+def invalid_number(edit: MapEdit) -> str | None:
     """Return why a number in an edit cannot belong to any segment or object, None if all can."""
     match edit:
         case DeleteSegments(numbers) | PinSegments(numbers):

@@ -15,7 +15,17 @@ from config.settings import PerceptionConfig
 from drivers.messages import Firing, Pose
 from perception.bayes.bayes_method import BayesPerception
 from perception.detected_object import DetectedObject, MapCounts
-from perception.edits import Edit, Evidence, MoveObject, PlaceModel, Segments, invalid_number, invalid_pose
+from perception.edits import (
+    Edit,
+    Evidence,
+    MapEdit,
+    MoveObject,
+    PlaceModel,
+    PlaceRobot,
+    Segments,
+    invalid_number,
+    invalid_pose,
+)
 from perception.fresh_echoes import FreshEchoes
 from perception.kernel import Floats
 from perception.localization.drift_correction import LocalizedPose
@@ -81,7 +91,7 @@ class Method(Protocol):
         """Return the outline segments with their numbers, times and pins."""
         ...
 
-    def edit(self, edit: Edit) -> str | None:
+    def edit(self, edit: MapEdit) -> str | None:
         """Apply an operator's edit; return None, or why it cannot be applied."""
         ...
 
@@ -266,12 +276,22 @@ class Perception:
 
         No edit changes the obstacles that the robot avoids: the fresh echoes stay.
         """
+        if isinstance(edit, PlaceRobot):
+            return self._place_robot(edit)
         refused = invalid_number(edit)
         if refused is None and isinstance(edit, PlaceModel | MoveObject):
             refused = invalid_pose(edit.x, edit.y, edit.theta)
         if refused is not None:
             return refused
         return self.method.edit(edit if self.map_frame is None else self.map_frame.edit_in_map(edit))
+
+    def _place_robot(self, edit: PlaceRobot) -> str | None:
+        if self.known_room is None:
+            return "there is no known room: start with --map"
+        refused = invalid_pose(edit.x, edit.y, edit.theta)
+        if refused is None:
+            self.known_room.assume(Pose(edit.x, edit.y, edit.theta))
+        return refused
 
     def evidence(self, number: int) -> Evidence | None:
         """Return the evidence for an object, None if no object has this number; changes nothing."""

@@ -44,8 +44,8 @@ from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import (
     ClearMap,
     ConfirmObject,
-    Edit,
     Evidence,
+    MapEdit,
     MoveObject,
     PlaceModel,
     RejectObject,
@@ -228,7 +228,7 @@ class BayesPerception:
         pinned = np.isin(numbers, self._pins.numbers) if self._pins.count else np.zeros(len(numbers))
         return Segments(numbers, drawn(mapped), times, pinned.astype(np.int64))
 
-    def edit(self, edit: Edit) -> str | None:
+    def edit(self, edit: MapEdit) -> str | None:
         """Apply a user's edit; return None, or the reason why it cannot be done."""
         self._objects = self._archived = self._archived_labels = None
         self._counted_at = UNKNOWN

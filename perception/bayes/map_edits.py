@@ -22,7 +22,7 @@ from perception.edits import (
     ClearMap,
     ConfirmObject,
     DeleteSegments,
-    Edit,
+    MapEdit,
     MoveObject,
     PinSegments,
     PlaceModel,
@@ -40,7 +40,7 @@ def row_of(memory: Memory, number: int) -> int | None:
 
 
 def edit_memory(
-    memory: Memory, p: SettingsRecord, pins: Pins, rounds: Sequence[str], outlines: Sequence[str], edit: Edit
+    memory: Memory, p: SettingsRecord, pins: Pins, rounds: Sequence[str], outlines: Sequence[str], edit: MapEdit
 ) -> str | None:
     """Apply a user's edit; return None, or the reason why it cannot be done.
 
@@ -50,7 +50,7 @@ def edit_memory(
         Memory, updated, and settings.
     rounds, outlines : sequence of str
         Names of the round models and of the polygons, in the order of their numbers.
-    edit : Edit
+    edit : MapEdit
         The edit.
     """
     match edit:

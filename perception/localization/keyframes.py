@@ -89,10 +89,27 @@ class Keyframes:
         x, y, yaw = self.odometry[number % KEYFRAMES_MAX].tolist()
         return Pose(x, y, yaw)
 
+    def begin(self) -> None:
+        """Begin a keyframe with the next firing; a robot that stands makes one again."""
+        self._has_fired[:] = False
+        self._firings = 0
+        self._is_started = self._has_stood = False
+
+    @property
+    def is_stand(self) -> bool:
+        """Whether the last keyframe is of a robot that stands."""
+        return self._has_stood
+
     @property
     def driven_m(self) -> float:
         """Way driven until the end of the last keyframe, m."""
         return float(self.way_m[(self.count - 1) % KEYFRAMES_MAX])
+
+    def way_of(self, number: int) -> float:
+        """Return the way from the keyframe before to the end of this one, m; 0 for the oldest one."""
+        if number <= max(0, self.count - KEYFRAMES_MAX):
+            return 0.0
+        return float(self.way_m[number % KEYFRAMES_MAX] - self.way_m[(number - 1) % KEYFRAMES_MAX])
 
     def way_since(self, number: int) -> float:
         """Return the way from the end of a keyframe to that of the last one, m."""

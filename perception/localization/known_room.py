@@ -36,8 +36,20 @@ WINDOW_MAX: Final = 96
 SEARCH_M: Final = (1.0, 3.0)
 SEARCH_GROWTH: Final = 1.5
 """Way until the first search, the longest one between two searches, and by how much it grows from one to the next."""
+STAND_SEARCH_M: Final = 0.3
+"""A robot that stands searches if it has driven so far since the last search."""
+LOST_M: Final = 1.0
 LATEST_M: Final = 0.2
-"""Way over which a place must explain the readings, or the probability falls."""
+"""Ways over which a place must explain the readings: otherwise it is lost, or its probability falls."""
+MISSED_SHARE: Final = 0.35
+REPORT_SHARE: Final = 0.7
+REPORT_SHARE_STANDING: Final = 0.85
+REPORT_M: Final = 0.5
+"""Shares of a true pose's log likelihood ratio: a place below the first is lost, one above the second is sure. The
+third is for a place known from less way than this: few readings fit somewhere in a wrong map by chance."""
+ASSUMED_M: Final = 0.3
+ASSUMED_RAD: Final = math.radians(12.0)
+"""Standard deviation of a place that the operator names, on each axis, and half the width of its row of headings."""
 SURE: Final = 0.9
 """Probability above which a place is the robot's."""
 DOUBT: Final = 0.5
@@ -101,7 +113,7 @@ class KnownRoom:
         self._window_begin = 0
         """Number of the first keyframe that a search uses."""
         self._stage = IDLE
-        self._searched_at_m = 0.0
+        self._searched_at_m = -STAND_SEARCH_M
         self._pause_m = SEARCH_M[0]
         self._travel = 0.0
         """Direction of travel at the last firing."""
@@ -122,11 +134,28 @@ class KnownRoom:
             self._window_begin = max(self._window_begin, keyframes.count - WINDOW_MAX)
             while keyframes.way_since(self._window_begin) > WINDOW_M:
                 self._window_begin += 1
-        is_due = keyframes.driven_m - self._searched_at_m >= self._pause_m
-        if self._stage == IDLE and self._status != TRACKING and is_due:
+        if self._stage != IDLE or self._status == TRACKING:
+            return
+        way_m = keyframes.driven_m - self._searched_at_m
+        if way_m >= self._pause_m or (keyframes.is_stand and way_m >= STAND_SEARCH_M):
             self._searched_at_m = keyframes.driven_m
-            self._pause_m = min(SEARCH_M[1], SEARCH_GROWTH * self._pause_m)
+            self._pause_m = (
+                min(SEARCH_M[1], SEARCH_GROWTH * self._pause_m) if way_m >= self._pause_m else self._pause_m
+            )
             self._stage = DUE
+
+    def assume(self, pose: Pose) -> None:
+        """Take the operator's word that the robot is at a pose (position, direction of travel) in the map frame."""
+        heading = pose.theta - self._travel + float(self._odometry[2])
+        here = np.array([[pose.x, pose.y, heading]])
+        self._grid.cancel()
+        self._candidates.clear()
+        self._stage = IDLE
+        self._tracked.start(here, ASSUMED_M, ASSUMED_RAD, self._at_last_firing(), self._keyframes.count)
+        self._tracked.conclude()
+        self._keyframes.begin()
+        self._status, self.probability = LOCALIZING, 0.0
+        self._searched_at_m, self._pause_m = self._keyframes.driven_m, SEARCH_M[0]
 
     @property
     def can_refine(self) -> bool:
@@ -146,7 +175,8 @@ class KnownRoom:
             self._grid.refine()
             if not self._grid.is_searching:
                 starts = self._grid.best_starts(HYPOTHESES_MAX)
-                self._candidates.start(starts, CELL_M, STEP_RAD, self._keyframes, self._window_begin)
+                begin = self._window_begin
+                self._candidates.start(starts, CELL_M, STEP_RAD, self._keyframes.pose(begin), begin)
                 self._stage = WEIGHING if len(starts) else IDLE
         elif self._stage == WEIGHING:
             self._enter(self._candidates)
@@ -183,7 +213,7 @@ class KnownRoom:
         """Do a quantum of entering a keyframe; return whether it is done."""
         before = track.entered
         readings = track.enter(self._keyframes, self.specular_share)
-        if readings and track.explains(RECENT_M) > SURE:
+        if readings and track.explains(LOST_M, MISSED_SHARE) > SURE:
             share = self.specular_share + readings * (track.best.specular - self.specular_share) / SHARE_MEMORY
             self.specular_share = min(1.0 - SHARE_MIN, max(SHARE_MIN, share))
         return track.entered > before
@@ -193,8 +223,10 @@ class KnownRoom:
         track = self._tracked
         if track.readings < RECENT_READINGS:
             return
-        explains = track.explains(RECENT_M)
-        self.probability = track.best.share * min(explains, track.explains(LATEST_M))
+        explains = track.explains(LOST_M, MISSED_SHARE)
+        report_share = REPORT_SHARE if track.way_m >= REPORT_M else REPORT_SHARE_STANDING
+        reported = min(track.explains(RECENT_M, report_share), track.explains(LATEST_M, MISSED_SHARE))
+        self.probability = track.best.share * reported
         if self._status == TRACKING:
             if explains < DOUBT:
                 self._lose()

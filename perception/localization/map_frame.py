@@ -18,13 +18,13 @@ from config.robot import RingConfig
 from drivers.messages import Firing, Pose
 from perception.bayes.object_report import worst_sigma
 from perception.detected_object import DetectedObject
-from perception.edits import Edit, Evidence, MoveObject, PlaceModel
+from perception.edits import Evidence, MapEdit, MoveObject, PlaceModel
 from perception.kernel import Floats
 from perception.localization.drift_correction import DriftCorrection, LandmarkPlace, LocalizedPose, SeenObject
 
 SHIFT_MIN_M: Final = 0.002
 """An object moves with its landmark once that has moved this far."""
-AnyEdit = TypeVar("AnyEdit", bound=Edit)
+AnyEdit = TypeVar("AnyEdit", bound=MapEdit)
 
 
 class MapFrame:

@@ -30,14 +30,12 @@ QUANTA: Final = math.ceil(HEADINGS / PARTICLES_PER_QUANTUM)
 KEPT_MAX: Final = 40
 LEAST_LOG: Final = 12.0
 """Hypotheses less likely than the best by more than this are dropped, nat, and those beyond so many."""
-RECENT_M: Final = 1.0
+RECENT_M: Final = 3.0
 RECENT_MIN: Final = 3
 RECENT_MAX: Final = 64
 """Way over which the fit is kept, with at least and at most so many keyframes."""
-RECENT_READINGS: Final = 30
+RECENT_READINGS: Final = 20
 """It is judged by at least so many readings."""
-MISSED_SHARE: Final = 0.35
-"""A pose explains the readings if their log likelihood ratio is above this share of a true pose's."""
 EXCESS_MAX: Final = 50.0
 """Greatest log odds that a place explains the readings, nat."""
 NOISES: Final = 512
@@ -82,7 +80,6 @@ class PoseTrack:
         """Quanta done for that keyframe."""
         self._at = np.zeros(3)
         """Odometry at the last keyframe that was entered."""
-        self._entered_way_m = 0.0
         self._recent = np.zeros((RECENT_MAX, 4))
         self._recent_count = 0
 
@@ -92,9 +89,9 @@ class PoseTrack:
         self._step = self._recent_count = 0
 
     def start(
-        self, poses: Floats, place_sigma_m: float, heading_half_rad: float, keyframes: Keyframes, at: int
+        self, poses: Floats, place_sigma_m: float, heading_half_rad: float, odometry: Pose, entered: int
     ) -> None:
-        """Start anew with hypotheses of the pose at a keyframe's end, which is the next one to enter.
+        """Start anew with hypotheses of the pose.
 
         Parameters
         ----------
@@ -102,18 +99,20 @@ class PoseTrack:
             x, y (m), heading (rad).
         place_sigma_m, heading_half_rad : float
             Standard deviation of the places; half the width of the row of headings around each.
-        keyframes : Keyframes
-            All.
-        at : int
-            Number of the keyframe.
+        odometry : Pose
+            The ring's pose by odometry there.
+        entered : int
+            Number of the next keyframe to enter.
         """
         self.clear()
         for x, y, heading in poses.tolist():
             add_hypothesis(self._hypotheses, x, y, heading, place_sigma_m, heading_half_rad)
-        self.entered = at
-        here = keyframes.pose(at)
-        self._at[:] = here.x, here.y, here.theta
-        self._entered_way_m = float(keyframes.way_m[at % KEYFRAMES_MAX])
+        self.entered = entered
+        self._at[:] = odometry.x, odometry.y, odometry.theta
+
+    def conclude(self) -> None:
+        """Write the most likely hypothesis to `best`, before the first keyframe."""
+        conclude(self._hypotheses, LEAST_LOG, KEPT_MAX, self._scratch)
 
     def __len__(self) -> int:
         return int(self._hypotheses[0].count)
@@ -158,18 +157,29 @@ class PoseTrack:
             if self._step < QUANTA * len(self):
                 return 0
             conclude(self._hypotheses, LEAST_LOG, KEPT_MAX, self._scratch)
-            way = float(keyframes.way_m[row]) - self._entered_way_m
-            self._remember(way, keyframes.readings[row, :count, -1])
-            self._entered_way_m += way
+            self._remember(keyframes.way_of(self.entered), keyframes.readings[row, :count, -1])
         self._step = 0
         self.entered += 1
         return count
 
-    def explains(self, way_m: float) -> float:
-        """Return the probability that the best place explains the readings of the last way as a true one would."""
+    @property
+    def way_m(self) -> float:
+        """Way of the recent keyframes, m."""
+        return float(self._recent[: self._recent_count, WAY].sum())
+
+    def explains(self, way_m: float, least_share: float) -> float:
+        """Return the probability that the best place explains the readings of the last way as a true one would.
+
+        Parameters
+        ----------
+        way_m : float
+            The way, m.
+        least_share : float
+            Share of a true pose's log likelihood ratio that the readings must have.
+        """
         excess, way, readings = 0.0, 0.0, 0.0
         for step, log_ratio, of_true_pose, count in reversed(self._recent[: self._recent_count].tolist()):
-            excess += log_ratio - MISSED_SHARE * of_true_pose
+            excess += log_ratio - least_share * of_true_pose
             way += step
             readings += count
             if way >= way_m and readings >= RECENT_READINGS:

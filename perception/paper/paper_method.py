@@ -21,9 +21,9 @@ from perception.edits import (
     ClearMap,
     ConfirmObject,
     DeleteSegments,
-    Edit,
     Evidence,
     Line,
+    MapEdit,
     MoveObject,
     PinSegments,
     PlaceModel,
@@ -182,7 +182,7 @@ class PaperPerception:
     def drop_caches(self) -> None:
         """Do nothing: this method caches no results."""
 
-    def edit(self, edit: Edit) -> str | None:
+    def edit(self, edit: MapEdit) -> str | None:
         """Apply an operator's edit; return None, or why it cannot be applied."""
         match edit:
             case DeleteSegments(numbers):

@@ -19,7 +19,7 @@ from config.settings import PerceptionConfig, Settings
 from drivers.driver import LineState
 from drivers.messages import Firing, Floats
 from perception.detected_object import DetectedObject, MapCounts
-from perception.edits import Edit, Evidence, Segments
+from perception.edits import Evidence, MapEdit, Segments
 from perception.pipeline import Perception
 from runtime.cycle.inputs import Inputs
 from runtime.cycle.step import Command, CycleRecord, State, step
@@ -75,7 +75,7 @@ class NoMethod:
         numbers = np.zeros(0, np.int64)
         return Segments(numbers, self.segment_geometry(), np.zeros(0), numbers)
 
-    def edit(self, edit: Edit) -> str | None:  # noqa: ARG002
+    def edit(self, edit: MapEdit) -> str | None:  # noqa: ARG002
         """Return why no edit is possible."""
         return REFUSED
 

@@ -23,6 +23,8 @@ from runtime.simulation.furnished_rooms import ACOUSTICS, drive, furnished_room
 
 STEP_M: Final = 0.03
 """Way between two firings of a part of the ring."""
+STAND_FIRINGS: Final = 30
+"""Firings of a robot that stands."""
 TURN_STEP_RAD: Final = math.radians(4.0)
 """Turn between two firings where the robot turns on the spot."""
 SCALE_ERROR: Final = 0.03
@@ -73,6 +75,7 @@ def furnished_drive(
     acoustics: AcousticsConfig = ACOUSTICS,
     length_m: float = 15.0,
     kidnapped: bool = False,
+    standing: bool = False,
 ) -> KnownDrive:
     """Return a drive through a furnished room.
 
@@ -90,9 +93,13 @@ def furnished_drive(
     kidnapped : bool
         Whether the robot is carried to another place of the room after this way, and drives as far again from there;
         its odometry does not notice.
+    standing : bool
+        Whether the robot stands at the start instead, for `STAND_FIRINGS`.
     """
     room = furnished_room(seed, acoustics)
     truth = _path(drive(room, seed, STEP_M, length_m), seed)
+    if standing:
+        truth = np.repeat(truth[:1], STAND_FIRINGS, axis=0)
     carried_at = len(truth) if kidnapped else None
     if kidnapped:
         truth = np.concatenate([truth, _path(drive(room, seed + 500_000, STEP_M, length_m), seed)])

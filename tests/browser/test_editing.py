@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Locator, expect
 
+from drivers.messages import Pose
 from tests.browser.fake_server import FakeServer
 from tests.browser.open_page import PHONE, Opened, Opener
 from tests.browser.synthetic_run import DRUMS, RADIUS
@@ -133,6 +134,22 @@ async def test_objects_are_placed_dragged_and_rotated_with_the_pointer(server: F
     await page.mouse.up()
     turned = await server.wait("move_object", 2)
     assert (turned["x"], turned["y"], turned["theta"]) == pytest.approx((cx, cy, math.pi / 2), abs=0.03)
+
+
+async def test_a_drag_says_where_the_robot_is_in_the_known_room(server: FakeServer, opener: Opener) -> None:
+    opened = await still(server, opener)
+    page = opened.page
+    await page.locator("#tool-here").click()
+    await page.mouse.move(*await opened.screen(1.0, 0.0))
+    await page.mouse.down()
+    await page.mouse.move(*await opened.screen(1.0, 0.5), steps=6)
+    await opened.save_screenshot("here")
+    await page.mouse.up()
+    sent = await server.wait("place_robot")
+    frame = Pose(0.05, -0.02, 0.03)  # of `synthetic_run`
+    here = frame.compose(Pose(sent["x"], sent["y"], sent["theta"]))
+    assert (here.x, here.y, here.theta) == pytest.approx((1.0, 0.0, math.pi / 2), abs=0.02)
+    await expect(page.locator("#tool-pan")).to_have_attribute("aria-checked", "true")
 
 
 async def test_an_object_is_nudged_and_rotated_by_keys(server: FakeServer, opener: Opener) -> None:

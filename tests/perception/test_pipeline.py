@@ -10,6 +10,7 @@ import pytest
 from config.load import load_model, load_settings, load_world, with_known_room
 from drivers.messages import Firing, Pose
 from perception.bayes.bayes_method import BayesPerception
+from perception.edits import PlaceRobot
 from perception.paper.paper_method import PaperPerception
 from perception.pipeline import Perception, make_method
 from tests.perception.edited import settle
@@ -36,12 +37,12 @@ def test_in_a_known_room_the_place_is_found_and_a_snapshot_continues_to_the_bit(
     chosen = with_known_room(settings(), "irregular")
     perception, other = (Perception(chosen.ring, chosen.models, chosen.perception) for _ in range(2))
     for k, firing in enumerate(drive(load_world("irregular"), (-5.0, 4.0))):
-        for one in (perception,) if k <= 75 else (perception, other):
+        for one in (perception,) if k <= 55 else (perception, other):
             one.observe(firing)
             quanta = 0
             while one.can_refine and quanta < 50 + k % 7:
                 quanta += one.refine() > 0
-        if k == 75:
+        if k == 55:
             assert perception.known_room is not None
             assert perception.known_room.can_refine, "in the midst of the search"
             other.restore(perception.snapshot())
@@ -56,6 +57,19 @@ def test_in_a_known_room_the_place_is_found_and_a_snapshot_continues_to_the_bit(
     again = perception.localized()
     assert again is not None
     assert again.status == "localizing"
+
+
+def test_the_robot_is_placed_in_a_known_room_only() -> None:
+    chosen = settings()
+    perception = Perception(chosen.ring, chosen.models, chosen.perception)
+    assert perception.edit(PlaceRobot(1.0, 2.0, 0.5)) == "there is no known room: start with --map"
+    chosen = with_known_room(chosen, "irregular")
+    perception = Perception(chosen.ring, chosen.models, chosen.perception)
+    assert "invalid pose" in (perception.edit(PlaceRobot(1.0, math.nan, 0.5)) or "")
+    assert perception.edit(PlaceRobot(1.0, 2.0, 0.5)) is None
+    here = perception.localized()
+    assert here is not None
+    assert (here.pose.x, here.pose.y, here.pose.theta) == pytest.approx((1.0, 2.0, 0.5))
 
 
 @pytest.mark.compiled

@@ -14,6 +14,7 @@ from perception.edits import (
     MoveObject,
     PinSegments,
     PlaceModel,
+    PlaceRobot,
     RejectObject,
 )
 from runtime.console.commands import async_commands, handlers
@@ -46,6 +47,7 @@ _ALL: Final[tuple[Command[Any], ...]] = (
     Command("place_model", PlaceModel, CONTROL, handlers.edit, always, survives_stop=True),
     Command("move_object", MoveObject, CONTROL, handlers.edit, always, survives_stop=True),
     Command("reject_object", RejectObject, CONTROL, handlers.edit, always, survives_stop=True),
+    Command("place_robot", PlaceRobot, CONTROL, handlers.edit, always, survives_stop=True),
     Command("confirm_object", ConfirmObject, CONTROL, handlers.edit, always, survives_stop=True),
     Command("evidence", arguments.GetEvidence, TOKEN, handlers.get_evidence),
     Command("load_model", arguments.LoadModel, CONTROL, async_commands.load_model, always, survives_stop=True),

@@ -59,7 +59,7 @@ export function drawRobot(f) {
   ctx.stroke();
 }
 
-// The surfaces of the known room, where the robot's place has them.
+// The surfaces of the known room, where the robot's place has them; dashed while it does not track.
 function drawKnownRoom({ ctx, run, px, theme }, { drums, walls, polygons }) {
   const [x, y, turn] = run.state.localized.frame, lines = new Path2D();
   for (const [x1, y1, x2, y2] of walls) {
@@ -89,7 +89,6 @@ export function drawMapFrame(f) {
   const { ctx, run, px, theme } = f;
   if (!run.fresh || run.state.localized === null) return;
   const { frame: [x, y, turn], covariance } = run.state.localized;
-  if (covariance === null) return; // the place in the known room is not found yet
   const length = AXIS_PX * px;
   f.inWorld();
   if (run.session?.known_room) drawKnownRoom(f, run.session.known_room);
@@ -100,10 +99,12 @@ export function drawMapFrame(f) {
   ctx.lineTo(x, y);
   ctx.lineTo(x - length * Math.sin(turn), y + length * Math.cos(turn));
   ctx.stroke();
-  const { major, minor, angle } = ellipseOf(covariance), times = f.options.ellipseScale;
-  ctx.beginPath();
-  ctx.ellipse(run.state.pose[0], run.state.pose[1], times * major, times * minor, angle + turn, 0, 2 * Math.PI);
-  ctx.stroke();
+  if (covariance !== null) {
+    const { major, minor, angle } = ellipseOf(covariance), times = f.options.ellipseScale;
+    ctx.beginPath();
+    ctx.ellipse(run.state.pose[0], run.state.pose[1], times * major, times * minor, angle + turn, 0, 2 * Math.PI);
+    ctx.stroke();
+  }
   const at = f.view.toScreen(x, y);
   f.onScreen();
   ctx.font = theme.font(11, 600);

@@ -20,7 +20,7 @@ import { Tabs } from "./tabs.js";
 import { Teleoperation } from "./teleoperation.js";
 import { Theme } from "./theme.js";
 import { screenshot, Time } from "./time.js";
-import { moveTool, placeTool } from "./tool_objects.js";
+import { hereTool, moveTool, placeTool } from "./tool_objects.js";
 import { goalTool, tapeTool } from "./tool_points.js";
 import { selectionBar, panTool, selectTool } from "./tool_select.js";
 import { Toolbox } from "./tools.js";
@@ -70,6 +70,7 @@ const tools = new Toolbox({
     placeTool({ run, view, connection, notifications, redraw }),
     goalTool({ sendGoal: (x, y) => drive.panel.goal(x, y).then(() => notifications.toast(`Goal: ${units.place(x, y)}`), notifications.showError), after: () => tools.choose("pan") }),
     tapeTool({ units, announce, redraw }),
+    hereTool({ run, connection, notifications, redraw, choose: (id) => tools.choose(id) }),
   ],
 });
 scene = new Scene({ back: byId("map-back"), front, layers, overlay: (f) => tools.draw(f), run, view, theme, units, selection, options });

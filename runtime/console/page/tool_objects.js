@@ -83,6 +83,52 @@ export function moveTool({ run, view, selection, connection, notifications, redr
   };
 }
 
+// "I am here": a drag from the robot's place in the known room, as it is drawn, towards where it looks.
+export function hereTool({ run, connection, notifications, redraw, choose }) {
+  let pose = null;
+
+  run.on("session", ({ known_room: room }) => {
+    byId("tool-here").hidden = !room;
+  });
+  const discard = () => {
+    pose = null;
+    redraw();
+  };
+  // From odometry's frame, in which the page draws, to the map's.
+  const inMap = ({ x, y, theta }) => {
+    const [x0, y0, turn] = run.state.localized?.frame ?? [0, 0, 0];
+    const c = Math.cos(turn), s = Math.sin(turn), dx = x - x0, dy = y - y0;
+    return { x: c * dx + s * dy, y: c * dy - s * dx, theta: theta - turn };
+  };
+  return {
+    id: "here", name: "Say where the robot is in the known room", icon: "i-here",
+    down(at) {
+      pose = { x: at.x, y: at.y, theta: 0, dragged: false };
+      redraw();
+    },
+    move(at) {
+      if (pose === null) return;
+      Object.assign(pose, { theta: Math.atan2(at.y - pose.y, at.x - pose.x), dragged: true });
+      redraw();
+    },
+    up() {
+      if (pose?.dragged) {
+        connection.request({ type: "place_robot", ...inMap(pose) })
+          .then(() => notifications.toast("The robot's place is checked by what it hears"), notifications.showError);
+        choose("pan");
+      }
+      discard();
+    },
+    cancel: discard,
+    draw(f) {
+      if (pose === null) return;
+      const radius = run.session?.body?.radius ?? 0.2, reach = radius + ARM_PX * f.px;
+      const disc = { vertices: [], closed: true, arc_radius_m: radius };
+      drawPreview(f, disc, pose, { x: pose.x + reach * Math.cos(pose.theta), y: pose.y + reach * Math.sin(pose.theta) });
+    },
+  };
+}
+
 export function placeTool({ run, view, connection, notifications, redraw }) {
   const chooser = byId("placing-model");
   let pose = null;

@@ -21,7 +21,8 @@ export class Toolbox {
         const by = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 }[event.key];
         if (by === undefined) return;
         event.preventDefault();
-        const next = tools[(index + by + tools.length) % tools.length];
+        const shown = tools.filter((one) => !this.#buttons.get(one.id).hidden);
+        const next = shown[(shown.indexOf(tool) + by + shown.length) % shown.length];
         this.choose(next.id);
         this.#buttons.get(next.id).focus();
       });
@@ -52,7 +53,8 @@ export class Toolbox {
   }
 
   chooseNth(n) {
-    if (this.tools[n - 1]) this.choose(this.tools[n - 1].id);
+    const tool = this.tools[n - 1];
+    if (tool && !this.#buttons.get(tool.id).hidden) this.choose(tool.id);
   }
 
   draw(f) {

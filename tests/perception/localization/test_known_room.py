@@ -98,26 +98,35 @@ def test_firings_far_apart_are_keyframes_of_their_own() -> None:
     assert np.isfinite(localizer.localized().probability)
 
 
-def test_a_robot_that_stands_keeps_localizing() -> None:
-    drive = driven(CROOKED)
+def test_a_robot_that_stands_is_found_and_searches_once() -> None:
+    drive = furnished_drive(RING, 2001, standing=True)
     localizer = KnownRoom(drive.room, RING)
-    for _ in range(300):
+    trace = follow(localizer, drive)
+    assert (trace.status[0], trace.status[-1]) == ("localizing", "tracking")
+    assert trace.error_m[-1] < 0.05
+    assert np.isinf(KnownRoom(drive.room, RING).localized().covariance[0, 0])
+    for _ in range(60):
         localizer.observe(drive.firings[0])
-    assert not localizer.can_refine
-    assert localizer.localized().status == "localizing"
-    assert np.isinf(localizer.localized().covariance[0, 0])
+        assert not localizer.can_refine, "no more is heard by standing"
+
+
+def test_a_robot_that_stands_in_another_room_is_not_sure() -> None:
+    drive = furnished_drive(RING, 2001, standing=True)
+    other = furnished_drive(RING, 2002, length_m=0.5).room
+    trace = follow(KnownRoom(other, RING), drive)
+    assert trace.probability.max() <= 0.9
 
 
 def test_few_quanta_a_firing_find_the_robot_too_and_a_snapshot_continues_to_the_bit() -> None:
     drive = driven(CROOKED, 2.6)
     localizer, restored = KnownRoom(drive.room, RING), KnownRoom(drive.room, RING)
     for k, firing in enumerate(drive.firings):
-        for one in (localizer, restored) if k > 24 else (localizer,):
+        for one in (localizer, restored) if k > 18 else (localizer,):
             one.observe(firing)
             for _ in range(60):
                 if one.can_refine:
                     one.refine()
-        if k == 24:  # in the midst of the search
+        if k == 18:  # in the midst of the search
             assert localizer.can_refine
             put_back(restored, snapshot_of(localizer))
             restored.drop_caches()
@@ -125,6 +134,23 @@ def test_few_quanta_a_firing_find_the_robot_too_and_a_snapshot_continues_to_the_
     assert here.status == "tracking"
     assert (here.pose, here.probability) == (other.pose, other.probability)
     assert np.array_equal(here.covariance, other.covariance)
+
+
+@pytest.mark.parametrize("off", [0.2, 2.5])
+def test_what_the_operator_says_is_confirmed_or_refuted(off: float) -> None:
+    """A robot that stands near the place that the operator names tracks; one that is elsewhere is lost."""
+    drive = furnished_drive(RING, 2003, standing=True)
+    x, y, theta = drive.truth[0].tolist()
+    localizer = KnownRoom(drive.room, RING)
+    localizer.observe(drive.firings[0])
+    localizer.assume(Pose(x + off, y - 0.1, theta + 0.1))
+    here = localizer.localized()
+    assert (here.pose.x, here.ring_yaw) == pytest.approx((x + off, math.remainder(theta + 0.1, 2.0 * math.pi)))
+    assert (here.status, here.probability) == ("localizing", 0.0)
+    assert math.sqrt(here.covariance[0, 0]) == pytest.approx(0.3)
+    trace = follow(localizer, drive)
+    assert trace.status[-1] == ("tracking" if off < 1.0 else "lost")
+    assert (trace.error_m[-1] < 0.05) == (off < 1.0)
 
 
 def test_after_a_reset_the_place_is_unknown_again() -> None:

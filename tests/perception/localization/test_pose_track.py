@@ -34,7 +34,7 @@ def track_at(*poses: Pose, keyframes: Keyframes) -> PoseTrack:
     """A track with hypotheses at these poses."""
     track = PoseTrack(make_surroundings(ROOM, MODEL, HALF_ANGLE), MODEL, heading_noise(0))
     starts = np.array([(pose.x, pose.y, pose.theta) for pose in poses])
-    track.start(starts, 0.1, math.radians(3.0), keyframes, 0)
+    track.start(starts, 0.1, math.radians(3.0), keyframes.pose(0), 0)
     return track
 
 
@@ -47,7 +47,9 @@ def test_a_keyframe_takes_quanta_for_each_hypothesis_and_the_right_one_is_left()
     assert done == [0, 0, 0, 24]
     assert len(track) == 1
     assert track.readings == 24
-    assert track.explains(1.0) > 0.9
+    assert track.way_m == 0.0
+    assert track.explains(1.0, 0.35) > track.explains(1.0, 3.0)
+    assert track.explains(1.0, 0.35) > 0.9
     pose = track.pose(Pose(0.1, 0.0, 0.12))  # odometry's frame is the ring's at the keyframe, but for the turn
     here = (
         Pose(track.best.x, track.best.y, track.best.heading).compose(Pose(0.0, 0.0, -0.12)).compose(Pose(0.1, 0, 0))
@@ -64,7 +66,7 @@ def test_a_place_that_does_not_explain_the_readings_says_so_and_memory_is_bounde
     track = track_at(TRUTH, keyframes=keyframes)  # the true robot would not turn while its readings stay
     while track.is_behind(keyframes):
         track.enter(keyframes, 0.5)
-    assert track.explains(1.0) < 0.1
+    assert track.explains(1.0, 0.35) < 0.1
     assert track.readings == 24 * RECENT_MAX
 
 

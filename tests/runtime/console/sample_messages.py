@@ -13,6 +13,7 @@ from perception.edits import (
     MoveObject,
     PinSegments,
     PlaceModel,
+    PlaceRobot,
     RejectObject,
 )
 from runtime.cycle.drive_requests import Legs
@@ -36,6 +37,7 @@ EDITS: list[tuple[dict[str, Any], object]] = [
         PlaceModel("semicircle", 1.0, 2.0, 0.5),
     ),
     ({"type": "move_object", "object": 4, "x": 1.0, "y": 2.0, "theta": 0}, MoveObject(4, 1.0, 2.0, 0.0)),
+    ({"type": "place_robot", "x": 1.0, "y": 2.0, "theta": 0.5}, PlaceRobot(1.0, 2.0, 0.5)),
     ({"type": "reject_object", "object": 4}, RejectObject(4)),
     ({"type": "confirm_object", "object": 4}, ConfirmObject(4)),
 ]
