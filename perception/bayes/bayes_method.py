@@ -40,6 +40,7 @@ from perception.bayes.segment_list import count_made, count_segments, drawn, map
 from perception.bayes.state import FREE, Memory
 from perception.bayes.state_migration import migrate
 from perception.bayes.track_archive import TrackArchive
+from perception.bayes.wall_map import update_walls
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import (
     ClearMap,
@@ -136,6 +137,7 @@ class BayesPerception:
             # Not in the kernel: where all models are round, it need not be compiled.
             associate_polygons(s, tracks, settings, readings)
         made, self._circles_pending = observe(s, tracks, settings, readings, time_s, self._config.fresh_share)
+        update_walls(self.memory, settings, readings)
         # Polygons come after the circles, unless the time ran out before.
         self._polygons_turn = self._polygons_pending and self._polygons_left > 0 and not self._polygons_turn
         self._left = self._config.quanta_per_firing

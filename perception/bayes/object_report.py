@@ -22,6 +22,7 @@ from perception.bayes.polygon_parameters import POLYGON_INFLATION, POLYGON_TURN_
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, Memory, PolygonTrack
 from perception.bayes.track_archive import TrackArchive
+from perception.bayes.wall_report import wall_segments
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
 
@@ -124,24 +125,24 @@ def archived_models(
 
 
 def known_walls(memory: Memory) -> NDArray[Any]:
-    """Return the lines that count as walls, as records of `state.Line`."""
+    """Return the lines that recognition takes for walls, as records of `state.Line`."""
     lines = memory.state["lines"][0]
     is_wall = (lines["echoes"] > WALL_ECHOES_MIN) & (lines["high"] - lines["low"] > WALL_LENGTH_MIN_M)
     return lines[is_wall]  # type: ignore[no-any-return]  # numpy types a field as Any
 
 
-def wall_object(line: Row) -> DetectedObject:
-    """Return a line as a reported object: the middle of its extent, and its direction."""
-    nx, ny, distance, ox, oy, angle_variance, _, distance_variance, low, high, log_odds, echoes = line
-    middle = 0.5 * (low + high)
-    across, length = distance_variance + angle_variance * middle**2, high - low
+def wall_object(segment: Row) -> DetectedObject:
+    """Return a `WallSegment` as a reported object: its middle and direction; its length is in the covariance."""
+    x1, y1, x2, y2, variance_across, variance_turn, echoes, log_odds = segment
+    length = math.hypot(x2 - x1, y2 - y1) or 1.0  # 0 in a damaged recording
+    tx, ty = (x2 - x1) / length, (y2 - y1) / length
     along = length * length / 12.0
-    xx, yy = nx * nx * across + ny * ny * along, ny * ny * across + nx * nx * along
-    xy = nx * ny * (across - along)
+    across = variance_across + along * variance_turn
+    xx, yy, xy = tx * tx * along + ty * ty * across, ty * ty * along + tx * tx * across, tx * ty * (along - across)
     probability = 1.0 / (1.0 + math.exp(-log_odds))
     return DetectedObject(
-        "wall", ox + distance * nx - ny * middle, oy + distance * ny + nx * middle, math.atan2(nx, -ny),
-        worst_sigma(xx, xy, yy), int(echoes), probability, probability, (xx, xy, yy),
+        "wall", 0.5 * (x1 + x2), 0.5 * (y1 + y2), math.atan2(ty, tx), worst_sigma(xx, xy, yy), int(echoes),
+        probability, probability, (xx, xy, yy),
     )  # fmt: skip
 
 
@@ -193,7 +194,7 @@ def other_objects(
     named : sequence of DetectedObject
         The models.
     """
-    walls = [wall_object(line.item()) for line in known_walls(memory)]
+    walls = [wall_object(segment.item()) for segment in wall_segments(memory)]
     return walls + other_circles(memory.circles, memory, p, least, named)
 
 

@@ -14,6 +14,7 @@ from perception.bayes.elements import (
     Pose,
     Reading,
 )
+from perception.bayes.wall_records import RECENT_MAX
 from perception.kernel import Floats, Ints
 from perception.records import Record, Records
 
@@ -133,6 +134,8 @@ class Scratch(Record):
     fired_sensors: Annotated[Ints, SENSORS_MAX]
     explained_by: Annotated[Ints, SENSORS_MAX]
     """Explanation of each fired reading; see `UNEXPLAINED`."""
+    near_recent: Annotated[Ints, RECENT_MAX]
+    """Places of the recent readings that may bear on a new wall."""
     segments: Annotated[Records[PairSegment], PAIRS_PER_SENSOR * SENSORS_MAX]
     """The segments of this firing."""
     readings: Annotated[Records[Reading], READINGS_MAX]

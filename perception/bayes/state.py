@@ -34,6 +34,7 @@ from perception.bayes.elements import (
 from perception.bayes.parameters import START_NOISE, START_NOISE_NAT
 from perception.bayes.scratch import Scratch
 from perception.bayes.settings_record import NOISES
+from perception.bayes.wall_records import WallMap
 from perception.kernel import Floats
 from perception.records import Record, Records, records, zeros
 
@@ -304,6 +305,7 @@ class State(Record):
     buckets: Annotated[Records[Bucket], BUCKETS]
     """The outline map."""
     lines: Annotated[Records[Line], MAX_LINES]
+    room: WallMap
     polygons: Annotated[Records[PolygonTrack], MAX_POLYGONS]
     rejections: Annotated[Records[Rejection], REJECTIONS_MAX]
     requests: Annotated[Records[PolygonRequest], REQUESTS_MAX]

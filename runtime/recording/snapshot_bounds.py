@@ -32,6 +32,7 @@ from perception.bayes.pose_restarts import LATTICE
 from perception.bayes.scratch import POLYGON
 from perception.bayes.settings_record import CIRCLES_MAX, NOISES, POLYGONS_MAX
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED
+from perception.bayes.wall_records import IS_KNOWN, IS_TAKEN, MAX_WALLS, SPANS_MAX, WALL_BIN_M, WALL_BINS
 from perception.localization.known_room import IDLE, STATUSES, WEIGHING
 from perception.localization.landmark_state import LANDMARKS_MAX
 from perception.localization.pose_grid import NONE as NO_QUANTUM
@@ -68,6 +69,8 @@ QUANTA: Final = Bound(0, 1000)
 """As `config.settings.BayesConfig.quanta_per_firing`, which a running process may change."""
 ITERATIONS: Final = Bound(0, 1_000_000)
 """As `config.settings.RelaxationConfig.iterations_max`, which a running process may change."""
+WALL_EXTENT: Final = Bound(-0.5 * WALL_BINS * WALL_BIN_M, 0.5 * WALL_BINS * WALL_BIN_M)
+"""Of the ends of a wall's spans, which become indices of its bins."""
 JOB_READINGS: Final = POLYGON_BEARING_BINS * POLYGON_BIN_CAPACITY
 SCRATCH: Final = "method.memory.state.scratch."
 UNHEARD: Final = "method.memory.state.sensors.last."
@@ -90,8 +93,8 @@ _COUNTS: Final = (
     "_numbers.last _rejections.total _ring.firings sets_seen bins.count buckets.count number candidates._sizes _turn "
     "changes idle_firings passed_over refinements reservoir unseen clusters.sizes requests_made leaps missed "
     "near_echoes newest_segment objects_numbered off_stuck outline.numbers outline.total _sensors.readings "
-    "rejection_count run_firing run_length segments_made segments_numbered sensors.kept members_sum "
-    "_archive.circles.count _archive.polygons.count _numbered waiting "
+    "room.firings room.recent_count rejection_count run_firing run_length segments_made segments_numbered "
+    "sensors.kept members_sum _archive.circles.count _archive.polygons.count _numbered waiting "
     "drift._arrived drift._entered drift._windows landmarks.failures landmarks.hits "
     "_keyframes.count _keyframes._firings entered known_room._window_begin _grid._due _grid._searches"
 )
@@ -135,6 +138,9 @@ BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
         "circles.kind": Bound(0, CIRCLES_MAX - 1),
         "circles.radius": Bound(0.0, 1e3),
         "circles.status": Bound(FREE, ESTABLISHED),
+        "corners.first": Bound(0, MAX_WALLS - 1),
+        "corners.is_used": Bound(0, 1),
+        "corners.second": Bound(0, MAX_WALLS - 1),
         "final_refinements": SIGNED,
         "iterations_left": ITERATIONS,
         "job.lattices": Bound(0, LATTICE_ATTEMPTS),
@@ -156,9 +162,16 @@ BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
         "archived_rows.status": Bound(FREE, ESTABLISHED),
         "placements.count": Bound(0, PLACEMENTS_MAX),
         "range_m": Bound(0.0, 1e7),
+        "recent.is_free": Bound(IS_KNOWN, IS_TAKEN),
         "rejections.what": Bound(0, POLYGON + POLYGONS_MAX - 1),
         "search.rounds_left": Bound(0, 1000),
         "search.trial": Bound(-1, 2 * AXES - 1),
+        "spans.end_bin": Bound(0, WALL_BINS),
+        "spans.first_bin": Bound(0, WALL_BINS),
+        "spans.high": WALL_EXTENT,
+        "spans.low": WALL_EXTENT,
+        "walls.is_changed": Bound(0, 1),
+        "walls.span_count": Bound(0, SPANS_MAX),
     }
 )
 """Bounds by the end of the name. `settings_bounds` has those that depend on the settings."""

@@ -166,7 +166,7 @@ def compare(walls: Sequence[Segment], answered: Sequence[Places], found: Sequenc
         turns = np.array([abs(_sine(wall.direction, line.direction)) for wall in walls])
         distances = np.array([wall.distance(middles) for wall in walls])
         right = (distances < RIGHT_M) & (turns < math.sin(RIGHT_RAD))[:, None]
-        false_m += line.length_m * (1.0 - right.any(axis=0).mean())
+        false_m += line.length_m * float(1.0 - right.any(axis=0).mean())
         owner = int(right.sum(axis=1).argmax()) if right.any() else -1
         owners.append(owner)
         if owner >= 0:

@@ -191,7 +191,7 @@ def compile_parts(settings: Settings, folder: Path, parts: Sequence[str]) -> Non
     if BAYES in parts and (os.cpu_count() or 1) > 1:
         # What the other process compiles is in the cache afterwards; this one starts with what shares none of it.
         with kernel_warmup.compile_in_parallel(POLYGONS if POLYGONS in parts else BAYES):
-            kernel_warmup.observe_once(settings)
+            kernel_warmup.observe_only(settings)
             if POLYGONS in parts:
                 kernel_warmup.RUN_ONCE[BAYES](settings)
     for part in parts:

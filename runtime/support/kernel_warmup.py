@@ -51,7 +51,7 @@ def _perception(settings: Settings, method: str, models: Sequence[ModelConfig]) 
     return Perception(settings.ring, models, config)
 
 
-def _drive(settings: Settings, perception: Perception, firings: int = FIRINGS) -> None:
+def _drive(settings: Settings, perception: Perception, firings: int = FIRINGS, *, refines: bool = True) -> None:
     """Drive past a wall."""
     import numpy as np
 
@@ -60,7 +60,7 @@ def _drive(settings: Settings, perception: Perception, firings: int = FIRINGS) -
     for k in range(firings):
         ranges = np.full(len(settings.ring.mounts), 2.0)
         perception.observe(Firing(0.1 * k, Pose(0.1 * k, 0.0, 0.0), 0.0, ranges))
-        while firings > 1 and perception.can_refine:
+        while refines and perception.can_refine:
             perception.refine()
     perception.labelled_objects()
     perception.counts  # noqa: B018 - a property that runs kernels
@@ -109,9 +109,9 @@ def _drive_and_edit(settings: Settings, method: str, models: Sequence[ModelConfi
     _edit(settings, perception, models, FIRINGS)
 
 
-def observe_once(settings: Settings) -> None:
-    """Observe one firing without refinement."""
-    _drive(settings, _perception(settings, BAYES, settings.models), 1)
+def observe_only(settings: Settings) -> None:
+    """Drive past a wall without refinement."""
+    _drive(settings, _perception(settings, BAYES, settings.models), refines=False)
 
 
 def _circles(settings: Settings) -> None:

@@ -22,12 +22,11 @@ from tests.perception.bayes.tracks import (
     place_of,
     random_lines,
     random_track,
-    unit,
 )
 
 
 @examples(150, 1000)
-def test_greatest_deviation_walls_and_names_of_rivals_equal_their_oracles(examples: int) -> None:
+def test_greatest_deviation_lines_and_names_of_rivals_equal_their_oracles(examples: int) -> None:
     rng, memory, corners = np.random.default_rng(18), new_memory(), 0
     for _ in range(examples):
         root = rng.normal(0, 1, (2, 2))
@@ -39,14 +38,7 @@ def test_greatest_deviation_walls_and_names_of_rivals_equal_their_oracles(exampl
         assert [wall["normal_x"] for wall in object_report.known_walls(memory)] == [
             line_rows(memory)[k, 0] for k in long
         ]
-        for k, line in lines.items():
-            seen, length = object_report.wall_object(tuple(line_rows(memory)[k].tolist())), line.high - line.low
-            middle = line.origin + line.c * line.normal + 0.5 * (line.low + line.high) * line.along
-            assert (seen.x, seen.y) == pytest.approx(middle, abs=1e-12)
-            assert unit(seen.theta) == pytest.approx(line.along, abs=1e-12)
-            lever = np.array([0.5 * (line.low + line.high), 1.0])
-            across = float(line.cov[1, 1] + lever[0] ** 2 * line.cov[0, 0])
-            assert seen.sigma == pytest.approx(math.sqrt(max(across, length**2 / 12)), rel=1e-9)
+        for k in lines:
             assert walls.is_wall(memory.s[0].lines[k]) == (k in long)
         random_track(rng, memory, 0)
         memory.circles["radius"][0] = radius = float(rng.choice([0.0, 0.1, 0.6]))

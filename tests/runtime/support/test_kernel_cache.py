@@ -215,8 +215,8 @@ def test_each_part_is_compiled_once_and_then_warmed_up(home: Path, monkeypatch: 
 @pytest.mark.parametrize(
     ("parts", "processors", "helped"),
     [
-        ((kernels.EMULATOR, kernels.BAYES), 2, ["helper bayes", "observe_once"]),
-        ((kernels.BAYES, kernels.POLYGONS), 2, ["helper polygons", "observe_once", "bayes"]),
+        ((kernels.EMULATOR, kernels.BAYES), 2, ["helper bayes", "observe_only"]),
+        ((kernels.BAYES, kernels.POLYGONS), 2, ["helper polygons", "observe_only", "bayes"]),
         ((kernels.POLYGONS,), 2, []),
         ((kernels.EMULATOR, kernels.BAYES), 1, []),
     ],
@@ -236,7 +236,7 @@ def test_a_second_process_compiles_the_last_part(
         return lambda _settings: happened.append(name)
 
     monkeypatch.setattr(warming, "compile_in_parallel", compile_in_parallel)
-    monkeypatch.setattr(warming, "observe_once", noted("observe_once"))
+    monkeypatch.setattr(warming, "observe_only", noted("observe_only"))
     monkeypatch.setattr(warming, "RUN_ONCE", {part: noted(part) for part in kernels.PARTS})
     monkeypatch.setattr(os, "cpu_count", lambda: processors)
     kernels.compile_parts(load_settings("hallway"), tmp_path, parts)

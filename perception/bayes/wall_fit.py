@@ -1,0 +1,203 @@
+"""Fit of the walls to their bins: the spans that the bins cover, their ends, and the line by least squares."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from perception.bayes.settings_record import SettingsRecord
+from perception.bayes.state import StateRecord
+from perception.bayes.wall_bins import HALF, clear_wall, is_covered, mean_error, middle_of
+from perception.bayes.wall_contact import edges_answer, range_sigma
+from perception.bayes.wall_evidence import judge
+from perception.bayes.wall_records import SPANS_MAX, WALL_BIN_M, WALL_BINS, Wall, WallMap
+from perception.kernel import kernel
+
+SLOPE_SIGMA: Final = 0.15
+"""Prior of a wall's slope in its frame."""
+OFFSET_INFORMATION: Final = 1e-3
+"""Prior information on a wall's offset, m⁻²."""
+WALL_WEIGHT_MIN: Final = 3.0
+"""A wall of less weight ends."""
+GAP_MAX_M: Final = 0.6
+"""Longest gap without readings inside a span."""
+OPENING_MIN_M: Final = 0.3
+"""Least width of an opening."""
+OPENING_PASSES_MIN: Final = 1.0
+"""Passes in a gap of that width that make it an opening: echoes from its ends cover the rest …"""
+CRACK_PASSES_MIN: Final = 3.0
+"""… and in a narrower one."""
+STRAY_BINS: Final = 2
+"""Neighbours on either side with which a bin is compared with the line."""
+STRAY_SIGMAS: Final = 3.0
+STRAY_SLACK_M: Final = 0.012
+"""Echoes whose mean lies this far behind the line come from something else: from the ends of an opening, mostly."""
+PASSED_MIN: Final = 1.5
+PASSED_SHARE: Final = 0.4
+"""Passes there that make it open: so many, and of so great a share of the weight."""
+TRIM_BINS_MAX: Final = 13
+TRIM_GAIN_NAT: Final = 0.5
+"""Gain required of each earlier end."""
+TRIM_SYSTEMATIC_M: Final = 0.005
+"""Error that the mean of many readings keeps."""
+
+
+@kernel
+def fit_line(room: WallMap, wall: Wall) -> None:
+    """Fit a wall's line to the covered bins of its spans, to all where it has none, by weighted least squares."""
+    s0 = OFFSET_INFORMATION
+    s1 = 0.0
+    s2 = 1.0 / SLOPE_SIGMA**2
+    t0 = 0.0
+    t1 = 0.0
+    total = 0.0
+    for k in range(max(1, wall.span_count)):
+        first = 0
+        end = WALL_BINS
+        if wall.span_count > 0:
+            first = wall.spans[k].first_bin
+            end = wall.spans[k].end_bin
+        for b in range(first, end):
+            of = wall.bins[b]
+            if is_covered(of):
+                n = of.weight
+                total += n
+                u = middle_of(b)
+                w = n / range_sigma(room, of.range_sum / n) ** 2
+                z = of.offset_sum / n
+                s0 += w
+                s1 += w * u
+                s2 += w * u * u
+                t0 += w * z
+                t1 += w * u * z
+    wall.weight = total
+    det = s0 * s2 - s1 * s1
+    wall.offset = (s2 * t0 - s1 * t1) / det
+    wall.slope = (s0 * t1 - s1 * t0) / det
+    wall.variance_offset = s2 / det
+    wall.covariance = -s1 / det
+    wall.variance_slope = s0 / det
+
+
+@kernel
+def trimmed_end(room: WallMap, wall: Wall, low: int, high: int, side: int) -> int:
+    """Return the last bin of a run of bins at one side, by likelihood.
+
+    A sensor beyond the end of a wall hears the end. Its range is longer than the line's would be, at first by less
+    than the noise, so that the bins' means decide.
+
+    Parameters
+    ----------
+    room, wall
+        The noise, and the wall.
+    low, high : int
+        First and last bin of the run.
+    side : int
+        1 for the high end, −1 for the low one.
+    """
+    best = 0.0
+    outer = high if side > 0 else low
+    last = outer
+    for k in range(1, min(TRIM_BINS_MAX, high - low - 2)):
+        end = outer - side * k
+        gain = 0.0
+        for j in range(1, k + 1):
+            of = wall.bins[end + side * j]
+            if is_covered(of):
+                e = mean_error(wall, end + side * j)
+                d = of.range_sum / of.weight
+                x = (j - 0.5) * WALL_BIN_M
+                longer = math.sqrt(d * d + x * x) - d
+                var = range_sigma(room, d) ** 2 / of.weight + TRIM_SYSTEMATIC_M**2
+                gain += (e * e - (e - longer) ** 2) / (2.0 * var)
+        if gain > best + TRIM_GAIN_NAT:
+            best = gain
+            last = end
+    return last
+
+
+@kernel
+def is_stray(room: WallMap, wall: Wall, b: int) -> bool:
+    """Return whether the echoes of a covered bin and its neighbours lie too far behind the line."""
+    total = 0.0
+    error = 0.0
+    passes = 0.0
+    for k in range(max(0, b - STRAY_BINS), min(WALL_BINS, b + STRAY_BINS + 1)):
+        of = wall.bins[k]
+        passes += of.passes
+        if is_covered(of):
+            total += of.weight
+            error += of.weight * mean_error(wall, k)
+    if edges_answer(room) and passes >= PASSED_MIN and passes > PASSED_SHARE * total:
+        return True
+    of = wall.bins[b]
+    sigma = range_sigma(room, of.range_sum / of.weight) / math.sqrt(total)
+    return error / total > STRAY_SIGMAS * sigma + STRAY_SLACK_M
+
+
+@kernel
+def find_spans(room: WallMap, wall: Wall) -> None:
+    """Find the spans of a wall: runs of covered bins without a long gap, and without passes in a gap.
+
+    What the ends of a run explain better than the line is left out.
+    """
+    wall.span_count = 0
+    first = -1
+    last = -1
+    passes = 0.0
+    for b in range(WALL_BINS + 1):
+        is_end = b == WALL_BINS
+        if not is_end:
+            of = wall.bins[b]
+            if not is_covered(of):
+                passes += of.passes
+                continue
+            if is_stray(room, wall, b):
+                passes += of.weight
+                continue
+        width = (b - last - 1) * WALL_BIN_M
+        is_opening = width > GAP_MAX_M or passes >= CRACK_PASSES_MIN
+        is_opening = is_opening or (width >= OPENING_MIN_M and passes >= OPENING_PASSES_MIN)
+        if first >= 0 and (is_end or is_opening) and wall.span_count < SPANS_MAX:
+            low = first
+            high = last
+            for side in range(1, -2, -2):  # a literal in the call would be a type of its own, compiled by itself
+                end = trimmed_end(room, wall, low, high, side)
+                low = low if side > 0 else end
+                high = end if side > 0 else high
+            span = wall.spans[wall.span_count]
+            span.first_bin = low
+            span.end_bin = high + 1
+            span.low = (low - HALF) * WALL_BIN_M
+            span.high = (high + 1 - HALF) * WALL_BIN_M
+            wall.span_count += 1
+        if first < 0 or is_opening:
+            first = b
+        last = b
+        passes = 0.0
+
+
+@kernel
+def fit_walls(s: StateRecord, p: SettingsRecord, first: int, end: int, step: int) -> None:
+    """Find the spans of the walls whose bins have changed, fit and judge them; end those of which little is left.
+
+    Parameters
+    ----------
+    s, p
+        Memory, updated, and settings.
+    first, end, step : int
+        Only every `step`-th wall from `first` on, `end` excluded.
+    """
+    room = s[0].room
+    for k in range(first, end, step):
+        wall = room.walls[k]
+        if wall.is_changed == 1:
+            wall.is_changed = 0
+            if wall.span_count == 0:
+                fit_line(room, wall)
+            find_spans(room, wall)
+            fit_line(room, wall)
+            if wall.span_count == 0 or wall.weight < WALL_WEIGHT_MIN:
+                clear_wall(wall)
+            else:
+                judge(room, wall, p)

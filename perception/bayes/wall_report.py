@@ -1,0 +1,181 @@
+"""The walls that are sure, with their ends: a segment for each span, as far as the corners in which it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.bayes.state import Memory
+from perception.bayes.wall_bins import bin_of
+from perception.bayes.wall_corners import CORNER_ECHOES_MIN, CORNER_REACH_M
+from perception.bayes.wall_evidence import SPAN_CHI2_MIN, WALL_MIN_M
+from perception.bayes.wall_fit import OPENING_PASSES_MIN
+from perception.bayes.wall_records import MAX_WALLS, WALL_BINS
+from perception.kernel import Floats
+from perception.records import Record
+
+WALL_CHI2_MIN: Final = 20.0
+"""Least evidence of the best span, or of all together."""
+SPAN_MIN_M: Final = 0.3
+SPAN_WEIGHT_MIN: Final = 3.0
+"""Least length and weight of a span that is reported, …"""
+MISFIT_MAX: Final = 3.0
+"""Greatest χ² of a wall's line for each degree of freedom."""
+CORNER_NEAR_M: Final = 1.0
+"""Distance from the ends of both walls within which a corner need not be heard …"""
+CORNER_PASSED_SHARE: Final = 0.2
+"""… if no more than this share of the ranges towards it went on."""
+WALL_WEIGHT_MIN: Final = 12.0
+"""… and weight of a wall's heaviest one."""
+TOGETHER_WEIGHT_MIN: Final = 5.0
+"""Weight of two spans, at least, that are evidence together."""
+PRIOR_NAT: Final = -2.0
+"""Log prior odds of a line that passed the tests, before its evidence."""
+EVIDENCE_MAX_NAT: Final = 12.0
+"""Greatest evidence that is believed: readings are not independent."""
+FRAME: Final = ("origin_x", "origin_y", "normal_x", "normal_y", "offset", "slope")
+VARIANCES: Final = ("variance_offset", "covariance", "variance_slope")
+
+
+class WallSegment(Record):
+    """A reported wall: one span, from end to end."""
+
+    x1: float
+    y1: float
+    x2: float
+    y2: float
+    variance_across: float
+    """Of its middle, across the wall, m²."""
+    variance_turn: float
+    """rad²"""
+    echoes: float
+    log_odds: float
+
+
+@dataclass(slots=True)
+class Straight:
+    """The line of a wall that is sure, and its spans.
+
+    Attributes
+    ----------
+    frame : tuple of float
+        Origin (m), normal, offset (m) and slope, as in `Wall`.
+    ends : (n, 2) float
+        The ends of the spans along it in ascending order, m.
+    """
+
+    wall: Any
+    spans: NDArray[Any]
+    frame: tuple[float, ...]
+    ends: Floats
+
+    def point(self, along: float) -> tuple[float, float]:
+        """Return the point at a position along the line, m."""
+        ox, oy, nx, ny, offset, slope = self.frame
+        off = offset + slope * along
+        return ox + nx * off - ny * along, oy + ny * off + nx * along
+
+    def beyond(self, x: float, y: float) -> tuple[float, float, int]:
+        """Return a point's position along the line, how far it is beyond the nearer outer end (m), and which end."""
+        ox, oy, nx, ny, _, _ = self.frame
+        along = nx * (y - oy) - ny * (x - ox)
+        below, above = float(self.ends[0, 0]) - along, along - float(self.ends[-1, 1])
+        return (along, below, 0) if below > above else (along, above, 1)
+
+    def is_passed(self, a: float, b: float) -> bool:
+        """Return whether ranges passed through the wall between two positions along it, m."""
+        low, high = min(a, b), max(a, b)
+        between = self.wall["bins"][max(0, bin_of(low)) : min(WALL_BINS, bin_of(high))]
+        is_covered = between["weight"] > np.maximum(between["passes"], 0.0)
+        return bool(between["passes"][~is_covered].sum() >= OPENING_PASSES_MIN)
+
+
+def wall_segments(memory: Memory) -> NDArray[Any]:
+    """Return the walls that are sure, one segment for each span, as records of `WallSegment`, shape (n,)."""
+    with np.errstate(all="ignore"):  # numbers of a damaged recording
+        room = memory.state["room"][0]
+        walls = sure_walls(room["walls"][:MAX_WALLS])
+        reach_corners(walls, room["corners"])
+        return np.array([row for wall in walls.values() for row in _segments(wall)], WallSegment.DTYPE)
+
+
+def _segments(of: Straight) -> Iterator[tuple[float, ...]]:
+    variance, covariance, variance_turn = (float(of.wall[name]) for name in VARIANCES)
+    for (low, high), weight, chi2 in zip(of.ends.tolist(), of.spans["weight"], of.spans["chi2"], strict=True):
+        middle = 0.5 * (low + high)
+        across = variance + 2.0 * middle * covariance + middle * middle * variance_turn
+        evidence = min(EVIDENCE_MAX_NAT, 0.5 * max(of.wall["chi2"], chi2))
+        yield (*of.point(low), *of.point(high), across, variance_turn, weight, PRIOR_NAT + evidence)
+
+
+def sure_walls(walls: NDArray[Any]) -> dict[int, Straight]:
+    """Return the walls that are sure, by their number.
+
+    Parameters
+    ----------
+    walls : (n,) record of `Wall`
+        All walls.
+    """
+    found = {}
+    for number in np.flatnonzero((walls["weight"] > 0.0) & (walls["misfit"] < MISFIT_MAX)).tolist():
+        wall = walls[number]
+        spans = wall["spans"][: wall["span_count"]]
+        spans = spans[sure_spans(spans, wall["chi2"])]
+        if len(spans):
+            frame = tuple(float(wall[name]) for name in FRAME)
+            found[number] = Straight(wall, spans, frame, np.column_stack([spans["low"], spans["high"]]))
+    return found
+
+
+def sure_spans(spans: NDArray[Any], chi2: float) -> NDArray[np.bool_]:
+    """Return which spans of a wall can be reported: none unless it is a wall, by its best span or by all together.
+
+    Parameters
+    ----------
+    spans : (n,) record of `Span`
+        All spans of the wall.
+    chi2 : float
+        Evidence of all together.
+    """
+    length, weight, straight = spans["high"] - spans["low"], spans["weight"], spans["chi2"]
+    sure = (length >= SPAN_MIN_M) & (weight >= SPAN_WEIGHT_MIN) & (straight > SPAN_CHI2_MIN)
+    if sure.any():
+        together = chi2 if np.count_nonzero(sure & (weight >= TOGETHER_WEIGHT_MIN)) > 1 else -np.inf
+        is_large = length[sure].max() >= WALL_MIN_M and weight[sure].max() >= WALL_WEIGHT_MIN
+        sure &= bool(max(straight[sure].max(), together) >= WALL_CHI2_MIN and is_large)
+    return np.asarray(sure)
+
+
+def reach_corners(walls: dict[int, Straight], corners: NDArray[Any]) -> None:
+    """Move the outer ends of walls outwards to the corners in which they end, unless ranges passed there.
+
+    A corner that is heard is reached from afar; one that is not, only if both walls end near it.
+
+    Parameters
+    ----------
+    walls : dict of Straight
+        The walls by their number; their ends are updated.
+    corners : (n,) record of `RoomCorner`
+        All corners.
+    """
+    for corner in corners[corners["is_used"] == 1]:
+        x, y, echoes, passes, ended = (float(corner[name]) for name in ("x", "y", "echoes", "passes", "ended"))
+        owners = [walls[number] for number in (int(corner["first"]), int(corner["second"])) if number in walls]
+        places = [owner.beyond(x, y) for owner in owners]
+        is_heard = echoes >= CORNER_ECHOES_MIN and echoes > passes
+        is_near = len(owners) == 2 and max(gap for _, gap, _ in places) < CORNER_NEAR_M
+        is_near = is_near and passes < CORNER_PASSED_SHARE * ended
+        for owner, (along, gap, side) in zip(owners, places, strict=True):
+            end = owner.ends[-side, side]
+            if (is_heard or is_near) and 0.0 < gap < CORNER_REACH_M and not owner.is_passed(along, end):
+                owner.ends[-side, side] = along
+
+
+def wall_ends(memory: Memory) -> Floats:
+    """Return the ends x, y, x, y (m) of the walls that are sure, shape (n, 4)."""
+    segments = wall_segments(memory)
+    return np.column_stack([segments[name] for name in ("x1", "y1", "x2", "y2")])

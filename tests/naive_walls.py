@@ -1,0 +1,51 @@
+"""Slow, readable oracles of walls: where a beam touches a line, least squares, and where two lines cross.
+
+They share no code with the product; constants are repeated.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+
+def touch(sensor: Array, axis: float, half_angle: float, normal: float, distance: float) -> tuple[float, float]:
+    """Return the range and the position along the line n · x = distance of its nearest point in a beam, by search.
+
+    The position is measured from the foot of the origin, to the left of the normal.
+    """
+    n, t = (np.array([math.cos(a), math.sin(a)]) for a in (normal, normal + math.pi / 2))
+    rays = axis + np.linspace(-half_angle, half_angle, 4001)
+    ranges = (distance - n @ sensor) / np.cos(rays - normal)
+    k = int(np.argmin(ranges))
+    point = sensor + ranges[k] * np.array([math.cos(rays[k]), math.sin(rays[k])])
+    return float(ranges[k]), float(t @ point)
+
+
+def line_fit(u: Array, z: Array, w: Array) -> tuple[Array, Array]:
+    """Return offset and slope of z over u with weights w, and their covariance, with the product's weak priors."""
+    rows = np.concatenate(
+        [np.sqrt(w)[:, None] * np.column_stack([np.ones_like(u), u]), np.diag([1e-3**0.5, 1.0 / 0.15])]
+    )
+    solution = np.linalg.lstsq(rows, np.concatenate([np.sqrt(w) * z, [0.0, 0.0]]), rcond=None)[0]
+    return solution, np.linalg.inv(rows.T @ rows)
+
+
+def bend(u: Array, z: Array, d: Array, sigma: Array, radius: float) -> tuple[float, float]:
+    """Return χ² of a circle less that of a line, each with its own place and turn, and that of the line."""
+    sagitta = np.hypot(d + radius, u) - d - radius
+    rows, chi2 = np.column_stack([np.ones_like(u), u]) / sigma[:, None], []
+    for target in (z - sagitta, z):
+        solution = np.linalg.lstsq(rows, target / sigma, rcond=None)[0]
+        chi2.append(float(((target / sigma - rows @ solution) ** 2).sum()))
+    return chi2[0] - chi2[1], chi2[1]
+
+
+def crossing(normal_a: Array, distance_a: float, normal_b: Array, distance_b: float) -> Array:
+    """Return where two lines n · x = distance cross."""
+    return np.linalg.solve(np.stack([normal_a, normal_b]), [distance_a, distance_b])

@@ -1,0 +1,77 @@
+"""Where readings touch walls, against a search over the beam; and what explains an echo."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from perception.bayes import wall_contact
+from perception.bayes.wall_contact import BEAM_EDGE, FOOT, NOWHERE
+from tests import naive_walls
+from tests.perception.bayes.rooms import facing, fill, new_room, place_wall, reading
+from tests.perception.bayes.tracks import P, S, examples, pair
+
+
+@examples(60, 600)
+def test_a_reading_touches_the_nearest_point_in_its_beam(examples: int) -> None:
+    rng = np.random.default_rng(40)
+    _, room = new_room()
+    wall, kinds = room.walls[0], set()
+    for _ in range(examples):
+        normal, distance = rng.uniform(-math.pi, math.pi), rng.uniform(0.5, 4.0)
+        turn = rng.uniform(-0.03, 0.03)
+        place_wall(wall, np.zeros(2), normal + turn, distance / math.cos(turn))
+        wall.slope = math.tan(turn)
+        sensor, axis = rng.uniform(-1.0, 1.0, 2), normal + rng.normal(0.0, 0.4)
+        kind, reach, along, dot = wall_contact.contact(wall, reading(*pair(sensor), axis, 1.0), P)
+        kinds.add(kind)
+        ahead = distance - sensor @ (math.cos(normal), math.sin(normal))
+        if ahead <= 0.0 or math.cos(axis - normal) < 0.6:
+            assert kind == NOWHERE
+            continue
+        expected, place = naive_walls.touch(sensor, axis, S.half_angle_rad, normal, distance)
+        assert kind == (FOOT if abs(axis - normal) <= S.half_angle_rad else BEAM_EDGE)
+        place = place * math.cos(turn) + distance * math.sin(-turn)
+        assert (reach, along) == pytest.approx((expected, place), abs=5e-3)
+        assert dot == pytest.approx(math.cos(axis - normal), abs=1e-3)
+    assert kinds == {NOWHERE, FOOT, BEAM_EDGE}
+
+
+def test_the_wall_of_least_error_explains_an_echo_where_it_has_a_span() -> None:
+    rng = np.random.default_rng(41)
+    memory, room = new_room()
+    for k, (offset, low, high) in enumerate(((2.0, -1.0, 1.0), (2.02, -1.0, 1.0), (2.0, 3.0, 4.0))):
+        place_wall(room.walls[k], np.zeros(2), 0.0, offset)
+        fill(memory, room.walls[k], low, high)
+    for y, margin, expected in ((0.0, 0.09, 1), (1.3, 0.09, -1), (1.3, 0.5, 1), (3.5, 0.09, 2), (5.0, 0.5, -1)):
+        q = reading(0.0, y, facing(0.0, rng), 2.018 if expected == 1 else 2.0)
+        owner, kind = wall_contact.explaining_wall(room, q, P, margin)
+        assert (owner, kind) == (expected, FOOT if expected >= 0 else NOWHERE)
+    assert wall_contact.explaining_wall(room, reading(0.0, 0.0, 0.0, 2.1), P, 0.0)[0] == -1
+
+
+def test_echoes_from_a_beams_edge_count_where_slanting_walls_answer() -> None:
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -2.0, 2.0)
+    q = reading(0.0, 0.0, 2.0 * S.half_angle_rad, 2.0 / math.cos(S.half_angle_rad))
+    assert wall_contact.explaining_wall(room, q, P, 0.0) == (-1, NOWHERE)
+    room.edge_echoes, room.edge_silences = 9.0, 2.0
+    assert wall_contact.explaining_wall(room, q, P, 0.0) == (0, BEAM_EDGE)
+
+
+def test_ends_and_corners_explain_echoes() -> None:
+    memory, room = new_room()
+    wall = room.walls[0]
+    place_wall(wall, np.zeros(2), 0.0, 2.0)
+    fill(memory, wall, -1.0, 1.0)
+    x, y = wall_contact.wall_point(wall, wall.spans[0].high)
+    for error, from_end in ((0.0, True), (0.2, False)):
+        q = reading(0.5, 1.5, math.atan2(y - 1.5, x - 0.5), math.hypot(x - 0.5, y - 1.5) + error)
+        assert wall_contact.is_from_end(room, wall, q, P) is from_end
+    corner = room.corners[3]
+    corner.is_used, corner.x, corner.y = 1, 0.0, 3.0
+    assert wall_contact.corner_of(room, reading(0.0, 1.0, math.pi / 2, 2.0), P) == 3
+    assert wall_contact.corner_of(room, reading(0.0, 1.0, 0.0, 2.0), P) == -1

@@ -1,0 +1,79 @@
+"""Reported walls: ends of the spans, as far as the corners in which they end."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from perception.bayes.object_report import wall_object
+from perception.bayes.wall_bins import bin_of, enter_pass, free
+from perception.bayes.wall_corners import find_corners
+from perception.bayes.wall_report import wall_ends, wall_segments
+from tests.perception.bayes.rooms import fill, new_room, place_wall
+
+
+def test_spans_are_segments_and_reach_a_corner_that_is_heard() -> None:
+    memory, room = new_room()
+    place_wall(room.walls[2], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[2], -2.0, -1.0)
+    fill(memory, room.walls[2], 0.0, 1.5)
+    place_wall(room.walls[5], np.zeros(2), math.pi / 2, 2.0)
+    fill(memory, room.walls[5], -1.5, 0.6)
+    ends = wall_ends(memory)
+    assert ends == pytest.approx(np.array([[2, -1.98, 2, -1.02], [2, 0, 2, 1.5], [1.5, 2, -0.6, 2]]), abs=0.05)
+    find_corners(memory.s)
+    room.corners[0].echoes = 4.0
+    ends = wall_ends(memory)
+    assert ends[1] == pytest.approx([2, 0, 2, 2], abs=0.05)
+    assert ends[2] == pytest.approx([2, 2, -0.6, 2], abs=0.05)
+    for b in range(bin_of(1.6), bin_of(1.9)):
+        enter_pass(room.walls[2], b, 1.0)
+    assert wall_ends(memory)[1] == pytest.approx([2, 0, 2, 1.5], abs=0.05)
+
+
+def test_walls_that_end_near_each_other_meet_in_a_corner_that_no_range_passed() -> None:
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -1.0, 1.5)
+    place_wall(room.walls[1], np.zeros(2), math.pi / 2, 2.0)
+    fill(memory, room.walls[1], -1.4, 1.0)
+    find_corners(memory.s)
+    assert wall_ends(memory)[0] == pytest.approx([2, -1, 2, 1.5], abs=0.05)
+    room.corners[0].ended = 10.0
+    assert wall_ends(memory) == pytest.approx(np.array([[2, -1, 2, 2], [2, 2, -1, 2]]), abs=0.05)
+    room.corners[0].passes = 3.0
+    assert wall_ends(memory)[0] == pytest.approx([2, -1, 2, 1.5], abs=0.05)
+
+
+def test_short_light_and_bent_lines_are_no_walls() -> None:
+    memory, room = new_room()
+    wall = room.walls[0]
+    for low, high, count, is_wall in ((-0.6, 0.6, 5.0, True), (-0.12, 0.12, 9.0, False), (-0.6, 0.6, 0.3, False)):
+        free(wall)
+        place_wall(wall, np.zeros(2), 0.0, 2.0)
+        fill(memory, wall, low, high, count)
+        assert len(wall_ends(memory)) == is_wall
+    free(wall)
+    place_wall(wall, np.zeros(2), 0.0, 2.0)
+    fill(memory, wall, -0.6, 0.6)
+    wall.misfit = 4.0
+    assert len(wall_ends(memory)) == 0
+
+
+def test_a_segment_is_an_object_with_its_length_in_its_covariance() -> None:
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.3, 2.0)
+    fill(memory, room.walls[0], -0.9, 0.9)
+    (segment,) = wall_segments(memory)
+    seen = wall_object(segment.item())
+    (x1, y1, x2, y2), t = wall_ends(memory)[0], np.array([math.cos(seen.theta), math.sin(seen.theta)])
+    assert (seen.x, seen.y) == pytest.approx((0.5 * (x1 + x2), 0.5 * (y1 + y2)))
+    assert t @ (x2 - x1, y2 - y1) == pytest.approx(math.hypot(x2 - x1, y2 - y1))
+    assert seen.covariance is not None
+    xx, xy, yy = seen.covariance
+    assert 12.0 * (t @ np.array([[xx, xy], [xy, yy]]) @ t) == pytest.approx((x2 - x1) ** 2 + (y2 - y1) ** 2)
+    assert seen.model == "wall"
+    assert seen.probability is not None
+    assert 0.9 < seen.probability < 1.0
