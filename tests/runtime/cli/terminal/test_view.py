@@ -119,7 +119,7 @@ def test_a_drive_is_drawn_by_the_thread_and_the_loop_never_waits_for_it(monkeypa
             view.on_cycle(record, run.state, stats, driver)
         until(lambda: "DRIVE" in file.getvalue())
     assert sys.getswitchinterval() == pytest.approx(before_s)
-    assert all(thread.name != "view" for thread in threading.enumerate())
+    until(lambda: all(thread.name != "view" for thread in threading.enumerate()))
     assert "outline segments" in file.getvalue()
 
 
