@@ -126,7 +126,7 @@ class KnownRoom:
     def observe(self, firing: Firing) -> None:
         """Take a firing with its pose by odometry."""
         self._odometry[:] = firing.pose.x, firing.pose.y, firing.ring_yaw
-        self._travel = firing.pose.theta
+        self._travel = float(firing.pose.theta)
         if not self._keyframes.observe(firing):
             return
         keyframes = self._keyframes
@@ -226,7 +226,7 @@ class KnownRoom:
         explains = track.explains(LOST_M, MISSED_SHARE)
         report_share = REPORT_SHARE if track.way_m >= REPORT_M else REPORT_SHARE_STANDING
         reported = min(track.explains(RECENT_M, report_share), track.explains(LATEST_M, MISSED_SHARE))
-        self.probability = track.best.share * reported
+        self.probability = float(track.best.share) * reported
         if self._status == TRACKING:
             if explains < DOUBT:
                 self._lose()

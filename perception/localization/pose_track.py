@@ -190,7 +190,8 @@ class PoseTrack:
         """Return the pose of the ring where odometry has it here; there must be a hypothesis."""
         best = self.best
         x, y, yaw = self._at.tolist()
-        return Pose(best.x, best.y, best.heading).compose(Pose(x, y, yaw).inverse().compose(odometry))
+        here = Pose(float(best.x), float(best.y), float(best.heading))  # numpy's numbers are no JSON
+        return here.compose(Pose(x, y, yaw).inverse().compose(odometry))
 
     def covariance(self) -> Floats:
         """Return the covariance of x, y (m) and heading (rad) at the last keyframe, shape (3, 3)."""

@@ -150,6 +150,18 @@ def test_what_the_operator_says_is_confirmed_or_refuted(off: float) -> None:
     assert math.sqrt(here.covariance[0, 0]) == pytest.approx(0.3)
     trace = follow(localizer, drive)
     assert trace.status[-1] == ("tracking" if off < 1.0 else "lost")
+    here, frame = localizer.localized(), localizer.odometry_from_map()
+    numbers = [
+        here.pose.x,
+        here.pose.y,
+        here.pose.theta,
+        here.ring_yaw,
+        here.probability,
+        frame.x,
+        frame.y,
+        frame.theta,
+    ]
+    assert {type(number) for number in numbers} == {float}, "the console writes them as JSON, which knows no numpy"
     assert (trace.error_m[-1] < 0.05) == (off < 1.0)
 
 
