@@ -19,7 +19,7 @@ from bench.estimator import Peer
 from bench.measure import Plan, measure
 from bench.recording import measure_recording
 from bench.runners import Method, candidates
-from bench.table import results_table
+from bench.table import results_table, rows_table
 from bench.timing import Timing, TimingPlan, measure_timing
 from bench.timing_table import figures_table, quantiles_table, read_earlier
 from bench.waking import figures, waking_table
@@ -71,7 +71,6 @@ def bench(
         Run only the methods whose name contains this text.
     """
     use_kernel_cache()
-    from runtime.cycle.summary import write_json
 
     console = Console(stderr=True)
     plan = QUICK if quick else FULL
@@ -85,9 +84,11 @@ def bench(
         return 2
     with console.status("bench") as status:
         results = measure(selected, settings.ring, plan, status.update)
-    write_json(json, {"repetitions": plan.repetitions, "passes": plan.passes, "results": results})
-    _wide().print(results_table(results, plan))
-    return 0
+    return _report(
+        json,
+        {"repetitions": plan.repetitions, "passes": plan.passes, "results": results},
+        results_table(results, plan),
+    )
 
 
 @app.command
@@ -162,16 +163,13 @@ def console(*, json: str = "console.json", seconds: float = 30.0, rounds: int = 
         Number of rounds.
     """
     use_kernel_cache()
-    from runtime.cycle.summary import write_json
 
     out = Console(stderr=True)
     seconds, rounds = max(5.0, seconds), max(1, rounds)
     prepare_kernels(load_settings("hallway"), out)
     with out.status("bench") as status:
         rows = figures_of(measure_console(seconds, rounds, status.update))
-    write_json(json, {"seconds": seconds, "rounds": rounds, "rows": rows})
-    _wide().print(console_table(rows, seconds, rounds))
-    return 0
+    return _report(json, {"seconds": seconds, "rounds": rounds, "rows": rows}, console_table(rows, seconds, rounds))
 
 
 @app.command
@@ -187,16 +185,13 @@ def waking(*, json: str = "waking.json", turns: int = WAKING_TURNS, busy: int = 
     busy
         Number of CPU-bound background processes in the second half.
     """
-    from runtime.cycle.summary import write_json
 
     console = Console(stderr=True)
     with console.status("bench") as status:
         by_load = {
             f"{count} busy": figures(measure_waking(max(1, turns), count, status.update)) for count in (0, busy)
         }
-    write_json(json, by_load)
-    _wide().print(waking_table(by_load))
-    return 0
+    return _report(json, by_load, waking_table(by_load))
 
 
 Rows: TypeAlias = dict[str, dict[str, float]]
@@ -209,16 +204,13 @@ def _try_in_rooms(
     seeds: Iterable[int],
 ) -> int:
     """Write and print what is measured in the rooms of some seeds."""
-    from runtime.cycle.summary import write_json
 
     console = Console(stderr=True)
     settings = load_settings("hallway")
     prepare_kernels(settings, console, (EMULATOR,))
     with console.status("bench") as status:
         rows = measure(settings.ring, seeds, status.update)
-    write_json(json, rows)
-    _wide().print(table(rows))
-    return 0
+    return _report(json, rows, table(rows))
 
 
 @app.command
@@ -271,16 +263,13 @@ def beacons(recording: Path, *, json: str = "beacons.json") -> int:
         File to write.
     """
     use_kernel_cache()
-    from bench.beacons import beacons_table, figures, read_plaza, track
-    from runtime.cycle.summary import write_json
+    from bench.beacons import figures, read_plaza, track
 
     if not recording.is_file():
         raise UserError(f"{recording}: there is no such file; Plaza1_.mat comes with the examples of gtsam")
     data = read_plaza(recording)
     row = figures(data, track(data))
-    write_json(json, row)
-    _wide().print(beacons_table(row))
-    return 0
+    return _report(json, row, rows_table("landmark filter on ranges to beacons at unknown places", {"ours": row}))
 
 
 @app.command
@@ -297,8 +286,7 @@ def sightings(folder: Path, *, robot: int = 1, json: str = "sightings.json") -> 
         File to write.
     """
     use_kernel_cache()
-    from bench.sightings import figures, read_mrclam, sightings_table, track
-    from runtime.cycle.summary import write_json
+    from bench.sightings import figures, read_mrclam, track
 
     if not (folder / f"Robot{robot}_Odometry.dat").is_file():
         raise UserError(
@@ -311,9 +299,7 @@ def sightings(folder: Path, *, robot: int = 1, json: str = "sightings.json") -> 
         from bench.peers import gtsam_sightings
 
         rows["gtsam iSAM2"] = gtsam_sightings.figures(data, found.odometer_scale, found.turn_scale)
-    write_json(json, rows)
-    _wide().print(sightings_table(rows))
-    return 0
+    return _report(json, rows, rows_table("sightings of posts at unknown places", rows))
 
 
 @app.command(name="map")
@@ -331,16 +317,13 @@ def map_size(*, json: str = "map.json", drums: tuple[int, ...] = (40, 200), seed
     """
     use_kernel_cache()
     from bench.map_size import map_table, measure
-    from runtime.cycle.summary import write_json
 
     console = Console(stderr=True)
     settings = load_settings("hallway")
     prepare_kernels(settings, console)
     with console.status("bench") as status:
         rows = measure(settings, drums, seed, status.update)
-    write_json(json, rows)
-    _wide().print(map_table(rows))
-    return 0
+    return _report(json, rows, map_table(rows))
 
 
 @app.command
@@ -360,16 +343,13 @@ def walls(*, json: str = "walls.json", seeds: int = 100, first: int = 0, steps: 
     """
     use_kernel_cache()
     from bench.walls import measure, walls_table
-    from runtime.cycle.summary import write_json
 
     console = Console(stderr=True)
     settings = load_settings("hallway", ("perception.method=bayes",))
     prepare_kernels(settings, console)
     with console.status("bench") as status:
         rows = measure(settings, range(first, first + max(1, seeds)), steps, status.update)
-    write_json(json, rows)
-    _wide().print(walls_table(rows))
-    return 0
+    return _report(json, rows, walls_table(rows))
 
 
 def _measured(measure: Measure, plan: TimingPlan, sets: tuple[str, ...], json: str, against: str | None) -> int:
@@ -386,6 +366,15 @@ def _measured(measure: Measure, plan: TimingPlan, sets: tuple[str, ...], json: s
     wide = _wide()
     wide.print(quantiles_table(result, earlier))
     wide.print(figures_table(result, earlier))
+    return 0
+
+
+def _report(json: str, rows: object, table: Table) -> int:
+    """Write what was measured and print its table; return the exit code."""
+    from runtime.cycle.summary import write_json
+
+    write_json(json, rows)
+    _wide().print(table)
     return 0
 
 

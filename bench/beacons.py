@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
-from rich.table import Table
 
 from perception.kernel import Floats
 from perception.localization.landmark_filter import add_landmark, correct, innovation_variance, propagate, rows_used
@@ -159,15 +158,6 @@ def figures(recording: Recording, found: Track) -> dict[str, float]:
         "ignored": float(np.mean(found.squared_innovations > GATE_SIGMAS**2)),
         "odometry_rms_m": float(np.sqrt(np.mean(by_odometry**2))),
     }
-
-
-def beacons_table(row: dict[str, float]) -> Table:
-    """Return the table of figures."""
-    table = Table(title="landmark filter on ranges to beacons at unknown places", title_justify="left")
-    for column in row:
-        table.add_column(column, justify="right")
-    table.add_row(*(f"{value:.3g}" if isinstance(value, float) else str(value) for value in row.values()))
-    return table
 
 
 def _path(odometry: Floats) -> Floats:

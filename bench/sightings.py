@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
-from rich.table import Table
 
 from bench.beacons import errors_when_aligned
 from perception.kernel import Floats
@@ -168,17 +167,6 @@ def figures(recording: Recording, found: Found) -> dict[str, float]:
         "median_ms": float(np.median(found.took_ms)),
         "mean_ms": float(found.took_ms.mean()),
     }
-
-
-def sightings_table(rows: Mapping[str, dict[str, float]]) -> Table:
-    """Return the table of figures, a row for each method; a figure that a method does not have is left empty."""
-    table = Table(title="landmark filter on sightings of posts at unknown places", title_justify="left")
-    columns = next(iter(rows.values()))
-    for column in ("method", *columns):
-        table.add_column(column, justify="left" if column == "method" else "right")
-    for method, row in rows.items():
-        table.add_row(method, *(f"{row[column]:.3g}" if column in row else "" for column in columns))
-    return table
 
 
 def noise(distance: float) -> tuple[float, float]:

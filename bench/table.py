@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from rich.table import Table
 
@@ -67,3 +67,22 @@ def _part(ms: float) -> str:
 
 def _growth(first: Times | None, last: Times | None) -> str:
     return "–" if first is None or last is None else f"{last['own'] / first['own']:.2f}"
+
+
+def rows_table(title: str, rows: Mapping[str, Mapping[str, float]]) -> Table:
+    """Return a table with a row for each method; a figure that a method does not have is left empty.
+
+    Parameters
+    ----------
+    title : str
+        Of the table.
+    rows : mapping
+        The figures of each method; those of the first give the columns.
+    """
+    table = Table(title=title, title_justify="left")
+    columns = next(iter(rows.values()))
+    for column in ("method", *columns):
+        table.add_column(column, justify="left" if column == "method" else "right")
+    for method, row in rows.items():
+        table.add_row(method, *(f"{row[column]:.3g}" if column in row else "" for column in columns))
+    return table
