@@ -13,7 +13,7 @@ from typing import Protocol
 
 from config.errors import WRONG_CALL, UserError
 from config.robot import RingConfig
-from drivers.messages import Firing, Identity, LinkCounts, Odometry, Pose, Twist
+from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
 
 
 class DriverError(UserError):
@@ -47,6 +47,8 @@ class Received:
     """The robot restarted: its clock and odometry began again at zero. Nothing here is from before the restart."""
     notes: tuple[str, ...] = ()
     """Messages for the operator, one line each: what happened, likely cause, next action."""
+    flags: Flags = Flags.NONE
+    """Every flag that any sample of the odometry had, not only the newest: a contact may last for one sample."""
 
 
 class RobotDriver(Protocol):

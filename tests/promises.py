@@ -152,6 +152,11 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "each with its number; where more is near than fits, the farthest wait and are counted; what was left "
             "behind can be edited, and a restored state goes on the same",
         ),
+        "P25": Promise(
+            "The base is not believed on its word",
+            "a flag in any one sample of the odometry stops the drive; an ARM while bumper or motor fault is "
+            "reported sends no DRIVE",
+        ),
     }
 )  # fmt: skip
 

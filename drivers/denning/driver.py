@@ -74,7 +74,7 @@ class DenningDriver:
         self._must_identify = False
         self._firings: deque[Firing] = deque(maxlen=_FIRINGS_MAX)
         self._odometry: Odometry | None = None
-        self._rebooted = False
+        self._flags, self._rebooted = Flags.NONE, False
 
     @property
     def state(self) -> LineState:
@@ -242,10 +242,10 @@ class DenningDriver:
 
     def take_received(self) -> Received:
         """Return what was received since the last call, and remove it."""
-        received = Received(tuple(self._firings), self._odometry, self._rebooted, self._stamper.notes())
+        firings, notes = tuple(self._firings), self._stamper.notes()
+        received = Received(firings, self._odometry, self._rebooted, notes, self._flags)
         self._firings.clear()
-        self._odometry = None
-        self._rebooted = False
+        self._odometry, self._flags, self._rebooted = None, Flags.NONE, False
         return received
 
     def _check_timeouts(self) -> None:
@@ -328,8 +328,7 @@ class DenningDriver:
             self._abandon()
             self._stamper.restart()
             self._firings.clear()
-            self._odometry = None
-            self._rebooted = True
+            self._odometry, self._flags, self._rebooted = None, Flags.NONE, True
             self._drive_acks = CommandAckMonitor()
         elif self._jump is not None:
             self._stamper.break_off()
@@ -388,6 +387,7 @@ class DenningDriver:
             return
         self._odometry_s, self._bad_at_odometry = self._run_s, self._decoder.bad
         self._odometry = sample
+        self._flags |= sample.flags
         if (error := self._stamper.clock_error) is not None and error > 0.0:
             self._go_down(diagnostics.wrong_clock_rate(error))
         if self._halt_monitor.is_ignored(sample, self._run_s):

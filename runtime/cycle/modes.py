@@ -25,6 +25,8 @@ ARMING_MAX_S: Final = 1.0
 DEADMAN_GRACE_S: Final = 0.5
 """Time after DRIVE is entered in which the deadman's flag may still date from before the first DRIVE command, s."""
 
+STOPPING: Final = Flags.BUMPER | Flags.MOTOR_FAULT
+"""Flags that name why the base is latched, or should be."""
 
 LINE_REASONS: Final = MappingProxyType(
     {
@@ -89,7 +91,7 @@ def advance(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> Mod
     inputs : Inputs
         The cycle's: line, requests, faults.
     flags : Flags
-        The base's, as of the newest odometry.
+        The base's, of all odometry since the cycle before.
     gap_s : float
         Time since the cycle before.
     """
@@ -125,7 +127,7 @@ def why_stop(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> st
     inputs : Inputs
         The cycle's: line, requests, faults.
     flags : Flags
-        The base's, as of the newest odometry.
+        The base's, of all odometry since the cycle before.
     gap_s : float
         Time since the cycle before.
     """
@@ -135,6 +137,16 @@ def why_stop(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> st
         return inputs.fault
     if inputs.line is not LineState.READY:
         return inputs.line_problem or LINE_REASONS[inputs.line]
+    reason = _why_interrupt(inputs, gap_s) or _why_latched(flags)
+    if reason is not None:
+        return reason
+    if flags & Flags.DEADMAN and inputs.run_s - state.entered_run_s > DEADMAN_GRACE_S:
+        return "the base's deadman tripped: commands came too late; check line and load, then re-arm"
+    return None
+
+
+def _why_interrupt(inputs: Inputs, gap_s: float) -> str | None:
+    """Return why driving, or arming, must end because of the cycle's own lateness or a restart of the robot."""
     if gap_s > inputs.gap_max_s:
         # The received data may be from before the gap, and the base may have stopped by its deadman: the next
         # command would set it in motion again.
@@ -143,19 +155,26 @@ def why_stop(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> st
         return inputs.overrun
     if inputs.received.rebooted:
         return "the robot restarted, so its odometry began again at zero: check why, then re-arm"
+    return None
+
+
+def _why_latched(flags: Flags) -> str | None:
+    """Return why the base, by its flags, must not be driven: it is latched, or what latches it is present."""
     if flags & Flags.BUMPER:
         return "bumper contact: free the robot, then re-arm"
     if flags & Flags.MOTOR_FAULT:
         return "the base reports a motor fault: check its drives, then re-arm"
     if flags & Flags.LATCHED:
         return "the base latched without a HALT from here: check its emergency stop, then re-arm"
-    if flags & Flags.DEADMAN and inputs.run_s - state.entered_run_s > DEADMAN_GRACE_S:
-        return "the base's deadman tripped: commands came too late; check line and load, then re-arm"
     return None
 
 
 def _advance_arming(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> ModeState:
-    """Return the mode of a robot in READY or SAFE_STOP on a working line, by the progress of arming."""
+    """Return the mode of a robot in READY or SAFE_STOP on a working line, by the progress of arming.
+
+    RELEASE clears the latch and the flags of what caused it. What is still set afterwards is present, and the robot
+    is not armed.
+    """
     run_s = inputs.run_s
     if inputs.request is Request.ARM and state.arming_run_s is None:
         return replace(state, arming_run_s=run_s)
@@ -164,15 +183,12 @@ def _advance_arming(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float
     if inputs.request is Request.DISARM:
         # Entering SAFE_STOP again sets the latch, which the arming has already cleared.
         return state.enter(state.mode, run_s, DISARMED)
-    if gap_s > inputs.gap_max_s:
-        return state.enter(Mode.SAFE_STOP, run_s, HELD_UP.format(gap_s))
-    if inputs.overrun is not None:
-        return state.enter(Mode.SAFE_STOP, run_s, inputs.overrun)
-    waited_s = run_s - state.arming_run_s
-    if waited_s >= ARMING_MIN_S and not flags & Flags.LATCHED:
+    if (reason := _why_interrupt(inputs, gap_s)) is not None:
+        return state.enter(Mode.SAFE_STOP, run_s, reason)
+    waited_s, reason = run_s - state.arming_run_s, _why_latched(flags)
+    if waited_s >= ARMING_MIN_S and reason is None:
         return state.enter(Mode.DRIVE, run_s)
     if waited_s > ARMING_MAX_S:
-        return state.enter(
-            Mode.SAFE_STOP, run_s, "the base's latch does not clear: look for bumper contact or a motor fault"
-        )
+        latch = "the base's latch does not clear: look for bumper contact or a motor fault"
+        return state.enter(Mode.SAFE_STOP, run_s, reason if flags & STOPPING else latch)
     return state

@@ -208,7 +208,7 @@ def _accept_drive_request(state: State, inputs: Inputs) -> None:
 
 def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
     """Return the command that mode and schemas lead to."""
-    flags = Flags.NONE if state.odometry is None else state.odometry.flags
+    flags = inputs.received.flags | (Flags.NONE if state.odometry is None else state.odometry.flags)
     before = state.mode
     gap_s = 0.0 if state.run_s is None else inputs.run_s - state.run_s
     state.run_s = inputs.run_s

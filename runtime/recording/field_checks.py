@@ -106,6 +106,7 @@ def check_cycle(record: CycleRecord) -> None:
     for k, firing in enumerate(received.firings):
         _firing(f"inputs.received.firings.{k}", firing)
     _odometry("inputs.received.odometry", received.odometry)
+    _count("inputs.received.flags", received.flags)
     check_mode(record.mode)
     if isinstance(record.command, Twist):
         _twist("command", record.command)

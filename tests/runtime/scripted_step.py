@@ -70,8 +70,9 @@ class ScriptedRobot:
         firing: bool = True,
         odometry: bool = True,
         rebooted: bool = False,
+        earlier_flags: Flags = Flags.NONE,
     ) -> CycleRecord:
-        """Run one cycle; 3 m of free space around the robot."""
+        """Run one cycle; 3 m of free space around the robot; `earlier_flags` are of all odometry but the newest."""
         self.run_s += PERIOD_S
         self.robot_s += PERIOD_S
         sensors = len(self.settings.ring.mounts)
@@ -81,7 +82,7 @@ class ScriptedRobot:
             self.run_s,
             line,
             trouble,
-            Received(firings, reported, rebooted),
+            Received(firings, reported, rebooted, flags=flags | earlier_flags),
             request,
             drive_request=self.drive_request,
         )

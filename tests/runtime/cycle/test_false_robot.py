@@ -14,6 +14,7 @@ from runtime.cycle.modes import HELD_UP, Mode, ModeState, advance
 from tests.drivers.driver_harness import IDENT, DriverHarness, only
 
 pytestmark = pytest.mark.promise("P22")
+base_promise = pytest.mark.promise("P25")
 
 CYCLE_S, ODOMETRY_S = 0.05, 0.01
 
@@ -30,6 +31,10 @@ class FalseRobot:
     flags: Flags = Flags.LATCHED
     obeys: bool = False
     """Whether RELEASE and HALT have an effect."""
+    persisting: Flags = Flags.NONE
+    """Set beside the latch, and not cleared by RELEASE."""
+    momentary: Flags = Flags.NONE
+    """Set in the next sample of the odometry only."""
     acknowledges: bool = True
     drives: int = 0
 
@@ -41,13 +46,12 @@ class FalseRobot:
         for _ in range(round(gap_s / ODOMETRY_S)):
             self.harness.now += ODOMETRY_S
             self.t_us += 1e6 * ODOMETRY_S * self.clock
-            self.harness.odom(round(self.t_us) % 2**32, flags=int(self.flags))
+            self.harness.odom(round(self.t_us) % 2**32, flags=int(self.flags | self.momentary))
+            self.momentary = Flags.NONE
             self.harness.robot.tick(self.harness.now)
             self._answer()
         inputs = gather_inputs(self.harness.robot, self.harness.now, request)
-        odometry = inputs.received.odometry
-        flags = self.flags if odometry is None else odometry.flags
-        before, self.mode = self.mode, advance(self.mode, inputs, flags, gap_s)
+        before, self.mode = self.mode, advance(self.mode, inputs, inputs.received.flags, gap_s)
         if self.mode.mode is Mode.DRIVE:
             self.harness.robot.drive(Twist(0.1, 0.0))
         elif self.mode.mode is Mode.SAFE_STOP and self.mode.entered_since(before):
@@ -67,7 +71,7 @@ class FalseRobot:
                     if self.acknowledges or isinstance(frame, Pattern):
                         self.harness.send(Ack(0, frame.seq))
                     if self.obeys:
-                        self.flags = Flags.LATCHED if isinstance(frame, Halt) else Flags.NONE
+                        self.flags = self.persisting | (Flags.LATCHED if isinstance(frame, Halt) else Flags.NONE)
                 case _:
                     pass
 
@@ -144,3 +148,33 @@ def test_no_claimed_deadman_lets_the_program_drive_on_after_a_long_gap() -> None
     assert case.mode.mode is Mode.DRIVE
     case.cycle(gap_s=2.5)
     assert (case.mode.mode, case.mode.reason) == (Mode.SAFE_STOP, HELD_UP.format(2.5))
+
+
+@base_promise
+@pytest.mark.parametrize(
+    ("flag", "reason"), [(Flags.BUMPER, "bumper contact"), (Flags.MOTOR_FAULT, "a motor fault")], ids=str
+)
+def test_no_robot_is_armed_while_it_reports_what_stops_it(flag: Flags, reason: str) -> None:
+    """The base clears its latch all the same, so a DRIVE would be obeyed."""
+    case = FalseRobot(obeys=True, persisting=flag)
+    case.until(Mode.READY, 1.0)
+    case.until(Mode.SAFE_STOP, 2.0, Request.ARM)
+    assert reason in (case.mode.reason or "")
+    for _ in range(40):
+        case.cycle(Request.ARM)
+    assert case.drives == 0
+    case.persisting = Flags.NONE
+    for _ in range(25):
+        case.cycle()
+    case.until(Mode.DRIVE, 3.0, Request.ARM)
+
+
+@base_promise
+@pytest.mark.parametrize("flag", [Flags.BUMPER, Flags.MOTOR_FAULT, Flags.LATCHED], ids=str)
+def test_a_flag_in_one_sample_between_two_cycles_stops_the_drive(flag: Flags) -> None:
+    """The first of five; the newest sample has none again."""
+    case = driving(FalseRobot())
+    case.momentary, drives = flag, case.drives
+    case.cycle()
+    assert case.mode.mode is Mode.SAFE_STOP
+    assert case.drives == drives

@@ -60,6 +60,13 @@ TRANSITIONS = [
     (arming(READY, WAITED), flags(Flags.LATCHED), Mode.READY, None, True),
     (arming(READY, WAITED), flags(Flags.DEADMAN | Flags.BATTERY_LOW), Mode.DRIVE, None, False),
     (arming(READY, TOO_LONG), flags(Flags.LATCHED), Mode.SAFE_STOP, "latch does not clear", False),
+    (arming(READY, WAITED), flags(Flags.BUMPER), Mode.READY, None, True),
+    (arming(READY, TOO_LONG), flags(Flags.BUMPER), Mode.SAFE_STOP, "bumper contact", False),
+    (arming(READY, TOO_LONG), flags(Flags.BUMPER | Flags.LATCHED), Mode.SAFE_STOP, "bumper contact", False),
+    (arming(STOPPED, WAITED), flags(Flags.MOTOR_FAULT), Mode.SAFE_STOP, "a reason", True),
+    (arming(STOPPED, TOO_LONG), flags(Flags.MOTOR_FAULT), Mode.SAFE_STOP, "motor fault", False),
+    (arming(READY, WAITED), replace(QUIET, rebooted=True), Mode.SAFE_STOP, "restarted", False),
+    (READY, replace(QUIET, rebooted=True), Mode.READY, None, False),
     (arming(READY, WAITED), line(LineState.HANDSHAKE), Mode.CONNECTING, None, False),
     (arming(READY, WAITED), HALT, Mode.SAFE_STOP, "halted by the operator", False),
     (DRIVE, QUIET, Mode.DRIVE, None, False),
@@ -179,7 +186,7 @@ def test_motion_never_resumes_by_itself(steps: list[ModeInputs], begin: ModeStat
         if state.mode is Mode.DRIVE:
             assert seen.request not in {Request.HALT, Request.DISARM}
             assert seen.line is LineState.READY
-            assert not seen.flags & Flags.LATCHED
+            assert not seen.flags & (Flags.LATCHED | Flags.BUMPER | Flags.MOTOR_FAULT)
             assert seen.gap_s <= GAP_MAX_S, "it drives on data from before the gap"
             assert before.mode is Mode.DRIVE or armed, "DRIVE was entered without an ARM after the last stop"
         if seen.request is Request.ARM:

@@ -124,6 +124,7 @@ class ModesMachine(RuleBasedStateMachine):
         if state.mode is Mode.DRIVE:
             assert seen.line is LineState.READY
             assert state.reason is None
+            assert not seen.flags & (Flags.LATCHED | Flags.BUMPER | Flags.MOTOR_FAULT)
             assert state.arming_run_s is None
         if state.mode is Mode.SAFE_STOP:
             assert state.reason

@@ -43,6 +43,7 @@ REASONS: list[tuple[str, dict[str, object], str]] = [
     ("bumper", {"flags": Flags.BUMPER | Flags.LATCHED}, "bumper"),
     ("motor", {"flags": Flags.MOTOR_FAULT | Flags.LATCHED}, "motor"),
     ("latched", {"flags": Flags.LATCHED}, "latched"),
+    ("bumper for one sample", {"earlier_flags": Flags.BUMPER}, "bumper"),
     ("reboot", {"rebooted": True}, "restarted"),
 ]
 
