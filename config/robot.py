@@ -148,10 +148,20 @@ class LinkConfig(Strict):
     """Unanswered tries after which the link is down."""
     silence_max_s: float = Field(default=0.4, ge=0.05, le=60.0)
     """Time without odometry after which the link is down, s; a robot at rest sends it too."""
+    deadman_min_s: float = Field(default=0.1, ge=0.02, le=10.0)
+    """Least deadman of a base, s: one that reports a shorter one would stop between two cycles and is refused."""
+    deadman_max_s: float = Field(default=1.0, ge=0.02, le=10.0)
+    """Greatest deadman of a base, s: so long does it drive on if the program hangs. A longer one is refused."""
     reopen_first_s: float = Field(default=0.05, gt=0.0, le=60.0)
     """Wait before the first attempt to reopen the port, s; it doubles with each attempt."""
     reopen_max_s: float = Field(default=0.5, gt=0.0, le=600.0)
     """Longest wait between such attempts, s."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> LinkConfig:
+        if self.deadman_min_s > self.deadman_max_s:
+            raise ValueError(f"deadman_min_s {self.deadman_min_s} is above deadman_max_s {self.deadman_max_s}")
+        return self
 
 
 class DriverConfig(Strict):

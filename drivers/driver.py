@@ -77,7 +77,8 @@ class RobotDriver(Protocol):
     def identity(self) -> Identity | None:
         """The robot's description of itself; the last one known while it is connecting again, None before the first.
 
-        Its `deadman_s` is how long two drive commands may be apart.
+        Its `deadman_s` is how long two drive commands may be apart. A driver refuses a robot whose deadman is not
+        within `link.deadman_min_s` and `link.deadman_max_s`: it goes DOWN, with the reason.
         """
 
     @property

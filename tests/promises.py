@@ -155,7 +155,8 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         "P25": Promise(
             "The base is not believed on its word",
             "a flag in any one sample of the odometry stops the drive; an ARM while bumper or motor fault is "
-            "reported sends no DRIVE",
+            "reported sends no DRIVE; a deadman outside the robot file's bounds (.1 to 1 s): refused, and no gap "
+            "between two cycles of more than .5 s is driven through, whatever the base reports",
         ),
     }
 )  # fmt: skip

@@ -27,15 +27,19 @@ from drivers.emulator.body import BRAKE_S, RAMP_S, Body
 from drivers.emulator.fault_schedule import FaultSchedule, flip_bits
 from drivers.emulator.faults import (
     BitErrors,
+    BlockedWheels,
     Bumper,
+    Deadman,
     Deaf,
     Fault,
     Garbage,
+    IgnoredHalt,
     MotorFault,
     Mute,
     OdometryJump,
     Outliers,
     Reboot,
+    Runaway,
     StuckSensor,
     Unplug,
 )
@@ -46,7 +50,7 @@ from drivers.emulator.uart import Uart
 from drivers.messages import Flags, Pose, Twist
 
 DEADMAN_MS = 500
-"""The base ramps to a stop this long after the last DRIVE; reported in IDENT."""
+"""The base ramps to a stop this long after the last DRIVE, unless a fault changes it; reported in IDENT."""
 ODOMETRY_PERIOD_MS = 20
 """Time between odometry frames; reported in IDENT."""
 TICK_US = 5_000
@@ -113,6 +117,7 @@ class DenningDevice:
         self._now_us = self._moved_us = 0
         self._next_event_us: int | None = None  # None once something may have changed it
         self._faults = FaultSchedule(faults)
+        self._deadman_ms = DEADMAN_MS
         self._boot_id = self._new_boot_id()
         self._boot(clock_start_us)
         # Load the compiled kernels now, so that the first firing is not late.
@@ -186,18 +191,8 @@ class DenningDevice:
             case Hello() if frame.version != frames.VERSION:
                 self._send(frames.Nak(0, frame.seq, NakCode.VALUE_OUT_OF_RANGE))
             case Hello():
-                self._send(
-                    frames.Ident(
-                        0,
-                        frames.VERSION,
-                        self._sensors,
-                        self._ring_radius_mm,
-                        DEADMAN_MS,
-                        ODOMETRY_PERIOD_MS,
-                        self._boot_id,
-                        NAME,
-                    )
-                )
+                size, times = (self._sensors, self._ring_radius_mm), (self._deadman_ms, ODOMETRY_PERIOD_MS)
+                self._send(frames.Ident(0, frames.VERSION, *size, *times, self._boot_id, NAME))
             case Pattern() if self._is_possible(frame):
                 self._rotation.set_pattern(frame, self._now_us)
                 self._send(frames.Ack(0, frame.seq))
@@ -209,7 +204,7 @@ class DenningDevice:
                 # The body clamps the velocity to its limits.
                 self._target = Twist(frame.v_mm_s * 1e-3, frame.w_mrad_s * 1e-3)
                 self._drive_seq = frame.seq
-                self._deadman_us = self._now_us + 1000 * DEADMAN_MS
+                self._deadman_us = self._now_us + 1000 * self._deadman_ms
                 self._flags &= ~Flags.DEADMAN
             case Halt():
                 self._latch(Flags.NONE)
@@ -226,7 +221,11 @@ class DenningDevice:
 
     def _latch(self, reason: Flags) -> None:
         self._flags |= Flags.LATCHED | reason
-        self._target = _STILL
+        self._end_drive()
+
+    def _end_drive(self) -> None:
+        if not self._faults.has(IgnoredHalt):
+            self._target = _STILL
 
     def _latch_again(self) -> None:
         """Latch if a bumper is still pressed or a motor still faulty: that cannot be released."""
@@ -256,24 +255,30 @@ class DenningDevice:
 
     def _move(self) -> None:
         """Move the body up to the present event."""
-        target, within_s = self._target, None
         dt_s = (self._now_us - self._moved_us) * 1e-6
         if dt_s <= 0.0:
             return
-        flags = self._flags.value
-        if flags & _LATCHED or self._faults.has(Reboot):
-            target, within_s = _STILL, BRAKE_S
-        elif flags & _DEADMAN:
-            target, within_s = _STILL, RAMP_S
+        target, within_s = self._wheels()
         if self._body.step(dt_s, target, within_s=within_s):
             self._latch(Flags.BUMPER)
         self._moved_us = self._now_us
+
+    def _wheels(self) -> tuple[Twist, float | None]:
+        """Return the velocity that the wheels accelerate towards, and the time for it if they brake."""
+        flags, faults = self._flags.value, self._faults
+        if faults.has(Reboot) or faults.has(BlockedWheels):
+            return _STILL, BRAKE_S
+        if flags & _LATCHED and not faults.has(IgnoredHalt):
+            return _STILL, BRAKE_S
+        for runaway in faults.all(Runaway):
+            return Twist(runaway.v_m_s, runaway.w_rad_s), None
+        return (_STILL, RAMP_S) if flags & _DEADMAN and not faults.has(IgnoredHalt) else (self._target, None)
 
     def _handle_events(self) -> None:
         now = self._now_us
         if now >= self._deadman_us and not self._flags.value & _DEADMAN:
             self._flags |= Flags.DEADMAN
-            self._target = _STILL
+            self._end_drive()
         while self._echoes and self._echoes[0][0] <= now:
             self._send(self._echoes.popleft()[1])
         if (step := self._rotation.step(now)) is not None:
@@ -339,6 +344,9 @@ class DenningDevice:
                 self._latch(Flags.BUMPER)
             case MotorFault():
                 self._latch(Flags.MOTOR_FAULT)
+            case Deadman():
+                self._deadman_ms = fault.deadman_ms
+                self._deadman_us = self._now_us + 1000 * self._deadman_ms
             case OdometryJump():
                 self._body.jump_odometry(fault.dx_m, fault.dy_m, fault.dheading_rad)
 
@@ -354,7 +362,7 @@ class DenningDevice:
         self._latch_again()
         self._target = _STILL
         self._drive_seq = 0
-        self._deadman_us = self._now_us + 1000 * DEADMAN_MS
+        self._deadman_us = self._now_us + 1000 * self._deadman_ms
         self._odometry_us = self._now_us + 1000 * ODOMETRY_PERIOD_MS
 
     def _new_boot_id(self) -> int:

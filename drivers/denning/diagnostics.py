@@ -49,6 +49,13 @@ def wrong_robot(ident: Ident, config: RobotConfig) -> str | None:
             f"the ring of the robot '{ident.name}' has a radius of {ident.ring_radius_mm * 1e-3:.3f} m and the robot "
             f"file says {radius_m:.3f} m; correct ring.radius_m, or choose the robot's own file"
         )
+    deadman_s, link = ident.deadman_ms * 1e-3, config.link
+    if not link.deadman_min_s <= deadman_s <= link.deadman_max_s:
+        return (
+            f"the base of the robot '{ident.name}' stops by itself {deadman_s:g} s after the last command, and the "
+            f"robot file allows {link.deadman_min_s:g} to {link.deadman_max_s:g} s; correct the deadman in the "
+            f"base's configuration, or link.deadman_min_s and link.deadman_max_s"
+        )
     return None
 
 

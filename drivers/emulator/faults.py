@@ -72,6 +72,33 @@ class MotorFault(_Timed):
     kind: Literal["motor_fault"]
 
 
+class IgnoredHalt(_Timed):
+    """The base acknowledges HALT, reports its latch, and drives on, also without commands."""
+
+    kind: Literal["ignored_halt"]
+
+
+class BlockedWheels(_Timed):
+    """The wheels do not turn, whatever is commanded, and the base reports no fault."""
+
+    kind: Literal["blocked_wheels"]
+
+
+class Runaway(_Timed):
+    """The base drives at this velocity, whatever is commanded, until it is latched."""
+
+    kind: Literal["runaway"]
+    v_m_s: float = 0.0
+    w_rad_s: float = 0.0
+
+
+class Deadman(_Timed):
+    """The base has this deadman from then on, and reports it."""
+
+    kind: Literal["deadman"]
+    deadman_ms: int = Field(ge=0, le=0xFFFF)
+
+
 class StuckSensor(_Timed):
     """A sensor always reports the same range; without a range it reports a fault."""
 
@@ -104,7 +131,21 @@ class Unplug(_Timed):
 
 
 Fault: TypeAlias = (
-    Mute | Deaf | Garbage | BitErrors | Reboot | Bumper | MotorFault | StuckSensor | Outliers | OdometryJump | Unplug
+    Mute
+    | Deaf
+    | Garbage
+    | BitErrors
+    | Reboot
+    | Bumper
+    | MotorFault
+    | IgnoredHalt
+    | BlockedWheels
+    | Runaway
+    | Deadman
+    | StuckSensor
+    | Outliers
+    | OdometryJump
+    | Unplug
 )
 
 

@@ -16,8 +16,9 @@ GAP_SHARE: Final = 0.9
 GAP_MAX_S: Final = GAP_SHARE * 0.5
 """That time, s, for the protocol's usual deadman of 0.5 s, until the robot reports its own."""
 
-DEADMAN_MAX_S: Final = 2.0
-"""A longer deadman that a robot reports is not relied on, s: what it sent before such a gap is out of date."""
+GAP_LIMIT_S: Final = 0.5
+"""Largest time between two commands, s, however long a deadman the robot reports: in a longer gap it drives more than
+a hand's breadth on data that are out of date."""
 
 
 class Request(Enum):
@@ -108,6 +109,6 @@ def gather_inputs(
 
 
 def command_gap_max_s(driver: RobotDriver) -> float:
-    """Return the longest time between two commands that the base's deadman allows, s."""
+    """Return the longest time between two commands that this program and the base's deadman allow, s."""
     identity = driver.identity
-    return GAP_MAX_S if identity is None else GAP_SHARE * min(identity.deadman_s, DEADMAN_MAX_S)
+    return GAP_MAX_S if identity is None else min(GAP_SHARE * identity.deadman_s, GAP_LIMIT_S)

@@ -211,3 +211,27 @@ def test_after_a_jump_of_clock_or_pose_the_robot_is_identified_and_nothing_inter
     assert heard.odometry.pose == Pose(0.0, 0.0, 0.0), "no base moves so far at once"
     assert harness.robot.odometry_origin == Pose(x * 1e-4, 0.0, 0.0)
     assert harness.robot.late_echoes == 1
+
+
+@pytest.mark.promise("P25")
+@pytest.mark.parametrize("deadman_ms", [0, 1, 99, 1001, 65_535])
+def test_a_deadman_outside_the_robot_file_s_bounds_is_refused(deadman_ms: int) -> None:
+    harness = DriverHarness()
+    harness.ident = replace(IDENT, deadman_ms=deadman_ms)
+    harness.open()
+    harness.answer()
+    harness.robot.drive(Twist(0.1, 0.0))
+    assert only(harness.received(), Drive) == []
+    assert harness.state() is LineState.DOWN
+    problem = harness.robot.problem or ""
+    assert f"stops by itself {1e-3 * deadman_ms:g} s after the last command" in problem
+    assert "allows 0.1 to 1 s; correct the deadman" in problem
+
+
+@pytest.mark.promise("P25")
+@pytest.mark.parametrize("deadman_ms", [100, 1000])
+def test_a_deadman_at_either_bound_is_accepted(deadman_ms: int) -> None:
+    harness = DriverHarness()
+    harness.ident = replace(IDENT, deadman_ms=deadman_ms)
+    harness.open()
+    harness.handshake()

@@ -10,6 +10,7 @@ import pytest
 from config.files import ConfigError
 from config.world import WorldConfig
 from drivers.denning.frames import (
+    Ack,
     Drive,
     Echo,
     Halt,
@@ -98,6 +99,46 @@ def test_bumper_and_motor_fault_latch_and_hold_while_they_last(kind: str, flag: 
     h.send(Release)
     h.run(0.05)
     assert not h.flags() & (Flags.LATCHED | flag)
+
+
+def test_an_ignored_halt_is_acknowledged_and_the_base_drives_on_without_commands() -> None:
+    h = host(WorldConfig(), faults=script(kind="ignored_halt", at_s=0.5, duration_s=5.0))
+    h.run(1.0, drive=(300, 0))
+    seq = h.send(Halt)
+    h.run(2.0)
+    assert [ack.of for ack in h.of(Ack)] == [seq]
+    assert h.flags() == Flags.LATCHED | Flags.DEADMAN
+    assert h.robot.truth.twist.v == pytest.approx(0.3)
+    h.run(3.0)
+    assert h.robot.truth.twist.v == 0.0, "when it is over, the latch holds"
+
+
+def test_blocked_wheels_do_not_turn_and_report_nothing() -> None:
+    h = host(WorldConfig(), faults=script(kind="blocked_wheels", at_s=0.5, duration_s=1.0))
+    h.run(1.4, drive=(300, 100))
+    assert (h.robot.truth.twist, h.flags()) == (Twist(0.0, 0.0), Flags.NONE)
+    h.run(1.0, drive=(300, 0))
+    assert h.robot.truth.twist.v == pytest.approx(0.3)
+
+
+def test_a_runaway_drives_without_a_command_until_it_is_halted() -> None:
+    h = host(WorldConfig(), faults=script(kind="runaway", at_s=0.5, duration_s=9.0, v_m_s=0.2, w_rad_s=-0.3))
+    h.run(2.0, drive=(0, 0))
+    assert (h.robot.truth.twist.v, h.robot.truth.twist.w) == pytest.approx((0.2, -0.3))
+    h.send(Halt)
+    h.run(0.3)
+    assert h.robot.truth.twist == Twist(0.0, 0.0)
+
+
+@pytest.mark.parametrize("deadman_ms", [0, 1, 65_535])
+def test_a_deadman_is_reported_and_kept(deadman_ms: int) -> None:
+    h = host(WorldConfig(), faults=script(kind="deadman", at_s=0.0, deadman_ms=deadman_ms))
+    h.run(0.1)
+    h.send(Hello, 1)
+    h.send(Drive, 300, 0)
+    h.run(3.0)
+    assert h.last(Ident).deadman_ms == deadman_ms
+    assert (h.robot.truth.twist.v > 0.0) == (deadman_ms > 3000)
 
 
 @pytest.mark.parametrize(("range_m", "byte"), [(None, 0), (1.0, 33), (0.0, 5), (99.0, 255)])

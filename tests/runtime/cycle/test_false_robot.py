@@ -6,12 +6,13 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
+from config.robot import LinkConfig
 from drivers.denning.frames import Ack, Drive, Halt, Hello, Pattern, Release
 from drivers.driver import LineState
 from drivers.messages import Flags, Twist
 from runtime.cycle.inputs import Request, gather_inputs
 from runtime.cycle.modes import HELD_UP, Mode, ModeState, advance
-from tests.drivers.driver_harness import IDENT, DriverHarness, only
+from tests.drivers.driver_harness import CONFIG, IDENT, DriverHarness, only
 
 pytestmark = pytest.mark.promise("P22")
 base_promise = pytest.mark.promise("P25")
@@ -140,14 +141,16 @@ def test_a_drive_by_a_clock_that_turns_back_ends_in_a_stop() -> None:
     assert case.drives == drives
 
 
+@base_promise
 def test_no_claimed_deadman_lets_the_program_drive_on_after_a_long_gap() -> None:
-    harness = DriverHarness()
-    harness.ident = replace(IDENT, deadman_ms=65_535)
+    """Not even one that the robot file allows."""
+    harness = DriverHarness(CONFIG.model_copy(update={"link": LinkConfig(deadman_max_s=10.0)}))
+    harness.ident = replace(IDENT, deadman_ms=10_000)
     case = driving(FalseRobot(harness))
-    case.cycle(gap_s=1.5)
+    case.cycle(gap_s=0.4)
     assert case.mode.mode is Mode.DRIVE
-    case.cycle(gap_s=2.5)
-    assert (case.mode.mode, case.mode.reason) == (Mode.SAFE_STOP, HELD_UP.format(2.5))
+    case.cycle(gap_s=0.6)
+    assert (case.mode.mode, case.mode.reason) == (Mode.SAFE_STOP, HELD_UP.format(0.6))
 
 
 @base_promise

@@ -10,7 +10,7 @@ import pytest
 from drivers.driver import LineState, Received
 from drivers.messages import Identity
 from runtime.cycle.drive_requests import Legs
-from runtime.cycle.inputs import GAP_MAX_S, GAP_SHARE, Inputs, Request, command_gap_max_s, gather_inputs
+from runtime.cycle.inputs import GAP_LIMIT_S, GAP_MAX_S, GAP_SHARE, Inputs, Request, command_gap_max_s, gather_inputs
 
 RECEIVED = Received((), None, rebooted=True)
 
@@ -48,6 +48,13 @@ def test_the_driver_is_asked_at_the_time_of_the_cycle_and_what_it_received_is_ta
 def test_commands_may_be_nine_tenths_of_the_deadman_apart() -> None:
     driver: Any = StubDriver()
     assert command_gap_max_s(driver) == GAP_MAX_S == pytest.approx(0.45), "until the robot reports its own"
-    driver.identity = Identity("denning", 24, 0.381, 2.0, 0.02, 7)
-    assert command_gap_max_s(driver) == GAP_SHARE * 2.0
-    assert gather_inputs(driver, 0.0, None).gap_max_s == GAP_SHARE * 2.0
+    driver.identity = Identity("denning", 24, 0.381, 0.4, 0.02, 7)
+    assert command_gap_max_s(driver) == GAP_SHARE * 0.4
+    assert gather_inputs(driver, 0.0, None).gap_max_s == GAP_SHARE * 0.4
+
+
+@pytest.mark.promise("P25")
+@pytest.mark.parametrize("deadman_s", [0.6, 1.0, 65.535])
+def test_an_own_limit_holds_whatever_deadman_the_base_reports(deadman_s: float) -> None:
+    driver: Any = StubDriver(Identity("denning", 24, 0.381, deadman_s, 0.02, 7))
+    assert command_gap_max_s(driver) == GAP_LIMIT_S == 0.5
