@@ -267,7 +267,8 @@ class LogConfig(Strict):
 class RecordingConfig(Strict):
     """The recording of every run, in a folder from which the oldest recordings are deleted.
 
-    A run deletes no more than it writes, and nothing that is bookmarked or beside which a file NAME.mcap.keep lies.
+    A run deletes no more than it writes, only what runs have written into this folder, and nothing that is bookmarked
+    or beside which a file NAME.mcap.keep lies.
     """
 
     enabled: bool = True

@@ -158,6 +158,13 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "reported sends no DRIVE; a deadman outside the robot file's bounds (.1 to 1 s): refused, and no gap "
             "between two cycles of more than .5 s is driven through, whatever the base reports",
         ),
+        "P26": Promise(
+            "No file that is not ours is destroyed",
+            "a full folder of recordings with foreign MCAP files, links, copies, files being written, runs of one "
+            "name, a clock set back: only listed and finished recordings are removed; every output of every command "
+            "against each of its inputs, every other output and an existing file, also through links: refused, all "
+            "content as before",
+        ),
     }
 )  # fmt: skip
 

@@ -1,8 +1,12 @@
-"""An MCAP file while it is being written: small chunks, each readable by itself once it is flushed."""
+"""An MCAP file while it is being written: small chunks, each readable by itself once it is flushed.
+
+It is locked while it is open: other runs then leave it alone when they make room.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 from pathlib import Path
 from typing import Final
@@ -42,6 +46,10 @@ class McapFile:
     def __init__(self, path: Path, info: bytes, log_ns: int) -> None:
         self.path = path
         self._file = path.open("wb")
+        with contextlib.suppress(
+            OSError
+        ):  # a file that the user named is locked already, see `run`; or no locks exist
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._writer = Writer(
             self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD, index_types=INDEX,
             enable_crcs=True, enable_data_crcs=True,

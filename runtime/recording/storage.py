@@ -1,6 +1,7 @@
 """The storage of recordings: a file named by the user, or a folder from which the oldest are deleted.
 
-What one run can displace is bounded, so no sequence of commands or restarts empties the folder.
+What one run can displace is bounded, so no sequence of commands or restarts empties the folder. Files that no run has
+written into the folder are left alone.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import contextlib
 import stat
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NamedTuple, Protocol
 
@@ -17,6 +18,7 @@ import platformdirs
 
 from config.settings import RecordingConfig
 from runtime.recording.channels import BOOKMARK
+from runtime.recording.folder_index import create_listed, is_finished_recording, listed_names
 
 SUFFIX: Final = ".mcap"
 MEGABYTE: Final = 1_000_000
@@ -63,9 +65,21 @@ class SingleFile:
     first: Path
 
     def path(self, part: int) -> Path:
-        """Return the path of a file, numbered from 1; only the first, which the user named, may exist already."""
-        path = self.first if part == 1 else self.first.with_stem(f"{self.first.stem}-{part}")
-        return self.path(part + 1) if part > 1 and path.exists() else path
+        """Return the path of a file, numbered from 1; only the first, which the user named, may exist already.
+
+        Raises
+        ------
+        OSError
+            A later file cannot be created.
+        """
+        if part == 1:
+            return self.first
+        path = self.first.with_stem(f"{self.first.stem}-{part}")
+        try:
+            path.touch(exist_ok=False)
+        except FileExistsError:
+            return self.path(part + 1)
+        return path
 
     def enforce_limits(self, current: Path) -> None:
         """Do nothing: files that the user named are never deleted."""
@@ -85,7 +99,6 @@ class SingleFile:
 class StoredFile(NamedTuple):
     """A file of the folder that counts towards its limits."""
 
-    modified_ns: int
     bytes: int
     path: Path
 
@@ -97,14 +110,15 @@ class RotatingFolder:
     The oldest files go first, one at each check, and only after an earlier check of this run has named them. A run
     removes at most as many bytes of older runs as it has written itself; a file too large for that stays, and the
     oldest that fits goes. Pinned files, beside which an empty `NAME.mcap.keep` lies, stay and do not count. A file
-    with a bookmark is pinned.
+    with a bookmark is pinned. Files that the folder's index does not list stay and do not count either, nor do files
+    go that another run is still writing.
 
     Parameters
     ----------
     folder : Path
         Created if it is missing.
     run : str
-        Prefix of this run's file names; names sort by time.
+        Prefix of this run's file names; names sort by time. Another is taken where files have it already.
     config : RecordingConfig
         The limits.
     """
@@ -112,6 +126,8 @@ class RotatingFolder:
     folder: Path
     run: str
     config: RecordingConfig
+    _own: set[Path] = field(default_factory=set)
+    """The files of this run."""
     _removed_bytes: int = 0
     """Of older runs."""
     _own_removed_bytes: int = 0
@@ -119,9 +135,26 @@ class RotatingFolder:
     """The file that the last check has named."""
 
     def path(self, part: int) -> Path:
-        """Return the path of a file, numbered from 1."""
+        """Create a file, numbered from 1, and return its path.
+
+        Raises
+        ------
+        OSError
+            It cannot be created.
+        """
         self.folder.mkdir(parents=True, exist_ok=True)
-        return self.folder / f"{self.run}-{part:0{PART_DIGITS}d}{SUFFIX}"
+        run, number = self.run, 1
+        while True:
+            path = self.folder / f"{run}-{part:0{PART_DIGITS}d}{SUFFIX}"
+            try:
+                create_listed(path)
+                break
+            except FileExistsError:  # of another machine, container or time
+                number += 1
+                run = f"{self.run}.{number}"
+        self.run = run
+        self._own.add(path)
+        return path
 
     def enforce_limits(self, current: Path) -> str | None:
         """Remove the file that the last check named if the folder exceeds a limit, but never `current`.
@@ -134,8 +167,7 @@ class RotatingFolder:
         files = self._counted_files()
         if self._fill(files) > 1.0 and self._announced is not None:
             due = self._next(files, current)
-            if due is not None and due.path == self._announced:
-                self._remove(due)
+            if due is not None and due.path == self._announced and self._remove(due):
                 files.remove(due)
         fill = self._fill(files)
         due = self._next(files, current) if fill > WARN_SHARE else None
@@ -163,14 +195,17 @@ class RotatingFolder:
         return part_bytes > PART_SHARE * self.config.cap_mb * MEGABYTE
 
     def _counted_files(self) -> list[StoredFile]:
-        """Return the files that are not pinned, oldest first."""
+        """Return the files that are listed and not pinned, oldest first."""
         files = []
-        for path in self.folder.glob(f"*{SUFFIX}"):
-            with contextlib.suppress(OSError):  # another run has just deleted it
-                info = path.stat()
-                if not pin_of(path).exists():
-                    files.append(StoredFile(info.st_mtime_ns, info.st_size, path))
-        return sorted(files)
+        present = {path.name for path in self.folder.iterdir()}
+        for name in listed_names(self.folder):
+            if name in present and f"{name}{PIN_SUFFIX}" not in present:
+                path = self.folder / name
+                with contextlib.suppress(OSError):  # just removed by another run
+                    info = path.lstat()
+                    if stat.S_ISREG(info.st_mode):
+                        files.append(StoredFile(info.st_size, path))
+        return files
 
     def _fill(self, files: Sequence[StoredFile]) -> float:
         """Return the share of a limit that the folder has reached, by size or by number of runs."""
@@ -179,23 +214,28 @@ class RotatingFolder:
 
     def _next(self, files: Sequence[StoredFile], current: Path) -> StoredFile | None:
         """Return the file that goes next, None if this run may remove none."""
-        own = [file for file in files if _run_of(file.path) == self.run]
+        own = [file for file in files if file.path in self._own]
         written = self._own_removed_bytes + sum(file.bytes for file in own)
-        older = [file for file in files if _run_of(file.path) != self.run]
-        for file in older:
-            if self._removed_bytes + file.bytes <= written and not has_bookmark(file.path):
+        for file in files:
+            if file.path in self._own or self._removed_bytes + file.bytes > written:
+                continue
+            if is_finished_recording(file.path) and not has_bookmark(file.path):
                 return file
         too_large = sum(file.bytes for file in files) > self.config.cap_mb * MEGABYTE
         finished = [file for file in own if file.path != current]
         return finished[0] if too_large and finished else None
 
-    def _remove(self, file: StoredFile) -> None:
-        with contextlib.suppress(OSError):
+    def _remove(self, file: StoredFile) -> bool:
+        """Remove a file and return whether that was possible."""
+        try:
             file.path.unlink()
-        if _run_of(file.path) == self.run:
+        except OSError:
+            return False
+        if file.path in self._own:
             self._own_removed_bytes += file.bytes
         else:
             self._removed_bytes += file.bytes
+        return True
 
 
 def pin_of(path: Path) -> Path:
@@ -226,7 +266,7 @@ def has_bookmark(path: Path) -> bool:
 def _run_of(path: Path) -> str:
     """Return the run that a file belongs to: its name without the number of the part."""
     run, _, part = path.stem.rpartition("-")
-    return run if run and part.isdigit() and len(part) == PART_DIGITS else path.stem
+    return run if run and part.isdigit() and len(part) >= PART_DIGITS else path.stem
 
 
 class RecordingFile(NamedTuple):

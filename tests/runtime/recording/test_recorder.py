@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import statistics
 import threading
 import time
@@ -29,6 +28,7 @@ from runtime.recording.channels import (
     decode,
     encode,
 )
+from runtime.recording.folder_index import create_listed
 from runtime.recording.reader import open_recording
 from runtime.recording.recorder import Recorder
 from runtime.recording.schema import Cycle, LogLine, MapChange, Payload, SerialBytes
@@ -175,9 +175,8 @@ def test_the_folder_keeps_its_cap_and_every_part_replays(tmp_path: Path, monkeyp
     monkeypatch.setattr("runtime.recording.mcap_file.CHUNK_BYTES", 16 * 1024)
     settings = hall("recording.cap_mb=1.0", "recording.keep=3", "recording.keyframe_period_s=0.5")
     old = [tmp_path / f"2000-{k}.mcap" for k in range(5)]
-    for k, path in enumerate(old):
-        path.write_bytes(b"x" * 1000)
-        os.utime(path, (k, k))
+    for path in old:
+        create_listed(path)
     (tmp_path / "notes.txt").write_text("not a recording")
     place = RotatingFolder(tmp_path, "run", settings.recording)
 

@@ -11,6 +11,8 @@ import pytest
 
 from config.load import load_settings
 from config.settings import RecordingConfig
+from runtime.recording.folder_index import INDEX, create_listed
+from runtime.recording.mcap_file import McapFile
 from runtime.recording.recorder import Recorder
 from runtime.recording.storage import (
     MEGABYTE,
@@ -25,6 +27,8 @@ from runtime.recording.storage import (
 from tests.recorded import hall, until
 
 RUN = "20300101T000000Z-7"
+HEADER = bytes.fromhex("894d434150300d0a 01 1400000000000000 0c000000") + b"echolocate/9" + bytes(4)
+"""Beginning of a recording."""
 
 
 def config(*, cap_bytes: int = MEGABYTE, keep: int = 100) -> RecordingConfig:
@@ -35,16 +39,15 @@ def config(*, cap_bytes: int = MEGABYTE, keep: int = 100) -> RecordingConfig:
 def older(folder: Path, *sizes: int) -> list[Path]:
     """Write recordings of older runs, the oldest first."""
     files = [folder / f"20200101T{k:06d}Z-1-001.mcap" for k in range(len(sizes))]
-    for k, (path, size) in enumerate(zip(files, sizes, strict=True)):
-        path.write_bytes(b"x" * size)
-        os.utime(path, (k, k))
+    for path, size in zip(files, sizes, strict=True):
+        create_listed(path)
+        path.write_bytes(HEADER.ljust(size, b"x"))
     return files
 
 
 def write(target: RotatingFolder, part: int, size: int) -> list[str | None]:
     """Write a file as the recorder does, with a check at its opening and at its end; return the warnings."""
     path = target.path(part)
-    path.touch()
     first = target.enforce_limits(path)
     path.write_bytes(b"y" * size)
     return [first, target.enforce_limits(path)]
@@ -67,10 +70,10 @@ def test_switching_a_hundred_times_removes_no_more_than_was_written(
 @pytest.mark.promise("P20")
 def test_any_run_removes_at_most_its_own_bytes_and_only_what_was_named(tmp_path: Path) -> None:
     rng = random.Random(5)
-    for k in range(20):
+    for k in range(8):
         folder = tmp_path / str(k)
         folder.mkdir()
-        sizes = [rng.randrange(1, 40_000) for _ in range(30)]
+        sizes = [rng.randrange(100, 40_000) for _ in range(30)]
         files = older(folder, *sizes)
         pinned = rng.sample(files, 5)
         for path in pinned:
@@ -97,10 +100,68 @@ def test_the_folder_stays_within_its_limits_while_it_is_written(tmp_path: Path) 
     target = RotatingFolder(tmp_path, RUN, config(cap_bytes=300_000))
     for part in range(1, 31):
         write(target, part, 50_000)
-        write(target, part, 50_000)
         assert sum(path.stat().st_size for path in tmp_path.iterdir()) <= 400_000
     assert not any(path.exists() for path in files)
-    assert target.path(30).exists()
+    assert (tmp_path / f"{RUN}-030.mcap").exists()
+
+
+@pytest.mark.compiled
+@pytest.mark.promise("P26")
+def test_only_files_that_runs_have_written_here_are_removed(tmp_path: Path, measured: Callable[[str], None]) -> None:
+    """Not the files of others, whatever they are called and however old they are; not one that is being written."""
+    rng = random.Random(6)
+    removed = 0
+    for k in range(4):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        files = older(folder, *(rng.randrange(100, 3_000) for _ in range(9)))
+        # Of others: by its name, by its header, copied from another folder, in the place of one of ours, a link.
+        foreign = [folder / "20190101T000000Z-1-001.mcap", folder / "bag.mcap", folder / "copy.mcap", *files[:2]]
+        foreign[0].write_bytes(b"z" * 2_000)
+        foreign[1].write_bytes(b"\x89MCAP0\r\n" + b"z" * 2_000)
+        foreign[2].write_bytes(HEADER.ljust(2_000, b"z"))
+        files[0].write_bytes(b"\x89MCAP0\r\n".ljust(2_000, b"z"))
+        files[1].unlink()
+        files[1].symlink_to(foreign[2])
+        for path in foreign[:3]:
+            os.utime(path, (0, 0))
+        live = McapFile(files[2], b"{}", 0)
+        target = RotatingFolder(folder, RUN, config(cap_bytes=5_000, keep=rng.choice((1, 100))))
+        for part in range(1, 20):
+            write(target, part, 2_000)
+        assert all(path.exists() for path in (*foreign, files[2])), "none of them"
+        assert not any(path.exists() for path in files[3:]), "all the others"
+        removed += len(files[3:])
+        live.finish()
+    measured(f"4 folders, twice as full as allowed: {removed} old recordings removed, 0 of 24 other files")
+
+
+@pytest.mark.promise("P26")
+def test_a_clock_that_was_set_back_changes_nothing(tmp_path: Path) -> None:
+    """The order is that of the index: neither times nor names of files."""
+    files = older(tmp_path, 2_000, 2_000, 2_000)
+    for k, path in enumerate(files):
+        os.utime(path, (10**9 - k, 10**9 - k))
+    target = RotatingFolder(tmp_path, "19700101T000000Z-1", config(cap_bytes=8_000))
+    assert "000000Z-1-001.mcap goes next" in str(write(target, 1, 2_000)[1])
+    write(target, 2, 2_000)
+    assert [path.exists() for path in files] == [False, True, True]
+
+
+@pytest.mark.promise("P26")
+def test_runs_of_the_same_name_share_a_folder(tmp_path: Path) -> None:
+    """As of two containers whose processes have the same number: each has files of its own."""
+    first, second = (RotatingFolder(tmp_path, RUN, config(cap_bytes=1_000)) for _ in range(2))
+    written = McapFile(first.path(1), b"{}", 0)
+    write(second, 1, 300)
+    assert [path.name for path in sorted(tmp_path.glob("*.mcap"))] == [f"{RUN}-001.mcap", f"{RUN}.2-001.mcap"]
+    for part in range(2, 20):
+        write(second, part, 9_000)
+    assert written.path.exists(), "it is being written"
+    written.finish()
+    write(second, 20, 9_000)
+    write(second, 21, 9_000)
+    assert not written.path.exists()
 
 
 def test_a_person_is_warned_which_goes_next_and_how_to_keep_it(tmp_path: Path) -> None:
@@ -148,7 +209,7 @@ def test_what_is_switched_off_without_content_is_removed(tmp_path: Path) -> None
             recorder.set_enabled(on=True)
         recorder.set_enabled(on=False)
     assert (recorder.status.file, recorder.status.files, recorder.status.bytes) == (None, 0, 0)
-    assert list(tmp_path.iterdir()) == []
+    assert [path.name for path in tmp_path.iterdir()] == [INDEX]
 
 
 def test_only_the_file_that_the_user_named_is_replaced(tmp_path: Path) -> None:
