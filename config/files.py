@@ -157,6 +157,19 @@ def one_line(text: str) -> str:
     return text if text.isprintable() else json.dumps(text)
 
 
+def utf8(text: str) -> str:
+    r"""Return `text` with what UTF-8 cannot encode escaped: the bytes of a file name may be anything.
+
+    Python keeps such a byte as a lone surrogate, which no JSON and no other text file can hold.
+    """
+    return text.encode(errors="backslashreplace").decode()
+
+
+def is_utf8(text: str) -> bool:
+    """Return whether UTF-8 can encode `text`."""
+    return utf8(text) == text
+
+
 def dotted(location: Iterable[str | int]) -> str:
     """Return a location as the user writes it: keys and numbers joined by dots."""
     keys = (k if isinstance(k, str) and re.fullmatch(r"[A-Za-z0-9_-]+", k) else json.dumps(k) for k in location)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from config.files import DEPTH_MAX, ConfigError, TomlSyntaxError, one_line, parse_toml
+from config.files import DEPTH_MAX, ConfigError, TomlSyntaxError, is_utf8, one_line, parse_toml
 from config.layers import Layers, Location, PathError, Source
 
 OVERRIDE = Source("--set")
@@ -34,6 +34,8 @@ def parse_override(text: str) -> Override:
         The text does not have this form.
     """
     shown = one_line(text) if len(text) <= 60 else one_line(text[:59]) + "…"
+    if not is_utf8(text):
+        raise ConfigError(f"--set {shown}: is not UTF-8 text")
     path, equals, value = text.partition("=")
     keys = tuple(key.strip() for key in path.split("."))
     if not equals or not all(keys):

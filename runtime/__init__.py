@@ -1,5 +1,3 @@
 """The running program: the perception-action cycle, its modes, recordings, the console and the command line."""
 
-from typing import Final
-
-VERSION: Final = "0.1.0"
+VERSION = "0.1.0"

@@ -165,6 +165,11 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "against each of its inputs, every other output and an existing file, also through links: refused, all "
             "content as before",
         ),
+        "P28": Promise(
+            "Anyone's account and terminal",
+            "paths that are not UTF-8, no home folder, `~` of no user, streams that are closed, full or ASCII: no "
+            "traceback, no folder of the name `~`",
+        ),
     }
 )  # fmt: skip
 

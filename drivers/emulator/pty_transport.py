@@ -18,11 +18,11 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TextIO
 
-from config.errors import UserError
 from config.robot import RobotConfig
 from config.world import WorldConfig
 from drivers.emulator.faults import Fault
 from drivers.emulator.latency_trace import LatencyTrace
+from drivers.emulator.port_link import EmulatorError, PortLink
 from drivers.emulator.robot_device import RobotDevice
 from drivers.emulator.time_channel import TimeChannel
 from drivers.emulator.truth_trace import TruthTrace
@@ -41,10 +41,6 @@ _NO_HOST = frozenset({errno.EIO, errno.ENXIO})
 """Errors of a pty whose other end is not open."""
 
 
-class EmulatorError(UserError):
-    """The emulator cannot start or be controlled; the text is one line with the reason."""
-
-
 class PtyPort:
     """The emulator's end of a pty, and a symbolic link to the host's end.
 
@@ -61,21 +57,25 @@ class PtyPort:
     Raises
     ------
     EmulatorError
-        `link_path` exists and is not a link to a pty, or the link cannot be made.
+        `link_path` exists and is not a link to a pty, another emulator has it, or the link cannot be made.
     """
 
     def __init__(self, link_path: str | None) -> None:
-        self._link = None if link_path is None else Path(link_path)
+        self._link = None if link_path is None else PortLink(link_path)
         self._master: int | None = None
         self._slave_name = ""
         self._has_host = False
         self.dropped = 0
-        self.open()
+        try:
+            self.open()
+        except BaseException:
+            self.close()
+            raise
 
     @property
     def path(self) -> str:
         """The path that a host opens."""
-        return self._slave_name if self._link is None else str(self._link)
+        return self._slave_name if self._link is None else str(self._link.path)
 
     @property
     def is_open(self) -> bool:
@@ -83,7 +83,7 @@ class PtyPort:
         return self._master is not None
 
     def open(self) -> None:
-        """Open a new pty in raw mode and point the link at it."""
+        """Plug in: open a new pty in raw mode and point the link at it."""
         master, slave = os.openpty()
         try:
             tty.setraw(slave)
@@ -93,22 +93,24 @@ class PtyPort:
             os.close(slave)
         self._master = master
         self._has_host = False
-        try:
-            self._point_link()
-        except BaseException:
-            self.close()
-            raise
+        if self._link is not None:
+            self._link.point_at(self._slave_name)
 
-    def close(self) -> None:
-        """Hang up and remove the link."""
+    def unplug(self) -> None:
+        """Hang up and remove the link, which stays reserved."""
         if self._master is None:
             return
         os.close(self._master)
         self._master = None
         if self._link is not None:
-            with contextlib.suppress(OSError):
-                if self._link.readlink() == Path(self._slave_name):
-                    self._link.unlink()
+            self._link.remove(self._slave_name)
+
+    def close(self) -> None:
+        """Hang up for good."""
+        self.unplug()
+        if self._link is not None:
+            self._link.close()
+            self._link = None
 
     def read(self) -> bytes | None:
         """Return the bytes that the host wrote, without waiting; None if no host has the pty open."""
@@ -163,26 +165,6 @@ class PtyPort:
                 termios.tcflush(slave, termios.TCIFLUSH)
             finally:
                 os.close(slave)
-
-    def _point_link(self) -> None:
-        link = self._link
-        if link is None:
-            return
-        if link.is_symlink():
-            target = link.readlink()
-            if link.exists() and not str(target).startswith("/dev/pts/"):
-                raise EmulatorError(
-                    f"{link} is a link to {target}, which is not a pty: remove it or choose another path"
-                )
-        elif link.exists():
-            raise EmulatorError(f"{link} exists and is not a link: remove it or choose another path")
-        new_link = link.with_name(f".{link.name}.{os.getpid()}")
-        try:
-            new_link.symlink_to(self._slave_name)
-            new_link.replace(link)
-        except OSError as error:
-            reason = os.strerror(error.errno or 0)
-            raise EmulatorError(f"cannot make the link {link}: {reason}; choose another path") from error
 
 
 class SlippingClock:
@@ -328,7 +310,7 @@ def _exchange(
     """Advance the robot to `emulated_s` and move bytes both ways."""
     data = device.advance(emulated_s)
     if port.is_open and not device.plugged:
-        port.close()
+        port.unplug()
     elif device.plugged and not port.is_open:
         port.open()
     received = port.read()

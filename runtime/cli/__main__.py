@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from runtime.cli.start_signals import end_at_once
+from runtime.cli.first_signals import handle_first_signals
 
 
 def main() -> None:
     """Run the command line and exit."""
-    end_at_once()
+    handle_first_signals()
+    from runtime.cli.standard_streams import open_standard_streams
+
+    open_standard_streams()
     from runtime.cli.app import main as run_app
 
     run_app()

@@ -6,7 +6,6 @@ its cache folder is set.
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
 
@@ -16,9 +15,10 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.files import one_line
 from runtime import VERSION
 from runtime.cli.experiment_commands import experiment
+from runtime.cli.first_signals import EXIT_CODE_BASE
 from runtime.cli.recording_commands import export, figures, map_command, recover, replay, report
 from runtime.cli.robot_commands import check, emulate, run, service
-from runtime.cli.start_signals import EXIT_CODE_BASE, ending_in_order
+from runtime.cli.start_signals import ending_in_order
 
 app = App(
     name="echolocate",
@@ -47,10 +47,7 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         with ending_in_order():
             code = run_command(sys.argv[1:] if arguments is None else arguments)
-            sys.stdout.flush()
-    except BrokenPipeError:
-        # The reader of the pipe has gone, as `head` does. Python flushes once more at exit, so redirect that.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # the reader of the pipe has gone, as `head` does
         code = FAILED
     sys.exit(code)
 
@@ -59,9 +56,10 @@ def run_command(arguments: list[str]) -> int:
     """Run one command and return its exit code; print a user's error on stderr."""
     from runtime.support.kernel_cache import use_kernel_cache
 
-    use_kernel_cache()
     try:
+        use_kernel_cache()
         result = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        sys.stdout.flush()
     except CycloptsError as error:
         print_error(f"{' '.join(str(error).split())} See `echolocate --help`.")
         return WRONG_CALL

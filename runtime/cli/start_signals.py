@@ -1,43 +1,33 @@
 """Signals that end the program before a run handles them: exit code 128 + n, no traceback, nothing left over.
 
-While modules are imported nothing has been started, so the process ends at once. Afterwards a signal is raised as an
-exception, which ends child processes and removes temporary folders on its way out; within the event loop of a run it
-cancels the start.
+While modules are imported nothing has been started, so the process ends at once: see `runtime.cli.first_signals`.
+Afterwards a signal is raised as an exception, which ends child processes and removes temporary folders on its way
+out; within the event loop of a run it cancels the start.
 """
 
 from __future__ import annotations
 
 import contextlib
-import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from types import FrameType
 from typing import TYPE_CHECKING, Final
 
 from config.errors import UserError
+from runtime.cli.first_signals import EXIT_CODE_BASE, not_ignored
 
 if TYPE_CHECKING:
     from sys import UnraisableHookArgs
 
-ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Signals that end a start. A run handles them itself: see `runtime.cli.commands.run.signals`."""
-EXIT_CODE_BASE: Final = 128
-"""Exit code of a program that a signal ended, less the signal's number, as shells count."""
 RETRY_S: Final = 0.01
 """Time until an exception is raised again that a destructor has swallowed."""
-
-
-def end_at_once() -> None:
-    """From now on end the process without any further step when one of these signals comes."""
-    for number in _not_ignored():
-        signal.signal(number, lambda number, _frame: os._exit(EXIT_CODE_BASE + number))
 
 
 @contextlib.contextmanager
 def ending_in_order() -> Iterator[None]:
     """Raise SystemExit with the exit code where the program is when one of these signals comes."""
-    before = {number: signal.signal(number, _raise) for number in _not_ignored()}
+    before = {number: signal.signal(number, _raise) for number in not_ignored()}
     hook, sys.unraisablehook = sys.unraisablehook, _raise_again
     try:
         yield
@@ -56,7 +46,7 @@ def ending_the_start() -> Iterator[None]:
     UserError
         A signal came; its exit code is 128 + n.
     """
-    import asyncio  # takes so long that `end_at_once` comes first
+    import asyncio  # takes long, and not every command needs it
 
     loop, task = asyncio.get_running_loop(), asyncio.current_task()
     received: list[signal.Signals] = []
@@ -66,7 +56,8 @@ def ending_the_start() -> Iterator[None]:
         if task is not None and len(received) == 1:  # a second one must not interrupt the cleaning up
             task.cancel()
 
-    for number in _not_ignored():
+    before = {number: signal.getsignal(number) for number in not_ignored()}
+    for number in before:
         loop.add_signal_handler(number, end, number)
     try:
         yield
@@ -74,11 +65,28 @@ def ending_the_start() -> Iterator[None]:
         if not received:
             raise
         raise UserError(f"ended by {received[0].name}", EXIT_CODE_BASE + received[0]) from None
+    finally:
+        for number, handler in before.items():
+            loop.remove_signal_handler(number)
+            signal.signal(number, handler)
 
 
-def _not_ignored() -> list[signal.Signals]:
-    """Return the signals that end the program; `nohup` and a shell's background jobs ignore some of them."""
-    return [number for number in ENDING if signal.getsignal(number) is not signal.SIG_IGN]
+@contextlib.contextmanager
+def handled_by_loop(handlers: Mapping[signal.Signals, Callable[[], object]]) -> Iterator[None]:
+    """Let the running loop handle signals; afterwards one of `ENDING` is raised: a second Ctrl-C ends a slow end."""
+    import asyncio
+
+    loop = asyncio.get_running_loop()
+    raised = not_ignored()
+    afterwards = {number: _raise if number in raised else signal.getsignal(number) for number in handlers}
+    for number, handler in handlers.items():
+        loop.add_signal_handler(number, handler)
+    try:
+        yield
+    finally:
+        for number, after in afterwards.items():
+            loop.remove_signal_handler(number)
+            signal.signal(number, after)
 
 
 def _raise(number: int, _frame: FrameType | None) -> None:

@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NamedTuple, Protocol
 
-import platformdirs
-
+from config.files import is_utf8
 from config.settings import RecordingConfig
 from runtime.recording.channels import BOOKMARK
 from runtime.recording.folder_index import create_listed, is_finished_recording, listed_names
+from runtime.support.user_folders import expanded, state_folder
 
 SUFFIX: Final = ".mcap"
 MEGABYTE: Final = 1_000_000
@@ -286,7 +286,7 @@ def list_recordings(folder: Path) -> list[RecordingFile]:
         for path in folder.glob(f"*{SUFFIX}"):
             with contextlib.suppress(OSError):  # just deleted to make room
                 info = path.stat()
-                if stat.S_ISREG(info.st_mode):
+                if stat.S_ISREG(info.st_mode) and is_utf8(path.name):  # the console has no other text
                     found.append(RecordingFile(path.name, info.st_size, info.st_mtime))
     return sorted(found, key=lambda file: (-file.modified_s, file.file))
 
@@ -300,6 +300,11 @@ def find_recording(folder: Path, name: str) -> Path | None:
 
 
 def recordings_folder(config: RecordingConfig) -> Path:
-    """Return the folder of the settings, or else `echolocate/runs` in the user's state folder."""
-    default = platformdirs.user_state_path("echolocate") / "runs"
-    return Path(config.folder).expanduser() if config.folder else default
+    """Return the folder of the settings, or else `echolocate/runs` in the user's state folder.
+
+    Raises
+    ------
+    UserError
+        The settings name the home folder of a user that has none, or see `runtime.support.user_folders`.
+    """
+    return expanded(config.folder, "recording.folder") if config.folder else state_folder() / "runs"

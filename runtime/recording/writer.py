@@ -15,6 +15,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
+from config.files import utf8
 from config.settings import Settings
 from drivers.messages import Floats
 from runtime.cycle.modes import ModeState
@@ -240,7 +241,7 @@ class RecordingWriter:
         self._file = McapFile(self._target.path(self._parts), encode(self._info), log_ns)
         self._bytes_before = self._status.bytes
         self._mode = None
-        path, files = str(self._file.path), self._status.files + 1
+        path, files = utf8(str(self._file.path)), self._status.files + 1
         self._status = replace(self._status, file=path, files=files, is_writing=True)
         self._is_empty = True
         self._enforce_limits(self._file.path)

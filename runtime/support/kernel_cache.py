@@ -8,6 +8,7 @@ one process compiles everything before the next starts.
 from __future__ import annotations
 
 import atexit
+import contextlib
 import hashlib
 import os
 import shutil
@@ -22,7 +23,9 @@ from typing import TYPE_CHECKING, Final
 
 from platformdirs import user_cache_path
 
+from config.errors import UserError
 from runtime.support.progress import progress
+from runtime.support.user_folders import users_own
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -71,18 +74,29 @@ def cache_folder() -> Path:
     Numba unpickles what it finds there, so a user who can write into it can run code as this one. It is in the user's
     cache; where that cannot be written or others can write into it, it is a new folder for this process and its
     children, which is removed at the end.
+
+    Raises
+    ------
+    UserError
+        Neither can be created.
     """
     # Numba keeps the kernels of each place of the sources apart, so the marks of compiled parts must be, too.
     place = hashlib.sha256(os.fsencode(Path(__file__))).hexdigest()[:8]
-    folder = user_cache_path("echolocate") / "kernels" / f"{kernels_key()}-{place}"
+    own = users_own(user_cache_path)
+    if own is not None:
+        folder = own / "kernels" / f"{kernels_key()}-{place}"
+        with contextlib.suppress(OSError):
+            folder.mkdir(mode=PRIVATE, parents=True, exist_ok=True)
+            if all(_is_ours(place) for place in (folder, *folder.parents[:2])):
+                with tempfile.TemporaryFile(dir=folder):
+                    return folder
     try:
-        folder.mkdir(mode=PRIVATE, parents=True, exist_ok=True)
-        if all(_is_ours(place) for place in (folder, *folder.parents[:2])):
-            with tempfile.TemporaryFile(dir=folder):
-                return folder
-    except OSError:
-        pass
-    private = Path(tempfile.mkdtemp(prefix="echolocate-kernels-"))
+        private = Path(tempfile.mkdtemp(prefix="echolocate-kernels-"))
+    except OSError as error:
+        raise UserError(
+            f"compiled kernels can be stored neither in {own or 'a home folder'} nor in a temporary folder: "
+            f"{error.strerror or error}; make room, or name a folder in XDG_CACHE_HOME or TMPDIR"
+        ) from error
     atexit.register(shutil.rmtree, private, ignore_errors=True)
     return private
 

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import orjson
 import structlog
-from platformdirs import user_state_path
 
 from config.errors import WRONG_CALL, UserError
-from config.files import one_line
+from config.files import one_line, utf8
 from runtime.support.background_writer import BackgroundWriter
+from runtime.support.user_folders import expanded, has_home, state_folder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, MutableMapping
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     LogListener = Callable[[Mapping[str, Any]], None]
 
 
+LOG_FILE: Final = "echolocate.jsonl"
+"""Default file, in the user's state folder."""
 SECRET: Final = frozenset({"start_url"})
 """Fields written only to the log file and the terminal: recordings are passed on, pages are shown."""
 
@@ -73,6 +75,7 @@ class _LineOutput:
 
     def __call__(self, logger: object, name: str, event: MutableMapping[str, Any]) -> Mapping[str, Any]:
         settings = event.pop("settings", None)
+        event = {name: utf8(value) if isinstance(value, str) else value for name, value in event.items()}
         self._report_error(logger, event)
         if self._status.file is not None:
             if settings is not None:
@@ -149,6 +152,11 @@ def open_log(
         )
         if error is not None:
             log.warning("no log file is written", reason=error)
+        elif config.file is None and not has_home():
+            log.warning(
+                "no home folder is known, so log and recordings go to a temporary one; set HOME or XDG_STATE_HOME",
+                folder=str(state_folder()),
+            )
         yield log
 
 
@@ -198,8 +206,9 @@ def terminal_writer(name: str, stream: TextIO) -> BackgroundWriter[bytes]:
 
 def _open_file(config: LogConfig) -> tuple[int | None, str | None]:
     """Return the descriptor of the log file, or None and the reason why the default file cannot be written."""
-    path = Path(config.file).expanduser() if config.file else user_state_path("echolocate") / "echolocate.jsonl"
+    path = Path(LOG_FILE) if config.file is None else expanded(config.file, "log.file")
     try:
+        path = state_folder() / path if config.file is None else path
         path.parent.mkdir(parents=True, exist_ok=True)
         return os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NOCTTY, 0o600), None
     except OSError as error:

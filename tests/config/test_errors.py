@@ -10,7 +10,7 @@ from config.errors import FAILED, WRONG_CALL, UserError
 from config.files import ConfigError, TomlSyntaxError
 from config.layers import PathError
 from config.robot import LinkConfig
-from drivers.emulator.pty_transport import EmulatorError
+from drivers.emulator.port_link import EmulatorError
 from drivers.firing_pattern import FiringError
 from drivers.serial_port import LinkError, opening_error
 from runtime.recording.reader import RecordingError

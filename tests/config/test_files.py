@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from config.files import SIZE_MAX
+from config.files import SIZE_MAX, is_utf8, utf8
 from config.load import ConfigError, load_robot, load_settings, load_world
 from tests.config.toml_text import ROBOT, document
 
@@ -104,6 +104,12 @@ def test_unusual_names(name: str) -> None:
     with pytest.raises(ConfigError, match="no such world") as caught:
         load_world(name)
     assert str(caught.value).isprintable()
+
+
+def test_what_utf8_cannot_encode_is_escaped() -> None:
+    assert is_utf8("Größe 5 °")
+    assert not is_utf8("\udcff.mcap")
+    assert utf8("Größe \udcff.mcap") == r"Größe \udcff.mcap"
 
 
 def test_an_endless_device() -> None:

@@ -130,6 +130,7 @@ def write_parquet(timeline: Timeline, folder: Path) -> list[Path]:
             metadata={"echolocate": FRAME_NOTE, "start_unix_ns": str(timeline.start_unix_ns)},
         )
         path = folder / f"{name}.parquet"
-        pq.write_table(pa.table(dict(table), schema=schema), path, compression="zstd")
+        with path.open("wb") as file:
+            pq.write_table(pa.table(dict(table), schema=schema), file, compression="zstd")
         paths.append(path)
     return paths

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from config.files import utf8
 from config.units import FOOT_M
 from drivers.messages import Pose
 from perception.detected_object import DetectedObject
@@ -38,7 +39,7 @@ CAPTIONS: Final = MappingProxyType(
 
 def page(timeline: Timeline, units: Units) -> str:
     """Return the page as one HTML text that refers to nothing outside itself."""
-    name = escape(timeline.path.name)
+    name = escape(utf8(timeline.path.name))
     body = "".join(
         (
             _head(timeline, units),
@@ -92,7 +93,7 @@ def _head(timeline: Timeline, units: Units) -> str:
     tiles.append(tile(f"{timeline.seconds:.1f} s", "duration"))
     about = escape(f"{when}{method}, version {timeline.versions.get('echolocate', VERSION)}")
     notes = "".join(note(text, bad=True) for text in timeline.notes)
-    title = escape(timeline.path.stem)
+    title = escape(utf8(timeline.path.stem))
     return f'<h1>{title}</h1><p class="sub">{about}</p><div class="tiles">{"".join(tiles)}</div>{notes}'
 
 

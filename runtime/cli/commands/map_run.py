@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from config.errors import DONE, FAILED, UserError
+from config.files import utf8
 from config.world import ITEMS_MAX
 from runtime.cli.commands.offline_io import (
     plain_console,
@@ -49,7 +50,7 @@ def map_run(source: TimelineSource, out: str, grid: str | None) -> int:
         raise UserError(f"{source.file}: a world file holds at most {ITEMS_MAX} objects of a kind", FAILED)
     settings = timeline.settings
     world = world_of(timeline.objects, timeline.walls, settings.models)
-    head = (f"Map of {Path(source.file).name}: what was recognised, in the frame of its odometry (m).",)
+    head = (f"Map of {utf8(Path(source.file).name)}: what was recognised, in the frame of its odometry (m).",)
     with writing("--out", out):
         Path(out).write_text(world_text(world, head), encoding="utf-8")
     output.print(f"{out}: {len(world.drum)} drums, {len(world.polygon)} polygons, {len(world.wall)} walls")

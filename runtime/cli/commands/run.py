@@ -13,13 +13,15 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
+from config.files import is_utf8, utf8
 from config.load import ConfigError, load_settings, with_known_room
 from config.settings import Settings
 from drivers.registry import make_driver
 from runtime import VERSION
 from runtime.cli.commands.offline_io import refuse_unwritable
 from runtime.cli.commands.run_recording import RunRecording, open_run_recording
-from runtime.cli.start_signals import ending_the_start
+from runtime.cli.first_signals import is_remembered
+from runtime.cli.start_signals import ending_the_start, handled_by_loop
 from runtime.cli.tables import objects_table, timing_line, timing_table
 from runtime.support.config_lint import lint_settings
 from runtime.support.file_lock import file_lock
@@ -180,7 +182,15 @@ def without_console(settings: Settings) -> Settings:
 
 
 def with_port(settings: Settings, port: str) -> Settings:
-    """Return the settings with the serial port replaced."""
+    """Return the settings with the serial port replaced.
+
+    Raises
+    ------
+    UserError
+        No settings can hold the port's path.
+    """
+    if not is_utf8(port):
+        raise UserError(f"the port {utf8(port)}: its path is not UTF-8 text; use a link at another path", WRONG_CALL)
     return settings.model_copy(update={"link": settings.link.model_copy(update={"port": port})})
 
 
@@ -318,11 +328,11 @@ async def run_process(
 def signals(process: RobotProcess, reloader: Reloader) -> Iterator[None]:
     """Handle signals during a run: INT and TERM end it, USR1 arms the robot, USR2 halts it, HUP reloads the settings.
 
+    A USR2 that came during the start halts the robot before its first cycle, so that it is not armed by itself.
     If the reloaded configuration is wrong, the errors go to the log and the settings in force remain.
     """
     from runtime.cycle.inputs import Request
 
-    loop = asyncio.get_running_loop()
     handlers: dict[signal.Signals, Callable[[], None]] = {
         signal.SIGINT: process.stop,
         signal.SIGTERM: process.stop,
@@ -330,11 +340,11 @@ def signals(process: RobotProcess, reloader: Reloader) -> Iterator[None]:
         signal.SIGUSR2: lambda: process.request(Request.HALT),
         signal.SIGHUP: reloader.request,
     }
-    for number, handler in handlers.items():
-        loop.add_signal_handler(number, handler)
-    try:
-        yield
-    finally:
-        for number in handlers:
-            loop.remove_signal_handler(number)
-        reloader.cancel()
+    halting = signal.getsignal(signal.SIGUSR2)
+    with handled_by_loop(handlers):
+        if is_remembered(halting):
+            process.request(Request.HALT)
+        try:
+            yield
+        finally:
+            reloader.cancel()

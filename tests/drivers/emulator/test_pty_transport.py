@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from drivers.denning.frames import Ack, Drive, Echo, Hello, Ident, Odom, Pattern
-from drivers.emulator.pty_transport import LAG_MAX_S, LINGER_S, EmulatorError, PtyPort, SlippingClock
+from drivers.emulator.port_link import EmulatorError
+from drivers.emulator.pty_transport import LAG_MAX_S, LINGER_S, PtyPort, SlippingClock
 from drivers.emulator.truth_trace import HEADER
 from drivers.messages import Flags
 from tests.drivers.device_host import script
@@ -246,6 +247,27 @@ def test_host_that_does_not_read_blocks_nothing() -> None:
     port.close()
 
 
+@pytest.mark.promise("P13")
+def test_a_second_emulator_is_refused_and_disturbs_no_host_of_the_first(link: Path) -> None:
+    first = PtyPort(str(link))
+    host = os.open(first.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    target = link.readlink()
+    with pytest.raises(EmulatorError, match=f"another emulator has the link {link}: end it or choose"):
+        PtyPort(str(link))
+    assert link.readlink() == target
+    first.unplug()
+    with pytest.raises(EmulatorError, match="another emulator"):
+        PtyPort(str(link))
+    first.open()
+    assert link.exists()
+    os.close(host)
+    first.close()
+    second = PtyPort(str(link))
+    assert link.exists()
+    second.close()
+    assert list(link.parent.iterdir()) == []
+
+
 def test_stale_link_is_replaced_and_another_is_not(link: Path, tmp_path: Path) -> None:
     link.symlink_to("/dev/pts/123456")
     port = PtyPort(str(link))
@@ -262,13 +284,12 @@ def test_stale_link_is_replaced_and_another_is_not(link: Path, tmp_path: Path) -
         PtyPort(str(tmp_path / "nowhere" / "robot"))
 
 
-def test_link_of_a_successor_is_left_alone(link: Path) -> None:
-    first = PtyPort(str(link))
-    second = PtyPort(str(link))
-    first.close()
-    assert link.exists()
-    second.close()
-    assert not link.is_symlink()
+def test_a_link_that_points_elsewhere_by_now_is_left_alone(link: Path) -> None:
+    port = PtyPort(str(link))
+    link.unlink()
+    link.symlink_to("/dev/null")
+    port.close()
+    assert link.readlink() == Path("/dev/null")
 
 
 def test_the_emulators_clock_slips_rather_than_bursts() -> None:

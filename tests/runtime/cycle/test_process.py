@@ -66,6 +66,19 @@ def test_a_request_that_is_void_when_the_cycle_takes_it_does_nothing(monkeypatch
     assert process.state.drive_request != Legs()
 
 
+@pytest.mark.promise("P19")
+def test_a_halt_before_the_first_cycle_keeps_the_robot_from_being_armed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of a SIGUSR2 during the start of a run that arms the robot by itself."""
+    with in_virtual_time(monkeypatch, "perception.method=paper") as (loop, settings, robot, _links):
+        process = RobotProcess(settings, Log().log, Observers(), loop.time)
+        process.request(Request.HALT)
+        start = robot.truth.pose
+        summary = loop.run_until_complete(process.run(arm=True, seconds=3.0))
+    assert summary["mode"] == "SAFE_STOP"
+    assert robot.truth.flags & Flags.LATCHED
+    assert robot.truth.pose == start
+
+
 @pytest.mark.promise("P22")
 def test_a_flood_of_edits_is_spread_over_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
     """In the order in which they came; what is too much is refused."""

@@ -257,6 +257,7 @@ def test_only_files_of_the_folder_are_recordings(tmp_path: Path) -> None:
     stored(tmp_path / "old.mcap", 3, 100)
     stored(tmp_path / "b.mcap", 0, 200)
     stored(tmp_path / "a.mcap", 7, 200)
+    stored(tmp_path / "\udcff.mcap", 7, 300)  # not UTF-8, so no message to the console can name it
     assert list_recordings(tmp_path) == [("a.mcap", 7, 200.0), ("b.mcap", 0, 200.0), ("old.mcap", 3, 100.0)]
     assert find_recording(tmp_path, "old.mcap") == tmp_path / "old.mcap"
     for name in ("", "none.mcap", "folder.mcap", "../old.mcap", str(tmp_path / "old.mcap"), "log.jsonl"):

@@ -16,6 +16,7 @@ import pytest
 from rich.console import Console
 
 import runtime.support.kernel_cache as kernels
+from config.errors import UserError
 from config.load import load_settings, with_known_room
 from config.settings import Settings
 from runtime.support import kernel_warmup as warming
@@ -352,3 +353,15 @@ def test_a_kernel_that_comes_to_life_is_counted_once() -> None:
         assert kernels.compiled_signatures() == before + 2
     finally:
         del relaxation.doubled  # type: ignore[attr-defined]
+
+
+@pytest.mark.promise("P28")
+def test_without_a_home_folder_the_cache_is_temporary(homeless: Path) -> None:
+    assert kernels.cache_folder().parent == homeless / "tmp"
+    assert [file.name for file in homeless.iterdir()] == ["tmp"], "no folder of the name ~"
+
+
+def test_without_any_place_it_is_said(homeless: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(homeless / "nowhere"))
+    with pytest.raises(UserError, match=r"neither in .* nor in a temporary folder: No such file"):
+        kernels.cache_folder()

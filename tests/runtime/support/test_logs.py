@@ -119,3 +119,23 @@ def test_no_control_character_reaches_the_terminal(tmp_path: Path, capsys: pytes
     assert all(line.isprintable() for line in shown.splitlines())
     assert "\\u001b[2J" in shown
     assert lines(path)[0]["robot"] == hostile
+
+
+@pytest.mark.promise("P28")
+def test_without_a_home_folder_the_log_goes_to_a_temporary_one_and_says_so(
+    homeless: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with open_log(LogConfig(), terminal=True) as log:
+        log.info("start")
+    (file,) = homeless.glob("tmp/*/echolocate.jsonl")
+    assert [line["event"] for line in lines(file)][1:] == ["start"]
+    err = capsys.readouterr().err
+    assert "no home folder is known" in err
+    assert str(file.parent) in err
+
+
+@pytest.mark.promise("P28")
+def test_a_text_that_is_not_utf8_is_written_escaped(tmp_path: Path) -> None:
+    with open_log(LogConfig(file=str(tmp_path / "log")), terminal=False) as log:
+        log.info("recording", file="\udcff.mcap")
+    assert lines(tmp_path / "log")[0]["file"] == r"\udcff.mcap"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from pathlib import Path
 
@@ -36,7 +37,9 @@ def test_csv(tmp_path: Path) -> None:
 
 
 def test_parquet(tmp_path: Path) -> None:
-    read = {path.stem: pq.read_table(path) for path in write_parquet(RUN, tmp_path)}
+    folder = tmp_path / "\udcff"  # not UTF-8, which pyarrow opens by no path
+    folder.mkdir()
+    read = {path.stem: pq.read_table(io.BytesIO(path.read_bytes())) for path in write_parquet(RUN, folder)}
     assert set(read) == TABLES
     echoes = read["echoes"]
     assert b"metres" in echoes.schema.metadata[b"echolocate"]

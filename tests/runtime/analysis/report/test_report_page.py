@@ -73,6 +73,7 @@ def test_page_without_a_known_world() -> None:
 @pytest.mark.usefixtures("_no_figures")
 def test_page_shows_the_summary_and_why_the_robot_stopped() -> None:
     run = synthetic_timeline()
+    run.path = run.path.with_name("\udcff.mcap")
     run.modes.append(ModeEntry(2.0, "SAFE_STOP", "bumper <contact>"))
     run.summary = {
         "late": 7, "missed": 4, "link": {"frames": 1832, "bad": 3, "lost": 2}, "stop_reasons": ["bumper <contact>"],
@@ -80,6 +81,7 @@ def test_page_shows_the_summary_and_why_the_robot_stopped() -> None:
                    "faults": {"outside the process": 6}},
     }  # fmt: skip
     shown = page(run, "m")
+    assert shown.encode().decode() == shown, "it is UTF-8, whatever the name of the file is"
     text = " ".join(PageReader(shown).text)
     for piece in ("refine", "between cycles: link receive", "a cycle begins after it is due by", "1.25", "49.65"):
         assert piece in text, piece

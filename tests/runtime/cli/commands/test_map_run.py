@@ -25,10 +25,13 @@ def test_the_map_of_a_recording_is_a_world_that_can_be_loaded(
     assert (tmp_path / "map.yaml").exists()
 
 
-def test_the_map_of_a_ring_log(hall_log: Path, tmp_path: Path) -> None:
-    out = tmp_path / "map.toml"
-    assert run_command(["map", str(hall_log), "--out", str(out)]) == DONE
+@pytest.mark.promise("P28")
+def test_the_map_of_a_ring_log_whose_name_is_not_utf8(hall_log: Path, tmp_path: Path) -> None:
+    out, log = tmp_path / "map.toml", tmp_path / "\udcff.csv"
+    log.symlink_to(hall_log)
+    assert run_command(["map", str(log), "--out", str(out)]) == DONE
     assert load_world(str(out)).drum
+    assert out.read_text("utf-8").startswith("# Map of \\udcff.csv: ")
 
 
 def test_calls_that_are_refused_name_the_cause(

@@ -6,6 +6,7 @@ import asyncio
 import fcntl
 import os
 import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from config.errors import FAILED, WRONG_CALL
 from drivers.link import Link
 from runtime.cli.app import run_command
 from runtime.cli.commands.run import signals
+from runtime.cli.first_signals import ENDING, Remembered
 from runtime.cycle.inputs import Request
 from runtime.support.file_lock import file_lock
 from tests.drivers.stranger import Stranger
@@ -135,6 +137,15 @@ class StubReloader:
         self.is_cancelled = True
 
 
+@pytest.fixture
+def _handlers_restored() -> Iterator[None]:
+    handlers = {number: signal.getsignal(number) for number in (*ENDING, signal.SIGUSR1, signal.SIGUSR2)}
+    yield
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("_handlers_restored")
 async def test_signals_are_requests_while_the_run_lasts() -> None:
     process = StubProcess()
     reloader = StubReloader(process.asked)
@@ -150,5 +161,20 @@ async def test_signals_are_requests_while_the_run_lasts() -> None:
             signal.raise_signal(number)
             assert await asyncio.wait_for(process.asked.get(), TIMEOUT_S) == asked
     assert reloader.is_cancelled
-    # The runner of asyncio has its own handler of SIGINT.
-    assert {signal.getsignal(number) for number in expected.keys() - {signal.SIGINT}} == {signal.SIG_DFL}
+    for number in ENDING:
+        with pytest.raises(SystemExit) as ended:  # a second one ends an end that takes long
+            signal.raise_signal(number)
+        assert ended.value.code == 128 + number
+    assert {signal.getsignal(number) for number in expected.keys() - {*ENDING}} == {signal.SIG_DFL}
+
+
+@pytest.mark.promise("P19")
+@pytest.mark.usefixtures("_handlers_restored")
+async def test_a_halt_from_before_the_run_stops_it_from_arming_the_robot() -> None:
+    process = StubProcess()
+    for number in (signal.SIGUSR1, signal.SIGUSR2):
+        signal.signal(number, Remembered())
+        signal.raise_signal(number)
+    with signals(process, StubReloader(process.asked)):  # type: ignore[arg-type]
+        assert process.asked.get_nowait() is Request.HALT
+    assert process.asked.empty(), "no robot is armed later than it was asked for"

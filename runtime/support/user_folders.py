@@ -1,0 +1,74 @@
+"""Folders of the user: for the program's state, and those that a setting names with a tilde.
+
+A user may have no home folder: in a container, a process can have a number without an entry in the list of users.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from platformdirs import user_state_path
+
+from config.errors import WRONG_CALL, UserError
+from config.files import one_line
+
+NAME: Final = "echolocate"
+
+
+def state_folder() -> Path:
+    """Return the folder for logs and recordings; without a home folder, a new one that only this user can enter.
+
+    Raises
+    ------
+    UserError
+        There is no home folder, and no temporary folder can be created.
+    """
+    return users_own(user_state_path) or _temporary_folder()
+
+
+def has_home() -> bool:
+    """Return whether the user has a home folder, or the environment names another place for the state."""
+    return users_own(user_state_path) is not None
+
+
+def users_own(find: Callable[[str], Path]) -> Path | None:
+    """Return the program's folder that a function of `platformdirs` finds; None if the user has no home folder."""
+    with contextlib.suppress(RuntimeError):
+        folder = find(NAME)
+        return folder if folder.is_absolute() else None  # earlier versions return a folder of the name ~
+    return None
+
+
+@functools.cache
+def _temporary_folder() -> Path:
+    """Return the folder of this process in place of one in the user's home."""
+    try:
+        return Path(tempfile.mkdtemp(prefix=f"{NAME}-state-"))
+    except OSError as error:
+        raise UserError(
+            f"no home folder is known, and no temporary folder can be created: {error.strerror or error}; name a "
+            "folder in XDG_STATE_HOME"
+        ) from error
+
+
+def expanded(path: str, setting: str) -> Path:
+    """Return the path that a setting names, with ``~`` and ``~name`` replaced by the home folder of a user.
+
+    Raises
+    ------
+    UserError
+        There is no such user, or the user has no home folder.
+    """
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        user = Path(path).parts[0]
+        raise UserError(
+            f"{setting} = {one_line(path)!r}: no home folder is known for {one_line(user)}; give a path without ~",
+            WRONG_CALL,
+        ) from None
