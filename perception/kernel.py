@@ -8,15 +8,14 @@ as plain Python.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final, TypeVar, cast
 
 import numpy as np
-from numba.core import types
-from numba.core.registry import CPUDispatcher
 from numpy.typing import NDArray
 
+from perception.kernel_compiler import KernelDispatcher
 from perception.records import INTERPRETED
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -28,25 +27,10 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-_unliteral: Final[Callable[[object], object]] = types.unliteral
-
-
-class _Dispatcher(CPUDispatcher):
-    """Compiles a kernel once for each type of its arguments; numba's own does so for each constant in a call."""
-
-    def get_call_template(  # type: ignore[override]  # versions of numba differ
-        self, args: Iterable[object], kws: Mapping[str, object]
-    ) -> object:
-        named = {name: _unliteral(kind) for name, kind in kws.items()}
-        return super().get_call_template(tuple(map(_unliteral, args)), named)
-
-
 def _compiled(function: F, **options: object) -> F:
     if INTERPRETED:
         return function
-    dispatcher = _Dispatcher(function, targetoptions={"nopython": True, **options})
-    dispatcher.enable_caching()
-    return cast("F", dispatcher)
+    return cast("F", KernelDispatcher(function, **options))
 
 
 def kernel(function: F) -> F:

@@ -52,6 +52,9 @@ PARTS: Final = (EMULATOR, BAYES, POLYGONS, PAPER, LOCALIZATION, KNOWN_ROOM)
 emulator, the correction of drift, and finding the robot in a known room. A file with the name of a part in the cache
 folder says that it is compiled."""
 
+COMPILED_SUFFIX: Final = ".compiled"
+"""Ending of empty files in the cache folder, one for each kernel that was compiled, from which progress is shown."""
+
 PRIVATE: Final = 0o700
 OTHERS_WRITE: Final = stat.S_IWGRP | stat.S_IWOTH
 

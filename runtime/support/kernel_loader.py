@@ -20,6 +20,7 @@ from config.settings import Settings
 from runtime.support.child_process import kill_child, start_child
 from runtime.support.kernel_cache import (
     BAYES,
+    COMPILED_SUFFIX,
     EMULATOR,
     KNOWN_ROOM,
     LOCALIZATION,
@@ -43,10 +44,7 @@ COMPILING_MAX_S: Final = 600.0
 WARM_UP: Final = "runtime.support.kernel_warmup"
 """The module that compiles, run as a program."""
 
-COMPILED: Final = "*.nbi"
-"""Pattern of numba's index files, one for each compiled kernel."""
-
-KERNEL_COUNTS: Final = MappingProxyType({BAYES: 171, POLYGONS: 65, PAPER: 20, LOCALIZATION: 14, KNOWN_ROOM: 25})
+KERNEL_COUNTS: Final = MappingProxyType({BAYES: 172, POLYGONS: 65, PAPER: 7, LOCALIZATION: 14, KNOWN_ROOM: 25})
 """Kernels of each part that no part before it has, as counted after compiling; for the display of progress only."""
 
 SHARE_MIN: Final = 0.1
@@ -134,7 +132,7 @@ class KernelPreparation:
         host_s = self._host_clock()
         if host_s - self._progress_host_s >= COUNT_PERIOD_S:
             self._progress_host_s = host_s
-            done = min(sum(1 for _ in self._folder.rglob(COMPILED)), self._expected)
+            done = min(sum(1 for _ in self._folder.glob(f"*{COMPILED_SUFFIX}")), self._expected)
             self._progress = progress_text(done, self._expected, host_s - self._begin_host_s)
         return self._progress
 

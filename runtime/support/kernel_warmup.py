@@ -1,9 +1,9 @@
 """Run every kernel once, part by part: this compiles a kernel that was never compiled, and loads one that was.
 
 Two processes that compile the same kernel do the same work twice. So the second process begins with what the first
-one compiles last: `python -m runtime.support.kernel_warmup bayes` compiles the refinement of circles and the edits,
-`… polygons` the refinement of polygons, and `… bayes,emulator whole` everything that these parts need, in this order,
-for a robot whose process has already started.
+one compiles last: `python -m runtime.support.kernel_warmup bayes` compiles the refinement of circles, the edits, and
+what walls need now and then; `… polygons` the refinement of polygons; and `… bayes,emulator whole` everything that
+these parts need, in this order, for a robot whose process has already started.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Final
 from runtime.support.child_process import child_environment
 from runtime.support.kernel_cache import (
     BAYES,
+    COMPILED_SUFFIX,
     EMULATOR,
     KNOWN_ROOM,
     LOCALIZATION,
@@ -30,6 +31,8 @@ from runtime.support.kernel_cache import (
 )
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from config.model import ModelConfig
     from config.settings import Settings
     from perception.pipeline import Perception
@@ -181,6 +184,24 @@ RUN_ONCE: Final[Mapping[str, Callable[[Settings], None]]] = MappingProxyType({
 
 
 @contextlib.contextmanager
+def marking_compiled_kernels(folder: Path) -> Iterator[None]:
+    """Leave a file in the cache folder for each kernel that is compiled meanwhile."""
+    from numba.core import event
+
+    class Marker(event.Listener):  # type: ignore[misc]  # numba has no types
+        def on_start(self, started: event.Event) -> None:
+            pass
+
+        def on_end(self, ended: event.Event) -> None:
+            kernel = ended.data["dispatcher"]
+            with contextlib.suppress(OSError):  # only the progress shown depends on it
+                (folder / f"{kernel.__module__}.{kernel.__name__}{COMPILED_SUFFIX}").touch()
+
+    with event.install_listener("numba:compile", Marker()):
+        yield
+
+
+@contextlib.contextmanager
 def compile_in_parallel(part: str) -> Iterator[None]:
     """Compile the refinement of `part` in another process meanwhile, and wait for it at the end."""
     null = subprocess.DEVNULL
@@ -199,20 +220,27 @@ def compile_in_parallel(part: str) -> Iterator[None]:
 
 
 def compile_refinement(part: str) -> None:
-    """Compile the refinement of a part by a call on an empty state, which does nothing, and edits after circles."""
+    """Compile the refinement of a part, for circles also edits and walls, by calls on an empty state."""
     from config.load import load_settings
     from perception.bayes.kernel_settings import make_settings
     from perception.bayes.polygon_tracks import polygon_quantum
     from perception.bayes.refine import quantum
     from perception.bayes.state import Memory
+    from perception.bayes.wall_corners import find_corners
+    from perception.bayes.wall_initiation import best_line
+    from perception.bayes.wall_merging import drop_explained
 
     settings = load_settings(None)
     bayes = settings.perception.bayes
     memory = Memory(len(settings.ring.mounts), bayes.tracks_max)
     refine = {BAYES: quantum, POLYGONS: polygon_quantum}[part]
-    refine(memory.s, memory.tracks, make_settings(settings.ring, settings.models, bayes), bayes.fresh_share)
+    constants = make_settings(settings.ring, settings.models, bayes)
+    refine(memory.s, memory.tracks, constants, bayes.fresh_share)
     if part == BAYES:
         _edit(settings, _perception(settings, BAYES, settings.models), settings.models, 0)
+        best_line(memory.s, constants, 0)
+        drop_explained(memory.s, memory.tracks, constants, 0)
+        find_corners(memory.s)
 
 
 def compile_whole(parts: Sequence[str]) -> None:
@@ -224,8 +252,8 @@ def compile_whole(parts: Sequence[str]) -> None:
 
 if __name__ == "__main__":
     gc.set_threshold(GARBAGE_MAX)
-    use_kernel_cache()
-    if sys.argv[2:] == ["whole"]:
-        compile_whole(sys.argv[1].split(","))
-    else:
-        compile_refinement(sys.argv[1])
+    with marking_compiled_kernels(use_kernel_cache()):
+        if sys.argv[2:] == ["whole"]:
+            compile_whole(sys.argv[1].split(","))
+        else:
+            compile_refinement(sys.argv[1])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any, cast
 
 import numba
 import numpy as np
@@ -45,20 +44,6 @@ def test_nan_stays_nan() -> None:
 
     assert is_missing(math.nan)
     assert not is_missing(math.inf)
-
-
-@pytest.mark.compiled
-def test_constants_in_calls_need_no_compilation_each() -> None:
-    @kernel
-    def increased(n: int, by: int) -> int:
-        return n + by
-
-    @kernel
-    def increased_thrice(n: int) -> int:
-        return increased(increased(increased(n, 1), 2), by=3)
-
-    assert increased_thrice(1) == 7
-    assert len(cast("Any", increased).signatures) == 1
 
 
 @pytest.mark.compiled

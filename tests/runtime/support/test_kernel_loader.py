@@ -19,7 +19,7 @@ from config.load import load_settings
 from config.settings import Settings
 from runtime.support import kernel_cache as kernels
 from runtime.support import kernel_loader
-from runtime.support.kernel_cache import BAYES, EMULATOR, POLYGONS
+from runtime.support.kernel_cache import BAYES, COMPILED_SUFFIX, EMULATOR, POLYGONS
 from runtime.support.kernel_loader import KernelLoader, KernelPreparation
 from tests.hil.running import ROOT
 
@@ -184,18 +184,17 @@ def test_progress_counts_kernels_and_shows_the_time_left(monkeypatch: pytest.Mon
     host_s = 100.0
     preparation = KernelPreparation((EMULATOR, BAYES), lambda: host_s)
     count = kernel_loader.KERNEL_COUNTS[BAYES]
-    (tmp_path / "room").mkdir()
     assert preparation.progress == f"recognition is being prepared: 0 of {count} kernels"
     done = count // 5
     for k in range(done):
-        (tmp_path / "room" / f"kernel{k}.nbi").touch()
+        (tmp_path / f"kernel{k}{COMPILED_SUFFIX}").touch()
     host_s = 100.5
     assert "0 of" in preparation.progress, "counted once a second"
     host_s = 110.0
     left_s = round(10.0 * (count - done) / done)
     assert preparation.progress == f"recognition is being prepared: {done} of {count} kernels, about {left_s} s left"
     for k in range(count + 5):
-        (tmp_path / "room" / f"kernel{k}.nbi").touch()
+        (tmp_path / f"kernel{k}{COMPILED_SUFFIX}").touch()
     host_s = 120.0
     assert preparation.progress.endswith(f"{count} of {count} kernels; they are being loaded")
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+from numba.core import event
 
 from config.load import load_settings
 from perception.bayes import polygon_tracks, refine
@@ -45,6 +47,15 @@ def test_a_second_process_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) 
 DRIFT = frozenset({"add_landmark", "propagate", "remove_landmark", "update_with_firing"})
 GRID = frozenset({"fill_cell", "score_block", "offer_peaks"})
 TRACK = frozenset({"add_hypothesis", "move", "update_particles", "conclude"})
+
+
+def test_each_compiled_kernel_leaves_a_mark(tmp_path: Path) -> None:
+    compiled, other = ({"dispatcher": kernel} for kernel in (refine.quantum, refine.refine))
+    with kernel_warmup.marking_compiled_kernels(tmp_path), event.trigger_event("numba:compile", compiled):
+        pass
+    with event.trigger_event("numba:compile", other):
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == [f"perception.bayes.refine.quantum{kernels.COMPILED_SUFFIX}"]
 
 
 @pytest.mark.parametrize(

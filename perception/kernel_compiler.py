@@ -1,0 +1,157 @@
+"""Compile kernels in about half of the time that numba takes by itself.
+
+Numba compiles every function as if Python called it: with a wrapper, machine code and a file in the cache of its own.
+Most kernels are called by kernels only. Those are kept as LLVM's intermediate code, linked into each caller, and
+optimised there. Numba also resolves each operation again in every pass of its type inference, compares forty options
+each time, and looks for closures, generators, `with` and parallel loops, which no kernel has.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Final
+
+from llvmlite.binding import Linkage
+from numba.core import compiler, event, sigutils, typed_passes, types, typing, untyped_passes
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler_machinery import PassManager
+from numba.core.dispatcher import _FunctionCompiler
+from numba.core.registry import CPUDispatcher, cpu_target
+
+Untyped = Any
+"""What numba gives no types to."""
+
+Args = tuple[Untyped, ...]
+"""Numba's types of the arguments of a call."""
+
+_unliteral: Final[Callable[[object], object]] = types.unliteral
+
+_PASSES: Final = (
+    untyped_passes.TranslateByteCode,
+    untyped_passes.FixupArgs,
+    untyped_passes.IRProcessing,
+    untyped_passes.GenericRewrites,
+    untyped_passes.ReconstructSSA,
+    typed_passes.NopythonTypeInference,
+    typed_passes.PreLowerStripPhis,
+    typed_passes.IRLegalization,
+    typed_passes.NativeLowering,
+    typed_passes.NoPythonBackend,
+)
+"""Those of numba's passes that change a function of loops and branches on scalars, arrays and records."""
+
+
+class _Pipeline(compiler.CompilerBase):  # type: ignore[misc]  # numba has no types
+    def define_pipelines(self) -> list[PassManager]:
+        passes = PassManager("kernel")
+        for each in _PASSES:
+            passes.add_pass(each, each.__name__)
+        passes.finalize()
+        return [passes]
+
+
+class _Options(compiler.Flags):  # type: ignore[misc]
+    """Compared by what was set; numba's own compares all options, at every operation that it resolves."""
+
+    __slots__ = ()
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._values))  # some values have none
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Options) and self._values == other._values
+
+
+class _TypingContext(typing.Context):  # type: ignore[misc]
+    """Numba's own context, which resolves the same operation on the same types once."""
+
+    def __init__(self) -> None:
+        self.__dict__.update(vars(cpu_target.typing_context))
+        self._resolved: dict[Args, Untyped] = {}
+
+    def resolve_function_type(self, func: Untyped, args: Args, kws: Untyped) -> Untyped:
+        if not isinstance(func, types.Type):  # an operation on a constant: equal constants may differ in type
+            return super().resolve_function_type(func, args, kws)
+        key = (func, args, tuple(kws.items()))
+        resolved = self._resolved.get(key)
+        if resolved is None:
+            resolved = super().resolve_function_type(func, args, kws)
+            self._resolved[key] = resolved
+        return resolved
+
+
+@functools.cache
+def _typing_context() -> _TypingContext:
+    return _TypingContext()
+
+
+class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """The code of a kernel for its callers: it is linked, and never run by itself."""
+
+    def finalize(self) -> None:
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        codegen = self._codegen
+        passes, builder = codegen._module_pass_manager(
+            loop_vectorize=codegen._loopvect, slp_vectorize=False, opt=codegen._opt_level, cost="cheap"
+        )
+        passes.run(self._final_module, builder)  # less to link into each caller
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == Linkage.external:
+                function.linkage = "linkonce_odr"
+        self._shared_module = self._final_module
+        self._finalized = True
+
+
+class _Compiler(_FunctionCompiler):  # type: ignore[misc]
+    """Compiles a kernel for Python or for other kernels."""
+
+    def _compile_core(self, args: Args, return_type: Untyped, *, inner: bool = False) -> Untyped:
+        options = _Options()
+        self.targetdescr.options.parse_as_flags(options, self.targetoptions)
+        if inner:
+            options.no_cpython_wrapper = options.no_cfunc_wrapper = options.no_compile = True
+        compiled = compiler.compile_extra(
+            _typing_context(), self.targetdescr.target_context, self.py_func, args=args, return_type=return_type,
+            flags=options, locals=self.locals, pipeline_class=_Pipeline,
+        )  # fmt: skip
+        if compiled.typing_error is not None:
+            raise compiled.typing_error
+        return compiled
+
+    def compile_inner(self, args: Args) -> tuple[object, Untyped]:
+        """Compile for other kernels; return the key by which callers find the code, and the signature."""
+        compiled = self._compile_core(args, None, inner=True)
+        compiled.library.__class__ = _InnerLibrary
+        key = object()
+        self.targetdescr.target_context.insert_user_function(key, compiled.fndesc, [compiled.library])
+        return key, compiled.signature
+
+
+class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]
+    """Compiles a kernel once for each type of its arguments; numba's own does so for each constant in a call."""
+
+    def __init__(self, function: Callable[..., object], **options: object) -> None:
+        super().__init__(function, targetoptions={"nopython": True, **options})
+        self._compiler = _Compiler(function, self.targetdescr, self.targetoptions, self.locals, _Pipeline)
+        self._inner: dict[Args, tuple[object, Untyped]] = {}
+        self.enable_caching()
+
+    def get_call_template(self, args: Iterable[object], kws: Mapping[str, object]) -> Untyped:
+        """Return what types a call by another kernel, as numba asks for it."""
+        named = {name: _unliteral(kind) for name, kind in kws.items()}
+        pysig, folded = self._compiler.fold_argument_types(tuple(map(_unliteral, args)), named)
+        folded = tuple(folded)
+        if folded not in self._inner:
+            with event.trigger_event("numba:compile", {"dispatcher": self}):
+                self._inner[folded] = self._compiler.compile_inner(folded)
+        name, signature = self.__name__, self._inner[folded][1]
+        template = typing.make_concrete_template(f"CallTemplate({name})", key=name, signatures=[signature])
+        return template, pysig, folded, {}
+
+    def get_overload(self, sig: Untyped) -> Untyped:
+        """Return the key of the code that a kernel calls."""
+        args, _ = sigutils.normalize_signature(sig)
+        return self._inner[args][0] if args in self._inner else super().get_overload(sig)

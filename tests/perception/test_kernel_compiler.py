@@ -1,0 +1,91 @@
+"""Kernels called by kernels: right results, one compilation for all constants, and errors that name their cause."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numba
+import numpy as np
+import pytest
+from numba.core import event
+from numba.core.caching import NullCache
+
+from perception.kernel import Floats, kernel
+
+F = TypeVar("F", bound=Callable[..., object])
+
+pytestmark = pytest.mark.compiled
+
+
+def _uncached(function: F) -> F:
+    """Compile a kernel in this run, not load it."""
+    cast("Any", function)._cache = NullCache()
+    return function
+
+
+@kernel
+def raised(x: float, power: int = 2, scale: float = 1.0) -> float:
+    product = scale
+    for _ in range(power):
+        product *= x
+    return product
+
+
+@_uncached
+@kernel
+def raise_all(values: Floats, power: int) -> float:
+    total = 0.0
+    for i in range(values.shape[0]):
+        values[i] = raised(values[i], power)
+        total += raised(values[i], 1) + raised(values[i], scale=0.5) + raised(values[i], 3, 0.0)
+    return total
+
+
+def _compilations(function: object) -> tuple[int, int]:
+    """Return how often a kernel was compiled for Python and for other kernels."""
+    dispatcher = cast("Any", function)
+    return len(dispatcher.signatures), len(dispatcher._inner)
+
+
+def test_a_kernel_for_kernels_is_compiled_once_for_all_constants_and_for_python_only_when_python_calls() -> None:
+    values = np.array([2.0, -3.0, math.inf])
+    total = raise_all(values, 2)
+    assert values.tolist() == [4.0, 9.0, math.inf]
+    assert math.isnan(total), "0 times infinity"
+    for_python, for_kernels = _compilations(raised)
+    assert for_python == 0
+    assert for_kernels == 3, "one for each way of leaving out defaults; the power is a constant in three calls"
+    assert raised(3.0, 3, 2.0) == 54.0
+    assert _compilations(raised) == (1, for_kernels)
+    assert raise_all(np.array([2.0]), 3) == 8.0 + 0.5 * 64.0
+
+
+def test_numba_reports_each_kernel_to_its_listeners() -> None:
+    @kernel
+    def halved(x: float) -> float:
+        return 0.5 * x
+
+    @_uncached
+    @kernel
+    def quartered(x: float) -> float:
+        return halved(halved(x))
+
+    with event.install_recorder("numba:compile") as recorder:
+        assert quartered(8.0) == 2.0
+    ended = [each.data["dispatcher"].__name__ for _, each in recorder.buffer if each.is_end]
+    assert ended == ["halved", "quartered"]
+
+
+def test_an_error_in_a_kernel_for_kernels_names_it() -> None:
+    @kernel
+    def wrong(x: float) -> float:
+        return x.no_such_attribute  # type: ignore[attr-defined,no-any-return]  # the error
+
+    @kernel
+    def calls_wrong(x: float) -> float:
+        return wrong(x) + 1.0
+
+    with pytest.raises(numba.NumbaError, match="no_such_attribute"):
+        calls_wrong(1.0)
