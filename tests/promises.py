@@ -155,8 +155,11 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         "P25": Promise(
             "The base is not believed on its word",
             "a flag in any one sample of the odometry stops the drive; an ARM while bumper or motor fault is "
-            "reported sends no DRIVE; a deadman outside the robot file's bounds (.1 to 1 s): refused, and no gap "
-            "between two cycles of more than .5 s is driven through, whatever the base reports",
+            "reported sends no DRIVE; a base that acknowledges HALT and drives on at .3 m/s: FAULT ≤ 1.2 s later, "
+            "HALT again and again; motion without a command, or none for 1 s on command: SAFE_STOP with the reason; "
+            "one that brakes, is pushed, or held for .85 s: no false alarm; a deadman "
+            "outside the robot file's bounds (.1 to 1 s): refused; no gap of more than .5 s between two cycles is "
+            "driven through, whatever the base reports",
         ),
         "P26": Promise(
             "No file that is not ours is destroyed",

@@ -7,7 +7,6 @@ from types import MappingProxyType
 
 from config.robot import RobotConfig
 from drivers.denning.frames import VERSION, Ident, NakCode
-from drivers.messages import Twist
 
 _RADIUS_TOLERANCE_MM = 1.0
 """The robot reports whole millimetres."""
@@ -170,12 +169,4 @@ def wrong_clock_rate(error: float) -> str:
         f"the robot's clock runs {abs(error):.1%} too {'fast' if error > 0.0 else 'slow'}, and its ranges and speeds "
         f"are measured by it, so objects are located wrongly; its oscillator or its configuration is faulty: restart "
         f"the robot, and repair it if this message returns"
-    )
-
-
-def halt_ignored(twist: Twist) -> str:
-    """Return the message for a base that acknowledged HALT and moves, by its odometry, at this velocity."""
-    return (
-        f"the base acknowledged HALT and still moves at {twist.v:.2f} m/s and {twist.w:.2f} rad/s: HALT is sent "
-        f"again; stop it by its emergency switch, and repair it"
     )

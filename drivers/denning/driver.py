@@ -14,7 +14,7 @@ from drivers.denning.frames import Ack, Drive, Echo, Frame, Hello, Ident, Nak, N
 from drivers.denning.pending_command import PendingCommand, pending_command
 from drivers.denning.pose_stamping import PoseStamper
 from drivers.denning.robot_clock import Jump
-from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout, HaltMonitor
+from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout
 from drivers.denning.wire_units import identity_of, to_wire, wire_pattern
 from drivers.driver import LineState, Received
 from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
@@ -65,7 +65,6 @@ class DenningDriver:
         self._commands: dict[str, PendingCommand] = {}
         self._drive: Twist | None = None
         self._drive_acks = CommandAckMonitor()
-        self._halt_monitor = HaltMonitor()
         self._echo_timeout = EchoTimeout(
             config.link.silence_max_s + _MISSED_STEPS_MAX * 1e-3 * self._pattern.step_period_ms
         )
@@ -188,7 +187,6 @@ class DenningDriver:
         """Clear the latch; without effect unless READY, so that the robot is never released later and unnoticed."""
         if self._state is LineState.READY:
             self._commands.pop("HALT", None)
-            self._halt_monitor.released()
             self._queue("RELEASE")
 
     def set_firing(self, ring: RingConfig) -> None:
@@ -342,8 +340,6 @@ class DenningDriver:
         if name is None or name == "HELLO":  # the answer to HELLO is IDENT
             return
         del self._commands[name]
-        if name == "HALT":
-            self._halt_monitor.acknowledged(self._run_s)
         if name == "PATTERN":
             self._state = LineState.READY
             self._odometry_s, self._bad_at_odometry = self._run_s, self._decoder.bad
@@ -390,9 +386,6 @@ class DenningDriver:
         self._flags |= sample.flags
         if (error := self._stamper.clock_error) is not None and error > 0.0:
             self._go_down(diagnostics.wrong_clock_rate(error))
-        if self._halt_monitor.is_ignored(sample, self._run_s):
-            self._stamper.note(diagnostics.halt_ignored(sample.twist))
-            self.halt()
         self._drive_acks.acknowledged(odom.last_drive_seq)
         if sample.flags & Flags.LATCHED:
             self._drive_acks.forget()  # while latched, the robot refuses every DRIVE with a NAK

@@ -1,4 +1,4 @@
-"""Supervision of faults that a robot does not report: it no longer receives, restarted unnoticed, or does not halt.
+"""Supervision of faults that a robot does not report: it no longer receives, or it restarted unnoticed.
 
 A robot that still sends may have stopped receiving; then its odometry keeps naming an old DRIVE. One that restarted
 just as its clock wrapped seems to carry on; but it has lost its firing pattern, so its ring is silent.
@@ -8,14 +8,8 @@ from __future__ import annotations
 
 from collections import deque
 
-from drivers.messages import Flags, Odometry
-
 _KEPT = 128
 """DRIVEs remembered: half of the 256 sequence numbers, so that each number identifies one of them."""
-_BRAKING_MAX_S = 2.0
-"""Time in which a base comes to rest after it acknowledged HALT, s."""
-_STILL_M_S, _STILL_RAD_S = 0.02, 0.05
-"""Velocities below which a base stands, m/s and rad/s."""
 
 
 class CommandAckMonitor:
@@ -84,28 +78,3 @@ class EchoTimeout:
     def corrupt_frames(self, run_s: float, bad: int) -> int:
         """Return how many corrupt frames came since the last echo, of `bad` so far; 0 before the timeout."""
         return bad - self._bad if run_s - self._echo_s > self._timeout_s else 0
-
-
-class HaltMonitor:
-    """Detects a base that acknowledges HALT and moves on: an acknowledgement alone stops nothing."""
-
-    def __init__(self) -> None:
-        self._acknowledged_s: float | None = None
-
-    def acknowledged(self, run_s: float) -> None:
-        """Note that a HALT was acknowledged."""
-        self._acknowledged_s = run_s
-
-    def released(self) -> None:
-        """Note that the base may move again."""
-        self._acknowledged_s = None
-
-    def is_ignored(self, sample: Odometry, run_s: float) -> bool:
-        """Return True once if the base is not latched and still moves although it had time to brake."""
-        if self._acknowledged_s is None or run_s - self._acknowledged_s <= _BRAKING_MAX_S:
-            return False
-        is_moving = abs(sample.twist.v) > _STILL_M_S or abs(sample.twist.w) > _STILL_RAD_S
-        if not is_moving or sample.flags & Flags.LATCHED:
-            return False
-        self._acknowledged_s = None
-        return True

@@ -51,4 +51,5 @@ class ModeLog:
         left_out = self._limit.take(run_s)
         if left_out is not None:
             more = {"suppressed_before": left_out} if left_out else {}
-            self._log.info("mode", mode=mode.mode.value, reason=mode.reason, cycle=state.cycle, **more)
+            write = self._log.error if mode.mode is Mode.FAULT else self._log.info
+            write("mode", mode=mode.mode.value, reason=mode.reason, cycle=state.cycle, **more)

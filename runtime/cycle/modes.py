@@ -2,7 +2,7 @@
 
 CONNECTING until the robot answers, READY until an operator arms it, DRIVE until anything is wrong, then SAFE_STOP
 with a reason. Leaving SAFE_STOP takes an explicit re-arm: motion never resumes by itself. FAULT is the program's own
-failure and is never left.
+failure, or a base that does not obey HALT, and is never left.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Final
 from drivers.driver import LineState
 from drivers.messages import Flags
 from runtime.cycle.inputs import Inputs, Request
+from runtime.cycle.motion_monitor import Movement
 
 ARMING_MIN_S: Final = 0.1
 """Time from a RELEASE until the flags are believed: odometry sent after it must have had time to arrive, s."""
@@ -39,6 +40,23 @@ LINE_REASONS: Final = MappingProxyType(
 HALTED: Final = "halted by the operator; re-arm to continue"
 DISARMED: Final = "disarmed by the operator; re-arm to continue"
 HELD_UP: Final = "the program was held up for {:.1f} s, so commands came too late: check the load, then re-arm"
+
+RUNS_AWAY: Final = (
+    "the base moves faster or elsewhere than commanded: unless it is being pushed, check its motors, its odometry "
+    "and body.acceleration_max_m_s2, then re-arm"
+)
+MOVES: Final = (
+    "the base moves without a command, and HALT is sent again: unless it is being pushed, stop it by its emergency "
+    "switch and check its motors; then re-arm"
+)
+STANDS: Final = (
+    "the base does not move although it is commanded to: it is held or blocked, its motors are off, or its odometry "
+    "has failed: free it, check its motors, then re-arm"
+)
+NOT_HALTED: Final = (
+    "the base does not obey HALT and drives on, or brakes far less than body.acceleration_max_m_s2: stop it by its "
+    "emergency switch; HALT is sent again and again; repair the base, then restart the program"
+)
 
 
 class Mode(Enum):
@@ -81,7 +99,9 @@ class ModeState:
         return (self.mode, self.entered_run_s) != (before.mode, before.entered_run_s)
 
 
-def advance(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> ModeState:
+def advance(
+    state: ModeState, inputs: Inputs, flags: Flags, gap_s: float, movement: Movement = Movement.AS_COMMANDED
+) -> ModeState:
     """Return the mode in which a cycle decides.
 
     Parameters
@@ -94,15 +114,19 @@ def advance(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> Mod
         The base's, of all odometry since the cycle before.
     gap_s : float
         Time since the cycle before.
+    movement : Movement
+        How the base moves by its odometry.
     """
     run_s, request, fault = inputs.run_s, inputs.request, inputs.fault
     if state.mode is Mode.FAULT:
         return state
     if state.mode is Mode.DRIVE:
-        reason = why_stop(state, inputs, flags, gap_s)
+        reason = why_stop(state, inputs, flags, gap_s) or _why_moving(movement)
         if reason is not None:
             return state.enter(Mode.SAFE_STOP, run_s, reason)
         return state.enter(Mode.READY, run_s, DISARMED) if request is Request.DISARM else state
+    if state.mode is Mode.SAFE_STOP and movement is Movement.UNSTOPPED:
+        return state.enter(Mode.FAULT, run_s, NOT_HALTED)
     if request is Request.HALT:
         return state.enter(Mode.SAFE_STOP, run_s, HALTED)
     if fault is not None:
@@ -114,6 +138,9 @@ def advance(state: ModeState, inputs: Inputs, flags: Flags, gap_s: float) -> Mod
         return replace(state, mode=Mode.CONNECTING, reason=inputs.line_problem, arming_run_s=None)
     if state.mode is Mode.CONNECTING:
         state = state.enter(Mode.READY, run_s)
+    if movement in {Movement.UNCOMMANDED, Movement.UNSTOPPED}:
+        is_known = state.mode is Mode.SAFE_STOP and state.reason == MOVES and state.arming_run_s is None
+        return state if is_known else state.enter(Mode.SAFE_STOP, run_s, MOVES)
     return _advance_arming(state, inputs, flags, gap_s)
 
 
@@ -156,6 +183,17 @@ def _why_interrupt(inputs: Inputs, gap_s: float) -> str | None:
     if inputs.received.rebooted:
         return "the robot restarted, so its odometry began again at zero: check why, then re-arm"
     return None
+
+
+def _why_moving(movement: Movement) -> str | None:
+    """Return why driving must end because of how the base moves."""
+    match movement:
+        case Movement.AS_COMMANDED:
+            return None
+        case Movement.MISSING:
+            return STANDS
+        case _:
+            return RUNS_AWAY
 
 
 def _why_latched(flags: Flags) -> str | None:

@@ -24,6 +24,7 @@ from perception.pipeline import Perception
 from runtime.cycle.drive_requests import STANDSTILL, DriveRequest, Legs, after_stop, drive, validate
 from runtime.cycle.inputs import Inputs
 from runtime.cycle.modes import Mode, ModeState, advance
+from runtime.cycle.motion_monitor import MotionMonitor, Movement
 from runtime.timing.phases import Phase, ignore_phase
 
 __all__ = [
@@ -87,6 +88,8 @@ class State:
     """The schemas' responses in the last cycle, and their sum; empty if no schema was called."""
     hold_reason: str | None = None
     """Why the robot does not move although it may drive; None if it moves."""
+    motion_monitor: MotionMonitor = field(default_factory=MotionMonitor)
+    """Whether the base moves as commanded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +175,7 @@ def _perceive(state: State, inputs: Inputs) -> int:
     if inputs.received.rebooted:
         state.perception.reset()
         state.odometry = None
+        state.motion_monitor = MotionMonitor()
         state.leg = None
         state.drive_request = after_stop(state.drive_request)  # a goal is a place in the odometry before the reboot
         state.last_firing_robot_s = 0.0
@@ -189,7 +193,10 @@ def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
     before = state.mode
     state.vectors, state.hold_reason = (), None
     _accept_drive_request(state, inputs)
+    state.motion_monitor = state.motion_monitor.observe(inputs.received.odometry, inputs.run_s, settings.body)
     command = _command(state, inputs, settings)
+    twist = command if isinstance(command, Twist) else None
+    state.motion_monitor = state.motion_monitor.command(twist, inputs.run_s)
     after = state.mode
     stopped = after.mode in {Mode.SAFE_STOP, Mode.FAULT} and after.entered_since(before)
     if stopped or (before.mode is Mode.DRIVE and after.mode is not Mode.DRIVE):
@@ -212,13 +219,15 @@ def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
     before = state.mode
     gap_s = 0.0 if state.run_s is None else inputs.run_s - state.run_s
     state.run_s = inputs.run_s
-    state.mode = advance(before, inputs, flags, gap_s)
+    movement = state.motion_monitor.movement
+    state.mode = advance(before, inputs, flags, gap_s, movement)
     if state.mode.mode is Mode.DRIVE:
         decision = _drive(state, inputs, settings)
         if isinstance(decision, Drive):
             return decision.twist
         state.mode = state.mode.enter(Mode.SAFE_STOP, inputs.run_s, decision.reason)
-    if state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT} and state.mode.entered_since(before):
+    must_stand = state.mode.mode in {Mode.SAFE_STOP, Mode.FAULT}
+    if must_stand and (state.mode.entered_since(before) or movement is not Movement.AS_COMMANDED):
         return Order.HALT
     if state.mode.arming_run_s is not None and before.arming_run_s is None:
         return Order.RELEASE

@@ -16,6 +16,7 @@ import numpy as np
 from drivers.messages import Firing, Floats, Odometry, Pose, Twist
 from runtime.cycle.drive_requests import validate
 from runtime.cycle.modes import ModeState
+from runtime.cycle.motion_monitor import DIRECTIONS, MotionMonitor
 from runtime.cycle.step import CycleRecord
 from runtime.cycle.summary import ObjectRow
 
@@ -86,6 +87,24 @@ def _twist(what: str, twist: Twist) -> None:
     _bounded(f"{what}.w", twist.w, SPEED_MAX)
 
 
+def _motion(what: str, monitor: MotionMonitor) -> None:
+    _odometry(f"{what}.odometry", monitor.odometry)
+    for command in monitor.commands:
+        _time(f"{what}.commands.run_s", command.run_s)
+        _twist(f"{what}.commands.twist", command.twist)
+    for direction in monitor.directions:
+        _bounded(f"{what}.directions.explained", direction.explained, SPEED_MAX)
+        _bounded(f"{what}.directions.excess", direction.excess, PLACE_MAX_M)
+    if len(monitor.directions) not in {0, DIRECTIONS} or (monitor.odometry is None) != (not monitor.directions):
+        raise ValueError(f"{what} has {len(monitor.directions)} directions, expected {DIRECTIONS} beside odometry")
+    if monitor.still is not None:
+        _pose(f"{what}.still", monitor.still)
+    _time(f"{what}.still_s", monitor.still_s)
+    _time(f"{what}.asked_s", monitor.asked_s)
+    _bounded(f"{what}.asked.along", monitor.asked.along, PLACE_MAX_M)
+    _bounded(f"{what}.asked.turned", monitor.asked.turned, PLACE_MAX_M)
+
+
 def check_mode(mode: ModeState) -> None:
     """Check the times of a mode."""
     _time("mode.entered_run_s", mode.entered_run_s)
@@ -135,6 +154,7 @@ def check_state(state: Mapping[str, Any]) -> None:
         _bounded("state.leg.origin_y", state["leg"].origin_y, PLACE_MAX_M)
     if (problem := validate(state["drive_request"])) is not None:
         raise ValueError(f"state.drive_request: {problem}")
+    _motion("state.motion_monitor", state["motion_monitor"])
     for response in state["vectors"]:
         _bounded("state.vectors.x", response.x, PLACE_MAX_M)
         _bounded("state.vectors.y", response.y, PLACE_MAX_M)

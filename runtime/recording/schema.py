@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import fields
 from itertools import accumulate
+from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Final, Self, TypeAlias, get_type_hints
 
 import numpy as np
@@ -19,6 +20,7 @@ from pydantic_core import core_schema
 
 from perception.snapshot import Snapshot, fixed_shape
 from runtime.cycle.modes import ModeState
+from runtime.cycle.motion_monitor import MotionMonitor
 from runtime.cycle.step import CycleRecord, State
 from runtime.recording.field_checks import (
     COUNT_MAX,
@@ -191,11 +193,13 @@ class ObjectList(TimedPayload):
 
 _HINTS: Final = get_type_hints(State)
 _CARRIED: Final = tuple(f.name for f in fields(State) if f.name != "perception")
+_ADDED: Final = MappingProxyType({"motion_monitor": MotionMonitor()})
+"""Fields that older recordings of this format lack, with the value that they had then."""
 CarriedState: Any = create_model(  # type: ignore[call-overload]  # mypy sees no field definitions here
     "CarriedState",
     __base__=Payload,
     __doc__="What a cycle carries over to the next one, apart from perception's state.",
-    **{name: (_HINTS[name], ...) for name in _CARRIED},
+    **{name: (_HINTS[name], _ADDED.get(name, ...)) for name in _CARRIED},
 )
 
 

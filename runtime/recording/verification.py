@@ -194,7 +194,8 @@ def _keyframe_difference(frame: Keyframe, state: State) -> tuple[str, object, ob
         if array.tobytes() != arrays[name].tobytes():
             where = str(np.argwhere(np.atleast_1d(arrays[name] != array)).tolist()[:1])
             return f"perception {name}{where}", "one value", "another"
-    replayed = encode(CarriedState.model_construct(**carried_state(state)))
+    known = {name: value for name, value in carried_state(state).items() if name in frame.state.model_fields_set}
+    replayed = encode(CarriedState.model_construct(**known))
     return find_difference(orjson.loads(encode(frame.state)), orjson.loads(replayed), "state.")
 
 

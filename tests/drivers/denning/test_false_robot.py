@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.denning.frames import Ack, Drive, Echo, Halt, Hello, Nak, Odom, Pattern, Release, RobotFrame
+from drivers.denning.frames import Ack, Drive, Echo, Halt, Hello, Nak, Odom, Pattern, RobotFrame
 from drivers.denning.robot_clock import Jump, RobotClock
 from drivers.driver import LineState
 from drivers.messages import Twist
@@ -251,49 +251,6 @@ def test_a_pattern_that_is_acknowledged_before_it_is_sent_is_not_in_force() -> N
     assert isinstance(pattern, Pattern)
     harness.send(Ack(0, pattern.seq))
     assert harness.state() is LineState.READY
-
-
-def test_a_base_that_acknowledges_halt_and_moves_on_is_halted_again_and_reported(harness: DriverHarness) -> None:
-    t_us, halts, notes = 0, 0, list[str]()
-    harness.robot.halt()
-    for _ in range(50 * 7):
-        t_us += PERIOD_US
-        harness.pass_time(0.02)
-        harness.odom(t_us, x_0p1mm=t_us // 200, v_mm_s=50)
-        halts += len(only(harness.answer(), Halt))
-        notes += harness.robot.take_received().notes
-    assert halts == 4, "every two seconds"
-    assert len(notes) == halts - 1
-    assert "acknowledged HALT and still moves at 0.05 m/s" in notes[0]
-
-
-@pytest.mark.parametrize(("flags", "v_mm_s"), [(1, 300), (0, 0), (0, 15)])
-def test_a_base_that_is_latched_or_stands_is_not_halted_again(
-    harness: DriverHarness, flags: int, v_mm_s: int
-) -> None:
-    """A latched one is pushed."""
-    t_us = 0
-    harness.robot.halt()
-    harness.answer()
-    for _ in range(250):
-        t_us += PERIOD_US
-        harness.pass_time(0.02)
-        harness.odom(t_us, flags=flags, v_mm_s=v_mm_s, x_0p1mm=t_us // 10_000 * v_mm_s // 10)
-        assert only(harness.answer(), Halt) == []
-    assert harness.robot.take_received().notes == ()
-
-
-def test_a_released_base_may_move(harness: DriverHarness) -> None:
-    t_us = 0
-    harness.robot.halt()
-    harness.answer()
-    harness.robot.release()
-    assert len(only(harness.answer(), Release)) == 1
-    for _ in range(250):
-        t_us += PERIOD_US
-        harness.pass_time(0.02)
-        harness.odom(t_us, v_mm_s=100, x_0p1mm=t_us // 1000)
-        assert only(harness.answer(), Halt) == []
 
 
 def test_ident_again_and_again_with_another_ring_each_time(harness: DriverHarness) -> None:

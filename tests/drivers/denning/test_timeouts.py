@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout, HaltMonitor
-from drivers.messages import Flags, Odometry, Pose, Twist
+from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout
 
 
 def test_the_oldest_unacknowledged_drive_counts_once_acknowledgements_are_supported() -> None:
@@ -55,17 +54,3 @@ def test_corrupt_frames_count_from_the_last_echo_and_after_the_timeout_only() ->
     assert timeout.corrupt_frames(10.6, bad=7) == 4
     timeout.restart(10.7, bad=7)
     assert timeout.corrupt_frames(11.3, bad=7) == 0
-
-
-@pytest.mark.promise("P22")
-def test_a_halt_is_found_ignored_once_for_each_acknowledgement() -> None:
-    moving = Odometry(0.0, Pose(0.0, 0.0, 0.0), 0.0, Twist(0.1, 0.0), Flags.NONE, 0)
-    monitor = HaltMonitor()
-    assert not monitor.is_ignored(moving, 99.0), "none was sent"
-    for acknowledged_s in (100.0, 200.0):
-        monitor.acknowledged(acknowledged_s)
-        at_s = [acknowledged_s + s for s in (1.9, 2.1, 2.2)]
-        assert [monitor.is_ignored(moving, s) for s in at_s] == [False, True, False]
-    monitor.acknowledged(300.0)
-    monitor.released()
-    assert not monitor.is_ignored(moving, 310.0)

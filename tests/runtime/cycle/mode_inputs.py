@@ -8,6 +8,7 @@ from drivers.driver import LineState, Received
 from drivers.messages import Flags
 from runtime.cycle.inputs import Inputs, Request
 from runtime.cycle.modes import ModeState, advance
+from runtime.cycle.motion_monitor import Movement
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class ModeInputs:
     gap_s: float = 0.0
     overrun: str | None = None
     fault: str | None = None
+    movement: Movement = Movement.AS_COMMANDED
 
 
 def advance_by(state: ModeState, seen: ModeInputs) -> ModeState:
@@ -31,4 +33,4 @@ def advance_by(state: ModeState, seen: ModeInputs) -> ModeState:
         seen.run_s, seen.line, seen.trouble, Received((), None, rebooted=seen.rebooted), seen.request,
         overrun=seen.overrun, fault=seen.fault,
     )  # fmt: skip
-    return advance(state, inputs, seen.flags, seen.gap_s)
+    return advance(state, inputs, seen.flags, seen.gap_s, seen.movement)

@@ -186,6 +186,7 @@ def test_a_stop_by_the_arbiter_drops_the_goal() -> None:
     script = driving()
     script.request_drive(Goal(30.0, 0.0))
     while script.state.mode.mode is Mode.DRIVE:
+        script.pose = replace(script.pose, x=script.pose.x + 0.015)
         record = script.request_drive(None, firing=False)
     assert "ring has not reported" in str(record.mode.reason)
     assert script.state.drive_request == TELEOPERATION_ENDED

@@ -12,6 +12,7 @@ from drivers.driver import LineState
 from drivers.messages import Flags
 from runtime.cycle.inputs import GAP_MAX_S, Request
 from runtime.cycle.modes import ARMING_MAX_S, ARMING_MIN_S, DEADMAN_GRACE_S, Mode, ModeState
+from runtime.cycle.motion_monitor import Movement
 from tests.runtime.cycle.mode_inputs import ModeInputs, advance_by
 
 NOW = 100.0
@@ -36,6 +37,11 @@ def flags(value: Flags) -> ModeInputs:
     return replace(QUIET, flags=value)
 
 
+def moves(movement: Movement) -> ModeInputs:
+    return replace(QUIET, movement=movement)
+
+
+UNCOMMANDED, UNSTOPPED = moves(Movement.UNCOMMANDED), moves(Movement.UNSTOPPED)
 WAITED, TOO_SOON, TOO_LONG = 1.01 * ARMING_MIN_S, 0.5 * ARMING_MIN_S, 1.01 * ARMING_MAX_S
 
 TRANSITIONS = [
@@ -108,6 +114,21 @@ TRANSITIONS = [
     (DRIVE, replace(DISARM, line=LineState.CLOSED), Mode.SAFE_STOP, "line to the robot is gone", False),
     (STOPPED, DISARM, Mode.SAFE_STOP, "a reason", False),
     (arming(STOPPED, WAITED), DISARM, Mode.SAFE_STOP, "disarmed by the operator", False),
+    (DRIVE, moves(Movement.MISSING), Mode.SAFE_STOP, "does not move although", False),
+    (DRIVE, UNCOMMANDED, Mode.SAFE_STOP, "faster or elsewhere than commanded", False),
+    (DRIVE, UNSTOPPED, Mode.SAFE_STOP, "faster or elsewhere than commanded", False),
+    (DRIVE, replace(UNSTOPPED, flags=Flags.BUMPER), Mode.SAFE_STOP, "bumper", False),
+    (READY, UNCOMMANDED, Mode.SAFE_STOP, "moves without a command", False),
+    (READY, UNSTOPPED, Mode.SAFE_STOP, "moves without a command", False),
+    (arming(READY, WAITED), UNCOMMANDED, Mode.SAFE_STOP, "moves without a command", False),
+    (STOPPED, UNCOMMANDED, Mode.SAFE_STOP, "moves without a command", False),
+    (arming(STOPPED, WAITED), UNCOMMANDED, Mode.SAFE_STOP, "moves without a command", False),
+    (STOPPED, UNSTOPPED, Mode.FAULT, "does not obey HALT", False),
+    (STOPPED, replace(UNSTOPPED, request=Request.HALT), Mode.FAULT, "does not obey HALT", False),
+    (STOPPED, replace(UNSTOPPED, line=LineState.DOWN), Mode.FAULT, "does not obey HALT", False),
+    (STOPPED, moves(Movement.MISSING), Mode.SAFE_STOP, "a reason", False),
+    (CONNECTING, replace(UNCOMMANDED, line=LineState.HANDSHAKE), Mode.CONNECTING, None, False),
+    (FAULT, UNSTOPPED, Mode.FAULT, "a fault", False),
     (FAULT, DISARM, Mode.FAULT, "a fault", False),
     (FAULT, QUIET, Mode.FAULT, "a fault", False),
     (FAULT, ARM, Mode.FAULT, "a fault", False),
@@ -151,7 +172,7 @@ def test_the_table_covers_every_possible_transition() -> None:
         Mode.CONNECTING: {Mode.CONNECTING, Mode.READY, Mode.SAFE_STOP},
         Mode.READY: {Mode.READY, Mode.CONNECTING, Mode.DRIVE, Mode.SAFE_STOP},
         Mode.DRIVE: {Mode.DRIVE, Mode.READY, Mode.SAFE_STOP},
-        Mode.SAFE_STOP: {Mode.SAFE_STOP, Mode.DRIVE},
+        Mode.SAFE_STOP: {Mode.SAFE_STOP, Mode.DRIVE, Mode.FAULT},
         Mode.FAULT: {Mode.FAULT},
     }
     assert shown == {(a, b) for a, many in everywhere.items() for b in many}
@@ -196,6 +217,16 @@ def test_motion_never_resumes_by_itself(steps: list[ModeInputs], begin: ModeStat
             armed = False
         if before.arming_run_s is not None and state.mode is Mode.SAFE_STOP and state.entered_run_s == run_s:
             armed = False
+
+
+def test_a_base_that_goes_on_being_pushed_is_reported_once() -> None:
+    stopped = advance_by(STOPPED, UNCOMMANDED)
+    later = replace(UNCOMMANDED, run_s=NOW + 1.0)
+    assert advance_by(stopped, later) == stopped
+    armed = advance_by(stopped, replace(ARM, run_s=NOW + 1.0))
+    assert armed.arming_run_s == NOW + 1.0
+    again = advance_by(armed, replace(UNCOMMANDED, run_s=NOW + 1.05))
+    assert (again.arming_run_s, again.entered_run_s) == (None, NOW + 1.05), "the latch is set again"
 
 
 def test_cycles_that_overrun_too_often_stop_a_drive_and_end_an_arming() -> None:

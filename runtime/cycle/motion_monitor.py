@@ -1,0 +1,213 @@
+"""Whether the base moves as it is commanded, by its odometry: an acknowledgement alone moves and stops nothing.
+
+**More than commanded.** In each of four directions (forward, backward, left, right) the commands explain a velocity.
+It is the greatest one commanded within the last `AGE_S`, as the newest odometry may still show a command so old. From
+there on it falls by the base's deceleration: the base brakes. What the odometry moves beyond `GAIN` times that
+velocity plus `NOISE` is summed up, never below zero, and reported above `EXCESS`. A base that brakes, that is a
+quarter too fast, or whose odometry trembles or leaps once therefore moves as commanded.
+
+**Not at all.** While the odometry has not moved by `MOVED`, commands are summed up; to and fro cancels out. The base
+does not move if they reach `ASKED` and `STALL_S` has passed. Commands below `CRAWL` do not count: wheels may stick.
+
+A base that moves without a command may be pushed by hand. Odometry cannot tell that from a base that runs away,
+unless the base was commanded to move and has not stood since: then it was never stopped.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Final
+
+from config.robot import BodyConfig
+from drivers.messages import Odometry, Pose, Twist
+
+
+@dataclass(frozen=True, slots=True)
+class Amount:
+    """A distance and an angle, m and rad, or their rates, m/s and rad/s."""
+
+    along: float
+    turned: float
+
+
+AGE_S: Final = 0.2
+"""Greatest age of a command that the newest odometry shows: a cycle, the way there and back, odometry's period, s."""
+GAIN: Final = 1.25
+"""A base may be faster than commanded by this factor: a controller overshoots, an odometer has a scale."""
+NOISE: Final = Amount(0.005, 0.03)
+"""Velocities that are none: the heading of an odometry drifts."""
+EXCESS: Final = Amount(0.15, 0.2)
+"""Unexplained motion that is reported; more than one leap."""
+LEAP: Final = Amount(0.1, 0.1)
+"""The odometry leapt, and the base did not move, if it moved by more than this beyond its top speed."""
+GAP_MAX_S: Final = 1.0
+"""Samples of the odometry that are farther apart, as after a lost line, say nothing about what lies between."""
+
+STOOD_S: Final = 0.3
+"""After this time in which the odometry has not moved by `MOVED`, the base stands, s."""
+
+STALL_S: Final = 1.0
+"""Least time in which a base moves, s."""
+ASKED: Final = Amount(0.02, 0.05)
+"""Least commanded motion after which a base has moved."""
+MOVED: Final = Amount(0.005, 0.01)
+"""Motion of the odometry that counts as such."""
+CRAWL: Final = Amount(0.03, 0.05)
+"""Commanded velocities below which real wheels may stick."""
+
+
+DIRECTIONS: Final = 4
+NOTHING: Final = Amount(0.0, 0.0)
+STANDSTILL: Final = Twist(0.0, 0.0)
+
+
+class Movement(Enum):
+    """How the base moves, compared with its commands."""
+
+    AS_COMMANDED = "as commanded"
+    MISSING = "missing"
+    """It does not move although it is commanded to."""
+    UNCOMMANDED = "uncommanded"
+    """It moves more than commanded, and stood before: it may be pushed."""
+    UNSTOPPED = "unstopped"
+    """It moves more than commanded, and has not stood since it was commanded to move."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A velocity and when it was commanded, by the run's clock."""
+
+    run_s: float
+    twist: Twist
+
+
+@dataclass(frozen=True, slots=True)
+class Direction:
+    """One of the four directions in which the base moves."""
+
+    explained: float
+    """Velocity that the commands explain, m/s or rad/s."""
+    excess: float = 0.0
+    """Motion that they do not, m or rad."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotionMonitor:
+    """Compares the odometry with the commands; immutable, as keyframes hold it."""
+
+    movement: Movement = Movement.AS_COMMANDED
+    """As of the newest cycle."""
+    commands: tuple[Command, ...] = ()
+    """Of the last `AGE_S`, and the newest one in any case."""
+    odometry: Odometry | None = None
+    """The newest sample."""
+    directions: tuple[Direction, ...] = ()
+    """Forward, backward, left, right; empty before the first sample."""
+    still: Pose | None = None
+    """The pose from which the odometry has not moved by `MOVED`, and …"""
+    still_s: float = 0.0
+    """… for how long, by the robot's clock."""
+    has_stood: bool = True
+    """Whether the base has stood since it was last commanded to move."""
+    asked_s: float = 0.0
+    """For how long the base has been commanded to move without having moved, and …"""
+    asked: Amount = NOTHING
+    """… by how much."""
+
+    def observe(self, odometry: Odometry | None, run_s: float, body: BodyConfig) -> MotionMonitor:
+        """Return the monitor after the newest odometry.
+
+        Parameters
+        ----------
+        odometry : Odometry, optional
+            The newest sample since the cycle before; None if there was none.
+        run_s : float
+            The cycle's beginning, by the run's clock.
+        body : BodyConfig
+            The base's limits.
+        """
+        recent = tuple(c for c in self.commands[:-1] if run_s - c.run_s <= AGE_S) + self.commands[-1:]
+        monitor, last = replace(self, movement=Movement.AS_COMMANDED, commands=recent), self.odometry
+        if odometry is None:
+            return monitor
+        if last is None:  # it may be moving by commands of before
+            limits = (body.speed_max_m_s,) * 2 + (body.turn_max_rad_s,) * 2
+            return replace(monitor, odometry=odometry, directions=tuple(map(Direction, limits)))
+        passed_s = odometry.robot_s - last.robot_s
+        monitor = replace(monitor, odometry=odometry)
+        fastest = Amount(GAIN * body.speed_max_m_s * passed_s, GAIN * body.turn_max_rad_s * passed_s)
+        leap = Amount(fastest.along + LEAP.along, fastest.turned + LEAP.turned)
+        if not 0.0 < passed_s <= GAP_MAX_S or _reaches(_between(last.pose, odometry.pose), leap):
+            return replace(monitor, still=None, asked_s=0.0, asked=NOTHING)
+        return monitor._since(last, odometry, passed_s, body)._stood(odometry.pose, passed_s)._stalled(run_s)
+
+    def command(self, twist: Twist | None, run_s: float) -> MotionMonitor:
+        """Return the monitor after a cycle's command; None where it commands no velocity, which ends any motion."""
+        command = Command(run_s, STANDSTILL if twist is None else twist)
+        has_stood = self.has_stood and command.twist == STANDSTILL
+        return replace(self, commands=(*self.commands, command), has_stood=has_stood)
+
+    def _since(self, last: Odometry, now: Odometry, passed_s: float, body: BodyConfig) -> MotionMonitor:
+        """Return the monitor with what the commands do not explain of the motion between two samples."""
+        moved, asked = _between(last.pose, now.pose), [c.twist for c in self.commands]
+        along = _axis(self.directions[:2], [t.v for t in asked], moved.along, body.acceleration_max_m_s2, passed_s,
+                      NOISE.along)  # fmt: skip
+        turned = _axis(self.directions[2:], [t.w for t in asked], moved.turned, body.turn_acceleration_max_rad_s2,
+                       passed_s, NOISE.turned)  # fmt: skip
+        if max(d.excess for d in along) <= EXCESS.along and max(d.excess for d in turned) <= EXCESS.turned:
+            return replace(self, directions=along + turned)
+        movement = Movement.UNCOMMANDED if self.has_stood else Movement.UNSTOPPED
+        return replace(self, movement=movement, directions=tuple(Direction(d.explained) for d in along + turned))
+
+    def _stood(self, pose: Pose, passed_s: float) -> MotionMonitor:
+        """Return the monitor with how long the base has been standing."""
+        if self.still is None or _reaches(_between(self.still, pose), MOVED):
+            return replace(self, still=pose, still_s=0.0, asked_s=0.0, asked=NOTHING)
+        still_s = self.still_s + passed_s
+        return replace(self, still_s=still_s, has_stood=self.has_stood or still_s >= STOOD_S)
+
+    def _stalled(self, run_s: float) -> MotionMonitor:
+        """Return the monitor with what has been commanded since the base last moved."""
+        command = self.commands[-1] if self.commands else None
+        if command is None or command.twist == STANDSTILL:
+            return replace(self, asked_s=0.0, asked=NOTHING)
+        twist, lasted_s = command.twist, run_s - command.run_s
+        along = self.asked.along + (lasted_s * twist.v if abs(twist.v) >= CRAWL.along else 0.0)
+        turned = self.asked.turned + (lasted_s * twist.w if abs(twist.w) >= CRAWL.turned else 0.0)
+        asked_s, asked = self.asked_s + lasted_s, Amount(along, turned)
+        if asked_s < STALL_S or not _reaches(asked, ASKED):
+            return replace(self, asked_s=asked_s, asked=asked)
+        movement = Movement.MISSING if self.movement is Movement.AS_COMMANDED else self.movement
+        return replace(self, movement=movement, asked_s=0.0, asked=NOTHING)
+
+
+def _axis(
+    before: tuple[Direction, ...],
+    commanded: list[float],
+    moved: float,
+    deceleration: float,
+    passed_s: float,
+    noise: float,
+) -> tuple[Direction, Direction]:
+    """Return both directions of an axis after `passed_s`, in which the base moved by `moved` in the first of them."""
+    both = []
+    for direction, sign in zip(before, (1.0, -1.0), strict=True):
+        fastest = max((sign * velocity for velocity in commanded), default=0.0)
+        explained = max(0.0, fastest, direction.explained - deceleration * passed_s)
+        allowed = (GAIN * max(explained, direction.explained) + noise) * passed_s
+        both.append(Direction(explained, max(0.0, direction.excess + sign * moved - allowed)))
+    return both[0], both[1]
+
+
+def _between(before: Pose, after: Pose) -> Amount:
+    """Return by how much the base moved along its heading, and turned, from one pose to another."""
+    turned = after.theta - before.theta
+    heading = before.theta + 0.5 * turned
+    dx, dy = after.x - before.x, after.y - before.y
+    return Amount(math.cos(heading) * dx + math.sin(heading) * dy, turned)
+
+
+def _reaches(moved: Amount, least: Amount) -> bool:
+    return abs(moved.along) >= least.along or abs(moved.turned) >= least.turned
