@@ -111,7 +111,7 @@ def one_turn(folder: Path, seconds: float, count: int) -> Turn:
     with emulating(folder, ()) as port:
         run = start(
             folder, "run", "runtime.cli", "run", "--headless", "--port", port, "--arm", "--seconds", f"{seconds}",
-            "--json", str(summary), "--no-record", *DRIVE_ON, "--set", "console.port=0",
+            "--json", str(summary), "--force", "--no-record", *DRIVE_ON, "--set", "console.port=0",
         )  # fmt: skip
         page_process: subprocess.Popen[bytes] | None = None
         if count:

@@ -85,7 +85,7 @@ def _run(folder: Path, seconds: float, sets: Sequence[str], *arguments: str) -> 
     options = [option for text in sets for option in ("--set", text)]
     run = start(
         folder, "run", "bench.recording_probe", str(folder / "samples.csv"), "run", "--headless", "--seconds",
-        f"{seconds}", "--json", str(summary), *arguments, *DRIVE_ON, *options,
+        f"{seconds}", "--json", str(summary), "--force", *arguments, *DRIVE_ON, *options,
     )  # fmt: skip
     finish(folder, run, "run", seconds + TIMEOUT_S)
     found: dict[str, Any] = orjson.loads(summary.read_bytes())

@@ -199,7 +199,7 @@ def _ours(folder: Path, seconds: float, sets: Sequence[str]) -> tuple[dict[str, 
     with emulating(folder, options) as port:
         run = start(
             folder, "run", "runtime.cli", "run", "--headless", "--port", port, "--arm", "--seconds", f"{seconds}",
-            "--json", str(summary), *DRIVE_ON, *options,
+            "--json", str(summary), "--force", *DRIVE_ON, *options,
         )  # fmt: skip
         control = start(folder, "wake", "bench.control", "wake", f"{PERIOD_S}", f"{seconds}", str(late))
         for process, name in ((run, "run"), (control, "wake")):
@@ -240,7 +240,8 @@ def emulating(folder: Path, options: Sequence[str]) -> Iterator[str]:
     """Run the emulator and yield its port; its latency trace is complete afterwards."""
     port, trace = folder / "robot", folder / "latency.csv"
     process = start(
-        folder, "emulate", "runtime.cli", "emulate", "--link", str(port), "--latency", str(trace), *options,
+        folder, "emulate", "runtime.cli", "emulate", "--link", str(port), "--latency", str(trace), "--force",
+        *options,
     )  # fmt: skip
     try:
         end_s = time.monotonic() + TIMEOUT_S

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import json
 import os
@@ -9,7 +10,8 @@ import re
 import select
 import stat
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -30,6 +32,8 @@ PIPE_WAIT_S = 5.0
 DEPTH_MAX = 12
 """Deepest nesting of tables and lists; the schema needs six."""
 
+
+_FILES_READ: ContextVar[set[Path] | None] = ContextVar("files_read", default=None)
 
 _KEY = r"""(?:(?<![A-Za-z0-9_-])[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.){0,256}+"|'[^'\n]{0,256}+')"""
 _LONG_KEY = re.compile(rf"{_KEY}(?:[ \t]*+\.[ \t]*+{_KEY}){{31}}")
@@ -106,7 +110,24 @@ def read_document(kind: Kind, name: str | os.PathLike[str], named_by: Source | N
         raise ConfigError(f"{shown}: cannot be read: {error.strerror or error}") from None
     except ValueError as error:  # a NUL or a lone surrogate in the path
         raise ConfigError(f"{shown}: not a path: {one_line(str(error))}") from None
+    if (read := _FILES_READ.get()) is not None:
+        read.add(Path.cwd() / path)
     return Document(parse_document(data, shown), Source(shown, path.parent))
+
+
+@contextlib.contextmanager
+def noting_files_read() -> Iterator[None]:
+    """Note during the block which files are read, for `files_read`."""
+    token = _FILES_READ.set(set())
+    try:
+        yield
+    finally:
+        _FILES_READ.reset(token)
+
+
+def files_read() -> frozenset[Path]:
+    """Return the paths of the files that this command has read, besides shipped ones: no output may be one."""
+    return frozenset(_FILES_READ.get() or ())
 
 
 def parse_document(data: bytes, shown: str) -> dict[str, Any]:

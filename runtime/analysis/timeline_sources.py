@@ -40,6 +40,11 @@ class TimelineSource:
     world: str | None = None
     """The true world, instead of the one in a recording; the start of a log is then at the world's start."""
 
+    @property
+    def inputs(self) -> tuple[str | None, ...]:
+        """The file and those that it is read with, as the user named them."""
+        return (self.file, self.robot, self.world, *self.models)
+
 
 def load_timeline(
     source: TimelineSource, prepare: Callable[[Settings], None], on_step: Progress = lambda: None

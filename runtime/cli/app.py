@@ -12,7 +12,7 @@ import sys
 from cyclopts import App, CycloptsError, Group
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
-from config.files import one_line
+from config.files import noting_files_read, one_line
 from runtime import VERSION
 from runtime.cli.experiment_commands import experiment
 from runtime.cli.first_signals import EXIT_CODE_BASE
@@ -58,7 +58,8 @@ def run_command(arguments: list[str]) -> int:
 
     try:
         use_kernel_cache()
-        result = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        with noting_files_read():
+            result = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except CycloptsError as error:
         print_error(f"{' '.join(str(error).split())} See `echolocate --help`.")

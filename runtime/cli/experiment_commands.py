@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from config.errors import WRONG_CALL, UserError
-from runtime.cli.options import Count, JsonFile, ModelFiles, Sets, Several, UnitsOption, WorldFile
+from runtime.cli.options import Count, Force, JsonFile, ModelFiles, Sets, Several, UnitsOption, WorldFile
 from runtime.simulation.scene_names import SceneName
 
 
@@ -22,6 +22,7 @@ def experiment(
     seeds: Count = 1,
     out: str | None = None,
     json: JsonFile = None,
+    force: Force = False,
     units: UnitsOption = "ft",
     sets: Sets = (),
 ) -> int:
@@ -51,6 +52,8 @@ def experiment(
         Object models to recognise; empty for those of the experiment.
     json
         File for a summary (JSON); None for no file.
+    force
+        Overwrite files that exist already.
     units
         Units of the printed tables.
     sets
@@ -75,17 +78,20 @@ def experiment(
         if scene is not None or world is not None:
             raise UserError("experiment budget has a hall of its own: leave out --scene and --world", WRONG_CALL)
         return run_budgets(
-            sets, budgets_ms=budget_ms, quanta=quanta, models=model, seeds=seeds, json_file=json, units=units
-        )
+            sets, budgets_ms=budget_ms, quanta=quanta, models=model, seeds=seeds, json_file=json, force=force,
+            units=units,
+        )  # fmt: skip
     if name == "drift":
         from runtime.cli.commands.drift import run_drift
 
         if scene is not None or world is not None or out is not None:
             raise UserError("experiment drift has a hall of its own and records nothing: leave out --scene, --world "
                             "and --out", WRONG_CALL)  # fmt: skip
-        return run_drift(sets, models=model, seeds=seeds, json_file=json, units=units)
+        return run_drift(sets, models=model, seeds=seeds, json_file=json, force=force, units=units)
     if scene is not None:
         if name != "hallway" or world is not None:
             raise UserError("--scene is a hallway of its own: call `experiment hallway`, without --world", WRONG_CALL)
-        return run_scenes(scene, sets, models=model, seeds=seeds, json_file=json, units=units)
-    return run_experiment(name, sets, world=world, models=model, seeds=seeds, out=out, json_file=json, units=units)
+        return run_scenes(scene, sets, models=model, seeds=seeds, json_file=json, force=force, units=units)
+    return run_experiment(
+        name, sets, world=world, models=model, seeds=seeds, out=out, json_file=json, force=force, units=units
+    )

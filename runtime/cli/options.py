@@ -18,6 +18,9 @@ Sets = Annotated[
     ),
 ]
 JsonFile = Annotated[str | None, Parameter(name="--json", help="Write a summary to this file (JSON).")]
+Force = Annotated[
+    bool, Parameter(name="--force", negative="", show_default=False, help="Overwrite files that exist already.")
+]
 UnitsOption = Annotated[Literal["m", "ft"], Parameter(help="Units of the printed tables.")]
 Flag = Parameter(negative="", show_default=False)
 Several = Parameter(negative="", consume_multiple=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 from cyclopts import Parameter
 
 from config.errors import WRONG_CALL, UserError
-from runtime.cli.options import Flag, JsonFile, ModelFiles, RobotFile, Sets, UnitsOption
+from runtime.cli.options import Flag, Force, JsonFile, ModelFiles, RobotFile, Sets, UnitsOption
 
 if TYPE_CHECKING:
     from runtime.analysis.timeline_sources import TimelineSource
@@ -60,6 +60,7 @@ def replay(
     robot: RobotFile = None,
     model: ModelFiles = (),
     json: JsonFile = None,
+    force: Force = False,
     units: UnitsOption = "m",
     sets: Sets = (),
 ) -> int:
@@ -93,6 +94,8 @@ def replay(
         Object models to recognise in a ring log; a recording contains its models.
     json
         File for a summary (JSON); None for no file.
+    force
+        Overwrite files that exist already.
     units
         Units of the printed tables.
     sets
@@ -118,7 +121,7 @@ def replay(
 
         return replay_recording(
             log, sets, span=Span(since, until, speed), verify=verify, other=other, robot=robot, models=model,
-            json_file=json, units=units,
+            json_file=json, force=force, units=units,
         )  # fmt: skip
     if verify or other is not None or since or until is not None or speed is not None:
         raise UserError(
@@ -128,12 +131,12 @@ def replay(
     from runtime.cli.commands.replay_ring_log import replay_log
 
     return replay_log(
-        log, sets, robot=robot, models=model, json_file=json, units=units, localize=localize, trajectory=trajectory,
-        map_file=map_file,
+        log, sets, robot=robot, models=model, json_file=json, force=force, units=units, localize=localize,
+        trajectory=trajectory, map_file=map_file,
     )  # fmt: skip
 
 
-def recover(recording: str, /, *, out: str | None = None) -> int:
+def recover(recording: str, /, *, out: str | None = None, force: Force = False) -> int:
     """Restore what can be read of a damaged or incomplete recording.
 
     Parameters
@@ -142,10 +145,12 @@ def recover(recording: str, /, *, out: str | None = None) -> int:
         Damaged file; it is not changed.
     out
         File to write; by default NAME-recovered.mcap in the same folder.
+    force
+        Overwrite it if it exists already.
     """
     from runtime.cli.commands.recover import recover_recording
 
-    return recover_recording(recording, out)
+    return recover_recording(recording, out, force=force)
 
 
 def figures(
@@ -154,6 +159,7 @@ def figures(
     *,
     out: str,
     still: Annotated[bool, Flag] = False,
+    force: Force = False,
     options: SourceOptions = NO_OPTIONS,
     units: UnitsOption = "m",
     sets: Sets = (),
@@ -166,6 +172,8 @@ def figures(
         Folder for the figures: SVG, PDF and PNG; the animation as GIF, and as MP4 if ffmpeg is installed.
     still
         Leave out the animation.
+    force
+        Overwrite files that exist already.
     file
         Recording or ring log of the run.
     options
@@ -177,7 +185,7 @@ def figures(
     """
     from runtime.cli.commands.figures import draw_figures
 
-    return draw_figures(options.timeline_source(file, sets), out, moving=not still, units=units)
+    return draw_figures(options.timeline_source(file, sets), out, moving=not still, force=force, units=units)
 
 
 def report(
@@ -185,6 +193,7 @@ def report(
     /,
     *,
     out: str | None = None,
+    force: Force = False,
     options: SourceOptions = NO_OPTIONS,
     units: UnitsOption = "m",
     sets: Sets = (),
@@ -195,6 +204,8 @@ def report(
     ----------
     out
         Page to write; by default NAME.html in the folder of FILE.
+    force
+        Overwrite it if it exists already.
     file
         Recording or ring log of the run.
     options
@@ -206,7 +217,7 @@ def report(
     """
     from runtime.cli.commands.report import write_report
 
-    return write_report(options.timeline_source(file, sets), out, units=units)
+    return write_report(options.timeline_source(file, sets), out, force=force, units=units)
 
 
 def export(
@@ -215,6 +226,7 @@ def export(
     *,
     to: Literal["csv", "parquet", "foxglove", "rosbag2", "ringlog"],
     out: str,
+    force: Force = False,
     options: SourceOptions = NO_OPTIONS,
     sets: Sets = (),
 ) -> int:
@@ -227,6 +239,8 @@ def export(
         recording as a ring log (ringlog). Formats with * need the extra `export`.
     out
         Folder for tables, new folder for a bag, otherwise the file to write.
+    force
+        Overwrite files that exist already; a bag always needs a new folder.
     file
         Recording or ring log of the run.
     options
@@ -236,7 +250,7 @@ def export(
     """
     from runtime.cli.commands.export import export_run
 
-    return export_run(options.timeline_source(file, sets), to, out)
+    return export_run(options.timeline_source(file, sets), to, out, force=force)
 
 
 def map_command(
@@ -245,6 +259,7 @@ def map_command(
     *,
     out: str,
     grid: str | None = None,
+    force: Force = False,
     options: SourceOptions = NO_OPTIONS,
     sets: Sets = (),
 ) -> int:
@@ -256,6 +271,8 @@ def map_command(
         World file to write (TOML).
     grid
         Image to write (PGM); its YAML is written beside it.
+    force
+        Overwrite files that exist already.
     file
         Recording or ring log of the run.
     options
@@ -265,4 +282,4 @@ def map_command(
     """
     from runtime.cli.commands.map_run import map_run
 
-    return map_run(options.timeline_source(file, sets), out, grid)
+    return map_run(options.timeline_source(file, sets), out, grid, force=force)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from runtime.cli.options import ConfigFile, Count, Flag, JsonFile, RobotFile, Sets, UnitsOption, WorldFile
+from runtime.cli.options import ConfigFile, Count, Flag, Force, JsonFile, RobotFile, Sets, UnitsOption, WorldFile
 
 
 def run(
@@ -21,6 +21,7 @@ def run(
     no_record: Annotated[bool, Flag] = False,
     no_console: Annotated[bool, Flag] = False,
     json: JsonFile = None,
+    force: Force = False,
     map_file: Annotated[str | None, Parameter(name="--map")] = None,
     world: str | None = None,
     seed: Count = 0,
@@ -63,6 +64,8 @@ def run(
         Run file, or the name of a shipped one; None for the default settings.
     json
         File for a summary at the end of the run (JSON); None for no file.
+    force
+        Overwrite files that exist already.
     units
         Units of the printed tables.
     sets
@@ -70,10 +73,10 @@ def run(
     """
     from runtime.cli.commands.run import EmulatorOptions, run_robot
 
-    emulator = EmulatorOptions(world=world, seed=seed, trace=trace, faults=faults)
+    emulator = EmulatorOptions(world=world, seed=seed, trace=trace, faults=faults, force=force)
     return run_robot(
         config, sets, port=port, arm=arm, seconds=seconds, headless=headless, record=record, map_file=map_file,
-        no_record=no_record, no_console=no_console, json_file=json, emulator=emulator, units=units,
+        no_record=no_record, no_console=no_console, json_file=json, force=force, emulator=emulator, units=units,
     )  # fmt: skip
 
 
@@ -86,6 +89,7 @@ def emulate(
     robot: RobotFile = None,
     trace: str | None = None,
     latency: str | None = None,
+    force: Force = False,
     clock: float = 0.0,
     control: Annotated[bool, Flag] = False,
     config: ConfigFile = None,
@@ -106,6 +110,8 @@ def emulate(
         Write the true poses to this file (CSV), 100 rows a second.
     latency
         Write to this file (CSV) when each echo was sent and when each drive command arrived.
+    force
+        Overwrite files that exist already.
     clock
         Initial value of the robot's own clock, s; it wraps at 4294.967296.
     control
@@ -127,7 +133,7 @@ def emulate(
 
     return emulate_robot(
         config, sets, world=world, robot=robot, link=link, faults=faults, seed=seed, trace=trace,
-        latency=latency, clock_s=clock, end_with_parent=end_with_parent, control=control,
+        latency=latency, force=force, clock_s=clock, end_with_parent=end_with_parent, control=control,
     )  # fmt: skip
 
 

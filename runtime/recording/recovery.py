@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final
 
 from mcap.writer import CompressionType, Writer
 
@@ -16,7 +16,7 @@ from runtime.recording.reader import RecordingError, check_format, check_origin,
 from runtime.recording.schema import FORMAT
 
 PARTIAL: Final = ".part"
-"""Suffix of the file until it is complete."""
+"""Suffix of the file until it is complete, after the number of the process."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +45,15 @@ def recover(source: Path, target: Path) -> Recovered:
     OSError
         The target cannot be written; it does not exist then.
     """
-    partial = target.with_name(target.name + PARTIAL)
+    partial = target.with_name(f"{target.name}.{os.getpid()}{PARTIAL}")
     with map_file(source) as data:
         scanner = McapScanner(data)
         check_origin(source, scanner)
+        # Exclusively: a file of any name may be the user's, or even the source.
+        file = partial.open("xb")
         try:
-            recovered = _copy(scanner, source, partial, target)
+            with file:
+                recovered = _copy(scanner, source, file, target)
             partial.replace(target)
         finally:
             partial.unlink(missing_ok=True)
@@ -58,31 +61,30 @@ def recover(source: Path, target: Path) -> Recovered:
     return recovered
 
 
-def _copy(scanner: McapScanner, source: Path, partial: Path, target: Path) -> Recovered:
+def _copy(scanner: McapScanner, source: Path, file: BinaryIO, target: Path) -> Recovered:
     chunks = messages = cycles = 0
     first_ns = last_ns = 0
-    with partial.open("wb") as file:
-        writer = Writer(file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD, index_types=INDEX,
-                        enable_data_crcs=True)  # fmt: skip
-        writer.start(profile=scanner.profile or f"{PROFILE}/{FORMAT}", library=scanner.library or PROFILE)
-        channels: dict[str, int] = {}
-        for chunk in scanner.chunks():
-            for message in chunk:
-                if message.topic not in channels:
-                    channels[message.topic] = _register(writer, scanner, message)
-                writer.add_message(channels[message.topic], message.log_ns, message.data, message.log_ns)
-                first_ns = message.log_ns if not messages else min(first_ns, message.log_ns)
-                last_ns = max(last_ns, message.log_ns)
-                messages += 1
-                cycles += message.topic == CYCLE
-            chunks += 1
-            writer.flush()
-        if not messages:
-            check_format(source, scanner)
-            raise RecordingError(f"{source}: holds no whole chunk: nothing can be recovered")
-        writer.finish()
-        file.flush()
-        os.fsync(file.fileno())
+    writer = Writer(file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD, index_types=INDEX,
+                    enable_data_crcs=True)  # fmt: skip
+    writer.start(profile=scanner.profile or f"{PROFILE}/{FORMAT}", library=scanner.library or PROFILE)
+    channels: dict[str, int] = {}
+    for chunk in scanner.chunks():
+        for message in chunk:
+            if message.topic not in channels:
+                channels[message.topic] = _register(writer, scanner, message)
+            writer.add_message(channels[message.topic], message.log_ns, message.data, message.log_ns)
+            first_ns = message.log_ns if not messages else min(first_ns, message.log_ns)
+            last_ns = max(last_ns, message.log_ns)
+            messages += 1
+            cycles += message.topic == CYCLE
+        chunks += 1
+        writer.flush()
+    if not messages:
+        check_format(source, scanner)
+        raise RecordingError(f"{source}: holds no whole chunk: nothing can be recovered")
+    writer.finish()
+    file.flush()
+    os.fsync(file.fileno())
     return Recovered(
         target, chunks, messages, cycles, first_ns, last_ns, tuple(scanner.corrupt_regions), scanner.finished
     )  # fmt: skip

@@ -204,11 +204,15 @@ def terminal_writer(name: str, stream: TextIO) -> BackgroundWriter[bytes]:
     return BackgroundWriter(name, write_all)
 
 
+def log_path(config: LogConfig) -> Path:
+    """Return the path of the log file: the configured one, or else `echolocate.jsonl` in the user's state folder."""
+    return state_folder() / LOG_FILE if config.file is None else expanded(config.file, "log.file")
+
+
 def _open_file(config: LogConfig) -> tuple[int | None, str | None]:
     """Return the descriptor of the log file, or None and the reason why the default file cannot be written."""
-    path = Path(LOG_FILE) if config.file is None else expanded(config.file, "log.file")
+    path = log_path(config)
     try:
-        path = state_folder() / path if config.file is None else path
         path.parent.mkdir(parents=True, exist_ok=True)
         return os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NOCTTY, 0o600), None
     except OSError as error:

@@ -137,7 +137,7 @@ class Emulated:
 def emulated(folder: Path, *arguments: str) -> Iterator[Emulated]:
     """Run the emulator by itself."""
     robot = Emulated(str(folder / "robot"), folder / "trace.csv")
-    command = ["emulate", "--link", robot.port, "--trace", str(robot.trace), *arguments]
+    command = ["emulate", "--link", robot.port, "--trace", str(robot.trace), "--force", *arguments]
     with running(folder, "emulate", *command) as emulator:
         wait_for(lambda: emulator.out.startswith("ready") or emulator.process.poll() is not None, "ready")
         assert emulator.process.poll() is None, emulator.err

@@ -34,7 +34,7 @@ RECORDED_BYTES = 40_000
 def record(folder: Path, seconds: float, *more: str) -> dict[str, Any]:
     """Record a run of the six-drum hall and return its summary."""
     path = folder / "summary.json"
-    command = ["run", "--seconds", str(seconds), "--json", str(path), *TIGHT, *more]
+    command = ["run", "--seconds", str(seconds), "--json", str(path), "--force", *TIGHT, *more]
     with running(folder, "run", *command, "--record", str(folder / "hall.mcap")) as run:
         assert run.process.wait(seconds + 60.0) == 0, run.err
     got: dict[str, Any] = json.loads(path.read_bytes())
@@ -44,7 +44,7 @@ def record(folder: Path, seconds: float, *more: str) -> dict[str, Any]:
 def verify(path: Path, *more: str) -> dict[str, Any]:
     """Replay a recording, fail where anything differs, and return the summary."""
     summary = path.with_suffix(".json")
-    assert run_command(["replay", str(path), "--verify", "--json", str(summary), *more]) == DONE
+    assert run_command(["replay", str(path), "--verify", "--json", str(summary), "--force", *more]) == DONE
     got: dict[str, Any] = json.loads(summary.read_bytes())
     assert got["verify"]["differences"] == 0
     return got
@@ -94,7 +94,7 @@ def hour_mb(size: int, seconds: float) -> float:
 def killed(folder: Path, name: str, after_s: float) -> tuple[Path, float]:
     """Kill a recorded run some time after its first cycle; return the file, and when it was killed, in Unix time."""
     path = folder / "hall.mcap"
-    with running(folder, name, "run", "--record", str(path), *TIGHT) as run:
+    with running(folder, name, "run", "--record", str(path), "--force", *TIGHT) as run:
         run.comes_to("DRIVE")
         time.sleep(after_s)
         run.process.kill()

@@ -6,7 +6,7 @@ import csv
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
@@ -15,17 +15,15 @@ from runtime.analysis.timeline import Timeline
 Table: TypeAlias = Mapping[str, Sequence[Any]]
 """Columns by name, all of the same length. None means unknown."""
 
+NAMES: Final = ("echoes", "segments", "objects", "odometry")
+"""Tables, and files without their suffix."""
 FRAME_NOTE = "metres, radians, seconds after the first cycle; coordinates in the frame of the odometry"
 
 
 def tables(timeline: Timeline) -> dict[str, Table]:
     """Return the tables of a run by name."""
-    return {
-        "echoes": _echoes(timeline),
-        "segments": _segments(timeline),
-        "objects": _objects(timeline),
-        "odometry": _odometry(timeline),
-    }
+    found = (_echoes(timeline), _segments(timeline), _objects(timeline), _odometry(timeline))
+    return dict(zip(NAMES, found, strict=True))
 
 
 def _echoes(timeline: Timeline) -> Table:

@@ -63,7 +63,7 @@ class OccupancyImage:
         """
         rows, columns = self.pixels.shape
         path.write_bytes(b"P5\n%d %d\n255\n" % (columns, rows) + self.pixels.tobytes())
-        beside = path.with_suffix(".yaml")
+        beside = yaml_beside(path)
         beside.write_text(
             f"image: {path.name}\nmode: trinary\nresolution: {RESOLUTION_M}\n"
             f"origin: [{self.x_m:.3f}, {self.y_m:.3f}, 0.0]\n"
@@ -71,6 +71,11 @@ class OccupancyImage:
             encoding="utf-8",
         )
         return beside
+
+
+def yaml_beside(path: Path) -> Path:
+    """Return the path of the YAML that describes an image."""
+    return path.with_suffix(".yaml")
 
 
 def occupancy_image(

@@ -33,6 +33,8 @@ SECONDS: Final = 8.0
 REST_S: Final = 2.5
 """Pause on the last frame."""
 DPI: Final = 100
+MOVING: Final = ("gif", "mp4")
+"""Formats; the second only if ffmpeg is installed."""
 ROOM_IN: Final = 1.45
 """Height for title, axis label and legend, which lists everything."""
 COLOURS: Final = 128
@@ -129,9 +131,10 @@ def save_moving(
     if not shown:
         return []
     step_s = max(0.05, SECONDS / len(shown))
-    paths = [_gif(shown, step_s, folder / f"{name}.gif")]
+    gif, mp4 = (folder / f"{name}.{kind}" for kind in MOVING)
+    paths = [_gif(shown, step_s, gif)]
     if (ffmpeg := shutil.which("ffmpeg")) is not None:
-        paths += _mp4(shown, step_s, folder / f"{name}.mp4", ffmpeg)
+        paths += _mp4(shown, step_s, mp4, ffmpeg)
     return paths
 
 

@@ -28,6 +28,8 @@ from runtime.analysis.plots.plot_style import MUTED, WIDTH_IN
 from runtime.analysis.timeline import Timeline
 from runtime.support.length_format import Units
 
+NAMES: Final = ("raw", "segments", "clusters", "models")
+"""The figures, in the paper's order."""
 HEIGHT_MIN_IN, HEIGHT_MAX_IN = 3.0, 8.5
 ROOM_IN: Final = 1.2
 """Height for title, axis label and legend."""
@@ -99,14 +101,14 @@ def pictures(timeline: Timeline, units: Units) -> dict[str, Figure]:
             axes, last.objects, timeline, frame, units
         )
 
-    layers = {
-        "raw": ("Raw data", f"{count:,} echoes in {timeline.seconds:.0f} s{few}", raw),
-        "segments": ("Segments", f"{len(last.segments):,} outline segments in the map", segments),
-        "clusters": ("Clusters", f"{len(last.clusters)} clusters of outline segments", clusters),
-        "models": ("Matched models", f"{len(last.objects)} recognised, by {method}", models),
-    }
+    layers = (
+        ("Raw data", f"{count:,} echoes in {timeline.seconds:.0f} s{few}", raw),
+        ("Segments", f"{len(last.segments):,} outline segments in the map", segments),
+        ("Clusters", f"{len(last.clusters)} clusters of outline segments", clusters),
+        ("Matched models", f"{len(last.objects)} recognised, by {method}", models),
+    )
     drawn = {}
-    for at, (name, (title, line, draw)) in enumerate(layers.items()):
+    for at, (name, (title, line, draw)) in enumerate(zip(NAMES, layers, strict=True)):
         like = "" if numbers is None else f", as the paper's Figure {numbers[at]}"
         drawn[name] = _figure(canvas, f"{title}{like}", line, draw)
     return drawn

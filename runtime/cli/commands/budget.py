@@ -11,7 +11,7 @@ from rich.console import Console
 
 from config.errors import DONE, WRONG_CALL, UserError
 from config.load import load_settings
-from runtime.cli.commands.offline_io import refuse_unwritable
+from runtime.cli.commands.output_files import check_outputs
 from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.progress import progress
 
@@ -28,13 +28,14 @@ def run_budgets(
     models: Sequence[str],
     seeds: int,
     json_file: str | None,
+    force: bool,
     units: Units,
 ) -> int:
     """Drive through the hall under each budget, print a table and return the exit code.
 
     Parameters
     ----------
-    sets, budgets_ms, quanta, models, seeds, json_file, units
+    sets, budgets_ms, quanta, models, seeds, json_file, force, units
         As of `runtime.cli.experiment_commands.experiment`.
 
     Raises
@@ -46,7 +47,7 @@ def run_budgets(
         raise UserError("--budget-ms, --quanta: must be 0 or above", WRONG_CALL)
     settings = load_settings("irregular", sets, models=models)
     console = Console(stderr=True)
-    refuse_unwritable({"--json": json_file})
+    check_outputs({"--json": json_file}, force=force)
     prepare_kernels(settings, console)
     from runtime.cli.tables import budget_table
     from runtime.cycle.summary import write_json

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from config.errors import DONE
 from config.load import load_settings
-from runtime.cli.commands.offline_io import refuse_unwritable
+from runtime.cli.commands.output_files import check_outputs
 from runtime.support.kernel_cache import LOCALIZATION, needed_parts, prepare_kernels
 from runtime.support.progress import progress
 
@@ -18,18 +18,18 @@ if TYPE_CHECKING:
 
 
 def run_drift(
-    sets: Sequence[str], *, models: Sequence[str], seeds: int, json_file: str | None, units: Units
+    sets: Sequence[str], *, models: Sequence[str], seeds: int, json_file: str | None, force: bool, units: Units
 ) -> int:  # fmt: skip
     """Drive the rounds at each level of errors, print a table and return the exit code.
 
     Parameters
     ----------
-    sets, models, seeds, json_file, units
+    sets, models, seeds, json_file, force, units
         As of `runtime.cli.experiment_commands.experiment`.
     """
     settings = load_settings("hallway", sets, models=models)
     console = Console(stderr=True)
-    refuse_unwritable({"--json": json_file})
+    check_outputs({"--json": json_file}, force=force)
     prepare_kernels(settings, console, (*needed_parts(settings), LOCALIZATION))
     from runtime.cli.tables import drift_table
     from runtime.cycle.summary import write_json

@@ -9,6 +9,7 @@ from typing import Final
 
 from config.errors import DONE, WRONG_CALL, UserError
 from config.load import load_settings
+from runtime.cli.commands.output_files import check_outputs
 
 PIPES: Final = (0, 1)
 """Standard input and output, for the program that started this one."""
@@ -27,6 +28,7 @@ def emulate_robot(
     seed: int,
     trace: str | None,
     latency: str | None,
+    force: bool,
     clock_s: float,
     end_with_parent: bool,
     control: bool,
@@ -35,7 +37,7 @@ def emulate_robot(
 
     Parameters
     ----------
-    config, sets, world, robot, link, faults, seed, trace, latency, clock_s, control
+    config, sets, world, robot, link, faults, seed, trace, latency, force, clock_s, control
         As of `runtime.cli.robot_commands.emulate`.
     end_with_parent : bool
         Whether it ends when the process that started it ends.
@@ -54,6 +56,7 @@ def emulate_robot(
     if not 0.0 <= clock_s < CLOCK_WRAP_S:
         raise UserError(f"--clock {clock_s:g}: must be from 0 to below {CLOCK_WRAP_S} s, where it wraps", WRONG_CALL)
     script = () if faults is None else load_faults(faults)
+    check_outputs({"--trace": trace, "--latency": latency}, (faults, link), force=force)
 
     def ready(path: str) -> None:
         sys.stdout.write(f"ready on {path}\n")

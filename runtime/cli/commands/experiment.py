@@ -12,7 +12,8 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings
 from config.settings import Settings
 from drivers.registry import make_driver
-from runtime.cli.commands.offline_io import make_output_folder, plain_console, read_timeline, refuse_unwritable
+from runtime.cli.commands.offline_io import plain_console, read_timeline
+from runtime.cli.commands.output_files import check_outputs, make_output_folder
 from runtime.cli.tables import boxes_table, outcome_line, scene_line, spread_line, table_2
 from runtime.simulation.scene_names import SceneName
 from runtime.support.kernel_cache import prepare_kernels
@@ -39,13 +40,14 @@ def run_experiment(
     seeds: int,
     out: str | None = None,
     json_file: str | None,
+    force: bool,
     units: Units,
 ) -> int:
     """Drive through the experiment's hall once per seed, print the outcome and return the exit code.
 
     Parameters
     ----------
-    name, sets, world, models, seeds, out, json_file, units
+    name, sets, world, models, seeds, out, json_file, force, units
         As of `runtime.cli.experiment_commands.experiment`.
 
     Raises
@@ -58,12 +60,12 @@ def run_experiment(
         raise UserError("the world has no drum: the experiment compares what is recognised with drums", WRONG_CALL)
     make_driver(settings)  # refuses what the robot cannot carry out
     console, output = Console(stderr=True), plain_console()
-    refuse_unwritable({"--json": json_file})
+    folder = None if out is None else make_output_folder(out)
+    check_outputs({"--out": [] if folder is None else run_files(folder, name), "--json": json_file}, force=force)
     prepare_kernels(settings, console)
     from runtime.cycle.summary import write_json
     from runtime.simulation.evaluation import run_seed, summarise
 
-    folder = None if out is None else make_output_folder(out)
     outcomes = []
     with progress(console, "driving", seeds) as step:
         for seed in range(seeds):
@@ -84,6 +86,13 @@ def run_experiment(
         for path in draw_recorded_run(folder, name, console, units):
             output.print(str(path))
     return DONE
+
+
+def run_files(folder: Path, name: str) -> list[Path]:
+    """Return the files that `run_experiment` may write into `--out`: recording, page and figures."""
+    from runtime.cli.commands.figures import figure_files
+
+    return [folder / f"{name}.mcap", folder / f"{name}.html", *figure_files(folder, moving=True)]
 
 
 def record_seed(settings: Settings, seed: int, path: Path) -> SeedOutcome:
@@ -161,18 +170,19 @@ def run_scenes(
     models: Sequence[str],
     seeds: int,
     json_file: str | None,
+    force: bool,
     units: Units,
 ) -> int:
     """Give perception the readings of a scene once per seed, print the outcome and return the exit code.
 
     Parameters
     ----------
-    scene, sets, models, seeds, json_file, units
+    scene, sets, models, seeds, json_file, force, units
         As of `runtime.cli.experiment_commands.experiment`.
     """
     settings = load_settings("hallway", sets, models=models)
     console = Console(stderr=True)
-    refuse_unwritable({"--json": json_file})
+    check_outputs({"--json": json_file}, force=force)
     prepare_kernels(settings, console)
     from runtime.cycle.summary import write_json
     from runtime.simulation.open_loop import run_scene, summarise_scene

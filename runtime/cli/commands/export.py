@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
-from runtime.cli.commands.offline_io import (
-    make_output_folder,
-    plain_console,
-    read_timeline,
-    refuse_overwriting,
-    require_package,
-    writing,
-)
+from runtime.cli.commands.offline_io import plain_console, read_timeline, require_package
+from runtime.cli.commands.output_files import check_outputs, make_output_folder, writing
 from runtime.support.progress import progress
 
 if TYPE_CHECKING:
@@ -30,12 +25,12 @@ OPTIONAL_PACKAGES: Final = MappingProxyType(
 EXTRA: Final = "export"
 
 
-def export_run(source: TimelineSource, to: ExportFormat, out: str) -> int:
+def export_run(source: TimelineSource, to: ExportFormat, out: str, *, force: bool) -> int:
     """Export a run and return the exit code.
 
     Parameters
     ----------
-    source, to, out
+    source, to, out, force
         As of `runtime.cli.recording_commands.export`.
 
     Raises
@@ -46,16 +41,22 @@ def export_run(source: TimelineSource, to: ExportFormat, out: str) -> int:
     if to in OPTIONAL_PACKAGES:
         require_package(*OPTIONAL_PACKAGES[to], EXTRA)
     target = Path(out)
-    refuse_overwriting(source.file, target)
     console, output = plain_console(stderr=True), plain_console()
     if to == "ringlog":
+        check_outputs({"--out": target}, source.inputs, force=force)
         output.print(f"{target}: {export_ring_log(source, target)} firings")
         return DONE
+    files = [target]
     if to in {"csv", "parquet"}:
+        from runtime.analysis.export.csv_tables import NAMES
+
         target = make_output_folder(out)
-    elif to == "rosbag2" and target.exists():
-        raise UserError(f"--out {out}: exists; a bag needs a new folder", FAILED)
-    timeline = read_timeline(source, console)
+        files = [target / f"{name}.{to}" for name in NAMES]
+    elif to == "rosbag2":
+        if target.exists():
+            raise UserError(f"--out {out}: exists; a bag needs a new folder", FAILED)
+        files = []
+    timeline = read_timeline(source, console, partial(check_outputs, {"--out": files}, source.inputs, force=force))
     with progress(console, "writing"), writing("--out", target):
         for path in write_timeline(timeline, to, target):
             output.print(str(path))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from rich.console import Console
 
 from config.errors import DONE
-from runtime.cli.commands.offline_io import make_output_folder, plain_console, read_timeline, writing
+from runtime.cli.commands.offline_io import plain_console, read_timeline
+from runtime.cli.commands.output_files import check_outputs, make_output_folder, writing
 from runtime.support.length_format import Units
 from runtime.support.progress import progress
 
@@ -16,25 +18,48 @@ if TYPE_CHECKING:
     from runtime.analysis.timeline import Timeline
     from runtime.analysis.timeline_sources import TimelineSource
 
+ANIMATION: Final = "overview"
+"""Name of the animation without its suffix."""
 
-def draw_figures(source: TimelineSource, out: str, *, moving: bool, units: Units) -> int:
+
+def draw_figures(source: TimelineSource, out: str, *, moving: bool, force: bool, units: Units) -> int:
     """Draw all figures of a run and return the exit code.
 
     Parameters
     ----------
-    source, out, units
+    source, out, force, units
         As of `runtime.cli.recording_commands.figures`.
     moving : bool
         Whether the animation is drawn.
     """
     console, output = plain_console(stderr=True), plain_console()
     folder = make_output_folder(out)
-    timeline = read_timeline(source, console)
+    files = figure_files(folder, moving=moving)
+    check = partial(check_outputs, {"--out": files}, source.inputs, force=force)
+    timeline = read_timeline(source, console, check)
     for path in draw_all(timeline, folder, console, moving=moving, units=units):
         output.print(str(path))
     for note in timeline.notes:
         console.print(note)
     return DONE
+
+
+def figure_files(folder: Path, *, moving: bool) -> list[Path]:
+    """Return the files that `draw_all` may write.
+
+    Parameters
+    ----------
+    folder : Path
+        Where they go.
+    moving : bool
+        Whether the animation is drawn.
+    """
+    from runtime.analysis.plots.animation import MOVING
+    from runtime.analysis.plots.figure_files import FORMATS
+    from runtime.analysis.plots.paper_figures import NAMES
+
+    files = [folder / f"{name}.{kind}" for name in NAMES for kind in FORMATS]
+    return files + [folder / f"{ANIMATION}.{kind}" for kind in MOVING if moving]
 
 
 def draw_all(timeline: Timeline, folder: Path, console: Console, *, moving: bool, units: Units) -> list[Path]:
@@ -68,5 +93,5 @@ def draw_all(timeline: Timeline, folder: Path, console: Console, *, moving: bool
             paths += save(figure, folder, name)
             step()
         if moving:
-            paths += save_moving(timeline, units, folder, "overview", step)
+            paths += save_moving(timeline, units, folder, ANIMATION, step)
     return paths

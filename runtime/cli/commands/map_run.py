@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,24 +12,19 @@ import numpy as np
 from config.errors import DONE, FAILED, UserError
 from config.files import utf8
 from config.world import ITEMS_MAX
-from runtime.cli.commands.offline_io import (
-    plain_console,
-    read_timeline,
-    refuse_overwriting,
-    refuse_unwritable,
-    writing,
-)
+from runtime.cli.commands.offline_io import plain_console, read_timeline
+from runtime.cli.commands.output_files import check_outputs, writing
 
 if TYPE_CHECKING:
     from runtime.analysis.timeline_sources import TimelineSource
 
 
-def map_run(source: TimelineSource, out: str, grid: str | None) -> int:
+def map_run(source: TimelineSource, out: str, grid: str | None, *, force: bool) -> int:
     """Write the map of a run and return the exit code.
 
     Parameters
     ----------
-    source, out, grid
+    source, out, grid, force
         As of `runtime.cli.recording_commands.map_command`.
 
     Raises
@@ -36,16 +32,13 @@ def map_run(source: TimelineSource, out: str, grid: str | None) -> int:
     UserError
         The input cannot be read, an output cannot be written, or the map is too large for one.
     """
-    from runtime.analysis.export.occupancy_image import occupancy_image
+    from runtime.analysis.export.occupancy_image import occupancy_image, yaml_beside
     from runtime.analysis.export.shapes import firing_scans
     from runtime.analysis.export.world_file import world_of, world_text
 
-    for target in (out, grid):
-        if target is not None:
-            refuse_overwriting(source.file, Path(target))
-    refuse_unwritable({"--out": out, "--grid": grid})
     console, output = plain_console(stderr=True), plain_console()
-    timeline = read_timeline(source, console)
+    files = {"--out": out, "--grid": grid, "--grid (its YAML)": None if grid is None else yaml_beside(Path(grid))}
+    timeline = read_timeline(source, console, partial(check_outputs, files, source.inputs, force=force))
     if len(timeline.objects) + len(timeline.walls) > ITEMS_MAX:
         raise UserError(f"{source.file}: a world file holds at most {ITEMS_MAX} objects of a kind", FAILED)
     settings = timeline.settings

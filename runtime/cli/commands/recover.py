@@ -7,14 +7,20 @@ from typing import Final
 
 from rich.console import Console
 
-from config.errors import DONE, FAILED, WRONG_CALL, UserError
+from config.errors import DONE, WRONG_CALL, UserError
+from runtime.cli.commands.output_files import check_outputs, writing
 
 SHOWN_MAX: Final = 10
 """Damaged places that are listed."""
 
 
-def recover_recording(source: str, out: str | None) -> int:
+def recover_recording(source: str, out: str | None, *, force: bool) -> int:
     """Write what can be read of a recording into a new one and return the exit code.
+
+    Parameters
+    ----------
+    source, out, force
+        As of `runtime.cli.recording_commands.recover`.
 
     Raises
     ------
@@ -25,14 +31,11 @@ def recover_recording(source: str, out: str | None) -> int:
 
     path = Path(source)
     target = path.with_name(f"{path.stem}-recovered.mcap") if out is None else Path(out)
-    if target.absolute() == path.absolute():
-        raise UserError(f"--out {out}: is the input itself; choose another name", WRONG_CALL)
-    try:
+    if target.exists() and not target.is_file():
+        raise UserError(f"--out {target}: is not a file; choose another name", WRONG_CALL)
+    check_outputs({"--out": target}, (source,), force=force)
+    with writing("--out", target):
         recovered = recover(path, target)
-    except OSError as error:
-        raise UserError(
-            f"{target}: cannot be written: {error.strerror or error}; choose another place with --out", FAILED
-        ) from error
     console = Console(soft_wrap=True, highlight=False)
     for region in recovered.corrupt_regions[:SHOWN_MAX]:
         console.print(str(region))

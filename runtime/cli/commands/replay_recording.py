@@ -14,7 +14,8 @@ from rich.console import Console
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings, override_settings
-from runtime.cli.commands.offline_io import plain_console, refuse_unwritable
+from runtime.cli.commands.offline_io import plain_console
+from runtime.cli.commands.output_files import check_outputs
 from runtime.cli.tables import objects_table
 from runtime.cycle.summary import object_row, write_json
 from runtime.recording.replay_summary import ReplaySummary
@@ -68,13 +69,14 @@ def replay_recording(
     robot: str | None,
     models: Sequence[str],
     json_file: str | None,
+    force: bool,
     units: Units,
 ) -> int:
     """Replay a recording, print the outcome and return the exit code.
 
     Parameters
     ----------
-    log, sets, verify, other, robot, models, json_file, units
+    log, sets, verify, other, robot, models, json_file, force, units
         As of `runtime.cli.recording_commands.replay`.
     span : Span
         The part to replay.
@@ -96,6 +98,7 @@ def replay_recording(
         if has_other_settings:
             settings = other_settings(recording, other, sets, robot=robot, models=models)
             return compare_with_settings(recording, settings, console, units)
+        check_outputs({"--json": json_file}, (log,), force=force)
         return replay_again(recording, console, span=span, verify=verify, json_file=json_file, units=units)
 
 
@@ -138,7 +141,6 @@ def replay_again(
     from runtime.recording.recorder import software_versions
     from runtime.recording.verification import verify_recording
 
-    refuse_unwritable({"--json": json_file})
     prepare_kernels(recording.settings, console)
     now, then = software_versions(), recording.info.versions
     others = [f"{name} {then.get(name)} → {now[name]}" for name in now if then.get(name) != now[name]]

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from config.errors import DONE
 from config.load import load_settings, with_known_room
-from runtime.cli.commands.offline_io import refuse_unwritable
+from runtime.cli.commands.output_files import check_outputs, writing
 from runtime.cli.tables import objects_table, pose_line
 from runtime.cycle.summary import write_json
 from runtime.support.kernel_cache import LOCALIZATION, needed_parts, prepare_kernels
@@ -31,6 +31,7 @@ def replay_log(
     robot: str | None,
     models: Sequence[str],
     json_file: str | None,
+    force: bool,
     units: Units,
     localize: bool = False,
     trajectory: str | None = None,
@@ -40,14 +41,14 @@ def replay_log(
 
     Parameters
     ----------
-    log, sets, robot, models, json_file, units, localize, trajectory, map_file
+    log, sets, robot, models, json_file, force, units, localize, trajectory, map_file
         As of `runtime.cli.recording_commands.replay`.
     """
     settings = load_settings(None, sets, robot=robot, models=models)
     if map_file is not None:
         settings = with_known_room(settings, map_file)
     console = Console(stderr=True)
-    refuse_unwritable({"--json": json_file, "--trajectory": trajectory})
+    check_outputs({"--json": json_file, "--trajectory": trajectory}, (log,), force=force)
     corrects_drift = localize and map_file is None
     prepare_kernels(settings, console, (*needed_parts(settings), *([LOCALIZATION] if corrects_drift else [])))
     from runtime.recording.ring_log import read_ring_log
@@ -67,7 +68,8 @@ def replay_log(
         else:
             summary = replay_firings(settings, firings)
     if trajectory is not None:
-        Path(trajectory).write_text("\n".join([TRAJECTORY_HEADER, *rows, ""]), "utf-8")
+        with writing("--trajectory", trajectory):
+            Path(trajectory).write_text("\n".join([TRAJECTORY_HEADER, *rows, ""]), "utf-8")
     if json_file is not None:
         write_json(json_file, summary)
     output = Console()

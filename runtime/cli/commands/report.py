@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from config.errors import DONE
-from runtime.cli.commands.offline_io import (
-    plain_console,
-    read_timeline,
-    refuse_overwriting,
-    refuse_unwritable,
-    writing,
-)
+from runtime.cli.commands.offline_io import plain_console, read_timeline
+from runtime.cli.commands.output_files import check_outputs, writing
 from runtime.support.length_format import Units
 from runtime.support.progress import progress
 
@@ -23,19 +19,17 @@ if TYPE_CHECKING:
     from runtime.analysis.timeline_sources import TimelineSource
 
 
-def write_report(source: TimelineSource, out: str | None, *, units: Units) -> int:
+def write_report(source: TimelineSource, out: str | None, *, force: bool, units: Units) -> int:
     """Write the page of a run and return the exit code.
 
     Parameters
     ----------
-    source, out, units
+    source, out, force, units
         As of `runtime.cli.recording_commands.report`.
     """
     console = plain_console(stderr=True)
     target = Path(source.file).with_suffix(".html") if out is None else Path(out)
-    refuse_overwriting(source.file, target)
-    refuse_unwritable({"--out": str(target)})
-    timeline = read_timeline(source, console)
+    timeline = read_timeline(source, console, partial(check_outputs, {"--out": target}, source.inputs, force=force))
     write_page(timeline, target, console, units=units)
     plain_console().print(str(target))
     return DONE

@@ -7,6 +7,7 @@ import contextlib
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,7 @@ from config.load import ConfigError, load_settings, with_known_room
 from config.settings import Settings
 from drivers.registry import make_driver
 from runtime import VERSION
-from runtime.cli.commands.offline_io import refuse_unwritable
+from runtime.cli.commands.output_files import check_outputs
 from runtime.cli.commands.run_recording import RunRecording, open_run_recording
 from runtime.cli.first_signals import is_remembered
 from runtime.cli.start_signals import ending_the_start, handled_by_loop
@@ -28,7 +29,7 @@ from runtime.support.file_lock import file_lock
 from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.kernel_loader import KernelPreparation, begin_preparation
 from runtime.support.length_format import Units
-from runtime.support.logs import LogStatus, open_log
+from runtime.support.logs import LogStatus, log_path, open_log
 from runtime.support.sd_notify import SdNotifier
 from runtime.timing.run_clock import RunClock, ScaledClock
 
@@ -52,6 +53,8 @@ class EmulatorOptions:
     seed: int
     trace: str | None
     faults: str | None
+    force: bool = False
+    """Whether the trace may overwrite an existing file."""
 
     def arguments(self, config: str | None, sets: Sequence[str]) -> list[str]:
         """Return the command line of ``echolocate emulate`` with these options."""
@@ -63,7 +66,8 @@ class EmulatorOptions:
             "--faults": self.faults,
         }
         words = [word for option, value in named.items() if value is not None for word in (option, value)]
-        return words + [word for text in sets for word in ("--set", text)]
+        overrides = [word for text in sets for word in ("--set", text)]
+        return [*words, *(["--force"] if self.force else []), *overrides]
 
 
 def run_robot(
@@ -79,6 +83,7 @@ def run_robot(
     no_record: bool,
     no_console: bool,
     json_file: str | None,
+    force: bool,
     emulator: EmulatorOptions,
     units: Units,
 ) -> int:
@@ -86,7 +91,7 @@ def run_robot(
 
     Parameters
     ----------
-    config, sets, port, arm, seconds, headless, record, map_file, no_record, no_console, json_file, units
+    config, sets, port, arm, seconds, headless, record, map_file, no_record, no_console, json_file, force, units
         As of `runtime.cli.robot_commands.run`.
     emulator : EmulatorOptions
         Used without a port.
@@ -107,7 +112,11 @@ def run_robot(
     port_option, port = port, port if port is not None else settings.link.port
     if port is not None:
         settings = with_port(settings, port)
-    refuse_unwritable({"--record": record, "--json": json_file})
+    own_files = {"--record": record, "--json": json_file}
+    check_files = partial(
+        check_outputs, inputs=(emulator.faults, port), force=force, appended={"log.file": log_path(settings.log)}
+    )
+    check_files({**own_files, "--trace": emulator.trace})
     console = Console(stderr=True)
     preparation = begin_preparation(settings)
     if preparation is None:
@@ -115,8 +124,10 @@ def run_robot(
     live = not headless and console.is_terminal and not console.is_dumb_terminal
     log_status = LogStatus()
     with contextlib.ExitStack() as stack:
-        if record is not None:
-            stack.enter_context(file_lock(Path(record), f"--record {record}"))
+        for option, path in own_files.items():
+            if path is not None:
+                stack.enter_context(file_lock(Path(path), f"{option} {path}"))
+        check_files(own_files)  # another run may have written them while kernels were prepared
         clock = ScaledClock() if port is None else RunClock()
         recording = stack.enter_context(
             open_run_recording(settings, record, no_record=no_record, emulated=port is None, clock=clock)

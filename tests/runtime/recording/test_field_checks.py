@@ -97,7 +97,7 @@ def test_every_number_of_a_cycle(small: list[RawMessage], tmp_path: Path) -> Non
 
 
 @pytest.mark.promise("P21")
-@pytest.mark.parametrize("command", [("replay",), ("report", "--out")], ids=["replay", "report"])
+@pytest.mark.parametrize("command", [("replay",), ("report", "--force", "--out")], ids=["replay", "report"])
 def test_commands_end_in_one_line(
     command: tuple[str, ...], small: list[RawMessage], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

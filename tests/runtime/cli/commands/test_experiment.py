@@ -23,7 +23,7 @@ TABLE_2 = [(1.0, 4.0), (4.0, 4.0), (7.0, 4.0), (1.0, -4.0), (4.0, -4.0), (7.0, -
 
 def experiment(tmp_path: Path, *arguments: str) -> dict[str, Any]:
     path = tmp_path / "outcome.json"
-    assert run_command(["experiment", *arguments, "--json", str(path)]) == DONE
+    assert run_command(["experiment", *arguments, "--json", str(path), "--force"]) == DONE
     got = json.loads(path.read_bytes())
     assert isinstance(got, dict)
     return got

@@ -38,7 +38,7 @@ def test_calls_that_are_refused_name_the_cause(
     hall_log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for arguments, code, part in (
-        ([str(hall_log), "--out", str(hall_log)], WRONG_CALL, "is the input itself"),
+        ([str(hall_log), "--out", str(hall_log)], WRONG_CALL, "is an input itself"),
         ([str(tmp_path / "none.csv"), "--out", str(tmp_path / "map.toml")], WRONG_CALL, "none.csv"),
         ([str(hall_log), "--out", str(tmp_path / "no" / "map.toml")], FAILED, "cannot be written"),
     ):
