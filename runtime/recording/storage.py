@@ -7,9 +7,11 @@ written into the folder are left alone.
 from __future__ import annotations
 
 import contextlib
+import heapq
+import os
 import stat
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NamedTuple, Protocol
@@ -25,6 +27,8 @@ MEGABYTE: Final = 1_000_000
 PIN_SUFFIX: Final = ".keep"
 """An empty file with this after a recording's name pins it."""
 PART_DIGITS: Final = 3
+LISTED_MAX: Final = 500
+"""Recordings that are listed: more than a person looks through."""
 WARN_SHARE: Final = 0.9
 """Share of a limit at which a person is warned of what goes next."""
 PART_SHARE: Final = 0.25
@@ -280,23 +284,34 @@ class RecordingFile(NamedTuple):
 
 
 def list_recordings(folder: Path) -> list[RecordingFile]:
-    """Return the recordings in a folder, newest first; empty if the folder does not exist. Blocks on the disk."""
-    found = []
-    with contextlib.suppress(OSError):
-        for path in folder.glob(f"*{SUFFIX}"):
-            with contextlib.suppress(OSError):  # just deleted to make room
-                info = path.stat()
-                if stat.S_ISREG(info.st_mode) and is_utf8(path.name):  # the console has no other text
-                    found.append(RecordingFile(path.name, info.st_size, info.st_mtime))
-    return sorted(found, key=lambda file: (-file.modified_s, file.file))
+    """Return the newest recordings in a folder, newest first; empty if the folder does not exist. Blocks on the disk.
+
+    In a thread it leaves the interpreter to the loop, however many files there are: no single call takes long.
+    """
+    return heapq.nsmallest(LISTED_MAX, _recordings(folder), key=lambda file: (-file.modified_s, file.file))
+
+
+def _recordings(folder: Path) -> Iterator[RecordingFile]:
+    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.endswith(SUFFIX) and is_utf8(entry.name):  # the console has no other text
+                with contextlib.suppress(OSError):  # just deleted to make room
+                    info = entry.stat()
+                    if stat.S_ISREG(info.st_mode):
+                        yield RecordingFile(entry.name, info.st_size, info.st_mtime)
 
 
 def find_recording(folder: Path, name: str) -> Path | None:
-    """Return the path of a recording by its name in a folder; None if `list_recordings` has no such name.
+    """Return the path of a recording by its name in a folder; None if there is none of this name.
 
     A name that leads out of the folder is therefore never found.
     """
-    return next((folder / file.file for file in list_recordings(folder) if file.file == name), None)
+    path = folder / name
+    try:
+        is_file = path.is_file()
+    except ValueError:  # a NUL in the name
+        return None
+    return path if is_file and path.name == name and name.endswith(SUFFIX) and is_utf8(name) else None
 
 
 def recordings_folder(config: RecordingConfig) -> Path:

@@ -107,11 +107,12 @@ class ReplayProcess:
         self._process.stdin.write(orjson.dumps(command) + b"\n")
 
     async def close(self) -> None:
-        """End the process."""
+        """End the process. It is killed at once, also where the caller is cancelled meanwhile."""
         if self._reader is not None:
             self._reader.cancel()
-            await asyncio.gather(self._reader, return_exceptions=True)
         await kill_child(self._process)
+        if self._reader is not None:
+            await asyncio.gather(self._reader, return_exceptions=True)
 
     async def _read_all(self) -> None:
         with contextlib.suppress(asyncio.IncompleteReadError, OSError):
@@ -153,7 +154,8 @@ class ReplayClient:
         self._current = current
         self._units: Units = units
         self._open: dict[int, ReplayProcess] = {}
-        self._opening = 0
+        self._workers = 0
+        """Processes that run, from before their start until after their end."""
         self._closing: set[asyncio.Task[None]] = set()
         self._report_lock = asyncio.Lock()
 
@@ -186,21 +188,23 @@ class ReplayClient:
         if path is None:
             raise ReplayError(f"there is no recording {file!r} in {self._folder}: list the recordings again")
         await self._close(viewer)
-        if len(self._open) + self._opening >= WORKERS_MAX:
+        if self._workers >= WORKERS_MAX:
             raise ReplayError(f"{WORKERS_MAX} recordings are open already, in other pages: close one of them first")
-        self._opening += 1
+        self._workers += 1
         try:
             process = await start_child(self._program, [str(path)], pipes=True, low_priority=True)
-            replay = ReplayProcess(process, partial(_forward, viewer), viewer.send)
-            try:
-                description = await replay.begin()
-            except BaseException:  # a cancellation too: the page may be closed while the recording opens
-                await replay.close()
-                raise
-        finally:
-            self._opening -= 1
+        except BaseException:
+            self._workers -= 1
+            raise
+        replay = ReplayProcess(process, partial(_forward, viewer), viewer.send)
+        try:
+            description = await replay.begin()
+            await self._close(viewer)  # the page may have opened another one meanwhile
+        except BaseException:  # a cancellation too: the page may be closed while the recording opens
+            await self._end(replay)
+            raise
         if viewer.is_gone:
-            await replay.close()
+            await self._end(replay)
             raise ReplayError("the page is gone")
         self._open[id(viewer)] = replay
         viewer.switch(live=False)
@@ -256,7 +260,7 @@ class ReplayClient:
     async def close(self) -> None:
         """End every worker."""
         replays, self._open = list(self._open.values()), {}
-        await asyncio.gather(*(replay.close() for replay in replays), *self._closing, return_exceptions=True)
+        await asyncio.gather(*(self._end(replay) for replay in replays), *self._closing, return_exceptions=True)
 
     async def report(self) -> bytes:
         """Return the report of the run so far as an HTML page, made from the recording in progress.
@@ -283,9 +287,14 @@ class ReplayClient:
         return replay
 
     async def _close(self, viewer: Viewer) -> None:
-        replay = self._open.pop(id(viewer), None)
-        if replay is not None:
+        while (replay := self._open.pop(id(viewer), None)) is not None:
+            await self._end(replay)
+
+    async def _end(self, replay: ReplayProcess) -> None:
+        try:
             await replay.close()
+        finally:
+            self._workers -= 1
 
 
 async def make_report(file: Path, units: Units, timeout_s: float = REPORT_MAX_S) -> bytes:

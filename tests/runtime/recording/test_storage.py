@@ -260,8 +260,28 @@ def test_only_files_of_the_folder_are_recordings(tmp_path: Path) -> None:
     stored(tmp_path / "\udcff.mcap", 7, 300)  # not UTF-8, so no message to the console can name it
     assert list_recordings(tmp_path) == [("a.mcap", 7, 200.0), ("b.mcap", 0, 200.0), ("old.mcap", 3, 100.0)]
     assert find_recording(tmp_path, "old.mcap") == tmp_path / "old.mcap"
-    for name in ("", "none.mcap", "folder.mcap", "../old.mcap", str(tmp_path / "old.mcap"), "log.jsonl"):
+    for name in (
+        "",
+        "none.mcap",
+        "folder.mcap",
+        "../old.mcap",
+        str(tmp_path / "old.mcap"),
+        "log.jsonl",
+        "./old.mcap",
+        "\0.mcap",
+    ):
         assert find_recording(tmp_path, name) is None
+
+
+@pytest.mark.promise("P22")
+def test_the_newest_of_many_are_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And none whose name no page could be sent; all are found by their names."""
+    monkeypatch.setattr("runtime.recording.storage.LISTED_MAX", 10)
+    for k in range(40):
+        stored(tmp_path / f"{k}.mcap", 1, 100 + k)
+    stored(tmp_path / os.fsdecode(b"\xff.mcap"), 1, 1000)
+    assert [file.file for file in list_recordings(tmp_path)] == [f"{k}.mcap" for k in range(39, 29, -1)]
+    assert find_recording(tmp_path, "0.mcap") == tmp_path / "0.mcap"
 
 
 def test_the_folder_of_recordings(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import random
 import shutil
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -15,7 +16,8 @@ import pytest
 
 from runtime.console.clients.client import Frame
 from runtime.console.frames.frame_encoder import EncodedFrame
-from runtime.console.playback.replay_client import ReplayClient, ReplayError, make_report
+from runtime.console.playback.replay_client import WORKERS_MAX, ReplayClient, ReplayError, make_report
+from runtime.console.playback.replay_worker import ANSWER, HEADER
 from runtime.recording.storage import find_recording, list_recordings
 from runtime.support.child_process import ECHOLOCATE, kill_child, start_child
 from tests.hil.machine import TIMEOUT_S
@@ -153,6 +155,74 @@ async def test_workers_are_limited_their_death_is_reported_and_none_outlives_the
             os.kill(pid, 0)
 
 
+@asynccontextmanager
+async def counted_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Callable[[], int]]:
+    """Replace the workers by processes that answer and wait; yield the number of those that run."""
+    answer = tmp_path / "answer"
+    answer.write_bytes(HEADER.pack(ANSWER, 0, 0, 2, 0, 0) + b"{}")
+    started: list[asyncio.subprocess.Process] = []
+
+    async def start(*_: object, **__: object) -> asyncio.subprocess.Process:
+        program = f"sleep 0.0$$; cat {answer}; exec sleep 600"
+        pipe = asyncio.subprocess.PIPE
+        process = await asyncio.create_subprocess_exec(
+            "/bin/sh", "-c", program, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
+        )
+        started.append(process)
+        return process
+
+    monkeypatch.setattr("runtime.console.playback.replay_client.start_child", start)
+    try:
+        yield lambda: sum(process.returncode is None for process in started)
+    finally:
+        for process in started:
+            await kill_child(process)
+
+
+@pytest.mark.promise("P19")
+async def test_a_page_that_opens_again_and_again_has_one_worker(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "run.mcap").touch()
+    page = Page()
+    async with counted_workers(tmp_path, monkeypatch) as running, replay_client(tmp_path) as client:
+        for _ in range(4):
+            found = await asyncio.gather(*(client.open(page, "run.mcap") for _ in range(8)), return_exceptions=True)
+            assert running() == 1
+            assert 1 <= sum(isinstance(one, dict) for one in found) <= WORKERS_MAX
+        await client.close_recording(page)
+        assert running() == 0
+
+
+@pytest.mark.promise("P19")
+async def test_pages_that_close_while_they_open_leave_no_worker(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, measured: Callable[[str], None]
+) -> None:
+    """Cancelled at any moment, twice in a row, and with the page gone or not."""
+    (tmp_path / "run.mcap").touch()
+    rng, most = random.Random(1), 0
+    async with counted_workers(tmp_path, monkeypatch) as running, replay_client(tmp_path) as client:
+        for _ in range(6):
+            pages = [Page() for _ in range(8)]
+            tasks = [asyncio.create_task(client.open(page, "run.mcap")) for page in pages]
+            for page, task in zip(pages, tasks, strict=True):
+                for _ in range(rng.randrange(40)):
+                    await asyncio.sleep(0)
+                most = max(most, running())
+                page.is_gone = True
+                task.cancel()
+                await asyncio.sleep(0)
+                task.cancel()
+                client.leave(page)
+            await asyncio.gather(*tasks, return_exceptions=True)
+            await until(lambda: not client._closing and running() == 0)
+        assert most <= WORKERS_MAX
+        page = Page()
+        await client.open(page, "run.mcap")
+        assert running() == 1, "each has given back its place"
+    measured(f"48 pages closed while their recordings open: at most {most} workers at a time, none left")
+
+
 async def test_a_missing_program_is_reported_in_one_line(folder: Path) -> None:
     client = ReplayClient(folder, "tests.runtime.console.no_such", lambda: None)
     with pytest.raises(ReplayError, match="no_such"):
@@ -219,5 +289,5 @@ async def test_a_page_that_closes_while_its_recording_opens_leaves_no_worker(
     with pytest.raises(asyncio.CancelledError):
         await opening
     assert started[0].returncode is not None
-    assert client._opening == 0
+    assert client._workers == 0
     measured("a page closed while its recording opens: its worker has ended before the command has")
