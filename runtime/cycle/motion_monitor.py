@@ -144,7 +144,7 @@ class MotionMonitor:
         return monitor._since(last, odometry, passed_s, body)._stood(odometry.pose, passed_s)._stalled(run_s)
 
     def command(self, twist: Twist | None, run_s: float) -> MotionMonitor:
-        """Return the monitor after a cycle's command; None where it commands no velocity, which ends any motion."""
+        """Return the monitor after a command that reached the base; None commands no velocity: it ends any motion."""
         command = Command(run_s, STANDSTILL if twist is None else twist)
         has_stood = self.has_stood and command.twist == STANDSTILL
         return replace(self, commands=(*self.commands, command), has_stood=has_stood)

@@ -16,7 +16,7 @@ from behaviors.arbiter import Drive, Stop
 from behaviors.move_ahead import Leg
 from behaviors.response import Response
 from config.settings import Settings
-from drivers.driver import RobotDriver
+from drivers.driver import LineState, RobotDriver
 from drivers.messages import Flags, Odometry, Twist
 from perception.edits import Edit
 from perception.percept import Percept
@@ -195,8 +195,9 @@ def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
     _accept_drive_request(state, inputs)
     state.motion_monitor = state.motion_monitor.observe(inputs.received.odometry, inputs.run_s, settings.body)
     command = _command(state, inputs, settings)
-    twist = command if isinstance(command, Twist) else None
-    state.motion_monitor = state.motion_monitor.command(twist, inputs.run_s)
+    if inputs.line is LineState.READY:  # no other command reaches the base
+        twist = command if isinstance(command, Twist) else None
+        state.motion_monitor = state.motion_monitor.command(twist, inputs.run_s)
     after = state.mode
     stopped = after.mode in {Mode.SAFE_STOP, Mode.FAULT} and after.entered_since(before)
     if stopped or (before.mode is Mode.DRIVE and after.mode is not Mode.DRIVE):

@@ -64,8 +64,8 @@ class Base:
         v, w = self.twist.v + self.pushed.v, self.twist.w + self.pushed.w
         self.pose = self.pose.compose(exp(v * TICK_S, 0.0, w * TICK_S))
 
-    def cycle(self, command: Twist | None, *, odometry: bool = True) -> Movement:
-        """Run a cycle: what the base has done since the last one, and then a command."""
+    def cycle(self, command: Twist | None, *, odometry: bool = True, is_sent: bool = True) -> Movement:
+        """Run a cycle: what the base has done since the last one, and then a command unless the line is lost."""
         due_s = self.now_s + self.cycle_s
         while self.now_s < due_s - 1e-9:
             self._tick()
@@ -75,6 +75,8 @@ class Base:
         self.monitor = self.monitor.observe(sample, self.now_s, self.body)
         if self.monitor.movement is not Movement.AS_COMMANDED:
             self.found.append((self.now_s, self.monitor.movement))
+        if not is_sent:
+            return self.monitor.movement
         self.monitor = self.monitor.command(command, self.now_s)
         self.commands = [*self.commands[-20:], (self.now_s, STANDSTILL if command is None else command)]
         return self.monitor.movement
@@ -267,3 +269,13 @@ def test_a_pose_is_compared_along_its_heading() -> None:
     """Driving in circles brings it back, and turns by the command alone."""
     base = driving(Base(), Twist(0.3, 0.6), 4.0 * math.pi)
     assert base.run(HALTED, 3.0).found == []
+
+
+@pytest.mark.parametrize("lost_s", [0.2, 0.5, 0.95, 3.0])
+def test_a_base_goes_on_by_its_last_command_while_the_line_is_lost(lost_s: float) -> None:
+    """And brakes once the line is back and HALT reaches it."""
+    base = driving(Base(), Twist(0.5, 0.0))
+    for _ in range(round(lost_s / base.cycle_s)):
+        base.cycle(HALTED, odometry=False, is_sent=False)
+    base.run(HALTED, 3.0)
+    assert base.found == []
