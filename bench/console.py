@@ -26,6 +26,8 @@ from bench.timing import DRIVE_ON, TIMEOUT_S, emulating, finish, start
 from config.errors import FAILED, UserError
 from tests.rawpage import RawPage
 
+LOG: Final = Path("echolocate", "echolocate.jsonl")
+"""The log of a run, in its state folder."""
 PAGES: Final = 5
 LATE_MAX_US: Final = 500.0
 """Limit of the additional lateness of cycles at p99.9 while pages are open."""
@@ -108,6 +110,7 @@ def one_turn(folder: Path, seconds: float, count: int) -> Turn:
         A process failed.
     """
     summary, frames = folder / "run.json", folder / "frames.json"
+    (folder / LOG).unlink(missing_ok=True)
     with emulating(folder, ()) as port:
         run = start(
             folder, "run", "runtime.cli", "run", "--headless", "--port", port, "--arm", "--seconds", f"{seconds}",
@@ -115,7 +118,7 @@ def one_turn(folder: Path, seconds: float, count: int) -> Turn:
         )  # fmt: skip
         page_process: subprocess.Popen[bytes] | None = None
         if count:
-            url = start_url(folder / "run.err", run)
+            url = start_url(folder, run)
             # A second less: the run starts when the robot has answered.
             page_process = start(folder, "pages", "bench.console", url, f"{count}", f"{seconds - 1.0}", str(frames))
         finish(folder, run, "run", seconds + TIMEOUT_S)
@@ -130,7 +133,7 @@ def one_turn(folder: Path, seconds: float, count: int) -> Turn:
     )  # fmt: skip
 
 
-def start_url(err: Path, run: subprocess.Popen[bytes]) -> str:
+def start_url(folder: Path, run: subprocess.Popen[bytes]) -> str:
     """Wait for the line with the console's start URL in the log of a run, and return the URL.
 
     Raises
@@ -138,13 +141,14 @@ def start_url(err: Path, run: subprocess.Popen[bytes]) -> str:
     UserError
         The run ended or timed out without it.
     """
+    log = folder / LOG
     end_s = time.monotonic() + TIMEOUT_S
     while time.monotonic() < end_s and run.poll() is None:
-        found = re.search(r"start_url='?(http[^\s']+)", err.read_text("utf-8", errors="replace"))
+        found = re.findall(r'"start_url":"(http[^"]+)"', log.read_text("utf-8")) if log.exists() else []
         if found:
-            return found[1]
+            return str(found[0])
         time.sleep(0.02)
-    raise UserError(f"the run printed no start URL: {err.read_text('utf-8', errors='replace')[-500:]}", FAILED)
+    raise UserError(f"the run logged no start URL: {(folder / 'run.err').read_text('utf-8')[-500:]}", FAILED)
 
 
 def measure(seconds: float, rounds: int, report: Callable[[str], None]) -> dict[str, list[Turn]]:

@@ -256,12 +256,14 @@ class RealtimeConfig(Strict):
 
 
 class LogConfig(Strict):
-    """The log: its file and its level."""
+    """The log: its file, which is cut, and its level."""
 
     file: str | None = None
     """Path of the log, in JSON lines; by default echolocate/echolocate.jsonl in the user's state folder."""
     level: Literal["debug", "info", "warning", "error"] = "info"
     """Least severity that is logged."""
+    cap_mb: float = Field(default=20.0, ge=0.1, le=1e6)
+    """Size at which the file becomes NAME.1, in place of the one before, MB."""
 
 
 class RecordingConfig(Strict):

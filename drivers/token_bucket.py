@@ -49,16 +49,21 @@ class LineLimit:
         Lines a second, on average.
     burst : float
         Lines at once.
+
+    Attributes
+    ----------
+    suppressed
+        Number of lines left out since the last one.
     """
 
     def __init__(self, rate_per_s: float, burst: float) -> None:
         self._bucket = TokenBucket(rate_per_s, burst)
-        self._suppressed = 0
+        self.suppressed = 0
 
     def take(self, now_s: float) -> int | None:
         """Return how many lines were left out before this one; None if this one is left out too."""
         if not self._bucket.take(now_s):
-            self._suppressed += 1
+            self.suppressed += 1
             return None
-        suppressed, self._suppressed = self._suppressed, 0
+        suppressed, self.suppressed = self.suppressed, 0
         return suppressed

@@ -1,7 +1,8 @@
 """The log: JSON lines in a file for programs, coloured lines on the terminal for people.
 
 Lines are written in the background: a stalled or full disk, a terminal held by Ctrl-S or a pipe without a reader
-delays no cycle. Lost lines are counted and reported wherever lines still arrive.
+delays no cycle. Lost lines are counted and reported wherever lines still arrive. The rate of lines and the size of
+the file are bounded, whatever causes them.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import contextlib
 import logging
 import os
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -18,7 +20,9 @@ import structlog
 
 from config.errors import WRONG_CALL, UserError
 from config.files import one_line, utf8
+from drivers.token_bucket import LineLimit
 from runtime.support.background_writer import BackgroundWriter
+from runtime.support.log_file import LogFile
 from runtime.support.user_folders import expanded, has_home, state_folder
 
 if TYPE_CHECKING:
@@ -35,7 +39,11 @@ if TYPE_CHECKING:
 LOG_FILE: Final = "echolocate.jsonl"
 """Default file, in the user's state folder."""
 SECRET: Final = frozenset({"start_url"})
-"""Fields written only to the log file and the terminal: recordings are passed on, pages are shown."""
+"""Fields written only to the log file and a terminal: recordings are passed on, and many may read a journal."""
+LINES_PER_S: Final = 5.0
+LINES_BURST: Final = 300.0
+"""Lines of one level at once; each level has its own limit, so that warnings suppress no error."""
+MEGABYTE: Final = 1_000_000
 
 
 class LogStatus:
@@ -66,14 +74,26 @@ class LogStatus:
 class _LineOutput:
     """The last processor of structlog: send one line to the file, the terminal and the listeners."""
 
-    def __init__(self, status: LogStatus, terminal: TextIO | None, listener: LogListener | None) -> None:
+    def __init__(
+        self, status: LogStatus, terminal: TextIO | None, listener: LogListener | None, path: Path,
+        clock: Callable[[], float],
+    ) -> None:  # fmt: skip
         self._status = status
         self._listener = listener
         self._reported: str | None = None
-        colors = terminal is not None and terminal.isatty()
-        self._render = structlog.dev.ConsoleRenderer(colors=colors, pad_event_to=0)
+        self._limits: dict[str, LineLimit] = {}
+        self._clock = clock
+        self._is_terminal = terminal is not None and terminal.isatty()
+        self._path = path
+        self._render = structlog.dev.ConsoleRenderer(colors=self._is_terminal, pad_event_to=0)
 
     def __call__(self, logger: object, name: str, event: MutableMapping[str, Any]) -> Mapping[str, Any]:
+        limit = self._limits.setdefault(name, LineLimit(LINES_PER_S, LINES_BURST))
+        left_out = limit.take(self._clock())
+        if left_out is None:
+            raise structlog.DropEvent
+        if left_out:
+            event["left_out_before"] = left_out
         settings = event.pop("settings", None)
         event = {name: utf8(value) if isinstance(value, str) else value for name, value in event.items()}
         self._report_error(logger, event)
@@ -83,6 +103,11 @@ class _LineOutput:
             self._status.file.put(_json(event))
         self._show(logger, name, event)
         raise structlog.DropEvent
+
+    @property
+    def left_out(self) -> int:
+        """Number of lines left out since the last one of their level."""
+        return sum(limit.suppressed for limit in self._limits.values())
 
     def _report_error(self, logger: object, event: Mapping[str, Any]) -> None:
         """Warn once of each error of the file, on the terminal and to the listeners."""
@@ -96,7 +121,9 @@ class _LineOutput:
         for listener in (*(() if self._listener is None else (self._listener,)), *self._status.listeners):
             listener({name: value for name, value in event.items() if name not in SECRET})
         if self._status.terminal is not None:
-            shown = {name: _printable(name, value) for name, value in event.items()}
+            where = "on a terminal only" if self._status.file is None else f"in {self._path}"
+            hidden = {} if self._is_terminal else dict.fromkeys(SECRET & event.keys(), where)
+            shown = {name: _printable(name, value) for name, value in {**event, **hidden}.items()}
             self._status.terminal.put((str(self._render(logger, name, shown)) + "\n").encode(errors="replace"))
 
 
@@ -113,7 +140,12 @@ def _json(event: Mapping[str, Any]) -> bytes:
 
 @contextlib.contextmanager
 def open_log(
-    config: LogConfig, *, terminal: bool, listener: LogListener | None = None, status: LogStatus | None = None
+    config: LogConfig,
+    *,
+    terminal: bool,
+    listener: LogListener | None = None,
+    status: LogStatus | None = None,
+    clock: Callable[[], float] = time.monotonic,
 ) -> Iterator[FilteringBoundLogger]:
     """Yield the logger of the run; at the end, write what is left and close the file.
 
@@ -127,6 +159,8 @@ def open_log(
         Called with every line: the recording.
     status : LogStatus, optional
         Receives the writers, for who reports on them.
+    clock : callable
+        Limits the rate of lines, s.
 
     Raises
     ------
@@ -134,19 +168,21 @@ def open_log(
         The configured file cannot be opened.
     """
     status = LogStatus() if status is None else status
-    fd, error = _open_file(config)
+    path = log_path(config)
+    file, error = _open_file(config, path)
+    output = _LineOutput(status, sys.stderr if terminal else None, listener, path, clock)
     with contextlib.ExitStack() as stack:
         if terminal:
             status.terminal = stack.enter_context(terminal_writer("log on the terminal", sys.stderr))
-        if fd is not None:
-            status.file = stack.enter_context(file_writer("log", fd))
+        if file is not None:
+            status.file = stack.enter_context(file_writer("log", file))
         log: FilteringBoundLogger = structlog.wrap_logger(
             None,
             processors=[
                 structlog.processors.add_log_level,
                 structlog.processors.TimeStamper(fmt="iso", utc=True),
                 structlog.processors.format_exc_info,
-                _LineOutput(status, sys.stderr if terminal else None, listener),
+                output,
             ],
             wrapper_class=structlog.make_filtering_bound_logger(getattr(logging, config.level.upper())),
         )
@@ -158,27 +194,17 @@ def open_log(
                 folder=str(state_folder()),
             )
         yield log
+        if output.left_out and status.file is not None:
+            status.file.put(_json({"event": "log lines were left out at last", "left_out": output.left_out}))
 
 
-def file_writer(name: str, fd: int) -> BackgroundWriter[bytes]:
-    """Return a writer of lines into an open file, which it closes at the end.
-
-    Lost lines are replaced by one line with their number; a line cut off by a full disk is ended first.
-    """
-    is_cut = False
-
-    def write(line: bytes) -> None:
-        nonlocal is_cut
-        rest = memoryview(b"\n" + line if is_cut else line)
-        while rest:
-            count = os.write(fd, rest)
-            is_cut = count < len(rest)
-            rest = rest[count:]
+def file_writer(name: str, file: LogFile) -> BackgroundWriter[bytes]:
+    """Return a writer into a log file, which it closes at the end; a line with their number replaces lost lines."""
 
     def write_gap(count: int) -> None:
-        write(_json({"event": "log lines are missing here", "level": "warning", "lost": count}))
+        file.write(_json({"event": "log lines are missing here", "level": "warning", "lost": count}))
 
-    return BackgroundWriter(name, write, write_gap=write_gap, finish=lambda: os.close(fd))
+    return BackgroundWriter(name, file.write, write_gap=write_gap, finish=file.close)
 
 
 def terminal_writer(name: str, stream: TextIO) -> BackgroundWriter[bytes]:
@@ -209,15 +235,14 @@ def log_path(config: LogConfig) -> Path:
     return state_folder() / LOG_FILE if config.file is None else expanded(config.file, "log.file")
 
 
-def _open_file(config: LogConfig) -> tuple[int | None, str | None]:
-    """Return the descriptor of the log file, or None and the reason why the default file cannot be written."""
-    path = log_path(config)
+def _open_file(config: LogConfig, path: Path) -> tuple[LogFile | None, str | None]:
+    """Return the log file, or None and the reason why the default file cannot be written."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        return os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NOCTTY, 0o600), None
-    except OSError as error:
+        return LogFile(path, round(config.cap_mb * MEGABYTE)), None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
         if config.file is None:
-            return None, f"{path}: {error.strerror}"
+            return None, f"{path}: {reason}"
         raise UserError(
-            f"log.file = {config.file!r} cannot be written: {error.strerror}; choose another file", WRONG_CALL
+            f"log.file = {config.file!r} cannot be written: {reason}; choose another file", WRONG_CALL
         ) from error

@@ -6,7 +6,6 @@ import contextlib
 import json
 import math
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -78,13 +77,14 @@ class Running:
         assert "Traceback" not in self.err, self.err
         return code
 
+    def events(self) -> list[dict[str, object]]:
+        """Return the lines of its log so far."""
+        log = self.folder / f"{self.name}.jsonl"
+        return [json.loads(line) for line in log.read_text("utf-8").split("\n")[:-1]] if log.exists() else []
+
     def modes(self) -> list[str]:
         """Return the modes it has noted in its log so far."""
-        log = self.folder / f"{self.name}.jsonl"
-        if not log.exists():
-            return []
-        events = [json.loads(line) for line in log.read_text("utf-8").split("\n")[:-1]]
-        return [str(event["mode"]) for event in events if event["event"] == "mode"]
+        return [str(event["mode"]) for event in self.events() if event["event"] == "mode"]
 
     def comes_to(self, mode: str) -> None:
         """Wait until it says that it is in a mode."""
@@ -147,13 +147,14 @@ def emulated(folder: Path, *arguments: str) -> Iterator[Emulated]:
 
 
 def start_url(run: Running) -> str:
-    """Wait for the line with the console's address, and return the address."""
+    """Wait for the line of the log with the console's address, and return the address."""
     found: list[str] = []
 
-    def is_printed() -> bool:
+    def is_written() -> bool:
         assert run.process.poll() is None, run.err
-        found[:] = re.findall(r"start_url='?(http[^\s']+)", run.err)
+        found[:] = [str(event["start_url"]) for event in run.events() if event["event"] == "console"]
         return bool(found)
 
-    wait_for(is_printed, "the start URL")
+    wait_for(is_written, "the start URL")
+    assert found[0] not in run.err, "who reads the journal must not get the token"
     return found[0]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -105,6 +107,56 @@ def test_an_unwritable_state_folder_is_a_warning(
     assert "no log file is written" in warning
     assert str(tmp_path / "state") in warning
     assert "still here" in line
+
+
+@pytest.mark.promise("P22")
+def test_a_flood_of_lines_is_limited_and_suppresses_no_other_level(
+    tmp_path: Path, measured: Callable[[str], None]
+) -> None:
+    path, host_s = tmp_path / "run.jsonl", 0.0
+    with open_log(LogConfig(file=str(path)), terminal=False, clock=lambda: host_s) as log:
+        for k in range(10_000):
+            host_s = 1e-3 * k
+            log.warning(f"sensor {k % 24} is masked")
+            if k % 2_000 == 1_999:
+                log.error("the cycle failed")
+                log.info("mode")
+        host_s = 60.0
+        log.warning("the last one")
+        for _ in range(1_000):
+            log.info("flood")
+    events = lines(path)
+    warnings = [event for event in events if event.get("level") == "warning"]
+    assert 300 <= len(warnings) <= 400
+    assert sum(1 + int(str(event.get("left_out_before", 0))) for event in warnings) - 1 == 10_000
+    assert warnings[-1]["event"] == "the last one"
+    assert sum(event.get("level") == "error" for event in events) == 5
+    assert events[-1] == {"event": "log lines were left out at last", "left_out": 700}
+    measured(f"10,000 warnings in 10 s: {len(warnings) - 1} lines, none of 5 errors suppressed")
+
+
+def test_a_file_that_is_no_log_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "my.toml").write_text("robot = 'denning'\n")
+    with ExitStack() as stack, pytest.raises(UserError, match="it is not a log; choose another file"):
+        stack.enter_context(open_log(LogConfig(file=str(tmp_path / "my.toml")), terminal=False))
+    assert (tmp_path / "my.toml").read_text() == "robot = 'denning'\n"
+
+
+@pytest.mark.promise("P22")
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_a_secret_goes_to_the_file_and_to_a_terminal_only(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *, is_terminal: bool
+) -> None:
+    """Elsewhere, as in the journal of a service, the line says where it is."""
+    path = tmp_path / "run.jsonl"
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: is_terminal)
+    heard: list[Mapping[str, object]] = []
+    with open_log(LogConfig(file=str(path)), terminal=True, listener=heard.append) as log:
+        log.info("console", url="http://robot", start_url="http://robot?token=s3cr3t")
+    assert ("s3cr3t" in capsys.readouterr().err) == is_terminal
+    assert lines(path)[0]["start_url"] == "http://robot?token=s3cr3t"
+    assert "s3cr3t" not in str(heard)
+    assert path.stat().st_mode & 0o777 == 0o600
 
 
 @pytest.mark.promise("P22")
