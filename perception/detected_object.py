@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -27,13 +28,26 @@ class DetectedObject:
     probability: float | None = None
     """Probability of the label; None from the paper's method."""
     covariance: tuple[float, float, float] | None = None
-    """xx, xy, yy of the position, m²; None from the paper's method."""
+    """xx, xy, yy of the position, m²; None from the paper's method. Along a wall it is that of an even distribution
+    over its length, a twelfth of the length squared."""
     number: int | None = None
     """The object's number for as long as it exists; numbers are never reused. None for walls."""
     confirmed: bool = False
     """A user confirmed it."""
     placed: bool = False
     """A user placed it, and the readings alone do not support it yet."""
+    sigma_theta: float | None = None
+    """Standard error of `theta`, rad; None for all but walls."""
+
+    @property
+    def ends(self) -> tuple[float, float, float, float] | None:
+        """Ends x, y, x, y of a wall, m; None for all others."""
+        if self.model != "wall" or self.covariance is None:
+            return None
+        xx, xy, yy = self.covariance
+        tx, ty = math.cos(self.theta), math.sin(self.theta)
+        half = 0.5 * math.sqrt(12.0 * (tx * tx * xx + 2.0 * tx * ty * xy + ty * ty * yy))
+        return self.x - half * tx, self.y - half * ty, self.x + half * tx, self.y + half * ty
 
 
 class MapCounts(NamedTuple):

@@ -142,7 +142,7 @@ def wall_object(segment: Row) -> DetectedObject:
     probability = 1.0 / (1.0 + math.exp(-log_odds))
     return DetectedObject(
         "wall", 0.5 * (x1 + x2), 0.5 * (y1 + y2), math.atan2(ty, tx), worst_sigma(xx, xy, yy), int(echoes),
-        probability, probability, (xx, xy, yy),
+        probability, probability, (xx, xy, yy), sigma_theta=math.sqrt(variance_turn),
     )  # fmt: skip
 
 

@@ -141,6 +141,8 @@ def _placed(seen: DetectedObject, place: LandmarkPlace | None) -> DetectedObject
 
 def turned_object(to: Pose, seen: DetectedObject) -> DetectedObject:
     """Return an object in another frame, in which the present origin lies at `to`."""
+    if to == Pose(0.0, 0.0, 0.0):
+        return seen
     place = to.compose(Pose(seen.x, seen.y, seen.theta))
     if seen.covariance is None:
         return replace(seen, x=place.x, y=place.y, theta=place.theta)

@@ -7,13 +7,11 @@ end processes the same firings here. Memory is bounded: the snapshots of a long 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from drivers.messages import Firing, Floats, Odometry, Pose
-from perception.detected_object import DetectedObject
 from perception.paper.paper_method import PaperPerception
 from perception.pipeline import Perception
 from perception.sensor_mounts import mounts_array
@@ -96,7 +94,8 @@ class TimelineBuilder:
         if perception is not None and (not timeline.snapshots or timeline.snapshots[-1].t_s < timeline.seconds):
             self._add_snapshot(timeline.seconds, perception)
         if perception is not None:
-            timeline.walls = wall_ends((*perception.labelled_objects(), *perception.archived_objects()))
+            labelled = (*perception.labelled_objects(), *perception.archived_objects())
+            timeline.walls = np.array([seen.ends for seen in labelled if seen.ends is not None]).reshape(-1, 4)
         if self._rows:
             timeline.echoes = np.concatenate(self._rows)
         if self._segments:
@@ -132,19 +131,3 @@ def clusters_of(front: PaperPerception) -> tuple[Cluster, ...]:
             Cluster(x, y, float(xs.min()), float(ys.min()), float(xs.max()), float(ys.max()), len(rows))
         )  # fmt: skip
     return tuple(clusters)
-
-
-def wall_ends(objects: Sequence[DetectedObject]) -> Floats:
-    """Return the ends x, y, x, y (m) of the walls among labelled objects, shape (n, 4).
-
-    A wall is reported by its middle and direction; along it, its covariance is that of an even distribution over its
-    length, a twelfth of the length squared.
-    """
-    rows = list[tuple[float, ...]]()
-    for wall in objects:
-        if wall.model == "wall" and wall.covariance is not None:
-            xx, xy, yy = wall.covariance
-            c, s = math.cos(wall.theta), math.sin(wall.theta)
-            half = 0.5 * math.sqrt(12.0 * (c * c * xx + 2.0 * c * s * xy + s * s * yy))
-            rows.append((wall.x - half * c, wall.y - half * s, wall.x + half * c, wall.y + half * s))
-    return np.array(rows).reshape(-1, 4)

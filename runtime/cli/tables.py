@@ -13,8 +13,7 @@ from runtime.support.length_format import Units, format_length, format_point
 
 if TYPE_CHECKING:
     # The robot's own process has tables too, and shall not load the emulator for them.
-    from runtime.cycle.summary import ObjectRow, RunSummary
-    from runtime.recording.replay_summary import PoseRow
+    from runtime.cycle.summary import ObjectRow, PoseRow, RunSummary
     from runtime.simulation.budget_sweep import BudgetRow
     from runtime.simulation.drift_trials import DriftRow
     from runtime.simulation.evaluation import DrumRow, Outcome, Spread

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import NotRequired, TypedDict
+from types import MappingProxyType
+from typing import Final, Literal, NotRequired, TypedDict
 
 import orjson
 
 from config.errors import FAILED, UserError
 from drivers.driver import RobotDriver
 from drivers.messages import Pose
-from perception.pipeline import DetectedObject
+from perception.localization.drift_correction import LocalizedPose, Status
+from perception.localization.map_frame import turned_object
+from perception.pipeline import DetectedObject, Perception
 from runtime.cycle.step import State
 from runtime.timing.cycle_stats import CycleStats, Quantiles
 from runtime.timing.footprint import FootprintRow
 from runtime.timing.timing_monitor import TimingMonitor, TimingSummary
+
+CORNER_KINDS: Final[Mapping[str, Literal["inside", "edge"]]] = MappingProxyType({
+    "inside corner": "inside", "edge": "edge",
+})  # fmt: skip
+"""Kinds of corners by the labels that perception gives them."""
 
 
 class ObjectRow(TypedDict):
@@ -33,6 +41,50 @@ class ObjectRow(TypedDict):
     """Probability that it is this model."""
     covariance: NotRequired[tuple[float, float, float]]
     """xx, xy, yy of the position, m²."""
+
+
+class WallRow(TypedDict):
+    """One wall: its ends, m, in the frame of the objects."""
+
+    x1: float
+    y1: float
+    x2: float
+    y2: float
+    probability: float
+    sigma_offset: float
+    """Standard error across the wall, the mean over its length, m."""
+    sigma_angle: float
+    """rad"""
+
+
+class CornerRow(TypedDict):
+    """One corner, m, in the frame of the objects."""
+
+    x: float
+    y: float
+    kind: Literal["inside", "edge"]
+    sigma: float
+    probability: float
+
+
+class PerceivedRows(TypedDict):
+    """What perception reports, in one frame."""
+
+    objects: list[ObjectRow]
+    walls: list[WallRow]
+    corners: list[CornerRow]
+
+
+class PoseRow(TypedDict):
+    """The robot in the map frame; m and rad."""
+
+    x: float
+    y: float
+    theta: float
+    covariance: list[list[float]]
+    """Of x, y and theta."""
+    status: Status
+    probability: float
 
 
 class LinkRow(TypedDict):
@@ -69,10 +121,9 @@ class LogRow(TypedDict):
     last_error: str | None
 
 
-class RunSummary(TypedDict):
+class RunSummary(PerceivedRows):
     """Summary of ``echolocate run``."""
 
-    objects: list[ObjectRow]
     cycles: int
     cycle_us: Quantiles
     late: int
@@ -84,6 +135,8 @@ class RunSummary(TypedDict):
     mode: str
     stop_reasons: list[str]
     timing: TimingSummary
+    pose: NotRequired[PoseRow]
+    """Of a run that corrects drift or has a map: the robot at the end. The objects are in odometry's frame."""
     recording: NotRequired[RecordingRow]
     log: NotRequired[LogRow]
 
@@ -106,21 +159,51 @@ def object_row(seen: DetectedObject) -> ObjectRow:
     return row
 
 
-def in_frame(frame: Pose, seen: DetectedObject) -> DetectedObject:
-    """Return an object in another frame, in which the present origin lies at `frame`."""
-    if frame == Pose(0.0, 0.0, 0.0):
-        return seen
-    place = frame.compose(Pose(seen.x, seen.y, seen.theta))
-    covariance = seen.covariance
-    if covariance is not None:
-        xx, xy, yy = covariance
-        c, s = math.cos(frame.theta), math.sin(frame.theta)
-        covariance = (
-            c * c * xx - 2.0 * c * s * xy + s * s * yy,
-            c * s * (xx - yy) + (c * c - s * s) * xy,
-            s * s * xx + 2.0 * c * s * xy + c * c * yy,
-        )
-    return replace(seen, x=place.x, y=place.y, theta=place.theta, covariance=covariance)
+def perceived_rows(
+    perception: Perception, to: Pose | None = None, objects: Iterable[DetectedObject] | None = None
+) -> PerceivedRows:  # fmt: skip
+    """Return what perception reports in its JSON form.
+
+    Parameters
+    ----------
+    perception : Perception
+        With everything perceived so far.
+    to : Pose, optional
+        Pose of the odometry's frame in that of the result; by default they are the same.
+    objects : iterable of DetectedObject, optional
+        The models' objects in the frame of the result, where that is known better; by default those of `perception`.
+    """
+    to = Pose(0.0, 0.0, 0.0) if to is None else to
+    found = (turned_object(to, seen) for seen in perception.objects()) if objects is None else objects
+    rows: PerceivedRows = {"objects": [object_row(seen) for seen in found], "walls": [], "corners": []}
+    labelled = (*perception.labelled_objects(), *perception.archived_objects())
+    for seen in (turned_object(to, one) for one in labelled):
+        if seen.ends is not None and seen.covariance is not None:
+            x1, y1, x2, y2 = seen.ends
+            nx, ny, (xx, xy, yy) = -math.sin(seen.theta), math.cos(seen.theta), seen.covariance
+            across = nx * nx * xx + 2.0 * nx * ny * xy + ny * ny * yy
+            rows["walls"].append({
+                "x1": x1, "y1": y1, "x2": x2, "y2": y2, "probability": seen.score,
+                "sigma_offset": math.sqrt(max(0.0, across)), "sigma_angle": seen.sigma_theta or 0.0,
+            })  # fmt: skip
+        elif seen.model in CORNER_KINDS:
+            rows["corners"].append({
+                "x": seen.x, "y": seen.y, "kind": CORNER_KINDS[seen.model], "sigma": seen.sigma,
+                "probability": seen.score,
+            })  # fmt: skip
+    return rows
+
+
+def pose_row(here: LocalizedPose) -> PoseRow:
+    """Return the robot's pose as JSON has it."""
+    return {
+        "x": here.pose.x,
+        "y": here.pose.y,
+        "theta": here.pose.theta,
+        "covariance": here.covariance.tolist(),
+        "status": here.status,
+        "probability": here.probability,
+    }
 
 
 def run_summary(
@@ -149,8 +232,11 @@ def run_summary(
         Of every stop, in order.
     """
     counts = driver.counts
-    return {
-        "objects": [object_row(in_frame(driver.odometry_origin, seen)) for seen in state.perception.objects()],
+    perceived = perceived_rows(state.perception, driver.odometry_origin)
+    summary: RunSummary = {
+        "objects": perceived["objects"],
+        "walls": perceived["walls"],
+        "corners": perceived["corners"],
         "cycles": stats.cycles,
         "cycle_us": stats.cycle_us(),
         "late": stats.late,
@@ -165,6 +251,10 @@ def run_summary(
         "stop_reasons": stop_reasons,
         "timing": timing_monitor.summary(),
     }
+    here = state.perception.localized()
+    if here is not None:
+        summary["pose"] = pose_row(here)
+    return summary
 
 
 def write_json(path: str, summary: object) -> None:

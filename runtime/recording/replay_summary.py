@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, NotRequired, TypedDict
 
-from perception.localization.drift_correction import Status
-from runtime.cycle.summary import ObjectRow
+from runtime.cycle.summary import PerceivedRows, PoseRow
 from runtime.timing.cycle_stats import Quantiles
 
 
@@ -23,19 +22,7 @@ class VerifyRow(TypedDict):
     damage: list[str]
 
 
-class PoseRow(TypedDict):
-    """The robot in the map frame; m and rad."""
-
-    x: float
-    y: float
-    theta: float
-    covariance: list[list[float]]
-    """Of x, y and theta."""
-    status: Status
-    probability: float
-
-
-class ReplaySummary(TypedDict):
+class ReplaySummary(PerceivedRows):
     """Summary of ``echolocate replay``."""
 
     verify: NotRequired[VerifyRow]
@@ -45,7 +32,6 @@ class ReplaySummary(TypedDict):
     frame: NotRequired[Literal["map"]]
     """The frame of pose and objects, where it is not odometry's."""
 
-    objects: list[ObjectRow]
     segments: int
     clusters: int
     cycles: int

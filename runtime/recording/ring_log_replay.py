@@ -6,12 +6,12 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 
 from config.settings import LocalizationConfig, Settings
-from drivers.messages import Firing
+from drivers.messages import Firing, Pose
+from perception.detected_object import DetectedObject
 from perception.localization.drift_correction import LocalizedPose
-from perception.localization.map_frame import turned_object
 from perception.pipeline import Perception
-from runtime.cycle.summary import object_row
-from runtime.recording.replay_summary import PoseRow, ReplaySummary
+from runtime.cycle.summary import perceived_rows, pose_row
+from runtime.recording.replay_summary import ReplaySummary
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.refinement_budget import within_quanta_per_cycle
 
@@ -49,11 +49,22 @@ class FiringReplayer:
             self._cycle_stats.add_cycle(time.perf_counter() - started_s)
             yield firing
 
-    def summary(self) -> ReplaySummary:
-        """Return the results of perception so far, and the time they took."""
+    def summary(self, to: Pose | None = None, objects: Iterable[DetectedObject] | None = None) -> ReplaySummary:
+        """Return the results of perception so far, and the time they took.
+
+        Parameters
+        ----------
+        to : Pose, optional
+            Pose of the odometry's frame in that of the results; by default they are in odometry's.
+        objects : iterable of DetectedObject, optional
+            The models' objects in the frame of the results, where that is known better.
+        """
+        perceived = perceived_rows(self.perception, to, objects)
         counts = self.perception.counts
         return {
-            "objects": [object_row(seen) for seen in self.perception.objects()],
+            "objects": perceived["objects"],
+            "walls": perceived["walls"],
+            "corners": perceived["corners"],
             "segments": counts.segments_total,
             "clusters": counts.hypotheses,
             "cycles": self._cycle_stats.cycles,
@@ -82,11 +93,10 @@ def replay_localized(
         here = perception.localized()
         if here is not None:
             on_pose(firing.robot_s, here)
-    summary, here = replayer.summary(), perception.localized()
-    summary["frame"] = "map"
-    summary["objects"] = [object_row(seen) for seen in perception.mapped_objects()]
+    summary = replayer.summary(perception.odometry_from_map().inverse(), perception.mapped_objects())
+    summary["frame"], here = "map", perception.localized()
     if here is not None:
-        summary["pose"] = _pose_row(here)
+        summary["pose"] = pose_row(here)
     return summary
 
 
@@ -119,25 +129,13 @@ def replay_in_known_room(
         while known_room.can_refine:  # a log has time for a whole search
             known_room.refine()
         on_pose(firing.robot_s, known_room.localized())
-    summary, here = replayer.summary(), known_room.localized()
-    summary["pose"] = _pose_row(here)
-    if here.status == "tracking":
-        to = known_room.odometry_from_map().inverse()
+    here = known_room.localized()
+    is_known = here.status == "tracking"
+    summary = replayer.summary(known_room.odometry_from_map().inverse()) if is_known else replayer.summary()
+    summary["pose"] = pose_row(here)
+    if is_known:
         summary["frame"] = "map"
-        summary["objects"] = [object_row(turned_object(to, seen)) for seen in replayer.perception.objects()]
     return summary
-
-
-def _pose_row(here: LocalizedPose) -> PoseRow:
-    """Return the robot's pose as JSON has it."""
-    return {
-        "x": here.pose.x,
-        "y": here.pose.y,
-        "theta": here.pose.theta,
-        "covariance": here.covariance.tolist(),
-        "status": here.status,
-        "probability": here.probability,
-    }
 
 
 def replay_firings(settings: Settings, firings: Iterable[Firing]) -> ReplaySummary:

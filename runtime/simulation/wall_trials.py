@@ -88,16 +88,9 @@ class WallTrial:
 
 
 def reported_walls(objects: Iterable[DetectedObject]) -> list[Segment]:
-    """Return the walls among reported objects: a wall's covariance along it is that of its length, evenly filled."""
-    walls = []
-    for wall in objects:
-        if wall.model == "wall" and wall.covariance is not None:
-            tx, ty = math.cos(wall.theta), math.sin(wall.theta)
-            xx, xy, yy = wall.covariance
-            half = 0.5 * math.sqrt(12.0 * (xx * tx * tx + 2.0 * xy * tx * ty + yy * ty * ty)) * np.array([tx, ty])
-            middle = np.array([wall.x, wall.y])
-            walls.append(Segment(middle - half, middle + half))
-    return walls
+    """Return the walls among reported objects."""
+    ends = (seen.ends for seen in objects)
+    return [Segment(np.array(end[:2]), np.array(end[2:])) for end in ends if end is not None]
 
 
 def try_room(settings: Settings, room: FurnishedRoom, seed: int, step_m: float) -> WallTrial:

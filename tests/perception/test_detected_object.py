@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -40,6 +41,14 @@ def test_counts_are_those_of_the_map(seen: Perception) -> None:
     assert counts.segments == len(seen.segment_geometry())
     assert counts.segments_total >= counts.segments
     assert counts.hypotheses >= len(seen.objects())
+
+
+def test_a_wall_ends_where_its_covariance_says() -> None:
+    along, c, s = 3.0**2 / 12.0, math.cos(0.5), math.sin(0.5)
+    wall = DetectedObject("wall", 1.0, 2.0, 0.5, 0.9, 9, 1.0, 1.0, (c * c * along, c * s * along, s * s * along))
+    assert wall.ends == pytest.approx((1.0 - 1.5 * c, 2.0 - 1.5 * s, 1.0 + 1.5 * c, 2.0 + 1.5 * s))
+    assert replace(wall, model="drum").ends is None
+    assert replace(wall, covariance=None).ends is None
 
 
 def test_without_more_an_object_is_neither_numbered_nor_edited() -> None:

@@ -17,7 +17,7 @@ from config.load import load_settings, override_settings
 from runtime.cli.commands.offline_io import plain_console
 from runtime.cli.commands.output_files import check_outputs
 from runtime.cli.tables import objects_table
-from runtime.cycle.summary import object_row, write_json
+from runtime.cycle.summary import PerceivedRows, perceived_rows, write_json
 from runtime.recording.replay_summary import ReplaySummary
 from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.length_format import Units, format_length
@@ -189,8 +189,13 @@ def replay_again(
 def summarise(recording: Recording, result: ReplayResult) -> ReplaySummary:
     """Return the summary of a replay."""
     perception = result.state.perception if result.state is not None else None
+    perceived: PerceivedRows = {"objects": [], "walls": [], "corners": []}
+    if perception is not None:
+        perceived = perceived_rows(perception)
     return {
-        "objects": [] if perception is None else [object_row(seen) for seen in perception.objects()],
+        "objects": perceived["objects"],
+        "walls": perceived["walls"],
+        "corners": perceived["corners"],
         "segments": 0 if perception is None else perception.counts.segments_total,
         "clusters": 0 if perception is None else perception.counts.hypotheses,
         "cycles": result.cycles,

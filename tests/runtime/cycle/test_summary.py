@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import get_type_hints
+from typing import cast, get_type_hints
 
+import numpy as np
 import pytest
 
 from config.errors import FAILED, UserError
-from perception.pipeline import DetectedObject
-from runtime.cycle.summary import LinkRow, ObjectRow, RunSummary, object_row, write_json
+from drivers.messages import Pose
+from perception.localization.drift_correction import LocalizedPose
+from perception.pipeline import DetectedObject, Perception
+from runtime.cycle.summary import LinkRow, ObjectRow, RunSummary, object_row, perceived_rows, pose_row, write_json
 from runtime.recording.replay_summary import ReplaySummary
 from runtime.simulation.evaluation import DrumRow, Outcome
 
@@ -41,6 +44,53 @@ def test_an_object_survives_json_to_the_bit(tmp_path: Path) -> None:
     ]  # fmt: skip
     assert read["estimate"] is None
     assert read["nan"] is None, "JSON has no NaN"
+
+
+class Perceived:
+    """Perception with a drum, a wall, corners, a post, and an edge that the robot has left behind."""
+
+    def objects(self) -> tuple[DetectedObject, ...]:
+        return (SEEN,)
+
+    def labelled_objects(self) -> tuple[DetectedObject, ...]:
+        along, across = 2.0**2 / 12.0, 0.01**2
+        wall = DetectedObject(
+            "wall", 1.0, 3.0, math.pi / 2, 0.6, 40, 0.99, 0.99, (across, 0.0, along), sigma_theta=0.002
+        )
+        corner = DetectedObject("inside corner", 1.0, 4.0, 0.0, 0.02, 12, 0.97)
+        return SEEN, wall, corner, DetectedObject("post", 0.0, 0.0, 0.0, 0.1, 9, 0.9)
+
+    def archived_objects(self) -> tuple[DetectedObject, ...]:
+        return (DetectedObject("edge", -5.0, 0.0, 0.0, 0.03, 9, 0.9),)
+
+
+def test_walls_and_corners_have_rows_of_their_own_in_the_frame_of_the_result() -> None:
+    rows = perceived_rows(cast("Perception", Perceived()), Pose(10.0, 0.0, math.pi / 2))
+    (seen,) = rows["objects"]
+    assert seen["model"] == "semicircle"
+    assert seen["x"] == pytest.approx(12.0)
+    (wall,) = rows["walls"]
+    assert (wall["x1"], wall["y1"], wall["x2"], wall["y2"]) == pytest.approx((8.0, 1.0, 6.0, 1.0))
+    assert (wall["sigma_offset"], wall["sigma_angle"], wall["probability"]) == pytest.approx((0.01, 0.002, 0.99))
+    inside, edge = rows["corners"]
+    assert (inside["kind"], edge["kind"]) == ("inside", "edge")
+    assert (inside["x"], inside["y"], inside["sigma"]) == pytest.approx((6.0, 1.0, 0.02))
+    assert (edge["x"], edge["y"], edge["sigma"]) == pytest.approx((10.0, -5.0, 0.03))
+
+
+def test_objects_given_in_the_frame_of_the_result_are_not_turned() -> None:
+    rows = perceived_rows(cast("Perception", Perceived()), Pose(10.0, 0.0, 0.0), (SEEN,))
+    assert rows["objects"] == [object_row(SEEN)]
+    assert perceived_rows(cast("Perception", Perceived()))["corners"][0]["x"] == 1.0
+
+
+def test_a_pose_has_what_the_public_surface_names() -> None:
+    here = LocalizedPose(Pose(1.0, 2.0, 0.5), 3.0, np.diag([0.1, 0.2, 0.3]), "tracking", 0.98)
+    row = pose_row(here)
+    assert json.loads(json.dumps(row)) == row
+    assert (row["x"], row["theta"], row["covariance"][1], row["status"], row["probability"]) == (
+        1.0, 0.5, [0.0, 0.2, 0.0], "tracking", 0.98,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["", "file/summary.json", "nowhere/summary.json"])

@@ -9,9 +9,9 @@ import pytest
 
 from drivers.driver import LineState
 from drivers.emulator.faults import Fault, Garbage, OdometryJump, Outliers, StuckSensor
+from perception.localization.map_frame import turned_object
 from runtime.cycle.alerts import Alerts
 from runtime.cycle.modes import Mode
-from runtime.cycle.summary import in_frame
 from tests.runtime.emulated_run import FT, Run, hallway
 
 pytestmark = [pytest.mark.compiled]
@@ -129,7 +129,7 @@ def test_a_leap_is_reported_and_the_robot_drives_on(measured: Callable[[str], No
     frame = run.driver.odometry_origin
     assert (frame.x / FT, frame.y / FT) == pytest.approx((1.0, 0.0), abs=0.02)
     for seen in run.state.perception.objects():
-        assert in_frame(frame, seen).x - seen.x == pytest.approx(FT, abs=0.01)
+        assert turned_object(frame, seen).x - seen.x == pytest.approx(FT, abs=0.01)
     measured("a leap of 1 ft in mid-run: no stop, one line to the operator")
 
 
