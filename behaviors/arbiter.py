@@ -1,7 +1,8 @@
 """The arbiter: sums the schemas' vectors and returns a velocity within the base's limits, or a reason to stop.
 
 Most schemas request a direction (`arbitrate`). Teleoperation requests a velocity (`limit_velocity`), which echoes can
-only reduce. With incomplete or invalid inputs the decision is to stop.
+only reduce. With incomplete or invalid inputs the decision is to stop. Neither moves the robot towards a direction in
+which the ring has not looked (`behaviors.field_of_view`).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from behaviors.clearance import stoppable_speed_m_s
+from behaviors.field_of_view import UnseenWay, seen_speed_m_s, unseen_way
 from behaviors.response import Response
 from config.robot import BodyConfig
 from config.settings import ArbiterConfig
@@ -42,6 +44,14 @@ class Stop:
     reason: str
 
 
+@dataclass(frozen=True, slots=True)
+class Unseen(Stop):
+    """Stop: the sensors have looked neither along the heading nor in the direction of the sum lately."""
+
+    age_s: float
+    """How long they have not, s; infinite if they never have."""
+
+
 Decision: TypeAlias = Drive | Stop
 
 
@@ -55,7 +65,9 @@ def arbitrate(
     """Return the velocity for the sum of all responses, or a reason to stop.
 
     The sum's length is clamped to 1. The speed is the base velocity times that length, reduced while the robot has to
-    turn, and limited to what it can stop from before the nearest echo ahead. The base limits its own acceleration.
+    turn, and limited to what it can stop from before the nearest echo ahead, and before what it has seen ahead is too
+    old. The base limits its own acceleration. A robot that does not see along its heading turns on the spot to a
+    direction in which it does.
 
     Parameters
     ----------
@@ -82,10 +94,14 @@ def arbitrate(
     magnitude = min(1.0, math.hypot(x, y))
     if magnitude < NEGLIGIBLE:
         return Drive(Twist(0.0, 0.0))
-    angle = wrap_angle(math.atan2(y, x) - percept.pose.theta)
+    course = math.atan2(y, x)
+    angle = wrap_angle(course - percept.pose.theta)
     speed = magnitude * _course_speed_m_s(abs(angle), config)
-    v = min(speed, body.speed_max_m_s, stoppable_speed_m_s(percept, body, config.clearance_m))
     w = max(-body.turn_max_rad_s, min(body.turn_max_rad_s, config.turn_gain_per_s * angle))
+    seen = seen_speed_m_s(percept, body, config.clearance_m, w)
+    if seen == 0.0 and (unseen := _unseen_ways(percept, course, body, config)) is not None:
+        return Unseen(f"{unseen.reason}; check the ring's cables and what covers it, then re-arm", unseen.age_s)
+    v = min(speed, body.speed_max_m_s, stoppable_speed_m_s(percept, body, config.clearance_m), seen)
     # Not `v > limit or …`: only this form also refuses NaN.
     if not (0.0 <= v <= body.speed_max_m_s and abs(w) <= body.turn_max_rad_s):
         return _outside(v, w)
@@ -105,7 +121,8 @@ def limit_velocity(
     The schemas' vectors, the request's own included, are summed in the robot's frame. The component along the heading
     may reduce the requested speed to zero but never reverse it. The component across steers the robot while it drives
     forward, in proportion to its speed. Forward and backward, the speed is limited to what the robot can stop from
-    before the nearest echo in that direction. Turning on the spot is not limited: it needs no room.
+    before the nearest echo in that direction, and before what it has seen there is too old. Turning on the spot is
+    not limited: it needs no room.
 
     Parameters
     ----------
@@ -136,10 +153,12 @@ def limit_velocity(
         fastest = min(requested.v, body.speed_max_m_s, stoppable_speed_m_s(percept, body, config.clearance_m))
         v = max(0.0, min(along, fastest))
         w += config.turn_gain_per_s * lateral * v / config.base_velocity_m_s
+        v = min(v, seen_speed_m_s(percept, body, config.clearance_m, w))
     else:
-        pose = replace(percept.pose, theta=percept.pose.theta + math.pi)
-        behind = stoppable_speed_m_s(replace(percept, pose=pose), body, config.clearance_m)
-        v = min(0.0, max(along, requested.v, -body.speed_max_m_s, -behind))
+        behind = replace(percept, pose=replace(percept.pose, theta=percept.pose.theta + math.pi))
+        stoppable = stoppable_speed_m_s(behind, body, config.clearance_m)
+        seen = seen_speed_m_s(behind, body, config.clearance_m, w)
+        v = min(0.0, max(along, requested.v, -body.speed_max_m_s, -stoppable, -seen))
     w = max(-body.turn_max_rad_s, min(body.turn_max_rad_s, w))
     if not (abs(v) <= body.speed_max_m_s and abs(w) <= body.turn_max_rad_s):
         return _outside(v, w)
@@ -151,6 +170,13 @@ def _outside(v: float, w: float) -> Stop:
         f"the arbiter computed a velocity outside the base's limits (v {v:g} m/s, w {w:g} rad/s), "
         "which is a bug in this program: keep the recording of this run and report it"
     )
+
+
+def _unseen_ways(percept: Percept, course_rad: float, body: BodyConfig, config: ArbiterConfig) -> UnseenWay | None:
+    """Return why neither the heading nor the course is seen; None if sensors look along one of them."""
+    ahead = unseen_way(percept, percept.pose.theta, body, config.clearance_m)
+    course = None if ahead is None else unseen_way(percept, course_rad, body, config.clearance_m)
+    return None if ahead is None or course is None else min(ahead, course, key=lambda unseen: unseen.age_s)
 
 
 def _course_speed_m_s(angle_rad: float, config: ArbiterConfig) -> float:

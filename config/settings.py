@@ -177,8 +177,11 @@ class AvoidStaticObstacleConfig(Strict):
     """R: nearer than this the repulsion is unbounded, m. Must exceed the ring's least range to have an effect."""
     summing: Literal["sum", "largest"] = "largest"
     """`sum` adds the vectors of all echoes; `largest` limits the sum to the largest single push in its direction."""
-    echo_age_max_s: float = Field(default=1.0, gt=0.0, le=60.0)
-    """Age up to which an echo counts as an obstacle, s."""
+    echo_age_max_s: float = Field(default=1.5, gt=0.0, le=60.0)
+    """Age up to which an echo counts as an obstacle, and a direction as seen, s.
+
+    The robot slows down so that it stands before a direction ahead of it is older.
+    """
 
     @model_validator(mode="after")
     def _ordered(self) -> AvoidStaticObstacleConfig:

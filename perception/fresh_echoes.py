@@ -1,12 +1,15 @@
-"""The last echo of each sensor as a point in the odometry's frame: the obstacles that the schemas avoid.
+"""The last usable readings of each sensor in the odometry's frame: the obstacles to avoid, and where the ring looked.
 
-A new reading of a sensor replaces only that sensor's echo; a reading without an echo removes it. So a reading at
-maximum range leaves no obstacle, and neighbours do not erase each other's echoes.
+A new reading of a sensor replaces only what that sensor heard in the same direction; a reading without an echo
+removes it. So a reading at maximum range leaves no obstacle, and neighbours do not erase each other's echoes. A ring
+that turns keeps what it heard in other directions. A sensor that reports a fault, or whose reading is not believed,
+has not looked: its last echo ages.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +17,14 @@ from numpy.typing import NDArray
 from drivers.messages import Firing
 from perception.kernel import Floats, kernel
 
+LOOKS: Final = 16
+"""Readings of each sensor that are kept, each in a direction of its own; in a turn faster than this holds, fewer."""
+
 
 @kernel
 def record_echoes(
-    ranges: Floats, mounts: Floats, x: float, y: float, yaw: float, t: float, points: Floats, times: Floats,
-    heard: NDArray[np.bool_],
+    ranges: Floats, mounts: Floats, x: float, y: float, yaw: float, t: float, same: float, points: Floats,
+    bearings: Floats, times: Floats, heard: NDArray[np.bool_],
 ) -> None:  # fmt: skip
     """Enter the readings of a firing.
 
@@ -30,11 +36,15 @@ def record_echoes(
         x, y (m), direction (rad) of each sensor in the ring's frame.
     x, y, yaw, t : float
         Place (m) and direction (rad) of the ring, time of the firing (s).
-    points : (n, 2) float
-        Place of each sensor's last echo, m. Updated.
-    times : (n,) float
-        When each sensor last fired, s. Updated.
-    heard : (n,) bool
+    same : float
+        Angle up to which a new look replaces an older one of the same sensor, rad.
+    points : (n, looks, 2) float
+        Places of each sensor's echoes, m. Updated.
+    bearings : (n, looks) float
+        Directions in which it looked, rad. Updated.
+    times : (n, looks) float
+        When it did, s; −inf where none is kept. Updated.
+    heard : (n, looks) bool
         Whether it heard an echo then. Updated.
     """
     c = math.cos(yaw)
@@ -43,34 +53,48 @@ def record_echoes(
         r = ranges[i]
         if math.isnan(r):
             continue
-        times[i] = t
-        heard[i] = math.isfinite(r)
-        if heard[i]:
-            points[i, 0] = x + c * mounts[i, 0] - s * mounts[i, 1] + r * math.cos(yaw + mounts[i, 2])
-            points[i, 1] = y + s * mounts[i, 0] + c * mounts[i, 1] + r * math.sin(yaw + mounts[i, 2])
+        bearing = yaw + mounts[i, 2]
+        oldest = 0
+        for k in range(times.shape[1]):
+            turned = bearing - bearings[i, k]
+            if abs(turned - 2.0 * math.pi * math.floor(turned / (2.0 * math.pi) + 0.5)) <= same:
+                times[i, k] = -math.inf
+                heard[i, k] = False
+            if times[i, k] < times[i, oldest]:
+                oldest = k
+        bearings[i, oldest] = bearing
+        times[i, oldest] = t
+        heard[i, oldest] = math.isfinite(r)
+        if heard[i, oldest]:
+            points[i, oldest, 0] = x + c * mounts[i, 0] - s * mounts[i, 1] + r * math.cos(bearing)
+            points[i, oldest, 1] = y + s * mounts[i, 0] + c * mounts[i, 1] + r * math.sin(bearing)
 
 
 class FreshEchoes:
-    """Each sensor's last echo.
+    """Each sensor's last usable readings.
 
     Parameters
     ----------
     mounts : (n, 3) float
         x, y (m), direction (rad) of each sensor in the ring's frame.
+    half_angle : float
+        Half the width of a beam, rad. A look within half of it of an older one is in the same direction.
     """
 
-    def __init__(self, mounts: Floats) -> None:
+    def __init__(self, mounts: Floats, half_angle: float) -> None:
         self._mounts = mounts
-        self._points = np.zeros((len(mounts), 2))
-        self._times = np.zeros(len(mounts))
-        self._heard = np.zeros(len(mounts), dtype=np.bool_)
+        self._half_angle = half_angle
+        self._points = np.zeros((len(mounts), LOOKS, 2))
+        self._bearings = np.zeros((len(mounts), LOOKS))
+        self._times = np.full((len(mounts), LOOKS), -math.inf)
+        self._heard = np.zeros((len(mounts), LOOKS), dtype=np.bool_)
 
     def update(self, firing: Firing) -> None:
         """Enter the echoes of a firing."""
         pose = firing.pose
         record_echoes(
             firing.ranges_m, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw),
-            float(firing.robot_s), self._points, self._times, self._heard,
+            float(firing.robot_s), 0.5 * self._half_angle, self._points, self._bearings, self._times, self._heard,
         )  # fmt: skip
 
     def points(self, robot_s: float, age_max_s: float) -> Floats:
@@ -78,6 +102,21 @@ class FreshEchoes:
         fresh: Floats = self._points[self._heard & (robot_s - self._times <= age_max_s)]
         return fresh
 
+    def looks(self, robot_s: float, age_max_s: float) -> tuple[Floats, Floats]:
+        """Return where the ring looked and how long ago at the robot's time `robot_s`: shapes (k,), rad and s.
+
+        Older looks than `age_max_s` are left out.
+        """
+        ages = robot_s - self._times
+        fresh = ages <= age_max_s
+        return self._bearings[fresh], ages[fresh]
+
+    def ages(self, robot_s: float) -> Floats:
+        """Return how long ago each sensor last looked, shape (n,), s; infinite for one that has not looked yet."""
+        ages: Floats = robot_s - self._times.max(axis=1)
+        return ages
+
     def clear(self) -> None:
-        """Remove all echoes."""
+        """Remove all readings."""
         self._heard[:] = False
+        self._times[:] = -math.inf

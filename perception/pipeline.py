@@ -6,6 +6,7 @@ continues in the next cycle from where it stopped. A method recognises the objec
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Protocol
 
@@ -33,8 +34,9 @@ from perception.localization.known_room import KnownRoom
 from perception.localization.map_frame import MapFrame
 from perception.localization.room import room_of
 from perception.paper.paper_method import PaperPerception
+from perception.percept import FieldOfView
 from perception.sensor_monitor import SensorMonitor
-from perception.sensor_mounts import mounts_array
+from perception.sensor_mounts import mounts_array, reach_m
 from perception.sensor_report import SensorReport
 from perception.snapshot import Snapshot, put_back, snapshot_of
 
@@ -167,7 +169,11 @@ class Perception:
         known_room = config.localization.known_room
         self.known_room = None if known_room is None else KnownRoom(room_of(known_room), ring)
         """Finds the robot in the room of the settings, where there is one."""
-        self._echoes = FreshEchoes(mounts_array(ring.mounts))
+        mounts = mounts_array(ring.mounts)
+        self._axes = mounts[:, 2].copy()
+        self._half_angle = math.radians(ring.beam_half_angle_deg)
+        self._echoes = FreshEchoes(mounts, self._half_angle)
+        self._reach_m = reach_m(ring)
         self._sensors = len(ring.mounts)
         self._models = tuple(models)
 
@@ -302,6 +308,29 @@ class Perception:
         """Return each sensor's last echo if no older than `age_max_s` at the robot's time: shape (k, 2), m."""
         return self._echoes.points(robot_s, age_max_s)
 
+    def field_of_view(self, robot_s: float, ring_yaw: float, age_max_s: float) -> FieldOfView:
+        """Return where the ring has looked.
+
+        Parameters
+        ----------
+        robot_s : float
+            The robot's time now, s.
+        ring_yaw : float
+            Direction of the ring now, rad.
+        age_max_s : float
+            Longest age at which a direction counts as seen, s.
+        """
+        bearings, ages = self._echoes.looks(robot_s, age_max_s)
+        return FieldOfView(
+            bearings,
+            ages,
+            ring_yaw + self._axes,
+            self._echoes.ages(robot_s),
+            self._half_angle,
+            self._reach_m,
+            age_max_s,
+        )
+
     def reset(self) -> None:
         """Start again with an empty map, as after a reset of the odometry."""
         self.method.reset()
@@ -327,6 +356,7 @@ class Perception:
     def set_firing_pattern(self, ring: RingConfig) -> None:
         """Expect another firing pattern of the same sensors."""
         self.sensor_monitor.set_firing_pattern(ring)
+        self._reach_m = reach_m(ring)
 
     def sensor_reports(self) -> tuple[SensorReport, ...]:
         """Return a report on each faulty sensor."""

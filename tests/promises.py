@@ -152,6 +152,13 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "each with its number; where more is near than fits, the farthest wait and are counted; what was left "
             "behind can be edited, and a restored state goes on the same",
         ),
+        "P24": Promise(
+            "It never drives blind",
+            "sensors fail, one, many or all, at random moments of random drives with any pattern: no motion towards "
+            "a direction of the body's path without a usable range or believed silence there that is younger than "
+            "echo_age_max_s + 0.15 s, and nothing touched; a pattern with which the robot could not drive is refused "
+            "wherever it can be set",
+        ),
         "P25": Promise(
             "The base is not believed on its word",
             "a flag in any one sample of the odometry stops the drive; an ARM while bumper or motor fault is "

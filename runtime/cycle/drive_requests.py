@@ -14,6 +14,7 @@ from typing import Final, Literal, TypeAlias
 from behaviors.arbiter import Decision, Drive, arbitrate, limit_velocity
 from behaviors.avoid_static_obstacle import SCHEMA as AVOID
 from behaviors.avoid_static_obstacle import avoid_static_obstacle
+from behaviors.field_of_view import unseen_way
 from behaviors.move_ahead import SCHEMA as AHEAD
 from behaviors.move_ahead import Leg, move_ahead
 from behaviors.move_to_goal import SCHEMA as TO_GOAL
@@ -115,6 +116,10 @@ def drive(
         requested = Twist(drive_request.v, drive_request.w)
         decision = limit_velocity(requested, responses, percept, body, behaviors.arbiter, expected)
         hold_reason = NO_CONTROL if drive_request == TELEOPERATION_ENDED else None
+        if hold_reason is None and requested.v != 0.0 and isinstance(decision, Drive) and decision.twist.v == 0.0:
+            way = percept.pose.theta + (0.0 if requested.v > 0.0 else math.pi)
+            unseen = unseen_way(percept, way, body, behaviors.arbiter.clearance_m)
+            hold_reason = None if unseen is None else unseen.reason
         return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason)
     if isinstance(drive_request, Goal):
         to_goal, drive_request = move_to_goal(percept, drive_request, behaviors.move_to_goal)

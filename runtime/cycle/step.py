@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Literal, TypeAlias
 
-from behaviors.arbiter import Drive, Stop
+from behaviors.arbiter import Drive, Stop, Unseen
 from behaviors.move_ahead import Leg
 from behaviors.response import Response
 from config.settings import Settings
@@ -240,17 +240,29 @@ def _drive(state: State, inputs: Inputs, settings: Settings) -> Drive | Stop:
     odometry, behaviors = state.odometry, settings.behaviors
     if odometry is None:
         return Stop("no odometry has arrived: check that the base reports it, then re-arm")
-    silence_s = odometry.robot_s - state.last_firing_robot_s
-    silence_max_s = behaviors.avoid_static_obstacle.echo_age_max_s
-    if silence_s > silence_max_s:
+    age_max_s = behaviors.avoid_static_obstacle.echo_age_max_s
+    view = state.perception.field_of_view(odometry.robot_s, odometry.ring_yaw, age_max_s)
+    blind_s = min(float(view.sensor_ages_s.min()), odometry.robot_s)
+    if blind_s > age_max_s:
         likely = inputs.line_problem or "check the ring's power and cable"
-        return Stop(f"the ring has not reported for {silence_s:.1f} s: {likely}, then re-arm")
+        if odometry.robot_s - state.last_firing_robot_s > age_max_s:
+            return Stop(f"the ring has not reported for {blind_s:.1f} s: {likely}, then re-arm")
+        return Stop(
+            f"the ring fires, but no sensor has given a usable range for {blind_s:.1f} s, as all are masked or "
+            f"report faults: {likely}, then re-arm"
+        )
     if state.leg is None:
         state.leg = Leg.starting_at(odometry.pose)
-    percept = Percept(odometry.pose, state.perception.obstacles(odometry.robot_s, silence_max_s))
+    percept = Percept(odometry.pose, state.perception.obstacles(odometry.robot_s, age_max_s), view)
     result = drive(state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings)
     state.drive_request, state.leg = result.drive_request, result.leg
     state.vectors, state.hold_reason = result.vectors, result.hold_reason
+    if isinstance(result.decision, Unseen):
+        driven_s = inputs.run_s - state.mode.entered_run_s
+        if min(result.decision.age_s - age_max_s, driven_s) <= age_max_s:
+            # It stands until the ring looks there: echoes were lost, or not every sensor has fired since the start.
+            state.hold_reason = result.decision.reason
+            return Drive(STANDSTILL)
     return result.decision
 
 

@@ -77,7 +77,7 @@ UNHEARD: Final = "method.memory.state.sensors.last."
 """Readings that are NaN until their sensor has made one."""
 
 _CONSTANTS: Final = (
-    "_mounts _half_angle _sensors _segments_min _reach_m sensor_monitor._axes sensor_monitor._neighbours "
+    "_axes _mounts _half_angle _sensors _segments_min _reach_m sensor_monitor._neighbours "
     "sensor_monitor._tolerance sensor_monitor._near state.sensor_count scratch.attracting_rows drift._ring"
 )
 CONSTANTS: Final = frozenset(_CONSTANTS.split())
@@ -85,9 +85,9 @@ CONSTANTS: Final = frozenset(_CONSTANTS.split())
 
 MAY_BE_INFINITE: Final = frozenset({
     "_sensors.last_m", "before_last_m", "run_m", "stuck_m", "job.best_nat", "_looked_x", "_looked_y",
-    "_keyframes._latest", "_keyframes.readings", "_grid._readings",
+    "_keyframes._latest", "_keyframes.readings", "_grid._readings", "_echoes._times",
 })  # fmt: skip
-"""Floats for which an infinity stands for no echo, for no evidence yet, or for no place yet."""
+"""Floats for which an infinity stands for no echo, for no evidence yet, or for no place or time yet."""
 
 _COUNTS: Final = (
     "_numbers.last _rejections.total _ring.firings sets_seen bins.count buckets.count number candidates._sizes _turn "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from config.settings import Settings
+from runtime.support.pattern_check import pattern_speed_m_s
 
 
 def lint_settings(settings: Settings) -> list[str]:
@@ -25,5 +26,11 @@ def lint_settings(settings: Settings) -> list[str]:
         warnings.append(
             f"cycle.rate_hz = {settings.cycle.rate_hz:g} is less than half of {firing_hz:g} firings a second: "
             "several firings wait for each cycle"
+        )
+    speed_m_s = pattern_speed_m_s(settings)
+    if speed_m_s < min(arbiter.base_velocity_m_s, settings.body.speed_max_m_s):
+        warnings.append(
+            f"ring.firing: the pattern looks ahead so seldom that it limits the speed to {speed_m_s:.2f} m/s, below "
+            f"behaviors.arbiter.base_velocity_m_s = {arbiter.base_velocity_m_s:g}; fire more sensors at a time"
         )
     return warnings

@@ -16,6 +16,7 @@ from behaviors.arbiter import Drive, arbitrate
 from config.robot import BodyConfig
 from config.settings import BehaviorsConfig
 from perception.percept import Percept, Pose
+from tests.behaviors.views import EVERYWHERE
 
 SENSORS = 24
 HALF_BEAM_RAD = math.radians(12.0)
@@ -91,7 +92,7 @@ def drive(
     run, pose, v, w = Run(), start, 0.0, 0.0
     leg = ahead.Leg.starting_at(start)
     for _ in range(round(seconds / STEP_S)):
-        percept = Percept(pose, echoes(world, pose, wide=wide, noise=noise))
+        percept = Percept(pose, echoes(world, pose, wide=wide, noise=noise), EVERYWHERE)
         response, leg = ahead.move_ahead(percept, leg, config.move_ahead)
         push = avoid.avoid_static_obstacle(percept, BODY.radius_m, config.avoid_static_obstacle)
         decision = arbitrate((response, push), percept, BODY, config.arbiter, (ahead.SCHEMA, avoid.SCHEMA))

@@ -14,13 +14,14 @@ from behaviors.response import Response
 from config.robot import BodyConfig
 from config.settings import ArbiterConfig
 from perception.percept import Percept, Pose, Twist
+from tests.behaviors.views import EVERYWHERE
 
 BODY = BodyConfig(radius_m=0.4, speed_max_m_s=0.5, turn_max_rad_s=1.0, acceleration_max_m_s2=0.5)
 CONFIG = ArbiterConfig(base_velocity_m_s=0.3, cautious_velocity_m_s=0.1, turn_gain_per_s=2.0, clearance_m=0.1)
 
 
 def at(theta: float = 0.0, *points: tuple[float, float]) -> Percept:
-    return Percept(Pose(0.0, 0.0, theta), np.array(points, dtype=np.float64).reshape(-1, 2))
+    return Percept(Pose(0.0, 0.0, theta), np.array(points, dtype=np.float64).reshape(-1, 2), EVERYWHERE)
 
 
 def decide(
@@ -123,7 +124,7 @@ def test_vectors_too_large_to_add_stop() -> None:
 @pytest.mark.parametrize("part", ["x", "y", "theta"])
 def test_a_non_finite_pose_stops(bad: float, part: str) -> None:
     values = {"x": 0.0, "y": 0.0, "theta": 0.0, part: bad}
-    decision = decide((1.0, 0.0), percept=Percept(Pose(**values), np.empty((0, 2))))
+    decision = decide((1.0, 0.0), percept=Percept(Pose(**values), np.empty((0, 2)), EVERYWHERE))
     assert "pose" in reason(decision)
 
 
@@ -164,7 +165,7 @@ def test_never_over_a_limit_never_nan() -> None:
     points = rng.uniform(-1.0, 1.0, (64, 3, 2))
     stops = 0
     for i, (rows, heading) in enumerate(zip(vectors.tolist(), headings.tolist(), strict=True)):
-        percept = Percept(Pose(0.0, 0.0, heading), points[i % 64])
+        percept = Percept(Pose(0.0, 0.0, heading), points[i % 64], EVERYWHERE)
         given = [Response("a", *rows[0]), Response("b", *rows[1])]
         decision = arbitrate(given, percept, BODY, CONFIG, ("a", "b"))
         if isinstance(decision, Stop):

@@ -10,6 +10,7 @@ import pytest
 from behaviors.avoid_static_obstacle import SCHEMA, UNBOUNDED, avoid_static_obstacle, repulsions
 from config.settings import AvoidStaticObstacleConfig
 from perception.percept import Percept, Pose
+from tests.behaviors.views import EVERYWHERE
 
 RADIUS = 0.5
 SUM = AvoidStaticObstacleConfig(
@@ -20,7 +21,7 @@ BOTH = pytest.mark.parametrize("config", [SUM, LARGEST], ids=["sum", "largest"])
 
 
 def seen(*points: tuple[float, float], pose: Pose | None = None) -> Percept:
-    return Percept(pose or Pose(0.0, 0.0, 0.0), np.array(points, dtype=np.float64).reshape(-1, 2))
+    return Percept(pose or Pose(0.0, 0.0, 0.0), np.array(points, dtype=np.float64).reshape(-1, 2), EVERYWHERE)
 
 
 def vector(percept: Percept, config: AvoidStaticObstacleConfig) -> tuple[float, float]:
@@ -132,7 +133,7 @@ def test_agrees_with_the_oracle(config: AvoidStaticObstacleConfig) -> None:
         angle, far = rng.uniform(-math.pi, math.pi, (2, rng.integers(1, 40)))
         far = np.abs(far)
         points = np.column_stack((pose.x + far * np.cos(angle), pose.y + far * np.sin(angle)))
-        percept = Percept(pose, points)
+        percept = Percept(pose, points, EVERYWHERE)
         expected = naive(percept, config)
         assert vector(percept, config) == pytest.approx(expected, rel=1e-9, abs=1e-6)
 

@@ -16,6 +16,7 @@ from drivers.denning import frames
 from drivers.denning.codec import Decoder
 from drivers.messages import Twist
 from perception.percept import Percept, Pose
+from tests.behaviors.views import EVERYWHERE
 from tests.drivers.driver_harness import CONFIG, DriverHarness
 
 pytestmark = pytest.mark.promise("P3")
@@ -92,9 +93,9 @@ def check_decisions(count: int, seed: int, measured: Callable[[str], None]) -> N
         for points, of in zip(
             rng.uniform(-3.0, 3.0, (64, 4, 2)), rng.normal(0.0, 3.0, (64, 3)).tolist(), strict=True
         ):
-            percepts.append(Percept(Pose(*of), points[: rng.integers(0, 5)]))
-        percepts[0] = Percept(Pose(*numbers(rng, (3,)).tolist()), np.empty((0, 2)))
-        percepts[1] = Percept(Pose(0.0, 0.0, 0.0), numbers(rng, (3, 2)))
+            percepts.append(Percept(Pose(*of), points[: rng.integers(0, 5)], EVERYWHERE))
+        percepts[0] = Percept(Pose(*numbers(rng, (3,)).tolist()), np.empty((0, 2)), EVERYWHERE)
+        percepts[1] = Percept(Pose(0.0, 0.0, 0.0), numbers(rng, (3, 2)), EVERYWHERE)
         asked = 0
         for i, (first, second) in enumerate(vectors.tolist()):
             percept = percepts[i % 64]
@@ -149,7 +150,7 @@ def test_driver_given_any_velocity_sends_nothing_bad(measured: Callable[[str], N
 def test_a_missing_axis_is_a_stop_with_a_reason(axis: object) -> None:
     """A user's schema may omit an axis; that does not count as zero."""
     body, config = BodyConfig(radius_m=0.4, speed_max_m_s=0.5, turn_max_rad_s=1.0), ArbiterConfig()
-    percept = Percept(Pose(0.0, 0.0, 0.0), np.empty((0, 2)))
+    percept = Percept(Pose(0.0, 0.0, 0.0), np.empty((0, 2)), EVERYWHERE)
     for x, y in ((axis, 0.0), (0.0, axis), (axis, axis)):
         given = (Response(NAMES[0], 1.0, 0.0), Response(NAMES[1], x, y))  # type: ignore[arg-type]
         decision = arbitrate(given, percept, body, config, NAMES)
@@ -162,7 +163,7 @@ def test_a_missing_axis_is_a_stop_with_a_reason(axis: object) -> None:
 @pytest.mark.parametrize("given", [(), NAMES[:1], NAMES[1:], (*NAMES, "stranger"), (*NAMES, NAMES[0])], ids=str)
 def test_a_decision_that_lacks_a_part_or_has_one_too_many_is_a_stop(given: tuple[str, ...]) -> None:
     body, config = BodyConfig(radius_m=0.4, speed_max_m_s=0.5, turn_max_rad_s=1.0), ArbiterConfig()
-    percept = Percept(Pose(0.0, 0.0, 0.0), np.empty((0, 2)))
+    percept = Percept(Pose(0.0, 0.0, 0.0), np.empty((0, 2)), EVERYWHERE)
     decision = arbitrate([Response(name, 1.0, 0.0) for name in given], percept, body, config, NAMES)
     assert isinstance(decision, Stop)
     assert decision.reason

@@ -10,6 +10,7 @@ import pytest
 from behaviors.clearance import free_path_m, stoppable_speed_m_s
 from config.robot import BodyConfig
 from perception.percept import Percept, Pose
+from tests.behaviors.views import EVERYWHERE
 
 BODY = BodyConfig(radius_m=0.4, speed_max_m_s=0.5, turn_max_rad_s=1.0, acceleration_max_m_s2=0.5)
 REACH_M = 0.5
@@ -17,7 +18,7 @@ STEP_M = 0.002
 
 
 def seen(*points: tuple[float, float], theta: float = 0.0) -> Percept:
-    return Percept(Pose(0.0, 0.0, theta), np.array(points, dtype=np.float64).reshape(-1, 2))
+    return Percept(Pose(0.0, 0.0, theta), np.array(points, dtype=np.float64).reshape(-1, 2), EVERYWHERE)
 
 
 def naive_free_path(percept: Percept, reach_m: float) -> float:
@@ -37,7 +38,7 @@ def test_free_path_agrees_with_the_oracle() -> None:
     found = []
     for _ in range(40):
         x, y, theta = rng.uniform((-1.0, -1.0, -7.0), (1.0, 1.0, 7.0)).tolist()
-        percept = Percept(Pose(x, y, theta), rng.uniform(-3.0, 3.0, (5, 2)))
+        percept = Percept(Pose(x, y, theta), rng.uniform(-3.0, 3.0, (5, 2)), EVERYWHERE)
         slow = naive_free_path(percept, REACH_M)
         found.append(free_path_m(percept, REACH_M))
         assert found[-1] == (slow if slow == math.inf else pytest.approx(slow, abs=1.1 * STEP_M))

@@ -10,10 +10,11 @@ import pytest
 from behaviors.move_ahead import SCHEMA, Leg, move_ahead
 from config.settings import MoveAheadConfig
 from perception.percept import Percept, Pose
+from tests.behaviors.views import EVERYWHERE
 
 
 def at(x: float, y: float, theta: float = 0.0) -> Percept:
-    return Percept(Pose(x, y, theta), np.empty((0, 2)))
+    return Percept(Pose(x, y, theta), np.empty((0, 2)), EVERYWHERE)
 
 
 @pytest.mark.parametrize(

@@ -11,12 +11,13 @@ from pydantic import ValidationError
 from behaviors.move_to_goal import Goal, move_to_goal
 from config.settings import MoveToGoalConfig
 from perception.percept import Percept, Pose
+from tests.behaviors.views import EVERYWHERE
 
 CONFIG = MoveToGoalConfig(move_to_goal_gain=2.0, success_radius_m=0.1, controlled_zone_m=0.5)
 
 
 def at(x: float, y: float, theta: float = 0.3) -> Percept:
-    return Percept(Pose(x, y, theta), np.empty((0, 2)))
+    return Percept(Pose(x, y, theta), np.empty((0, 2)), EVERYWHERE)
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, is_expired
 from config.robot import BodyConfig
 from config.settings import ArbiterConfig, TeleoperationConfig
 from perception.percept import Percept, Pose, Twist
+from tests.behaviors.views import EVERYWHERE
 
 BODY = BodyConfig(radius_m=0.4, speed_max_m_s=0.5, turn_max_rad_s=1.0, acceleration_max_m_s2=0.5)
 CONFIG = ArbiterConfig(base_velocity_m_s=0.4, turn_gain_per_s=2.0, clearance_m=0.1)
@@ -24,7 +25,7 @@ def at(theta: float, *points: tuple[float, float]) -> Percept:
     """Return the percept of a robot at the origin; points count ahead and to the left."""
     c, s = math.cos(theta), math.sin(theta)
     turned = [(c * x - s * y, s * x + c * y) for x, y in points]
-    return Percept(Pose(0.0, 0.0, theta), np.array(turned, dtype=np.float64).reshape(-1, 2))
+    return Percept(Pose(0.0, 0.0, theta), np.array(turned, dtype=np.float64).reshape(-1, 2), EVERYWHERE)
 
 
 def decide(v: float, w: float, percept: Percept, push: tuple[float, float] = (0.0, 0.0)) -> Drive | Stop:
@@ -134,7 +135,7 @@ def test_no_velocity_and_no_vector_makes_a_bad_command() -> None:
     points = rng.uniform(-1.0, 1.0, (64, 3, 2))
     stops = 0
     for i, (v, w, x1, y1, x2, y2) in enumerate(rows.tolist()):
-        percept = Percept(Pose(0.0, 0.0, float(rng.uniform(-4.0, 4.0))), points[i % 64])
+        percept = Percept(Pose(0.0, 0.0, float(rng.uniform(-4.0, 4.0))), points[i % 64], EVERYWHERE)
         decision = limit_velocity(
             Twist(v, w), (Response("a", x1, y1), Response("b", x2, y2)), percept, BODY, CONFIG, ("a", "b")
         )

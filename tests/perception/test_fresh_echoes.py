@@ -8,11 +8,16 @@ import numpy as np
 import pytest
 
 from drivers.messages import Firing, Pose
-from perception.fresh_echoes import FreshEchoes
+from perception.fresh_echoes import LOOKS, FreshEchoes
 from perception.pipeline import Perception
 from tests.perception.halls import settings
 
 MOUNTS = np.array([[0.4, 0.0, 0.0], [0.0, 0.4, math.pi / 2]])
+BEAM = math.radians(12.0)
+
+
+def at(robot_s: float, yaw: float, *ranges: float) -> Firing:
+    return Firing(robot_s, Pose(0.0, 0.0, 0.0), yaw, np.array(ranges))
 
 
 def test_echoes_are_obstacles_until_the_sensor_fires_again_or_they_age() -> None:
@@ -33,16 +38,53 @@ def test_echoes_are_obstacles_until_the_sensor_fires_again_or_they_age() -> None
 
 
 def test_an_echo_lies_on_the_axis_of_its_turned_sensor() -> None:
-    echoes = FreshEchoes(MOUNTS)
+    echoes = FreshEchoes(MOUNTS, BEAM)
     echoes.update(Firing(1.0, Pose(1.0, 2.0, 0.3), math.pi / 2, np.array([1.0, 2.0])))
     np.testing.assert_allclose(echoes.points(1.0, 0.0), [[1.0, 3.4], [-1.4, 2.0]], atol=1e-12)
 
 
 def test_a_sensor_that_does_not_fire_keeps_its_echo_and_the_age_limit_is_inclusive() -> None:
-    echoes = FreshEchoes(MOUNTS)
+    echoes = FreshEchoes(MOUNTS, BEAM)
     echoes.update(Firing(1.0, Pose(0.0, 0.0, 0.0), 0.0, np.array([1.0, 2.0])))
     echoes.update(Firing(2.0, Pose(0.0, 0.0, 0.0), 0.0, np.array([3.0, math.nan])))
     assert len(echoes.points(2.0, 1.0)) == 2
     assert echoes.points(2.0, 0.5) == pytest.approx(np.array([[3.4, 0.0]]))
     echoes.clear()
     assert len(echoes.points(2.0, math.inf)) == 0
+
+
+def test_only_a_usable_range_or_a_silence_is_a_look() -> None:
+    echoes = FreshEchoes(MOUNTS, BEAM)
+    assert np.isinf(echoes.ages(5.0)).all()
+    assert [len(found) for found in echoes.looks(5.0, 60.0)] == [0, 0]
+    echoes.update(at(5.0, 0.1, 1.0, math.nan))
+    echoes.update(at(6.0, 0.1, math.nan, math.inf))
+    echoes.update(at(7.0, 0.1, math.nan, math.nan))
+    bearings, ages = echoes.looks(7.0, 2.0)
+    np.testing.assert_allclose(bearings, [0.1, 0.1 + math.pi / 2])
+    np.testing.assert_allclose(ages, [2.0, 1.0])
+    assert echoes.ages(7.0) == pytest.approx([2.0, 1.0])
+    assert echoes.looks(7.0, 1.5)[0] == pytest.approx([0.1 + math.pi / 2])
+    echoes.clear()
+    assert np.isinf(echoes.ages(0.0)).all(), "a robot that restarted counts from zero again"
+
+
+def test_a_ring_that_turns_keeps_what_it_heard_in_other_directions() -> None:
+    echoes = FreshEchoes(MOUNTS[:1], BEAM)
+    for k, turn in enumerate((0.0, 0.09, 0.2, 0.2 + 2.0 * math.pi, 0.4 - 2.0 * math.pi)):
+        echoes.update(at(float(k), turn, 1.0))
+    bearings, ages = echoes.looks(4.0, 60.0)
+    kept = sorted(zip(ages.tolist(), np.remainder(bearings, 2.0 * math.pi).tolist(), strict=True))
+    assert [age for age, _ in kept] == [0.0, 1.0, 3.0], "a look replaces those within half of a beam's half width"
+    assert [bearing for _, bearing in kept] == pytest.approx([0.4, 0.2, 0.09])
+    assert len(echoes.points(4.0, math.inf)) == 3
+    echoes.update(at(5.0, 0.05, math.inf))
+    assert len(echoes.points(5.0, math.inf)) == 2, "a silence removes the echo that it would have repeated"
+
+
+def test_where_more_directions_are_heard_than_kept_the_oldest_goes() -> None:
+    echoes = FreshEchoes(MOUNTS[:1], BEAM)
+    for k in range(LOOKS + 3):
+        echoes.update(at(float(k), 0.2 * k, 1.0))
+    _, ages = echoes.looks(LOOKS + 2.0, 60.0)
+    assert sorted(ages.tolist()) == list(range(LOOKS))

@@ -10,6 +10,7 @@ import pytest
 from drivers.messages import Firing
 from perception.percept import Percept, Pose, wrap_angle
 from perception.pipeline import Perception
+from tests.behaviors.views import EVERYWHERE
 from tests.perception.edited import fresh
 
 
@@ -19,7 +20,8 @@ def test_perception_fills_a_percept_that_cannot_be_changed() -> None:
     ranges[0] = 1.0
     pose = Pose(1.0, 0.0, 0.0)
     perception.observe(Firing(0.0, pose, 0.0, ranges))
-    percept = Percept(pose, perception.obstacles(0.0, 1.0), perception.objects())
+    view = perception.field_of_view(0.0, 0.0, 1.0)
+    percept = Percept(pose, perception.obstacles(0.0, 1.0), view, perception.objects())
     assert percept.obstacles.shape == (1, 2)
     assert np.isfinite(percept.obstacles).all()
     assert percept.objects == ()
@@ -29,4 +31,4 @@ def test_perception_fills_a_percept_that_cannot_be_changed() -> None:
 
 
 def test_by_default_no_object_is_recognised() -> None:
-    assert Percept(Pose(0.0, 0.0, 0.0), np.zeros((0, 2))).objects == ()
+    assert Percept(Pose(0.0, 0.0, 0.0), np.zeros((0, 2)), EVERYWHERE).objects == ()

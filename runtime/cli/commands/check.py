@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from config.errors import DONE
 from config.load import load_any
 from config.settings import Settings
-from drivers.registry import make_driver
 from runtime.support.config_lint import lint_settings
+from runtime.support.pattern_check import refuse_undrivable
 
 
 def check_config(config: str, sets: Sequence[str]) -> int:
@@ -20,11 +20,11 @@ def check_config(config: str, sets: Sequence[str]) -> int:
     ConfigError
         The configuration is wrong; the message says what and where.
     FiringError
-        Each value is valid, but the ring cannot carry out its firing pattern.
+        Each value is valid, but the ring cannot carry out its firing pattern, or would not see where it drives.
     """
     settings = load_any(config, sets)
     if isinstance(settings, Settings):
-        make_driver(settings)  # refuses what the robot cannot carry out
+        refuse_undrivable(settings)
         for text in lint_settings(settings):
             sys.stdout.write(f"{config}: {text}\n")
     sys.stdout.write(f"{config}: good\n")

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from rich.console import Console
+
 from config.errors import DONE
 from config.load import load_settings
 from runtime.cli.commands.output_files import check_outputs
-from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.support.kernel_cache import LOCALIZATION, needed_parts, prepare_kernels
 from runtime.support.progress import progress
 
@@ -27,7 +28,7 @@ def run_drift(
         As of `runtime.cli.experiment_commands.experiment`.
     """
     settings = load_settings("hallway", sets, models=models)
-    console = EscapingConsole(stderr=True)
+    console = Console(stderr=True)
     check_outputs({"--json": json_file}, force=force)
     prepare_kernels(settings, console, (*needed_parts(settings), LOCALIZATION))
     from runtime.cli.tables import drift_table
@@ -45,5 +46,5 @@ def run_drift(
                 rows.append(summarise_drives(errors, outcomes))
     if json_file is not None:
         write_json(json_file, {"levels": rows})
-    EscapingConsole().print(drift_table(rows, units))
+    Console().print(drift_table(rows, units))
     return DONE

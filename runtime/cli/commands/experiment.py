@@ -11,14 +11,13 @@ from rich.console import Console
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.load import load_settings
 from config.settings import Settings
-from drivers.registry import make_driver
 from runtime.cli.commands.offline_io import plain_console, read_timeline
 from runtime.cli.commands.output_files import check_outputs, make_output_folder
 from runtime.cli.tables import boxes_table, outcome_line, scene_line, spread_line, table_2
-from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.simulation.scene_names import SceneName
 from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.length_format import Units
+from runtime.support.pattern_check import refuse_undrivable
 from runtime.support.progress import progress
 
 if TYPE_CHECKING:
@@ -59,8 +58,8 @@ def run_experiment(
     settings = stop_at_leg_end(load_settings(name, sets, world=world, models=models))
     if settings.world is None or not settings.world.drum:
         raise UserError("the world has no drum: the experiment compares what is recognised with drums", WRONG_CALL)
-    make_driver(settings)  # refuses what the robot cannot carry out
-    console, output = EscapingConsole(stderr=True), plain_console()
+    refuse_undrivable(settings)
+    console, output = Console(stderr=True), plain_console()
     folder = None if out is None else make_output_folder(out)
     check_outputs({"--out": [] if folder is None else run_files(folder, name), "--json": json_file}, force=force)
     prepare_kernels(settings, console)
@@ -182,7 +181,7 @@ def run_scenes(
         As of `runtime.cli.experiment_commands.experiment`.
     """
     settings = load_settings("hallway", sets, models=models)
-    console = EscapingConsole(stderr=True)
+    console = Console(stderr=True)
     check_outputs({"--json": json_file}, force=force)
     prepare_kernels(settings, console)
     from runtime.cycle.summary import write_json
@@ -196,7 +195,7 @@ def run_scenes(
     outcome = summarise_scene(scene, halls, settings.models)
     if json_file is not None:
         write_json(json_file, outcome)
-    output = EscapingConsole()
+    output = Console()
     if len(outcome["drums"]) + len(outcome["boxes"]) <= ROWS_SHOWN:
         if outcome["drums"]:
             output.print(table_2(outcome, units))

@@ -17,20 +17,19 @@ from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.files import is_utf8, utf8
 from config.load import ConfigError, load_settings, with_known_room
 from config.settings import Settings
-from drivers.registry import make_driver
 from runtime import VERSION
 from runtime.cli.commands.output_files import check_outputs
 from runtime.cli.commands.run_recording import RunRecording, open_run_recording
 from runtime.cli.first_signals import is_remembered
 from runtime.cli.start_signals import ending_the_start, handled_by_loop
 from runtime.cli.tables import objects_table, timing_line, timing_table
-from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.support.config_lint import lint_settings
 from runtime.support.file_lock import file_lock
 from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.kernel_loader import KernelPreparation, begin_preparation
 from runtime.support.length_format import Units
 from runtime.support.logs import LogStatus, log_path, open_log
+from runtime.support.pattern_check import refuse_undrivable
 from runtime.support.sd_notify import SdNotifier
 from runtime.timing.run_clock import RunClock, ScaledClock
 
@@ -105,7 +104,7 @@ def run_robot(
     settings = load_settings(config, sets, world=emulator.world)
     if map_file is not None:
         settings = with_known_room(settings, map_file)
-    make_driver(settings)  # refuses what the robot cannot carry out
+    refuse_undrivable(settings)
     if no_console:
         settings = without_console(settings)
     if seconds is not None and not seconds > 0.0:
@@ -118,7 +117,7 @@ def run_robot(
         check_outputs, inputs=(emulator.faults, port), force=force, appended={"log.file": log_path(settings.log)}
     )
     check_files({**own_files, "--trace": emulator.trace})
-    console = EscapingConsole(stderr=True)
+    console = Console(stderr=True)
     preparation = begin_preparation(settings)
     if preparation is None:
         prepare_kernels(settings, console)
@@ -173,7 +172,7 @@ def run_robot(
         from runtime.cycle.summary import write_json
 
         write_json(json_file, summary)
-    output = EscapingConsole()
+    output = Console()
     output.print(objects_table(summary["objects"], units))
     output.print(timing_table(summary))
     output.print(timing_line(summary))
@@ -234,7 +233,7 @@ def reload_settings(
     if map_file is not None:
         settings = with_known_room(settings, map_file)
     try:
-        make_driver(settings)
+        refuse_undrivable(settings)
     except UserError as error:
         raise ConfigError(str(error)) from error
     if no_console:

@@ -18,9 +18,9 @@ from config.model import ModelConfig
 from config.problems import shown
 from config.reload import Difference, ReloadResult, differences
 from config.settings import Settings
-from drivers.registry import make_driver
 from runtime.console.commands.command_error import CommandError
 from runtime.cycle.live_settings import LiveSettings, PrepareSettings
+from runtime.support.pattern_check import refuse_undrivable
 
 SOURCE: Final = "page"
 """What error messages of the configuration call the source of a value."""
@@ -154,7 +154,7 @@ class Tuning:
         def proposed() -> Settings:
             settings = propose()
             try:
-                make_driver(settings)  # refuses a firing pattern that the robot cannot carry out
+                refuse_undrivable(settings)
             except UserError as error:
                 raise ConfigError(str(error)) from error
             return settings

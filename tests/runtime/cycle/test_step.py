@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from drivers.driver import LineState
@@ -124,8 +126,14 @@ def test_no_odometry_is_a_reason_to_stop() -> None:
 def test_a_silent_ring_is_a_reason_to_stop() -> None:
     script = ScriptedRobot().driving()
     begin_s = script.robot_s
+    speeds = []
     while script.state.mode.mode is Mode.DRIVE:
         record = script.cycle(firing=False)
+        if isinstance(record.command, Twist):
+            speeds.append(record.command.v)
+            script.pose = replace(script.pose, x=script.pose.x + PERIOD_S * record.command.v)
+    assert speeds[0] == pytest.approx(0.3)
+    assert speeds[-1] < 0.05, "it has slowed down before"
     assert "ring has not reported" in str(record.mode.reason)
     assert record.command is Order.HALT
     assert TIMEOUT_S < script.robot_s - begin_s < TIMEOUT_S + 2 * PERIOD_S

@@ -105,7 +105,7 @@ def test_no_state_among_irregular_objects_is_refused(method: str) -> None:
         if method == "bayes":
             kinds.add(int(state.perception.snapshot()["method.memory.state"]["job"]["kind"][0]))
 
-    simulate(settings, settings.world, 1, 15.0, on_state=on_state)
+    simulate(settings, settings.world, 2, 15.0, on_state=on_state)
     assert method == "paper" or len(kinds) == 3, "polygons are initiated and refined"
 
 

@@ -23,3 +23,8 @@ def test_a_cycle_much_slower_than_the_ring_is_named() -> None:
     assert len(warnings) == 1
     assert "cycle.rate_hz = 5" in warnings[0]
     assert "20 firings a second" in warnings[0]
+
+
+def test_a_pattern_that_limits_the_speed_is_named() -> None:
+    (warning,) = lint_settings(load_settings("hallway", ["ring.firing=single"]))
+    assert warning.startswith("ring.firing: the pattern looks ahead so seldom that it limits the speed to 0.10 m/s")

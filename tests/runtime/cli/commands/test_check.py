@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from config.errors import DONE
+from config.errors import DONE, WRONG_CALL
 from config.load import list_shipped
 from runtime.cli.app import run_command
 
@@ -31,3 +31,14 @@ def test_an_unwise_setting_is_named_and_good(capsys: pytest.CaptureFixture[str])
     warning, good = capsys.readouterr().out.splitlines()
     assert warning.startswith("hallway: cycle.rate_hz = 5")
     assert good == "hallway: good"
+
+
+@pytest.mark.promise("P24")
+def test_a_pattern_with_which_the_robot_could_not_drive_is_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+    for firing in ("{preset='single', step_period_s=0.1}", "{sets=[[10, 12, 14]]}"):
+        assert run_command(["check", "hallway", "--set", f"ring.firing={firing}"]) == WRONG_CALL
+        out, err = capsys.readouterr()
+        assert out == ""
+        assert "so that the robot could not drive" in err
+    assert run_command(["check", "hallway", "--set", "ring.firing=single"]) == DONE
+    assert "limits the speed to 0.10 m/s" in capsys.readouterr().out

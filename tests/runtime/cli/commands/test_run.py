@@ -12,9 +12,10 @@ from pathlib import Path
 import pytest
 
 from config.errors import FAILED, WRONG_CALL
+from config.load import ConfigError
 from drivers.link import Link
 from runtime.cli.app import run_command
-from runtime.cli.commands.run import signals
+from runtime.cli.commands.run import reload_settings, signals
 from runtime.cli.first_signals import ENDING, Remembered
 from runtime.cycle.inputs import Request
 from runtime.support.file_lock import file_lock
@@ -178,3 +179,14 @@ async def test_a_halt_from_before_the_run_stops_it_from_arming_the_robot() -> No
     with signals(process, StubReloader(process.asked)):  # type: ignore[arg-type]
         assert process.asked.get_nowait() is Request.HALT
     assert process.asked.empty(), "no robot is armed later than it was asked for"
+
+
+@pytest.mark.promise("P24")
+def test_a_pattern_with_which_it_could_not_drive_is_refused_at_the_start_and_in_a_reload(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    backwards = "ring.firing={sets=[[10, 12, 14]]}"
+    assert run_command(["run", "--set", backwards, *HEADLESS]) == WRONG_CALL
+    assert "the pattern does not look ahead" in error_line(capfd)
+    with pytest.raises(ConfigError, match="the pattern does not look ahead"):
+        reload_settings(None, [backwards], None, None, None)

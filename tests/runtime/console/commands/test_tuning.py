@@ -43,6 +43,8 @@ async def test_a_change_is_shown_to_all_clients_and_undone() -> None:
         ("behaviors.avoid_static_obstacle.gain", 1.0, "unknown key"),
         ("link.port.x.y", 1.0, "link.port is a single value"),
         ("ring.firing.step_period_s", 0.001, "step_period_s 0.001 is shorter than sound takes"),
+        ("ring.firing.step_period_s", 0.6, "a look ahead can be 1.90 s old, and counts for behaviors."),
+        ("behaviors.avoid_static_obstacle.echo_age_max_s", 0.2, "a look ahead can be 0.25 s old"),
     ],
 )  # fmt: skip
 async def test_an_invalid_change_is_refused(path: str, value: Any, error: str) -> None:

@@ -1,0 +1,181 @@
+"""The speed that the field of view allows: nothing moves towards a direction in which the ring has not looked lately.
+
+The path of the body, from where it leaves the clearance on, needs every direction within asin(R / (R + clearance)) of
+the heading; what is nearer lies inside the clearance. A direction is seen while a sensor whose beam covers it has
+given a usable range, or a believed silence, no longer ago than the age limit. The speed falls so that the robot
+stands before the first of these directions is too old, and before its path turns to one that is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from config.robot import BodyConfig
+from perception.percept import FieldOfView, Floats, Percept, wrap_angle
+
+ROUNDING_RAD: Final = 1e-6
+"""A gap between two beams that is no wider than this comes from rounding."""
+REACTION_S: Final = 0.1
+"""Time from odometry until the wheels follow the velocity that was decided on it, s: two cycles."""
+SENSORS_NAMED_MAX: Final = 8
+"""Most sensors that a reason names."""
+
+
+@dataclass(frozen=True, slots=True)
+class UnseenWay:
+    """A direction in which the robot must not move, for want of sensors that look there."""
+
+    reason: str
+    """Which sensors have not looked there, for the operator."""
+    age_s: float
+    """How long they have not, s; infinite if they never have."""
+    sensors: tuple[int, ...]
+    """The sensors that should look there and have not lately."""
+
+
+def path_half_angle_rad(body: BodyConfig, clearance_m: float) -> float:
+    """Return the angle from the heading within which the body's path leaves the clearance, rad."""
+    return math.asin(body.radius_m / (body.radius_m + clearance_m))
+
+
+def seen_speed_m_s(percept: Percept, body: BodyConfig, clearance_m: float, turn_rad_s: float = 0.0) -> float:
+    """Return the highest speed from which the robot stands before it would move towards an unseen direction, m/s.
+
+    With a the deceleration: a·t for the time t until the first direction is both in the path, to which a turn may
+    bring it, and beyond the age limit; and √(2·a·d) for the distance d that the ring reaches beyond the clearance.
+
+    Parameters
+    ----------
+    percept
+        Pose and field of view of this cycle.
+    body
+        Radius and largest deceleration of the base.
+    clearance_m
+        Distance to keep between rim and echo, m.
+    turn_rad_s
+        The turning rate, rad/s. Both sides count, as the wheels may still turn the other way.
+    """
+    view, heading, half_angle = percept.field_of_view, percept.pose.theta, path_half_angle_rad(body, clearance_m)
+    free_m = view.reach_m - body.radius_m - clearance_m
+    left_s = seen_for_s(view, heading, half_angle, turn_rad_s, body.speed_max_m_s / body.acceleration_max_m_s2)
+    if not (free_m > 0.0 and left_s > 0.0):
+        return 0.0
+    return min(body.acceleration_max_m_s2 * left_s, math.sqrt(2.0 * body.acceleration_max_m_s2 * free_m))
+
+
+def oldest_look_s(view: FieldOfView, direction_rad: float, half_angle_rad: float) -> float:
+    """Return the age of the direction that was looked in longest ago, s; infinite where no look is fresh.
+
+    Parameters
+    ----------
+    view
+        Where the ring has looked.
+    direction_rad, half_angle_rad
+        The directions from one to the other side of this one, in the odometry's frame.
+    """
+    return _oldest_s(turn(direction_rad, view.bearings_rad), view.ages_s, view.half_angle_rad, half_angle_rad)
+
+
+def seen_for_s(
+    view: FieldOfView, heading_rad: float, half_angle_rad: float, turn_rad_s: float, horizon_s: float
+) -> float:
+    """Return the time until the first direction is both in the path and too old, s; not positive if one is now.
+
+    Parameters
+    ----------
+    view
+        Where the ring has looked.
+    heading_rad, half_angle_rad
+        The path's directions now, from one to the other side of this one, in the odometry's frame.
+    turn_rad_s
+        The rate at which the path turns, to either side.
+    horizon_s
+        Time beyond which directions that a turn brings into the path do not matter.
+    """
+    beam, rate = view.half_angle_rad, abs(turn_rad_s)
+    swept = min(rate * (horizon_s + REACTION_S), max(0.0, math.pi - half_angle_rad - beam))
+    widest = half_angle_rad + swept
+    begin, end, ages_s = _youngest(
+        turn(heading_rad, view.bearings_rad), view.ages_s, beam, (-widest, -half_angle_rad, half_angle_rad, widest)
+    )
+    outside = np.maximum(begin - half_angle_rad, -half_angle_rad - end)
+    reached_s = np.where(outside < -ROUNDING_RAD, -math.inf, outside / max(rate, ROUNDING_RAD) - REACTION_S)
+    return float(np.maximum(reached_s, view.age_max_s - ages_s).min(initial=math.inf))
+
+
+def unseen_way(percept: Percept, direction_rad: float, body: BodyConfig, clearance_m: float) -> UnseenWay | None:
+    """Return which sensors lack for a motion in a direction, None if all have looked lately.
+
+    The sensors count that look there now. After a turn a direction may be unseen although none lacks: then the next
+    firings look there.
+
+    Parameters
+    ----------
+    percept
+        Pose and field of view of this cycle.
+    direction_rad
+        The direction, in the odometry's frame.
+    body, clearance_m
+        As for `seen_speed_m_s`.
+    """
+    view, half_angle = percept.field_of_view, path_half_angle_rad(body, clearance_m)
+    turned = turn(direction_rad, view.axes_rad)
+    age_s = _oldest_s(turned, view.sensor_ages_s, view.half_angle_rad, half_angle)
+    if age_s < view.age_max_s:
+        return None
+    turn_deg = math.degrees(wrap_angle(direction_rad - percept.pose.theta))
+    side = "left" if turn_deg > 0.0 else "right"
+    where = "ahead" if abs(turn_deg) < 1.0 else f"{abs(turn_deg):.0f}° to the {side} of the heading"
+    lasting = f"for {age_s:.1f} s" if math.isfinite(age_s) else "yet"
+    looks_there = np.abs(turned) < half_angle + view.half_angle_rad
+    missing = np.flatnonzero(looks_there & ~(view.sensor_ages_s < view.age_max_s)).tolist()
+    cause = f"no usable range from sensor {listed(missing)}" if missing else "no sensor of the ring looks there"
+    return UnseenWay(f"the ring has not looked {where} {lasting}: {cause}", age_s, tuple(missing))
+
+
+def listed(sensors: Sequence[int]) -> str:
+    """Return the numbers of sensors as text; of many, the first ones."""
+    return ", ".join(map(str, sensors[:SENSORS_NAMED_MAX])) + (" …" if len(sensors) > SENSORS_NAMED_MAX else "")
+
+
+def turn(begin_rad: float, ends_rad: Floats) -> Floats:
+    """Return the angles from one direction to others, within [−π, π), shape (n,)."""
+    turned: Floats = np.remainder(ends_rad - begin_rad + math.pi, 2.0 * math.pi) - math.pi
+    return turned
+
+
+def _oldest_s(turned: Floats, ages_s: Floats, beam_rad: float, half_angle_rad: float) -> float:
+    """Return the largest age of any direction within `half_angle_rad` of 0, each being that of its youngest beam."""
+    _, _, youngest_s = _youngest(turned, ages_s, beam_rad, (-half_angle_rad, half_angle_rad))
+    return float(youngest_s.max(initial=-math.inf))
+
+
+def _youngest(
+    turned: Floats, ages_s: Floats, beam_rad: float, ends_rad: Sequence[float]
+) -> tuple[Floats, Floats, Floats]:
+    """Return sectors in which the same beams lie: where they begin and end, and the age of the youngest beam in each.
+
+    Parameters
+    ----------
+    turned, ages_s
+        Axes and ages of the beams, shape (n,).
+    beam_rad
+        Half their width.
+    ends_rad
+        Ascending ends of further sectors; the first and the last are those of the whole.
+    """
+    low, high = ends_rad[0], ends_rad[-1]
+    near = (turned > low - beam_rad) & (turned < high + beam_rad)
+    turned, ages_s = turned[near], ages_s[near]
+    edges = np.concatenate((turned - beam_rad, turned + beam_rad, ends_rad))
+    edges = np.sort(np.minimum(np.maximum(edges, low), high))
+    begin, end = edges[:-1], edges[1:]
+    wide = end - begin > ROUNDING_RAD
+    begin, end = begin[wide], end[wide]
+    covers = np.abs(0.5 * (begin + end)[:, None] - turned) < beam_rad
+    return begin, end, np.where(covers, ages_s, math.inf).min(axis=1, initial=math.inf)

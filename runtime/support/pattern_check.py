@@ -1,0 +1,121 @@
+"""Whether a robot with its firing pattern sees where it drives.
+
+A pattern is judged by the same rule as each cycle (`behaviors.field_of_view`), with the oldest looks that it ever
+leaves: those of sensors that are just about to report again.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from behaviors.field_of_view import listed, oldest_look_s, path_half_angle_rad, seen_speed_m_s, unseen_way
+from config.settings import Settings
+from drivers.firing_pattern import FiringError, FiringPattern, firing_pattern, sensors, time_of_flight_s
+from drivers.registry import make_driver
+from perception.percept import FieldOfView, Floats, Percept, Pose
+from perception.sensor_mounts import mounts_array, reach_m
+
+CRAWL_SHARE: Final = 0.1
+"""Least share of the base velocity that a pattern must allow; a robot that is slower stands more than it drives."""
+
+
+def refuse_undrivable(settings: Settings) -> None:
+    """Raise an error if the robot cannot carry out its firing pattern, or could not see where it drives.
+
+    Raises
+    ------
+    drivers.driver.DriverError
+        The robot's driver is not available.
+    drivers.firing_pattern.FiringError
+        The robot cannot fire so; or the pattern leaves out sensors that look along the way, looks there too seldom
+        for the age limit, or listens no farther than the clearance.
+    """
+    make_driver(settings)
+    arbiter, body = settings.behaviors.arbiter, settings.body
+    age_path = "behaviors.avoid_static_obstacle.echo_age_max_s"
+    for course in courses_rad(settings):
+        percept = oldest_percept(settings, course)
+        if seen_speed_m_s(percept, body, arbiter.clearance_m) >= CRAWL_SHARE * arbiter.base_velocity_m_s:
+            continue
+        view = percept.field_of_view
+        oldest_s = oldest_look_s(view, course, path_half_angle_rad(body, arbiter.clearance_m))
+        where = "ahead" if course == 0.0 else f"along a leg, at {math.degrees(course):.0f}° from sensor 0's direction"
+        if not math.isfinite(oldest_s):
+            unseen = unseen_way(percept, course, body, arbiter.clearance_m)
+            left_out = [] if unseen is None else [i for i in unseen.sensors if math.isinf(view.sensor_ages_s[i])]
+            remedy = f"add sensors to the sets: {listed(left_out)}" if left_out else "the ring has no sensor there"
+            raise FiringError(
+                f"ring.firing: the pattern does not look {where}, so that the robot could not drive there; {remedy}"
+            )
+        if view.reach_m <= body.radius_m + arbiter.clearance_m:
+            raise FiringError(
+                f"ring.firing: window_m {settings.ring.window_m:g} ends within behaviors.arbiter.clearance_m "
+                f"{arbiter.clearance_m:g} of the rim, so that the robot could not drive; make it larger"
+            )
+        enough_s = math.ceil(10.0 * (oldest_s + arbiter.base_velocity_m_s / body.acceleration_max_m_s2)) / 10.0
+        raise FiringError(
+            f"ring.firing: a look {where} can be {oldest_s:.2f} s old, and counts for {age_path} "
+            f"{view.age_max_s:g} s, so that the robot could not drive; fire more sensors at a time or make "
+            f"step_period_s shorter, or make {age_path} at least {enough_s:g}"
+        )
+
+
+def pattern_speed_m_s(settings: Settings) -> float:
+    """Return the speed that the firing pattern allows on every leg, at its oldest looks, m/s."""
+    clearance_m = settings.behaviors.arbiter.clearance_m
+    courses = courses_rad(settings)
+    return min(seen_speed_m_s(oldest_percept(settings, c), settings.body, clearance_m) for c in courses)
+
+
+def courses_rad(settings: Settings) -> tuple[float, ...]:
+    """Return the directions in the ring's frame in which the robot must see, rad.
+
+    Where the ring turns with the wheels, that is ahead. On a synchro drive it does not: there each leg has its own.
+    """
+    ahead = settings.behaviors.move_ahead
+    if not settings.body.synchro:
+        return (0.0,)
+    out = math.radians(ahead.move_ahead_direction_deg)
+    return (out, out + math.pi) if ahead.distance_m is not None and ahead.at_end == "turn_back" else (out,)
+
+
+def oldest_percept(settings: Settings, course_rad: float) -> Percept:
+    """Return what a robot in the open sees when every sensor's look is as old as the pattern lets it become.
+
+    An echo arrives when its window has closed, and waits for a cycle at most.
+
+    Parameters
+    ----------
+    settings
+        The robot and its settings.
+    course_rad
+        Its heading in the ring's frame.
+    """
+    ring = settings.ring
+    pattern, mounts = firing_pattern(ring), mounts_array(ring.mounts)
+    late_s = time_of_flight_s(pattern.window_m) + 1.0 / settings.cycle.rate_hz
+    axes, ages_s = mounts[:, 2], longest_gaps_s(pattern, len(mounts)) + late_s
+    view = FieldOfView(
+        axes,
+        ages_s,
+        axes,
+        ages_s,
+        math.radians(ring.beam_half_angle_deg),
+        reach_m(ring),
+        settings.behaviors.avoid_static_obstacle.echo_age_max_s,
+    )
+    return Percept(Pose(0.0, 0.0, course_rad), np.empty((0, 2)), view)
+
+
+def longest_gaps_s(pattern: FiringPattern, count: int) -> Floats:
+    """Return the longest time between two firings of each sensor, shape (count,), s; infinite where none fires."""
+    steps: list[list[int]] = [[] for _ in range(count)]
+    for step, mask in enumerate(pattern.masks):
+        for sensor in sensors(mask):
+            steps[sensor].append(step)
+    around = len(pattern.masks)
+    gaps = [max(np.diff([*fired, fired[0] + around]).tolist()) if fired else math.inf for fired in steps]
+    return pattern.step_period_s * np.array(gaps)

@@ -1,0 +1,103 @@
+"""Firing patterns with which a robot could not drive are refused, with what would work."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.load import list_shipped, load_settings
+from drivers.driver import DriverError
+from drivers.firing_pattern import FiringError, firing_pattern
+from runtime.support.pattern_check import courses_rad, longest_gaps_s, pattern_speed_m_s, refuse_undrivable
+
+pytestmark = pytest.mark.promise("P24")
+
+DATA = Path(__file__).parents[2] / "data"
+STOP = "behaviors.move_ahead.at_end=stop"
+
+
+def problem(*sets: str) -> str:
+    """Return why these settings of the hallway are refused."""
+    with pytest.raises(FiringError) as refused:
+        refuse_undrivable(load_settings("hallway", sets))
+    return str(refused.value)
+
+
+@pytest.mark.parametrize("run", [*list_shipped("runs"), DATA / "corridor.toml", DATA / "ring24.toml"], ids=str)
+def test_shipped_runs_and_recorded_rings_drive_at_their_base_velocity(run: str | Path) -> None:
+    settings = load_settings(run)
+    refuse_undrivable(settings)
+    assert pattern_speed_m_s(settings) >= settings.behaviors.arbiter.base_velocity_m_s
+
+
+PRESETS = {
+    "single": 0.102, "opposite_pairs": 0.402, "thirds": 0.502, "quadrants": 0.552, "octets": 0.627,
+    "alternating": 0.452,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_every_preset_drives_and_how_fast(preset: str) -> None:
+    settings = load_settings("hallway", [f"ring.firing={preset}"])
+    refuse_undrivable(settings)
+    assert pattern_speed_m_s(settings) == pytest.approx(PRESETS[preset], abs=0.001)
+
+
+def test_a_pattern_that_comes_round_too_seldom() -> None:
+    """24 steps of .1 s, a flight of .045 s and a cycle of .05 s."""
+    line = problem("ring.firing={preset='single', step_period_s=0.1}")
+    assert line.startswith(
+        "ring.firing: a look ahead can be 2.50 s old, and counts for behaviors.avoid_static_obstacle"
+    )
+    assert line.endswith("echo_age_max_s at least 3.1")
+    longer = "behaviors.avoid_static_obstacle.echo_age_max_s=3.1"
+    settings = load_settings("hallway", ["ring.firing={preset='single', step_period_s=0.1}", longer])
+    refuse_undrivable(settings)
+    assert pattern_speed_m_s(settings) >= settings.behaviors.arbiter.base_velocity_m_s
+    assert "a look ahead can be 0.25 s old" in problem("behaviors.avoid_static_obstacle.echo_age_max_s=0.25")
+    assert "a look ahead can be 1.20 s old" in problem("cycle.rate_hz=1", longer.replace("3.1", "1.2"))
+
+
+def test_a_pattern_that_looks_backwards() -> None:
+    line = problem("ring.firing={sets=[[10, 12, 14], [11, 13]]}")
+    assert line == (
+        "ring.firing: the pattern does not look ahead, so that the robot could not drive there; add sensors to the "
+        "sets: 0, 1, 2, 3, 21, 22, 23"
+    )
+
+
+def test_a_ring_with_a_hole_ahead() -> None:
+    line = problem("ring.beam_half_angle_deg=7")
+    assert line.endswith("does not look ahead, so that the robot could not drive there; the ring has no sensor there")
+
+
+def test_a_window_that_ends_within_the_clearance() -> None:
+    line = problem("ring.firing.window_m=0.2", "behaviors.arbiter.clearance_m=0.2")
+    assert line.startswith("ring.firing: window_m 0.2 ends within behaviors.arbiter.clearance_m 0.2 of the rim")
+
+
+def test_a_synchro_drive_must_see_along_each_leg_and_others_ahead() -> None:
+    """The ring of a synchro drive does not turn with its wheels."""
+    front = "ring.firing={sets=[[21, 22, 23, 0, 1, 2, 3]]}"
+    assert "does not look along a leg, at 180° from sensor 0's direction" in problem(front)
+    assert "at 90° from" in problem(front, STOP, "behaviors.move_ahead.move_ahead_direction_deg=90")
+    for sets in ([front, STOP], [front, "body.synchro=false"]):
+        refuse_undrivable(load_settings("hallway", sets))
+    assert courses_rad(load_settings("hallway")) == pytest.approx((0.0, math.pi))
+    assert courses_rad(load_settings("hallway", [STOP])) == (0.0,)
+
+
+def test_what_the_robot_itself_cannot_do_is_refused_as_before() -> None:
+    assert "step_period_s 0.001 is shorter than sound takes" in problem("ring.firing.step_period_s=0.001")
+    with pytest.raises(DriverError):
+        refuse_undrivable(load_settings("hallway", ["robot.driver=nonesuch"]))
+
+
+def test_the_longest_gap_of_each_sensor() -> None:
+    ring = load_settings("hallway", ["ring.firing={sets=[[0], [1], [0], [2], [2]], step_period_s=0.1}"]).ring
+    gaps = longest_gaps_s(firing_pattern(ring), 24)
+    np.testing.assert_allclose(gaps[:3], [0.3, 0.5, 0.4])
+    assert np.isinf(gaps[3:]).all()
