@@ -355,9 +355,11 @@ def walls(*, json: str = "walls.json", seeds: int = 100, first: int = 0, steps: 
 def _measured(measure: Measure, plan: TimingPlan, sets: tuple[str, ...], json: str, against: str | None) -> int:
     """Run a timing measurement, write its figures as JSON and print its tables; return the exit code."""
     use_kernel_cache()
+    from runtime.cli.commands.output_files import check_outputs
     from runtime.cycle.summary import write_json
 
     console = Console(stderr=True)
+    check_outputs({"--json": json}, (against,), force=True)  # the figures of an earlier run of the same name go
     earlier = None if against is None else read_earlier(against)
     prepare_kernels(load_settings("hallway"), console)
     with console.status("bench") as status:

@@ -128,20 +128,33 @@ class MotionMonitor:
         body : BodyConfig
             The base's limits.
         """
-        recent = tuple(c for c in self.commands[:-1] if run_s - c.run_s <= AGE_S) + self.commands[-1:]
-        monitor, last = replace(self, movement=Movement.AS_COMMANDED, commands=recent), self.odometry
+        commands = tuple(c for c in self.commands[:-1] if run_s - c.run_s <= AGE_S) + self.commands[-1:]
+        last, fine = self.odometry, Movement.AS_COMMANDED
         if odometry is None:
-            return monitor
+            return replace(self, movement=fine, commands=commands)
         if last is None:  # it may be moving by commands of before
             limits = (body.speed_max_m_s,) * 2 + (body.turn_max_rad_s,) * 2
-            return replace(monitor, odometry=odometry, directions=tuple(map(Direction, limits)))
-        passed_s = odometry.robot_s - last.robot_s
-        monitor = replace(monitor, odometry=odometry)
+            return replace(self, commands=commands, odometry=odometry, directions=tuple(map(Direction, limits)))
+        passed_s, moved = odometry.robot_s - last.robot_s, _between(last.pose, odometry.pose)
         fastest = Amount(GAIN * body.speed_max_m_s * passed_s, GAIN * body.turn_max_rad_s * passed_s)
-        leap = Amount(fastest.along + LEAP.along, fastest.turned + LEAP.turned)
-        if not 0.0 < passed_s <= GAP_MAX_S or _reaches(_between(last.pose, odometry.pose), leap):
-            return replace(monitor, still=None, asked_s=0.0, asked=NOTHING)
-        return monitor._since(last, odometry, passed_s, body)._stood(odometry.pose, passed_s)._stalled(run_s)
+        has_leapt = _reaches(moved, Amount(fastest.along + LEAP.along, fastest.turned + LEAP.turned))
+        if has_leapt or not 0.0 < passed_s <= GAP_MAX_S:
+            seen = replace(self, movement=fine, commands=commands, odometry=odometry)
+            return replace(seen, still=None, still_s=0.0, asked_s=0.0, asked=NOTHING)
+        directions, is_excessive = self._explain(commands, moved, passed_s, body)
+        is_still = self.still is not None and not _reaches(_between(self.still, odometry.pose), MOVED)
+        still_s = self.still_s + passed_s if is_still else 0.0
+        has_stood = self.has_stood or still_s >= STOOD_S
+        asked_s, asked = self._ask(run_s) if is_still else (0.0, NOTHING)
+        is_stalled = asked_s >= STALL_S and _reaches(asked, ASKED)
+        if is_stalled:
+            asked_s, asked = 0.0, NOTHING
+        if is_excessive:
+            movement = Movement.UNCOMMANDED if has_stood else Movement.UNSTOPPED
+        else:
+            movement = Movement.MISSING if is_stalled else fine
+        still = self.still if is_still else odometry.pose
+        return MotionMonitor(movement, commands, odometry, directions, still, still_s, has_stood, asked_s, asked)
 
     def command(self, twist: Twist | None, run_s: float) -> MotionMonitor:
         """Return the monitor after a command that reached the base; None commands no velocity: it ends any motion."""
@@ -149,38 +162,28 @@ class MotionMonitor:
         has_stood = self.has_stood and command.twist == STANDSTILL
         return replace(self, commands=(*self.commands, command), has_stood=has_stood)
 
-    def _since(self, last: Odometry, now: Odometry, passed_s: float, body: BodyConfig) -> MotionMonitor:
-        """Return the monitor with what the commands do not explain of the motion between two samples."""
-        moved, asked = _between(last.pose, now.pose), [c.twist for c in self.commands]
-        along = _axis(self.directions[:2], [t.v for t in asked], moved.along, body.acceleration_max_m_s2, passed_s,
+    def _explain(
+        self, commands: tuple[Command, ...], moved: Amount, passed_s: float, body: BodyConfig
+    ) -> tuple[tuple[Direction, ...], bool]:
+        """Return the directions after a motion, and whether too much is unexplained; the sum then starts anew."""
+        twists = [command.twist for command in commands]
+        along = _axis(self.directions[:2], [t.v for t in twists], moved.along, body.acceleration_max_m_s2, passed_s,
                       NOISE.along)  # fmt: skip
-        turned = _axis(self.directions[2:], [t.w for t in asked], moved.turned, body.turn_acceleration_max_rad_s2,
+        turned = _axis(self.directions[2:], [t.w for t in twists], moved.turned, body.turn_acceleration_max_rad_s2,
                        passed_s, NOISE.turned)  # fmt: skip
-        if max(d.excess for d in along) <= EXCESS.along and max(d.excess for d in turned) <= EXCESS.turned:
-            return replace(self, directions=along + turned)
-        movement = Movement.UNCOMMANDED if self.has_stood else Movement.UNSTOPPED
-        return replace(self, movement=movement, directions=tuple(Direction(d.explained) for d in along + turned))
+        is_excessive = max(d.excess for d in along) > EXCESS.along or max(d.excess for d in turned) > EXCESS.turned
+        directions = along + turned
+        return tuple(Direction(d.explained) for d in directions) if is_excessive else directions, is_excessive
 
-    def _stood(self, pose: Pose, passed_s: float) -> MotionMonitor:
-        """Return the monitor with how long the base has been standing."""
-        if self.still is None or _reaches(_between(self.still, pose), MOVED):
-            return replace(self, still=pose, still_s=0.0, asked_s=0.0, asked=NOTHING)
-        still_s = self.still_s + passed_s
-        return replace(self, still_s=still_s, has_stood=self.has_stood or still_s >= STOOD_S)
-
-    def _stalled(self, run_s: float) -> MotionMonitor:
-        """Return the monitor with what has been commanded since the base last moved."""
+    def _ask(self, run_s: float) -> tuple[float, Amount]:
+        """Return for how long a base that stands has been commanded to move, and by how much."""
         command = self.commands[-1] if self.commands else None
         if command is None or command.twist == STANDSTILL:
-            return replace(self, asked_s=0.0, asked=NOTHING)
+            return 0.0, NOTHING
         twist, lasted_s = command.twist, run_s - command.run_s
         along = self.asked.along + (lasted_s * twist.v if abs(twist.v) >= CRAWL.along else 0.0)
         turned = self.asked.turned + (lasted_s * twist.w if abs(twist.w) >= CRAWL.turned else 0.0)
-        asked_s, asked = self.asked_s + lasted_s, Amount(along, turned)
-        if asked_s < STALL_S or not _reaches(asked, ASKED):
-            return replace(self, asked_s=asked_s, asked=asked)
-        movement = Movement.MISSING if self.movement is Movement.AS_COMMANDED else self.movement
-        return replace(self, movement=movement, asked_s=0.0, asked=NOTHING)
+        return self.asked_s + lasted_s, Amount(along, turned)
 
 
 def _axis(

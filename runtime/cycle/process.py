@@ -395,6 +395,6 @@ class RobotProcess:
         self.health.begin_shutdown()
         self._notifier.stopping()
         if not await self._connection.halt():
-            self._log.warning("the base did not confirm the halt; its deadman stops it")
+            self._log.warning("the base did not confirm the halt: if it moves, stop it by its emergency switch")
         link_task.cancel()
         await asyncio.gather(link_task, return_exceptions=True)

@@ -107,7 +107,7 @@ def check_killed(folder: Path, name: str, after_s: float) -> float:
     """Kill a run, restore its recording, replay it; return how much was lost, s."""
     path, killed_s = killed(folder, name, after_s)
     restored = path.with_name(f"{path.stem}-recovered.mcap")
-    assert run_command(["recover", str(path)]) == DONE
+    assert run_command(["recover", str(path), "--force"]) == DONE
     got = verify(restored)
     cycles = [entry for entry in entries_of(restored) if entry.topic == CYCLE]
     assert got["cycles"] == len(cycles)
@@ -143,7 +143,7 @@ def test_a_killed_run_is_restored(tmp_path: Path) -> None:
         assert run.process.poll() is None
         run.process.kill()
         run.process.wait()
-    (path,) = runs.iterdir()
+    (path,) = runs.glob("*.mcap")
     restored = path.with_name(f"{path.stem}-recovered.mcap")
     assert run_command(["recover", str(path)]) == DONE
     got = verify(restored)

@@ -7,11 +7,10 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-
 from config.errors import DONE, WRONG_CALL, UserError
 from config.load import load_settings
 from runtime.cli.commands.output_files import check_outputs
+from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.progress import progress
 
@@ -46,7 +45,7 @@ def run_budgets(
     if not all(0.0 <= budget < math.inf for budget in (*budgets_ms, *quanta)):
         raise UserError("--budget-ms, --quanta: must be 0 or above", WRONG_CALL)
     settings = load_settings("irregular", sets, models=models)
-    console = Console(stderr=True)
+    console = EscapingConsole(stderr=True)
     check_outputs({"--json": json_file}, force=force)
     prepare_kernels(settings, console)
     from runtime.cli.tables import budget_table
@@ -69,5 +68,5 @@ def run_budgets(
     unit = "quanta" if quanta else "ms"
     if json_file is not None:
         write_json(json_file, {"unit": unit, "budgets": rows})
-    Console().print(budget_table(rows, unit, units))
+    EscapingConsole().print(budget_table(rows, unit, units))
     return DONE

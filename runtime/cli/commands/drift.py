@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-
 from config.errors import DONE
 from config.load import load_settings
 from runtime.cli.commands.output_files import check_outputs
+from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.support.kernel_cache import LOCALIZATION, needed_parts, prepare_kernels
 from runtime.support.progress import progress
 
@@ -28,7 +27,7 @@ def run_drift(
         As of `runtime.cli.experiment_commands.experiment`.
     """
     settings = load_settings("hallway", sets, models=models)
-    console = Console(stderr=True)
+    console = EscapingConsole(stderr=True)
     check_outputs({"--json": json_file}, force=force)
     prepare_kernels(settings, console, (*needed_parts(settings), LOCALIZATION))
     from runtime.cli.tables import drift_table
@@ -46,5 +45,5 @@ def run_drift(
                 rows.append(summarise_drives(errors, outcomes))
     if json_file is not None:
         write_json(json_file, {"levels": rows})
-    Console().print(drift_table(rows, units))
+    EscapingConsole().print(drift_table(rows, units))
     return DONE

@@ -14,6 +14,7 @@ from config.settings import Settings
 from runtime.cli.commands.offline_io import plain_console, read_timeline
 from runtime.cli.commands.output_files import check_outputs, make_output_folder
 from runtime.cli.tables import boxes_table, outcome_line, scene_line, spread_line, table_2
+from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.simulation.scene_names import SceneName
 from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.length_format import Units
@@ -59,7 +60,7 @@ def run_experiment(
     if settings.world is None or not settings.world.drum:
         raise UserError("the world has no drum: the experiment compares what is recognised with drums", WRONG_CALL)
     refuse_undrivable(settings)
-    console, output = Console(stderr=True), plain_console()
+    console, output = EscapingConsole(stderr=True), plain_console()
     folder = None if out is None else make_output_folder(out)
     check_outputs({"--out": [] if folder is None else run_files(folder, name), "--json": json_file}, force=force)
     prepare_kernels(settings, console)
@@ -181,7 +182,7 @@ def run_scenes(
         As of `runtime.cli.experiment_commands.experiment`.
     """
     settings = load_settings("hallway", sets, models=models)
-    console = Console(stderr=True)
+    console = EscapingConsole(stderr=True)
     check_outputs({"--json": json_file}, force=force)
     prepare_kernels(settings, console)
     from runtime.cycle.summary import write_json
@@ -195,7 +196,7 @@ def run_scenes(
     outcome = summarise_scene(scene, halls, settings.models)
     if json_file is not None:
         write_json(json_file, outcome)
-    output = Console()
+    output = EscapingConsole()
     if len(outcome["drums"]) + len(outcome["boxes"]) <= ROWS_SHOWN:
         if outcome["drums"]:
             output.print(table_2(outcome, units))

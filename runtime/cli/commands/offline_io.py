@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from config.errors import FAILED, UserError
+from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.progress import progress
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 def plain_console(*, stderr: bool = False) -> Console:
     """Return a console that neither wraps lines nor colours numbers: paths can be copied, output can be parsed."""
-    return Console(stderr=stderr, soft_wrap=True, highlight=False)
+    return EscapingConsole(stderr=stderr, soft_wrap=True, highlight=False)
 
 
 def read_timeline(

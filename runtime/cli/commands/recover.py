@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from rich.console import Console
-
 from config.errors import DONE, WRONG_CALL, UserError
 from runtime.cli.commands.output_files import check_outputs, writing
+from runtime.cli.terminal.escaping_console import EscapingConsole
 
 SHOWN_MAX: Final = 10
 """Damaged places that are listed."""
@@ -36,7 +35,7 @@ def recover_recording(source: str, out: str | None, *, force: bool) -> int:
     check_outputs({"--out": target}, (source,), force=force)
     with writing("--out", target):
         recovered = recover(path, target)
-    console = Console(soft_wrap=True, highlight=False)
+    console = EscapingConsole(soft_wrap=True, highlight=False)
     for region in recovered.corrupt_regions[:SHOWN_MAX]:
         console.print(str(region))
     if len(recovered.corrupt_regions) > SHOWN_MAX:

@@ -17,6 +17,7 @@ from config.load import load_settings, override_settings
 from runtime.cli.commands.offline_io import plain_console
 from runtime.cli.commands.output_files import check_outputs
 from runtime.cli.tables import objects_table
+from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.cycle.summary import PerceivedRows, perceived_rows, write_json
 from runtime.recording.replay_summary import ReplaySummary
 from runtime.support.kernel_cache import prepare_kernels
@@ -234,7 +235,7 @@ def live_view(recording: Recording, speed: float, units: Units) -> Iterator[OnSt
     from runtime.recording.schema import SerialBytes
     from runtime.timing.cycle_stats import CycleStats
 
-    settings, console = recording.settings, Console(stderr=True)
+    settings, console = recording.settings, EscapingConsole(stderr=True)
     view = View(settings, console, units) if console.is_terminal and not console.is_dumb_terminal else None
     driver, stats = make_driver(settings), CycleStats(late_after_s=math.inf)
     driver.line_opened(0.0)

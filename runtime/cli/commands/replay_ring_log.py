@@ -6,12 +6,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from rich.console import Console
-
 from config.errors import DONE
 from config.load import load_settings, with_known_room
 from runtime.cli.commands.output_files import check_outputs, writing
 from runtime.cli.tables import objects_table, pose_line
+from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.cycle.summary import write_json
 from runtime.support.kernel_cache import LOCALIZATION, needed_parts, prepare_kernels
 from runtime.support.length_format import Units
@@ -47,7 +46,7 @@ def replay_log(
     settings = load_settings(None, sets, robot=robot, models=models)
     if map_file is not None:
         settings = with_known_room(settings, map_file)
-    console = Console(stderr=True)
+    console = EscapingConsole(stderr=True)
     check_outputs({"--json": json_file, "--trajectory": trajectory}, (log,), force=force)
     corrects_drift = localize and map_file is None
     prepare_kernels(settings, console, (*needed_parts(settings), *([LOCALIZATION] if corrects_drift else [])))
@@ -72,7 +71,7 @@ def replay_log(
             Path(trajectory).write_text("\n".join([TRAJECTORY_HEADER, *rows, ""]), "utf-8")
     if json_file is not None:
         write_json(json_file, summary)
-    output = Console()
+    output = EscapingConsole()
     output.print(objects_table(summary["objects"], units, frame=summary.get("frame", "odometry")))
     if "pose" in summary:
         output.print(pose_line(summary["pose"], units))

@@ -23,6 +23,7 @@ from runtime.cli.commands.run_recording import RunRecording, open_run_recording
 from runtime.cli.first_signals import is_remembered
 from runtime.cli.start_signals import ending_the_start, handled_by_loop
 from runtime.cli.tables import objects_table, timing_line, timing_table
+from runtime.cli.terminal.escaping_console import EscapingConsole
 from runtime.support.config_lint import lint_settings
 from runtime.support.file_lock import file_lock
 from runtime.support.kernel_cache import prepare_kernels
@@ -117,7 +118,7 @@ def run_robot(
         check_outputs, inputs=(emulator.faults, port), force=force, appended={"log.file": log_path(settings.log)}
     )
     check_files({**own_files, "--trace": emulator.trace})
-    console = Console(stderr=True)
+    console = EscapingConsole(stderr=True)
     preparation = begin_preparation(settings)
     if preparation is None:
         prepare_kernels(settings, console)
@@ -172,7 +173,7 @@ def run_robot(
         from runtime.cycle.summary import write_json
 
         write_json(json_file, summary)
-    output = Console()
+    output = EscapingConsole()
     output.print(objects_table(summary["objects"], units))
     output.print(timing_table(summary))
     output.print(timing_line(summary))

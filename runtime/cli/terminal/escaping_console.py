@@ -1,0 +1,66 @@
+"""A console on which no text acts: neither as a control sequence of the terminal nor as markup of rich.
+
+What commands print comes from robots, recordings, file names and settings of others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import IO
+
+from rich.console import Console, ConsoleOptions, HighlighterType, JustifyMethod, OverflowMethod, RenderableType
+from rich.segment import Segment
+from rich.style import Style
+from rich.text import Text
+
+
+class EscapingConsole(Console):
+    """A console that escapes whatever is not printable, in strings, tables and texts alike.
+
+    Parameters
+    ----------
+    file : text stream, optional
+        Where it prints; by default standard output.
+    stderr : bool
+        Whether it prints on standard error instead.
+    soft_wrap : bool
+        Whether lines are left as long as they are.
+    highlight : bool
+        Whether numbers and paths are coloured.
+    """
+
+    def __init__(
+        self, file: IO[str] | None = None, *, stderr: bool = False, soft_wrap: bool = False, highlight: bool = True
+    ) -> None:
+        super().__init__(
+            file=file, stderr=stderr, soft_wrap=soft_wrap, highlight=highlight, markup=False, emoji=False
+        )  # fmt: skip
+
+    def render_str(
+        self,
+        text: str,
+        *,
+        style: str | Style = "",
+        justify: JustifyMethod | None = None,
+        overflow: OverflowMethod | None = None,
+        emoji: bool | None = None,
+        markup: bool | None = None,
+        highlight: bool | None = None,
+        highlighter: HighlighterType | None = None,
+    ) -> Text:
+        """Return a string as a text, escaped before it is laid out."""
+        return super().render_str(
+            escaped(text), style=style, justify=justify, overflow=overflow, emoji=emoji, markup=markup,
+            highlight=highlight, highlighter=highlighter,
+        )  # fmt: skip
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Yield the segments of a renderable; nested ones pass here as well."""
+        for segment in super().render(renderable, options):
+            is_safe = segment.control or segment.text.isprintable() or segment.text == "\n"
+            yield segment if is_safe else Segment(escaped(segment.text), segment.style)
+
+
+def escaped(text: str) -> str:
+    """Return a text with everything escaped that is not printable, but for newlines."""
+    return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text)

@@ -1,0 +1,61 @@
+"""Whatever a command prints, no text of others acts on the terminal."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from rich.console import Group
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from runtime.cli import commands
+from runtime.cli.terminal.escaping_console import EscapingConsole, escaped
+
+HOSTILE = (
+    "\x1b[2J",
+    "\x9b1A",
+    "\x1b]0;title\x07",
+    "a\rb",
+    "\u202egnp.exe",
+    "\x7f",
+    "\udcff",
+    "a[/b]",
+    "[red]",
+    ":bomb:",
+)
+
+
+def as_table(text: str) -> Table:
+    table = Table(text, title=text)
+    table.add_row(text, style="bold")
+    return table
+
+
+@pytest.mark.promise("P22")
+@pytest.mark.parametrize("form", [str, Text, as_table, lambda text: Panel(Group(Text(text), text))])
+def test_no_text_acts_on_the_terminal(form: Callable[[str], str | Text | Table | Panel]) -> None:
+    for text in HOSTILE:
+        shown = io.StringIO()
+        EscapingConsole(shown, soft_wrap=True).print(form(text))
+        assert all(line.isprintable() for line in shown.getvalue().split("\n")), text
+        if form is str:
+            assert shown.getvalue() == f"{escaped(text)}\n", "nothing is left out"
+
+
+def test_styles_and_lines_of_our_own_pass() -> None:
+    shown = io.StringIO()
+    console = EscapingConsole(shown)
+    console.print("two\nlines")
+    assert shown.getvalue() == "two\nlines\n"
+    assert escaped("ö → ½\n") == "ö → ½\n"
+
+
+def test_every_command_prints_on_such_a_console() -> None:
+    for path in Path(str(commands.__file__)).parent.glob("*.py"):
+        if path.name != "serve_console.py":  # the operator's
+            assert not re.search(r"(?<!Escaping)\bConsole\(", path.read_text("utf-8")), path
