@@ -7,6 +7,7 @@ written into the folder are left alone.
 from __future__ import annotations
 
 import contextlib
+import glob
 import heapq
 import os
 import stat
@@ -19,7 +20,7 @@ from typing import Final, NamedTuple, Protocol
 from config.files import is_utf8
 from config.settings import RecordingConfig
 from runtime.recording.channels import BOOKMARK
-from runtime.recording.folder_index import create_listed, is_finished_recording, listed_names
+from runtime.recording.folder_index import create_listed, is_being_written, is_finished_recording, listed_names
 from runtime.support.user_folders import expanded, state_folder
 
 SUFFIX: Final = ".mcap"
@@ -114,8 +115,8 @@ class RotatingFolder:
     The oldest files go first, one at each check, and only after an earlier check of this run has named them. A run
     removes at most as many bytes of older runs as it has written itself; a file too large for that stays, and the
     oldest that fits goes. Pinned files, beside which an empty `NAME.mcap.keep` lies, stay and do not count. A file
-    with a bookmark is pinned. Files that the folder's index does not list stay and do not count either, nor do files
-    go that another run is still writing.
+    with a bookmark is pinned. Files that the folder's index does not list stay and do not count either. Nor do the
+    files of another run go while it is writing one of them.
 
     Parameters
     ----------
@@ -223,11 +224,16 @@ class RotatingFolder:
         for file in files:
             if file.path in self._own or self._removed_bytes + file.bytes > written:
                 continue
-            if is_finished_recording(file.path) and not has_bookmark(file.path):
+            if is_finished_recording(file.path) and not self._is_live(file) and not has_bookmark(file.path):
                 return file
         too_large = sum(file.bytes for file in files) > self.config.cap_mb * MEGABYTE
         finished = [file for file in own if file.path != current]
         return finished[0] if too_large and finished else None
+
+    def _is_live(self, file: StoredFile) -> bool:
+        """Return whether another run is still writing a later part of the same recording."""
+        parts = self.folder.glob(f"{glob.escape(_run_of(file.path))}-*{SUFFIX}")
+        return any(is_being_written(path) for path in parts)
 
     def _remove(self, file: StoredFile) -> bool:
         """Remove a file and return whether that was possible."""

@@ -152,15 +152,19 @@ def test_a_clock_that_was_set_back_changes_nothing(tmp_path: Path) -> None:
 def test_runs_of_the_same_name_share_a_folder(tmp_path: Path) -> None:
     """As of two containers whose processes have the same number: each has files of its own."""
     first, second = (RotatingFolder(tmp_path, RUN, config(cap_bytes=1_000)) for _ in range(2))
-    written = McapFile(first.path(1), b"{}", 0)
+    finished = first.path(1)
+    written = McapFile(first.path(2), b"{}", 0)
     write(second, 1, 300)
-    assert [path.name for path in sorted(tmp_path.glob("*.mcap"))] == [f"{RUN}-001.mcap", f"{RUN}.2-001.mcap"]
+    names = [path.name for path in sorted(tmp_path.glob("*.mcap"))]
+    assert names == [f"{RUN}-001.mcap", f"{RUN}-002.mcap", f"{RUN}.2-001.mcap"]
     for part in range(2, 20):
         write(second, part, 9_000)
+    assert finished.exists(), "its run goes on"
     assert written.path.exists(), "it is being written"
     written.finish()
-    write(second, 20, 9_000)
-    write(second, 21, 9_000)
+    for part in range(20, 23):
+        write(second, part, 9_000)
+    assert not finished.exists()
     assert not written.path.exists()
 
 
