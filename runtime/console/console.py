@@ -15,6 +15,7 @@ from drivers.driver import RobotDriver
 from runtime.console.clients.challenges import PERIOD_S
 from runtime.console.clients.client import Client
 from runtime.console.clients.client_hub import ClientHub
+from runtime.console.clients.control import Holder
 from runtime.console.commands.command import CommandContext
 from runtime.console.commands.command_error import CommandError
 from runtime.console.commands.dispatcher import CommandDispatcher
@@ -102,7 +103,7 @@ class Console:
         self._limits = default if limits is None else limits
         self._console_log = ConsoleLog(log, clock)
         self._shown_models = settings.models
-        self.hub = ClientHub(self._limits, clock, lambda: self.dispatcher.end_teleoperation())
+        self.hub = ClientHub(self._limits, clock, self._on_control_lost)
         self.tuning = Tuning(run.live_settings, prepare, self._on_tuned, emulated=emulated)
         run.live_settings.subscribe(self._show_settings)
         self._commands = CommandContext(run, self.hub, self.tuning, clock, time, recording, replay)
@@ -250,13 +251,17 @@ class Console:
     def _on_stalled(self, client: str) -> None:
         self._console_log.refuse(f"it took nothing for {self._limits.stall_s:g} s: disconnected", client)
 
-    def _on_leave(self, client: Client) -> None:
-        if client.task is not None:
-            client.task.cancel()
+    def _on_control_lost(self, client: Holder) -> None:
+        """End what begins or keeps a motion only for the client that had control."""
+        self.dispatcher.end_teleoperation()
         if self._commands.armed_by is client:
             self._commands.armed_by = None
             if self._run.state.mode.arming_run_s is not None:
-                self._run.request(Request.DISARM)  # it would begin to drive with its operator gone
+                self._run.request(Request.DISARM)  # it would begin to drive for an operator who did not arm it
+
+    def _on_leave(self, client: Client) -> None:
+        if client.task is not None:
+            client.task.cancel()
         if self._commands.replay is not None:
             self._commands.replay.leave(client)
 

@@ -10,15 +10,14 @@ import io
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import dataclass
+from typing import Final, NamedTuple
 
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, DataEnd, Footer, Header, Message, Schema
-from mcap.stream_reader import breakup_chunk
+from mcap.records import Channel, DataEnd, Footer, Header, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from runtime.recording.channels import CHANNELS, RawMessage
@@ -30,11 +29,24 @@ RECORD_HEADER: Final = 9
 ZSTD: Final = b"\x04\x00\x00\x00zstd"
 ZSTD_AT: Final = RECORD_HEADER + 8 + 8 + 8 + 4
 """Offset of the compression's name in a chunk record."""
+CHUNK_HEAD: Final = ZSTD_AT - RECORD_HEADER + len(ZSTD) + 8
+"""Bytes of a chunk's content before its data: times, size, checksum, compression, size of the data."""
 CONTENT_MAX: Final = 64 << 20
 """Largest chunk that is decompressed, bytes. Ours have 256 KiB, or one keyframe of up to a few MiB."""
 RECORDS_MAX: Final = 1 << 16
 """Most records in a chunk that is read; each takes half a kilobyte. Ours have up to a few thousand."""
+CHUNK_MAX: Final = CONTENT_MAX + (1 << 20)
+"""Longest chunk record: what does not shrink by compression grows by little."""
+MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
+"""Of a message record: channel, sequence number, log time and publish time."""
 HEADER_MAX: Final = 4096
+SEARCH_BYTES: Final = 1 << 20
+"""What is searched at a time for the next chunk: a file may be larger than the memory, and most of it a hole."""
+TOPIC_MAX: Final = 256
+"""Longest topic that is kept, characters."""
+SCHEMA_MAX: Final = 1 << 20
+"""Largest schema that is kept, bytes; ours have some ten thousand."""
+SCHEMAS_MAX: Final = 64
 OPCODES: Final = frozenset(int(code) for code in Opcode)
 UNREADABLE: Final = (McapError, zstandard.ZstdError, ValueError, struct.error, OverflowError, MemoryError)
 """Exceptions that reading damaged bytes may raise."""
@@ -96,7 +108,8 @@ class McapScanner:
         try:
             code, length = struct.unpack_from("<BQ", self._data, 8)
             if code == Opcode.HEADER:
-                header = Header.read(_stream(self._data[8 + RECORD_HEADER : 8 + RECORD_HEADER + length]))
+                content = self._data[8 + RECORD_HEADER : 8 + RECORD_HEADER + min(length, HEADER_MAX)]
+                header = Header.read(_stream(content))
                 self.profile, self.library = header.profile, header.library
         except UNREADABLE:
             self.profile = ""
@@ -147,21 +160,29 @@ class McapScanner:
 
     def _find_chunk(self, at: int) -> tuple[list[RawMessage] | None, int]:
         """Return the next whole chunk from `at` on and the byte after it; without one, None and the file's end."""
-        data, start_search = bytes(self._data[at:]), 0
-        while (found := data.find(ZSTD, start_search)) >= 0:
-            start_search = found + 1
+        size = len(self._data)
+        for found in self._marks(at):
             start = found - ZSTD_AT
-            if start < 0 or found + 16 > len(data):
+            if start < at or found + 16 > size:
                 continue
-            (length,) = struct.unpack_from("<Q", data, found + len(ZSTD))
-            whole = ZSTD_AT - RECORD_HEADER + len(ZSTD) + 8 + length
-            if start + RECORD_HEADER + whole <= len(data) and (chunk := self._chunk(at + start, whole)) is not None:
+            (length,) = struct.unpack_from("<Q", self._data, found + len(ZSTD))
+            whole = CHUNK_HEAD + length
+            if start + RECORD_HEADER + whole <= size and (chunk := self._chunk(start, whole)) is not None:
                 wrong_head = "a chunk's kind or length is wrong; its messages are whole"
-                self._note(at, f"{start} bytes cannot be read" if start else wrong_head)
-                return chunk, at + start + RECORD_HEADER + whole
+                self._note(at, f"{start - at} bytes cannot be read" if start > at else wrong_head)
+                return chunk, start + RECORD_HEADER + whole
         if not self._is_cut_off(at):
-            self._note(at, f"nothing can be read from here to the end, {len(data)} bytes")
-        return None, len(self._data)
+            self._note(at, f"nothing can be read from here to the end, {size - at} bytes")
+        return None, size
+
+    def _marks(self, since: int) -> Iterator[int]:
+        """Yield every place of a chunk's compression from a byte on."""
+        for begin in range(since, len(self._data), SEARCH_BYTES):
+            block = bytes(self._data[begin : begin + SEARCH_BYTES + len(ZSTD) - 1])
+            at = block.find(ZSTD)
+            while at >= 0:
+                yield begin + at
+                at = block.find(ZSTD, at + 1)
 
     def _is_cut_off(self, at: int) -> bool:
         """Return whether the file just ends in the middle of this record, which does not count as corrupt."""
@@ -173,42 +194,56 @@ class McapScanner:
 
     def _chunk(self, at: int, length: int) -> list[RawMessage] | None:
         """Return the messages of the chunk at a byte; None if it is damaged."""
-        try:
-            chunk = Chunk.read(_stream(self._data[at + RECORD_HEADER : at + RECORD_HEADER + length]))
-            if len(chunk.data) + len(ZSTD) + 8 + ZSTD_AT - RECORD_HEADER != length:
-                return None
-            if chunk.compression != "zstd" or not 0 < chunk.uncompressed_size < CONTENT_MAX:
-                return None
-            if zstandard.frame_content_size(chunk.data) != chunk.uncompressed_size:
-                return None
-            content = zstandard.decompress(chunk.data)
-            if not _has_few_records(content):
-                return None
-            records = breakup_chunk(replace(chunk, compression="", data=content), validate_crc=True)
-        except UNREADABLE:
+        if not CHUNK_HEAD <= length <= CHUNK_MAX:
             return None
-        if not chunk.uncompressed_crc:
+        try:
+            begin_ns, end_ns, size, crc = struct.unpack_from("<QQQI", self._data, at + RECORD_HEADER)
+            compression, data_size = struct.unpack_from(f"<{len(ZSTD)}sQ", self._data, at + ZSTD_AT)
+            if compression != ZSTD or CHUNK_HEAD + data_size != length or not 0 < size < CONTENT_MAX or not crc:
+                return None
+            # Not copied: a file of many chunks, each as long as the rest of it, would take forever.
+            data = self._data[at + RECORD_HEADER + CHUNK_HEAD : at + RECORD_HEADER + length]
+            if zstandard.frame_content_size(data) != size:
+                return None
+            content = zstandard.decompress(data)
+            if zlib.crc32(content) != crc:
+                return None
+            records = list(_records(content))
+        except UNREADABLE:
             return None
         messages = []
         for record in records:
             if isinstance(record, Schema):
-                self._schemas[record.id] = record
+                self._keep_schema(record)
             elif isinstance(record, Channel):
-                self._topics[record.id] = record.topic
-                if record.schema_id in self._schemas:
-                    self.schemas[record.topic] = self._schemas[record.schema_id]
-            elif isinstance(record, Message) and record.channel_id in self._topics:
-                messages.append(RawMessage(self._topics[record.channel_id], record.log_time, record.data))
+                self._keep_channel(record)
+            elif record.channel in self._topics:
+                messages.append(RawMessage(self._topics[record.channel], record.log_ns, record.data))
         times = [message.log_ns for message in messages]
-        if times and (min(times), max(times)) != (chunk.message_start_time, chunk.message_end_time):
+        if times and (min(times), max(times)) != (begin_ns, end_ns):
             self._note(at, "a chunk's own times are wrong; its messages are whole")
         return messages
+
+    def _keep_schema(self, schema: Schema) -> None:
+        """Keep a schema, but no more than a recording can have: a small file may expand to many large ones."""
+        size = len(schema.data) + len(schema.name) + len(schema.encoding)
+        if size <= SCHEMA_MAX and (schema.id in self._schemas or len(self._schemas) < SCHEMAS_MAX):
+            self._schemas[schema.id] = schema
+
+    def _keep_channel(self, channel: Channel) -> None:
+        """Keep a channel's topic and schema, within the same limits."""
+        if len(channel.topic) <= TOPIC_MAX:
+            self._topics[channel.id] = channel.topic
+            if channel.schema_id in self._schemas and (
+                channel.topic in self.schemas or len(self.schemas) < SCHEMAS_MAX
+            ):
+                self.schemas[channel.topic] = self._schemas[channel.schema_id]
 
     def _check_end(self, at: int, length: int) -> None:
         """Check what follows the messages: the checksums of everything before it and of the index."""
         self.finished = True
         try:
-            end = DataEnd.read(_stream(self._data[at + RECORD_HEADER : at + RECORD_HEADER + length]))
+            end = DataEnd.read(_stream(self._data[at + RECORD_HEADER : at + RECORD_HEADER + min(length, END_BYTES)]))
             summary = at + RECORD_HEADER + length
             footer_at = len(self._data) - END_BYTES
             footer = Footer.read(_stream(self._data[footer_at + RECORD_HEADER :]))
@@ -227,14 +262,43 @@ class McapScanner:
             self._note(0, "a byte between the chunks is damaged; their messages are whole")
 
 
-def _has_few_records(content: bytes) -> bool:
-    """Return whether a chunk's content has `RECORDS_MAX` records at most."""
+class _Message(NamedTuple):
+    """A message record of a chunk."""
+
+    channel: int
+    log_ns: int
+    data: bytes
+
+
+def _records(content: bytes) -> Iterator[Schema | Channel | _Message]:
+    """Yield the records of a chunk's content; each is read within its own length.
+
+    Raises
+    ------
+    ValueError
+        A record leads out of the chunk, or there are more than `RECORDS_MAX`.
+    McapError
+        A schema or channel is longer than its record.
+    struct.error
+        A record is too short for its kind.
+    """
     at = 0
-    for _ in range(RECORDS_MAX + 1):
-        if at + RECORD_HEADER > len(content):
-            return True
-        at += RECORD_HEADER + int(struct.unpack_from("<Q", content, at + 1)[0])
-    return False
+    for _ in range(RECORDS_MAX):
+        if at == len(content):
+            return
+        code, length = struct.unpack_from("<BQ", content, at)
+        begin, at = at + RECORD_HEADER, at + RECORD_HEADER + length
+        if at > len(content):
+            raise ValueError("a record leads out of its chunk")
+        if code == Opcode.MESSAGE:
+            channel, _sequence, log_ns, _published_ns = MESSAGE_HEAD.unpack_from(content, begin)
+            yield _Message(channel, log_ns, content[begin + MESSAGE_HEAD.size : at])
+        elif code == Opcode.SCHEMA:
+            yield Schema.read(_stream(memoryview(content)[begin:at]))
+        elif code == Opcode.CHANNEL:
+            yield Channel.read(_stream(memoryview(content)[begin:at]))
+    if at != len(content):
+        raise ValueError(f"more than {RECORDS_MAX} records")
 
 
 def _stream(data: memoryview) -> ReadDataStream:

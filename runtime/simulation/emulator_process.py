@@ -106,16 +106,22 @@ async def _wait_until_ready(process: asyncio.subprocess.Process) -> None:
     out, err = process.stdout, process.stderr
     if out is None or err is None:
         raise UserError("the emulator was started without pipes: this is a fault of the program", FAILED)
+    silent = ""
     try:
         line = await asyncio.wait_for(out.readline(), START_MAX_S)
     except TimeoutError:
-        line = b""
+        line, silent = b"", f"no answer within {START_MAX_S:.0f} s"
     if not line.startswith(READY_WORD.encode()):
         _signal(process, signal.SIGKILL)
         words = (await err.read()).decode(errors="replace").strip()
-        why = words.removeprefix("echolocate: ") or f"no answer within {START_MAX_S:.0f} s"
-        wrong_call = await process.wait() == WRONG_CALL
-        raise UserError(f"the emulator did not start: {why}", WRONG_CALL if wrong_call else FAILED)
+        code = await process.wait()
+        why = words.removeprefix("echolocate: ") or silent or f"it ended by {_end_of(code)}"
+        raise UserError(f"the emulator did not start: {why}", WRONG_CALL if code == WRONG_CALL else FAILED)
+
+
+def _end_of(code: int) -> str:
+    """Return the signal that ended a process, or else its exit code."""
+    return signal.Signals(-code).name if code < 0 else f"exit code {code}"
 
 
 async def _end(process: asyncio.subprocess.Process) -> None:

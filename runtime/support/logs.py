@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 
 LOG_FILE: Final = "echolocate.jsonl"
 """Default file, in the user's state folder."""
+ALWAYS: Final = frozenset({"console"})
+"""Events that are written at every level: without its start URL the console is of no use."""
 SECRET: Final = frozenset({"start_url"})
 """Fields written only to the log file and a terminal: recordings are passed on, and many may read a journal."""
 LINES_PER_S: Final = 5.0
@@ -69,6 +71,19 @@ class LogStatus:
         """Return how one of the writers' threads ended; None while they run. See `runtime.support.health`."""
         writers = (writer for writer in (self.file, self.terminal) if writer is not None)
         return next((how for writer in writers if (how := writer.probe()) is not None), None)
+
+
+class _LevelFilter:
+    """The first processor of structlog: drop lines below the configured level, but for those of `ALWAYS`."""
+
+    def __init__(self, level: str) -> None:
+        self._level = logging.getLevelNamesMapping()[level.upper()]
+        self._levels = {name.lower(): number for name, number in logging.getLevelNamesMapping().items()}
+
+    def __call__(self, _logger: object, name: str, event: MutableMapping[str, Any]) -> Mapping[str, Any]:
+        if self._levels.get(name, logging.ERROR) < self._level and event["event"] not in ALWAYS:
+            raise structlog.DropEvent
+        return event
 
 
 class _LineOutput:
@@ -179,12 +194,13 @@ def open_log(
         log: FilteringBoundLogger = structlog.wrap_logger(
             None,
             processors=[
+                _LevelFilter(config.level),
                 structlog.processors.add_log_level,
                 structlog.processors.TimeStamper(fmt="iso", utc=True),
                 structlog.processors.format_exc_info,
                 output,
             ],
-            wrapper_class=structlog.make_filtering_bound_logger(getattr(logging, config.level.upper())),
+            wrapper_class=structlog.make_filtering_bound_logger(logging.NOTSET),
         )
         if error is not None:
             log.warning("no log file is written", reason=error)

@@ -35,7 +35,7 @@ class ClientHub:
     clock : callable
         Monotonic, s.
     on_control_lost : callable
-        Called when the client that had control no longer has it.
+        Gets the client that had control, which has left or lost it.
 
     Attributes
     ----------
@@ -47,9 +47,9 @@ class ClientHub:
         Those that their commands carry.
     """
 
-    def __init__(self, limits: Limits, clock: Callable[[], float], on_control_lost: Callable[[], None]) -> None:
+    def __init__(self, limits: Limits, clock: Callable[[], float], on_control_lost: Callable[[Holder], None]) -> None:
         self.clients: dict[int, Client] = {}
-        self.control = Control(self._send_role, lambda _client: on_control_lost())
+        self.control = Control(self._send_role, on_control_lost)
         self.challenges = Challenges(clock, limits.command_age_max_s)
         self._limits = limits
         self._clock = clock

@@ -67,7 +67,8 @@ class Control:
     def request(self, client: Holder, host_s: float) -> str | None:
         """Take control, or ask the holder for it; return why it is not taken yet.
 
-        A holder that requests control itself declines the request of another client.
+        A holder that requests control itself declines the request of another client. One client asks at a time, and
+        asking again does not begin its wait anew, so no sequence of requests keeps control from changing hands.
         """
         if self._holder is client:
             self._requester = None
@@ -75,12 +76,15 @@ class Control:
         if self._holder is None:
             self._pass_to(client)
             return None
-        self._expires_s = host_s + REQUEST_TIMEOUT_S
-        self._requester = client
+        if self._requester is not None and self._requester is not client:
+            return f"{self._holder.name} has control, and {self._requester.name} has asked for it already"
+        if self._requester is None:
+            self._expires_s = host_s + REQUEST_TIMEOUT_S
+            self._requester = client
         self._notify(self._holder, client)
         return (
             f"{self._holder.name} has control and was asked for it; "
-            f"you get it in {REQUEST_TIMEOUT_S:.0f} s unless it is used"
+            f"you get it in {max(0.0, self._expires_s - host_s):.0f} s unless it is used"
         )
 
     def release(self) -> None:

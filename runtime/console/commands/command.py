@@ -67,10 +67,10 @@ class Call(NamedTuple):
     """Of the command."""
 
     def remains_valid(self) -> Callable[[], bool]:
-        """Return a function that returns False once the client has left or the robot has been stopped."""
-        challenges, client = self.context.hub.challenges, self.client
-        stops = challenges.stops
-        return lambda: not client.is_gone and challenges.stops == stops
+        """Return a function that returns False once the client has lost control or the robot has been stopped."""
+        hub, client = self.context.hub, self.client
+        stops = hub.challenges.stops
+        return lambda: hub.control.is_held_by(client) and not client.is_gone and hub.challenges.stops == stops
 
 
 def never(_: object) -> bool:

@@ -114,7 +114,12 @@ class Server:
         logger = logging.Logger("console")
         logger.addHandler(LogForwarder(context.log))
         self._web = web_server = web.Server(
-            self._answer, access_log=None, logger=logger, keepalive_timeout=IDLE_MAX_S, lingering_time=0.0
+            self._answer,
+            access_log=None,
+            logger=logger,
+            keepalive_timeout=IDLE_MAX_S,
+            lingering_time=0.0,
+            auto_decompress=False,
         )
         self._limiter = ConnectionLimiter(
             web_server,

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import random
+import struct
+import tracemalloc
+import zlib
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import zstandard
 from hypothesis import given
 from hypothesis import strategies as st
 from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC
 
 from runtime.recording.channels import CYCLE
+from runtime.recording.mcap_scanner import SCHEMAS_MAX, McapScanner
+from runtime.recording.reader import map_file
 from tests.examples import examples
 from tests.recorded import chunks_at, entries_of, rewrite, scanned
 
@@ -82,3 +90,95 @@ def test_a_file_that_is_not_a_recording_raises_nothing(data: bytes) -> None:
     chunks, scanner = scanned(data)
     assert chunks == []
     assert not scanner.finished
+
+
+def record(code: Opcode, content: bytes) -> bytes:
+    return struct.pack("<BQ", code, len(content)) + content
+
+
+def text(value: bytes) -> bytes:
+    return struct.pack("<I", len(value)) + value
+
+
+def schema(number: int, size: int) -> bytes:
+    return record(Opcode.SCHEMA, struct.pack("<H", number) + text(b"name") + text(b"jsonschema") + text(bytes(size)))
+
+
+def channel(number: int, topic: bytes, of: int) -> bytes:
+    return record(Opcode.CHANNEL, struct.pack("<HH", number, of) + text(topic) + text(b"json") + text(b""))
+
+
+def chunk(content: bytes) -> bytes:
+    data = zstandard.compress(content)
+    head = struct.pack("<QQQI", 0, 0, len(content), zlib.crc32(content)) + text(b"zstd")
+    return record(Opcode.CHUNK, head + struct.pack("<Q", len(data)) + data)
+
+
+@pytest.mark.promise("P21")
+def test_a_small_file_that_expands_to_much_takes_bounded_memory(measured: Callable[[str], None]) -> None:
+    """Each chunk is within its limits, but what is kept of all of them must be, too."""
+    large = 4 << 20
+    for name, contents in {
+        "schemas": [schema(k, large) for k in range(16)],
+        "topics": [channel(k, bytes(large), 1) for k in range(16)],
+    }.items():
+        data = MCAP0_MAGIC + b"".join(map(chunk, contents))
+        tracemalloc.start()
+        _, scanner = scanned(data)
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert scanner.schemas == {}
+        assert peak < 6 * large, name
+        measured(f"a file of {len(data) / 1e3:.0f} kB with {name} of {16 * large / 1e6:.0f} MB: {peak / 1e6:.0f} MB")
+
+
+@pytest.mark.promise("P21")
+def test_only_as_many_schemas_are_kept_as_a_recording_can_have() -> None:
+    chunks = (chunk(schema(k, 10) + channel(k, b"/%d" % k, k)) for k in range(3 * SCHEMAS_MAX))
+    _, scanner = scanned(MCAP0_MAGIC + b"".join(chunks))
+    assert len(scanner.schemas) == SCHEMAS_MAX
+    assert scanner.corrupt_regions == []
+
+
+@pytest.mark.promise("P21")
+@pytest.mark.parametrize("kind", [Opcode.SCHEMA, Opcode.CHANNEL])
+def test_no_record_hides_others(kind: Opcode, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A record that spans the rest of its chunk is one record."""
+    message = record(Opcode.MESSAGE, bytes(22))
+    own = schema(1, 10) if kind is Opcode.SCHEMA else channel(1, b"/log", 1)
+    monkeypatch.setattr("runtime.recording.mcap_scanner.RECORDS_MAX", 50)
+    hiding = record(kind, own[9:] + 100 * message)
+    chunks, scanner = scanned(MCAP0_MAGIC + chunk(hiding) + chunk(hiding + channel(0, b"/log", 1) + message))
+    assert [len(one) for one in chunks] == [0, 1]
+    assert scanner.corrupt_regions == []
+    for bad in (own[:-1], record(Opcode.MESSAGE, bytes(21)), 51 * message):
+        _, scanner = scanned(MCAP0_MAGIC + chunk(bad))
+        assert len(scanner.corrupt_regions) == 1
+
+
+@pytest.mark.parametrize("search_bytes", [1, 7, 100])
+def test_the_next_chunk_is_found_block_by_block(
+    small: bytes, search_bytes: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin = chunks_at(small)[0][0]
+    damaged = small[: begin + 2] + b"\xff" * 3 + small[begin + 5 :]
+    expected, before = scanned(damaged)
+    monkeypatch.setattr("runtime.recording.mcap_scanner.SEARCH_BYTES", search_bytes)
+    found, scanner = scanned(damaged)
+    assert (found, scanner.corrupt_regions) == (expected, before.corrupt_regions)
+
+
+@pytest.mark.promise("P21")
+def test_a_hole_in_a_file_takes_no_memory(small: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "x.mcap"
+    with path.open("wb") as file:
+        file.write(small[:30])
+        file.seek(400 << 20)
+        file.write(small)
+    tracemalloc.start()
+    with map_file(path) as data:
+        scanner = McapScanner(data)
+        assert [len(one) for one in scanner.chunks()] == [10] * 2
+        del scanner
+    assert tracemalloc.get_traced_memory()[1] < 50 << 20
+    tracemalloc.stop()

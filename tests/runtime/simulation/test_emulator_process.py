@@ -31,6 +31,7 @@ print("ready", flush=True)
 time.sleep(600)
 """
 FAILS = "import sys; sys.stderr.write('echolocate: no world: name one with --world\\n'); sys.exit({})"
+KILLED = "import os; os.kill(os.getpid(), 9)"
 SILENT = "import time; time.sleep(600)"
 
 
@@ -107,6 +108,14 @@ async def test_an_emulator_that_does_not_start_is_reported_in_its_own_words(
             pass
     assert caught.value.exit_code == code
     assert children.started[0].returncode == status
+
+
+@pytest.mark.promise("P19")
+async def test_an_emulator_that_is_killed_while_it_starts_is_reported(children: Children) -> None:
+    children.program = KILLED
+    with pytest.raises(UserError, match=r"^the emulator did not start: it ended by SIGKILL$"):
+        async with start_emulator([]):
+            pass
 
 
 async def test_an_emulator_that_says_nothing_is_given_up(children: Children, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -44,8 +44,11 @@ def test_lines_below_the_level_are_dropped(tmp_path: Path, capsys: pytest.Captur
         log.info("b")
         log.warning("c")
         log.error("d")
-    assert [line["event"] for line in lines(path)] == ["c", "d"]
-    assert len(capsys.readouterr().err.splitlines()) == 2
+        log.info("console", start_url="http://localhost:1/?token=x")
+    assert [line["event"] for line in lines(path)] == ["c", "d", "console"]
+    err = capsys.readouterr().err.splitlines()
+    assert len(err) == 3
+    assert "http://localhost:1/?token=x" in err[2], "at every level: there is no other way to the console"
 
 
 def test_no_line_is_printed_over_a_live_view(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import pytest
@@ -91,6 +92,26 @@ def test_an_idle_holder_loses_control_after_a_request(case: Case) -> None:
     assert control.is_held_by(first)
     control.expire(2.0 * REQUEST_TIMEOUT_S - 1.0)
     assert control.is_held_by(second)
+
+
+@pytest.mark.promise("P22")
+def test_requests_of_others_and_repeated_ones_postpone_nothing(case: Case, measured: Callable[[str], None]) -> None:
+    _, control, _first, second = case
+    third = StubClient(3)
+    control.join(third)
+    for k in range(100):
+        host_s = 0.01 * k * REQUEST_TIMEOUT_S
+        assert "client 1 has control and was asked" in str(control.request(second, host_s))
+        assert control.request(third, host_s) == "client 1 has control, and client 2 has asked for it already"
+        control.expire(host_s)
+    assert "you get it in 0 s" in str(control.request(second, REQUEST_TIMEOUT_S - 0.1))
+    control.expire(REQUEST_TIMEOUT_S)
+    assert control.is_held_by(second)
+    control.request(third, REQUEST_TIMEOUT_S)
+    control.leave(third)
+    control.expire(1e9)
+    assert control.is_held_by(second), "the one that asked has left"
+    measured("200 requests of two clients for control that is not used: it passes to the first of them after 10 s")
 
 
 def test_released_or_lost_control_passes_to_the_requester(case: Case) -> None:

@@ -116,6 +116,38 @@ async def test_arming_ends_with_its_client() -> None:
         await case.settled(lambda: case.run.asked == [Request.ARM, Request.DISARM], "the end of arming")
 
 
+@pytest.mark.promise("P18")
+@pytest.mark.parametrize("message", MOTIONS, ids=lambda message: str(message["type"]))
+async def test_a_command_that_waits_for_its_cycle_is_void_once_control_has_changed_hands(
+    message: dict[str, Any],
+) -> None:
+    async with open_console() as case:
+        page, other = await case.page(), await case.page()
+        await other.ask(type="take_control")
+        assert (await page.ask(**message))["ok"]
+        is_valid = case.run.validity[0]
+        assert is_valid()
+        assert (await page.ask(type="grant_control", client=2))["ok"]
+        assert not is_valid()
+
+
+@pytest.mark.promise("P18")
+@pytest.mark.parametrize("way", ["grant_control", "release_control"])
+async def test_arming_ends_with_control(way: str) -> None:
+    """Else the robot would begin to drive for an operator who did not arm it, or for none."""
+    async with open_console() as case:
+        page, other = await case.page(), await case.page()
+        await other.ask(type="take_control")
+        await page.ask(type="arm")
+        case.run.state.mode = ModeState(Mode.READY, 0.0, None, arming_run_s=1.0)
+        assert (await page.ask(type=way, client=2) if way == "grant_control" else await page.ask(type=way))["ok"]
+        assert case.run.asked == [Request.ARM, Request.DISARM]
+        await other.ask(type="arm")
+        case.run.state.mode = ModeState(Mode.DRIVE, 2.0)
+        await other.ask(type="release_control")
+        assert case.run.asked[2:] == [Request.ARM], "what drives already goes on"
+
+
 def test_whatever_requests_a_motion_needs_a_challenge() -> None:
     """Those that stop the robot need none, so that nothing can hold them up."""
     needs = {

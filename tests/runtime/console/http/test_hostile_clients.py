@@ -9,9 +9,12 @@ from __future__ import annotations
 import asyncio
 import base64
 import contextlib
+import gzip
 import os
 import struct
-from collections.abc import AsyncIterator, Callable
+import tracemalloc
+import zlib
+from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -42,9 +45,11 @@ class RawPage:
     reader: asyncio.StreamReader
     writer: asyncio.StreamWriter
 
-    def write(self, opcode: int, payload: bytes = b"", *, fin: bool = True, count: int = 1) -> None:
+    def write(
+        self, opcode: int, payload: bytes = b"", *, fin: bool = True, compressed: bool = False, count: int = 1
+    ) -> None:
         """Write a frame, masked with zeros, so many times."""
-        first = bytes([opcode | (0x80 if fin else 0)])
+        first = bytes([opcode | (0x80 if fin else 0) | (0x40 if compressed else 0)])
         size = bytes([0x80 | len(payload)]) if len(payload) < 126 else b"\xfe" + struct.pack(">H", len(payload))
         self.writer.write((first + size + bytes(4) + payload) * count)
 
@@ -58,16 +63,18 @@ class RawPage:
 
 
 @contextlib.asynccontextmanager
-async def raw_page(case: ConsoleCase) -> AsyncIterator[RawPage]:
-    """Connect a websocket by hand."""
+async def raw_page(case: ConsoleCase, *headers: str) -> AsyncIterator[RawPage]:
+    """Connect a websocket by hand; the server agrees to no extension."""
     reader, writer = await asyncio.open_connection("127.0.0.1", case.url.port)
     lines = [
         f"GET /ws?token={case.token} HTTP/1.1", f"Host: 127.0.0.1:{case.url.port}", f"Origin: {case.origin}",
         "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
-        f"Sec-WebSocket-Key: {base64.b64encode(os.urandom(16)).decode()}", "", "",
+        f"Sec-WebSocket-Key: {base64.b64encode(os.urandom(16)).decode()}", *headers, "", "",
     ]  # fmt: skip
     writer.write("\r\n".join(lines).encode())
-    assert (await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), TIMEOUT_S)).startswith(b"HTTP/1.1 101")
+    answer = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), TIMEOUT_S)
+    assert answer.startswith(b"HTTP/1.1 101")
+    assert b"extensions" not in answer.lower()
     try:
         yield RawPage(reader, writer)
     finally:
@@ -328,3 +335,51 @@ async def test_hundreds_of_pages_opened_and_closed(measured: Callable[[str], Non
         lines = [line for line in case.log if line["event"].startswith("console ")]
         assert len(lines) <= 4 * (LOG_LINES_BURST + 1), "nor is the log flooded"
         measured(f"60 pages opened and closed at once: {JOINS_BURST} get in, others are refused; HALT counts")
+
+
+@contextlib.contextmanager
+def allocating_less_than(limit_bytes: int) -> Iterator[None]:
+    """Check the most memory that is allocated at a time."""
+    tracemalloc.start()
+    try:
+        before = tracemalloc.get_traced_memory()[0]
+        yield
+        assert tracemalloc.get_traced_memory()[1] - before < limit_bytes
+    finally:
+        tracemalloc.stop()
+
+
+BOMB_BYTES = 50_000_000
+
+
+@pytest.mark.parametrize("fragments", [1, 3])
+async def test_a_compressed_bomb_is_not_decompressed(fragments: int, measured: Callable[[str], None]) -> None:
+    compressor = zlib.compressobj(9, zlib.DEFLATED, -15)
+    bomb = compressor.compress(b" " * BOMB_BYTES) + compressor.flush(zlib.Z_SYNC_FLUSH)
+    piece = bomb[:60_000]
+    async with open_console() as case:
+        async with raw_page(case, "Sec-WebSocket-Extensions: permessage-deflate; client_no_context_takeover") as page:
+            with allocating_less_than(2_000_000):
+                for k in range(fragments):
+                    page.write(CONTINUATION if k else TEXT, piece, fin=k == fragments - 1, compressed=k == 0)
+                assert await page.rest() != b"", "it gets the reason"
+        assert "reserved bits" in case.refusals()[-1]
+        assert (await (await case.page()).ask(type="halt"))["ok"]
+    measured("a websocket message of 60 kB that would be 50 MB: dropped, and not decompressed")
+
+
+@pytest.mark.parametrize("encoding", ["gzip", "deflate"])
+async def test_a_compressed_request_is_not_decompressed(encoding: str) -> None:
+    body = (gzip if encoding == "gzip" else zlib).compress(b" " * BOMB_BYTES)
+    async with open_console() as case:
+        with allocating_less_than(2_000_000):
+            reader, writer = await asyncio.open_connection("127.0.0.1", case.url.port)
+            writer.write(
+                f"GET /ws HTTP/1.1\r\nHost: 127.0.0.1:{case.url.port}\r\nContent-Encoding: {encoding}\r\n"
+                f"Content-Length: {len(body)}\r\n\r\n".encode()
+                + body
+            )
+            with contextlib.suppress(ConnectionError):
+                await asyncio.wait_for(reader.read(-1), TIMEOUT_S)
+            writer.transport.abort()
+        assert (await (await case.page()).ask(type="halt"))["ok"]
