@@ -169,16 +169,16 @@ def test_the_next_chunk_is_found_block_by_block(
 
 
 @pytest.mark.promise("P21")
-def test_a_hole_in_a_file_takes_no_memory(small: bytes, tmp_path: Path) -> None:
+def test_a_hole_in_a_file_takes_no_memory(tmp_path: Path) -> None:
     path = tmp_path / "x.mcap"
     with path.open("wb") as file:
-        file.write(small[:30])
-        file.seek(400 << 20)
-        file.write(small)
+        file.write(MCAP0_MAGIC)
+        file.seek(200 << 20)
+        file.write(chunk(channel(1, b"/log", 1) + record(Opcode.MESSAGE, struct.pack("<HIQQ", 1, 0, 0, 0))))
     tracemalloc.start()
     with map_file(path) as data:
         scanner = McapScanner(data)
-        assert [len(one) for one in scanner.chunks()] == [10] * 2
+        assert [len(one) for one in scanner.chunks()] == [1]
         del scanner
-    assert tracemalloc.get_traced_memory()[1] < 50 << 20
+    assert tracemalloc.get_traced_memory()[1] < 20 << 20
     tracemalloc.stop()

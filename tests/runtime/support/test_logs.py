@@ -45,10 +45,10 @@ def test_lines_below_the_level_are_dropped(tmp_path: Path, capsys: pytest.Captur
         log.warning("c")
         log.error("d")
         log.info("console", start_url="http://localhost:1/?token=x")
-    assert [line["event"] for line in lines(path)] == ["c", "d", "console"]
-    err = capsys.readouterr().err.splitlines()
-    assert len(err) == 3
-    assert "http://localhost:1/?token=x" in err[2], "at every level: there is no other way to the console"
+    found = lines(path)
+    assert [line["event"] for line in found] == ["c", "d", "console"]
+    assert found[2]["start_url"] == "http://localhost:1/?token=x", "at every level: no other way leads to the console"
+    assert len(capsys.readouterr().err.splitlines()) == 3
 
 
 def test_no_line_is_printed_over_a_live_view(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
