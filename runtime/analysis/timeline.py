@@ -94,6 +94,20 @@ class BookmarkEntry:
 
 
 @dataclass(slots=True, eq=False)
+class MapView:
+    """What a run perceived in the frame of the map in which it was driven, while it knew its place there."""
+
+    echoes: Echoes
+    """The readings of that time."""
+    way: Floats
+    """(n, 2): the robot's places x, y, m."""
+    objects: tuple[DetectedObject, ...]
+    """Those reported at the end, each as it was last seen nearby."""
+    walls: Floats
+    """(n, 4): ends x, y, x, y (m) of the walls recognised at the end."""
+
+
+@dataclass(slots=True, eq=False)
 class Timeline:
     """A run in the frame of the odometry. Times `t_s` are s of the run's clock after the first cycle or firing."""
 
@@ -117,6 +131,8 @@ class Timeline:
     """(n, 7): the run's own map: first and last seen (s), ends x, y, x, y (m), normal (rad)."""
     walls: Floats = field(default_factory=lambda: np.zeros((0, 4)))
     """(n, 4): ends x, y, x, y (m) of the walls recognised at the end."""
+    map_view: MapView | None = None
+    """Only of a run in a known room."""
     modes: list[ModeEntry] = field(default_factory=list)
     log: list[LogEntry] = field(default_factory=list)
     bookmarks: list[BookmarkEntry] = field(default_factory=list)

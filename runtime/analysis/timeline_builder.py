@@ -12,10 +12,12 @@ from typing import Final
 import numpy as np
 
 from drivers.messages import Firing, Floats, Odometry, Pose
+from perception.detected_object import DetectedObject
+from perception.localization.map_frame import turned_object
 from perception.paper.paper_method import PaperPerception
 from perception.pipeline import Perception
 from perception.sensor_mounts import mounts_array
-from runtime.analysis.timeline import ECHO, Cluster, Echoes, RunSnapshot, Timeline
+from runtime.analysis.timeline import ECHO, Cluster, Echoes, MapView, RunSnapshot, Timeline
 
 SNAPSHOTS_MAX: Final = 240
 """Snapshots kept. At this number every second one is dropped and the interval doubles."""
@@ -46,6 +48,9 @@ class TimelineBuilder:
         self._pose: Pose | None = None
         self._yaw = 0.0
         self._front = PaperPerception(settings.ring, settings.models, settings.perception)
+        self._placed: list[tuple[Pose, Echoes]] = []
+        self._near_map: dict[int | None, DetectedObject] = {}
+        self._unplaced = 0
 
     @property
     def pose(self) -> Pose | None:
@@ -56,6 +61,7 @@ class TimelineBuilder:
         """Discard everything so far, as a run does when the robot and its odometry restart."""
         self._timeline.notes.append(f"the robot restarted after {t_s:.1f} s; nothing before that is shown")
         self._rows, self._row_count, self._segments, self._pose = [], 0, {}, None
+        self._placed, self._near_map, self._unplaced = [], {}, 0
         self._timeline.snapshots, self._timeline.odometry = [], []
         self._front.reset()
 
@@ -84,6 +90,8 @@ class TimelineBuilder:
     def end_cycle(self, t_s: float, perception: Perception) -> None:
         """Take a snapshot of what is known after the cycle at `t_s` if one is due."""
         self._timeline.seconds = t_s
+        if perception.known_room is not None:
+            self._place_in_map(perception)
         if t_s >= self._next_s:
             self._next_s = t_s + self._interval_s
             self._add_snapshot(t_s, perception)
@@ -96,10 +104,34 @@ class TimelineBuilder:
         if perception is not None:
             labelled = (*perception.labelled_objects(), *perception.archived_objects())
             timeline.walls = np.array([seen.ends for seen in labelled if seen.ends is not None]).reshape(-1, 4)
+        if perception is not None and perception.known_room is not None:
+            timeline.map_view = self._map_view(perception)
         if self._rows:
             timeline.echoes = np.concatenate(self._rows)
         if self._segments:
             timeline.segments = np.array([[first, last, *row] for first, last, row in self._segments.values()])
+
+    def _place_in_map(self, perception: Perception) -> None:
+        """Keep the readings since the last cycle, and the objects nearby, in the map frame as it is known now."""
+        rows, self._unplaced = self._rows[self._unplaced :], len(self._rows)
+        here = perception.localized()
+        if here is None or here.status != "tracking":
+            return
+        to = perception.odometry_from_map().inverse()
+        self._placed += [(here.pose, _turned_echoes(to, row)) for row in rows]
+        for seen in perception.near_objects():
+            self._near_map[seen.number] = turned_object(to, seen)
+
+    def _map_view(self, perception: Perception) -> MapView:
+        numbers = {seen.number for seen in perception.objects()}
+        to = perception.odometry_from_map().inverse()
+        walls = [turned_object(to, seen).ends for seen in perception.labelled_objects()]
+        return MapView(
+            np.concatenate([np.empty(0, ECHO), *(rows for _, rows in self._placed)]),
+            np.array([(pose.x, pose.y) for pose, _ in self._placed]).reshape(-1, 2),
+            tuple(seen for number, seen in self._near_map.items() if number in numbers),
+            np.array([ends for ends in walls if ends is not None]).reshape(-1, 4),
+        )
 
     def _add_snapshot(self, t_s: float, perception: Perception) -> None:
         rows = perception.segment_geometry()
@@ -118,6 +150,15 @@ class TimelineBuilder:
                 perception.objects(),
             )
         )  # fmt: skip
+
+
+def _turned_echoes(to: Pose, echoes: Echoes) -> Echoes:
+    """Return readings in another frame, in which the present origin lies at `to`."""
+    turned, c, s = echoes.copy(), math.cos(to.theta), math.sin(to.theta)
+    turned["x"] = to.x + c * echoes["x"] - s * echoes["y"]
+    turned["y"] = to.y + s * echoes["x"] + c * echoes["y"]
+    turned["bearing"] += to.theta
+    return turned
 
 
 def clusters_of(front: PaperPerception) -> tuple[Cluster, ...]:

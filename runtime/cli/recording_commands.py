@@ -265,6 +265,8 @@ def map_command(
 ) -> int:
     """Write the map of a run as a world file, and as an occupancy image with the YAML of ROS's map_server.
 
+    Of a run in a known room (`run --map`) it is that map, corrected by what the run found, and what changed is said.
+
     Parameters
     ----------
     out

@@ -64,6 +64,12 @@ def world_of(objects: Sequence[DetectedObject], walls: Floats, models: Sequence[
     )
 
 
+def round_names(objects: Sequence[DetectedObject], models: Sequence[ModelConfig]) -> list[str]:
+    """Return the models' names of the objects that `world_of` turns into drums, in the same order."""
+    is_round = {model.name for model in models if model.arc_radius_m is not None}
+    return [seen.model for seen in objects if seen.model in is_round]
+
+
 def placed(model: ModelConfig, seen: DetectedObject) -> Floats:
     """Return a model's vertices where it was recognised, shape (n, 2), m."""
     c, s = math.cos(seen.theta), math.sin(seen.theta)

@@ -34,24 +34,42 @@ def map_run(source: TimelineSource, out: str, grid: str | None, *, force: bool) 
     """
     from runtime.analysis.export.occupancy_image import occupancy_image, yaml_beside
     from runtime.analysis.export.shapes import firing_scans
-    from runtime.analysis.export.world_file import world_of, world_text
+    from runtime.analysis.export.world_file import round_names, world_of, world_text
+    from runtime.analysis.map_changes import MapChange, compare_with_map
 
     console, output = plain_console(stderr=True), plain_console()
     files = {"--out": out, "--grid": grid, "--grid (its YAML)": None if grid is None else yaml_beside(Path(grid))}
     timeline = read_timeline(source, console, partial(check_outputs, files, source.inputs, force=force))
-    if len(timeline.objects) + len(timeline.walls) > ITEMS_MAX:
+    settings, view, changes = timeline.settings, timeline.map_view, list[MapChange]()
+    known = settings.perception.localization.known_room
+    objects, walls = (timeline.objects, timeline.walls) if view is None else (view.objects, view.walls)
+    if len(objects) + len(walls) > ITEMS_MAX:
         raise UserError(f"{source.file}: a world file holds at most {ITEMS_MAX} objects of a kind", FAILED)
-    settings = timeline.settings
-    world = world_of(timeline.objects, timeline.walls, settings.models)
-    head = (f"Map of {utf8(Path(source.file).name)}: what was recognised, in the frame of its odometry (m).",)
+    world, echoes = world_of(objects, walls, settings.models), timeline.echoes
+    half_angle_rad = math.radians(settings.ring.beam_half_angle_deg)
+    head = f"Map of {utf8(Path(source.file).name)}: what was recognised, in the frame of its odometry (m)."
+    if view is not None and known is not None:
+        if not len(view.echoes):
+            raise UserError(
+                f"{source.file}: the robot never knew its place in the map; drive farther, or check that it is the "
+                "map of this room",
+                FAILED,
+            )
+        echoes = view.echoes
+        changes, world = compare_with_map(known, world, round_names(objects, settings.models), echoes, half_angle_rad)
+        head = f"The map of {utf8(Path(source.file).name)}, corrected by what that run found (m)."
     with writing("--out", out):
-        Path(out).write_text(world_text(world, head), encoding="utf-8")
+        Path(out).write_text(world_text(world, (head,)), encoding="utf-8")
     output.print(f"{out}: {len(world.drum)} drums, {len(world.polygon)} polygons, {len(world.wall)} walls")
+    for change in changes:
+        output.print(str(change))
+    if view is not None and not changes:
+        output.print("nothing has changed where the robot has looked")
     if grid is not None:
         try:
-            way = np.array([(scan.x, scan.y) for scan in firing_scans(timeline)]).reshape(-1, 2)
-            half_angle_rad = math.radians(settings.ring.beam_half_angle_deg)
-            image = occupancy_image(world, timeline.echoes, half_angle_rad, way, settings.body.radius_m)
+            scans = np.array([(scan.x, scan.y) for scan in firing_scans(timeline)]).reshape(-1, 2)
+            way = scans if view is None else view.way
+            image = occupancy_image(world, echoes, half_angle_rad, way, settings.body.radius_m)
         except ValueError as error:
             raise UserError(f"--grid {grid}: {error}; the robot's way is too wide for one", FAILED) from error
         with writing("--grid", grid):

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from config.errors import DONE, FAILED, WRONG_CALL
-from config.load import load_world
+from config.load import load_settings, load_world, with_known_room
 from runtime.cli.app import run_command
+from tests.recorded import record
 
 
 def test_the_map_of_a_recording_is_a_world_that_can_be_loaded(
@@ -32,6 +34,43 @@ def test_the_map_of_a_ring_log_whose_name_is_not_utf8(hall_log: Path, tmp_path: 
     assert run_command(["map", str(log), "--out", str(out)]) == DONE
     assert load_world(str(out)).drum
     assert out.read_text("utf-8").startswith("# Map of \\udcff.csv: ")
+
+
+def _room(drums: str) -> str:
+    return f"""
+    drum = [{drums}]
+    wall = [{{x1_m=-3.0, y1_m=-2.5, x2_m=6.0, y2_m=-2.5}}, {{x1_m=6.0, y1_m=-2.5, x2_m=6.0, y2_m=2.5}},
+            {{x1_m=6.0, y1_m=2.5, x2_m=-3.0, y2_m=2.5}}, {{x1_m=-3.0, y1_m=2.5, x2_m=-3.0, y2_m=-2.5}}]
+    start = {{x_m=-1.8, y_m=0.0, heading_deg=0.0}}
+    """
+
+
+@pytest.mark.compiled
+def test_a_run_in_a_known_room_corrects_its_map_and_tells_what_changed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    at = "{{x_m={}, y_m={}, radius_m=0.3048}}".format
+    real, known, log = tmp_path / "real.toml", tmp_path / "known.toml", tmp_path / "run.mcap"
+    real.write_text(_room(", ".join((at(0.4, 1.2), at(2.1, 1.2), at(2.1, -1.2)))), "utf-8")
+    known.write_text(_room(", ".join((at(0.4, 1.2), at(2.9, -1.0), at(0.5, -1.3)))), "utf-8")
+    record(with_known_room(load_settings("hallway", world=str(real)), str(known)), log, 24.0, refused=0.02)
+    out, grid = tmp_path / "corrected.toml", tmp_path / "corrected.pgm"
+    assert run_command(["map", str(log), "--out", str(out), "--grid", str(grid)]) == DONE
+    written, *said, _ = capsys.readouterr().out.splitlines()
+    assert written == f"{out}: 3 drums, 0 polygons, 4 walls"
+    assert [line.split(" at ")[0] for line in said] == ["new: semicircle", "moved: semicircle", "gone: drum"]
+    drums = sorted((drum.y_m, drum.x_m) for drum in load_world(str(out)).drum)
+    assert np.array(drums) == pytest.approx(np.array([(-1.2, 2.1), (1.2, 0.4), (1.2, 2.1)]), abs=0.02)
+    assert grid.read_bytes().startswith(b"P5\n")
+
+
+def test_a_robot_that_never_knew_its_place_corrects_no_map(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "run.mcap"
+    record(with_known_room(load_settings("hallway"), "hallway"), log, 0.5)
+    assert run_command(["map", str(log), "--out", str(tmp_path / "map.toml")]) == FAILED
+    assert "never knew its place in the map" in capsys.readouterr().err
 
 
 def test_calls_that_are_refused_name_the_cause(
