@@ -1,4 +1,4 @@
-"""What changed in a map: openings, objects moved, gone and new, and what nobody has looked at stays."""
+"""What changed in a map: openings, objects moved, gone and new, and what was not looked at stays."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def _room(drums: str) -> str:
 
 
 @pytest.mark.compiled
-def test_a_run_in_a_known_room_corrects_its_map_and_tells_what_changed(
+def test_a_run_in_a_known_room_corrects_its_map_and_names_the_changes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     at = "{{x_m={}, y_m={}, radius_m=0.3048}}".format
