@@ -85,24 +85,6 @@ def is_finished_recording(path: Path) -> bool:
         os.close(fd)
 
 
-def is_being_written(path: Path) -> bool:
-    """Return whether a run holds the lock of a recording."""
-    try:
-        fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
-    except OSError:
-        return False
-    try:
-        fcntl.flock(fd, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:  # the file system has no locks
-        return False
-    else:
-        return False
-    finally:
-        os.close(fd)
-
-
 def _is_ours(head: bytes) -> bool:
     if len(head) < _HEAD.size:
         return False

@@ -20,7 +20,8 @@ from typing import Final, NamedTuple, Protocol
 from config.files import is_utf8
 from config.settings import RecordingConfig
 from runtime.recording.channels import BOOKMARK
-from runtime.recording.folder_index import create_listed, is_being_written, is_finished_recording, listed_names
+from runtime.recording.folder_index import create_listed, is_finished_recording, listed_names
+from runtime.support.file_lock import is_locked
 from runtime.support.user_folders import expanded, state_folder
 
 SUFFIX: Final = ".mcap"
@@ -233,7 +234,7 @@ class RotatingFolder:
     def _is_live(self, file: StoredFile) -> bool:
         """Return whether another run is still writing a later part of the same recording."""
         parts = self.folder.glob(f"{glob.escape(_run_of(file.path))}-*{SUFFIX}")
-        return any(is_being_written(path) for path in parts)
+        return any(is_locked(path) for path in parts)
 
     def _remove(self, file: StoredFile) -> bool:
         """Remove a file and return whether that was possible."""

@@ -42,14 +42,37 @@ def file_lock(path: Path, named: str) -> Iterator[None]:
     try:
         fd = _lock(path)
     except BlockingIOError:
-        raise UserError(
-            f"{named}: another process writes to this file; end it (`fuser {path}` shows it) or choose another file",
-            FAILED,
-        ) from None
+        raise in_use(path, named) from None
     except OSError as error:
         raise UserError(f"{named}: cannot be written: {error.strerror}; choose another file", FAILED) from error
     try:
         yield
+    finally:
+        os.close(fd)
+
+
+def in_use(path: Path, named: str) -> UserError:
+    """Return the error for a file that another process has locked; `named` as for `file_lock`."""
+    return UserError(
+        f"{named}: another process writes to this file; end it (`fuser {path}` shows it) or choose another file",
+        FAILED,
+    )
+
+
+def is_locked(path: Path) -> bool:
+    """Return whether a process holds the lock of a file, this one included."""
+    try:
+        fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOCTTY | os.O_NONBLOCK)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(fd, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:  # the file system has no locks
+        return False
+    else:
+        return False
     finally:
         os.close(fd)
 

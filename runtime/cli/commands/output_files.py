@@ -15,6 +15,7 @@ from typing import Final, TypeAlias
 
 from config.errors import FAILED, WRONG_CALL, UserError
 from config.files import files_read, one_line
+from runtime.support.file_lock import in_use, is_locked
 
 PathLike: TypeAlias = str | Path
 FileId: TypeAlias = tuple[int, int, str]
@@ -47,7 +48,7 @@ def check_outputs(
     Raises
     ------
     UserError
-        An output is an input or another output, exists, or cannot be written.
+        An output is an input or another output, exists, is being written by another process, or cannot be written.
     """
     read = {found: path for path in (*inputs, *files_read()) if path is not None and (found := _existing(path))}
     written: dict[FileId, str] = {}
@@ -63,10 +64,30 @@ def check_outputs(
         if found is not None and not is_device:
             written[found] = shown
     for option, path in _each(outputs):
+        if is_locked(Path(path)):
+            raise in_use(Path(path), f"{option} {one_line(str(path))}")
+    refuse_existing(outputs, force=force)
+    for option, path in _each(outputs):
+        _refuse_unwritable(option, Path(path))
+
+
+def refuse_existing(outputs: Mapping[str, PathLike | Iterable[PathLike] | None], *, force: bool) -> None:
+    """Refuse files that hold something; `check_outputs` includes it.
+
+    Parameters
+    ----------
+    outputs, force
+        As of `check_outputs`.
+
+    Raises
+    ------
+    UserError
+        There is such a file.
+    """
+    for option, path in _each(outputs):
         if not force and _has_content(Path(path)):
             problem = "exists; choose another name, or overwrite it with --force"
             raise UserError(f"{option} {one_line(str(path))}: {problem}", WRONG_CALL)
-        _refuse_unwritable(option, Path(path))
 
 
 @contextlib.contextmanager

@@ -7,7 +7,6 @@ import contextlib
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +17,7 @@ from config.files import is_utf8, utf8
 from config.load import ConfigError, load_settings, with_known_room
 from config.settings import Settings
 from runtime import VERSION
-from runtime.cli.commands.output_files import check_outputs
+from runtime.cli.commands.output_files import check_outputs, refuse_existing
 from runtime.cli.commands.run_recording import RunRecording, open_run_recording
 from runtime.cli.first_signals import is_remembered
 from runtime.cli.start_signals import ending_the_start, handled_by_loop
@@ -114,10 +113,10 @@ def run_robot(
     if port is not None:
         settings = with_port(settings, port)
     own_files = {"--record": record, "--json": json_file}
-    check_files = partial(
-        check_outputs, inputs=(emulator.faults, port), force=force, appended={"log.file": log_path(settings.log)}
-    )
-    check_files({**own_files, "--trace": emulator.trace})
+    check_outputs(
+        {**own_files, "--trace": emulator.trace}, (emulator.faults, port), force=force,
+        appended={"log.file": log_path(settings.log)},
+    )  # fmt: skip
     console = EscapingConsole(stderr=True)
     preparation = begin_preparation(settings)
     if preparation is None:
@@ -128,7 +127,7 @@ def run_robot(
         for option, path in own_files.items():
             if path is not None:
                 stack.enter_context(file_lock(Path(path), f"{option} {path}"))
-        check_files(own_files)  # another run may have written them while kernels were prepared
+        refuse_existing(own_files, force=force)  # another run may have written them while kernels were prepared
         clock = ScaledClock() if port is None else RunClock()
         recording = stack.enter_context(
             open_run_recording(settings, record, no_record=no_record, emulated=port is None, clock=clock)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from config.errors import FAILED, UserError
-from runtime.support.file_lock import file_lock
+from runtime.support.file_lock import file_lock, is_locked
 
 ROOT = Path(__file__).parents[3]
 HOLD = "import sys, pathlib\nfrom runtime.support.file_lock import file_lock\n" + (
@@ -110,3 +110,12 @@ def test_an_unwritable_path_is_refused(tmp_path: Path, name: str) -> None:
         file_lock(tmp_path / name, "--record x"),
     ):
         pass
+
+
+def test_a_lock_is_seen_while_it_is_held(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    assert not is_locked(path)
+    with file_lock(path, "--record"):
+        assert is_locked(path)
+    assert not is_locked(path)
+    assert not is_locked(Path("/dev/null"))

@@ -12,6 +12,7 @@ import pytest
 from config.errors import FAILED, WRONG_CALL, UserError
 from runtime.cli.app import app, run_command
 from runtime.cli.commands.output_files import check_outputs, make_output_folder, writing
+from runtime.recording.mcap_file import McapFile
 from runtime.recording.recorder import Recorder
 from runtime.recording.storage import SingleFile
 from tests.recorded import hall
@@ -167,6 +168,14 @@ def test_what_holds_nothing_may_be_written_to(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     check_outputs({"--json": tmp_path / "pipe"}, force=False)
     check_outputs({"--json": "/dev/null", "--trajectory": "/dev/null"}, ("/dev/null",), force=False)
+
+
+def test_a_file_that_another_process_writes_is_refused_even_by_force(tmp_path: Path) -> None:
+    recording = McapFile(tmp_path / "live.mcap", b"{}", 0)
+    with pytest.raises(UserError, match="another process writes to this file"):
+        check_outputs({"--json": tmp_path / "live.mcap"}, force=True)
+    recording.finish()
+    check_outputs({"--json": tmp_path / "live.mcap"}, force=True)
 
 
 def test_a_port_is_an_input_as_well(tmp_path: Path) -> None:
