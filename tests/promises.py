@@ -125,8 +125,8 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         ),
         "P19": Promise(
             "Nothing is left over",
-            "a page closed while its recording opens; SIGINT, SIGTERM or SIGHUP at any moment of a start: no "
-            "process, no folder, no traceback, exit code 128 + n",
+            "pages that close while a recording opens, or open many at once; SIGINT, SIGTERM or SIGHUP at any moment "
+            "of a start: no process, no folder, no traceback, exit code 128 + n",
         ),
         "P20": Promise(
             "No run deletes the recordings of others",
