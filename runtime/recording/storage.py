@@ -80,12 +80,14 @@ class SingleFile:
         """
         if part == 1:
             return self.first
-        path = self.first.with_stem(f"{self.first.stem}-{part}")
-        try:
-            path.touch(exist_ok=False)
-        except FileExistsError:
-            return self.path(part + 1)
-        return path
+        while True:
+            path = self.first.with_stem(f"{self.first.stem}-{part}")
+            try:
+                path.touch(exist_ok=False)
+            except FileExistsError:
+                part += 1
+            else:
+                return path
 
     def enforce_limits(self, current: Path) -> None:
         """Do nothing: files that the user named are never deleted."""
