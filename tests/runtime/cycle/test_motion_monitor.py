@@ -139,12 +139,14 @@ def test_any_drive_is_as_commanded(seed: int) -> None:
     assert base.found == []
 
 
-@pytest.mark.parametrize("leap_m", [0.09, 0.3, 5.0, 1e5])
-def test_a_leap_of_the_odometry_is_no_motion(leap_m: float) -> None:
-    off = [0.0]
-    base = driving(Base(noise=lambda: (off[0], 0.0)))
-    off[0] = leap_m
-    base.run(FORWARD, 2.0)
+@pytest.mark.parametrize(
+    ("leap_m", "leap_rad"), [(0.09, 0.09), (0.3, 0.0), (5.0, 0.0), (1e5, 0.0), (0.0, 0.3), (0.0, 2.0)]
+)
+def test_a_leap_of_the_odometry_is_no_motion(leap_m: float, leap_rad: float) -> None:
+    off = [(0.0, 0.0)]
+    base = driving(Base(noise=lambda: off[0]))
+    off[0] = leap_m, leap_rad
+    base.run(HALTED, 2.0)
     assert base.found == []
 
 
@@ -279,3 +281,33 @@ def test_a_base_goes_on_by_its_last_command_while_the_line_is_lost(lost_s: float
         base.cycle(HALTED, odometry=False, is_sent=False)
     base.run(HALTED, 3.0)
     assert base.found == []
+
+
+def test_the_velocity_that_commands_explain() -> None:
+    """Held for as long as the newest odometry may still show it, then falling by the base's deceleration."""
+    monitor, explained = MotionMonitor(), []
+    for k in range(40):
+        at_s = 0.09 * k
+        sample = Odometry(at_s, HERE, 0.0, STANDSTILL, Flags.NONE, 0)
+        monitor = monitor.observe(sample, at_s, BODY)
+        explained.append(tuple(direction.explained for direction in monitor.directions))
+        monitor = monitor.command(Twist(0.3, -0.4) if k == 19 else Twist(0.1, -0.4) if k == 20 else None, at_s)
+    fastest, turn = BODY.speed_max_m_s, BODY.turn_max_rad_s
+    assert explained[0] == (fastest, fastest, turn, turn), "unknown at first"
+    assert explained[1] == pytest.approx((0.455, 0.455, 0.82, 0.82))
+    assert explained[19] == (0.0,) * 4
+    assert [row[0] for row in explained[20:]] == pytest.approx(
+        [0.3, 0.3, 0.255, 0.21, 0.165, 0.12, 0.075, 0.03] + [0.0] * 12
+    )
+    assert {row[1:3] for row in explained[20:]} == {(0.0, 0.0)}, "forward and right explain no backward and left"
+    assert [row[3] for row in explained[20:]] == pytest.approx([0.4, 0.4, 0.4, 0.22, 0.04] + [0.0] * 15)
+
+
+def test_without_any_command_no_motion_is_explained() -> None:
+    """As before the first cycle of a robot that is connected."""
+    monitor, found = MotionMonitor(), set()
+    for k in range(100):
+        pose = Pose(0.02 * max(0, k - 40), 0.0, 0.0)
+        monitor = monitor.observe(Odometry(0.05 * k, pose, 0.0, STANDSTILL, Flags.NONE, 0), 0.05 * k, BODY)
+        found.add(monitor.movement)
+    assert found == {Movement.AS_COMMANDED, Movement.UNCOMMANDED}
