@@ -91,9 +91,15 @@ def replay_recording(
 
     span.validate()
     has_other_settings = other is not None or bool(sets) or bool(models) or robot is not None
-    if verify and has_other_settings:
-        raise UserError("--verify compares with the recorded settings: leave out --with, --set, --model, --robot",
-                        WRONG_CALL)  # fmt: skip
+    is_part = span != Span(0.0, None, None)
+    for option, is_given in (
+        ("--verify", verify),
+        ("--json", json_file is not None),
+        ("--from, --to, --speed", is_part),
+    ):
+        if is_given and has_other_settings:
+            raise UserError(f"{option}: for the recorded settings only: leave out --with, --set, --model, --robot",
+                            WRONG_CALL)  # fmt: skip
     console = plain_console(stderr=True)
     with open_recording(Path(log)) as recording:
         if has_other_settings:

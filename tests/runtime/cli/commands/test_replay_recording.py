@@ -93,8 +93,11 @@ def test_other_settings_are_compared(run: Path, capsys: pytest.CaptureFixture[st
     assert out.index("as it was") < out.index("with the other settings")
     assert out.count("of 6 drums") == 2
     assert out.splitlines()[-1] == "240 cycles; 0 with another command"
-    assert run_command(["replay", str(run), "--verify", "--set", "perception.method=paper"]) == WRONG_CALL
-    assert "--verify compares with the recorded settings" in capsys.readouterr().err
+    for option in (["--verify"], ["--json", "summary.json"], ["--to", "3"]):
+        assert run_command(["replay", str(run), *option, "--set", "perception.method=paper"]) == WRONG_CALL
+        err = capsys.readouterr().err
+        assert option[0] in err
+        assert "for the recorded settings only" in err
 
 
 def test_errors_in_one_line() -> None:
