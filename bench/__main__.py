@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Final, TypeAlias
+from typing import Annotated, Final, Literal, TypeAlias, get_args
 
 from cyclopts import App, Parameter
 from rich.console import Console
@@ -43,6 +43,8 @@ RECORDING: Final = TimingPlan(seconds=60.0, rounds=1, busy=0)
 WAKING_TURNS: Final = 10
 STEPS_FT: Final = (0.05, 0.2, 0.5, 1.0)
 """Distances between two firings of one sensor in the rooms with walls, ft."""
+
+Furniture: TypeAlias = Literal["boxes", "clutter"]
 
 Measure: TypeAlias = Callable[[TimingPlan, tuple[str, ...], Callable[[str], None]], Timing]
 
@@ -350,6 +352,43 @@ def walls(*, json: str = "walls.json", seeds: int = 100, first: int = 0, steps: 
     with console.status("bench") as status:
         rows = measure(settings, range(first, first + max(1, seeds)), steps, status.update)
     return _report(json, rows, walls_table(rows))
+
+
+@app.command
+def false_drums(
+    *,
+    json: str = "false_drums.json",
+    rooms: int = 10,
+    minutes: float = 30.0,
+    first: int = 100,
+    furniture: tuple[Furniture, ...] = get_args(Furniture),
+) -> int:  # fmt: skip
+    """Measure how often a drum is reported in rooms without one: walls and two boxes, and these among clutter.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    rooms
+        Number of rooms.
+    minutes
+        Duration of the drive through each, by each model of reflection, in virtual time.
+    first
+        Seed of the first room.
+    furniture
+        Two boxes, or these among clutter.
+    """
+    use_kernel_cache()
+    from bench.false_drums import measure
+
+    console = Console(stderr=True)
+    settings = load_settings("hallway", ("perception.method=bayes",))
+    prepare_kernels(settings, console)
+    with console.status("bench") as status:
+        rows = measure(
+            settings, range(first, first + max(1, rooms)), max(0.01, minutes), furniture, status.update
+        )  # fmt: skip
+    return _report(json, rows, rows_table(f"false drums in rooms without a drum, {minutes:g} min each", rows))
 
 
 def _measured(measure: Measure, plan: TimingPlan, sets: tuple[str, ...], json: str, against: str | None) -> int:
