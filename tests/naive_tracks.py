@@ -387,11 +387,30 @@ def fate(
     return 1 if probability < 0.2 or dispersion < 0.5 * spread else 2
 
 
+def model_check(
+    own: Array, room: Array, expected: Array, variance: Array, bearings: Array
+) -> tuple[float, float, int]:  # fmt: skip
+    """Return misfit (σ), lead of the room (nat) and sides of a model.
+
+    Each argument has a value for each reading in its beam and gate: log ratios of model and room (nat), mean and
+    variance of the first if the noise is right, and direction to the centre (rad).
+    """
+    short = expected - own
+    misfit = (short.sum() - max(0.0, short.max(initial=0.0))) / math.sqrt(max(0.25, np.maximum(0.25, variance).sum()))
+    sides = {int(v) % 36 for v in np.floor((bearings[own > 0] / (2.0 * math.pi) + 0.5) * 36)}
+    return float(misfit), float((room - own).sum()), len(sides)
+
+
+def is_doubtful(careful: bool, misfit: float, room_lead: float, sides: int, confirmed: bool) -> bool:
+    """Return whether a model's checks speak against its name."""
+    return room_lead > -5.0 or (careful and (misfit > 3.0 or sides < (8 if confirmed else 11)))
+
+
 def is_called(
     called: bool, established: bool, known: bool, probability: float, sure: float, near: float,
     rivals: Sequence[float], wall: float, dispersion: float, llr: float, unknown: float, variances: Sequence[float],
 ) -> bool:  # fmt: skip
-    """Return whether a circle has a model's name: given when sure, kept while likely and well located."""
+    """Return whether a circle has a model's name, unless it is doubtful: given when sure, kept while likely."""
     share = 1.1 if max(rivals) < -20 else 1.25
     seen_round = dispersion >= 0.008
     possible = established and known and seen_round and llr > share * unknown and max(variances) < (0.17 * FT) ** 2

@@ -27,6 +27,15 @@ def touch(sensor: Array, axis: float, half_angle: float, normal: float, distance
     return float(ranges[k]), float(t @ point)
 
 
+def answer(sensor: Array, axis: float, half_angle: float, normal: float, distance: float) -> tuple[float, float]:
+    """Return the same as `touch`, in closed form."""
+    off = (axis - normal + math.pi) % (2.0 * math.pi) - math.pi
+    ray = normal if abs(off) <= half_angle else axis - math.copysign(half_angle, off)
+    n, t = (np.array([math.cos(a), math.sin(a)]) for a in (normal, normal + math.pi / 2))
+    reach = float((distance - n @ sensor) / math.cos(ray - normal))
+    return reach, float(t @ (sensor + reach * np.array([math.cos(ray), math.sin(ray)])))
+
+
 def line_fit(u: Array, z: Array, w: Array) -> tuple[Array, Array]:
     """Return offset and slope of z over u with weights w, and their covariance, with the product's weak priors."""
     rows = np.concatenate(

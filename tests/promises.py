@@ -175,6 +175,11 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "against each of its inputs, every other output and an existing file, also through links: refused, all "
             "content as before",
         ),
+        "P27": Promise(
+            "No false drum where none stands",
+            "rooms of four walls and two boxes without a drum, .3 % noise, 90 s where everything echoes (soak: ten "
+            "rooms for thirty minutes each, `cone` and `specular`): at most 1 look in 1,000 with a drum at ≥ .95",
+        ),
         "P28": Promise(
             "Anyone's account and terminal",
             "paths that are not UTF-8, no home folder, `~` of no user, streams that are closed, full or ASCII: no "

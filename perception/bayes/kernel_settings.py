@@ -15,11 +15,12 @@ import numpy as np
 from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import BayesConfig
-from perception.bayes.likelihood import build_levels, build_table
+from perception.bayes.likelihood import build_levels, build_table, expected_evidence
 from perception.bayes.parameters import (
     ASSOCIATING_LINE_M,
     BACKGROUND_RANGE_M,
     COMPARE_ALL_BELOW,
+    DIFFUSE_SILENCE,
     DISPERSION_MIN,
     FAR_M,
     FAR_NAT_PER_M,
@@ -30,6 +31,7 @@ from perception.bayes.parameters import (
     IDLE_FIRINGS,
     MAY_ANSWER_DEG,
     MERGE_RADII,
+    MIRRORS_HEARD,
     MISSED_ECHO_PROBABILITY,
     MODEL_PRIOR_NAT,
     MUST_ANSWER_DEG,
@@ -223,6 +225,10 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: Bayes
         float(it.half_resolution_m), *TABLE_SIGMAS_M, 1.0 / BACKGROUND_RANGE_M, OUTLIER_SHARE, column(p, "table")[0],
         column(p, "table_bins_per_m")[0], sigmas,
     )  # fmt: skip
+    column(p, "expected_nat")[0], column(p, "variance_nat2")[0] = expected_evidence(
+        column(p, "table")[0], OUTLIER_SHARE
+    )
+    it.silent_share_min = DIFFUSE_SILENCE * max(0.0, 1.0 - MIRRORS_HEARD * half_angle / math.pi)
     for noise, (absolute, relative) in zip(
         it.noises, itertools.product(NOISE_ABSOLUTE_M, NOISE_RELATIVE), strict=True
     ):

@@ -11,12 +11,16 @@ import math
 from perception.bayes.elements import MAX_POLYGONS, POLYGON_BIN_CAPACITY
 from perception.bayes.parameters import (
     ALONE_LEAD_NAT,
+    CAREFUL_SIDES,
+    CONFIRMED_SIDES,
+    MISFIT_MAX,
     NAME_KEPT_PROBABILITY,
     NAMED_DISPERSION_MIN,
     NAMED_OVER_UNKNOWN,
     NAMED_OVER_UNKNOWN_ALONE,
     NAMED_SIGMA_MAX_M,
     NO_WALL_LEAD_NAT,
+    ROOM_LEAD_NAT,
 )
 from perception.bayes.polygon_parameters import (
     POLYGON_DISPERSION_MIN,
@@ -49,7 +53,24 @@ class Reported(Record):
 
 
 @kernel
-def update_name(track: CircleTrack, p: SettingsRecord, sure: float, least: float) -> None:
+def is_doubtful(track: CircleTrack, careful: bool) -> bool:
+    """Return whether a model's checks speak against its name; see `perception.bayes.model_check`.
+
+    Parameters
+    ----------
+    track : CircleTrack
+        The track.
+    careful : bool
+        Whether its readings must fit, and have been heard from all over its front.
+    """
+    if track.room_lead > ROOM_LEAD_NAT:
+        return True
+    sides_min = CONFIRMED_SIDES if track.is_confirmed == 1 else CAREFUL_SIDES
+    return bool(careful and (track.misfit > MISFIT_MAX or track.sides < sides_min))
+
+
+@kernel
+def update_name(track: CircleTrack, p: SettingsRecord, sure: float, least: float, careful: bool) -> None:
     """Name a track after a model once that is sure; withdraw the name once it is no longer likely.
 
     Without this hysteresis a name would come and go with each comparison, and could not be used for steering.
@@ -62,6 +83,8 @@ def update_name(track: CircleTrack, p: SettingsRecord, sure: float, least: float
         Which circles are models.
     sure, least : float
         Least probability to give a name, and the same where a wall is excluded.
+    careful : bool
+        Whether it must have been heard from all over its front.
     """
     line = p[0].circle_count
     if track.leads[line] == 0.0 or track.leads[line] > NO_WALL_LEAD_NAT:
@@ -70,6 +93,7 @@ def update_name(track: CircleTrack, p: SettingsRecord, sure: float, least: float
         track.status != ESTABLISHED
         or track.kind >= p[0].model_count
         or track.probability < min(least, NAME_KEPT_PROBABILITY)
+        or is_doubtful(track, careful)
     ):
         track.is_named = 0
         return

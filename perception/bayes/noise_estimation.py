@@ -85,7 +85,9 @@ def add_roughness(
 
 
 @kernel
-def add_residuals(s: Records[State], tracks: Records[CircleTrack], p: Records[Settings], t: int, n: int) -> None:
+def add_residuals(
+    s: Records[State], tracks: Records[CircleTrack], p: Records[Settings], t: int, n: int, careful: bool
+) -> None:  # fmt: skip
     """Update each noise's evidence from the residuals of track `t`, if the track is sure.
 
     Parameters
@@ -96,12 +98,16 @@ def add_residuals(s: Records[State], tracks: Records[CircleTrack], p: Records[Se
         The track, whose `n` readings are the first of the scratch.
     n : int
         Readings.
+    careful : bool
+        Whether only the residuals of named objects count.
     """
     track = tracks[t]
     if track.status != ESTABLISHED or track.refinements % RESIDUAL_EVERY != 0 or track.kind >= p[0].model_count:
         return
     for h in range(NOISES):
         track.noise_nat[h] = 0.0
+    if track.is_named == 0 and careful:
+        return
     if track.probability < RESIDUAL_PROBABILITY_MIN or track.hits < RESIDUAL_HITS_MIN:
         return
     for j in range(n):

@@ -9,6 +9,7 @@ import math
 from typing import Final
 
 from perception.bayes.elements import HISTORY, Reading
+from perception.bayes.model_check import count_surroundings
 from perception.bayes.noise_estimation import add_roughness, choose_noise, noise_variance, tolerance_m
 from perception.bayes.pairing import make_segments
 from perception.bayes.parameters import (
@@ -283,6 +284,7 @@ def associate(
     """
     m = place_readings(s, p, mounts, px, py, yaw, ranges) if math.isfinite(time_s) else 0
     if m > 0:
+        count_surroundings(s, m, math.hypot(px - s[0].ring_x, py - s[0].ring_y))
         s[0].ring_x = px
         s[0].ring_y = py
     associate_circles(s, tracks, p, m)

@@ -327,6 +327,32 @@ POST_RADIUS_M: Final = 1.0 * FOOT_M
 UNKNOWN_HITS_MIN: Final = 5.0
 """Least hits of an unnamed object that is reported."""
 
+# --- Whether a model is right where it is the best explanation ----------------------------------------------------
+
+MISFIT_MAX: Final = 3.0
+"""Greatest shortfall of the hits' log likelihood, in σ, of a model where an echo says little."""
+VARIANCE_MIN_NAT2: Final = 0.25
+"""Least variance assumed of a hit's log likelihood: exact ranges have none, and one outlier would decide."""
+ROOM_LEAD_NAT: Final = -5.0
+"""Lead of the mapped walls and corners at which they explain an object."""
+ROOM_MARGIN_M: Final = 0.2
+"""They explain as far as this beyond the ends of their spans."""
+MODEL_CHECK_EVERY: Final = 4
+"""A named object is checked in every fourth of its refinements."""
+SILENCE_MEMORY: Final = 0.999
+"""Factor on the counts of readings after each: a memory of a thousand, a few seconds of driving."""
+MIRRORS_HEARD: Final = 8
+"""Points of a room of mirrors that answer, over a beam's opening each: those of four walls, and four corners."""
+DIFFUSE_SILENCE: Final = 0.35
+"""Where the beams are silent less often than this share of what such a room leaves silent, surfaces answer at any
+angle: 16 % for beams of ±12°. The halls have 26 % or more, closed rooms of diffuse walls none."""
+CAREFUL_SIDES: Final = 11
+"""Bearing bins (10° each) from which an object must have been heard where an echo says little …"""
+CONFIRMED_SIDES: Final = 8
+"""… and from which a named object counts as confirmed."""
+TRUSTED_M: Final = 15.0
+"""After this way without a confirmed object, a withdrawn name makes all new ones need those sides."""
+
 # --- A user's edits ------------------------------------------------------------------------------------------------
 
 REJECTED_MAX_NAT: Final = 40.0

@@ -13,8 +13,8 @@ from typing import Final
 from perception.bayes.alternatives import fit_other_circle, fit_other_line, score
 from perception.bayes.circle_posterior import posterior_circle
 from perception.bayes.corner_model import score_corner
-from perception.bayes.elements import MAX_LINES
 from perception.bayes.lateral_search import search_across
+from perception.bayes.model_check import check_model, count_names, is_careful
 from perception.bayes.naming import update_name
 from perception.bayes.noise_estimation import add_residuals, noise_variance
 from perception.bayes.occlusion import keep_relevant
@@ -23,9 +23,6 @@ from perception.bayes.parameters import (
     APART_RADII,
     CENTRE_VARIANCE_MAX_M2,
     CERTAIN_PROBABILITY,
-    CIRCLE_WALL_BEHIND,
-    CIRCLE_WALL_BEYOND_M,
-    CIRCLE_WALL_FRONT,
     CORNER_MISS_SHARE,
     DOUBT_PROBABILITY,
     DOUBTED_DISPERSION_SHARE,
@@ -40,6 +37,7 @@ from perception.bayes.parameters import (
     LINE_LENGTH_MIN_M,
     LINE_PRIOR_NAT,
     LOST_NAT,
+    MODEL_CHECK_EVERY,
     REPLACING_LINE_HITS_MIN,
     ROOT_CORRELATION_MAX,
     ROOT_VARIANCE_MIN_M2,
@@ -58,7 +56,7 @@ from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, TENTATIVE, CircleTrack, CircleTracks, StateRecord
 from perception.bayes.track_labels import drop_track, is_rejected, outlives
 from perception.bayes.track_selection import choose_circle, is_waiting
-from perception.bayes.walls import add_line, is_wall, off_and_along, reaches
+from perception.bayes.walls import add_line, is_in_wall
 from perception.kernel import kernel
 
 EXPONENT_MAX: Final = 60.0
@@ -261,27 +259,6 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
 
 
 @kernel
-def is_in_wall(s: StateRecord, x: float, y: float, radius: float) -> bool:
-    """Return whether a circle's centre lies in a known wall, or just before or behind it.
-
-    Parameters
-    ----------
-    s, x, y, radius
-        Memory, and the circle, m.
-    """
-    for k in range(MAX_LINES):
-        line = s[0].lines[k]
-        if is_wall(line):
-            off, along = off_and_along(line, x, y)
-            if (
-                reaches(line, along, CIRCLE_WALL_BEYOND_M)
-                and CIRCLE_WALL_BEHIND * radius < off < CIRCLE_WALL_FRONT * radius
-            ):
-                return True
-    return False
-
-
-@kernel
 def existence_probability(s: StateRecord, p: SettingsRecord, track: CircleTrack, prior: float) -> float:
     """Return the probability of a track's explanation among all: radii, line, corner, unknown object, nothing.
 
@@ -345,14 +322,19 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
     prior = update_score(s, p, track, n)
     if not compare_alternatives(s, p, track, n, prior) and drop_track(track):
         return
-    add_residuals(s, tracks, p, t, n)
+    careful = is_careful(s, p)
+    add_residuals(s, tracks, p, t, n, careful)
     track.probability = existence_probability(s, p, track, prior)
     evidence = track.log_likelihood_ratio
     if (evidence < 0.0 or evidence < track.unknown_nat - UNKNOWN_LEAD_NAT) and drop_track(track):
         return
     update_status(track, p)
+    is_due = track.is_named == 0 or track.refinements % MODEL_CHECK_EVERY == 0
+    if track.status == ESTABLISHED and track.kind < p[0].model_count and is_due:
+        check_model(s, p, track, n)
     report = p[0].report_probability
-    update_name(track, p, report, p[0].report_probability_near if prior >= p[0].model_prior_nat else report)
+    near = p[0].report_probability_near if prior >= p[0].model_prior_nat else report
+    update_name(track, p, report, near, careful)
     if track.is_named == 1:
         track.marks &= CONFIRMED
     merge_duplicates(tracks, p, t)
@@ -395,5 +377,8 @@ def quantum(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, threshold: 
         track = tracks[t]
         if track.idle_firings > p[0].idle_firings:
             track.final_refinements -= 1
+        was_named, x, y = track.status == ESTABLISHED and track.is_named == 1, track.x, track.y
         refine(s, tracks, p, t)
+        if was_named:
+            count_names(s, tracks, p, t, x, y)
     return is_waiting(tracks, p, threshold)

@@ -7,6 +7,7 @@ from typing import Annotated, Final
 from config.robot import SENSORS_MAX
 from perception.bayes.elements import (
     ATTRACTING_MAX,
+    BEARING_BINS,
     GRID_CELLS,
     PAIRS_PER_SENSOR,
     READINGS_MAX,
@@ -144,6 +145,8 @@ class Scratch(Record):
     linear: Annotated[Records[LinearReading], READINGS_MAX]
     cells: Annotated[Floats, GRID_CELLS]
     """Log likelihood of each cell of a posterior's grid, nat."""
+    sides: Annotated[Ints, BEARING_BINS]
+    """1 for each bearing bin from which an object was heard."""
     near: Annotated[Records[MappedSegment], 32]
     """Segments near a place."""
     attracting: Annotated[Floats, ATTRACTING_MAX, 5]

@@ -161,6 +161,14 @@ class CircleTrack(Track):
     """Dispersion of the axes of the sensors that heard it."""
     unknown_nat: float
     """Evidence of an unknown object in its place."""
+    misfit: float
+    """Shortfall of its hits' log likelihood from what the noise lets expect, in σ."""
+    room_lead: float
+    """Lead of the mapped walls and corners, nat."""
+    sides: int
+    """Bearing bins from which it was heard."""
+    is_confirmed: int
+    """1 once it was heard from many sides while it was named."""
     leads: Annotated[Floats, ALTERNATIVES_MAX]
     """Lead of each alternative, nat: the radii, then a line, then a corner; 0 where it was not compared."""
     noise_nat: Annotated[Floats, NOISES]
@@ -297,6 +305,14 @@ class State(Record):
     segments_numbered: int
     """The same for segments."""
     rejection_count: int
+    heard: float
+    """Readings with an echo …"""
+    silent: float
+    """… and without; older ones count less."""
+    names_withdrawn: int
+    """Names withdrawn since a named circle was last heard from many sides, …"""
+    unconfirmed_m: float
+    """… and the way driven since, m."""
     roughness_nat: Annotated[Floats, NOISES]
     """Evidence of the readings' roughness for each noise."""
     residuals_nat: Annotated[Floats, NOISES]

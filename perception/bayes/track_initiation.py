@@ -173,6 +173,10 @@ def reset_circle(track: CircleTrack) -> None:
     track.misses = 0.0
     track.dispersion = 0.0
     track.unknown_nat = 0.0
+    track.misfit = 0.0
+    track.room_lead = 0.0
+    track.sides = 0
+    track.is_confirmed = 0
     track.leads[:] = 0.0
     track.noise_nat[:] = 0.0
 

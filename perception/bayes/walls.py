@@ -12,6 +12,9 @@ import math
 from perception.bayes.elements import MAX_LINES
 from perception.bayes.noise_estimation import noise_variance
 from perception.bayes.parameters import (
+    CIRCLE_WALL_BEHIND,
+    CIRCLE_WALL_BEYOND_M,
+    CIRCLE_WALL_FRONT,
     EXPLAINED_SIGMAS,
     LINE_ANGLE_DRIFT_RAD2,
     LINE_ANGLE_VARIANCE_RAD2,
@@ -76,6 +79,27 @@ def reaches(line: Line, along: float, beyond: float) -> bool:
 def is_wall(line: Line) -> bool:
     """Return whether a line is long enough and has enough echoes to be called a wall."""
     return bool(line.echoes > WALL_ECHOES_MIN and line.high - line.low > WALL_LENGTH_MIN_M)
+
+
+@kernel
+def is_in_wall(s: StateRecord, x: float, y: float, radius: float) -> bool:
+    """Return whether a circle's centre lies in a known wall, or just before or behind it.
+
+    Parameters
+    ----------
+    s, x, y, radius
+        Memory, and the circle, m.
+    """
+    for k in range(MAX_LINES):
+        line = s[0].lines[k]
+        if is_wall(line):
+            off, along = off_and_along(line, x, y)
+            if (
+                reaches(line, along, CIRCLE_WALL_BEYOND_M)
+                and CIRCLE_WALL_BEHIND * radius < off < CIRCLE_WALL_FRONT * radius
+            ):
+                return True
+    return False
 
 
 @kernel

@@ -19,6 +19,7 @@ import numpy as np
 from config.settings import Settings
 from perception.bayes.archived_tracks import READINGS_KEPT as READINGS_ARCHIVED
 from perception.bayes.elements import (
+    BEARING_BINS,
     BUCKETS,
     MAX_POLYGONS,
     POLYGON_BEARING_BINS,
@@ -92,7 +93,8 @@ MAY_BE_INFINITE: Final = frozenset({
 _COUNTS: Final = (
     "_numbers.last _rejections.total _ring.firings sets_seen bins.count buckets.count number candidates._sizes _turn "
     "changes idle_firings passed_over refinements reservoir unseen clusters.sizes requests_made leaps missed "
-    "near_echoes newest_segment objects_numbered off_stuck outline.numbers outline.total _sensors.readings "
+    "names_withdrawn near_echoes newest_segment objects_numbered off_stuck outline.numbers outline.total "
+    "_sensors.readings "
     "room.firings room.recent_count rejection_count run_firing run_length segments_made segments_numbered "
     "sensors.kept members_sum _archive.circles.count _archive.polygons.count _numbered waiting "
     "drift._arrived drift._entered drift._windows landmarks.failures landmarks.hits "
@@ -137,6 +139,7 @@ BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
         "circles.alternative": Bound(0, CIRCLES_MAX + 1),
         "circles.kind": Bound(0, CIRCLES_MAX - 1),
         "circles.radius": Bound(0.0, 1e3),
+        "circles.sides": Bound(0, BEARING_BINS),
         "circles.status": Bound(FREE, ESTABLISHED),
         "corners.first": Bound(0, MAX_WALLS - 1),
         "corners.is_used": Bound(0, 1),
@@ -159,6 +162,7 @@ BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
         "archived_rows.kept": Bound(0, READINGS_ARCHIVED),
         "archived_rows.kind": Bound(0, CIRCLES_MAX - 1),
         "archived_rows.radius": Bound(0.0, 1e3),
+        "archived_rows.sides": Bound(0, BEARING_BINS),
         "archived_rows.status": Bound(FREE, ESTABLISHED),
         "placements.count": Bound(0, PLACEMENTS_MAX),
         "range_m": Bound(0.0, 1e7),

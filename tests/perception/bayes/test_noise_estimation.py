@@ -64,10 +64,12 @@ def test_evidence_from_residuals_and_the_chosen_noise_equal_their_oracles(exampl
         t, n = int(rng.integers(TRACKS)), 30
         circles["status"][t], circles["kind"][t], circles["refinements"][t] = ESTABLISHED, 0, rng.integers(6)
         circles["probability"][t], circles["hits"][t] = rng.choice([0.9, 0.99]), rng.choice([20.0, 26.0])
+        is_named, careful = bool(rng.random() < 0.5), bool(rng.random() < 0.5)
+        circles["is_named"][t] = is_named
         enter_readings(memory, around(rng, n, place_of(memory, t), float(circles["radius"][t])))
         want, total = circles["noise_nat"].copy(), residual.copy()
         if circles["refinements"][t] % 3 == 0:
-            is_sure = circles["probability"][t] >= 0.95 and circles["hits"][t] >= 25
+            is_sure = circles["probability"][t] >= 0.95 and circles["hits"][t] >= 25 and (is_named or not careful)
             want[t] = 0.0
             if is_sure:
                 want[t] = naive_tracks.residual_evidence(
@@ -75,7 +77,7 @@ def test_evidence_from_residuals_and_the_chosen_noise_equal_their_oracles(exampl
                     S.gate_m, noises(),
                 )  # fmt: skip
                 total = want[circles["status"] == ESTABLISHED].sum(0)
-        noise_estimation.add_residuals(memory.s, memory.tracks, P, t, n)
+        noise_estimation.add_residuals(memory.s, memory.tracks, P, t, n, careful)
         assert circles["noise_nat"] == pytest.approx(want, rel=1e-12, abs=1e-11)
         assert residual == pytest.approx(total, rel=1e-12, abs=1e-11)
     assert len(chosen) == len(NOISES)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from perception.bayes import refine, reservoir
+from perception.bayes import refine, reservoir, walls
 from perception.bayes.parameters import SWITCH_LEAD_NAT, SWITCH_UNSEEN
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, TENTATIVE
 from tests import naive_tracks
@@ -64,7 +64,7 @@ def test_probability_is_a_share_among_all_explanations(examples: int) -> None:
         prior, kind = rng.normal(2, 2), track.kind
         place, rho = place_of(memory, 0), float(track.radius)
         in_wall = naive_tracks.stands_in_wall(lines.values(), place, rho)
-        assert refine.is_in_wall(memory.s, *pair(place), rho) == in_wall
+        assert walls.is_in_wall(memory.s, *pair(place), rho) == in_wall
         inside += in_wall
         leads = {k: float(v) for k, v in enumerate(track.leads) if k != kind and v != 0.0}
         want = naive_tracks.probability(
