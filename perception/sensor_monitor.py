@@ -7,7 +7,8 @@ A single reading proves nothing; how readings change while the robot moves and w
   along a wall and with slipping wheels: then the base moves across the beam, the neighbours' readings do not change,
   or those of the whole ring do not.
 - *Silent.* The sensor hears nothing over a long distance while both neighbours hear echoes. Its silence, which would
-  mean free space, is not trusted; its first echo is.
+  mean free space, is not mapped; its first echo is. It is no more than a suspicion: along a hall, a healthy sensor
+  hears nothing either. So its silence still counts as a look (`perception.fresh_echoes`), which has no echo.
 - *Failing.* The sensor should fire and reports no range, however often the ring fires.
 - *Crosstalk.* EERUF's idea (Borenstein & Koren 1995): a true echo does not depend on which other sensors fired. A
   reading that is shorter than the one before it in another set of sensors is not trusted until a reading in another

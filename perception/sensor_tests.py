@@ -344,9 +344,12 @@ def check_firing(
         for k in range(sets.shape[0]):
             if c.is_crossed[k]:
                 c.faults |= CROSSTALK
-        if c.faults & STUCK or c.is_crossed[fired_set] or (c.faults & SILENT and not math.isfinite(r)):
+        if c.faults & STUCK or c.is_crossed[fired_set]:
             trusted[i] = possible[i] = math.nan
             changed |= LESS_TRUSTED | LESS_POSSIBLE
+        elif c.faults & SILENT and not math.isfinite(r):
+            trusted[i] = math.nan
+            changed |= LESS_TRUSTED
         if c.faults != before:
             changed |= FAULTS_CHANGED
     return changed

@@ -20,6 +20,7 @@ from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
 from runtime.cycle.preparation import unprepared_state
 from runtime.cycle.step import CycleRecord
+from runtime.simulation.long_hall import long_hall
 from runtime.support.pattern_check import refuse_undrivable
 from tests.runtime.emulated_run import Run
 
@@ -221,3 +222,15 @@ def test_sensors_fail_at_random(measured: Callable[[str], None]) -> None:
 @pytest.mark.soak
 def test_sensors_fail_at_random_many_times(measured: Callable[[str], None]) -> None:
     measured(drive_at_random(range(100, 300)))
+
+
+@pytest.mark.soak
+def test_a_hall_in_which_the_sensors_ahead_hear_nothing_is_driven_to_its_end() -> None:
+    """A silence that is only suspected, as neighbours hear the sides of the hall, still counts as a look."""
+    chosen = settings("behaviors.move_ahead.distance_m=7.0")
+    run = WatchedRun(chosen, long_hall(0), 0)
+    run.until(26.0)
+    assert [report.sensor for report in run.state.perception.sensor_reports()] == [0]
+    assert run.mode is Mode.DRIVE
+    assert run.way_m > 6.5
+    assert_safe(run)
