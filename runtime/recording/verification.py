@@ -26,6 +26,8 @@ from runtime.recording.schema import (
 )
 from runtime.timing.cycle_stats import CycleStats
 
+GAPS_MAX: Final = 1000
+"""Gaps that are listed."""
 ABSENT: Final = "nothing"
 OnStep = Callable[[ReplayStep, Replayer], None]
 
@@ -58,7 +60,7 @@ class ReplayResult:
     skipped: int = 0
     """Cycles not replayed: something before them is missing, and no keyframe has followed yet."""
     missing: list[tuple[int, int]] = field(default_factory=list)
-    """First and last cycle of each gap in the recording."""
+    """First and last cycle of each gap in the recording, of the first `GAPS_MAX`."""
     refinement_stops: Counter[str] = field(default_factory=Counter)
     """How often refinement ended for which cause."""
     recorded_s: float = 0.0
@@ -69,6 +71,11 @@ class ReplayResult:
     """At the end of the replay."""
     cycle_stats: CycleStats = field(default_factory=lambda: CycleStats(late_after_s=float("inf")))
     """What the steps took."""
+
+    def add_gap(self, first: int, last: int) -> None:
+        """Note a gap from one cycle to another; a small file can have millions of them."""
+        if len(self.missing) < GAPS_MAX:
+            self.missing.append((first, last))
 
     @property
     def times_real_time(self) -> float:
@@ -155,10 +162,10 @@ class Verifier:
     def _check_cycle(self, found: ReplayStep, recorded: CycleRecord) -> None:
         result, last, self._last = self.result, self._last, recorded
         if last is not None and recorded.cycle != last.cycle + 1:
-            result.missing.append((last.cycle + 1, recorded.cycle - 1))
+            result.add_gap(last.cycle + 1, recorded.cycle - 1)
         if found.replayed is None:
             if last is None:
-                result.missing.append((1, recorded.cycle - 1))
+                result.add_gap(1, recorded.cycle - 1)
             result.skipped += 1
             return
         result.cycle_stats.add_cycle(found.elapsed_s)

@@ -15,7 +15,7 @@ from config.errors import DONE
 from runtime.recording.channels import CYCLE, KEYFRAME, decode, encode
 from runtime.recording.replayer import fresh_state
 from runtime.recording.schema import Cycle, Keyframe, keyframe, perception_snapshot, state_fields
-from runtime.recording.verification import ABSENT, ReplayResult, find_difference
+from runtime.recording.verification import ABSENT, GAPS_MAX, ReplayResult, find_difference
 from tests.recorded import SECONDS, entries_of, hall, record, rewrite, verify_file
 
 ROOT = Path(__file__).parents[3]
@@ -135,3 +135,12 @@ def test_the_first_difference_of_two_trees(recorded: object, replayed: object, e
     found = find_difference(recorded, replayed)
     assert repr(found) == repr(expected)
     assert (found is None) == (find_difference(replayed, recorded) is None)
+
+
+@pytest.mark.promise("P21")
+def test_no_more_gaps_are_listed_than_a_person_reads() -> None:
+    """A file of 100 kB can have a million cycles, each of them after a gap."""
+    result = ReplayResult()
+    for cycle in range(2 * GAPS_MAX):
+        result.add_gap(2 * cycle, 2 * cycle)
+    assert len(result.missing) == GAPS_MAX

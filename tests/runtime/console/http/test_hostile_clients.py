@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import contextlib
+import gc
 import gzip
 import os
 import struct
@@ -335,6 +336,50 @@ async def test_hundreds_of_pages_opened_and_closed(measured: Callable[[str], Non
         lines = [line for line in case.log if line["event"].startswith("console ")]
         assert len(lines) <= 4 * (LOG_LINES_BURST + 1), "nor is the log flooded"
         measured(f"60 pages opened and closed at once: {JOINS_BURST} get in, others are refused; HALT counts")
+
+
+CACHED_MAX = 500
+"""Objects in caches that are not filled yet."""
+OBJECTS_A_PAGE_MAX = 5.0
+"""Objects that may be left of each page, in the mean: those of one client and its websocket are far more."""
+
+
+@pytest.mark.promise("P15")
+@pytest.mark.parametrize("pages", [30, pytest.param(20_000, marks=pytest.mark.soak)])
+async def test_pages_that_come_and_go_leave_nothing(pages: int, measured: Callable[[str], None]) -> None:
+    """They close in order or lose their connection, ask for control, and watch or not."""
+
+    def left() -> tuple[int, int]:
+        gc.collect()
+        return len(gc.get_objects()), len(os.listdir("/proc/self/fd"))  # noqa: PTH208
+
+    async with open_console() as case:
+        tasks = len(asyncio.all_tasks())
+
+        async def come_and_go(number: int) -> None:
+            case.cycles(step_s=1.0)
+            page, other = await case.page(), await case.page()
+            if number % 2:
+                await other.ask(type="take_control")
+                transport = page.socket._conn.transport  # type: ignore[union-attr]
+                assert transport is not None
+                transport.abort()
+            await page.socket.close()
+            await other.socket.close()
+            await case.settled(lambda: len(asyncio.all_tasks()) == tasks, "the end of their tasks")
+            assert not case.console.hub.clients
+            for kept in (case.sockets, case.log, case.run.asked, case.run.validity):
+                kept.clear()
+
+        for number in range(10):  # by then most caches are filled
+            await come_and_go(number)
+        before = left()
+        for number in range(pages // 2):
+            await come_and_go(number)
+        after = left()
+    assert after[1] == before[1], "file descriptors"
+    assert after[0] - before[0] < CACHED_MAX + OBJECTS_A_PAGE_MAX * pages
+    measured(f"{pages:,} pages opened and closed: {after[0] - before[0]} objects more than before")
 
 
 @contextlib.contextmanager
