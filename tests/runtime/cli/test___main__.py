@@ -14,9 +14,10 @@ ROOT = Path(__file__).parents[3]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
 WITHOUT_MATPLOTLIB = """
 import sys, runtime.cycle.process, runtime.recording.recorder
-from runtime.cli.app import main
+from runtime.cli.__main__ import main
 assert "matplotlib" not in sys.modules
-main(["check", "hallway"])
+sys.argv[1:] = ["check", "hallway"]
+main()
 """
 
 

@@ -263,8 +263,8 @@ def test_the_step_marks_its_phases_and_no_overrun_delays_a_stop(
         commands.append((command, machine.host_us))
         machine.work(command_us)
 
-    here = Pose(0.0, 0.0, 0.0)
     for cycle in range(30):
+        here = Pose(0.01 * cycle, 0.0, 0.0)  # wheels that stand in DRIVE would end it
         perception.refine_us = refine_us if cycle > 20 else 0
         began_us = machine.host_us
         t_s = 1.0 + 0.05 * cycle
