@@ -14,6 +14,7 @@ generates new ones), and the settings of the user's terminal are removed.
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -41,6 +42,11 @@ KERNEL_TESTS = [Path(__file__).parent / package for package in ("perception", "d
 
 for _name in TERMINAL:
     os.environ.pop(_name, None)
+
+# A shell starts background programs with SIGINT ignored, nohup with SIGHUP; children would inherit both.
+for _number, _handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
+    if signal.getsignal(_number) is signal.SIG_IGN:
+        signal.signal(_number, _handler)
 
 # How long an example takes depends on the machine only.
 _SLOW = [HealthCheck.too_slow]

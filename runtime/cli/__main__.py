@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import sys
+
 from runtime.cli.first_signals import handle_first_signals
 
 
@@ -11,9 +14,21 @@ def main() -> None:
     from runtime.cli.standard_streams import open_standard_streams
 
     open_standard_streams()
+    if not _has_working_directory():
+        from config.errors import WRONG_CALL
+
+        sys.stderr.write("echolocate: the working directory has been removed; change into another one\n")
+        sys.exit(WRONG_CALL)
     from runtime.cli.app import main as run_app
 
     run_app()
+
+
+def _has_working_directory() -> bool:
+    try:
+        return bool(os.getcwd())  # noqa: PTH109 - pathlib is imported later
+    except OSError:
+        return False
 
 
 if __name__ == "__main__":

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from config.errors import FAILED, WRONG_CALL
 from tests.runtime.cli.user_errors import error_lines
 
@@ -40,3 +42,13 @@ def test_a_closed_pipe_is_no_traceback_and_a_run_does_not_load_matplotlib() -> N
             text=True, check=False,
         )  # fmt: skip
     assert (done.returncode, done.stderr) == (FAILED, "")
+
+
+@pytest.mark.promise("P28")
+def test_a_working_directory_that_was_removed(tmp_path: Path) -> None:
+    script = "import os, sys; os.rmdir(os.getcwd()); from runtime.cli.__main__ import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=ENVIRONMENT, cwd=tmp_path, text=True, capture_output=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (WRONG_CALL, "")
+    assert error_lines(done.stderr) == ["echolocate: the working directory has been removed; change into another one"]
