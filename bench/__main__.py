@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Final, Literal, TypeAlias, get_args
+from typing import Annotated, Final, Literal, TypeAlias, TypeVar, get_args
 
 from cyclopts import App, Parameter
 from rich.console import Console
@@ -26,7 +26,7 @@ from bench.waking import figures, waking_table
 from bench.waking import measure as measure_waking
 from config.errors import UserError
 from config.load import load_settings
-from config.robot import RingConfig
+from config.settings import Settings
 from runtime.support.kernel_cache import EMULATOR, PARTS, prepare_kernels, use_kernel_cache
 
 OURS: Final = (
@@ -196,22 +196,25 @@ def waking(*, json: str = "waking.json", turns: int = WAKING_TURNS, busy: int = 
     return _report(json, by_load, waking_table(by_load))
 
 
-Rows: TypeAlias = dict[str, dict[str, float]]
+Rows = TypeVar("Rows")
+
+BY_BAYES: Final = ("perception.method=bayes",)
+"""The setting of benches that are about the Bayesian method."""
 
 
 def _try_in_rooms(
-    measure: Callable[[RingConfig, Iterable[int], Callable[[str], None]], Rows],
+    measure: Callable[[Settings, Callable[[str], None]], Rows],
     table: Callable[[Rows], Table],
     json: str,
-    seeds: Iterable[int],
+    sets: tuple[str, ...] = (),
+    parts: tuple[str, ...] | None = None,
 ) -> int:
-    """Write and print what is measured in the rooms of some seeds."""
-
+    """Write and print what is measured in rooms or halls, with these settings and parts of the kernels."""
     console = Console(stderr=True)
-    settings = load_settings("hallway")
-    prepare_kernels(settings, console, (EMULATOR,))
+    settings = load_settings("hallway", sets)
+    prepare_kernels(settings, console, parts)
     with console.status("bench") as status:
-        rows = measure(settings.ring, seeds, status.update)
+        rows = measure(settings, status.update)
     return _report(json, rows, table(rows))
 
 
@@ -231,7 +234,10 @@ def localization(*, json: str = "localization.json", rooms: int = 100, first: in
     use_kernel_cache()
     from bench.localization import localization_table, measure
 
-    return _try_in_rooms(measure, localization_table, json, range(first, first + max(1, rooms)))
+    seeds = range(first, first + max(1, rooms))
+    return _try_in_rooms(
+        lambda settings, tell: measure(settings.ring, seeds, tell), localization_table, json, parts=(EMULATOR,)
+    )
 
 
 @app.command
@@ -250,7 +256,10 @@ def known_room(*, json: str = "known_room.json", rooms: int = 20, first: int = 1
     use_kernel_cache()
     from bench.known_room import known_room_table, measure
 
-    return _try_in_rooms(measure, known_room_table, json, range(first, first + max(1, rooms)))
+    seeds = range(first, first + max(1, rooms))
+    return _try_in_rooms(
+        lambda settings, tell: measure(settings.ring, seeds, tell), known_room_table, json, parts=(EMULATOR,)
+    )
 
 
 @app.command
@@ -320,12 +329,7 @@ def map_size(*, json: str = "map.json", drums: tuple[int, ...] = (40, 200), seed
     use_kernel_cache()
     from bench.map_size import map_table, measure
 
-    console = Console(stderr=True)
-    settings = load_settings("hallway")
-    prepare_kernels(settings, console)
-    with console.status("bench") as status:
-        rows = measure(settings, drums, seed, status.update)
-    return _report(json, rows, map_table(rows))
+    return _try_in_rooms(lambda settings, tell: measure(settings, drums, seed, tell), map_table, json)
 
 
 @app.command
@@ -346,12 +350,8 @@ def walls(*, json: str = "walls.json", seeds: int = 100, first: int = 0, steps: 
     use_kernel_cache()
     from bench.walls import measure, walls_table
 
-    console = Console(stderr=True)
-    settings = load_settings("hallway", ("perception.method=bayes",))
-    prepare_kernels(settings, console)
-    with console.status("bench") as status:
-        rows = measure(settings, range(first, first + max(1, seeds)), steps, status.update)
-    return _report(json, rows, walls_table(rows))
+    rooms = range(first, first + max(1, seeds))
+    return _try_in_rooms(lambda settings, tell: measure(settings, rooms, steps, tell), walls_table, json, BY_BAYES)
 
 
 @app.command
@@ -381,14 +381,12 @@ def false_drums(
     use_kernel_cache()
     from bench.false_drums import measure
 
-    console = Console(stderr=True)
-    settings = load_settings("hallway", ("perception.method=bayes",))
-    prepare_kernels(settings, console)
-    with console.status("bench") as status:
-        rows = measure(
-            settings, range(first, first + max(1, rooms)), max(0.01, minutes), furniture, status.update
-        )  # fmt: skip
-    return _report(json, rows, rows_table(f"false drums in rooms without a drum, {minutes:g} min each", rows))
+    seeds = range(first, first + max(1, rooms))
+    title = f"false drums in rooms without a drum, {minutes:g} min each"
+    return _try_in_rooms(
+        lambda settings, tell: measure(settings, seeds, max(0.01, minutes), furniture, tell),
+        lambda rows: rows_table(title, rows), json, BY_BAYES,
+    )  # fmt: skip
 
 
 def _measured(measure: Measure, plan: TimingPlan, sets: tuple[str, ...], json: str, against: str | None) -> int:
