@@ -169,6 +169,8 @@ class DriverConfig(Strict):
 
     driver: str = Field(default="denning", min_length=1, max_length=64)
     """Name of a shipped driver, or of one that an installed package provides: entry points `echolocate.drivers`."""
+    protocol: int | None = Field(default=None, ge=1, le=255)
+    """Version of the protocol, for a driver that knows several; by default the newest that the robot speaks."""
 
 
 class RobotConfig(Strict):

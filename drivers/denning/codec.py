@@ -24,10 +24,12 @@ from drivers.denning.frames import (
     Ack,
     Drive,
     Echo,
+    Echo2,
     Frame,
     Halt,
     Hello,
     Ident,
+    Listen,
     Nak,
     NakCode,
     Odom,
@@ -43,6 +45,8 @@ _OVERHEAD = 4
 """Type, sequence number and checksum."""
 _NAME_BYTES = 16
 _MASK_BYTES = 3
+_IDENT_LONGER = 2
+"""The version whose IDENT has a range unit and capabilities."""
 _REJECTED_MAX = 64
 """Rejected frames kept if they are not taken."""
 
@@ -75,6 +79,7 @@ def _layout(kind: int, make: Callable[..., Frame], codes: str, fields: tuple[str
 _HOST = (
     _layout(0x01, Hello, "B", ("version",)),
     _layout(0x02, Pattern, "", ()),
+    _layout(0x03, Listen, "", ()),
     _layout(0x10, Drive, "hh", ("v_mm_s", "w_mrad_s")),
     _layout(0x11, Halt, "", ()),
     _layout(0x12, Release, "", ()),
@@ -105,6 +110,7 @@ _ROBOT = (
         ),
     ),
     _layout(0x91, Echo, "IB", ("t_us", "step")),
+    _layout(0x92, Echo2, "IB", ("t_us", "step")),
 )
 _BY_CLASS = MappingProxyType({layout.make: layout for layout in (*_HOST, *_ROBOT)})
 _BY_TYPE = MappingProxyType(
@@ -157,6 +163,14 @@ def _mask_bytes(frame: Frame, field: str, mask: int) -> bytes:
     return _checked(frame, field, mask, 0, 0xFF_FFFF).to_bytes(_MASK_BYTES, "little")
 
 
+def _masks_bytes(frame: Pattern | Listen) -> bytes:
+    return b"".join(_mask_bytes(frame, f"masks[{k}]", mask) for k, mask in enumerate(frame.masks))
+
+
+def _masks(data: bytes) -> tuple[int, ...]:
+    return tuple(int.from_bytes(data[k : k + _MASK_BYTES], "little") for k in range(0, len(data), _MASK_BYTES))
+
+
 def _encode_tail(frame: Frame) -> bytes:
     """Return the bytes after the fixed fields, for types of variable length."""
     match frame:
@@ -166,13 +180,20 @@ def _encode_tail(frame: Frame) -> bytes:
                 _checked(frame, "step_period_ms", frame.step_period_ms, *_RANGES["H"]),
                 _checked(frame, "window", frame.window, WINDOW_MIN, WINDOW_MAX),
             )
-            masks = (_mask_bytes(frame, f"masks[{k}]", mask) for k, mask in enumerate(frame.masks))
-            return struct.pack("<BHB", *head) + b"".join(masks)
+            return struct.pack("<BHB", *head) + _masks_bytes(frame)
+        case Listen():
+            return bytes((_checked(frame, "masks (their number)", len(frame.masks), 0, MASKS_MAX),)) + _masks_bytes(
+                frame
+            )
         case Ident():
             name = frame.name.encode(errors="replace")
             if len(name) > _NAME_BYTES or b"\0" in name:
                 raise ValueError(f"Ident.name is {frame.name!r}: it must be 0 to {_NAME_BYTES} bytes without a zero")
-            return name.ljust(_NAME_BYTES, b"\0")
+            name = name.ljust(_NAME_BYTES, b"\0")
+            if frame.version != _IDENT_LONGER:
+                return name
+            unit_um = _checked(frame, "range_unit_um", frame.range_unit_um, 1, 0xFFFF)
+            return name + struct.pack("<HB", unit_um, _checked(frame, "capabilities", frame.capabilities, 0, 0xFF))
         case Echo():
             mask = _mask_bytes(frame, "mask", frame.mask)
             fired = frame.mask.bit_count()
@@ -182,35 +203,65 @@ def _encode_tail(frame: Frame) -> bytes:
                 if tenths != 0:
                     _checked(frame, f"tenths_ft[{k}]", tenths, TENTHS_MIN, NO_ECHO)
             return mask + bytes(frame.tenths_ft)
+        case Echo2():
+            masks = _mask_bytes(frame, "fired", frame.fired) + _mask_bytes(frame, "heard", frame.heard)
+            if frame.fired & frame.heard:
+                raise ValueError(
+                    f"Echo2.heard is {frame.heard:#x}: a sensor of fired ({frame.fired:#x}) cannot listen"
+                )
+            sensors = (frame.fired | frame.heard).bit_count()
+            if len(frame.counts) != sensors:
+                raise ValueError(f"Echo2.counts has {len(frame.counts)} values: its pair of masks asks for {sensors}")
+            for k, count in enumerate(frame.counts):
+                _checked(frame, f"counts[{k}]", count, *_RANGES["H"])
+            return masks + struct.pack(f"<{sensors}H", *frame.counts)
         case _:
             return b""
 
 
-def _decode_tail(layout: _Layout, tail: bytes) -> tuple[object, ...] | NakCode:
-    """Return the fields after the fixed ones, or the reason why they are invalid."""
+def _decode_tail(layout: _Layout, version: int, tail: bytes) -> tuple[object, ...] | NakCode:
+    """Return the fields after the fixed ones, or the reason why they are invalid; `version` is that of an IDENT."""
     if layout.make is Pattern:
         if len(tail) < 4 or len(tail) != 4 + _MASK_BYTES * tail[0]:
             return NakCode.WRONG_LENGTH
         count, step_period_ms, window = struct.unpack_from("<BHB", tail)
         if count > MASKS_MAX or window < WINDOW_MIN:
             return NakCode.VALUE_OUT_OF_RANGE
-        starts = range(4, len(tail), _MASK_BYTES)
-        return step_period_ms, window, tuple(int.from_bytes(tail[k : k + _MASK_BYTES], "little") for k in starts)
-    if layout.make is Ident:
-        if len(tail) != _NAME_BYTES:
+        return step_period_ms, window, _masks(tail[4:])
+    if layout.make is Listen:
+        if not tail or len(tail) != 1 + _MASK_BYTES * tail[0]:
             return NakCode.WRONG_LENGTH
-        try:
-            name = tail.rstrip(b"\0").decode()
-        except UnicodeDecodeError:
-            return NakCode.VALUE_OUT_OF_RANGE
-        return NakCode.VALUE_OUT_OF_RANGE if "\0" in name else (name,)
+        return (_masks(tail[1:]),) if tail[0] <= MASKS_MAX else NakCode.VALUE_OUT_OF_RANGE
+    if layout.make is Ident:
+        return _decode_ident_tail(version, tail)
     if layout.make is Echo:
         mask = int.from_bytes(tail[:_MASK_BYTES], "little")
         if len(tail) < _MASK_BYTES or len(tail) != _MASK_BYTES + mask.bit_count():
             return NakCode.WRONG_LENGTH
         tenths = tuple(tail[_MASK_BYTES:])
         return NakCode.VALUE_OUT_OF_RANGE if any(0 < t < TENTHS_MIN for t in tenths) else (mask, tenths)
+    if layout.make is Echo2:
+        if len(tail) < 2 * _MASK_BYTES:
+            return NakCode.WRONG_LENGTH
+        fired, heard = _masks(tail[: 2 * _MASK_BYTES])
+        if len(tail) != 2 * (_MASK_BYTES + fired.bit_count() + heard.bit_count()):
+            return NakCode.WRONG_LENGTH
+        counts = struct.unpack_from(f"<{fired.bit_count() + heard.bit_count()}H", tail, 2 * _MASK_BYTES)
+        return NakCode.VALUE_OUT_OF_RANGE if fired & heard else (fired, heard, counts)
     return NakCode.WRONG_LENGTH if tail else ()
+
+
+def _decode_ident_tail(version: int, tail: bytes) -> tuple[object, ...] | NakCode:
+    if len(tail) != _NAME_BYTES + (3 if version == _IDENT_LONGER else 0):
+        return NakCode.WRONG_LENGTH
+    try:
+        name = tail[:_NAME_BYTES].rstrip(b"\0").decode()
+    except UnicodeDecodeError:
+        return NakCode.VALUE_OUT_OF_RANGE
+    more = struct.unpack("<HB", tail[_NAME_BYTES:]) if version == _IDENT_LONGER else (0, 0)
+    return (
+        NakCode.VALUE_OUT_OF_RANGE if "\0" in name or (version == _IDENT_LONGER and more[0] == 0) else (name, *more)
+    )
 
 
 class Decoder:
@@ -314,7 +365,7 @@ class Decoder:
             return NakCode.UNKNOWN_TYPE
         if len(payload) < layout.fixed.size:
             return NakCode.WRONG_LENGTH
-        tail = _decode_tail(layout, payload[layout.fixed.size :])
+        tail = _decode_tail(layout, payload[0] if payload else 0, payload[layout.fixed.size :])
         if isinstance(tail, NakCode):
             return tail
         return layout.make(seq, *layout.fixed.unpack_from(payload), *tail)

@@ -17,10 +17,11 @@ from config.robot import RobotConfig
 from config.world import WorldConfig
 from drivers.denning import frames
 from drivers.denning.codec import Decoder, encode
-from drivers.denning.frames import Drive, Halt, Hello, NakCode, Pattern, Release, RobotFrame
+from drivers.denning.frames import Drive, Halt, Hello, Listen, NakCode, Pattern, Release, RobotFrame
 from drivers.denning.pattern_rotation import Rotation, window_us
+from drivers.denning.reported_echoes import EchoReporter
 from drivers.denning.wire_frame_counter import WireFrameCounter
-from drivers.denning.wire_units import echo_byte
+from drivers.denning.wire_units import emulated_version
 from drivers.driver import DriverError
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.body import BRAKE_S, RAMP_S, Body
@@ -37,10 +38,8 @@ from drivers.emulator.faults import (
     MotorFault,
     Mute,
     OdometryJump,
-    Outliers,
     Reboot,
     Runaway,
-    StuckSensor,
     Unplug,
 )
 from drivers.emulator.robot_device import GroundTruth
@@ -84,7 +83,8 @@ class DenningDevice:
     _clock_offset_us: int
     _decoder: Decoder
     _seq: int
-    _echoes: deque[tuple[int, frames.Echo]]
+    _version: int
+    _echoes: deque[tuple[int, frames.Echo | frames.Echo2]]
     _rotation: Rotation
     _flags: Flags
     _target: Twist
@@ -106,23 +106,25 @@ class DenningDevice:
             raise DriverError(f"the ring has {self._sensors} sensors: the protocol supports at most {sensors_max}")
         seeds = np.random.SeedSequence(seed).spawn(6)
         sonar_rng, drift_rng, self._boot_rng, *noises = map(np.random.default_rng, seeds)
-        self._output_rng, self._input_rng, self._outlier_rng = noises
+        self._output_rng, self._input_rng, outlier_rng = noises
         self._ring_radius_mm = round(1000.0 * max(math.hypot(m.x_m, m.y_m) for m in mounts))
         scene = compile_scene(world)
         start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
         self._body = Body(robot.body, scene, start, world.odometry, drift_rng)
-        self._sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
+        sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
+        self._newest = emulated_version(robot)
         self._uart = Uart(robot.link.baud)
         self._outbox = bytearray()
         self._now_us = self._moved_us = 0
         self._next_event_us: int | None = None  # None once something may have changed it
         self._faults = FaultSchedule(faults)
+        self._reporter = EchoReporter(robot.ring, sonar, self._faults, outlier_rng)
         self._deadman_ms = DEADMAN_MS
         self._boot_id = self._new_boot_id()
         self._boot(clock_start_us)
         # Load the compiled kernels now, so that the first firing is not late.
         clearance(start.x, start.y, scene.circles, scene.segments)
-        self._sonar.true_echoes(start, start.theta, np.zeros(self._sensors, dtype=np.bool_))
+        sonar.true_echoes(start, start.theta, np.zeros(self._sensors, dtype=np.bool_))
 
     @property
     def truth(self) -> GroundTruth:
@@ -188,11 +190,19 @@ class DenningDevice:
 
     def _obey(self, frame: frames.Frame) -> None:
         match frame:
-            case Hello() if frame.version != frames.VERSION:
+            case Hello() if not 1 <= frame.version <= self._newest:
                 self._send(frames.Nak(0, frame.seq, NakCode.VALUE_OUT_OF_RANGE))
             case Hello():
+                self._version = frame.version
                 size, times = (self._sensors, self._ring_radius_mm), (self._deadman_ms, ODOMETRY_PERIOD_MS)
-                self._send(frames.Ident(0, frames.VERSION, *size, *times, self._boot_id, NAME))
+                more = (self._reporter.unit_um, frames.CAN_LISTEN) if frame.version > 1 else ()
+                self._send(frames.Ident(0, frame.version, *size, *times, self._boot_id, NAME, *more))
+            case Listen() if self._version == 1:
+                self._send(frames.Nak(0, frame.seq, NakCode.UNKNOWN_TYPE))
+            case Listen() if self._within_ring(frame) and self._rotation.set_listeners(frame.masks):
+                self._send(frames.Ack(0, frame.seq))
+            case Listen():
+                self._send(frames.Nak(0, frame.seq, NakCode.VALUE_OUT_OF_RANGE))
             case Pattern() if self._is_possible(frame):
                 self._rotation.set_pattern(frame, self._now_us)
                 self._send(frames.Ack(0, frame.seq))
@@ -215,9 +225,11 @@ class DenningDevice:
                 self._send(frames.Ack(0, frame.seq))
 
     def _is_possible(self, pattern: Pattern) -> bool:
-        within_ring = all(mask >> self._sensors == 0 for mask in pattern.masks)
         long_enough = 1000 * pattern.step_period_ms >= window_us(pattern)
-        return not pattern.masks or (within_ring and long_enough)
+        return not pattern.masks or (self._within_ring(pattern) and long_enough)
+
+    def _within_ring(self, frame: Pattern | Listen) -> bool:
+        return all(mask >> self._sensors == 0 for mask in frame.masks)
 
     def _latch(self, reason: Flags) -> None:
         self._flags |= Flags.LATCHED | reason
@@ -282,8 +294,8 @@ class DenningDevice:
         while self._echoes and self._echoes[0][0] <= now:
             self._send(self._echoes.popleft()[1])
         if (step := self._rotation.step(now)) is not None:
-            tenths = self._echo_bytes(step.mask, step.window_m)
-            echo = frames.Echo(0, self._clock_us(step.at_us), step.number, step.mask, tenths)
+            t_us, body = self._clock_us(step.at_us), self._body
+            echo = self._reporter.fire(step, t_us, body.pose, body.ring_yaw, self._version)
             self._echoes.append((step.closes_us, echo))
         if self._odometry_us <= now:
             self._report_odometry()
@@ -292,16 +304,6 @@ class DenningDevice:
             if now % TICK_US == 0:
                 count = max(1, round(garbage.bytes_per_s * TICK_US * 1e-6))
                 self._transmit(self._output_rng.bytes(count))
-
-    def _echo_bytes(self, mask: int, window_m: float) -> tuple[int, ...]:
-        """Return the echo byte of each sensor in `mask`, lowest first."""
-        fired = [i for i in range(self._sensors) if mask >> i & 1]
-        ranges = self._sonar.fire(self._body.pose, self._body.ring_yaw, fired, window_m)
-        for outliers in self._faults.all(Outliers):
-            wild = self._outlier_rng.random(len(ranges)) < outliers.share
-            ranges[wild] = self._outlier_rng.uniform(0.0, window_m, len(ranges))[wild]
-        stuck = {fault.sensor: fault.range_m for fault in self._faults.all(StuckSensor)}
-        return tuple(echo_byte(stuck[i] if i in stuck else float(ranges[i])) for i in fired)
 
     def _report_odometry(self) -> None:
         body = self._body
@@ -354,6 +356,7 @@ class DenningDevice:
         """Start as after power-on, except for the body, which stays where it is."""
         self._clock_offset_us = clock_start_us - self._now_us
         self._decoder = Decoder("host")
+        self._version = 1
         self._seq = 0
         self._uart.clear()
         self._echoes = deque()

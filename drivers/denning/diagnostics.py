@@ -6,11 +6,14 @@ import math
 from types import MappingProxyType
 
 from config.robot import RobotConfig
-from drivers.denning.frames import VERSION, Ident, NakCode
+from drivers.denning.frames import TENTH_FT_M, VERSION, Ident, NakCode
 
 _RADIUS_TOLERANCE_MM = 1.0
 """The robot reports whole millimetres."""
 
+_COARSENESS, _FINE_M = 1.01, 1e-3
+"""Steps of the ranges that are coarser than the robot file's by no more than this matter as little as those up to a
+millimetre."""
 _NOISE_MIN = 3
 """Fewest corrupt frames that count as noise; one or two are normal where a line starts or ends."""
 
@@ -31,9 +34,9 @@ EXCESS_ECHOES = (
 
 def wrong_robot(ident: Ident, config: RobotConfig) -> str | None:
     """Return the message for a robot that is not the one the robot file describes; None if it is."""
-    if ident.version != VERSION:
+    if not 1 <= ident.version <= VERSION:
         return (
-            f"the robot '{ident.name}' speaks version {ident.version} of the protocol and this program version "
+            f"the robot '{ident.name}' speaks version {ident.version} of the protocol and this program versions 1 to "
             f"{VERSION}; update the older one"
         )
     count = len(config.ring.mounts)
@@ -56,6 +59,18 @@ def wrong_robot(ident: Ident, config: RobotConfig) -> str | None:
             f"base's configuration, or link.deadman_min_s and link.deadman_max_s"
         )
     return None
+
+
+def coarse_ranges(ident: Ident, resolution_m: float) -> str | None:
+    """Return the message for a robot whose ranges are coarser than the robot file says; None if they are not."""
+    unit_m = 1e-6 * ident.range_unit_um if ident.range_unit_um else TENTH_FT_M
+    if unit_m <= max(_COARSENESS * resolution_m, _FINE_M):
+        return None
+    return (
+        f"the robot '{ident.name}' speaks version {ident.version} of the protocol and reports ranges in steps of "
+        f"{unit_m:.4g} m, and the robot file says ring.resolution_m = {resolution_m:g}: objects seem better known "
+        f"than they are; set ring.resolution_m = {unit_m:.4g}, or update the robot to finer steps"
+    )
 
 
 def no_answer(command: str, tries: int, *, frames: int, bad: int, baud: int) -> str:

@@ -10,12 +10,12 @@ from config.files import one_line
 from config.robot import RingConfig, RobotConfig
 from drivers.denning import diagnostics
 from drivers.denning.codec import Decoder, encode
-from drivers.denning.frames import Ack, Drive, Echo, Frame, Hello, Ident, Nak, NakCode, Odom
+from drivers.denning.frames import Ack, Drive, Echo, Echo2, Frame, Hello, Ident, Nak, NakCode, Odom
 from drivers.denning.pending_command import PendingCommand, pending_command
 from drivers.denning.pose_stamping import PoseStamper
 from drivers.denning.robot_clock import Jump
 from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout
-from drivers.denning.wire_units import identity_of, to_wire, wire_pattern
+from drivers.denning.wire_units import identity_of, newest_version, to_wire, wire_pattern
 from drivers.driver import LineState, Received
 from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
 
@@ -43,6 +43,8 @@ class DenningDriver:
     ------
     drivers.firing_pattern.FiringError
         The ring cannot carry out the firing pattern, or the protocol cannot express it.
+    DriverError
+        The robot file names a version of the protocol that does not exist.
     """
 
     def __init__(self, config: RobotConfig) -> None:
@@ -53,12 +55,13 @@ class DenningDriver:
         self._state = LineState.CLOSED
         self._problem: str | None = None
         self._identity: Identity | None = None
+        self._newest = self._version = newest_version(config)  # what to ask for first, and what to ask for now
+        self._unit_m = 0.0  # of a count in ECHO2
         self._jump: Jump | None = None
         self._decoder = Decoder("robot", midway=True)
         self._earlier_counts = LinkCounts()
         self._run_s = 0.0
-        self._odometry_s = 0.0
-        self._last_frame_s = 0.0
+        self._odometry_s = self._last_frame_s = 0.0
         self._bad_at_odometry = 0
         self._seq = 0
         self._flush_first = False
@@ -149,16 +152,11 @@ class DenningDriver:
         if self._state is LineState.CLOSED:
             return
         commands = self._commands
-        given_up = (
-            [name for name in _SEND_ORDER if name in commands and commands[name].tick(run_s)] if commands else ()
-        )
+        given_up = [n for n in _SEND_ORDER if n in commands and commands[n].tick(run_s)] if commands else ()
         if given_up:
             name = given_up[0]
-            decoder, tries = self._decoder, self._commands[name].tries
-            problem = diagnostics.no_answer(
-                name, tries, frames=decoder.frames, bad=decoder.bad, baud=self._config.link.baud
-            )
-            self._go_down(problem)
+            frames, bad, baud = self._decoder.frames, self._decoder.bad, self._config.link.baud
+            self._go_down(diagnostics.no_answer(name, commands[name].tries, frames=frames, bad=bad, baud=baud))
         if self._state is LineState.READY:
             self._check_timeouts()
             if "PATTERN" not in self._commands and run_s - self._pattern_acked_s > self._settling_s:
@@ -213,8 +211,6 @@ class DenningDriver:
         if self._state is LineState.CLOSED:
             self._drive = None
             return b""
-        if self._drive is None and not self._commands and not self._must_identify:
-            return b""
         out = bytearray()
         for name in _SEND_ORDER if writable else _SEND_ORDER[:1]:
             command = self._commands.get(name)
@@ -231,7 +227,7 @@ class DenningDriver:
         if writable and self._must_identify:
             # Not a pending command: it needs no answer, because other timeouts detect a lost robot.
             self._must_identify = False
-            out += encode(Hello(self._next_seq()))
+            out += encode(Hello(self._next_seq(), self._version))
         if out and self._flush_first:
             # Ends the incomplete frame that an earlier user of the line may have left in the robot's decoder.
             self._flush_first = False
@@ -269,11 +265,16 @@ class DenningDriver:
     def _queue(self, name: str) -> None:
         """Queue a command; with the usual number of tries, or without limit if the robot does not answer anyway."""
         without_limit = self._state in (LineState.DOWN, LineState.CLOSED)
-        self._commands[name] = pending_command(name, self._pattern, self._config.link, without_limit=without_limit)
+        link = self._config.link
+        self._commands[name] = pending_command(name, self._pattern, link, self._version, without_limit=without_limit)
+
+    def _queue_hello(self) -> None:
+        self._version = self._newest
+        self._queue("HELLO")
 
     def _start_handshake(self) -> None:
         self._state = LineState.HANDSHAKE
-        self._queue("HELLO")
+        self._queue_hello()
 
     def _abandon(self) -> None:
         """Drop all commands but HALT, which is repeated without limit from now on."""
@@ -290,7 +291,7 @@ class DenningDriver:
         self._state = LineState.DOWN
         self._problem = problem
         self._abandon()
-        self._queue("HELLO")
+        self._queue_hello()
         hello = self._commands["HELLO"]
         hello.due, hello.sent_s = False, self._run_s
 
@@ -304,20 +305,24 @@ class DenningDriver:
                 self._take_nak(frame)
             case Odom():
                 self._take_odometry(frame)
-            case Echo() if self._state is LineState.READY:
+            case Echo() | Echo2() if self._state is LineState.READY and (
+                self._version > 1 or isinstance(frame, Echo)
+            ):
                 self._echo_timeout.restart(self._run_s, self._decoder.bad)
-                self._stamper.echo(frame)
+                self._stamper.echo(frame, self._unit_m)
                 self._firings.extend(self._stamper.firings(self._run_s))
             case _:
-                pass  # an echo of a pattern that this driver has not set
+                pass  # an echo of a pattern that this driver has not set, or of another version
 
     def _take_ident(self, ident: Ident) -> None:
         ident = replace(ident, name=one_line(ident.name))  # it goes to terminals and logs
-        wrong = diagnostics.wrong_robot(ident, self._config)
-        if wrong is not None:
+        if (wrong := diagnostics.wrong_robot(ident, self._config)) is not None:
             self._go_down(wrong)
             return
         known, self._identity = self._identity, identity_of(ident)
+        self._version, self._unit_m = ident.version, 1e-6 * ident.range_unit_um
+        if known is None and (coarse := diagnostics.coarse_ranges(ident, self._config.ring.resolution_m)) is not None:
+            self._stamper.note(coarse)
         restarted = known is not None and (known.boot_id != ident.boot_id or self._jump is Jump.BACK)
         if known is None or known.odometry_period_s != self._identity.odometry_period_s:
             self._stamper.set_period(self._identity.odometry_period_s)
@@ -353,7 +358,10 @@ class DenningDriver:
 
     def _take_nak(self, nak: Nak) -> None:
         name = self._answered(nak.of)
-        if name is not None:
+        if name == "HELLO" and nak.code == NakCode.VALUE_OUT_OF_RANGE and self._version > 1:
+            self._version = 1  # the robot does not know the newer one
+            self._queue("HELLO")
+        elif name is not None:
             problem = diagnostics.refusal(name, nak.code)
             if name == "RELEASE":
                 del self._commands[name]

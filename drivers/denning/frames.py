@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import TypeAlias
 
-VERSION = 1
-"""The protocol version implemented here."""
+VERSION = 2
+"""The newest version of the protocol implemented here; the other one is 1."""
 SENSORS_MAX = 24
 """Bits in a mask of sensors."""
 MASKS_MAX = 24
@@ -22,7 +22,11 @@ TENTHS_MIN, TENTHS_MAX = 5, 254
 NO_ECHO = 255
 """The echo byte of a sensor that heard no echo inside the window."""
 FAULT = 0
-"""The echo byte of a sensor that reports a fault."""
+"""The echo byte, or count, of a sensor that reports a fault."""
+NO_ECHO_COUNT = 0xFFFF
+"""The count of a sensor that heard no echo inside the window, in version 2."""
+CAN_LISTEN = 1
+"""The bit of `Ident.capabilities` of a ring whose sensors can listen while others fire."""
 TENTH_FT_M = 0.03048
 """A tenth of a foot in metres."""
 
@@ -38,10 +42,10 @@ class NakCode(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Hello:
-    """Request the robot's IDENT; changes nothing."""
+    """Request the robot's IDENT, and the version of the protocol; changes nothing else."""
 
     seq: int
-    version: int = VERSION
+    version: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +55,14 @@ class Pattern:
     seq: int
     step_period_ms: int
     window: int
+    masks: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Listen:
+    """In each step of the pattern, listen with the sensors of its mask without firing them; without masks, never."""
+
+    seq: int
     masks: tuple[int, ...]
 
 
@@ -79,7 +91,7 @@ class Release:
 
 @dataclass(frozen=True, slots=True)
 class Ident:
-    """The robot's description of itself; the answer to HELLO."""
+    """The robot's description of itself, the answer to HELLO; the last two fields, µm and bits, in version 2."""
 
     seq: int
     version: int
@@ -89,6 +101,8 @@ class Ident:
     odometry_period_ms: int
     boot_id: int
     name: str
+    range_unit_um: int = 0
+    capabilities: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +149,21 @@ class Echo:
     tenths_ft: tuple[int, ...]
 
 
-HostFrame: TypeAlias = Hello | Pattern | Drive | Halt | Release
-RobotFrame: TypeAlias = Ident | Ack | Nak | Odom | Echo
+@dataclass(frozen=True, slots=True)
+class Echo2:
+    """The result of one firing in version 2, in counts of the ring's range unit.
+
+    First come the fired sensors, then the listeners, each lowest sensor first. A listener's is half the whole path.
+    """
+
+    seq: int
+    t_us: int
+    step: int
+    fired: int
+    heard: int
+    counts: tuple[int, ...]
+
+
+HostFrame: TypeAlias = Hello | Pattern | Listen | Drive | Halt | Release
+RobotFrame: TypeAlias = Ident | Ack | Nak | Odom | Echo | Echo2
 Frame: TypeAlias = HostFrame | RobotFrame

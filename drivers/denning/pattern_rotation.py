@@ -11,11 +11,12 @@ from drivers.denning.frames import TENTH_FT_M, Pattern
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One firing: its time, its number in the pattern, which sensors fire, and how far they listen."""
+    """One firing: its time, its number in the pattern, which sensors fire, which only listen, and how far."""
 
     at_us: int
     number: int
     mask: int
+    listeners: int
     window_m: float
     closes_us: int
     """When the window closes."""
@@ -27,6 +28,7 @@ class Rotation:
     def __init__(self) -> None:
         self._pattern: Pattern | None = None
         self._next_pattern: Pattern | None = None
+        self._listeners: tuple[int, ...] = ()
         self._number = 0
         self._at_us = 0
 
@@ -36,11 +38,30 @@ class Rotation:
         return None if self._pattern is None else self._at_us
 
     def set_pattern(self, pattern: Pattern, now_us: int) -> None:
-        """Use `pattern` from the end of the current step, or from now if nothing fires; without masks, stop."""
+        """Use `pattern` from the end of the current step, or from now if nothing fires; without masks, stop.
+
+        No sensor listens without firing until the next `set_listeners`.
+        """
+        self._listeners = ()
         if self._pattern is not None:
             self._next_pattern = pattern
         elif pattern.masks:
             self._pattern, self._number, self._at_us = pattern, 0, now_us
+
+    def set_listeners(self, masks: tuple[int, ...]) -> bool:
+        """Let the sensors of `masks` listen, one mask a step of the newest pattern; without masks, none.
+
+        Returns
+        -------
+        bool
+            False, and nothing changes, if the masks do not fit the pattern.
+        """
+        newest = self._next_pattern or self._pattern
+        fired = () if newest is None else newest.masks
+        if masks and (len(masks) != len(fired) or any(map(int.__and__, masks, fired))):
+            return False
+        self._listeners = masks
+        return True
 
     def step(self, now_us: int) -> Step | None:
         """Return the step that has started by now, and advance to the next; None if none has started."""
@@ -55,7 +76,8 @@ class Rotation:
         self._number = (number + 1) % len(pattern.masks)
         self._at_us = at_us + 1000 * pattern.step_period_ms
         window_m = pattern.window * TENTH_FT_M
-        return Step(at_us, number, pattern.masks[number], window_m, at_us + window_us(pattern))
+        listeners = self._listeners[number] if self._listeners else 0
+        return Step(at_us, number, pattern.masks[number], listeners, window_m, at_us + window_us(pattern))
 
 
 def window_us(pattern: Pattern) -> int:

@@ -61,7 +61,9 @@ class PendingCommand:
         return False
 
 
-def pending_command(name: str, pattern: WirePattern, link: LinkConfig, *, without_limit: bool) -> PendingCommand:
+def pending_command(
+    name: str, pattern: WirePattern, link: LinkConfig, version: int, *, without_limit: bool
+) -> PendingCommand:
     """Return the command of a name, not yet sent.
 
     Parameters
@@ -72,6 +74,8 @@ def pending_command(name: str, pattern: WirePattern, link: LinkConfig, *, withou
         The firing pattern that PATTERN sets.
     link : LinkConfig
         Gives the time between tries and their number.
+    version : int
+        The version of the protocol that HELLO asks for.
     without_limit : bool
         Never give up; for a robot that does not answer anyway.
     """
@@ -83,6 +87,6 @@ def pending_command(name: str, pattern: WirePattern, link: LinkConfig, *, withou
             return PendingCommand(Release, link.reply_timeout_s, tries_max)
         case "HELLO":
             every_s = _HELLO_PERIOD_S if without_limit else link.reply_timeout_s
-            return PendingCommand(Hello, every_s, tries_max)
+            return PendingCommand(lambda seq: Hello(seq, version), every_s, tries_max)
         case _:
             return PendingCommand(lambda seq: Pattern(seq, *pattern), link.reply_timeout_s, tries_max)

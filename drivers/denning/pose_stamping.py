@@ -14,13 +14,15 @@ import math
 from collections import deque
 from dataclasses import replace
 
+import numpy as np
+
 from config.robot import BodyConfig
 from drivers import se2
 from drivers.denning import diagnostics
-from drivers.denning.frames import FAULT, NO_ECHO, WINDOW_MAX, Echo, Odom
+from drivers.denning.frames import TENTH_FT_M, WINDOW_MAX, Echo, Echo2, Odom
 from drivers.denning.robot_clock import Jump, RobotClock
 from drivers.denning.wire_units import odometry_of, ranges_of
-from drivers.messages import Firing, Odometry, Pose, wrap_angle
+from drivers.messages import Firing, Floats, Odometry, Pose, wrap_angle
 from drivers.odometry_history import OdometryHistory
 from drivers.token_bucket import TokenBucket
 
@@ -89,7 +91,7 @@ class PoseStamper:
         self._clock = RobotClock()
         self._history = OdometryHistory(_HISTORY_MIN)
         self._gap_max_s = _GAP_MIN_S
-        self._held: deque[Echo] = deque()
+        self._held: deque[tuple[int, Floats]] = deque()
         self._last_firing_us: int | None = None
         self._last: Odometry | None = None
         self._steady = 0
@@ -212,20 +214,21 @@ class PoseStamper:
         self._ring_offset = ring_yaw - reported.ring_yaw
         return replace(reported, pose=expected, ring_yaw=ring_yaw)
 
-    def echo(self, echo: Echo) -> None:
-        """Take an echo frame; `firings` returns it as soon as its pose is known.
+    def echo(self, echo: Echo | Echo2, unit_m: float = TENTH_FT_M) -> None:
+        """Take an echo frame, whose counts are of `unit_m`; `firings` returns it as soon as its pose is known.
 
         A range beyond the window belongs to an earlier firing or is noise, and is treated like a sensor's fault.
         """
-        beyond = sum(self._window < tenths < NO_ECHO for tenths in echo.tenths_ft)
-        if beyond:
-            self.out_of_window += beyond
-            tenths_ft = tuple(FAULT if self._window < tenths < NO_ECHO else tenths for tenths in echo.tenths_ft)
-            echo = replace(echo, tenths_ft=tenths_ft)
+        ranges = ranges_of(echo, self._sensors, unit_m)
+        slack_m = 0.0 if isinstance(echo, Echo) else unit_m  # a range at the window's end is rounded to a count
+        beyond = np.isfinite(ranges) & (ranges > self._window * TENTH_FT_M + slack_m)
+        if beyond.any():
+            self.out_of_window += int(np.count_nonzero(beyond))
+            ranges[beyond] = math.nan
         if len(self._held) >= _HELD_MAX:
             self._held.popleft()
             self.late_echoes += 1
-        self._held.append(echo)
+        self._held.append((echo.t_us, ranges))
 
     def firings(self, run_s: float) -> list[Firing]:
         """Return the waiting echoes whose pose is known at `run_s`, in the order of their firing; remove them."""
@@ -234,13 +237,13 @@ class PoseStamper:
             return ready
         newest = self._history.newest
         while self._held and newest is not None:
-            t_us = self._clock.near_last(self._held[0].t_us)
+            t_us = self._clock.near_last(self._held[0][0])
             if t_us is None:
                 break
             ahead_us = t_us - round(newest.robot_s * 1e6)
             if 0 < ahead_us <= _FUTURE_MAX_US:
                 break
-            echo = self._held.popleft()
+            _, ranges = self._held.popleft()
             # Times passed on only grow: this drops firings older than the last one, and copies of it.
             if self._last_firing_us is not None and t_us <= self._last_firing_us:
                 self.late_echoes += 1
@@ -254,7 +257,7 @@ class PoseStamper:
                 continue
             self._last_firing_us = t_us
             pose, ring_yaw = place
-            ready.append(Firing(t_us * 1e-6, pose, ring_yaw, ranges_of(echo, self._sensors)))
+            ready.append(Firing(t_us * 1e-6, pose, ring_yaw, ranges))
         return ready
 
     def _drop_excess(self, run_s: float) -> None:

@@ -7,20 +7,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from config.robot import RingConfig
+from config.robot import RingConfig, RobotConfig
 from drivers.denning.frames import (
     FAULT,
     MASKS_MAX,
     NO_ECHO,
+    NO_ECHO_COUNT,
     SENSORS_MAX,
     TENTH_FT_M,
     TENTHS_MIN,
+    VERSION,
     WINDOW_MAX,
     WINDOW_MIN,
     Echo,
+    Echo2,
     Ident,
     Odom,
 )
+from drivers.driver import DriverError
 from drivers.firing_pattern import FiringError, firing_pattern, sensors
 from drivers.messages import Flags, Floats, Identity, Odometry, Pose, Twist
 
@@ -75,6 +79,43 @@ def wire_pattern(ring: RingConfig) -> WirePattern:
     return WirePattern(step_ms, window, pattern.masks)
 
 
+def newest_version(config: RobotConfig) -> int:
+    """Return the newest version of the protocol to speak with the robot.
+
+    Raises
+    ------
+    DriverError
+        The robot file names one that does not exist.
+    """
+    version = config.robot.protocol or VERSION
+    if version > VERSION:
+        raise DriverError(
+            f"robot.protocol = {version}: this driver speaks versions 1 to {VERSION}; correct the number"
+        )
+    return version
+
+
+def emulated_version(config: RobotConfig) -> int:
+    """Return the newest version of the protocol that the emulated robot speaks.
+
+    It is the one that the robot file names, or else 1 if that can express the ring.
+
+    Raises
+    ------
+    DriverError
+        The robot file names one that does not exist.
+    """
+    version, ring = newest_version(config), config.ring
+    in_tenths = ring.resolution_m >= TENTH_FT_M - _ROUNDING
+    return 1 if config.robot.protocol is None and in_tenths and len(ring.mounts) == SENSORS_MAX else version
+
+
+def range_unit_um(ring: RingConfig) -> int:
+    """Return the range unit of an emulated ring, µm: its resolution, or the finest whose counts reach its range."""
+    finest = math.ceil(1e6 * ring.range_max_m / (NO_ECHO_COUNT - 1))
+    return min(0xFFFF, max(finest, round(1e6 * ring.resolution_m)))
+
+
 def to_wire(value: float, limit: float) -> int:
     """Return a velocity, m/s or rad/s, as signed 16-bit thousandths, within ±`limit` even after rounding."""
     most = min(_I16_MAX, math.floor(limit * 1e3 + _ROUNDING))
@@ -106,15 +147,30 @@ def odometry_of(odom: Odom, t_us: int) -> Odometry:
     )
 
 
-def ranges_of(echo: Echo, count: int) -> Floats:
+def ranges_of(echo: Echo | Echo2, count: int, unit_m: float = TENTH_FT_M) -> Floats:
     """Return the ranges of a firing, shape (count,), m: NaN not fired or faulty, +inf no echo.
 
-    Bits of the mask beyond the ring's sensors are ignored.
+    Bits of the mask beyond the ring's sensors are ignored, and so are the readings of sensors that only listened:
+    their paths are not from a sensor and back.
+
+    Parameters
+    ----------
+    echo
+        The frame.
+    count
+        Sensors of the ring.
+    unit_m
+        What a count of an ECHO2 stands for, m; an ECHO has tenths of a foot.
     """
+    if isinstance(echo, Echo):
+        mask, values, no_echo, unit_m = echo.mask, echo.tenths_ft, NO_ECHO, TENTH_FT_M
+    else:
+        mask, no_echo = echo.fired, NO_ECHO_COUNT
+        values = echo.counts[: mask.bit_count()]
     ranges = [math.nan] * count
-    for sensor, tenths in zip(sensors(echo.mask), echo.tenths_ft, strict=True):
-        if sensor < count and tenths != FAULT:
-            ranges[sensor] = math.inf if tenths == NO_ECHO else tenths * TENTH_FT_M
+    for sensor, value in zip(sensors(mask), values, strict=True):
+        if sensor < count and value != FAULT:
+            ranges[sensor] = math.inf if value == no_echo else value * unit_m
     return np.array(ranges)
 
 
@@ -125,3 +181,12 @@ def echo_byte(range_m: float | None) -> int:
     if not math.isfinite(range_m):
         return NO_ECHO
     return min(NO_ECHO, max(TENTHS_MIN, round(range_m / TENTH_FT_M)))
+
+
+def echo_count(range_m: float | None, unit_um: int) -> int:
+    """Return the count of a sensor that fired or listened: its range in m, +inf for no echo, None for a fault."""
+    if range_m is None:
+        return FAULT
+    if not math.isfinite(range_m):
+        return NO_ECHO_COUNT
+    return min(NO_ECHO_COUNT, max(1, round(1e6 * range_m / unit_um)))

@@ -62,7 +62,12 @@ class Sonar:
         self._echoes: Records = np.empty(len(self._mounts), dtype=ECHO)
 
     def fire(
-        self, pose: Pose, ring_yaw: float, sensors: Iterable[int] | None = None, window_m: float | None = None
+        self,
+        pose: Pose,
+        ring_yaw: float,
+        sensors: Iterable[int] | None = None,
+        window_m: float | None = None,
+        listeners: Iterable[int] = (),
     ) -> Floats:
         """Return the ranges that sensors report when they fire together.
 
@@ -76,6 +81,9 @@ class Sonar:
             Numbers of the sensors that fire; all if not given.
         window_m
             How far the sensors listen, m; the ring's own window if not given.
+        listeners
+            Numbers of the sensors that listen without firing. Their range is half the shortest path from a sensor
+            that fires over a surface to them.
 
         Returns
         -------
@@ -87,14 +95,18 @@ class Sonar:
         fired[slice(None) if sensors is None else list(sensors)] = True
         echoes = self.true_echoes(pose, ring_yaw, fired)
         distances = echoes["distance"].copy()
+        ring_pose, active = Pose(pose.x, pose.y, ring_yaw), fired.copy()
+        for i in listeners:
+            active[i] = True
+            distances[i] = self._foreign_distance(ring_pose, i, np.flatnonzero(fired), echoes, math.inf)
         if self._acoustics.crosstalk > 0.0:
-            self._mix_in_crosstalk(pose, ring_yaw, fired, echoes, distances)
+            self._mix_in_crosstalk(ring_pose, fired, echoes, distances)
         ranges = self._with_errors(distances / self._acoustics.sound_speed_scale, window)
         ranges[ranges > window] = math.inf
         if self._ring.resolution_m > 0.0:
             ranges = np.rint(ranges / self._ring.resolution_m) * self._ring.resolution_m
         np.maximum(ranges, self._ring.range_min_m, out=ranges)
-        ranges[~fired] = math.nan
+        ranges[~active] = math.nan
         return ranges
 
     def true_echoes(self, pose: Pose, ring_yaw: float, fired: NDArray[np.bool_]) -> Records:
@@ -150,22 +162,31 @@ class Sonar:
         return reported
 
     def _mix_in_crosstalk(
-        self, pose: Pose, ring_yaw: float, fired: NDArray[np.bool_], echoes: Records, distances: Floats
+        self, ring_pose: Pose, fired: NDArray[np.bool_], echoes: Records, distances: Floats
     ) -> None:
         """Replace the distance of each sensor that first hears another one's pulse by half of that pulse's path."""
         count = len(self._mounts)
         chance = self._rng.random((count, count)) < self._acoustics.crosstalk
+        for i in map(int, np.flatnonzero(fired)):
+            others = np.flatnonzero(fired & chance[i] & (np.arange(count) != i))
+            distances[i] = self._foreign_distance(ring_pose, i, others, echoes, float(distances[i]))
+
+    def _foreign_distance(
+        self, ring_pose: Pose, sensor: int, others: NDArray[np.intp], echoes: Records, at_most_m: float
+    ) -> float:
+        """Return half the shortest path of the others' pulses to a sensor, m; `at_most_m` if none is shorter."""
         lobe = LISTENING_LOBE * self._half_angle
-        for i in np.flatnonzero(fired):
-            place = Pose(pose.x, pose.y, ring_yaw).compose(self._mount_poses[i])
-            for j in np.flatnonzero(fired & np.isfinite(echoes["distance"]) & chance[i]):
-                out, px, py = map(float, echoes[j])
-                back = math.hypot(px - place.x, py - place.y)
-                off_axis = abs(wrap_angle(math.atan2(py - place.y, px - place.x) - place.theta))
-                if (
-                    j != i
-                    and 0.5 * (out + back) < distances[i]
-                    and off_axis <= lobe
-                    and not hidden(place.x, place.y, px, py, SIGHT_SLACK_M, self._scene.circles, self._scene.segments)
-                ):
-                    distances[i] = 0.5 * (out + back)
+        place = ring_pose.compose(self._mount_poses[sensor])
+        for j in others:
+            if not math.isfinite(echoes["distance"][j]):
+                continue
+            out, px, py = map(float, echoes[j])
+            back = math.hypot(px - place.x, py - place.y)
+            off_axis = abs(wrap_angle(math.atan2(py - place.y, px - place.x) - place.theta))
+            if (
+                0.5 * (out + back) < at_most_m
+                and off_axis <= lobe
+                and not hidden(place.x, place.y, px, py, SIGHT_SLACK_M, self._scene.circles, self._scene.segments)
+            ):
+                at_most_m = 0.5 * (out + back)
+        return at_most_m

@@ -4,7 +4,22 @@ from __future__ import annotations
 
 from typing import Literal, TypeAlias
 
-from drivers.denning.frames import Ack, Drive, Echo, Frame, Halt, Hello, Ident, Nak, NakCode, Odom, Pattern, Release
+from drivers.denning.frames import (
+    Ack,
+    Drive,
+    Echo,
+    Echo2,
+    Frame,
+    Halt,
+    Hello,
+    Ident,
+    Listen,
+    Nak,
+    NakCode,
+    Odom,
+    Pattern,
+    Release,
+)
 
 Side: TypeAlias = Literal["host", "robot"]
 
@@ -52,6 +67,21 @@ GOOD: tuple[tuple[Side, Frame, str], ...] = (
         Echo(7, 5, 0, 0xFFFFFF, tuple(range(10, 34))),
         "049107050101011effffff0a0b0c0d0e0f101112131415161718191a1b1c1d1e1f20214c4f00",
     ),
+    # Version 2.
+    ("host", Hello(0, 2), "02010402eedb00"),
+    ("host", Listen(1, (10, 20)), "050301020a0102140103a70b00"),
+    ("host", Listen(2, ()), "03030203aef300"),
+    (
+        "robot",
+        Ident(0, 2, 16, 120, 500, 20, 0x1234ABCD, "ring", 1000, 1),
+        "02810402107804f4011409cdab341272696e67010101010101010101010106e80301cd7300",
+    ),
+    (
+        "robot",
+        Echo2(1, 3_000_000, 0, 4, 10, (1234, 1240, 65535)),
+        "069201c0c62d01020401020a0109d204d804ffff9ba600",
+    ),
+    ("robot", Echo2(2, 3_050_000, 1, 8, 0, (0,)), "069202108a2e03010801010101010103ee4200"),
 )
 
 BAD: tuple[tuple[str, str], ...] = (
@@ -63,4 +93,11 @@ BAD: tuple[tuple[str, str], ...] = (
     ("ECHO with a reserved range byte", "0491090101010102010104032b5800"),
     ("ODOM cut short, crc right", "0390010101010101010101010341c100"),
     ("unknown type, crc right", "087f01616263118200"),
+    # Version 2.
+    ("ECHO2 with fewer ranges than bits in both masks", "04920901010101020101020201026403550800"),
+    ("ECHO2 in which a sensor fires and listens", "0492090101010102030102020102640264026403da6200"),
+    (
+        "IDENT of version 2 cut before its range unit",
+        "06810902107804f40114020101010572696e67010101010101010101010103caea00",
+    ),
 )

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.denning.codec import FRAME_MAX, Decoder, crc, encode
-from drivers.denning.frames import Ack, Drive, Echo, Frame, Halt, Hello, Ident, NakCode, Odom, Pattern
+from drivers.denning.frames import Ack, Drive, Echo, Echo2, Frame, Halt, Hello, Ident, Listen, NakCode, Odom, Pattern
 from tests.drivers.vectors import BAD, GOOD, Side
 
 U8 = st.integers(0, 255)
@@ -26,6 +26,15 @@ def echoes(draw: st.DrawFn) -> Echo:
     return Echo(draw(U8), draw(st.integers(0, 2**32 - 1)), draw(U8), mask, tuple(tenths))
 
 
+@st.composite
+def fine_echoes(draw: st.DrawFn) -> Echo2:
+    fired = draw(st.integers(0, 2**24 - 1))
+    heard = draw(st.integers(0, 2**24 - 1)) & ~fired
+    sensors = (fired | heard).bit_count()
+    counts = draw(st.lists(st.integers(0, 2**16 - 1), min_size=sensors, max_size=sensors))
+    return Echo2(draw(U8), draw(st.integers(0, 2**32 - 1)), draw(U8), fired, heard, tuple(counts))
+
+
 odoms = st.builds(Odom, U8, st.integers(0, 2**32 - 1), I32, I32, I32, I32, I16, I16, U8, U8)
 patterns = st.builds(
     Pattern,
@@ -34,6 +43,9 @@ patterns = st.builds(
     st.integers(5, 255),
     st.lists(st.integers(0, 2**24 - 1), max_size=24).map(tuple),
 )
+
+
+listens = st.builds(Listen, U8, st.lists(st.integers(0, 2**24 - 1), max_size=24).map(tuple))
 
 
 def stuffed(body: bytes) -> bytes:
@@ -95,6 +107,9 @@ def test_a_refused_frame_keeps_its_number_and_the_reason() -> None:
         bytes((0x02, 14, 2, 50, 0, 255, 1, 1, 1)),
         bytes((0x02, 15, 25, 50, 0, 255)) + b"\1" * 75,
         bytes((0x02, 16, 1, 50, 0, 4, 1, 1, 1)),
+        bytes((0x03, 17)),
+        bytes((0x03, 18, 2, 1, 1, 1)),
+        bytes((0x03, 19, 25)) + b"\1" * 75,
     ):
         assert decoder.feed(stuffed(body)) == []
     assert decoder.take_rejected() == [
@@ -105,9 +120,12 @@ def test_a_refused_frame_keeps_its_number_and_the_reason() -> None:
         (14, NakCode.WRONG_LENGTH),
         (15, NakCode.VALUE_OUT_OF_RANGE),
         (16, NakCode.VALUE_OUT_OF_RANGE),
+        (17, NakCode.WRONG_LENGTH),
+        (18, NakCode.WRONG_LENGTH),
+        (19, NakCode.VALUE_OUT_OF_RANGE),
     ]
     assert decoder.take_rejected() == []
-    assert (decoder.frames, decoder.bad, decoder.lost) == (0, 7, 0)
+    assert (decoder.frames, decoder.bad, decoder.lost) == (0, 10, 0)
 
 
 def test_an_identity_whose_name_is_not_text_is_refused() -> None:
@@ -188,7 +206,9 @@ def test_the_decoder_recovers_from_any_bytes(chunks: list[bytes], side: Side) ->
     assert decoder.feed(b"\0" + encode(last)) == [last]
 
 
-@given(st.sampled_from([0x01, 0x02, 0x10, 0x11, 0x12, 0x81, 0x82, 0x83, 0x90, 0x91]), st.binary(max_size=124))
+@given(
+    st.sampled_from([0x01, 0x02, 0x03, 0x10, 0x11, 0x12, 0x81, 0x82, 0x83, 0x90, 0x91, 0x92]), st.binary(max_size=124)
+)
 def test_any_payload_is_a_frame_that_encodes_to_itself_or_refused(kind: int, payload: bytes) -> None:
     wire = stuffed(bytes((kind, 9)) + payload)
     decoder = Decoder("host" if kind < 0x80 else "robot")
@@ -197,9 +217,9 @@ def test_any_payload_is_a_frame_that_encodes_to_itself_or_refused(kind: int, pay
     assert all(encode(frame) == wire for frame in frames)
 
 
-@given(st.one_of(odoms, echoes(), patterns))
+@given(st.one_of(odoms, echoes(), fine_echoes(), patterns, listens))
 def test_any_frame_is_decoded_as_it_was_encoded(frame: Frame) -> None:
-    decoder = Decoder("host" if isinstance(frame, Pattern) else "robot")
+    decoder = Decoder("host" if isinstance(frame, Pattern | Listen) else "robot")
     assert decoder.feed(encode(frame)) == [frame]
 
 
@@ -232,10 +252,16 @@ ODOM = Odom(0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
         (Echo(0, 0, 0, 3, (9, 4)), "Echo.tenths_ft[1]", "5 to 255"),
         (Ident(0, 1, 24, 1, 1, 1, 1, "x" * 17), "Ident.name", "16 bytes"),
         (Ident(0, 1, 24, 1, 1, 1, 1, "a\0b"), "Ident.name", "without a zero"),
+        (Ident(0, 2, 24, 1, 1, 1, 1, "a"), "Ident.range_unit_um", "1 to 65535"),
+        (Ident(0, 2, 24, 1, 1, 1, 1, "a", 1, 256), "Ident.capabilities", "0 to 255"),
+        (Listen(0, (1,) * 25), "Listen.masks", "0 to 24"),
+        (Echo2(0, 0, 0, 3, 0, (9,)), "Echo2.counts", "asks for 2"),
+        (Echo2(0, 0, 0, 3, 1, (9, 9)), "Echo2.heard", "cannot listen"),
+        (Echo2(0, 0, 0, 3, 0, (9, 65536)), "Echo2.counts[1]", "0 to 65535"),
     ],
 )
 def test_a_value_out_of_range_is_refused_and_its_field_named(frame: Frame, field: str, limits: str) -> None:
-    with pytest.raises(ValueError, match=r"must be|asks for") as caught:
+    with pytest.raises(ValueError, match=r"must be|asks? for|cannot listen") as caught:
         encode(frame)
     assert field in str(caught.value)
     assert limits in str(caught.value)

@@ -30,7 +30,7 @@ def test_hello_then_pattern_then_ready() -> None:
     assert harness.state() is LineState.HANDSHAKE
     first = harness.robot.outgoing(writable=True)
     assert first[0] == 0, "a zero ends what an earlier user left half said"
-    assert Decoder("host").feed(first) == [Hello(0, 1)]
+    assert Decoder("host").feed(first) == [Hello(0, 2)]
     assert harness.received() == []
     harness.send(IDENT)
     assert harness.state() is LineState.HANDSHAKE
@@ -71,7 +71,7 @@ def test_an_unanswered_command_is_sent_three_times_each_with_its_own_number() ->
     for _ in range(31):
         sent += harness.received()
         harness.pass_time(0.01)
-    assert sent == [Hello(0), Hello(1), Hello(2)]
+    assert sent == [Hello(0, 2), Hello(1, 2), Hello(2, 2)]
     assert harness.device_lost == 0
     assert harness.state() is LineState.DOWN
     assert "no answer to 3 HELLO commands and nothing is received" in (harness.robot.problem or "")
@@ -117,7 +117,7 @@ def test_a_silent_robot_is_sent_hello_twice_a_second_until_it_answers() -> None:
 @pytest.mark.parametrize(
     ("ident", "text"),
     [
-        (replace(IDENT, version=2), "speaks version 2"),
+        (replace(IDENT, version=3), "speaks version 3"),
         (replace(IDENT, sensors=16), "has 16 sensors and the robot file 24"),
         (replace(IDENT, ring_radius_mm=383), r"a radius of 0\.383 m and the robot file says 0\.381 m"),
     ],

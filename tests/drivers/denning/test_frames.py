@@ -17,7 +17,7 @@ def test_the_numbers_of_the_protocol() -> None:
     assert [(code.name, int(code)) for code in NakCode] == [
         ("UNKNOWN_TYPE", 1), ("WRONG_LENGTH", 2), ("VALUE_OUT_OF_RANGE", 3), ("LATCHED", 4),
     ]  # fmt: skip
-    assert (frames.VERSION, frames.SENSORS_MAX, frames.MASKS_MAX) == (1, 24, 24)
+    assert (frames.VERSION, frames.SENSORS_MAX, frames.MASKS_MAX) == (2, 24, 24)
     assert (frames.WINDOW_MIN, frames.WINDOW_MAX) == (5, 255)
     assert (frames.FAULT, frames.TENTHS_MIN, frames.TENTHS_MAX, frames.NO_ECHO) == (0, 5, 254, 255)
     assert frames.TENTH_FT_M == 0.03048
@@ -26,11 +26,11 @@ def test_the_numbers_of_the_protocol() -> None:
 
 def test_every_frame_starts_with_its_sequence_number_and_cannot_be_changed() -> None:
     kinds = [*get_args(HostFrame), *get_args(RobotFrame)]
-    assert len(kinds) == 10
+    assert len(kinds) == 12
     assert all(dataclasses.fields(kind)[0].name == "seq" for kind in kinds)
     with pytest.raises(dataclasses.FrozenInstanceError):
         Halt(1).seq = 2  # type: ignore[misc]
 
 
-def test_a_hello_names_this_version() -> None:
-    assert Hello(3) == Hello(3, frames.VERSION)
+def test_a_hello_asks_for_what_every_robot_speaks() -> None:
+    assert Hello(3) == Hello(3, 1)

@@ -18,12 +18,12 @@ def is_due(command: PendingCommand) -> bool:
 
 
 def command(name: str, *, without_limit: bool = False) -> PendingCommand:
-    return pending_command(name, PATTERN, LINK, without_limit=without_limit)
+    return pending_command(name, PATTERN, LINK, 2, without_limit=without_limit)
 
 
 @pytest.mark.parametrize(
     ("name", "frame"),
-    [("HALT", Halt(9)), ("RELEASE", Release(9)), ("HELLO", Hello(9)), ("PATTERN", Pattern(9, 50, 255, (1, 2, 4)))],
+    [("HALT", Halt(9)), ("RELEASE", Release(9)), ("HELLO", Hello(9, 2)), ("PATTERN", Pattern(9, 50, 255, (1, 2, 4)))],
 )
 def test_a_name_gives_its_frame(name: str, frame: Halt | Release | Hello | Pattern) -> None:
     assert command(name).frame(9, 0.0) == frame
