@@ -139,7 +139,7 @@ class LinkConfig(Strict):
     """The serial line to the robot and its timeouts."""
 
     port: str | None = None
-    """Serial port of the robot, as /dev/ttyUSB0; without it a run starts the emulator."""
+    """Serial port of the robot, as /dev/ttyUSB0, or socket://host:port; without it a run starts the emulator."""
     baud: int = Field(default=115200, ge=300, le=4_000_000)
     """Speed of the line, bits per second."""
     reply_timeout_s: float = Field(default=0.1, ge=0.001, le=10.0)

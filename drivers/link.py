@@ -1,5 +1,7 @@
 """A serial line that is reopened after each loss, never blocks the loop, and reports why it was lost.
 
+A TCP connection can take the place of the serial port, and is the same to this module.
+
 The only importer of `serial_asyncio`, because that library needs care: its write buffer is unbounded, an exception in
 a data handler leaves the port open but no longer read, and its `close()` never returns if the peer has stalled. So
 writes are refused beyond a bound, handlers are guarded, and a line is ended by `abort()` only.
@@ -15,11 +17,10 @@ import traceback
 from collections.abc import Callable
 from typing import ParamSpec
 
-import serial
 import serial_asyncio
 
 from config.robot import LinkConfig
-from drivers.serial_port import OPENING_ERRORS, LinkError, OpenPort, open_off_loop, open_port, opening_error
+from drivers.serial_port import OPENING_ERRORS, LinkError, OpenPort, Port, open_off_loop, open_port, opening_error
 
 __all__ = ["Link", "LinkError"]
 
@@ -248,7 +249,7 @@ class _Transport(serial_asyncio.SerialTransport):  # type: ignore[misc]  # the l
         if data:
             self._protocol.data_received(data)
         elif is_certain:
-            self._abort(OSError("it reports data and has none"))
+            self._abort(OSError("its other end is closed"))
 
     def write(self, data: bytes) -> None:
         if self._closing:
@@ -275,7 +276,7 @@ class _Transport(serial_asyncio.SerialTransport):  # type: ignore[misc]  # the l
 class _Connection(asyncio.Protocol):
     """One connection: the line from its opening to its loss."""
 
-    def __init__(self, link: Link, port: serial.Serial) -> None:
+    def __init__(self, link: Link, port: Port) -> None:
         self.has_received = False
         self.opened = asyncio.Event()
         self.lost = asyncio.Event()

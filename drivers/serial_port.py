@@ -1,4 +1,4 @@
-"""Opening of a serial port, with a one-line error that names the cause if that fails.
+"""Opening of a serial port, or of a TCP connection in its place, with a one-line error if that fails.
 
 Opening blocks, without limit on a lost USB adapter or a driver that waits for a modem line. So `link` does it in a
 thread.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import socket
 import termios
 import threading
 from collections.abc import Callable
@@ -17,8 +18,10 @@ import serial
 
 from config.errors import FAILED, WRONG_CALL, UserError
 from config.robot import LinkConfig
+from drivers.tcp_port import TcpPort, explain_tcp, is_tcp
 
-OpenPort: TypeAlias = Callable[[LinkConfig], serial.Serial]
+Port: TypeAlias = serial.Serial | TcpPort
+OpenPort: TypeAlias = Callable[[LinkConfig], Port]
 
 
 OPENING_ERRORS = (OSError, ValueError, OverflowError, termios.error)
@@ -26,13 +29,15 @@ OPENING_ERRORS = (OSError, ValueError, OverflowError, termios.error)
 
 
 class LinkError(UserError):
-    """The serial port cannot be opened: one line with what happened, the likely cause and the next action."""
+    """The port cannot be opened: one line with what happened, the likely cause and the next action."""
 
     exit_code = WRONG_CALL
 
 
-def open_port(config: LinkConfig) -> serial.Serial:
+def open_port(config: LinkConfig) -> Port:
     """Return the opened port, locked for this process; blocks until it is open."""
+    if config.port is not None and is_tcp(config.port):
+        return TcpPort(config.port)
     return serial.Serial(config.port, config.baud, exclusive=True, timeout=0, write_timeout=0)
 
 
@@ -40,13 +45,16 @@ _IN_USE = (errno.EAGAIN, errno.EBUSY, errno.EWOULDBLOCK)
 
 
 def opening_error(config: LinkConfig, error: BaseException) -> LinkError:
-    """Return the error for the user: a port in use is a failure, any other cause is a wrong call."""
+    """Return the error for the user: a port in use or out of reach is a failure, other causes are a wrong call."""
+    if config.port is not None and is_tcp(config.port):
+        wrong = isinstance(error, ValueError | OverflowError | socket.gaierror)
+        return LinkError(explain_tcp(config.port, error), WRONG_CALL if wrong else FAILED)
     in_use = getattr(error, "errno", None) in _IN_USE
     return LinkError(explain(config, error), FAILED if in_use else WRONG_CALL)
 
 
 def explain(config: LinkConfig, error: BaseException) -> str:
-    """Return the message for a port that could not be opened, in one line."""
+    """Return the message for a serial port that could not be opened, in one line."""
     port = config.port
     number = getattr(error, "errno", None)
     text = " ".join(str(error).split())
@@ -74,7 +82,7 @@ def explain(config: LinkConfig, error: BaseException) -> str:
     return f"cannot open {port} ({text}); check the cable and the port's name"
 
 
-async def open_off_loop(config: LinkConfig, opener: OpenPort, timeout_s: float) -> serial.Serial:
+async def open_off_loop(config: LinkConfig, opener: OpenPort, timeout_s: float) -> Port:
     """Open the port in a thread of its own.
 
     The thread is a daemon, so that a port that never opens blocks neither the loop nor the end of the process. A port
@@ -97,9 +105,9 @@ async def open_off_loop(config: LinkConfig, opener: OpenPort, timeout_s: float) 
     if config.port is None:
         raise LinkError("no serial port is named; give it as --port or link.port")
     loop = asyncio.get_running_loop()
-    opened: asyncio.Future[serial.Serial] = loop.create_future()
+    opened: asyncio.Future[Port] = loop.create_future()
 
-    def hand_over(port: serial.Serial | None, error: BaseException | None) -> None:
+    def hand_over(port: Port | None, error: BaseException | None) -> None:
         if port is None:
             if not opened.done():
                 opened.set_exception(error or OSError("the opener returned no port"))

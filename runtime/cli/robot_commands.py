@@ -23,6 +23,7 @@ def run(
     json: JsonFile = None,
     force: Force = False,
     map_file: Annotated[str | None, Parameter(name="--map")] = None,
+    robot: RobotFile = None,
     world: str | None = None,
     seed: Count = 0,
     trace: str | None = None,
@@ -37,7 +38,7 @@ def run(
     Parameters
     ----------
     port
-        Serial port of the robot, which then waits in READY until it is armed.
+        Port of the robot, a serial device or socket://host:port; the robot then waits in READY until it is armed.
     arm
         Arm the robot once, at the start. The emulated robot is armed without this option.
     seconds
@@ -52,6 +53,8 @@ def run(
         Do not serve the operator console.
     map_file
         The known room in which the robot finds itself: a world file, or the name of a shipped one.
+    robot
+        Robot file, or the name of a shipped one; None for that of the run file.
     world
         Emulated robot: world file, or the name of a shipped one.
     seed
@@ -75,8 +78,9 @@ def run(
 
     emulator = EmulatorOptions(world=world, seed=seed, trace=trace, faults=faults, force=force)
     return run_robot(
-        config, sets, port=port, arm=arm, seconds=seconds, headless=headless, record=record, map_file=map_file,
-        no_record=no_record, no_console=no_console, json_file=json, force=force, emulator=emulator, units=units,
+        config, sets, robot=robot, port=port, arm=arm, seconds=seconds, headless=headless, record=record,
+        map_file=map_file, no_record=no_record, no_console=no_console, json_file=json, force=force,
+        emulator=emulator, units=units,
     )  # fmt: skip
 
 
@@ -84,6 +88,7 @@ def emulate(
     *,
     world: WorldFile = None,
     link: str | None = None,
+    tcp: str | None = None,
     faults: str | None = None,
     seed: Count = 0,
     robot: RobotFile = None,
@@ -96,12 +101,14 @@ def emulate(
     sets: Sets = (),
     end_with_parent: Annotated[bool, Parameter(negative="", show=False)] = False,
 ) -> int:
-    """Emulate a robot on a pseudo-terminal until interrupted.
+    """Emulate a robot on a pseudo-terminal or a TCP port until interrupted.
 
     Parameters
     ----------
     link
         Create a symbolic link to the pseudo-terminal at this path.
+    tcp
+        Listen on this TCP port of this machine in place of a pseudo-terminal; HOST:PORT to serve a network.
     faults
         Fault script.
     seed
@@ -132,7 +139,7 @@ def emulate(
     from runtime.cli.commands.emulate import emulate_robot
 
     return emulate_robot(
-        config, sets, world=world, robot=robot, link=link, faults=faults, seed=seed, trace=trace,
+        config, sets, world=world, robot=robot, link=link, tcp=tcp, faults=faults, seed=seed, trace=trace,
         latency=latency, force=force, clock_s=clock, end_with_parent=end_with_parent, control=control,
     )  # fmt: skip
 

@@ -10,10 +10,9 @@ from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import TypeVar
 
-import serial
-
 from config.robot import LinkConfig
 from drivers.link import Link
+from drivers.serial_port import Port
 from tests.hil.machine import TIMEOUT_S
 
 T = TypeVar("T")
@@ -66,7 +65,7 @@ class Host:
         self.closed: asyncio.Queue[str] = asyncio.Queue()
 
     def link(
-        self, path: Path | None, *, baud: int = 115200, **options: Callable[[LinkConfig], serial.Serial] | float
+        self, path: Path | str | None, *, baud: int = 115200, **options: Callable[[LinkConfig], Port] | float
     ) -> Link:
         port = None if path is None else str(path)
         config = LinkConfig(port=port, baud=baud, reopen_first_s=0.005, reopen_max_s=0.02)

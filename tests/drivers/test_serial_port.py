@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import termios
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -21,8 +22,9 @@ def config_of(path: Path) -> LinkConfig:
 
 def test_an_opened_port_never_blocks_and_is_locked(pty: PtyPair) -> None:
     config = config_of(pty.path)
-    with open_port(config) as port:
+    with closing(open_port(config)) as port:
         assert (port.timeout, port.write_timeout) == (0, 0)
+        assert isinstance(port, serial.Serial)
         assert port.read(1) == b""
         with pytest.raises(OPENING_ERRORS) as caught:
             open_port(config)

@@ -56,10 +56,11 @@ class EmulatorOptions:
     force: bool = False
     """Whether the trace may overwrite an existing file."""
 
-    def arguments(self, config: str | None, sets: Sequence[str]) -> list[str]:
+    def arguments(self, config: str | None, sets: Sequence[str], robot: str | None = None) -> list[str]:
         """Return the command line of ``echolocate emulate`` with these options."""
         named = {
             "--config": config,
+            "--robot": robot,
             "--world": self.world,
             "--seed": str(self.seed),
             "--trace": self.trace,
@@ -74,6 +75,7 @@ def run_robot(
     config: str | None,
     sets: Sequence[str],
     *,
+    robot: str | None,
     port: str | None,
     arm: bool,
     seconds: float | None,
@@ -91,7 +93,9 @@ def run_robot(
 
     Parameters
     ----------
-    config, sets, port, arm, seconds, headless, record, map_file, no_record, no_console, json_file, force, units
+    config, sets, robot, port, arm, seconds, headless, record, map_file, no_record, no_console, json_file, units
+        As of `runtime.cli.robot_commands.run`.
+    force : bool
         As of `runtime.cli.robot_commands.run`.
     emulator : EmulatorOptions
         Used without a port.
@@ -101,7 +105,7 @@ def run_robot(
     UserError
         An option is wrong, a file cannot be written, the run ended in FAULT, or the recording is incomplete.
     """
-    settings = load_settings(config, sets, world=emulator.world)
+    settings = load_settings(config, sets, robot=robot, world=emulator.world)
     if map_file is not None:
         settings = with_known_room(settings, map_file)
     refuse_undrivable(settings)
@@ -148,7 +152,7 @@ def run_robot(
                 run_settings = settings
                 control: TimeControl = NoTimeControl()
                 if isinstance(clock, ScaledClock):
-                    arguments = emulator.arguments(config, sets)
+                    arguments = emulator.arguments(config, sets, robot)
                     emulator_port, control = await running.enter_async_context(
                         start_emulator(arguments, clock, compiled=preparation is None)
                     )
@@ -159,7 +163,7 @@ def run_robot(
                     emulated=port is None, preparation=preparation,
                     reload=lambda: reload_settings(
                         config, sets, emulator.world, port_option, None if port else run_settings.link.port,
-                        map_file=map_file, no_console=no_console,
+                        robot=robot, map_file=map_file, no_console=no_console,
                     ),
                 )  # fmt: skip
 
@@ -212,6 +216,7 @@ def reload_settings(
     port: str | None,
     emulator_port: str | None,
     *,
+    robot: str | None = None,
     map_file: str | None = None,
     no_console: bool = False,
 ) -> Settings:
@@ -219,7 +224,7 @@ def reload_settings(
 
     Parameters
     ----------
-    config, sets, world, port, map_file, no_console
+    config, sets, world, port, robot, map_file, no_console
         As of `runtime.cli.robot_commands.run`.
     emulator_port : str, optional
         Port of the emulator, which is used if the settings name none.
@@ -229,7 +234,7 @@ def reload_settings(
     ConfigError
         The settings are wrong, or no robot can carry them out.
     """
-    settings = load_settings(config, sets, world=world)
+    settings = load_settings(config, sets, robot=robot, world=world)
     if map_file is not None:
         settings = with_known_room(settings, map_file)
     try:

@@ -7,6 +7,7 @@ import contextlib
 import errno
 import os
 from collections.abc import AsyncIterator, Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -15,7 +16,8 @@ from config.world import WallConfig, WorldConfig
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Frame
 from drivers.emulator.faults import Fault
-from drivers.emulator.pty_transport import serve
+from drivers.emulator.pty_transport import PtyPort
+from drivers.emulator.server import EmulatorPort, serve
 from drivers.emulator.truth_trace import HEADER
 from tests.drivers.ring import RING
 from tests.hil.machine import TIMEOUT_S
@@ -65,6 +67,7 @@ class Emulator:
 async def emulator(
     link: Path | None,
     *,
+    make_port: Callable[[], EmulatorPort] | None = None,
     trace: Path | None = None,
     latency: Path | None = None,
     baud: int = 115200,
@@ -75,13 +78,14 @@ async def emulator(
     robot = RobotConfig(
         ring=RING, body=BodyConfig(radius_m=0.381, speed_max_m_s=0.6, turn_max_rad_s=1.5), link=LinkConfig(baud=baud)
     )
+    make_port = make_port or partial(PtyPort, None if link is None else str(link))
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
     clock = TickingClock()
     task = asyncio.create_task(
         serve(
-            robot, WORLD, link_path=None if link is None else str(link), faults=faults, seed=1,
+            robot, WORLD, make_port=make_port, faults=faults, seed=1, ready=ready.set_result,
             trace_path=None if trace is None else str(trace), latency_path=None if latency is None else str(latency),
-            ready=ready.set_result, exit_with_parent=exit_with_parent, clock=clock,
+            exit_with_parent=exit_with_parent, clock=clock,
         )
     )  # fmt: skip
     try:

@@ -24,7 +24,7 @@ def served(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
         calls.append({"settings": settings, "world": world, **options})
         ready("/dev/pts/9")
 
-    monkeypatch.setattr("drivers.emulator.pty_transport.serve", serve)
+    monkeypatch.setattr("drivers.emulator.server.serve", serve)
     return calls
 
 
@@ -42,16 +42,38 @@ def test_every_option_reaches_the_emulator(
     assert call["settings"].cycle.rate_hz == 10.0
     assert call["world"] == call["settings"].world
     assert [type(fault) for fault in call["faults"]] == [Reboot]
-    options = ("link_path", "seed", "trace_path", "latency_path", "clock_start_us", "exit_with_parent", "control")
-    assert [call[name] for name in options] == ["robot", 7, "t.csv", "l.csv", 4_500_000, True, PIPES]
+    options = ("seed", "trace_path", "latency_path", "clock_start_us", "exit_with_parent", "control")
+    assert [call[name] for name in options] == [7, "t.csv", "l.csv", 4_500_000, True, PIPES]
+    assert call["make_port"].args == ("robot",)
 
 
 def test_by_default_nothing_is_written_and_no_fault_is_planned(served: list[dict[str, Any]]) -> None:
     assert run_command(["emulate", "--world", "irregular"]) == DONE
     (call,) = served
     assert len(call["world"].drum) == 8
-    options = ("link_path", "faults", "seed", "trace_path", "latency_path", "clock_start_us", "control")
-    assert [call[name] for name in options] == [None, (), 0, None, None, 0, None]
+    options = ("faults", "seed", "trace_path", "latency_path", "clock_start_us", "control")
+    assert [call[name] for name in options] == [(), 0, None, None, 0, None]
+    assert call["make_port"].args == (None,)
+
+
+@pytest.mark.parametrize(
+    ("text", "address"),
+    [("8101", ("127.0.0.1", 8101)), ("0.0.0.0:0", ("0.0.0.0", 0)), ("[::1]:8101", ("::1", 8101))],
+)
+def test_a_tcp_port_is_of_this_machine_unless_it_says_otherwise(
+    served: list[dict[str, Any]], text: str, address: tuple[str, int]
+) -> None:
+    assert run_command(["emulate", "--tcp", text]) == DONE
+    assert served[0]["make_port"].args == address
+
+
+@pytest.mark.parametrize("words", [["x"], ["99999"], [":8101"], ["host:"], ["8101", "--link", "robot"]])
+def test_a_wrong_tcp_port_is_one_line(
+    served: list[dict[str, Any]], words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command(["emulate", "--tcp", *words]) == WRONG_CALL
+    assert "--tcp" in capsys.readouterr().err
+    assert served == []
 
 
 @pytest.mark.parametrize("clock", ["-1", "4294.967296", "nan"])
