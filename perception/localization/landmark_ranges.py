@@ -11,7 +11,7 @@ from typing import Final
 
 from perception.kernel import Floats, kernel
 from perception.localization.landmark_filter import correct, innovation_variance, rows_used
-from perception.localization.landmark_state import FIRST, EstimateRecord
+from perception.localization.landmark_state import FIRST, EstimateRecord, X, Y
 
 GATE: Final = 10.8
 """χ² of one degree of freedom that a true reading exceeds in one of a thousand cases."""
@@ -24,8 +24,10 @@ NEAR_M: Final = 0.5
 FRESH_M: Final = 0.02
 FRESH_RAD: Final = math.radians(1.0)
 """A sensor's readings that are nearer together repeat one error of rounding; only the first is used."""
-MARGIN_RAD: Final = math.radians(3.0)
-"""This far inside the beam a landmark must answer."""
+MARGIN_RAD: Final = math.radians(1.0)
+MARGIN_SIGMAS: Final = 3.0
+"""This far inside the beam a landmark must answer, and this far outside it may: a fixed part, and standard deviations
+of its bearing."""
 NOISE_MEMORY: Final = 0.005
 """Share of one reading in the estimate of the noise."""
 NOISE_MIN: Final = 0.02
@@ -68,6 +70,18 @@ def has_moved(e: EstimateRecord, i: int, x: float, y: float, axis: float) -> boo
 
 
 @kernel
+def bearing_variance(covariance: Floats, i: int, dx: float, dy: float) -> float:
+    """Return the variance of the bearing of landmark `i`, at (dx, dy) m from a sensor, relative to the ring, rad²."""
+    row = FIRST + 2 * i
+    u, v, d2 = -dy, dx, dx * dx + dy * dy
+    xx = covariance[row, row] - 2.0 * covariance[row, X] + covariance[X, X]
+    xy = covariance[row, row + 1] - covariance[row, Y] - covariance[X, row + 1] + covariance[X, Y]
+    yy = covariance[row + 1, row + 1] - 2.0 * covariance[row + 1, Y] + covariance[Y, Y]
+    variance: float = (u * u * xx + 2.0 * u * v * xy + v * v * yy) / (d2 * d2)
+    return variance
+
+
+@kernel
 def is_hidden(e: EstimateRecord, i: int, x: float, y: float) -> bool:
     """Return whether another landmark stands between a sensor at (x, y) (m) and the centre of landmark `i`."""
     est = e[0]
@@ -84,9 +98,15 @@ def is_hidden(e: EstimateRecord, i: int, x: float, y: float) -> bool:
 
 @kernel
 def update_with_edge(
-    e: EstimateRecord, covariance: Floats, i: int, dx: float, dy: float, ax: float, ay: float, half_angle: float,
+    e: EstimateRecord,
+    covariance: Floats,
+    i: int,
+    mx: float,
+    my: float,
+    axis: float,
+    half_angle: float,
     is_heard: bool,
-) -> None:  # fmt: skip
+) -> None:
     """Enter that a sensor heard a landmark, which is inside the beam, or did not, so that it is rather outside.
 
     With t the angle from the landmark to the nearer edge of the beam, positive inside, and q² the sum of its variance
@@ -101,16 +121,18 @@ def update_with_edge(
         Updated.
     i : int
         The landmark.
-    dx, dy : float
-        From the sensor to its centre, m.
-    ax, ay : float
-        The sensor's axis.
+    mx, my, axis : float
+        The sensor's mount in the ring's frame, m and rad.
     half_angle : float
         Half the beam's width, rad.
     is_heard : bool
         Whether the sensor heard it.
     """
     est = e[0]
+    c, s = math.cos(est.heading), math.sin(est.heading)
+    dx = est.landmarks[i].x - (est.x + c * mx - s * my)
+    dy = est.landmarks[i].y - (est.y + s * mx + c * my)
+    ax, ay = math.cos(est.heading + axis), math.sin(est.heading + axis)
     d = math.sqrt(dx * dx + dy * dy)
     off = math.atan2(ax * dy - ay * dx, ax * dx + ay * dy)
     side = 1.0 if off > 0.0 else -1.0
@@ -166,7 +188,6 @@ def update_with_range(
     x = est.x + c * mx - s * my
     y = est.y + s * mx + c * my
     ax, ay = math.cos(est.heading + axis), math.sin(est.heading + axis)
-    cos_may, cos_must = math.cos(half_angle + MARGIN_RAD), math.cos(max(0.0, half_angle - MARGIN_RAD))
     best = second = first = NONE
     best_nis = second_nis = GATE
     nearest = math.inf
@@ -175,12 +196,15 @@ def update_with_range(
         landmark = est.landmarks[i]
         dx, dy = landmark.x - x, landmark.y - y
         d = math.sqrt(dx * dx + dy * dy)
-        ahead = dx * ax + dy * ay
-        if d <= landmark.radius or ahead < cos_may * d:
+        if d <= landmark.radius or dx * ax + dy * ay < 0.0:
+            continue
+        inside = half_angle - abs(math.atan2(ax * dy - ay * dx, ax * dx + ay * dy))
+        margin = MARGIN_RAD + MARGIN_SIGMAS * math.sqrt(bearing_variance(covariance, i, dx, dy))
+        if inside < -margin:
             continue
         predicted = est.range_scale * (d - landmark.radius)
         if predicted < nearest:
-            nearest, first, is_expected = predicted, i, ahead > cos_must * d
+            nearest, first, is_expected = predicted, i, inside > margin
         if abs(r - predicted) > OWN_M:
             continue
         u, v = est.range_scale * dx / d, est.range_scale * dy / d
@@ -193,24 +217,16 @@ def update_with_range(
             second, second_nis = i, nis
     if is_expected:
         est.fit_share += FIT_MEMORY * ((1.0 if best != NONE else 0.0) - est.fit_share)
-    if best == NONE:
-        if first != NONE and r > nearest + BEHIND_M and nearest < range_max and not is_hidden(e, first, x, y):
-            update_with_edge(
-                e,
-                covariance,
-                first,
-                est.landmarks[first].x - x,
-                est.landmarks[first].y - y,
-                ax,
-                ay,
-                half_angle,
-                is_heard=False,
-            )
-        elif is_expected and abs(r - nearest) <= NEAR_M:
-            est.landmarks[first].failures += 1
+    is_missed = first != NONE and first != best and r > nearest + BEHIND_M and nearest < range_max
+    if is_missed and not is_hidden(e, first, x, y):
+        update_with_edge(e, covariance, first, mx, my, axis, half_angle, is_heard=False)
+    elif best == NONE and is_expected and abs(r - nearest) <= NEAR_M:
+        est.landmarks[first].failures += 1
+    if best == NONE or second != NONE:
         return NONE
-    if second != NONE:
-        return NONE
+    c, s = math.cos(est.heading), math.sin(est.heading)
+    x = est.x + c * mx - s * my
+    y = est.y + s * mx + c * my
     landmark = est.landmarks[best]
     dx, dy = landmark.x - x, landmark.y - y
     d = math.sqrt(dx * dx + dy * dy)
@@ -223,14 +239,12 @@ def update_with_range(
         noise *= math.sqrt(best_nis / SOFT)
     correct(e, covariance, innovation, variance + noise)
     seen = (innovation * innovation - variance) / nominal
-    est.noise = min(NOISE_MAX, max(NOISE_MIN, est.noise + NOISE_MEMORY * (seen - est.noise)))
+    # Of a landmark at a place that is hardly known, an innovation says nothing about the noise.
+    weight = (noise / (variance + noise)) ** 2
+    est.noise = min(NOISE_MAX, max(NOISE_MIN, est.noise + NOISE_MEMORY * weight * (seen - est.noise)))
     landmark.failures = 0
     landmark.hits += 1
-    c, s = math.cos(est.heading), math.sin(est.heading)
-    x = est.x + c * mx - s * my
-    y = est.y + s * mx + c * my
-    ax, ay = math.cos(est.heading + axis), math.sin(est.heading + axis)
-    update_with_edge(e, covariance, best, landmark.x - x, landmark.y - y, ax, ay, half_angle, is_heard=True)
+    update_with_edge(e, covariance, best, mx, my, axis, half_angle, is_heard=True)
     return best
 
 

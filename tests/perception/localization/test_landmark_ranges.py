@@ -92,6 +92,44 @@ def test_an_echo_at_the_edge_of_the_beam_moves_the_landmark_in_and_silence_out(i
     assert abs(abs(bearing) - HALF_ANGLE) < math.radians(1.5)
 
 
+def test_a_range_of_a_farther_landmark_says_that_the_nearer_one_is_outside_the_beam() -> None:
+    off = HALF_ANGLE - math.radians(1.0)
+    near = (0.4 + 1.5 * math.cos(off), 1.5 * math.sin(off))
+    e, covariance = new_filter([near, (3.5, -0.4)], sigma=0.04)
+    assert enter(e, covariance, math.hypot(3.1, 0.4) - RADIUS_M) == 1
+    at = e[0].landmarks[0]
+    assert math.atan2(at.y - e[0].y, at.x - e[0].x - 0.4) > HALF_ANGLE
+
+
+@pytest.mark.parametrize(("sigma", "is_heard"), [(0.01, False), (0.08, True)])
+def test_a_landmark_outside_the_beam_may_answer_if_its_bearing_is_uncertain(sigma: float, is_heard: bool) -> None:
+    off = HALF_ANGLE + math.radians(4.0)
+    e, covariance = new_filter([(0.4 + 2.0 * math.cos(off), 2.0 * math.sin(off))], sigma)
+    assert enter(e, covariance, 2.0 - RADIUS_M) == (0 if is_heard else kernels.NONE)
+
+
+def test_the_variance_of_a_bearing_is_that_of_the_whole_covariance() -> None:
+    rng = np.random.default_rng(5)
+    _, covariance = new_filter([(2.0, 0.3), (1.0, 1.5)])
+    n = FIRST + 4
+    root = 0.05 * rng.standard_normal((n, n))
+    covariance[:n, :n] = root @ root.T
+    dx, dy = 0.7, 1.4
+    jacobian = np.zeros(n)
+    jacobian[FIRST + 2 : FIRST + 4] = np.array([-dy, dx]) / (dx * dx + dy * dy)
+    jacobian[X : Y + 1] = -jacobian[FIRST + 2 : FIRST + 4]
+    naive = jacobian @ covariance[:n, :n] @ jacobian
+    assert kernels.bearing_variance(covariance, 1, dx, dy) == pytest.approx(naive, rel=1e-9)
+
+
+def test_landmarks_at_hardly_known_places_do_not_change_the_estimate_of_the_noise() -> None:
+    e, covariance = new_filter([(2.0, 0.0)], sigma=0.1)
+    for _ in range(3):
+        covariance[FIRST, FIRST] = covariance[FIRST + 1, FIRST + 1] = 0.1**2
+        enter(e, covariance, 1.3)
+    assert e[0].noise == pytest.approx(1.0, abs=1e-3)
+
+
 def test_a_hidden_landmark_is_not_missed() -> None:
     near, far = (1.1, 0.33), (3.0, 0.62)
     e, covariance = new_filter([far, near])
