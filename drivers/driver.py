@@ -94,6 +94,13 @@ class RobotDriver(Protocol):
         """
 
     @property
+    def line_baud(self) -> int | None:
+        """The speed that the line must have for the next bytes, bits per second; None = `link.baud`.
+
+        A line without a speed, as a socket, ignores it.
+        """
+
+    @property
     def firings_waiting(self) -> int:
         """Number of firings that `take_received` would return."""
 
@@ -136,6 +143,9 @@ class RobotDriver(Protocol):
         drivers.firing_pattern.FiringError
             The robot or its protocol cannot carry out the pattern; the current one stays.
         """
+
+    def end_session(self) -> None:
+        """End the session at the end of a run: what `outgoing` then returns is the last to be sent."""
 
     def outgoing(self, *, writable: bool) -> bytes:
         """Return the bytes to send now, and consider them sent.

@@ -80,6 +80,7 @@ class Link:
         self._open_timeout_s = open_timeout_s
         self._line: _Connection | None = None
         self._last_error: str | None = None
+        self._baud = config.baud
 
     @property
     def config(self) -> LinkConfig:
@@ -118,12 +119,23 @@ class Link:
             line.transport.write(data)
         return True
 
+    def set_baud(self, baud: int | None) -> None:
+        """Set the line's speed, bits per second, or back to that of the settings; a line without a speed ignores it.
+
+        Bytes that have not been transmitted yet may be lost. If the port refuses the speed, the line is ended.
+        """
+        baud = self._config.baud if baud is None else baud
+        if baud == self._baud or self._line is None:
+            return
+        self._baud = baud
+        self._line.set_baud(baud)
+
     def hold(self, seconds: float) -> None:
         """Read nothing for this long, so that one wake-up takes what arrives meanwhile; sending is not affected.
 
         The line's own buffer keeps the bytes, so that a hold never lasts longer than it takes to fill a part of it.
         """
-        seconds = min(seconds, _HELD_BYTES_MAX * _BITS_PER_BYTE / self._config.baud)
+        seconds = min(seconds, _HELD_BYTES_MAX * _BITS_PER_BYTE / self._baud)
         if self._line is not None and seconds > _HOLD_MIN_S:
             self._line.transport.hold(seconds)
 
@@ -148,7 +160,7 @@ class Link:
         except LinkError as e:
             self._last_error = str(e)
             raise
-        self._line = line
+        self._line, self._baud = line, self._config.baud
         await line.opened.wait()
 
     async def run(self) -> None:
@@ -329,6 +341,13 @@ class _Connection(asyncio.Protocol):
         self.lost.set()
         self._drained.set()
         self._link._lost(reason)
+
+    def set_baud(self, baud: int) -> None:
+        """Set the port's speed; end the connection if it refuses."""
+        try:
+            self._port.baudrate = baud
+        except OPENING_ERRORS as e:
+            self.end(f"the line {self._link.config.port} cannot be set to {baud} baud ({e}); correct link.baud")
 
     def end(self, reason: str, *, drained: bool = False) -> None:
         """Abort the connection, once; `connection_lost` follows soon, with `reason`."""

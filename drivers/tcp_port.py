@@ -45,6 +45,8 @@ class TcpPort:
     ----------
     timeout, write_timeout
         Always 0: no call waits.
+    baudrate
+        May be set, and has no effect.
 
     Raises
     ------
@@ -55,7 +57,7 @@ class TcpPort:
     """
 
     def __init__(self, url: str) -> None:
-        self.timeout = self.write_timeout = 0
+        self.timeout = self.write_timeout = self.baudrate = 0
         self._socket = socket.create_connection(_address(url), timeout=_CONNECT_S)
         self._socket.settimeout(0.0)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from types import MappingProxyType
 
 from config.robot import RobotConfig
 from drivers.denning.frames import TENTH_FT_M, VERSION, Ident, NakCode
+from drivers.line_diagnostics import deadman_refused
 
 _RADIUS_TOLERANCE_MM = 1.0
 """The robot reports whole millimetres."""
@@ -14,9 +14,6 @@ _RADIUS_TOLERANCE_MM = 1.0
 _COARSENESS, _FINE_M = 1.01, 1e-3
 """Steps of the ranges that are coarser than the robot file's by no more than this matter as little as those up to a
 millimetre."""
-_NOISE_MIN = 3
-"""Fewest corrupt frames that count as noise; one or two are normal where a line starts or ends."""
-
 _MEANINGS = MappingProxyType(
     {
         NakCode.UNKNOWN_TYPE: "it does not know this command",
@@ -51,14 +48,7 @@ def wrong_robot(ident: Ident, config: RobotConfig) -> str | None:
             f"the ring of the robot '{ident.name}' has a radius of {ident.ring_radius_mm * 1e-3:.3f} m and the robot "
             f"file says {radius_m:.3f} m; correct ring.radius_m, or choose the robot's own file"
         )
-    deadman_s, link = ident.deadman_ms * 1e-3, config.link
-    if not link.deadman_min_s <= deadman_s <= link.deadman_max_s:
-        return (
-            f"the base of the robot '{ident.name}' stops by itself {deadman_s:g} s after the last command, and the "
-            f"robot file allows {link.deadman_min_s:g} to {link.deadman_max_s:g} s; correct the deadman in the "
-            f"base's configuration, or link.deadman_min_s and link.deadman_max_s"
-        )
-    return None
+    return deadman_refused(ident.name, ident.deadman_ms * 1e-3, config.link)
 
 
 def coarse_ranges(ident: Ident, resolution_m: float) -> str | None:
@@ -104,41 +94,6 @@ def no_answer(command: str, tries: int, *, frames: int, bad: int, baud: int) -> 
     )
 
 
-def silence(silent_s: float, *, others: bool, bad: int) -> str:
-    """Return the message for missing odometry.
-
-    Parameters
-    ----------
-    silent_s
-        For how long it has been missing.
-    others
-        Whether frames of other kinds are still received.
-    bad
-        Corrupt frames received since the last odometry.
-    """
-    if (noisy := noise(bad, "it")) is not None:
-        return f"no odometry for {silent_s:.2f} s, {noisy}; the connection is restored as soon as frames are valid"
-    if others:
-        return (
-            f"no odometry for {silent_s:.2f} s although the robot sends other frames; its base has stopped working: "
-            f"restart the robot"
-        )
-    return (
-        f"nothing received for {silent_s:.2f} s; the robot is off or restarting, or its cable is loose: check its "
-        f"power and cable; the connection is restored as soon as it answers"
-    )
-
-
-def noise(bad: int, what: str) -> str | None:
-    """Return the message for corrupt frames received in place of `what`; None if they are too few to matter."""
-    if bad < _NOISE_MIN:
-        return None
-    return (
-        f"{bad} corrupt frames came in place of {what}: noise on the line, check its cable and shield, and that "
-        f"nothing else sends on it"
-    )
-
-
 def not_receiving(unacknowledged_s: float) -> str:
     """Return the message for a robot that sends but does not acknowledge DRIVEs."""
     return (
@@ -158,24 +113,6 @@ def refusal(command: str, code: int) -> str:
     elif code == NakCode.VALUE_OUT_OF_RANGE and command == "DRIVE":
         action = "lower body.speed_max_m_s and body.turn_max_rad_s to what the robot can do"
     return f"the robot refuses {command} (NAK {code}): {meaning}; {action}"
-
-
-def odometry_jump(off_m: float, turned_rad: float, ring_rad: float) -> str:
-    """Return the message for a jump of the odometry.
-
-    Parameters
-    ----------
-    off_m
-        Distance between the odometry and where the wheels' speeds would have brought the base.
-    turned_rad, ring_rad
-        The same of the heading and of the ring's direction.
-    """
-    return (
-        f"the odometry jumped by {off_m:.2f} m and {math.degrees(turned_rad):+.0f} degrees, the ring's direction by "
-        f"{math.degrees(ring_rad):+.0f}: more than the wheels can have turned; a wheel slipped, or an "
-        f"encoder or its counter failed: the jump is removed and the map stays valid; if it happens again, check "
-        f"wheels and encoders"
-    )
 
 
 def wrong_clock_rate(error: float) -> str:

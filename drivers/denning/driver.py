@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from config.files import one_line
 from config.robot import RingConfig, RobotConfig
+from drivers import line_diagnostics
 from drivers.denning import diagnostics
 from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Ack, Drive, Echo, Echo2, Frame, Hello, Ident, Nak, NakCode, Odom
@@ -47,11 +48,14 @@ class DenningDriver:
         The robot file names a version of the protocol that does not exist.
     """
 
+    line_baud: int | None = None
+    """The line keeps the speed of the robot file."""
+
     def __init__(self, config: RobotConfig) -> None:
         self._config = config
         self._pattern = wire_pattern(config.ring)
-        self._stamper = PoseStamper(len(config.ring.mounts), config.body)
-        self._stamper.set_pattern(self._pattern.window, self._pattern.step_period_ms)
+        self.stamper = PoseStamper(len(config.ring.mounts), config.body)
+        self.stamper.set_pattern(self._pattern.window, self._pattern.step_period_ms)
         self._state = LineState.CLOSED
         self._problem: str | None = None
         self._identity: Identity | None = None
@@ -87,7 +91,8 @@ class DenningDriver:
     def problem(self) -> str | None:
         """What is wrong, in one line; None if nothing is."""
         if self._problem is None and self._state is LineState.READY:
-            return diagnostics.noise(self._echo_timeout.corrupt_frames(self._run_s, self._decoder.bad), "its echoes")
+            corrupt = self._echo_timeout.corrupt_frames(self._run_s, self._decoder.bad)
+            return line_diagnostics.noise(corrupt, "its echoes")
         return self._problem
 
     @property
@@ -107,19 +112,9 @@ class DenningDriver:
         return len(self._firings)
 
     @property
-    def late_echoes(self) -> int:
-        """Number of firings dropped: without odometry around them, duplicated, or older than one before."""
-        return self._stamper.late_echoes
-
-    @property
-    def out_of_window(self) -> int:
-        """Number of ranges dropped because they lie beyond the window of their firing."""
-        return self._stamper.out_of_window
-
-    @property
     def odometry_origin(self) -> Pose:
         """The origin of the poses passed on, in the robot's own odometry; it moves when that jumps."""
-        return self._stamper.origin
+        return self.stamper.origin
 
     def line_opened(self, run_s: float) -> None:
         """Start the handshake on a line that has just been opened: HELLO, then PATTERN."""
@@ -160,7 +155,7 @@ class DenningDriver:
         if self._state is LineState.READY:
             self._check_timeouts()
             if "PATTERN" not in self._commands and run_s - self._pattern_acked_s > self._settling_s:
-                self._stamper.set_pattern(self._pattern.window, self._pattern.step_period_ms)
+                self.stamper.set_pattern(self._pattern.window, self._pattern.step_period_ms)
 
     def drive(self, twist: Twist) -> None:
         """Request a velocity, clamped to the body's limits; sent only in state READY and while no HALT is pending.
@@ -200,11 +195,14 @@ class DenningDriver:
             return
         # Until the robot uses the new pattern, echoes may belong to either; an echo names its own sensors.
         step_ms = min(self._pattern.step_period_ms, pattern.step_period_ms)
-        self._stamper.set_pattern(max(self._pattern.window, pattern.window), step_ms)
+        self.stamper.set_pattern(max(self._pattern.window, pattern.window), step_ms)
         self._settling_s = _SETTLING_STEPS * 1e-3 * max(self._pattern.step_period_ms, pattern.step_period_ms)
         self._pattern = pattern
         if self._state is LineState.READY or "PATTERN" in self._commands:
             self._queue("PATTERN")
+
+    def end_session(self) -> None:
+        """End the session: this protocol has none."""
 
     def outgoing(self, *, writable: bool) -> bytes:
         """Return the bytes to send now; only HALT while the line is not `writable`."""
@@ -236,7 +234,7 @@ class DenningDriver:
 
     def take_received(self) -> Received:
         """Return what was received since the last call, and remove it."""
-        firings, notes = tuple(self._firings), self._stamper.notes()
+        firings, notes = tuple(self._firings), self.stamper.notes()
         received = Received(firings, self._odometry, self._rebooted, notes, self._flags)
         self._firings.clear()
         self._odometry, self._flags, self._rebooted = None, Flags.NONE, False
@@ -251,7 +249,7 @@ class DenningDriver:
             # A single echo may follow the last odometry before the robot falls silent.
             others = self._last_frame_s - self._odometry_s > 0.5 * silence_max_s
             bad = self._decoder.bad - self._bad_at_odometry
-            self._go_down(diagnostics.silence(silent_s, others=others, bad=bad))
+            self._go_down(line_diagnostics.silence(silent_s, others=others, bad=bad))
         elif unacknowledged_s > _UNACKNOWLEDGED_SHARE * silence_max_s:
             self._go_down(diagnostics.not_receiving(unacknowledged_s))
         elif self._echo_timeout.expired(self._run_s):
@@ -283,7 +281,7 @@ class DenningDriver:
         self._drive = None
         self._must_identify = False
         self._drive_acks.forget()
-        self._stamper.drop_held()
+        self.stamper.drop_held()
         if halt is not None:
             self._queue("HALT")
 
@@ -309,8 +307,8 @@ class DenningDriver:
                 self._version > 1 or isinstance(frame, Echo)
             ):
                 self._echo_timeout.restart(self._run_s, self._decoder.bad)
-                self._stamper.echo(frame, self._unit_m)
-                self._firings.extend(self._stamper.firings(self._run_s))
+                self.stamper.echo(frame, self._unit_m)
+                self._firings.extend(self.stamper.firings(self._run_s))
             case _:
                 pass  # an echo of a pattern that this driver has not set, or of another version
 
@@ -322,19 +320,19 @@ class DenningDriver:
         known, self._identity = self._identity, identity_of(ident)
         self._version, self._unit_m = ident.version, 1e-6 * ident.range_unit_um
         if known is None and (coarse := diagnostics.coarse_ranges(ident, self._config.ring.resolution_m)) is not None:
-            self._stamper.note(coarse)
+            self.stamper.note(coarse)
         restarted = known is not None and (known.boot_id != ident.boot_id or self._jump is Jump.BACK)
         if known is None or known.odometry_period_s != self._identity.odometry_period_s:
-            self._stamper.set_period(self._identity.odometry_period_s)
+            self.stamper.set_period(self._identity.odometry_period_s)
         answers_hello = self._commands.pop("HELLO", None) is not None
         if restarted:
             self._abandon()
-            self._stamper.restart()
+            self.stamper.restart()
             self._firings.clear()
             self._odometry, self._flags, self._rebooted = None, Flags.NONE, True
             self._drive_acks = CommandAckMonitor()
         elif self._jump is not None:
-            self._stamper.break_off()
+            self.stamper.break_off()
         self._jump = None
         if answers_hello or restarted:
             self._state = LineState.HANDSHAKE
@@ -382,7 +380,7 @@ class DenningDriver:
     def _take_odometry(self, odom: Odom) -> None:
         if "HELLO" in self._commands:
             return  # until it has identified itself, its clock and odometry may be those of before a restart
-        sample = self._stamper.odometry(odom, self._run_s)
+        sample = self.stamper.odometry(odom, self._run_s)
         if isinstance(sample, Jump):
             # It may have restarted and lost its clock, odometry and pattern: identify it again.
             self._jump = sample
@@ -392,9 +390,9 @@ class DenningDriver:
         self._odometry_s, self._bad_at_odometry = self._run_s, self._decoder.bad
         self._odometry = sample
         self._flags |= sample.flags
-        if (error := self._stamper.clock_error) is not None and error > 0.0:
+        if (error := self.stamper.clock_error) is not None and error > 0.0:
             self._go_down(diagnostics.wrong_clock_rate(error))
         self._drive_acks.acknowledged(odom.last_drive_seq)
         if sample.flags & Flags.LATCHED:
             self._drive_acks.forget()  # while latched, the robot refuses every DRIVE with a NAK
-        self._firings.extend(self._stamper.firings(self._run_s))
+        self._firings.extend(self.stamper.firings(self._run_s))

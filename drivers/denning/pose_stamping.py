@@ -3,27 +3,24 @@
 An echo arrives when its window has closed. Usually the odometry after its firing has arrived by then; if not, the
 echo waits for it.
 
-Odometry that jumps by more than the wheels can have turned means that a counter was set or a wheel slipped, not that
-the body moved. The jump is removed here, where every sample passes, so that poses stay continuous and the map stays
-valid: see `PoseStamper.origin`.
+Jumps of the odometry are removed here, where every sample passes: see `drivers.odometry_jumps`.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import replace
 
 import numpy as np
 
 from config.robot import BodyConfig
-from drivers import se2
 from drivers.denning import diagnostics
 from drivers.denning.frames import TENTH_FT_M, WINDOW_MAX, Echo, Echo2, Odom
 from drivers.denning.robot_clock import Jump, RobotClock
 from drivers.denning.wire_units import odometry_of, ranges_of
-from drivers.messages import Firing, Floats, Odometry, Pose, wrap_angle
+from drivers.messages import Firing, Floats, Odometry, Pose
 from drivers.odometry_history import OdometryHistory
+from drivers.odometry_jumps import OdometryJumps
 from drivers.token_bucket import TokenBucket
 
 _HISTORY_S = 2.5
@@ -39,19 +36,12 @@ _GAP_MIN_S = 0.01
 """The same limit, at least, s."""
 _FUTURE_MAX_US = 1_000_000
 """How far after the newest odometry an echo may have been fired to wait for more, µs; beyond, its time is corrupt."""
-_RESET_M, _RESET_M_S = 0.5, 20.0
-"""A pose that moved farther than this, m plus m/s, was reset: the robot may have restarted."""
-_JUMP_M, _JUMP_RAD = 0.1, 0.1
-"""Allowed difference of odometry from its own velocities, m and rad, besides a stop within one sample."""
-_STEADY_SAMPLES = 10
-"""A deviation counts as a jump only after this many samples without one; otherwise it is how this base moves."""
 _FIRINGS_SHARE = 4.0
 """Firings passed on are at most so many times as frequent as those of the pattern; more are none of it."""
 _FIRINGS_BURST = 64.0
 """Firings at once, as after a delay on the way."""
 _EXCESS_NOTE_S = 10.0
 """Time between notes about too many firings, s."""
-_IDENTITY = Pose(0.0, 0.0, 0.0)
 _NOTES_MAX = 16
 """Notes kept if they are not taken."""
 
@@ -74,28 +64,19 @@ class PoseStamper:
         Ranges dropped because they lie beyond the window of their firing.
     excess_echoes
         Firings dropped because the ring sends many more than its pattern has.
-    jumps
-        Jumps of the odometry that were removed.
-    origin
-        The origin of the poses passed on, in the robot's own odometry; the identity until that jumps.
     """
 
     def __init__(self, sensors: int, body: BodyConfig) -> None:
         self.late_echoes = 0
         self.out_of_window = 0
         self.excess_echoes = 0
-        self.jumps = 0
-        self.origin = _IDENTITY
         self._sensors = sensors
-        self._body = body
+        self._jumps = OdometryJumps(body)
         self._clock = RobotClock()
         self._history = OdometryHistory(_HISTORY_MIN)
         self._gap_max_s = _GAP_MIN_S
         self._held: deque[tuple[int, Floats]] = deque()
         self._last_firing_us: int | None = None
-        self._last: Odometry | None = None
-        self._steady = 0
-        self._ring_offset = 0.0
         self._window = WINDOW_MAX
         self._firing_limit = TokenBucket(math.inf, math.inf)
         self._step_period_ms: int | None = None
@@ -116,6 +97,16 @@ class PoseStamper:
         if step_period_ms != self._step_period_ms:
             self._step_period_ms = step_period_ms
             self._firing_limit = TokenBucket(1e3 * _FIRINGS_SHARE / max(step_period_ms, 1), _FIRINGS_BURST)
+
+    @property
+    def jumps(self) -> int:
+        """Number of jumps of the odometry that were removed."""
+        return self._jumps.count
+
+    @property
+    def origin(self) -> Pose:
+        """The origin of the poses passed on, in the robot's own odometry; the identity until that jumps."""
+        return self._jumps.origin
 
     @property
     def clock_error(self) -> float | None:
@@ -142,8 +133,7 @@ class PoseStamper:
         """Discard all state: the robot's clock and odometry restarted at zero."""
         self._clock.restart()
         self._last_firing_us = None
-        self._last, self._steady = None, 0
-        self.origin, self._ring_offset = _IDENTITY, 0.0
+        self._jumps.restart()
         self.break_off()
 
     def break_off(self) -> None:
@@ -167,52 +157,13 @@ class PoseStamper:
             # No reason to stop: objects seem nearer than they are, and an emulator on a busy machine is slow as well.
             self.note(diagnostics.wrong_clock_rate(self._clock.rate_error))
         reported = odometry_of(odom, t_us)
-        sample = self._from_origin(reported)
-        newest = self._history.newest
-        if newest is not None:
-            moved_m = math.hypot(sample.pose.x - newest.pose.x, sample.pose.y - newest.pose.y)
-            if moved_m > _RESET_M + _RESET_M_S * (sample.robot_s - newest.robot_s):
-                return Jump.AHEAD
-        sample = self._without_jump(reported, sample)
+        if len(self._history) and self._jumps.is_reset(reported):
+            return Jump.AHEAD
+        sample, note = self._jumps.remove(reported)
+        if note is not None:
+            self.note(note)
         self._history.add(sample)
-        self._last = sample
         return sample
-
-    def _from_origin(self, reported: Odometry) -> Odometry:
-        if self.origin == _IDENTITY and self._ring_offset == 0.0:
-            return reported
-        pose = self.origin.inverse().compose(reported.pose)
-        return replace(reported, pose=pose, ring_yaw=reported.ring_yaw + self._ring_offset)
-
-    def _without_jump(self, reported: Odometry, sample: Odometry) -> Odometry:
-        """Return `sample`, or the prediction from the wheels' speeds if they differ by a jump; then move `origin`.
-
-        A base may move otherwise than it says, as in steps; but none moves as far as after a reset of its odometry.
-        """
-        last = self._last
-        if last is None:
-            return sample
-        dt_s = sample.robot_s - last.robot_s
-        v, w = 0.5 * (last.twist.v + sample.twist.v), 0.5 * (last.twist.w + sample.twist.w)
-        expected = last.pose.compose(se2.exp(v * dt_s, 0.0, w * dt_s))
-        ring_yaw = last.ring_yaw if self._body.synchro else last.ring_yaw + w * dt_s
-        off_m = math.hypot(sample.pose.x - expected.x, sample.pose.y - expected.y)
-        turned = sample.pose.theta - expected.theta
-        off_rad = max(abs(turned), abs(sample.ring_yaw - ring_yaw))
-        limits = self._body
-        if off_m <= _JUMP_M + limits.speed_max_m_s * dt_s and off_rad <= _JUMP_RAD + limits.turn_max_rad_s * dt_s:
-            self._steady += 1
-            return sample
-        steady, self._steady = self._steady, 0
-        if steady < _STEADY_SAMPLES and off_m <= _RESET_M + _RESET_M_S * dt_s:
-            return sample
-        self.jumps += 1
-        self._notes.append(
-            diagnostics.odometry_jump(off_m, wrap_angle(turned), wrap_angle(sample.ring_yaw - ring_yaw))
-        )
-        self.origin = reported.pose.compose(expected.inverse())
-        self._ring_offset = ring_yaw - reported.ring_yaw
-        return replace(reported, pose=expected, ring_yaw=ring_yaw)
 
     def echo(self, echo: Echo | Echo2, unit_m: float = TENTH_FT_M) -> None:
         """Take an echo frame, whose counts are of `unit_m`; `firings` returns it as soon as its pose is known.

@@ -55,8 +55,14 @@ class Connection(NamedTuple):
                 raise UserError(lost or driver.problem or no_answer, FAILED)
             await asyncio.sleep(POLL_S)
 
-    async def halt(self) -> bool:
-        """Halt the base and wait until it has stopped; return whether it has confirmed that."""
+    async def shut_down(self) -> bool:
+        """Halt the base and end the session; return whether the base confirmed that it stopped."""
+        is_confirmed = await self._halt()
+        self.driver.end_session()
+        self.send()
+        return is_confirmed
+
+    async def _halt(self) -> bool:
         self.driver.halt()
         deadline_run_s = self.clock() + HALT_MAX_S
         while self.link.is_open and self.clock() < deadline_run_s:

@@ -361,10 +361,10 @@ class RobotProcess:
 
     def _send(self) -> None:
         """Send the bytes that the driver has to send."""
-        if self._link.is_open and (data := self._driver.outgoing(writable=self._link.writable)):
-            is_sent = self._link.send(data)
-            if is_sent and self._observers.on_bytes is not None:
-                self._observers.on_bytes("out", *self._clock.both(), data)
+        link, on_bytes = self._link, self._observers.on_bytes
+        link.set_baud(self._driver.line_baud)
+        if link.is_open and (data := self._driver.outgoing(writable=link.writable)) and link.send(data) and on_bytes:
+            on_bytes("out", *self._clock.both(), data)
 
     def _halt(self) -> None:
         """Send HALT now, whatever else is in progress; on a lost line, as soon as it is open again."""
@@ -394,7 +394,7 @@ class RobotProcess:
         self._clock.release()
         self.health.begin_shutdown()
         self._notifier.stopping()
-        if not await self._connection.halt():
+        if not await self._connection.shut_down():
             self._log.warning("the base did not confirm the halt: if it moves, stop it by its emergency switch")
         link_task.cancel()
         await asyncio.gather(link_task, return_exceptions=True)

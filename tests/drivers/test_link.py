@@ -6,6 +6,7 @@ import asyncio
 import math
 import os
 import select
+import termios
 import threading
 from itertools import pairwise
 from pathlib import Path
@@ -44,6 +45,21 @@ async def test_bytes_go_both_ways(pty: PtyPair) -> None:
         assert got == b"\0\x11\x13\n\r\xff"
     assert await soon(host.closed) == "closed by this program"
     assert host.opened.empty()
+
+
+async def test_the_speed_changes_while_the_line_is_open(pty: PtyPair) -> None:
+    host = Host()
+    link = host.link(pty.path, baud=9600)
+    link.set_baud(38400)
+    async with running(link):
+        await soon(host.opened)
+        assert termios.tcgetattr(pty.slave)[4] == termios.B9600
+        for baud, code in ((38400, termios.B38400), (None, termios.B9600)):
+            link.set_baud(baud)
+            assert termios.tcgetattr(pty.slave)[4] == code
+        assert link.is_open
+        link.set_baud(2**40)
+        assert "cannot be set to 1099511627776 baud" in await soon(host.closed)
 
 
 @pytest.mark.promise("P1")

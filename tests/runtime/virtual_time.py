@@ -92,6 +92,8 @@ class MemoryLink:
         self._robot.receive(data)
         return True
 
+    def set_baud(self, baud: int | None) -> None: ...
+
     def hold(self, seconds: float) -> None:
         self._held_until_s = self._loop.time() + seconds
 

@@ -58,7 +58,7 @@ def test_a_flood_of_odometry_keeps_a_bounded_history(harness: DriverHarness) -> 
         t_us += 10
         harness.odom(t_us)
     assert harness.state() is LineState.READY
-    assert len(harness.robot._stamper._history) <= 4096
+    assert len(harness.robot.stamper._history) <= 4096
     assert harness.robot.take_received().odometry is not None
 
 
@@ -70,7 +70,7 @@ def test_any_claimed_odometry_period_keeps_a_bounded_history(period_ms: int) -> 
     harness.handshake()
     for k in range(4200 if period_ms == 0 else 100):
         harness.odom(1000 * k)
-    assert 64 <= len(harness.robot._stamper._history) <= 4096
+    assert 64 <= len(harness.robot.stamper._history) <= 4096
 
 
 def drive_with_clock(harness: DriverHarness, speed: float, seconds: float) -> tuple[float | None, list[str]]:
@@ -159,7 +159,7 @@ def test_a_clock_that_runs_backwards_is_a_restart_each_time(harness: DriverHarne
         heard = harness.robot.take_received()
         rebooted, passed = rebooted + heard.rebooted, passed + len(heard.firings)
     assert rebooted >= 30
-    assert harness.robot.late_echoes + passed <= 100
+    assert harness.robot.stamper.late_echoes + passed <= 100
 
 
 def pose_leaps(harness: DriverHarness, every: int) -> tuple[float, list[str]]:
@@ -311,8 +311,8 @@ def test_random_frames_never_drive_it_nor_grow_the_driver(measured: Callable[[st
         robot = harness.robot
         assert len(robot._commands) <= 4
         assert robot.firings_waiting <= 1024
-        assert len(robot._stamper._held) <= 64
-        assert len(robot._stamper._history) <= 4096
+        assert len(robot.stamper._held) <= 64
+        assert len(robot.stamper._history) <= 4096
         if rng.random() < 0.1:
             heard = robot.take_received()
             assert len(heard.notes) <= 16

@@ -37,6 +37,7 @@ class PlainDriver:
     problem: str | None = None
     identity: Identity | None = None
     counts = LinkCounts()
+    line_baud: int | None = None
 
     def line_opened(self, run_s: float) -> None:
         self.log.append((run_s, "opened"))
@@ -59,6 +60,8 @@ class PlainDriver:
     def release(self) -> None: ...
 
     def set_firing(self, ring: RingConfig) -> None: ...
+
+    def end_session(self) -> None: ...
 
     def outgoing(self, *, writable: bool) -> bytes:
         assert writable

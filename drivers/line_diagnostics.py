@@ -1,0 +1,64 @@
+"""Messages about faults that a robot of any family may have: what happened, likely cause, next action."""
+
+from __future__ import annotations
+
+from config.robot import LinkConfig
+
+_NOISE_MIN = 3
+"""Fewest corrupt frames that count as noise; one or two are normal where a line starts or ends."""
+
+
+def deadman_refused(name: str, deadman_s: float, link: LinkConfig) -> str | None:
+    """Return the message for a base whose deadman the robot file does not allow; None if it does.
+
+    Parameters
+    ----------
+    name
+        The robot's.
+    deadman_s
+        How long the base drives on without a command.
+    link
+        The limits.
+    """
+    if link.deadman_min_s <= deadman_s <= link.deadman_max_s:
+        return None
+    return (
+        f"the base of the robot '{name}' stops by itself {deadman_s:g} s after the last command, and the "
+        f"robot file allows {link.deadman_min_s:g} to {link.deadman_max_s:g} s; correct the deadman in the "
+        f"base's configuration, or link.deadman_min_s and link.deadman_max_s"
+    )
+
+
+def silence(silent_s: float, *, others: bool, bad: int) -> str:
+    """Return the message for missing odometry.
+
+    Parameters
+    ----------
+    silent_s
+        For how long it has been missing.
+    others
+        Whether frames of other kinds are still received.
+    bad
+        Corrupt frames received since the last odometry.
+    """
+    if (noisy := noise(bad, "it")) is not None:
+        return f"no odometry for {silent_s:.2f} s, {noisy}; the connection is restored as soon as frames are valid"
+    if others:
+        return (
+            f"no odometry for {silent_s:.2f} s although the robot sends other frames; its base has stopped working: "
+            f"restart the robot"
+        )
+    return (
+        f"nothing received for {silent_s:.2f} s; the robot is off or restarting, or its cable is loose: check its "
+        f"power and cable; the connection is restored as soon as it answers"
+    )
+
+
+def noise(bad: int, what: str) -> str | None:
+    """Return the message for corrupt frames received in place of `what`; None if they are too few to matter."""
+    if bad < _NOISE_MIN:
+        return None
+    return (
+        f"{bad} corrupt frames came in place of {what}: noise on the line, check its cable and shield, and that "
+        f"nothing else sends on it"
+    )
