@@ -92,6 +92,10 @@ class OdometryConfig(Strict):
     """Reported distance over true distance."""
     heading_rad_per_sqrt_m: float = Field(default=0.0, ge=0.0, le=1.0)
     """Standard deviation of the heading's random walk, rad per √m travelled."""
+    turn_scale: float = Field(default=1.0, ge=0.5, le=1.5)
+    """Reported turn over true turn: a differential base's wheels stand farther apart than assumed if above 1."""
+    veer_rad_per_m: float = Field(default=0.0, ge=-1.0, le=1.0)
+    """Turn reported on a straight way, rad/m: a differential base's wheels differ in size."""
 
 
 class WorldConfig(Strict):

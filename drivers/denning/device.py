@@ -25,27 +25,22 @@ from drivers.denning.wire_units import emulated_version
 from drivers.driver import DriverError
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.body import BRAKE_S, RAMP_S, Body
-from drivers.emulator.fault_schedule import FaultSchedule, flip_bits
+from drivers.emulator.fault_schedule import FaultSchedule
 from drivers.emulator.faults import (
-    BitErrors,
     BlockedWheels,
     Bumper,
     Deadman,
-    Deaf,
     Fault,
-    Garbage,
     IgnoredHalt,
     MotorFault,
-    Mute,
     OdometryJump,
     Reboot,
     Runaway,
-    Unplug,
 )
+from drivers.emulator.faulty_line import FaultyLine
 from drivers.emulator.robot_device import GroundTruth
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
-from drivers.emulator.uart import Uart
 from drivers.messages import Flags, Pose, Twist
 
 DEADMAN_MS = 500
@@ -106,18 +101,17 @@ class DenningDevice:
             raise DriverError(f"the ring has {self._sensors} sensors: the protocol supports at most {sensors_max}")
         seeds = np.random.SeedSequence(seed).spawn(6)
         sonar_rng, drift_rng, self._boot_rng, *noises = map(np.random.default_rng, seeds)
-        self._output_rng, self._input_rng, outlier_rng = noises
+        *line_rngs, outlier_rng = noises
         self._ring_radius_mm = round(1000.0 * max(math.hypot(m.x_m, m.y_m) for m in mounts))
         scene = compile_scene(world)
         start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
         self._body = Body(robot.body, scene, start, world.odometry, drift_rng)
         sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
         self._newest = emulated_version(robot)
-        self._uart = Uart(robot.link.baud)
-        self._outbox = bytearray()
         self._now_us = self._moved_us = 0
         self._next_event_us: int | None = None  # None once something may have changed it
         self._faults = FaultSchedule(faults)
+        self._line = FaultyLine(robot.link.baud, self._faults, *line_rngs)
         self._reporter = EchoReporter(robot.ring, sonar, self._faults, outlier_rng)
         self._deadman_ms = DEADMAN_MS
         self._boot_id = self._new_boot_id()
@@ -145,12 +139,12 @@ class DenningDevice:
     @property
     def plugged(self) -> bool:
         """False while the line is unplugged."""
-        return not self._faults.has(Unplug)
+        return self._line.plugged
 
     @property
     def dropped(self) -> int:
         """Number of frames that did not fit into the transmitter's queue."""
-        return self._uart.dropped
+        return self._line.dropped
 
     def advance(self, to_s: float) -> bytes:
         """Simulate up to `to_s` seconds after the start and return the bytes that have left the robot by then."""
@@ -162,12 +156,8 @@ class DenningDevice:
             if not self._faults.has(Reboot):
                 self._handle_events()
         self._now_us, self._next_event_us = max(self._now_us, to_us), at_us
-        self._collect()
-        if not self._outbox:
-            return b""
-        left = bytes(self._outbox)
-        self._outbox.clear()
-        return left
+        self._line.collect(self._now_us)
+        return self._line.take()
 
     def frame_counter(self) -> WireFrameCounter:
         """Return a new counter of this protocol's echoes and drive commands, for a line that is in use already."""
@@ -175,11 +165,9 @@ class DenningDevice:
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the host, at the time to which the robot has advanced."""
-        if not data or not self.plugged or self._faults.has(Deaf) or self._faults.has(Reboot):
+        if not data or self._faults.has(Reboot) or not (data := self._line.heard(data)):
             return
         self._next_event_us = None
-        for bit_errors in self._faults.all(BitErrors):
-            data = flip_bits(data, bit_errors.rate, self._input_rng)
         for frame in self._decoder.feed(data):
             self._move()
             self._obey(frame)
@@ -300,10 +288,7 @@ class DenningDevice:
         if self._odometry_us <= now:
             self._report_odometry()
             self._odometry_us += 1000 * ODOMETRY_PERIOD_MS
-        for garbage in self._faults.all(Garbage):
-            if now % TICK_US == 0:
-                count = max(1, round(garbage.bytes_per_s * TICK_US * 1e-6))
-                self._transmit(self._output_rng.bytes(count))
+        self._line.add_garbage(now, TICK_US)
 
     def _report_odometry(self) -> None:
         body = self._body
@@ -329,7 +314,7 @@ class DenningDevice:
         if self._faults.next_us is None:
             return
         for begins, fault in self._faults.due(self._now_us):
-            self._collect()
+            self._line.collect(self._now_us)
             self._faults.set_active(fault, on=begins)
             if begins:
                 self._start_fault(fault)
@@ -358,7 +343,7 @@ class DenningDevice:
         self._decoder = Decoder("host")
         self._version = 1
         self._seq = 0
-        self._uart.clear()
+        self._line.clear()
         self._echoes = deque()
         self._rotation = Rotation()
         self._flags = Flags.NONE
@@ -380,17 +365,4 @@ class DenningDevice:
         """Queue `frame` with the next sequence number, which counts as used even if the frame is lost."""
         data = encode(frame, self._seq)
         self._seq = (self._seq + 1) % 256
-        for bit_errors in self._faults.all(BitErrors):
-            data = flip_bits(data, bit_errors.rate, self._output_rng)
-        self._transmit(data)
-
-    def _transmit(self, data: bytes) -> None:
-        self._collect()
-        if not self._faults.has(Mute):
-            self._uart.send(data, self._now_us)
-
-    def _collect(self) -> None:
-        """Collect what has left the transmitter; bytes sent into an unplugged line are lost."""
-        left = self._uart.take(self._now_us)
-        if left and self.plugged:
-            self._outbox += left
+        self._line.send(data, self._now_us)

@@ -81,6 +81,8 @@ class Body:
         The true pose, in world coordinates; angles are unwrapped.
     odometry_pose, odometry_ring_yaw
         The odometry.
+    odometry_m
+        The way of the wheels by odometry, m; backwards counts below zero.
     twist
         The wheels' velocity.
     contacts
@@ -98,6 +100,7 @@ class Body:
         self.ring_yaw = start.theta
         self.odometry_pose = Pose(0.0, 0.0, 0.0)
         self.odometry_ring_yaw = 0.0
+        self.odometry_m = 0.0
         self.twist = Twist(0.0, 0.0)
         self.contacts = 0
         self._last_clearance: tuple[Pose, float] | None = None
@@ -129,7 +132,14 @@ class Body:
         self.odometry_pose = Pose(old.x + dx_m, old.y + dy_m, old.theta + dheading_rad)
         self.odometry_ring_yaw += dheading_rad
 
-    def step(self, dt_s: float, target: Twist, *, within_s: float | None = None) -> bool:
+    def step(
+        self,
+        dt_s: float,
+        target: Twist,
+        *,
+        within_s: float | None = None,
+        rates: tuple[float, float] | None = None,
+    ) -> bool:
         """Move the base for `dt_s` and return whether its rim touched a surface.
 
         A contact stops the wheels at once, at the surface. From there the body can move away; any motion towards the
@@ -143,9 +153,12 @@ class Body:
             The velocity the wheels accelerate towards.
         within_s
             Time in which the wheels change by their full speed, even if the limits on acceleration are lower.
+        rates
+            Acceleration, m/s², and angular acceleration, rad/s², that the base's firmware has been set to; those of
+            the robot file if not given.
         """
         limits = self._config
-        rate, turn_rate = limits.acceleration_max_m_s2, limits.turn_acceleration_max_rad_s2
+        rate, turn_rate = rates or (limits.acceleration_max_m_s2, limits.turn_acceleration_max_rad_s2)
         if within_s is not None:
             rate = max(rate, limits.speed_max_m_s / within_s)
             turn_rate = max(turn_rate, limits.turn_max_rad_s / within_s)
@@ -202,10 +215,13 @@ class Body:
             distance, turn = share * distance, share * turn
             end = arc(self.pose, distance, turn)
         self.pose = end
-        drift = self._odometry_errors.heading_rad_per_sqrt_m
+        errors = self._odometry_errors
+        drift = errors.heading_rad_per_sqrt_m
         wander = drift * math.sqrt(abs(distance)) * self._rng.standard_normal() if drift > 0.0 else 0.0
-        self.odometry_pose = arc(self.odometry_pose, self._odometry_errors.scale * distance, turn + wander)
+        counted = errors.turn_scale * turn + errors.veer_rad_per_m * distance + wander
+        self.odometry_pose = arc(self.odometry_pose, errors.scale * distance, counted)
+        self.odometry_m += errors.scale * distance
         if not self._config.synchro:
             self.ring_yaw += turn
-            self.odometry_ring_yaw += turn + wander
+            self.odometry_ring_yaw += counted
         return share

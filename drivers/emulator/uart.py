@@ -53,6 +53,12 @@ class Uart:
         self._left_bytes += count
         return taken
 
+    def set_baud(self, baud: int, now_us: int) -> None:
+        """Change the speed at `now_us`, from the byte on that is being sent; call `take` before."""
+        self._start_us = max(now_us, self._leaves_us(self._left_bytes))
+        self._left_bytes = 0
+        self._baud = baud
+
     def clear(self) -> None:
         """Drop the bytes that have not left."""
         self._queue.clear()

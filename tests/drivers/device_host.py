@@ -46,8 +46,8 @@ WORLD = WorldConfig(
 def next_event_s(robot: DenningDevice) -> float:
     """Return when `advance` will next have something to do."""
     moments = [robot._next_us()]
-    if robot._uart.empty_us is not None:
-        moments.append(robot._uart.empty_us)
+    if robot._line.empty_us is not None:
+        moments.append(robot._line.empty_us)
     return min(moments) * 1e-6
 
 

@@ -210,3 +210,21 @@ def test_reset_and_jump_touch_the_odometry_only() -> None:
     body.jump_odometry(1.0, -2.0, 0.5)
     assert body.odometry_pose == Pose(1.0, -2.0, 0.5)
     assert body.pose == truth
+
+
+def test_a_differential_base_miscounts_turns_and_veers_on_a_straight_way() -> None:
+    body = make(odometry={"turn_scale": 1.05, "veer_rad_per_m": -0.02, "scale": 1.1}, synchro=False)
+    run(body, 1.0, Twist(0.0, 1.0))
+    assert body.odometry_pose.theta == pytest.approx(1.05 * body.pose.theta)
+    before = body.odometry_pose.theta - 1.05 * body.pose.theta
+    run(body, 3.0, Twist(0.5, 0.0))
+    way_m = body.odometry_m / 1.1
+    assert body.odometry_pose.theta - 1.05 * body.pose.theta == pytest.approx(before - 0.02 * way_m)
+    assert body.odometry_ring_yaw == body.odometry_pose.theta
+
+
+def test_the_firmware_can_set_the_ramps() -> None:
+    body = make()
+    for _ in range(100):
+        body.step(DT, Twist(1.0, 2.0), rates=(1.2, 3.0))
+    assert (body.twist.v, body.twist.w) == pytest.approx((0.6, 1.5))

@@ -1,0 +1,390 @@
+"""The emulated Pioneer: the robot's side of the protocol, without I/O and in its own time.
+
+It behaves as firmware does and not as the simulators do: motors are off until ENABLE, the watchdog stops the base,
+each SIP holds only the ranges measured since the last one, and nothing is sent before OPEN.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from enum import Enum
+
+import numpy as np
+
+from config.robot import SOUND_SPEED_M_S, RobotConfig
+from config.world import WorldConfig
+from drivers.arcos.codec import Decoder, decode_command, encode
+from drivers.arcos.commands import Command, CommandNumber
+from drivers.arcos.device_motion import STILL, MotionServo
+from drivers.arcos.device_packets import SONAR_MAX, RequestedPackets, make_sip
+from drivers.arcos.device_sonar import SonarArrays
+from drivers.arcos.device_touch import Touch
+from drivers.arcos.firmware import Firmware
+from drivers.arcos.frames import BAUDS, NO_ECHO_MM, Packet, ResetNotice, RobotName, SonarReading, SyncEcho
+from drivers.arcos.wire_frame_counter import WireFrameCounter
+from drivers.driver import DriverError
+from drivers.emulator.acoustics import clearance
+from drivers.emulator.body import BRAKE_S, Body
+from drivers.emulator.fault_schedule import FaultSchedule
+from drivers.emulator.faults import (
+    BlockedWheels,
+    Bumper,
+    Deadman,
+    Fault,
+    IgnoredHalt,
+    MotorFault,
+    OdometryJump,
+    Outliers,
+    Reboot,
+    Runaway,
+    StuckSensor,
+)
+from drivers.emulator.faulty_line import FaultyLine
+from drivers.emulator.robot_device import GroundTruth
+from drivers.emulator.scene import compile_scene
+from drivers.emulator.sonar import Sonar
+from drivers.messages import Flags, Pose, Twist
+
+TICK_US = 5_000
+"""Longest step of the body's simulation, µs."""
+STALL_US = 200_000
+"""The wheels are let go for this long after a stall, µs."""
+BATTERY_FULL, BATTERY_LOW = 126, 110
+"""The battery, 0.1 V, and where it is called low."""
+
+
+class Session(Enum):
+    """The state of the connection: three synchronising packets lead from one to the next."""
+
+    WAIT = "wait"
+    READY = "ready"
+    OPENED = "opened"
+
+
+class ArcosDevice:
+    """A `drivers.emulator.robot_device.RobotDevice` that speaks the protocol of the Pioneer family.
+
+    Parameters
+    ----------
+    robot, world
+        What the robot is, and what surrounds it.
+    firmware
+        Its names, factors and flash settings.
+    seed
+        Seed of all random numbers.
+    faults
+        What goes wrong, and when.
+
+    Raises
+    ------
+    DriverError
+        The robot file describes a synchro drive.
+    """
+
+    # Reset by a restart; see `_boot`.
+    _decoder: Decoder[Command]
+    _session: Session
+    _servo: MotionServo
+    _arrays: SonarArrays
+    _requested: RequestedPackets
+    _readings: list[tuple[int, SonarReading]]
+    _sip_us: int | None
+    _watchdog_us: int
+    _tripped: bool
+    _battery: int
+
+    def __init__(
+        self, robot: RobotConfig, world: WorldConfig, firmware: Firmware, seed: int, faults: Sequence[Fault] = ()
+    ) -> None:
+        if robot.body.synchro:
+            raise DriverError("a Pioneer's body turns with its wheels: set body.synchro = false")
+        seeds = np.random.SeedSequence(seed).spawn(5)
+        sonar_rng, drift_rng, self._outlier_rng, *line_rngs = map(np.random.default_rng, seeds)
+        self._firmware = firmware
+        scene = compile_scene(world)
+        start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
+        self._body = Body(robot.body, scene, start, world.odometry, drift_rng)
+        self._sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
+        self._window_m = min(robot.ring.window_m, 1e-3 * NO_ECHO_MM)
+        self._touch = Touch(firmware, scene, robot.body.radius_m)
+        self._now_us = self._moved_us = 0
+        self._next_event_us: int | None = None  # None once something may have changed it
+        self._faults = FaultSchedule(faults)
+        self._line = FaultyLine(firmware.baud, self._faults, *line_rngs)
+        self._watchdog_ms = firmware.watchdog_ms
+        self._driven = STILL
+        self._stalled_until_us = 0
+        self._boot()
+        # Load the compiled kernels now, so that the first firing is not late.
+        clearance(start.x, start.y, scene.circles, scene.segments)
+        self._sonar.true_echoes(start, start.theta, np.zeros(len(robot.ring.mounts), dtype=np.bool_))
+
+    @property
+    def truth(self) -> GroundTruth:
+        """The true state at the last event."""
+        body = self._body
+        return GroundTruth(self._moved_us * 1e-6, body.pose, body.ring_yaw, body.twist, self.flags, body.contacts)
+
+    @property
+    def flags(self) -> Flags:
+        """The base's status; motors that are off count as latched."""
+        front, rear, stalled = self._touched()
+        status = {
+            Flags.LATCHED: not self._servo.enabled,
+            Flags.BUMPER: bool(front or rear),
+            Flags.MOTOR_FAULT: stalled,
+            Flags.DEADMAN: self._tripped,
+            Flags.BATTERY_LOW: self._battery <= BATTERY_LOW,
+        }
+        return Flags(sum(flag for flag, is_set in status.items() if is_set))
+
+    @property
+    def plugged(self) -> bool:
+        """False while the line is unplugged."""
+        return self._line.plugged
+
+    @property
+    def dropped(self) -> int:
+        """Number of packets that did not fit into the transmitter's queue."""
+        return self._line.dropped
+
+    def advance(self, to_s: float) -> bytes:
+        """Simulate up to `to_s` seconds after the start and return the bytes that have left the robot by then."""
+        to_us = round(to_s * 1e6)
+        while (at_us := self._next_us() if self._next_event_us is None else self._next_event_us) <= to_us:
+            self._now_us, self._next_event_us = at_us, None
+            self._move()
+            self._update_faults()
+            if not self._faults.has(Reboot):
+                self._handle_events()
+        self._now_us, self._next_event_us = max(self._now_us, to_us), at_us
+        self._line.collect(self._now_us)
+        return self._line.take()
+
+    def frame_counter(self) -> WireFrameCounter:
+        """Return a new counter of this protocol's ranges and velocities, for a line that is in use already."""
+        return WireFrameCounter()
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes from the host, at the time to which the robot has advanced."""
+        if not data or self._faults.has(Reboot) or not (data := self._line.heard(data)):
+            return
+        self._next_event_us = None
+        for command in self._decoder.feed(data):
+            self._move()
+            self._watchdog_us = self._now_us + 1000 * self._watchdog_ms
+            self._tripped = False
+            self._take(command)
+
+    # Commands of the host.
+
+    def _take(self, command: Command) -> None:
+        """Obey a command as the state of the connection has it: in READY, OPEN has the bytes of SYNC1."""
+        if self._session is Session.OPENED:
+            self._obey(command)
+        elif command.number == CommandNumber.OPEN and self._session is Session.READY:
+            self._open()
+        elif command.argument is None and command.number in (0, 1):
+            self._session = Session.WAIT
+            self._send(SyncEcho(command.number))
+        elif command.argument is None and command.number == 2:
+            self._session = Session.READY
+            self._send(RobotName(self._firmware.name, self._firmware.class_name, self._firmware.subclass))
+
+    def _open(self) -> None:
+        self._session = Session.OPENED
+        self._body.reset_odometry()
+        self._arrays = SonarArrays(self._firmware.sensor_numbers, self._arrays.cycle_us // 1000)
+        self._arrays.start(self._now_us)
+        self._readings.clear()
+        self._requested = RequestedPackets()
+        self._sip_us = self._now_us + 1000 * self._firmware.sip_cycle_ms
+
+    def _close(self) -> None:
+        self._session = Session.WAIT
+        self._sip_us = None
+        self._servo.enable(on=False)
+        self._arrays = SonarArrays(self._firmware.sensor_numbers, self._arrays.cycle_us // 1000)
+        self._line.set_baud(self._firmware.baud, self._now_us)
+
+    def _obey(self, command: Command) -> None:
+        heading = self._body.odometry_pose.theta
+        refused = command.number == CommandNumber.ENABLE and self._faults.has(MotorFault)
+        if refused or self._servo.obey(command, heading) or self._requested.obey(command):
+            return
+        match command.number:
+            case CommandNumber.CLOSE:
+                self._close()
+            case CommandNumber.POLLING:
+                self._arrays.poll(command.argument if isinstance(command.argument, bytes) else b"")
+            case CommandNumber.SONAR:
+                self._arrays.switch(command.value)
+            case CommandNumber.SONARCYCLE:
+                self._arrays.set_cycle(command.value)
+            case CommandNumber.SETO:
+                self._servo.shift_heading(-heading)
+                self._body.reset_odometry()
+            case CommandNumber.BUMPSTALL:
+                self._touch.stalls_at = command.value
+            case CommandNumber.HOSTBAUD if 0 <= command.value < len(BAUDS):
+                self._line.set_baud(BAUDS[command.value], self._now_us)
+            case CommandNumber.CONFIG:
+                servo = self._servo
+                self._send(
+                    self._firmware.config_packet(servo.speed_mm_s, servo.turn_deg_s, self._watchdog_ms, servo.ramps)
+                )
+            case CommandNumber.BATTEST:
+                self._battery = command.value or BATTERY_FULL
+            case CommandNumber.RESET | CommandNumber.MAINTENANCE:
+                self._restart(0xFF if command.number == CommandNumber.RESET else 0xFE)
+
+    # Events.
+
+    def _next_us(self) -> int:
+        next_us = self._moved_us // TICK_US * TICK_US + TICK_US
+        others = [self._faults.next_us]
+        if self._session is Session.OPENED and not self._faults.has(Reboot):
+            others += [self._sip_us, self._arrays.next_us]
+            others += [None if self._tripped or not self._watchdog_ms else self._watchdog_us]
+        return max(self._now_us, min([next_us, *(other for other in others if other is not None)]))
+
+    def _move(self) -> None:
+        """Move the body up to the present event."""
+        dt_s = (self._now_us - self._moved_us) * 1e-6
+        if dt_s <= 0.0:
+            return
+        body, before = self._body, self._body.odometry_pose
+        target, rates = self._wheels()
+        within_s = BRAKE_S if rates is None else None
+        if body.step(dt_s, target, within_s=within_s, rates=rates):
+            self._stalled_until_us = self._now_us + STALL_US
+        self._moved_us = self._now_us
+        if body.odometry_pose is not before:
+            self._servo.moved(before, body.odometry_pose)
+
+    def _wheels(self) -> tuple[Twist, tuple[float, float] | None]:
+        """Return the velocity that the wheels accelerate towards, and the accelerations; None for a hard brake."""
+        faults, servo, twist = self._faults, self._servo, self._body.twist
+        if faults.has(Reboot) or faults.has(BlockedWheels) or faults.has(MotorFault):
+            return STILL, None
+        if self._moved_us < self._stalled_until_us:
+            return STILL, None
+        if not servo.enabled and not faults.has(IgnoredHalt):
+            return STILL, None
+        for runaway in faults.all(Runaway):
+            target = Twist(runaway.v_m_s, runaway.w_rad_s)
+            return target, servo.rates(target, twist)
+        target, rates = servo.target(self._body.odometry_pose.theta, twist)
+        if self._tripped:
+            target, rates = STILL, servo.rates(STILL, twist)
+        if faults.has(IgnoredHalt) and target == STILL:
+            return self._driven, servo.rates(self._driven, twist)
+        self._driven = target
+        front, rear, _ = self._touched()
+        if self._touch.blocks(target.v, front, rear):
+            return STILL, None
+        return target, rates
+
+    def _handle_events(self) -> None:
+        now = self._now_us
+        if self._session is Session.OPENED:
+            if self._watchdog_ms and now >= self._watchdog_us:
+                self._tripped = True
+            self._fire()
+            if self._sip_us is not None and self._sip_us <= now:
+                self._sip_us += 1000 * self._firmware.sip_cycle_ms
+                self._report()
+        self._line.add_garbage(now, TICK_US)
+
+    def _fire(self) -> None:
+        """Fire the discs that are due; their ranges are known at the end of the cycle."""
+        now, sensors = self._now_us, self._arrays.fire(self._now_us)
+        if not sensors:
+            return
+        window_m = min(self._window_m, 0.5e-6 * self._arrays.cycle_us * SOUND_SPEED_M_S)
+        ranges = self._sonar.fire(self._body.pose, self._body.ring_yaw, sensors, window_m)
+        for outliers in self._faults.all(Outliers):
+            wild = self._outlier_rng.random(len(ranges)) < outliers.share
+            ranges[wild] = self._outlier_rng.uniform(0.0, window_m, len(ranges))[wild]
+        stuck = {fault.sensor: fault.range_m for fault in self._faults.all(StuckSensor)}
+        for sensor in sensors:
+            range_m = stuck.get(sensor, float(ranges[sensor]))
+            if range_m is None:  # a disc that reports nothing
+                continue
+            raw = round(min(1e3 * range_m, NO_ECHO_MM) / self._firmware.mm_per_range)
+            number = self._firmware.sensor_numbers[sensor]
+            self._readings.append((now + self._arrays.cycle_us, SonarReading(number, min(raw, 0xFFFF))))
+
+    def _report(self) -> None:
+        """Send a SIP with the ranges heard since the last one, and the packets that go with it."""
+        front, rear, stalled = self._touched()
+        known = [reading for known_us, reading in self._readings if known_us <= self._now_us]
+        self._readings = [later for later in self._readings if later[0] > self._now_us]
+        sip = make_sip(
+            self._body, self._firmware, self._requested, front=front, rear=rear, stalled=stalled,
+            battery=self._battery, arrays=self._arrays.flags, sonar=known[-SONAR_MAX:],
+            motors=self._servo.enabled, heading_goal=self._servo.heading_goal,
+        )  # fmt: skip
+        for packet in (sip, *self._requested.due(self._body, self._firmware, front, rear)):
+            self._send(packet)
+
+    def _touched(self) -> tuple[int, int, bool]:
+        """Return the pressed segments of the front and rear bumper as bits from 1 on, and whether wheels stall."""
+        front, rear = self._touch.pressed(self._body.pose)
+        if self._faults.has(Bumper):
+            front |= self._touch.middle
+        blocked = self._touch.blocks(self._driven.v, front, rear)
+        stalled = self._now_us < self._stalled_until_us or self._faults.has(MotorFault) or blocked
+        return front, rear, stalled
+
+    # Faults.
+
+    def _update_faults(self) -> None:
+        """Start and end the faults whose time has come."""
+        if self._faults.next_us is None:
+            return
+        for begins, fault in self._faults.due(self._now_us):
+            self._line.collect(self._now_us)
+            self._faults.set_active(fault, on=begins)
+            if begins:
+                self._start_fault(fault)
+            elif isinstance(fault, Reboot) and not self._faults.has(Reboot):
+                self._restart(0xFF)
+
+    def _start_fault(self, fault: Fault) -> None:
+        match fault:
+            case Reboot():
+                self._boot()
+            case MotorFault():
+                self._servo.enable(on=False)
+            case Deadman():
+                self._watchdog_ms = fault.deadman_ms
+                self._watchdog_us = self._now_us + 1000 * self._watchdog_ms
+            case OdometryJump():
+                self._body.jump_odometry(fault.dx_m, fault.dy_m, fault.dheading_rad)
+
+    def _restart(self, notice: int) -> None:
+        """Start again as after the reset button, and say so."""
+        self._body.reset_odometry()
+        self._boot()
+        self._send(ResetNotice(notice))
+
+    def _boot(self) -> None:
+        """Start as after power-on, except for the body, which stays where it is."""
+        firmware = self._firmware
+        self._decoder = Decoder(decode_command)
+        self._session = Session.WAIT
+        self._servo = MotionServo(firmware)
+        self._arrays = SonarArrays(firmware.sensor_numbers, firmware.sonar_cycle_ms)
+        self._requested = RequestedPackets()
+        self._readings = []
+        self._sip_us = None
+        self._watchdog_us = self._now_us + 1000 * self._watchdog_ms
+        self._tripped = False
+        self._battery = BATTERY_FULL
+        self._line.clear()
+        self._line.set_baud(firmware.baud, self._now_us)
+
+    def _send(self, packet: Packet) -> None:
+        self._line.send(encode(packet), self._now_us)
