@@ -165,7 +165,7 @@ class Perception:
         self.sensor_monitor = SensorMonitor(ring)
         corrects = config.localization.correct_drift
         self.map_frame = MapFrame(ring, models) if corrects else None
-        """Corrects drift, where the settings say so; what `method` holds is in the map frame then."""
+        """Corrects drift, where the settings say so; what `method` holds is in the filter's frame then."""
         known_room = config.localization.known_room
         self.known_room = None if known_room is None else KnownRoom(room_of(known_room), ring)
         """Finds the robot in the room of the settings, where there is one."""
@@ -235,7 +235,7 @@ class Perception:
     def mapped_objects(self) -> tuple[DetectedObject, ...]:
         """Return the same objects in the map frame; without correction of drift that is odometry's."""
         seen = self.method.objects()
-        return seen if self.map_frame is None else self.map_frame.with_landmarks(seen)
+        return seen if self.map_frame is None else self.map_frame.in_map(seen)
 
     def localized(self) -> LocalizedPose | None:
         """Return where the robot was at the last firing in the map frame; None where that is odometry's."""
@@ -289,7 +289,7 @@ class Perception:
             refused = invalid_pose(edit.x, edit.y, edit.theta)
         if refused is not None:
             return refused
-        return self.method.edit(edit if self.map_frame is None else self.map_frame.edit_in_map(edit))
+        return self.method.edit(edit if self.map_frame is None else self.map_frame.edit_in_filter(edit))
 
     def _place_robot(self, edit: PlaceRobot) -> str | None:
         if self.known_room is None:

@@ -1,6 +1,7 @@
 """The map frame of perception: firings are entered at corrected poses, results are turned back to odometry's frame.
 
-What perception holds is in the map frame, so that drift does not smear it. Odometry's frame, in which the robot
+What perception holds is in the filter's frame, so that drift does not smear it; the map frame differs from that by a
+turn (`perception.localization.drift_correction`). Odometry's frame, in which the robot
 drives, stays continuous whatever is corrected: there, the objects move.
 """
 
@@ -57,14 +58,14 @@ class MapFrame:
         self.drift.reset()
 
     def follow(self, firing: Firing, objects: Sequence[DetectedObject]) -> Firing:
-        """Return a firing at its pose in the map frame.
+        """Return a firing at its pose in the filter's frame.
 
         Parameters
         ----------
         firing : Firing
             With its pose by odometry.
         objects : sequence of DetectedObject
-            Recognised near the robot before it, in the map frame.
+            Recognised near the robot before it, in the filter's frame.
         """
         self._near = {seen.number for seen in objects if seen.number is not None}
         self.drift.learn(
@@ -86,19 +87,24 @@ class MapFrame:
         """Return where the robot was at the last firing."""
         return self.drift.localized()
 
-    def with_landmarks(self, objects: Iterable[DetectedObject]) -> tuple[DetectedObject, ...]:
-        """Return objects in the map frame; those that are landmarks with the place that the filter gives them."""
+    def in_map(self, objects: Iterable[DetectedObject]) -> tuple[DetectedObject, ...]:
+        """Return objects of the filter's frame in the map frame."""
+        to = self.drift.map_from_filter()
+        return tuple(turned_object(to, seen) for seen in self._with_landmarks(objects))
+
+    def _with_landmarks(self, objects: Iterable[DetectedObject]) -> tuple[DetectedObject, ...]:
+        """Return objects, of which those that are landmarks with the place that the filter gives them."""
         places = self.drift.places()
         return tuple(_placed(seen, places.get(seen.number or 0)) for seen in objects)
 
     def objects_in_odometry(self, objects: Iterable[DetectedObject]) -> tuple[DetectedObject, ...]:
-        """Return objects of the map frame in odometry's frame."""
-        to = self.drift.odometry_from_map()
-        return tuple(turned_object(to, seen) for seen in self.with_landmarks(objects))
+        """Return objects of the filter's frame in odometry's frame."""
+        to = self.drift.odometry_from_filter()
+        return tuple(turned_object(to, seen) for seen in self._with_landmarks(objects))
 
     def segments_in_odometry(self, geometry: Floats) -> Floats:
-        """Return segments of the map frame in odometry's: ends x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""
-        to = self.drift.odometry_from_map()
+        """Return segments in odometry's frame: ends x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""
+        to = self.drift.odometry_from_filter()
         c, s = math.cos(to.theta), math.sin(to.theta)
         turned = geometry.copy()
         for x, y in ((0, 1), (2, 3)):
@@ -108,10 +114,10 @@ class MapFrame:
         return turned
 
     def evidence_in_odometry(self, evidence: Evidence | None) -> Evidence | None:
-        """Return the evidence for an object of the map frame in odometry's frame."""
+        """Return the evidence for an object of the filter's frame in odometry's frame."""
         if evidence is None:
             return None
-        to = self.drift.odometry_from_map()
+        to = self.drift.odometry_from_filter()
         arcs = [(arc, to.compose(Pose(arc.x, arc.y, arc.direction))) for arc in evidence.arcs]
         lines = [
             (line, to.compose(Pose(line.x1, line.y1, 0.0)), to.compose(Pose(line.x2, line.y2, 0.0)))
@@ -123,11 +129,11 @@ class MapFrame:
             lines=tuple(replace(line, x1=a.x, y1=a.y, x2=b.x, y2=b.y) for line, a, b in lines),
         )
 
-    def edit_in_map(self, edit: AnyEdit) -> AnyEdit:
-        """Return an operator's edit, whose places are in odometry's frame, in the map frame."""
+    def edit_in_filter(self, edit: AnyEdit) -> AnyEdit:
+        """Return an operator's edit, whose places are in odometry's frame, in the filter's frame."""
         if not isinstance(edit, PlaceModel | MoveObject):
             return edit
-        place = self.drift.odometry_from_map().inverse().compose(Pose(edit.x, edit.y, edit.theta))
+        place = self.drift.odometry_from_filter().inverse().compose(Pose(edit.x, edit.y, edit.theta))
         return replace(edit, x=place.x, y=place.y, theta=place.theta)
 
 

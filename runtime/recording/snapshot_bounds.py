@@ -36,6 +36,7 @@ from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED
 from perception.bayes.wall_records import IS_KNOWN, IS_TAKEN, MAX_WALLS, SPANS_MAX, WALL_BIN_M, WALL_BINS
 from perception.localization.known_room import IDLE, STATUSES, WEIGHING
 from perception.localization.landmark_state import LANDMARKS_MAX
+from perception.localization.map_heading import FIRST_FIRINGS
 from perception.localization.pose_grid import NONE as NO_QUANTUM
 from perception.localization.pose_grid import READINGS_MAX, STARTS_MAX
 from perception.localization.pose_particles import HYPOTHESES_MAX
@@ -79,7 +80,7 @@ UNHEARD: Final = "method.memory.state.sensors.last."
 
 _CONSTANTS: Final = (
     "_axes _mounts _half_angle _sensors _segments_min _reach_m sensor_monitor._neighbours "
-    "sensor_monitor._tolerance sensor_monitor._near state.sensor_count scratch.attracting_rows drift._ring"
+    "sensor_monitor._tolerance sensor_monitor._near state.sensor_count scratch.attracting_rows _tracker._ring"
 )
 CONSTANTS: Final = frozenset(_CONSTANTS.split())
 """Numbers that the settings give and no cycle changes."""
@@ -97,13 +98,14 @@ _COUNTS: Final = (
     "_sensors.readings "
     "room.firings room.recent_count rejection_count run_firing run_length segments_made segments_numbered "
     "sensors.kept members_sum _archive.circles.count _archive.polygons.count _numbered waiting "
-    "drift._arrived drift._entered drift._windows landmarks.failures landmarks.hits "
+    "drift._arrived _tracker.entered _tracker._windows landmarks.failures landmarks.hits "
     "_keyframes.count _keyframes._firings entered known_room._window_begin _grid._due _grid._searches"
 )
 _FLAGS: Final = (
     "_sets has_rested is_named has_gained refines_next is_confirmed has_challenger is_done is_crossed "
     "_is_due is_reported _circles_pending _polygons_pending _polygons_turn _placement_was_last _expected _heard "
-    "drift._has_started drift._is_synchro sensors.is_known _has_fired _is_started _has_stood"
+    "drift._has_started _tracker.is_synchro _map_heading._is_entering sensors.is_known _has_fired _is_started "
+    "_has_stood"
 )
 
 BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
@@ -121,10 +123,12 @@ BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
         "known_room.specular_share": SHARE,
         "known_room._stage": Bound(IDLE, WEIGHING),
         "known_room._status": Bound(0, len(STATUSES) - 1),
-        "_estimate.count": Bound(0, LANDMARKS_MAX),
-        "_estimate.noise": Bound(0.0, 1e3),
-        "_estimate.odometer_scale": SCALE,
-        "_estimate.range_scale": SCALE,
+        "_map_heading._kept": Bound(0, FIRST_FIRINGS),
+        "_map_heading._tracker.entered": Bound(0, FIRST_FIRINGS),
+        "_tracker.estimate.count": Bound(0, LANDMARKS_MAX),
+        "_tracker.estimate.noise": Bound(0.0, 1e3),
+        "_tracker.estimate.odometer_scale": SCALE,
+        "_tracker.estimate.range_scale": SCALE,
         "_extractor._sensors.count": Bound(0, READINGS_KEPT),
         "_extractor._sensors.newest": Bound(0, READINGS_KEPT - 1),
         "_left": QUANTA,

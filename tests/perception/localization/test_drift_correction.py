@@ -9,7 +9,7 @@ import pytest
 
 from config.load import load_settings
 from drivers.messages import Firing, Pose, wrap_angle
-from perception.localization import drift_correction
+from perception.localization import drift_correction, landmark_tracker
 from perception.localization.drift_correction import (
     CATCHING_UP,
     FAILURES_MAX,
@@ -84,7 +84,7 @@ def test_the_first_landmarks_share_an_error_of_the_heading() -> None:
     way = firing(39).pose.x
     for seen in SEEN:
         xx, _, yy = drift.places()[seen.number].covariance
-        shared = drift_correction.HEADING_WALK * way * ((seen.x - way) ** 2 + seen.y**2)
+        shared = landmark_tracker.HEADING_WALK * way * ((seen.x - way) ** 2 + seen.y**2)
         assert xx + yy == pytest.approx(2.0 * drift_correction.FIRST_SIGMA_M**2 + shared)
 
 
@@ -147,7 +147,7 @@ def test_while_no_echo_fits_odometry_is_trusted_less_and_the_robot_is_lost() -> 
     wide = drift.localized().covariance[0, 0]
     drift.observe(Firing(0.1, Pose(0.03, 0.0, 0.0), 0.0, np.full(len(MOUNTS), np.nan)))
     assert drift.localized().status == "lost"
-    assert drift.localized().covariance[0, 0] > wide + 0.9 * drift_correction.SLIP_M**2
+    assert drift.localized().covariance[0, 0] > wide + 0.9 * landmark_tracker.SLIP_M**2
 
 
 def test_firings_wait_no_longer_than_there_is_room() -> None:

@@ -132,9 +132,9 @@ def test_results_are_turned_into_odometrys_frame_and_edits_into_the_maps() -> No
     assert frame.segments_in_odometry(np.array([[1.0, 0.0, 0.0, 1.0, 0.2]]))[0] == pytest.approx(
         [1.0, 3.0, 0.0, 2.0, 0.2 + 0.5 * math.pi]
     )
-    edit = frame.edit_in_map(PlaceModel("drum", 1.0, 3.0, 0.0))
+    edit = frame.edit_in_filter(PlaceModel("drum", 1.0, 3.0, 0.0))
     assert (edit.x, edit.y, edit.theta) == pytest.approx((1.0, 0.0, -0.5 * math.pi))
-    assert frame.edit_in_map(ClearMap()) == ClearMap()
+    assert frame.edit_in_filter(ClearMap()) == ClearMap()
     evidence = Evidence(1, "drum", (Arc(1.0, 0.0, 0.0, None, 1.0),), (Line(1, 1.0, 0.0, 0.0, 1.0, supports=True),))
     found = frame.evidence_in_odometry(evidence)
     assert found is not None
