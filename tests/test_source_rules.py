@@ -61,6 +61,24 @@ WITHOUT_TEST: Final = MappingProxyType(
 
 TESTED_ELSEWHERE: Final = MappingProxyType(
     {
+        "tests/drivers/firmware runs them in the real MicroPython": (
+            "drivers/firmware/board/main.py",
+            "drivers/firmware/board/ring/base.py",
+            "drivers/firmware/board/ring/build.py",
+            "drivers/firmware/board/ring/clock.py",
+            "drivers/firmware/board/ring/firing.py",
+            "drivers/firmware/board/ring/i2c_sensors.py",
+            "drivers/firmware/board/ring/irq.py",
+            "drivers/firmware/board/ring/pio.py",
+            "drivers/firmware/board/ring/pulse_sensors.py",
+            "drivers/firmware/board/ring/robot.py",
+            "drivers/firmware/board/ring/uart_line.py",
+            "drivers/firmware/board/ring/usb_line.py",
+            "drivers/firmware/board/ring/wheel.py",
+            "drivers/firmware/board/ring/wire.py",
+            "drivers/firmware/board/robot_config_esp32.py",
+            "drivers/firmware/board/robot_config_pico.py",
+        ),
         "the scenes and oracles of tests/perception/bayes reach it": (
             "perception/bayes/alternatives.py",
             "perception/bayes/circle_posterior.py",

@@ -1,0 +1,135 @@
+"""The files that a board needs, and the robot file that matches its pins and geometry."""
+
+from __future__ import annotations
+
+import ast
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, Literal, TypeAlias
+
+from pydantic import ValidationError
+
+from config.errors import WRONG_CALL, UserError
+from config.robot import RobotConfig
+
+Board: TypeAlias = Literal["pico", "esp32"]
+CONFIG_NAME: Final = "robot_config.py"
+_SOURCES: Final = Path(__file__).parent / "board"
+_REPLY_TIMEOUT_S, _SPEED_SHARE = 0.1, 0.9
+"""Below the base's own limit, so that its control has something left."""
+
+
+class FirmwareError(UserError):
+    """The robot's configuration is wrong; the text says where and what to do."""
+
+    exit_code = WRONG_CALL
+
+
+def board_files(board: Board) -> dict[str, str]:
+    """Return the files of the firmware for a board, by their path on it."""
+    files = {CONFIG_NAME: (_SOURCES / f"robot_config_{board}.py").read_text("utf-8")}
+    for source in sorted([_SOURCES / "main.py", *(_SOURCES / "ring").glob("*.py")]):
+        files[source.relative_to(_SOURCES).as_posix()] = source.read_text("utf-8")
+    return files
+
+
+def read_config(text: str, place: str) -> dict[str, Any]:
+    """Return the values of a robot_config.py, which is read and not executed.
+
+    Raises
+    ------
+    FirmwareError
+        It is no Python, or a value is no constant.
+    """
+    values: dict[str, Any] = {}
+    try:
+        for statement in ast.parse(text).body:
+            match statement:
+                case ast.Assign(targets=[ast.Name(id=name)], value=value):
+                    values[name] = ast.literal_eval(value)
+                case ast.Expr(value=ast.Constant()):
+                    pass
+                case _:
+                    raise FirmwareError(
+                        f"{place}:{statement.lineno}: only NAME = value is understood; remove the line"
+                    )
+    except SyntaxError as error:
+        raise FirmwareError(f"{place}:{error.lineno}: {error.msg}; correct the line") from error
+    except ValueError as error:
+        raise FirmwareError(f"{place}: a value is no constant ({error}); write it out") from error
+    return values
+
+
+def robot_file(values: Mapping[str, Any], place: str) -> str:
+    """Return the text of the robot file for a board's configuration.
+
+    Parameters
+    ----------
+    values
+        As of `read_config`.
+    place
+        The configuration's file, for messages.
+
+    Raises
+    ------
+    FirmwareError
+        A value is missing or out of its range.
+    """
+    try:
+        text = _render(values)
+    except (KeyError, TypeError, ValueError) as error:
+        missing = f"{error.args[0]} is missing" if isinstance(error, KeyError) else f"a value is malformed ({error})"
+        raise FirmwareError(
+            f"{place}: {missing}; compare it with the one that --out in a new folder writes"
+        ) from error
+    try:
+        RobotConfig.model_validate(tomllib.loads(text))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise FirmwareError(f"{place}: gives {where} = {first['input']!r}: {first['msg']}; correct it") from error
+    return text
+
+
+def _render(values: Mapping[str, Any]) -> str:
+    mounts, count = values["MOUNTS"], len(values["SENSORS"])
+    if mounts is not None and len(mounts) != count:
+        raise ValueError(f"MOUNTS has {len(mounts)} places and SENSORS {count} sensors")
+    if mounts is None:
+        ring = f"count = {count}\nradius_m = {values['RING_RADIUS_MM'] / 1e3:g}"
+    else:
+        places = ",\n".join(
+            f"  {{x_m = {x / 1e3:g}, y_m = {y / 1e3:g}, angle_deg = {angle:g}}}" for x, y, angle in mounts
+        )
+        ring = f"sensors = [\n{places},\n]"
+    firing = values["FIRING"]
+    pattern = f'preset = "{firing}"' if isinstance(firing, str) else f"sets = {[list(numbers) for numbers in firing]}"
+    return f"""\
+# {values["NAME"]}: made by `echolocate firmware` from {CONFIG_NAME}; change it there and run the command again.
+
+[robot]
+driver = "denning"  # the ring-and-base protocol
+protocol = 2
+
+[ring]
+{ring}
+beam_half_angle_deg = {values["BEAM_HALF_ANGLE_DEG"]}
+resolution_m = {values["RESOLUTION_M"]}
+range_min_m = {values["RANGE_MIN_M"]}
+range_max_m = {values["RANGE_MAX_M"]}
+
+[ring.firing]
+{pattern}
+step_period_s = {values["STEP_PERIOD_S"]}
+
+[body]
+radius_m = {values["BODY_RADIUS_MM"] / 1e3:g}
+speed_max_m_s = {_SPEED_SHARE * values["SPEED_MAX_MM_S"] / 1e3:g}
+turn_max_rad_s = {_SPEED_SHARE * values["TURN_MAX_MRAD_S"] / 1e3:g}
+acceleration_max_m_s2 = {values["ACCELERATION_MM_S2"] / 1e3:g}
+turn_acceleration_max_rad_s2 = {values["TURN_ACCELERATION_MRAD_S2"] / 1e3:g}
+
+[link]
+baud = {115200 if values["LINE"] is None else values["LINE"][3]}
+"""
