@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from config.robot import BodyConfig
-from config.world import DrumConfig, WorldConfig
+from config.world import WorldConfig
 from drivers.arcos.codec import encode, frame
 from drivers.arcos.commands import Command, CommandNumber
 from drivers.arcos.device import ArcosDevice
@@ -232,26 +230,6 @@ def test_an_unplugged_robot_hears_nothing_and_its_watchdog_stops_it() -> None:
 
 
 # Time, noise and drift.
-
-
-def conversation(steps: Sequence[float], seed: int = 1) -> bytes:
-    world = WorldConfig(drum=(DrumConfig(x_m=1.5, y_m=0.3, radius_m=0.3),))
-    faults = script(kind="bit_errors", at_s=0.5, duration_s=0.3, rate=1e-3)
-    client = Client(world, faults, seed=seed).opened(motors=True)
-    for turn in (VEL, RVEL, VEL, RVEL):
-        client.send(turn, 100)
-        begin = client.now
-        for share in [*steps, 1.0]:
-            client.now = begin + 0.2 * share
-            client.raw += client.robot.advance(client.now)
-    return bytes(client.raw)
-
-
-@settings(max_examples=6, deadline=None)
-@given(steps=st.lists(st.floats(0, 1), max_size=8).map(sorted))
-def test_the_bytes_do_not_depend_on_how_time_is_split(steps: list[float]) -> None:
-    assert conversation(steps) == conversation(())
-    assert conversation((), seed=2) != conversation(())
 
 
 @settings(max_examples=60, deadline=None)

@@ -1,0 +1,102 @@
+"""The robots on which the contract of drivers is tested: one of each family, and what the contract leaves open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from config.robot import RingConfig, RobotConfig
+from config.world import WallConfig, WorldConfig
+from drivers.driver import LineState
+from drivers.emulator.faults import Fault
+from drivers.messages import Twist
+from tests.drivers.cable import ROBOT, STEP_S, Cable
+
+ROOM: Final = WorldConfig(
+    wall=tuple(WallConfig(x1_m=x1, y1_m=y1, x2_m=x2, y2_m=y2) for x1, y1, x2, y2 in (
+        (2.5, -2.0, 2.5, 2.0), (2.5, 2.0, -1.5, 2.0), (-1.5, 2.0, -1.5, -2.0), (-1.5, -2.0, 2.5, -2.0),
+    ))
+)  # fmt: skip
+"""Room to drive a metre, and an echo for every sensor."""
+AHEAD: Final = Twist(0.3, 0.0)
+PLAIN: Final = WorldConfig()
+"""Nothing in range, and endless room."""
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """A robot of a family, and how quick its protocol is.
+
+    Attributes
+    ----------
+    robot
+        A robot file of the family.
+    other_ring
+        Its ring with another firing pattern.
+    connect_s
+        Longest time from an open line to READY, and from there to the first firing.
+    silent_s, deaf_s
+        Longest times until a robot that sends nothing, or reads nothing, is DOWN.
+    halt_s
+        Longest time in which a halted base stands, from 0.3 m/s.
+    handshake_bytes
+        The line is cut before each of so many bytes, those of the handshake.
+    cut_stride
+        After them it is cut before each byte of this distance.
+    """
+
+    robot: RobotConfig
+    other_ring: RingConfig
+    connect_s: float
+    silent_s: float
+    deaf_s: float
+    halt_s: float
+    handshake_bytes: int
+    cut_stride: int
+
+    def cable(self, *faults: Fault, world: WorldConfig = ROOM) -> Cable:
+        """Return a line to the robot that is not plugged in yet, and on which nothing is driven."""
+        return Cable(faults, self.robot, world=world, twist=None)
+
+    def connected(self, *faults: Fault, world: WorldConfig = ROOM) -> Cable:
+        """Return a line on which the robot is READY."""
+        cable = self.cable(*faults, world=world)
+        cable.plug()
+        self.until_ready(cable)
+        return cable
+
+    def until_ready(self, cable: Cable) -> None:
+        """Run until the line is READY and the robot fires."""
+        cable.until(lambda: cable.driver.state is LineState.READY, self.connect_s, "READY")
+        cable.until_echo(self.connect_s)
+
+    def driving(self, twist: Twist = AHEAD, *faults: Fault, world: WorldConfig = PLAIN) -> Cable:
+        """Return a line on which the robot has been released and drives at full speed."""
+        cable = self.connected(*faults, world=world)
+        cable.driver.release()
+        cable.twist = twist
+        cable.until(lambda: is_near(cable.robot.truth.twist, twist), 3.0, "motion")
+        return cable
+
+
+def ring_with(ring: RingConfig, **firing: object) -> RingConfig:
+    """Return a ring with another firing pattern."""
+    return RingConfig.model_validate(ring.model_dump(exclude={"firing"}) | {"firing": firing})
+
+
+DENNING: Final = Family(
+    ROBOT, ring_with(ROBOT.ring, preset="quadrants", step_period_s=0.06), connect_s=0.2, silent_s=0.5, deaf_s=0.5,
+    halt_s=0.15, handshake_bytes=60, cut_stride=7,
+)  # fmt: skip
+FAMILIES: Final = MappingProxyType({"denning": DENNING})
+
+
+def is_near(twist: Twist, wanted: Twist) -> bool:
+    """Return whether a velocity is the wanted one, as far as protocols with whole degrees can say it."""
+    return abs(twist.v - wanted.v) < 1e-3 and abs(twist.w - wanted.w) < 0.01
+
+
+def steps(seconds: float) -> int:
+    """Return a time in steps of a cable."""
+    return round(seconds / STEP_S)
