@@ -7,6 +7,7 @@ from typing import Annotated, Literal, NamedTuple, TypeAlias
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from config.arcos import ArcosConfig
 from config.strict import Strict, TomlList
 
 SOUND_SPEED_M_S = 343.0
@@ -174,9 +175,11 @@ class DriverConfig(Strict):
 
 
 class RobotConfig(Strict):
-    """A robot file: `[robot]`, `[ring]`, `[body]` and `[link]`."""
+    """A robot file: `[robot]`, `[ring]`, `[body]`, `[link]`, and a section of the driver's own."""
 
     robot: DriverConfig = DriverConfig()
     ring: RingConfig
     body: BodyConfig
     link: LinkConfig = LinkConfig()
+    arcos: ArcosConfig = ArcosConfig()
+    """Of the driver "arcos", for the Pioneer family."""

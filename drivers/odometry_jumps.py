@@ -51,6 +51,12 @@ class OdometryJumps:
         self._last, self._steady = None, 0
         self.origin, self._ring_offset = _IDENTITY, 0.0
 
+    def rebase(self, reported: Odometry) -> None:
+        """Take `reported`, the next sample, as the place of the last one: the odometry was set, and nothing moved."""
+        if self._last is not None:
+            self.origin = reported.pose.compose(self._last.pose.inverse())
+            self._ring_offset = self._last.ring_yaw - reported.ring_yaw
+
     def is_reset(self, reported: Odometry) -> bool:
         """Return whether a sample is so far from the last one that the robot may have restarted."""
         if self._last is None:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 GROUP: Final = "echolocate.drivers"
 
 SHIPPED: Final[Mapping[str, EntryPoint]] = MappingProxyType(
-    {"denning": EntryPoint("denning", "drivers.denning.family", GROUP)}
+    {name: EntryPoint(name, f"drivers.{name}.family", GROUP) for name in ("arcos", "denning")}
 )
 
 

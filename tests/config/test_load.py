@@ -8,7 +8,16 @@ from typing import Any
 
 import pytest
 
-from config.load import ConfigError, load_any, load_model, load_robot, load_settings, load_world, with_known_room
+from config.load import (
+    ConfigError,
+    list_shipped,
+    load_any,
+    load_model,
+    load_robot,
+    load_settings,
+    load_world,
+    with_known_room,
+)
 from config.model import ModelConfig
 from config.settings import Settings
 from config.world import StartConfig, WorldConfig
@@ -16,6 +25,8 @@ from tests.config.loading import problem, problems, write
 from tests.config.toml_text import MODEL, ROBOT, WORLD, irregular
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
+
+ROBOTS = ", ".join(list_shipped("robots"))
 
 
 def test_a_name_finds_the_shipped_file_and_a_path_any_file(tmp_path: Path) -> None:
@@ -83,7 +94,7 @@ def test_bare_name_of_an_existing_file(tmp_path: Path) -> None:
 def test_a_missing_file_is_reported_with_the_file_that_names_it(tmp_path: Path) -> None:
     assert problem("run.toml") == "run.toml: file not found; known runs: hallway, irregular"
     run = write(tmp_path / "run.toml", {"robot": "robots/mine.toml"})
-    assert problem(run) == f"{tmp_path}/robots/mine.toml: file not found; named by {run}; known robots: denning"
+    assert problem(run) == f"{tmp_path}/robots/mine.toml: file not found; named by {run}; known robots: {ROBOTS}"
 
 
 def test_every_missing_file_is_reported(tmp_path: Path) -> None:
@@ -131,7 +142,7 @@ def test_a_robot_file_alone_is_a_run(tmp_path: Path) -> None:
 
 def test_a_run_without_a_robot(tmp_path: Path) -> None:
     run = write(tmp_path / "run.toml", {"perception": {"clusters": {"threshold_m": 1.0}}})
-    assert problem(run).startswith(f"{run}: robot: missing; name a robot or a robot file; known robots: denning")
+    assert problem(run).startswith(f"{run}: robot: missing; name a robot or a robot file; known robots: {ROBOTS}")
 
 
 def test_one_model_needs_no_list(tmp_path: Path) -> None:

@@ -24,7 +24,20 @@ BODY = {
     "turn_acceleration_max_rad_s2": 2.0,
     "synchro": True,
 }
-ROBOT: dict[str, Any] = {"ring": REGULAR_RING, "body": BODY, "link": {"port": "/dev/ttyS0", "baud": 9600}}
+ARCOS = {
+    "subclasses": ["p3dx"],
+    "distance_factor": 0.485,
+    "velocity_factor": 0.6154,
+    "range_factor": 0.268,
+    "turn_factor": 0.0034,
+    "discs": [0, 1],
+}
+ROBOT: dict[str, Any] = {
+    "ring": REGULAR_RING,
+    "body": BODY,
+    "link": {"port": "/dev/ttyS0", "baud": 9600},
+    "arcos": ARCOS,
+}
 MODEL: dict[str, Any] = {
     "name": "corner",
     "vertices_m": [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]],

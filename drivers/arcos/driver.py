@@ -1,0 +1,395 @@
+"""The driver for the Pioneer family: session, commands, supervision; without I/O and without a clock.
+
+A Pioneer acknowledges nothing but the SYNCs. What a command did is seen in later SIPs, so that a stop is repeated
+until the SIPs report that the base stands with its motors off. The base's own watchdog is slow, 2 s as delivered: so
+on every fault that this driver finds, it stops the base itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import replace
+from typing import Final
+
+from config.files import one_line
+from config.robot import RingConfig, RobotConfig
+from drivers import line_diagnostics
+from drivers.arcos import diagnostics
+from drivers.arcos.codec import Decoder, decode_packet, encode
+from drivers.arcos.commands import Command, CommandNumber
+from drivers.arcos.frames import EncoderPacket, Packet, ResetNotice, Sip, SipFlags
+from drivers.arcos.handshake import CLOSE, STOP, Handshake, Stage
+from drivers.arcos.pose_stamping import SIP_PERIOD_S, PoseStamper
+from drivers.arcos.supervision import Enabling, Halting, ReceiverMonitor
+from drivers.arcos.wire_units import discs_of, drive_commands, flags_of, limit_commands, limits_of, polling_of
+from drivers.driver import LineState, Received
+from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
+
+_PULSE_S: Final = 0.5
+"""Longest time without a command, s: a quarter of the watchdog."""
+_INCOMPLETE_S: Final = 0.25
+"""Time without any packet after which the rest of an incomplete one does not come, s."""
+_CALLING_S: Final = 2.0
+"""Shortest time for which the robot is called before the line counts as down, s."""
+_OPENING_S: Final = 1.0
+"""Longest time from the end of the handshake until the first SIP, s."""
+_REFUSED_S: Final = 2.0
+"""Time until a robot that was refused is asked again, s: another one may have been plugged in."""
+_SONAR_S: Final = 0.5
+"""Time from one attempt to switch the sonar on to the next, s."""
+_MOVING_MAX_S: Final = 2.5
+"""Longest time that a halted base may take to stand, s: from 2 m/s at 0.8 m/s²."""
+_FIRINGS_MAX: Final = 1024
+"""Firings kept if they are not taken; the oldest are dropped."""
+
+
+class ArcosDriver:
+    """A `drivers.driver.RobotDriver` for the Pioneer family.
+
+    Parameters
+    ----------
+    config
+        The robot file.
+
+    Raises
+    ------
+    drivers.firing_pattern.FiringError
+        The ring or the robot's arrays cannot carry out the firing pattern.
+    DriverError
+        The numbers of the discs do not fit the ring.
+    """
+
+    def __init__(self, config: RobotConfig) -> None:
+        self._config = config
+        self._discs = discs_of(config)
+        self._polling = polling_of(config, self._discs)
+        self._handshake = Handshake(config.link, has_speed="://" not in (config.link.port or ""))
+        self._limits = limits_of(config.body, None)
+        self._decoder = Decoder(decode_packet)
+        self._earlier_counts = LinkCounts()
+        self._state = LineState.CLOSED
+        self._problem: str | None = None
+        self._identity: Identity | None = None
+        self._boots = 0
+        self._run_s = self._sent_s = self._packet_s = self._sip_s = 0.0
+        self._called_s = self._refused_until_s = self._sonar_on_s = -math.inf
+        self._queue: deque[Command] = deque()
+        self._is_set_up = self._is_first_sip = False
+        self._has_session = self._was_reset = self._is_ending = False
+        self._halting, self._enabling, self._receiver = Halting(), Enabling(), ReceiverMonitor()
+        self._drive: Twist | None = None
+        self._bad_at_sip = 0
+        self._stamper = PoseStamper(config, self._discs)
+        self._stamper.set_polling(self._polling)
+        self._firings: deque[Firing] = deque(maxlen=_FIRINGS_MAX)
+        self._noted: set[str] = set()
+        self._odometry: Odometry | None = None
+        self._flags, self._rebooted = Flags.NONE, False
+
+    @property
+    def state(self) -> LineState:
+        """The state of the connection."""
+        return self._state
+
+    @property
+    def problem(self) -> str | None:
+        """What is wrong, in one line; None if nothing is."""
+        moving_s = self._halting.moving_s(self._run_s)
+        if self._state is LineState.READY and moving_s > _MOVING_MAX_S:
+            return diagnostics.not_stopping(moving_s)
+        return self._problem
+
+    @property
+    def identity(self) -> Identity | None:
+        """The robot's description of itself; the last one known during a new handshake."""
+        return self._identity
+
+    @property
+    def counts(self) -> LinkCounts:
+        """Frames received so far, over all lines; lost ones are not known, as frames have no numbers."""
+        earlier, now = self._earlier_counts, self._decoder
+        return LinkCounts(earlier.frames + now.frames, earlier.bad + now.bad, 0)
+
+    @property
+    def odometry_origin(self) -> Pose:
+        """The origin of the poses passed on, in the robot's own odometry; it moves when that jumps."""
+        return self._stamper.origin
+
+    @property
+    def line_baud(self) -> int | None:
+        """The speed that the line must have now; None on a line without one."""
+        return self._handshake.baud if self._handshake.bauds else None
+
+    @property
+    def firings_waiting(self) -> int:
+        """Number of firings that `take_received` would return."""
+        return len(self._firings)
+
+    def line_opened(self, run_s: float) -> None:
+        """Start the handshake on a line that has just been opened."""
+        self.line_closed()
+        self._run_s = self._called_s = self._packet_s = run_s
+        self._state = LineState.HANDSHAKE
+        self._problem = None
+        self._is_ending = False
+        self._refused_until_s = -math.inf
+        self._handshake.start(run_s)
+
+    def line_closed(self) -> None:
+        """Forget commands in progress; only a halt is kept for the next line until the base has confirmed it."""
+        self._earlier_counts = self.counts
+        self._decoder = Decoder(decode_packet)
+        self._state = LineState.CLOSED
+        self._abandon()
+
+    def receive(self, data: bytes, run_s: float) -> None:
+        """Take bytes from the line, split anywhere."""
+        self._run_s = run_s
+        if self._state is not LineState.CLOSED:
+            for packet in self._decoder.feed(data):
+                self._take(packet)
+
+    def tick(self, run_s: float) -> None:
+        """Let time pass: go on with the handshake; stop the base and go DOWN if the robot is silent for too long."""
+        self._run_s = run_s
+        if self._state is LineState.CLOSED:
+            return
+        if self._decoder.pending and run_s - self._packet_s > _INCOMPLETE_S:
+            for packet in self._decoder.skip():
+                self._take(packet)
+        if self._state is LineState.READY:
+            self._supervise()
+        elif run_s >= self._refused_until_s:
+            self._handshake.tick(run_s)
+            self._go_on()
+
+    def drive(self, twist: Twist) -> None:
+        """Request a velocity, clamped to the limits; sent only in state READY and with the motors on.
+
+        Raises
+        ------
+        ValueError
+            The velocity is not finite.
+        """
+        if not (math.isfinite(twist.v) and math.isfinite(twist.w)):
+            raise ValueError(f"cannot drive at {twist}: a velocity must be finite; something divided by zero")
+        self._drive = twist
+
+    def halt(self) -> None:
+        """Stop the base at once, repeat that until it stands, then switch its motors off."""
+        self._drive = None
+        self._enabling.withdraw()
+        self._halting.start()
+
+    def release(self) -> None:
+        """Switch the motors on; without effect unless READY, so that the base is never released unnoticed."""
+        if self._state is LineState.READY:
+            self._halting.cancel()
+            self._enabling.release()
+
+    def set_firing(self, ring: RingConfig) -> None:
+        """Change the firing pattern to that of `ring`; does nothing if it is the current one.
+
+        Raises
+        ------
+        drivers.firing_pattern.FiringError
+            The ring or the robot's arrays cannot carry out the pattern; the current one stays.
+        """
+        polling = polling_of(self._config.model_copy(update={"ring": ring}), self._discs)
+        if polling == self._polling:
+            return
+        self._polling = polling
+        self._stamper.set_polling(polling)
+        if self._is_set_up:
+            self._queue += polling.commands
+
+    def end_session(self) -> None:
+        """Stop the base and end the session: the robot then waits for its next client."""
+        self._is_ending = self._state is not LineState.CLOSED
+
+    def outgoing(self, *, writable: bool) -> bytes:
+        """Return the bytes to send now; only stops while the line is not `writable`."""
+        if self._state is LineState.CLOSED:
+            self._drive = None
+            return b""
+        if self._is_ending:
+            self._is_ending, self._has_session, self._state = False, False, LineState.CLOSED
+            return b"".join(map(encode, (*STOP, Command(CommandNumber.ENABLE, 0), *CLOSE)))
+        commands = self._halting.commands(self._run_s)
+        if writable:
+            commands += self._due_commands()
+        if commands:
+            self._sent_s = self._run_s
+        return b"".join(map(encode, commands))
+
+    def take_received(self) -> Received:
+        """Return what was received since the last call, and remove it."""
+        notes = self._stamper.notes()
+        received = Received(tuple(self._firings), self._odometry, self._rebooted, notes, self._flags)
+        self._firings.clear()
+        self._odometry, self._flags, self._rebooted = None, Flags.NONE, False
+        return received
+
+    def _due_commands(self) -> tuple[Command, ...]:
+        """Return the commands that are due besides a stop; one at a time of those that can wait."""
+        commands: tuple[Command, ...] = ()
+        drive, self._drive = self._drive, None
+        if self._state is not LineState.READY and self._run_s >= self._refused_until_s:
+            commands += self._handshake.commands()
+        if self._queue:
+            commands += (self._queue.popleft(),)
+        if self._state is not LineState.READY:
+            return commands
+        commands += self._enabling.commands(self._run_s)
+        if drive is not None and self._enabling.may_drive and not self._halting.is_active:
+            commands += drive_commands(drive, self._limits)
+        commands += self._receiver.commands(self._run_s)
+        if not commands and self._run_s - self._sent_s >= _PULSE_S:
+            commands += (Command(CommandNumber.PULSE),)
+        return commands
+
+    def _supervise(self) -> None:
+        """Detect a robot that is silent, one that does not receive, and motors that do not switch on."""
+        silence_max_s = self._config.link.silence_max_s
+        silent_s, unanswered_s = self._run_s - self._sip_s, self._receiver.unanswered_s(self._run_s)
+        if silent_s > silence_max_s:
+            others = self._packet_s - self._sip_s > 0.5 * silence_max_s
+            bad = self._decoder.bad - self._bad_at_sip
+            self._go_down(line_diagnostics.silence(silent_s, others=others, bad=bad))
+        elif unanswered_s > 2.0 * silence_max_s:
+            self._go_down(diagnostics.not_receiving(unanswered_s))
+        elif self._enabling.tries > self._config.link.tries:
+            self._enabling.withdraw()
+            self._problem = diagnostics.MOTORS_STAY_OFF
+
+    def _abandon(self) -> None:
+        """Drop all commands but a halt, and all that does not outlast an interruption."""
+        self._queue.clear()
+        self._drive, self._is_set_up = None, False
+        self._enabling, self._receiver = Enabling(), ReceiverMonitor()
+        self._stamper.break_off()
+        self._bad_at_sip = 0
+
+    def _go_down(self, problem: str) -> None:
+        """Give the session up: stop the base, whether it hears that or not, and call the robot again."""
+        self._state, self._problem = LineState.DOWN, problem
+        self._abandon()
+        self.halt()
+        self._handshake.restart(self._run_s)
+
+    def _refuse(self, problem: str, *farewell: Command) -> None:
+        self._go_down(problem)
+        self._queue += farewell
+        self._has_session = False
+        self._refused_until_s = self._run_s + _REFUSED_S
+
+    def _take(self, packet: Packet) -> None:
+        self._packet_s = self._run_s
+        if isinstance(packet, ResetNotice):
+            self._was_reset = True
+            if self._state is LineState.READY:
+                self._stamper.note(diagnostics.RESET)
+            self._go_down(diagnostics.RESET)
+            self._state = LineState.HANDSHAKE
+            return
+        if self._state is not LineState.READY and self._run_s >= self._refused_until_s:
+            self._handshake.take(packet)
+            self._go_on()
+        if isinstance(packet, Sip):
+            self._halting.observe(packet)
+            if self._is_set_up and not self._queue:
+                self._take_sip(packet)
+        elif isinstance(packet, EncoderPacket):
+            self._receiver.answered()
+
+    def _go_on(self) -> None:
+        """Follow the handshake: check what the robot says, and set it up at the end."""
+        handshake = self._handshake
+        if handshake.stage is Stage.SYNC0:
+            if handshake.sweeps and self._state is LineState.HANDSHAKE and self._run_s - self._called_s >= _CALLING_S:
+                self._state = LineState.DOWN
+                self._problem = diagnostics.no_answer(bauds=handshake.bauds, heard=self._decoder.bad)
+        elif self._state is LineState.DOWN and handshake.stage is not Stage.CLOSING:
+            self._state = LineState.HANDSHAKE
+        if handshake.stage is Stage.CONFIG and handshake.name is not None:
+            wrong = diagnostics.wrong_robot(handshake.name, self._config)
+            if wrong is not None:
+                self._refuse(wrong)
+        elif handshake.stage is Stage.DONE and not self._is_set_up:
+            self._set_up()
+        elif handshake.stage is Stage.DONE and self._run_s - self._sip_s > _OPENING_S:
+            self._abandon()
+            handshake.restart(self._run_s)
+
+    def _set_up(self) -> None:
+        """Check and adopt what the robot reports of itself, and queue the commands that set it up."""
+        handshake, config = self._handshake, self._config
+        packet, name = handshake.config, handshake.name
+        shown = one_line((name and (name.name or name.subclass)) or "Pioneer")
+        wrong = diagnostics.wrong_watchdog(shown, packet, config)
+        if wrong is not None:
+            self._refuse(wrong, *STOP, *CLOSE)
+            return
+        if packet is None:
+            self._note_once(diagnostics.NO_CONFIG)
+        if handshake.keeps_baud:
+            self._note_once(diagnostics.BAUD_KEPT.format(config.link.baud, handshake.baud))
+        deadman_s = diagnostics.deadman_s(packet)
+        self._note_once(diagnostics.watchdog_note(deadman_s))
+        period_s = 1e-3 * ((packet and packet.sip_cycle_ms) or 1e3 * SIP_PERIOD_S)
+        radius_m = max(math.hypot(mount.x_m, mount.y_m) for mount in config.ring.mounts)
+        self._identity = Identity(shown, len(self._discs), radius_m, deadman_s, period_s, self._boots)
+        self._stamper.set_period(period_s)
+        self._limits = limits_of(config.body, packet)
+        self._queue += (
+            Command(CommandNumber.ENABLE, 0),
+            *limit_commands(config.body, packet, self._limits),
+            Command(CommandNumber.BUMPSTALL, 3),
+            Command(CommandNumber.SONAR, 1),
+            *self._polling.commands,
+        )
+        self._is_set_up = self._is_first_sip = True
+        self._sip_s = self._sonar_on_s = self._run_s
+
+    def _take_sip(self, sip: Sip) -> None:
+        """Take odometry, status and ranges of a SIP; the first one of a session makes the line READY."""
+        if self._is_first_sip:
+            self._begin_session(sip)
+        packet, after_loss = self._handshake.config, self._decoder.bad != self._bad_at_sip
+        flags = flags_of(sip, (packet and packet.low_battery) or 0)
+        self._odometry, firings = self._stamper.sip(sip, self._run_s, flags, self.line_baud, after_loss=after_loss)
+        self._sip_s, self._bad_at_sip = self._run_s, self._decoder.bad
+        self._flags |= flags
+        self._firings += firings
+        self._follow_status(SipFlags(sip.flags))
+
+    def _begin_session(self, sip: Sip) -> None:
+        was_lost = self._has_session and not self._handshake.was_open
+        if self._stamper.begin_session(sip, was_reset=self._was_reset, was_lost=was_lost):
+            self._boots += 1
+            self._firings.clear()
+            self._odometry, self._flags, self._rebooted = None, Flags.NONE, True
+            if self._identity is not None:
+                self._identity = replace(self._identity, boot_id=self._boots)
+        self._has_session, self._is_first_sip, self._was_reset = True, False, False
+        self._state, self._problem = LineState.READY, None
+
+    def _follow_status(self, status: SipFlags) -> None:
+        """Act on what the robot reports of its motors and its sonar."""
+        self._enabling.observe(status)
+        if self._enabling.are_on and self._problem == diagnostics.MOTORS_STAY_OFF:
+            self._problem = None
+        if status & SipFlags.STOP_BUTTON:
+            self._problem = diagnostics.STOP_PRESSED
+        elif self._problem == diagnostics.STOP_PRESSED:
+            self._problem = None
+        if self._polling.arrays & ~status and self._run_s - self._sonar_on_s > _SONAR_S:
+            self._sonar_on_s = self._run_s
+            self._queue.append(Command(CommandNumber.SONAR, 1))
+            self._note_once(diagnostics.SONAR_OFF)
+
+    def _note_once(self, text: str) -> None:
+        if text not in self._noted:
+            self._noted.add(text)
+            self._stamper.note(text)

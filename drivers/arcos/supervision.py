@@ -1,0 +1,157 @@
+"""Supervision of a robot that acknowledges nothing: whether it stops, starts and still receives."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from drivers.arcos.commands import Command, CommandNumber
+from drivers.arcos.frames import Sip, SipFlags
+from drivers.arcos.handshake import STOP
+
+_REPEAT_S: Final = 0.1
+"""Time from one stop to the next until the base stands, s."""
+_MOTORS_OFF_S: Final = 1.0
+"""Time after which the motors of a base that does not stand are switched off in motion, s."""
+_REQUEST_S: Final = 0.25
+"""Time from one request for an answer to the next, s."""
+_ENABLE_S: Final = 0.3
+"""Time until motors that were switched on are reported so, s: two or three SIPs."""
+_UNSUPPORTED: Final = 8
+"""Requests without any answer after which a robot counts as one that does not know them."""
+
+
+class Halting:
+    """Stops the base again and again until it stands with its motors off.
+
+    Switched off in motion, motors may let the base roll; so they are switched off when it stands, or when it does not
+    obey for long. Until they are off, a velocity that was sent before the stop could still take effect.
+
+    Attributes
+    ----------
+    is_active
+        Whether the base has yet to stand with its motors off.
+    """
+
+    def __init__(self) -> None:
+        self.is_active = False
+        self._began_s: float | None = None
+        self._sent_s: float | None = None
+        self._has_stood = False
+
+    def start(self) -> None:
+        """Stop the base at once."""
+        if not self.is_active:
+            self.is_active, self._began_s = True, None
+        self._sent_s, self._has_stood = None, False
+
+    def cancel(self) -> None:
+        """End: the motors are to be switched on."""
+        self.is_active = False
+
+    def observe(self, sip: Sip) -> None:
+        """Take what the robot reports."""
+        if self.is_active and self._sent_s is not None:
+            had_stood, self._has_stood = self._has_stood, sip.left == sip.right == 0
+            self.is_active = not self._has_stood or bool(sip.flags & SipFlags.MOTORS_ENABLED)
+            if self._has_stood and not had_stood:
+                self._sent_s = -math.inf  # the motors go off at once
+
+    def commands(self, run_s: float) -> tuple[Command, ...]:
+        """Return the commands to send now."""
+        if not self.is_active or (self._sent_s is not None and run_s - self._sent_s < _REPEAT_S):
+            return ()
+        self._sent_s = run_s
+        if self._began_s is None:
+            self._began_s = run_s
+        if self._has_stood or run_s - self._began_s >= _MOTORS_OFF_S:
+            return *STOP, Command(CommandNumber.ENABLE, 0)
+        return STOP
+
+    def moving_s(self, run_s: float) -> float:
+        """Return for how long the base has been moving on."""
+        return run_s - self._began_s if self.is_active and self._began_s is not None and not self._has_stood else 0.0
+
+
+class Enabling:
+    """Switches the motors on when they are released, and only then.
+
+    Attributes
+    ----------
+    are_on
+        Whether the last SIP reported the motors as on.
+    is_waiting
+        Whether they were switched on and are not yet reported so.
+    """
+
+    def __init__(self) -> None:
+        self.are_on = self.is_waiting = False
+        self._is_released = False
+        self._tries, self._sent_s = 0, 0.0
+
+    @property
+    def may_drive(self) -> bool:
+        """Whether the motors are released and on."""
+        return self._is_released and self.are_on
+
+    @property
+    def tries(self) -> int:
+        """How often they were switched on without effect."""
+        return self._tries if self.is_waiting else 0
+
+    def release(self) -> None:
+        """Switch the motors on."""
+        self._is_released, self.is_waiting, self._tries = True, not self.are_on, 0
+
+    def withdraw(self) -> None:
+        """End the release: the motors are no longer switched on, nor the base driven."""
+        self._is_released = self.is_waiting = False
+
+    def observe(self, status: SipFlags) -> None:
+        """Take what the robot reports; whatever switches motors off, only a release switches them on again."""
+        were_on, self.are_on = self.are_on, bool(status & SipFlags.MOTORS_ENABLED)
+        if self.are_on:
+            self.is_waiting = False
+        elif were_on:
+            self.withdraw()
+
+    def commands(self, run_s: float) -> tuple[Command, ...]:
+        """Return the command to switch them on, if it is due."""
+        if not self.is_waiting or (self._tries > 0 and run_s - self._sent_s < _ENABLE_S):
+            return ()
+        self._tries, self._sent_s = self._tries + 1, run_s
+        return (Command(CommandNumber.ENABLE, 1),)
+
+
+class ReceiverMonitor:
+    """Requests the wheels' encoders now and then: a robot that does not answer any more no longer receives.
+
+    A robot that has never answered does not know the request, and is not supervised.
+    """
+
+    def __init__(self) -> None:
+        self._is_supported = False
+        self._unanswered = 0
+        self._first_s = 0.0
+        self._sent_s: float | None = None
+
+    def answered(self) -> None:
+        """Take an answer."""
+        self._is_supported = True
+        self._unanswered = 0
+
+    def commands(self, run_s: float) -> tuple[Command, ...]:
+        """Return the request, if it is due."""
+        if not self._is_supported and self._unanswered >= _UNSUPPORTED:
+            return ()
+        if self._sent_s is not None and run_s - self._sent_s < _REQUEST_S:
+            return ()
+        self._sent_s = run_s
+        if self._unanswered == 0:
+            self._first_s = run_s
+        self._unanswered += 1
+        return (Command(CommandNumber.ENCODER, 1),)
+
+    def unanswered_s(self, run_s: float) -> float:
+        """Return how long ago the first request was sent that is not answered; 0 if all are."""
+        return run_s - self._first_s if self._is_supported and self._unanswered > 0 else 0.0
