@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from config.robot import RobotConfig
 from config.world import WorldConfig
 from drivers.arcos.driver import ArcosDriver
-from drivers.driver import DriverError, RobotDriver
+from drivers.arcos.firmware import Firmware
+from drivers.arcos.wire_units import discs_of
+from drivers.driver import RobotDriver
 from drivers.emulator.faults import Fault
 from drivers.emulator.robot_device import RobotDevice
 
@@ -18,12 +20,39 @@ def make_driver(config: RobotConfig) -> RobotDriver:
 
 
 def make_device(
-    config: RobotConfig,  # noqa: ARG001
-    world: WorldConfig,  # noqa: ARG001
-    seed: int,  # noqa: ARG001
+    config: RobotConfig,
+    world: WorldConfig,
+    seed: int,
     *,
-    faults: Sequence[Fault],  # noqa: ARG001
-    clock_start_us: int,  # noqa: ARG001
+    faults: Sequence[Fault],
+    clock_start_us: int,  # noqa: ARG001 - a Pioneer reports no time
 ) -> RobotDevice:
-    """Raise `DriverError`: this family has no emulator."""
-    raise DriverError('robot.driver = "arcos": there is no emulated Pioneer; give the port of a robot')
+    """Return an emulated Pioneer of the robot file's first model.
+
+    Parameters
+    ----------
+    config, world, seed, faults, clock_start_us
+        As of `drivers.registry.make_device`.
+    """
+    from drivers.arcos.device import ArcosDevice  # it loads compiled kernels, which a real robot does not need
+
+    return ArcosDevice(config, world, firmware_of(config), seed, faults)
+
+
+def firmware_of(config: RobotConfig) -> Firmware:
+    """Return the flash settings of an emulated robot that the robot file describes.
+
+    Raises
+    ------
+    DriverError
+        The numbers of the discs do not fit the ring.
+    """
+    arcos = config.arcos
+    return Firmware(
+        subclass=arcos.subclasses[0] if arcos.subclasses else "p3dx",
+        mm_per_count=arcos.distance_factor,
+        mm_s_per_count=arcos.velocity_factor,
+        mm_per_range=arcos.range_factor,
+        rad_s_per_mm_s=arcos.turn_factor,
+        sensor_numbers=discs_of(config),
+    )
