@@ -60,13 +60,14 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         "P5": Promise(
             "Unplug anywhere",
             "the line cut before every byte of the handshake and every seventh of one full pattern (soak: every "
-            "byte), both directions: echoes again ≤ 1 s after replug; 320 cycles (soak: 20,000) with flat file "
-            "descriptors, tasks and memory",
+            "byte; a Pioneer: every 29th), both directions: echoes again ≤ 1 s after replug (a Pioneer, with its "
+            "longer handshake: 1.5 s); 320 cycles (soak: 20,000) with flat file descriptors, tasks and memory",
         ),
         "P6": Promise(
             "A stalled peer is harmless",
             "mute, or not reading, for 5 s (soak: 60 s): unsent bytes ≤ 4 KiB, newest command wins, link called dead "
-            "≤ 500 ms; bench and soak: the loop's worst gap ≤ paired control + 5 ms",
+            "≤ 500 ms (a Pioneer, which sends ten times a second: mute ≤ 650 ms, not reading ≤ 1.6 s); bench and "
+            "soak: the loop's worst gap ≤ paired control + 5 ms",
         ),
         "P7": Promise(
             "A robot reboot is seen",

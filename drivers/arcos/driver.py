@@ -29,7 +29,7 @@ from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose
 _PULSE_S: Final = 0.5
 """Longest time without a command, s: a quarter of the watchdog."""
 _INCOMPLETE_S: Final = 0.25
-"""Time without any packet after which the rest of an incomplete one does not come, s."""
+"""Time without any byte after which the rest of an incomplete packet does not come, s."""
 _CALLING_S: Final = 2.0
 """Shortest time for which the robot is called before the line counts as down, s."""
 _OPENING_S: Final = 1.0
@@ -72,7 +72,7 @@ class ArcosDriver:
         self._problem: str | None = None
         self._identity: Identity | None = None
         self._boots = 0
-        self._run_s = self._sent_s = self._packet_s = self._sip_s = 0.0
+        self._run_s = self._sent_s = self._data_s = self._packet_s = self._sip_s = 0.0
         self._called_s = self._refused_until_s = self._sonar_on_s = -math.inf
         self._queue: deque[Command] = deque()
         self._is_set_up = self._is_first_sip = False
@@ -145,7 +145,7 @@ class ArcosDriver:
 
     def receive(self, data: bytes, run_s: float) -> None:
         """Take bytes from the line, split anywhere."""
-        self._run_s = run_s
+        self._run_s = self._data_s = run_s
         if self._state is not LineState.CLOSED:
             for packet in self._decoder.feed(data):
                 self._take(packet)
@@ -155,7 +155,7 @@ class ArcosDriver:
         self._run_s = run_s
         if self._state is LineState.CLOSED:
             return
-        if self._decoder.pending and run_s - self._packet_s > _INCOMPLETE_S:
+        if self._decoder.pending and run_s - self._data_s > _INCOMPLETE_S:
             for packet in self._decoder.skip():
                 self._take(packet)
         if self._state is LineState.READY:

@@ -18,6 +18,8 @@ _CYCLE_MIN_MS, _CYCLE_MAX_MS = 2, 120
 """Shortest and longest sonar cycle."""
 _STEPS_MAX: Final = 16
 """Longest polling sequence of an array."""
+STOP_S: Final = 0.25
+"""Duration of a stop from full speed, s, as far as the robot allows it."""
 _ROUNDING: Final = 1e-6
 """Slack for decimal fractions that float64 cannot hold, ms."""
 _BUMPERS, _STALLED = 0xFE, 0x01
@@ -118,23 +120,26 @@ def limits_of(body: BodyConfig, config: ConfigPacket | None) -> Limits:
 
 
 def limit_commands(body: BodyConfig, config: ConfigPacket | None, limits: Limits) -> tuple[Command, ...]:
-    """Return the commands that set the base's speeds and accelerations to those of the robot file."""
-    acceleration, turning = (
-        round(1e3 * body.acceleration_max_m_s2),
-        round(math.degrees(body.turn_acceleration_max_rad_s2)),
-    )
-    if config is not None:
-        acceleration = min(acceleration, config.acceleration_top or acceleration)
-        turning = min(turning, config.turn_acceleration_top or turning)
-    acceleration, turning = max(1, acceleration), max(1, turning)
+    """Return the commands that set the base's speeds and accelerations to those of the robot file.
+
+    The decelerations are so high that the base stands soon after its watchdog has stopped it.
+    """
+    up, turn_up = 1e3 * body.acceleration_max_m_s2, math.degrees(body.turn_acceleration_max_rad_s2)
+    top = (config and config.acceleration_top) or math.inf
+    turn_top = (config and config.turn_acceleration_top) or math.inf
+    down, turn_down = max(up, limits.speed / STOP_S), max(turn_up, limits.turn / STOP_S)
     return (
         Command(CommandNumber.SETV, limits.speed),
-        Command(CommandNumber.SETA, acceleration),
-        Command(CommandNumber.SETA, -acceleration),
+        Command(CommandNumber.SETA, _ramp(up, top)),
+        Command(CommandNumber.SETA, -_ramp(down, top)),
         Command(CommandNumber.SETRV, limits.turn),
-        Command(CommandNumber.SETRA, turning),
-        Command(CommandNumber.SETRA, -turning),
+        Command(CommandNumber.SETRA, _ramp(turn_up, turn_top)),
+        Command(CommandNumber.SETRA, -_ramp(turn_down, turn_top)),
     )
+
+
+def _ramp(rate: float, top: float) -> int:
+    return max(1, round(min(rate, top)))
 
 
 def drive_commands(twist: Twist, limits: Limits) -> tuple[Command, Command]:

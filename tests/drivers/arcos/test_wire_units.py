@@ -110,8 +110,13 @@ def test_the_base_gets_the_robot_files_accelerations() -> None:
         Command(N.SETA, -200),
         Command(N.SETRV, 57),
         Command(N.SETRA, 97),
-        Command(N.SETRA, -97),
+        Command(N.SETRA, -228),
     )
+
+
+def test_it_stops_within_a_quarter_of_a_second_once_its_watchdog_has_run_out() -> None:
+    body = load_robot("p3dx").body
+    assert Command(N.SETA, -2000) in limit_commands(body, P3DX, Limits(500, 57))
 
 
 @pytest.mark.parametrize(

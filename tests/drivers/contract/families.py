@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
+from config.load import load_robot
 from config.robot import RingConfig, RobotConfig
 from config.world import WallConfig, WorldConfig
 from drivers.driver import LineState
@@ -55,6 +56,11 @@ class Family:
     handshake_bytes: int
     cut_stride: int
 
+    @property
+    def name(self) -> str:
+        """The driver's."""
+        return self.robot.robot.driver
+
     def cable(self, *faults: Fault, world: WorldConfig = ROOM) -> Cable:
         """Return a line to the robot that is not plugged in yet, and on which nothing is driven."""
         return Cable(faults, self.robot, world=world, twist=None)
@@ -89,7 +95,12 @@ DENNING: Final = Family(
     ROBOT, ring_with(ROBOT.ring, preset="quadrants", step_period_s=0.06), connect_s=0.2, silent_s=0.5, deaf_s=0.5,
     halt_s=0.15, handshake_bytes=60, cut_stride=7,
 )  # fmt: skip
-FAMILIES: Final = MappingProxyType({"denning": DENNING})
+P3DX: Final = load_robot("p3dx")
+ARCOS: Final = Family(
+    P3DX, ring_with(P3DX.ring, sets=[[k, 15 - k] for k in (3, 4, 0, 7)], step_period_s=0.06), connect_s=1.5,
+    silent_s=0.65, deaf_s=1.6, halt_s=0.3, handshake_bytes=0, cut_stride=29,
+)  # fmt: skip
+FAMILIES: Final = MappingProxyType({"arcos": ARCOS, "denning": DENNING})
 
 
 def is_near(twist: Twist, wanted: Twist) -> bool:

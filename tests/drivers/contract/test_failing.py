@@ -51,7 +51,8 @@ def cut_before_bytes(family: Family, way: Way, outages_s: Sequence[float], strid
         times = [firing.robot_s for firing in cable.firings]
         assert all(b > a for a, b in itertools.pairwise(times)), "none twice, none too soon"
     shown = ", ".join(f"{outage_s:g}" for outage_s in outages_s)
-    return f"cut before {len(tried)} of {total} bytes {way}, for {shown} s: echoes ≤ {worst:.3f} s after reopening"
+    cut = f"{family.name} cut before {len(tried)} of {total} bytes {way}, for {shown} s"
+    return f"{cut}: echoes ≤ {worst:.3f} s after reopening"
 
 
 @pytest.mark.compiled
@@ -113,7 +114,7 @@ def test_a_robot_that_falls_silent_is_called_dead_and_comes_back(
     cable.until_echo(2.0)
     assert cable.driver.problem is None
     assert worst_s <= limit_s + 1e-9
-    measured(f"{kind}, at {PHASES} phases: called dead after ≤ {worst_s:.3f} s")
+    measured(f"{family.name} {kind}, at {PHASES} phases: called dead after ≤ {worst_s:.3f} s")
 
 
 @pytest.mark.parametrize(("kind", "more"), [("garbage", {"bytes_per_s": 500.0}), ("bit_errors", {"rate": 2e-3})])

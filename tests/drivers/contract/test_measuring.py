@@ -141,7 +141,7 @@ def test_a_jump_of_the_odometry_does_not_move_the_pose(family: Family) -> None:
 
 def test_the_device_is_the_same_for_the_same_seed_however_time_is_split(family: Family) -> None:
     """A conversation is recorded and repeated, the robot's time in other pieces; another seed flips other bits."""
-    reference = family.cable(*script(kind="bit_errors", at_s=0.5, duration_s=0.2))
+    reference = family.cable(*script(kind="bit_errors", at_s=0.5, duration_s=0.5, rate=1e-2))
     reference.plug()
     reference.twist = Twist(0.1, 0.2)
     heard: list[tuple[float, bytes]] = []
