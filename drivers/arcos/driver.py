@@ -28,8 +28,8 @@ from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose
 
 _PULSE_S: Final = 0.5
 """Longest time without a command, s: a quarter of the watchdog."""
-_INCOMPLETE_S: Final = 0.25
-"""Time without any byte after which the rest of an incomplete packet does not come, s."""
+_INCOMPLETE_S, _PAUSE_S = 0.25, 0.03
+"""After so long without a packet, and so long without a byte, the rest of an incomplete packet does not come, s."""
 _CALLING_S: Final = 2.0
 """Shortest time for which the robot is called before the line counts as down, s."""
 _OPENING_S: Final = 1.0
@@ -134,7 +134,10 @@ class ArcosDriver:
         self._problem = None
         self._is_ending = False
         self._refused_until_s = -math.inf
-        self._handshake.start(run_s)
+        if self._has_session:  # the robot has kept the speed
+            self._handshake.restart(run_s)
+        else:
+            self._handshake.start(run_s)
 
     def line_closed(self) -> None:
         """Forget commands in progress; only a halt is kept for the next line until the base has confirmed it."""
@@ -155,7 +158,7 @@ class ArcosDriver:
         self._run_s = run_s
         if self._state is LineState.CLOSED:
             return
-        if self._decoder.pending and run_s - self._data_s > _INCOMPLETE_S:
+        if self._decoder.pending and run_s - self._packet_s > _INCOMPLETE_S and run_s - self._data_s > _PAUSE_S:
             for packet in self._decoder.skip():
                 self._take(packet)
         if self._state is LineState.READY:

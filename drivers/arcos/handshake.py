@@ -91,14 +91,13 @@ class Handshake:
 
     def start(self, run_s: float) -> None:
         """Begin on a line that was just opened, at the likeliest speed."""
-        self.sweeps = 0
         if self.bauds:
             self.baud = self.bauds[0]
         self.restart(run_s)
 
     def restart(self, run_s: float) -> None:
         """Begin again, at the present speed first."""
-        self._run_s = run_s
+        self._run_s, self.sweeps = run_s, 0
         self._order = tuple(dict.fromkeys((self.baud, *self.bauds))) if self.bauds else ()
         self.name = self.config = None
         self.was_open = self.keeps_baud = self._is_sending = False

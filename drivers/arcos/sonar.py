@@ -3,7 +3,7 @@
 All arrays fire in parallel, one disc each per sonar cycle, and a range is known at the end of its cycle. A SIP lists
 the ranges that became known since the last one, in the order of firing, without times. But each list bounds them: the
 cycle of its last range has ended before the SIP, and the next cycle has not. As SIPs and cycles shift against each
-other, these bounds narrow from SIP to SIP, for periods of 100 and 40 ms to 20 ms.
+other, these bounds narrow from SIP to SIP: with SIPs each 100 ms to 20 ms for cycles of 40 ms, and to 3 ms for 41 ms.
 """
 
 from __future__ import annotations
@@ -17,8 +17,10 @@ from drivers.arcos.frames import NO_ECHO_MM, SonarReading
 from drivers.messages import Floats
 
 DISCS_PER_ARRAY: Final = 8
-_SLACK_S: Final = 1.5e-3
-"""By how much the bounds widen from one SIP to the next, s: the times of SIPs are not exact."""
+_SLACK_S: Final = 3e-4
+"""By how much the bounds widen from one SIP to the next, s: the robot's clock and the run's differ a little."""
+_JITTER_S: Final = 5e-3
+"""Bounds that contradict each other by no more than this do so because the times of SIPs are not exact."""
 _ORDER_S: Final = 1e-4
 """Least time between two firings, s."""
 _TOO_MANY: Final = 2
@@ -51,8 +53,10 @@ class SonarTimes:
         passed_s = count * self.cycle_s
         low_s = max(self._low_s + passed_s - _SLACK_S, sip_s - self.cycle_s)
         high_s = min(self._high_s + passed_s + _SLACK_S, sip_s)
-        if low_s > high_s:  # a SIP was lost, or the sonar was off
+        if low_s > high_s + _JITTER_S:  # a SIP was lost, or the sonar was off
             low_s, high_s = sip_s - self.cycle_s, sip_s
+        elif low_s > high_s:
+            low_s = high_s = 0.5 * (low_s + high_s)
         self._low_s, self._high_s = low_s, high_s
         return 0.5 * (low_s + high_s)
 

@@ -43,7 +43,7 @@ def test_the_factory_sequence_is_opposite_pairs() -> None:
     polling = polling_of(robot, discs_of(robot))
     assert list(polling.sequence)[0::2] == list(range(1, 9))
     assert list(polling.sequence)[1::2] == list(range(9, 17))
-    assert polling.commands == (Command(N.SONARCYCLE, 40), Command(N.POLLING, polling.sequence))
+    assert polling.commands == (Command(N.SONARCYCLE, 41), Command(N.POLLING, polling.sequence))
     assert polling.arrays == SipFlags.SONAR_1 | SipFlags.SONAR_2
 
 
