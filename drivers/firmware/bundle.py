@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import itertools
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,11 +13,15 @@ from pydantic import ValidationError
 
 from config.errors import WRONG_CALL, UserError
 from config.robot import RobotConfig
+from drivers.firing_pattern import firing_pattern, sensors
 
 Board: TypeAlias = Literal["pico", "esp32"]
 CONFIG_NAME: Final = "robot_config.py"
 _SOURCES: Final = Path(__file__).parent / "board"
-_REPLY_TIMEOUT_S, _SPEED_SHARE = 0.1, 0.9
+_ON_I2C: Final = ("srf08", "srf10")
+_MACHINES: Final = 8
+"""State machines of the RP2040, each of which times one echo pin."""
+_SPEED_SHARE: Final = 0.9
 """Below the base's own limit, so that its control has something left."""
 
 
@@ -90,6 +95,35 @@ def robot_file(values: Mapping[str, Any], place: str) -> str:
         where = ".".join(map(str, first["loc"]))
         raise FirmwareError(f"{place}: gives {where} = {first['input']!r}: {first['msg']}; correct it") from error
     return text
+
+
+def check_pins(values: Mapping[str, Any], board: Board, place: str) -> None:
+    """Check that the board can time the echoes of each set of sensors that fire together.
+
+    Raises
+    ------
+    FirmwareError
+        It cannot; the message says what to change.
+    """
+    if values.get("ECHO_TIMING") not in ("irq", "pio") or (values["ECHO_TIMING"] == "pio" and board != "pico"):
+        possible = '"pio" or "irq"' if board == "pico" else '"irq"'
+        raise FirmwareError(f"{place}: ECHO_TIMING = {values.get('ECHO_TIMING')!r}: on this board it is {possible}")
+    ring = RobotConfig.model_validate(tomllib.loads(robot_file(values, place))).ring
+    wires = {i: sensor[1:] for i, sensor in enumerate(values["SENSORS"]) if sensor[0] not in _ON_I2C}
+    if values["ECHO_TIMING"] == "pio" and (echoes := len({echo for _, echo in wires.values()})) > _MACHINES:
+        raise FirmwareError(
+            f'{place}: SENSORS have {echoes} echo pins, and ECHO_TIMING = "pio" times {_MACHINES}; let sensors that '
+            f'do not fire together share echo pins through diodes, or set ECHO_TIMING = "irq"'
+        )
+    for mask in firing_pattern(ring).masks:
+        triggers = {wires[i][0] for i in sensors(mask) if i in wires}
+        firing = [i for i, (trigger, _) in wires.items() if trigger in triggers]
+        for i, j in itertools.combinations(firing, 2):
+            if wires[i][1] == wires[j][1]:
+                raise FirmwareError(
+                    f"{place}: sensors {i} and {j} share echo pin {wires[i][1]}, and FIRING or a shared trigger "
+                    f"fires them together; give one of them another pin, or change FIRING"
+                )
 
 
 def _render(values: Mapping[str, Any]) -> str:

@@ -14,6 +14,7 @@ from cyclopts import App, CycloptsError, Group
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
 from config.files import noting_files_read, one_line
 from runtime import VERSION
+from runtime.cli.board_commands import firmware, ring_test_command
 from runtime.cli.experiment_commands import experiment
 from runtime.cli.first_signals import EXIT_CODE_BASE
 from runtime.cli.recording_commands import export, figures, map_command, recover, replay, report
@@ -33,10 +34,11 @@ for title, commands in (
     ("Robot", (run, emulate, check, service)),
     ("Recordings", (replay, report, figures, export, map_command, recover)),
     ("Simulation", (experiment,)),
+    ("A robot of your own", (firmware, ring_test_command)),
 ):
     group = Group.create_ordered(title)
     for command in commands:
-        app.command(command, name=command.__name__.removesuffix("_command"), group=group)
+        app.command(command, name=command.__name__.removesuffix("_command").replace("_", "-"), group=group)
 general = Group.create_ordered("General")
 for flag in ("--help", "--version"):
     app[flag].group = general

@@ -1,6 +1,6 @@
 """The robot: pins and geometry, the one file to edit. Afterwards run `echolocate firmware` again for the robot file.
 
-ESP32-WROOM-32: 6 HC-SR04 in a circle, TB6612FNG or L298N, two motors with encoders. Pins are GPIO numbers.
+ESP32-WROOM-32: 12 HC-SR04 in a circle, TB6612FNG or L298N, two motors with encoders. Pins are GPIO numbers.
 """
 
 NAME = "ring"
@@ -9,14 +9,20 @@ WATCHDOG = False  # True resets a board that hangs; then new files need the flas
 
 # The ring. Sensors counter-clockwise from forward: ("hc-sr04", trigger pin, echo pin), "mb10xx" or "mb12xx" with
 # RX and PW pin, or ("srf08", I2C address of 7 bits), "srf10". Sensors that share a trigger pin fire together; sensors
-# may share an echo pin through diodes if they never fire together. Echoes of 5 V need dividers to 3.3 V.
+# may share an echo pin, through a diode each, if they never fire together. Echoes of 5 V need dividers to 3.3 V.
 SENSORS = (
     ("hc-sr04", 25, 34),
+    ("hc-sr04", 26, 34),
+    ("hc-sr04", 27, 34),
+    ("hc-sr04", 25, 35),
     ("hc-sr04", 26, 35),
+    ("hc-sr04", 27, 35),
+    ("hc-sr04", 25, 36),
+    ("hc-sr04", 26, 36),
     ("hc-sr04", 27, 36),
     ("hc-sr04", 25, 39),
-    ("hc-sr04", 26, 32),
-    ("hc-sr04", 27, 33),
+    ("hc-sr04", 26, 39),
+    ("hc-sr04", 27, 39),
 )
 I2C = None  # (number, SDA pin, SCL pin) for srf08 and srf10
 ECHO_TIMING = "irq"  # interrupts; the ESP32 has no state machines
@@ -28,7 +34,7 @@ BEAM_HALF_ANGLE_DEG = 15.0
 RESOLUTION_M = 0.003  # what a range is good for; the clock measures to .2 mm
 RANGE_MIN_M = 0.02
 RANGE_MAX_M = 4.0
-FIRING = "opposite_pairs"  # a preset, or sets of sensors: ((0, 3), (1, 4), (2, 5))
+FIRING = "quadrants"  # a preset, or sets of sensors: ((0, 3, 6, 9), (1, 4, 7, 10), (2, 5, 8, 11))
 STEP_PERIOD_S = 0.05
 
 # The base. Motors and encoders: left, right; swap a motor's IN1 and IN2 if it turns backward, an encoder's A and B if

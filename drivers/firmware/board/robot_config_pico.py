@@ -1,6 +1,6 @@
 """The robot: pins and geometry, the one file to edit. Afterwards run `echolocate firmware` again for the robot file.
 
-Raspberry Pi Pico: 8 HC-SR04 in a circle, TB6612FNG or L298N, two motors with encoders. Pins are GPIO numbers.
+Raspberry Pi Pico: 12 HC-SR04 in a circle, TB6612FNG or L298N, two motors with encoders. Pins are GPIO numbers.
 """
 
 NAME = "ring"
@@ -9,16 +9,20 @@ WATCHDOG = False  # True resets a board that hangs; then new files need the BOOT
 
 # The ring. Sensors counter-clockwise from forward: ("hc-sr04", trigger pin, echo pin), "mb10xx" or "mb12xx" with
 # RX and PW pin, or ("srf08", I2C address of 7 bits), "srf10". Sensors that share a trigger pin fire together; sensors
-# may share an echo pin through diodes if they never fire together. Echoes of 5 V need dividers to 3.3 V.
+# may share an echo pin, through a diode each, if they never fire together. Echoes of 5 V need dividers to 3.3 V.
 SENSORS = (
     ("hc-sr04", 0, 4),
+    ("hc-sr04", 1, 4),
+    ("hc-sr04", 2, 4),
+    ("hc-sr04", 0, 5),
     ("hc-sr04", 1, 5),
+    ("hc-sr04", 2, 5),
+    ("hc-sr04", 0, 6),
+    ("hc-sr04", 1, 6),
     ("hc-sr04", 2, 6),
-    ("hc-sr04", 3, 7),
-    ("hc-sr04", 0, 8),
-    ("hc-sr04", 1, 9),
-    ("hc-sr04", 2, 10),
-    ("hc-sr04", 3, 11),
+    ("hc-sr04", 0, 7),
+    ("hc-sr04", 1, 7),
+    ("hc-sr04", 2, 7),
 )
 I2C = None  # (number, SDA pin, SCL pin) for srf08 and srf10
 ECHO_TIMING = "pio"  # the RP2040's state machines, for up to 8 echo pins; or "irq"
@@ -30,7 +34,7 @@ BEAM_HALF_ANGLE_DEG = 15.0
 RESOLUTION_M = 0.003  # what a range is good for; the clock measures to .2 mm
 RANGE_MIN_M = 0.02
 RANGE_MAX_M = 4.0
-FIRING = "opposite_pairs"  # a preset, or sets of sensors: ((0, 4), (1, 5), (2, 6), (3, 7))
+FIRING = "quadrants"  # a preset, or sets of sensors: ((0, 3, 6, 9), (1, 4, 7, 10), (2, 5, 8, 11))
 STEP_PERIOD_S = 0.05
 
 # The base. Motors and encoders: left, right; swap a motor's IN1 and IN2 if it turns backward, an encoder's A and B if

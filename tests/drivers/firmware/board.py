@@ -49,6 +49,8 @@ class BoardRobot:
 
     def __init__(self, folder: Path, board: Board = "pico", changes: str = "") -> None:
         self.config = install(folder, board, f"{LOCKSTEP}\n{changes}")
+        values = read_config((folder / CONFIG_NAME).read_text("utf-8"), CONFIG_NAME)
+        self.triggers = [sensor[1] for sensor in values["SENSORS"]]
         self._process = start(folder, "lockstep.py", stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         self._waiting = b""
 

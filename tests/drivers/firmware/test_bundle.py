@@ -9,7 +9,15 @@ import pytest
 
 from config.robot import RobotConfig
 from drivers.denning.wire_units import wire_pattern
-from drivers.firmware.bundle import CONFIG_NAME, Board, FirmwareError, board_files, read_config, robot_file
+from drivers.firmware.bundle import (
+    CONFIG_NAME,
+    Board,
+    FirmwareError,
+    board_files,
+    check_pins,
+    read_config,
+    robot_file,
+)
 
 BOARDS: tuple[Board, ...] = get_args(Board)
 
@@ -34,7 +42,7 @@ def test_the_files_of_a_board(board: Board) -> None:
 def test_the_shipped_configurations_use_each_pin_once(board: Board) -> None:
     v = values(board)
     pins = [pin for pair in (*v["MOTORS"], *v["ENCODERS"]) for pin in pair]
-    pins += [sensor[2] for sensor in v["SENSORS"]] + sorted({sensor[1] for sensor in v["SENSORS"]})
+    pins += [*{sensor[2] for sensor in v["SENSORS"]}, *{sensor[1] for sensor in v["SENSORS"]}]
     assert len(set(pins)) == len(pins)
     forbidden = {"pico": {23, 24, 25, 29}, "esp32": {0, 1, 3, *range(6, 12)}}[board]
     assert not forbidden & set(pins)
@@ -45,6 +53,7 @@ def test_the_shipped_configurations_use_each_pin_once(board: Board) -> None:
 @pytest.mark.parametrize("board", BOARDS)
 def test_the_robot_file_matches_the_configuration(board: Board) -> None:
     v, robot = values(board), config(board)
+    check_pins(v, board, CONFIG_NAME)
     assert (robot.robot.driver, robot.robot.protocol) == ("denning", 2)
     assert len(robot.ring.mounts) == len(v["SENSORS"])
     assert robot.ring.radius_m == 0.09
@@ -54,7 +63,7 @@ def test_the_robot_file_matches_the_configuration(board: Board) -> None:
     for mask in pattern.masks:
         fired = [i for i in range(24) if mask >> i & 1]
         assert len({v["SENSORS"][i][2] for i in fired}) == len(fired), "each with its own echo pin"
-        assert len({v["SENSORS"][i][1] for i in fired}) == 1, "opposite sensors share a trigger"
+        assert len({v["SENSORS"][i][1] for i in fired}) == 1, "those that fire together share a trigger"
 
 
 def test_a_ring_that_is_no_circle_and_sets_of_ones_own() -> None:
@@ -82,7 +91,7 @@ def test_what_is_no_list_of_constants_is_refused(text: str, said: str) -> None:
     ("changes", "said"),
     [
         ({"RANGE_MAX_M": -1.0}, "gives ring.range_max_m = -1.0: Input should be greater than 0"),
-        ({"MOUNTS": ((1, 2, 3),)}, "MOUNTS has 1 places and SENSORS 8 sensors"),
+        ({"MOUNTS": ((1, 2, 3),)}, "MOUNTS has 1 places and SENSORS 12 sensors"),
         ({"FIRING": "octet"}, "gives ring.firing"),
         ({"SPEED_MAX_MM_S": "fast"}, "a value is malformed"),
     ],
@@ -97,3 +106,10 @@ def test_a_missing_value_is_named() -> None:
     del v["STEP_PERIOD_S"]
     with pytest.raises(FirmwareError, match="STEP_PERIOD_S is missing"):
         robot_file(v, CONFIG_NAME)
+
+
+def test_nine_echo_pins_are_more_than_there_are_state_machines() -> None:
+    nine = tuple(("hc-sr04", 0, 4 + i) for i in range(9))
+    with pytest.raises(FirmwareError, match='9 echo pins, and ECHO_TIMING = "pio" times 8'):
+        check_pins(values(SENSORS=nine, FIRING="single"), "pico", CONFIG_NAME)
+    check_pins(values(SENSORS=nine, FIRING="single", ECHO_TIMING="irq"), "pico", CONFIG_NAME)

@@ -14,7 +14,7 @@ class IrqTimer:
     """
 
     def __init__(self, group: list, number: int) -> None:
-        self.pin = Pin(number, Pin.IN, Pin.PULL_DOWN)
+        self.pin = Pin(number, Pin.IN)
         self._group = group
         self._rise_us = self._fall_us = 0
         self._edges = 2

@@ -131,6 +131,8 @@ class Board:
             else:
                 self.echoes[number] = entry[2]
                 self.triggers[entry[1]] = self.triggers.get(entry[1], ()) + (number,)
+        for number in getattr(config, "FAKE_DEAD", ()):
+            self.states[number] = DEAD
         encoders = getattr(config, "FAKE_ENCODERS", config.ENCODERS)
         for pins in encoders:
             for pin in pins:

@@ -1,0 +1,84 @@
+"""`echolocate firmware`: the files to copy to a board, and the robot file for them."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Final
+
+from config.errors import DONE, FAILED, WRONG_CALL, UserError
+from config.files import one_line
+from drivers.firmware.bundle import CONFIG_NAME, Board, board_files, check_pins, read_config, robot_file
+
+ROBOT_NAME: Final = "robot.toml"
+
+
+def write_firmware(board: Board, out: str, *, force: bool) -> int:
+    """Write the files, say what to do next, and return the exit code.
+
+    Parameters
+    ----------
+    board
+        The board.
+    out
+        The folder; a robot_config.py in it is kept.
+    force
+        Whether other files that differ may be overwritten.
+
+    Raises
+    ------
+    UserError
+        A file differs, or cannot be written; or robot_config.py is wrong.
+    """
+    folder = Path(out)
+    files = board_files(board)
+    try:
+        config_file = folder / CONFIG_NAME
+        is_kept = config_file.exists()
+        if is_kept:
+            files[CONFIG_NAME] = config_file.read_text("utf-8")
+        place = one_line(str(config_file))
+        values = read_config(files[CONFIG_NAME], place)
+        check_pins(values, board, place)
+        files[ROBOT_NAME] = robot_file(values, place)
+        _refuse_changed(folder, files, force=force)
+        for name, text in files.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text(text, "utf-8")
+    except UnicodeDecodeError as error:
+        raise UserError(f"{one_line(str(folder))}: a file in it is not UTF-8 ({error.reason})", WRONG_CALL) from error
+    except OSError as error:
+        where = one_line(str(error.filename or folder))
+        raise UserError(f"--out: {where}: {error.strerror}; choose another folder", FAILED) from error
+    _say_what_next(folder, is_kept=is_kept)
+    return DONE
+
+
+def _refuse_changed(folder: Path, files: dict[str, str], *, force: bool) -> None:
+    """Raise if a file would lose its changes; the robot file is made anew each time, and says so."""
+    changed = [
+        name
+        for name, text in files.items()
+        if name != ROBOT_NAME and (folder / name).exists() and (folder / name).read_text("utf-8") != text
+    ]
+    if changed and not force:
+        names = ", ".join(changed)
+        raise UserError(
+            f"--out {one_line(str(folder))}: {names} differ from this program's; use --force to overwrite them, or "
+            f"another folder",
+            WRONG_CALL,
+        )
+
+
+def _say_what_next(folder: Path, *, is_kept: bool) -> None:
+    shown = one_line(str(folder))
+    kept = "kept" if is_kept else "edit it to your pins and geometry, then run this command again"
+    sys.stdout.write(
+        f"{shown}/{CONFIG_NAME}: {kept}\n"
+        f"{shown}/main.py, {shown}/ring/: the firmware\n"
+        f"{shown}/{ROBOT_NAME}: the robot file, made from {CONFIG_NAME}\n"
+        f"Copy to the board, which has MicroPython:\n"
+        f"  mpremote fs cp -r {shown}/ring {shown}/{CONFIG_NAME} {shown}/main.py :\n"
+        f"  mpremote reset\n"
+        f"Then: echolocate ring-test PORT --robot {shown}/{ROBOT_NAME}\n"
+    )

@@ -1,0 +1,116 @@
+"""`echolocate ring-test`: what is found out about sensors and motors, and the whole command on the real firmware."""
+
+from __future__ import annotations
+
+import math
+import os
+import tty
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from config.errors import DONE, FAILED, WRONG_CALL, UserError
+from drivers.messages import Flags, Odometry, Pose, Twist
+from runtime.cli.app import run_command
+from runtime.cli.commands import ring_test
+from runtime.cli.commands.ring_test import judge_motion, judge_sensor, only_port
+from tests.drivers.firmware.board import install, start
+
+INF = math.inf
+
+
+@pytest.mark.parametrize(
+    ("ranges", "is_good", "said"),
+    [
+        ([], False, "NO ANSWER"),
+        ([1.0] * 15, False, "15 times of 20"),
+        ([INF] * 20, True, "hears nothing"),
+        ([1.0, 1.003] * 10, True, "1.002 m, 20 echoes of 20, within 3 mm"),
+        ([1.0] * 19 + [3.0], True, "within 0 mm"),
+        ([1.0, 1.5] * 8 + [INF] * 4, True, "16 echoes of 20, unsteady by 0.50 m"),
+    ],
+)
+def test_what_is_found_out_about_a_sensor(ranges: list[float], is_good: bool, said: str) -> None:
+    finding = judge_sensor(ranges, 20)
+    assert finding.is_good is is_good
+    assert said in finding.text
+
+
+def odometry(x: float, y: float, theta: float) -> Odometry:
+    return Odometry(0.0, Pose(x, y, theta), theta, Twist(0.0, 0.0), Flags.NONE, 0)
+
+
+@pytest.mark.parametrize(
+    ("asked", "after", "flags", "is_good"),
+    [
+        (Twist(0.1, 0.0), (0.0, 0.09, math.pi / 2), Flags.NONE, True),
+        (Twist(0.1, 0.0), (0.09, 0.0, math.pi / 2), Flags.NONE, False),
+        (Twist(-0.1, 0.0), (0.0, 0.1, math.pi / 2), Flags.NONE, False),
+        (Twist(0.0, 0.6), (0.0, 0.0, math.pi / 2 + 0.5), Flags.NONE, True),
+        (Twist(0.0, 0.6), (0.0, 0.0, math.pi / 2 - 0.5), Flags.NONE, False),
+        (Twist(0.1, 0.0), (0.0, 0.09, math.pi / 2), Flags.MOTOR_FAULT | Flags.LATCHED, False),
+        (Twist(0.1, 0.0), (0.0, 0.0, math.pi / 2), Flags.LATCHED, False),
+    ],
+)
+def test_what_is_found_out_about_a_motion(
+    asked: Twist, after: tuple[float, float, float], flags: Flags, is_good: bool
+) -> None:
+    finding = judge_motion(asked, odometry(0.0, 0.0, math.pi / 2), odometry(*after), flags, 1.0)
+    assert finding.is_good is is_good
+
+
+def test_without_a_port_there_must_be_exactly_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Port:
+        def __init__(self, device: str) -> None:
+            self.device = device
+
+    for names, said in (((), "found none"), (("/dev/b", "/dev/a"), "found /dev/a, /dev/b")):
+        monkeypatch.setattr(ring_test, "comports", lambda names=names: [Port(name) for name in names])
+        with pytest.raises(UserError, match=said):
+            only_port()
+    monkeypatch.setattr(ring_test, "comports", lambda: [Port("/dev/ttyACM0")])
+    assert only_port() == "/dev/ttyACM0"
+
+
+def test_no_rounds_are_a_wrong_call(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(["ring-test", "/dev/nowhere", "--rounds", "0"]) == WRONG_CALL
+    assert "--rounds" in capsys.readouterr().err
+
+
+@pytest.fixture
+def plugged(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[list[str]]:
+    """Yield the arguments that name a robot with the real firmware on a pty."""
+    install(tmp_path, "pico", request.param)
+    assert run_command(["firmware", "--board", "pico", "--out", str(tmp_path / "files")]) == DONE
+    board, port = os.openpty()
+    tty.setraw(port)
+    process = start(tmp_path, "realtime.py", stdin=board, stdout=board)
+    yield [os.ttyname(port), "--robot", str(tmp_path / "files" / "robot.toml")]
+    process.kill()
+    process.wait()
+    os.close(board)
+    os.close(port)
+
+
+@pytest.mark.parametrize("plugged", ["FAKE_DEAD = (3,)"], indirect=True)
+def test_a_dead_sensor_of_the_real_firmware_is_found(plugged: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    capsys.readouterr()
+    assert run_command(["ring-test", *plugged, "--rounds", "2"]) == FAILED
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("robot 'ring' on ")
+    assert "NO ANSWER" in lines[4]
+    assert all("echoes of 2" in line for line in (*lines[1:4], *lines[5:13]))
+    assert len(lines) == 13, "and no wheel has turned"
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("plugged", [""], indirect=True)
+def test_the_motors_of_the_real_firmware(plugged: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    capsys.readouterr()
+    assert run_command(["ring-test", *plugged, "--rounds", "2", "--move"]) == DONE
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[13].startswith("WARNING: the wheels turn in")
+    assert [line.split(":")[0] for line in lines[14:18]] == [
+        "motors forward", "motors backward", "motors left (counter-clockwise from above)", "motors right",
+    ]  # fmt: skip
