@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from tests.drivers.contract.families import FAMILIES, Family
+from drivers import registry
+from drivers.registry import GROUP
+from tests.drivers.contract.families import CHIRP_ENTRY, FAMILIES, Family
+
+
+@pytest.fixture(autouse=True)
+def _installed_example(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make the example known as if an installed package provided it."""
+    monkeypatch.setattr(registry, "entry_points", lambda *, group: (CHIRP_ENTRY,) if group == GROUP else ())
 
 
 @pytest.fixture(params=sorted(FAMILIES))

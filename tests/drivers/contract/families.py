@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib.metadata import EntryPoint
 from types import MappingProxyType
 from typing import Final
 
 from config.load import load_robot
-from config.robot import RingConfig, RobotConfig
+from config.robot import BodyConfig, DriverConfig, LinkConfig, RingConfig, RobotConfig
 from config.world import WallConfig, WorldConfig
 from drivers.driver import LineState
 from drivers.emulator.faults import Fault
 from drivers.messages import Twist
+from drivers.registry import GROUP
 from tests.drivers.cable import ROBOT, STEP_S, Cable
 
 ROOM: Final = WorldConfig(
@@ -100,7 +102,21 @@ ARCOS: Final = Family(
     P3DX, ring_with(P3DX.ring, sets=[[k, 15 - k] for k in (3, 4, 0, 7)], step_period_s=0.06), connect_s=1.5,
     silent_s=0.65, deaf_s=1.6, halt_s=0.3, handshake_bytes=0, cut_stride=29,
 )  # fmt: skip
-FAMILIES: Final = MappingProxyType({"arcos": ARCOS, "denning": DENNING})
+CHIRP_RING: Final = RingConfig.model_validate({
+    "count": 12, "radius_m": 0.2, "beam_half_angle_deg": 15.0, "resolution_m": 0.001, "range_min_m": 0.05,
+    "range_max_m": 4.0, "firing": {"preset": "thirds", "step_period_s": 0.05},
+})  # fmt: skip
+CHIRP: Final = Family(
+    RobotConfig(
+        robot=DriverConfig(driver="chirp"), ring=CHIRP_RING,
+        body=BodyConfig(radius_m=0.2, speed_max_m_s=0.6, turn_max_rad_s=1.5), link=LinkConfig(port="/dev/chirp"),
+    ),
+    ring_with(CHIRP_RING, preset="quadrants", step_period_s=0.06), connect_s=0.3, silent_s=0.5, deaf_s=0.5,
+    halt_s=0.15, handshake_bytes=0, cut_stride=29,
+)  # fmt: skip
+"""The example of docs/extending.md."""
+CHIRP_ENTRY: Final = EntryPoint("chirp", "tests.drivers.contract.example.family", GROUP)
+FAMILIES: Final = MappingProxyType({"arcos": ARCOS, "chirp": CHIRP, "denning": DENNING})
 
 
 def is_near(twist: Twist, wanted: Twist) -> bool:
