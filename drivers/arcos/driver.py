@@ -218,8 +218,10 @@ class ArcosDriver:
             return b""
         if self._is_ending:
             self._is_ending, self._has_session, self._state = False, False, LineState.CLOSED
-            return b"".join(map(encode, (*STOP, Command(CommandNumber.ENABLE, 0), *CLOSE)))
-        commands = self._halting.commands(self._run_s)
+            farewell = () if self._handshake.is_syncing else (Command(CommandNumber.ENABLE, 0), *CLOSE)
+            return b"".join(map(encode, (*STOP, *farewell)))
+        is_syncing = self._handshake.is_syncing
+        commands = () if is_syncing and writable else self._halting.commands(self._run_s)
         if writable:
             commands += self._due_commands()
         if commands:

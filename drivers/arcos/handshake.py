@@ -89,6 +89,11 @@ class Handshake:
         self._is_sending = False
         self._order = self.bauds
 
+    @property
+    def is_syncing(self) -> bool:
+        """Whether another command could break the sequence of SYNCs; each SYNC0 stops the base before it."""
+        return self.stage in {Stage.SYNC0, Stage.SYNC1, Stage.SYNC2}
+
     def start(self, run_s: float) -> None:
         """Begin on a line that was just opened, at the likeliest speed."""
         if self.bauds:

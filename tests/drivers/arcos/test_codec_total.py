@@ -49,9 +49,7 @@ def check_noise(side: Side, seed: int, total: int) -> str:
         assert chunked.pending == 0
     assert chunked.frames > 1e-3 * total
     assert chunked.bad > 1e-3 * total
-    return (
-        f"{total:.0e} bytes to the {side}'s peer: {chunked.frames:,} frames, {chunked.bad:,} dropped, ≤ {held} held"
-    )
+    return f"{total:.0e} bytes from the {side}: {chunked.frames:,} frames, {chunked.bad:,} dropped, ≤ {held} held"
 
 
 def check_driver(seed: int, total: int) -> str:

@@ -11,6 +11,7 @@ from config.robot import FiringConfig
 from drivers.arcos.codec import encode
 from drivers.arcos.commands import Command, CommandNumber
 from drivers.arcos.frames import Other, RobotName, SipFlags, SonarReading
+from drivers.arcos.handshake import STOP
 from drivers.driver import LineState
 from drivers.firing_pattern import FiringError
 from drivers.messages import Flags, Twist
@@ -357,6 +358,12 @@ def test_the_session_ends_with_close() -> None:
     assert harness.run(1.0) == []
     harness.driver.end_session()
     assert harness.exchange() == []
+
+
+def test_a_robot_without_a_session_is_only_stopped_at_the_end(harness: Harness) -> None:
+    harness.open()
+    harness.driver.end_session()
+    assert harness.driver.outgoing(writable=True) == b"".join(map(encode, STOP))
 
 
 def test_packets_that_are_none_of_its_business_are_skipped(harness: Harness) -> None:

@@ -41,6 +41,21 @@ class Simulator(Controller):
         return answers
 
 
+class Strict(Controller):
+    """Begins its handshake again at any command out of order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._expected = 0
+
+    def _answers(self, command: Command) -> tuple[Packet, ...]:
+        if self.session == "wait":
+            is_next = command.number == self._expected
+            self._expected = (self._expected + 1) % 3 if is_next else 0
+            return super()._answers(command) if is_next else ()
+        return super()._answers(command)
+
+
 class Late(Controller):
     """Carries out velocities as late as it shows them: after three SIPs."""
 
@@ -165,6 +180,14 @@ def test_slow_echoes_do_not_confuse_the_handshake() -> None:
     harness.run(0.28)
     harness.to_driver(encode(SyncEcho(0)) * 2)
     harness.run(2.0)
+    assert harness.state() is LineState.READY
+
+
+@pytest.mark.parametrize("is_halting", [False, True])
+def test_nothing_comes_between_the_syncs(*, is_halting: bool) -> None:
+    harness = Harness(controller=Strict())
+    harness.open()
+    harness.run(0.7, harness.driver.halt if is_halting else None)
     assert harness.state() is LineState.READY
 
 
