@@ -187,6 +187,11 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "paths that are not UTF-8, no home folder, `~` of no user, streams that are closed, full or ASCII: no "
             "traceback, no folder of the name `~`",
         ),
+        "P29": Promise(
+            "Robots that people have",
+            "an emulated p3dx in the paper's hallway, `specular`, 15 s in virtual time: six drums of six, none "
+            "false, error ≤ .02 ft; every driver and its emulated robot keep one contract",
+        ),
     }
 )  # fmt: skip
 

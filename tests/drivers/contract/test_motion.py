@@ -57,6 +57,7 @@ def test_no_command_exceeds_the_limits_of_the_body(family: Family) -> None:
     assert fastest_turn <= limits.turn_max_rad_s + 1e-9
 
 
+@pytest.mark.promise("P29")
 def test_a_halt_stops_the_base_and_holds_it_until_a_release(family: Family) -> None:
     cable = family.driving()
     cable.driver.halt()
@@ -120,6 +121,7 @@ def test_a_line_that_opens_again_moves_nothing_by_itself(family: Family) -> None
     assert cable.robot.truth.pose == stands
 
 
+@pytest.mark.promise("P1")
 @pytest.mark.parametrize("how", ["frozen", "unplugged"])
 def test_the_base_stops_by_itself_when_the_host_is_gone(family: Family, how: str) -> None:
     cable = family.driving()
