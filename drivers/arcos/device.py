@@ -12,16 +12,16 @@ from enum import Enum
 
 import numpy as np
 
-from config.robot import SOUND_SPEED_M_S, RobotConfig
+from config.robot import RobotConfig
 from config.world import WorldConfig
 from drivers.arcos.codec import Decoder, decode_command, encode
 from drivers.arcos.commands import Command, CommandNumber
 from drivers.arcos.device_motion import STILL, MotionServo
 from drivers.arcos.device_packets import SONAR_MAX, RequestedPackets, make_sip
-from drivers.arcos.device_sonar import SonarArrays
+from drivers.arcos.device_sonar import SonarArrays, SonarReadings
 from drivers.arcos.device_touch import Touch
 from drivers.arcos.firmware import Firmware
-from drivers.arcos.frames import BAUDS, NO_ECHO_MM, Packet, ResetNotice, RobotName, SonarReading, SyncEcho
+from drivers.arcos.frames import BAUDS, Packet, ResetNotice, RobotName, SyncEcho
 from drivers.arcos.wire_frame_counter import WireFrameCounter
 from drivers.driver import DriverError
 from drivers.emulator.acoustics import clearance
@@ -33,12 +33,12 @@ from drivers.emulator.faults import (
     Deadman,
     Fault,
     IgnoredHalt,
+    LowBattery,
     MotorFault,
     OdometryJump,
-    Outliers,
     Reboot,
     Runaway,
-    StuckSensor,
+    StopButton,
 )
 from drivers.emulator.faulty_line import FaultyLine
 from drivers.emulator.robot_device import GroundTruth
@@ -50,8 +50,8 @@ TICK_US = 5_000
 """Longest step of the body's simulation, µs."""
 STALL_US = 200_000
 """The wheels are let go for this long after a stall, µs."""
-BATTERY_FULL, BATTERY_LOW = 126, 110
-"""The battery, 0.1 V, and where it is called low."""
+BATTERY_FULL, BATTERY_LOW, BATTERY_EMPTY = 126, 110, 107
+"""The battery, 0.1 V: full, where it is called low, and nearly empty."""
 
 
 class Session(Enum):
@@ -88,7 +88,6 @@ class ArcosDevice:
     _servo: MotionServo
     _arrays: SonarArrays
     _requested: RequestedPackets
-    _readings: list[tuple[int, SonarReading]]
     _sip_us: int | None
     _watchdog_us: int
     _tripped: bool
@@ -100,25 +99,25 @@ class ArcosDevice:
         if robot.body.synchro:
             raise DriverError("a Pioneer's body turns with its wheels: set body.synchro = false")
         seeds = np.random.SeedSequence(seed).spawn(5)
-        sonar_rng, drift_rng, self._outlier_rng, *line_rngs = map(np.random.default_rng, seeds)
+        sonar_rng, drift_rng, outlier_rng, *line_rngs = map(np.random.default_rng, seeds)
         self._firmware = firmware
         scene = compile_scene(world)
         start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
         self._body = Body(robot.body, scene, start, world.odometry, drift_rng)
-        self._sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
-        self._window_m = min(robot.ring.window_m, 1e-3 * NO_ECHO_MM)
+        sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
         self._touch = Touch(firmware, scene, robot.body.radius_m)
         self._now_us = self._moved_us = 0
         self._next_event_us: int | None = None  # None once something may have changed it
         self._faults = FaultSchedule(faults)
         self._line = FaultyLine(firmware.baud, self._faults, *line_rngs)
+        self._readings = SonarReadings(firmware, sonar, robot.ring.window_m, self._faults, outlier_rng)
         self._watchdog_ms = firmware.watchdog_ms
         self._driven = STILL
         self._stalled_until_us = 0
         self._boot()
         # Load the compiled kernels now, so that the first firing is not late.
         clearance(start.x, start.y, scene.circles, scene.segments)
-        self._sonar.true_echoes(start, start.theta, np.zeros(len(robot.ring.mounts), dtype=np.bool_))
+        sonar.true_echoes(start, start.theta, np.zeros(len(robot.ring.mounts), dtype=np.bool_))
 
     @property
     def truth(self) -> GroundTruth:
@@ -135,7 +134,7 @@ class ArcosDevice:
             Flags.BUMPER: bool(front or rear),
             Flags.MOTOR_FAULT: stalled,
             Flags.DEADMAN: self._tripped,
-            Flags.BATTERY_LOW: self._battery <= BATTERY_LOW,
+            Flags.BATTERY_LOW: self._volts() <= BATTERY_LOW,
         }
         return Flags(sum(flag for flag, is_set in status.items() if is_set))
 
@@ -210,7 +209,7 @@ class ArcosDevice:
 
     def _obey(self, command: Command) -> None:
         heading = self._body.odometry_pose.theta
-        refused = command.number == CommandNumber.ENABLE and self._faults.has(MotorFault)
+        refused = command.number == CommandNumber.ENABLE and self._is_off()
         if refused or self._servo.obey(command, heading) or self._requested.obey(command):
             return
         match command.number:
@@ -266,7 +265,7 @@ class ArcosDevice:
     def _wheels(self) -> tuple[Twist, tuple[float, float] | None]:
         """Return the velocity that the wheels accelerate towards, and the accelerations; None for a hard brake."""
         faults, servo, twist = self._faults, self._servo, self._body.twist
-        if faults.has(Reboot) or faults.has(BlockedWheels) or faults.has(MotorFault):
+        if faults.has(Reboot) or faults.has(BlockedWheels) or self._is_off():
             return STILL, None
         if self._moved_us < self._stalled_until_us:
             return STILL, None
@@ -291,43 +290,27 @@ class ArcosDevice:
         if self._session is Session.OPENED:
             if self._watchdog_ms and now >= self._watchdog_us:
                 self._tripped = True
-            self._fire()
+            self._readings.fire(self._arrays.fire(now), now, self._arrays.cycle_us, self._body)
             if self._sip_us is not None and self._sip_us <= now:
                 self._sip_us += 1000 * self._firmware.sip_cycle_ms
                 self._report()
         self._line.add_garbage(now, TICK_US)
 
-    def _fire(self) -> None:
-        """Fire the discs that are due; their ranges are known at the end of the cycle."""
-        now, sensors = self._now_us, self._arrays.fire(self._now_us)
-        if not sensors:
-            return
-        window_m = min(self._window_m, 0.5e-6 * self._arrays.cycle_us * SOUND_SPEED_M_S)
-        ranges = self._sonar.fire(self._body.pose, self._body.ring_yaw, sensors, window_m)
-        for outliers in self._faults.all(Outliers):
-            wild = self._outlier_rng.random(len(ranges)) < outliers.share
-            ranges[wild] = self._outlier_rng.uniform(0.0, window_m, len(ranges))[wild]
-        stuck = {fault.sensor: fault.range_m for fault in self._faults.all(StuckSensor)}
-        for sensor in sensors:
-            range_m = stuck.get(sensor, float(ranges[sensor]))
-            if range_m is None:  # a disc that reports nothing
-                continue
-            raw = round(min(1e3 * range_m, NO_ECHO_MM) / self._firmware.mm_per_range)
-            number = self._firmware.sensor_numbers[sensor]
-            self._readings.append((now + self._arrays.cycle_us, SonarReading(number, min(raw, 0xFFFF))))
-
     def _report(self) -> None:
         """Send a SIP with the ranges heard since the last one, and the packets that go with it."""
         front, rear, stalled = self._touched()
-        known = [reading for known_us, reading in self._readings if known_us <= self._now_us]
-        self._readings = [later for later in self._readings if later[0] > self._now_us]
+        known = self._readings.take(self._now_us)
         sip = make_sip(
             self._body, self._firmware, self._requested, front=front, rear=rear, stalled=stalled,
-            battery=self._battery, arrays=self._arrays.flags, sonar=known[-SONAR_MAX:],
-            motors=self._servo.enabled, heading_goal=self._servo.heading_goal,
+            battery=self._volts(), stop=self._faults.has(StopButton), arrays=self._arrays.flags,
+            sonar=known[-SONAR_MAX:], motors=self._servo.enabled, heading_goal=self._servo.heading_goal,
         )  # fmt: skip
         for packet in (sip, *self._requested.due(self._body, self._firmware, front, rear)):
             self._send(packet)
+
+    def _volts(self) -> int:
+        """Return the battery's voltage, 0.1 V."""
+        return BATTERY_EMPTY if self._faults.has(LowBattery) else self._battery
 
     def _touched(self) -> tuple[int, int, bool]:
         """Return the pressed segments of the front and rear bumper as bits from 1 on, and whether wheels stall."""
@@ -339,6 +322,10 @@ class ArcosDevice:
         return front, rear, stalled
 
     # Faults.
+
+    def _is_off(self) -> bool:
+        """Return whether the motors cannot be switched on."""
+        return self._faults.has(MotorFault) or self._faults.has(StopButton)
 
     def _update_faults(self) -> None:
         """Start and end the faults whose time has come."""
@@ -356,7 +343,7 @@ class ArcosDevice:
         match fault:
             case Reboot():
                 self._boot()
-            case MotorFault():
+            case MotorFault() | StopButton():
                 self._servo.enable(on=False)
             case Deadman():
                 self._watchdog_ms = fault.deadman_ms
@@ -378,7 +365,7 @@ class ArcosDevice:
         self._servo = MotionServo(firmware)
         self._arrays = SonarArrays(firmware.sensor_numbers, firmware.sonar_cycle_ms)
         self._requested = RequestedPackets()
-        self._readings = []
+        self._readings.clear()
         self._sip_us = None
         self._watchdog_us = self._now_us + 1000 * self._watchdog_ms
         self._tripped = False

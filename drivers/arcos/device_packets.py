@@ -88,6 +88,7 @@ def make_sip(
     rear: int,
     stalled: bool,
     battery: int,
+    stop: bool,
     arrays: int,
     sonar: Sequence[SonarReading],
     motors: bool,
@@ -109,6 +110,8 @@ def make_sip(
         Whether the wheels stall.
     battery
         0.1 V.
+    stop
+        Whether the stop button is pressed.
     arrays
         Bits of the sonar arrays that are on, as in the flags.
     sonar
@@ -122,7 +125,8 @@ def make_sip(
     half = twist.w / firmware.rad_s_per_mm_s
     left, right = (int((1e3 * twist.v + side * half) / firmware.mm_s_per_count) for side in (-1, 1))
     moving = twist.v != 0.0 or twist.w != 0.0
-    flags = arrays | SipFlags.POWER_GOOD | (SipFlags.MOTORS_ENABLED if motors else 0)
+    flags = arrays | SipFlags.POWER_GOOD
+    flags |= SipFlags.MOTORS_ENABLED * motors | SipFlags.STOP_BUTTON * stop
     return Sip(
         SIP_MOVING if moving else SIP_STOPPED,
         _signed(round(1e3 * pose.x / firmware.mm_per_count), 16),

@@ -5,6 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+import numpy as np
+
+from config.robot import SOUND_SPEED_M_S
+from drivers.arcos.firmware import Firmware
+from drivers.arcos.frames import NO_ECHO_MM, SonarReading
+from drivers.emulator.body import Body
+from drivers.emulator.fault_schedule import FaultSchedule
+from drivers.emulator.faults import Outliers, StuckSensor
+from drivers.emulator.sonar import Sonar
+
 ARRAYS, DISCS = 4, 8
 """Most arrays of a robot, and discs of an array."""
 CYCLE_MIN_MS, CYCLE_MAX_MS = 2, 120
@@ -82,3 +92,59 @@ class SonarArrays:
     def _by_array(self, numbers: Sequence[int]) -> list[list[int]]:
         known = [number for number in numbers if number in self._sensor_of]
         return [[number for number in known if number // DISCS == array] for array in range(ARRAYS)]
+
+
+class SonarReadings:
+    """The ranges of discs that have fired; each is known at the end of its cycle.
+
+    Parameters
+    ----------
+    firmware
+        Numbers and factor of the ranges.
+    sonar
+        The discs.
+    window_m
+        How far they listen at most, m.
+    faults
+        What is wrong with the robot at present.
+    rng
+        Random numbers of outliers.
+    """
+
+    def __init__(
+        self, firmware: Firmware, sonar: Sonar, window_m: float, faults: FaultSchedule, rng: np.random.Generator
+    ) -> None:
+        self._firmware = firmware
+        self._sonar = sonar
+        self._window_m = min(window_m, 1e-3 * NO_ECHO_MM)
+        self._faults = faults
+        self._rng = rng
+        self._pending: list[tuple[int, SonarReading]] = []
+
+    def fire(self, sensors: Sequence[int], now_us: int, cycle_us: int, body: Body) -> None:
+        """Fire sensors together; they listen until the cycle ends."""
+        if not sensors:
+            return
+        window_m = min(self._window_m, 0.5e-6 * cycle_us * SOUND_SPEED_M_S)
+        ranges = self._sonar.fire(body.pose, body.ring_yaw, sensors, window_m)
+        for outliers in self._faults.all(Outliers):
+            wild = self._rng.random(len(ranges)) < outliers.share
+            ranges[wild] = self._rng.uniform(0.0, window_m, len(ranges))[wild]
+        stuck = {fault.sensor: fault.range_m for fault in self._faults.all(StuckSensor)}
+        for sensor in sensors:
+            range_m = stuck.get(sensor, float(ranges[sensor]))
+            if range_m is None:  # a disc that reports nothing
+                continue
+            raw = round(min(1e3 * range_m, NO_ECHO_MM) / self._firmware.mm_per_range)
+            reading = SonarReading(self._firmware.sensor_numbers[sensor], min(raw, 0xFFFF))
+            self._pending.append((now_us + cycle_us, reading))
+
+    def take(self, now_us: int) -> list[SonarReading]:
+        """Return the readings that are known by now, in the order of firing, and remove them."""
+        known = [reading for known_us, reading in self._pending if known_us <= now_us]
+        self._pending = [later for later in self._pending if later[0] > now_us]
+        return known
+
+    def clear(self) -> None:
+        """Forget all readings."""
+        self._pending.clear()

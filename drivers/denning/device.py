@@ -32,10 +32,12 @@ from drivers.emulator.faults import (
     Deadman,
     Fault,
     IgnoredHalt,
+    LowBattery,
     MotorFault,
     OdometryJump,
     Reboot,
     Runaway,
+    StopButton,
 )
 from drivers.emulator.faulty_line import FaultyLine
 from drivers.emulator.robot_device import GroundTruth
@@ -129,7 +131,7 @@ class DenningDevice:
     @property
     def flags(self) -> Flags:
         """The base's status; BUMPER and MOTOR_FAULT give the cause of the latch and are cleared with it."""
-        return self._flags
+        return self._flags | Flags.BATTERY_LOW if self._faults.has(LowBattery) else self._flags
 
     @property
     def boot_id(self) -> int:
@@ -228,11 +230,13 @@ class DenningDevice:
             self._target = _STILL
 
     def _latch_again(self) -> None:
-        """Latch if a bumper is still pressed or a motor still faulty: that cannot be released."""
+        """Latch if a bumper or the stop is still pressed or a motor still faulty: that cannot be released."""
         if self._faults.has(Bumper):
             self._latch(Flags.BUMPER)
         if self._faults.has(MotorFault):
             self._latch(Flags.MOTOR_FAULT)
+        if self._faults.has(StopButton):
+            self._latch(Flags.NONE)
 
     # Events.
 
@@ -302,7 +306,7 @@ class DenningDevice:
                 round(body.odometry_ring_yaw * 1e4),
                 round(body.twist.v * 1e3),
                 round(body.twist.w * 1e3),
-                int(self._flags),
+                int(self.flags),
                 self._drive_seq,
             )
         )
@@ -331,6 +335,8 @@ class DenningDevice:
                 self._latch(Flags.BUMPER)
             case MotorFault():
                 self._latch(Flags.MOTOR_FAULT)
+            case StopButton():
+                self._latch(Flags.NONE)
             case Deadman():
                 self._deadman_ms = fault.deadman_ms
                 self._deadman_us = self._now_us + 1000 * self._deadman_ms

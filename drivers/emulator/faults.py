@@ -72,6 +72,18 @@ class MotorFault(_Timed):
     kind: Literal["motor_fault"]
 
 
+class StopButton(_Timed):
+    """The emergency stop is pressed, and held for `duration_s`: the base stops and cannot be released meanwhile."""
+
+    kind: Literal["stop_button"]
+
+
+class LowBattery(_Timed):
+    """The battery is nearly empty for `duration_s`."""
+
+    kind: Literal["low_battery"]
+
+
 class IgnoredHalt(_Timed):
     """The base acknowledges HALT, reports its latch, and drives on, also without commands."""
 
@@ -138,6 +150,8 @@ Fault: TypeAlias = (
     | Reboot
     | Bumper
     | MotorFault
+    | StopButton
+    | LowBattery
     | IgnoredHalt
     | BlockedWheels
     | Runaway

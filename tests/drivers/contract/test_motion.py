@@ -7,10 +7,9 @@ import math
 import pytest
 
 from drivers.driver import LineState
-from drivers.emulator.faults import Fault
 from drivers.messages import Flags, Twist
 from tests.drivers.cable import STEP_S
-from tests.drivers.contract.families import PLAIN, ROOM, Family
+from tests.drivers.contract.families import AHEAD, PLAIN, ROOM, Family
 from tests.drivers.device_host import script
 
 STILL = Twist(0.0, 0.0)
@@ -135,19 +134,32 @@ def test_the_base_stops_by_itself_when_the_host_is_gone(family: Family, how: str
     assert cable.robot.truth.twist == STILL
 
 
-@pytest.mark.parametrize("kind", ["bumper", "motor_fault"])
-def test_a_contact_and_a_fault_of_the_motors_are_reported_and_hold_no_motion_back(family: Family, kind: str) -> None:
-    fault: tuple[Fault, ...] = script(kind=kind, at_s=family.connect_s + 2.0, duration_s=0.5)
-    cable = family.connected(*fault, world=PLAIN)
-    cable.driver.release()
-    cable.run(family.connect_s + 2.2 - cable.now_s)
-    flag = Flags.BUMPER if kind == "bumper" else Flags.MOTOR_FAULT
-    assert cable.flags & flag
+@pytest.mark.parametrize(
+    ("kind", "flag"),
+    [
+        ("bumper", Flags.BUMPER),
+        ("motor_fault", Flags.MOTOR_FAULT),
+        ("stop_button", Flags.LATCHED),
+        ("low_battery", Flags.BATTERY_LOW),
+    ],
+)
+def test_what_is_wrong_with_the_base_is_reported_and_over_when_it_is(family: Family, kind: str, flag: Flags) -> None:
+    at_s = family.connect_s + 3.0
+    cable = family.driving(AHEAD, *script(kind=kind, at_s=at_s, duration_s=0.5))
+    assert not cable.odometry[-1].flags & flag
+    cable.run(at_s + 0.2 - cable.now_s)
+    assert cable.odometry[-1].flags & flag
+    if kind == "stop_button":
+        assert cable.robot.truth.twist == STILL
+        cable.driver.release()
+        cable.run(0.2)
+        assert cable.robot.truth.twist == STILL
     cable.driver.halt()
-    cable.run(0.5)
+    cable.run(0.6)
     cable.driver.release()
-    cable.twist = Twist(0.3, 0.0)
-    cable.until(lambda: cable.robot.truth.twist.v > 0.1, 2.0, "motion after the fault")
+    cable.until(lambda: cable.robot.truth.twist.v > 0.1, 3.0, "motion after the fault")
+    cable.run(0.2)
+    assert not cable.odometry[-1].flags & flag
 
 
 def test_driven_into_a_wall_it_reports_the_contact(family: Family) -> None:

@@ -1,4 +1,4 @@
-"""The hallway of six drums with an emulated Pioneer 3-DX: sixteen uneven sensors, partial lists, a differential base."""
+"""The hallway of six drums with an emulated Pioneer 3-DX: sixteen uneven sensors and partial lists of ranges."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from config.robot import RobotConfig
 from config.world import WorldConfig
 from drivers.emulator.body import BRAKE_S, RAMP_S, Body
 from drivers.emulator.fault_schedule import FaultSchedule
-from drivers.emulator.faults import Bumper, Fault, MotorFault, OdometryJump, Reboot
+from drivers.emulator.faults import Bumper, Fault, LowBattery, MotorFault, OdometryJump, Reboot, StopButton
 from drivers.emulator.faulty_line import FaultyLine
 from drivers.emulator.latency_trace import FrameCounter
 from drivers.emulator.robot_device import GroundTruth
@@ -24,6 +24,7 @@ from tests.drivers.contract.example.lines import LineReader, line
 
 TICK_US, REPORT_US, DEADMAN_MS = 5_000, 50_000, 400
 STILL = Twist(0.0, 0.0)
+LATCHING = ((Bumper, Flags.BUMPER), (MotorFault, Flags.MOTOR_FAULT), (StopButton, Flags.NONE))
 
 
 class ChirpDevice:
@@ -108,7 +109,7 @@ class ChirpDevice:
         self._flags, self._target = self._flags | Flags.LATCHED | why, STILL
 
     def _latch_while_faulty(self) -> None:
-        for kind, flag in ((Bumper, Flags.BUMPER), (MotorFault, Flags.MOTOR_FAULT)):
+        for kind, flag in LATCHING:
             if self._faults.has(kind):
                 self._latch(flag)
 
@@ -121,8 +122,8 @@ class ChirpDevice:
             elif isinstance(fault, Reboot):
                 self._body.reset_odometry()
                 self._boot()
-            elif begins and isinstance(fault, Bumper | MotorFault):
-                self._latch(Flags.BUMPER if isinstance(fault, Bumper) else Flags.MOTOR_FAULT)
+            else:
+                self._latch_while_faulty()
         stops = self._flags & Flags.LATCHED or self._faults.has(Reboot)
         within_s = BRAKE_S if stops else RAMP_S if self._flags & Flags.DEADMAN else None
         if self._body.step(1e-6 * TICK_US, STILL if stops else self._target, within_s=within_s):
@@ -151,7 +152,8 @@ class ChirpDevice:
     def _report(self) -> None:
         pose, twist = self._body.odometry_pose, self._body.twist
         motion = (round(1e3 * x) for x in (pose.x, pose.y, pose.theta, twist.v, twist.w))
-        self._say("AT", self._clock_ms(), *motion, int(self._flags), self._go)
+        flags = self._flags | Flags.BATTERY_LOW * self._faults.has(LowBattery)
+        self._say("AT", self._clock_ms(), *motion, int(flags), self._go)
 
     def _clock_ms(self) -> int:
         return (self._tick_us - self._booted_us) // 1000
