@@ -109,7 +109,10 @@ def refusal(command: str, code: int) -> str:
     if code == NakCode.LATCHED:
         action = "remove the cause: free the bumper, or restart the motors after a fault"
     elif code == NakCode.VALUE_OUT_OF_RANGE and command == "PATTERN":
-        action = "make ring.firing.step_period_s longer or ring.firing.window_m shorter"
+        action = (
+            "make ring.firing.step_period_s longer or ring.firing.window_m shorter, or fire only sensors together "
+            "that the robot's wiring can"
+        )
     elif code == NakCode.VALUE_OUT_OF_RANGE and command == "DRIVE":
         action = "lower body.speed_max_m_s and body.turn_max_rad_s to what the robot can do"
     return f"the robot refuses {command} (NAK {code}): {meaning}; {action}"

@@ -12,7 +12,7 @@ _MOTOR_FAULT = const(4)
 _DEADMAN = const(8)
 _BATTERY_LOW = const(16)
 PERIOD_MS = 10
-_RAMP_S = 0.25
+_RAMP_S = 0.2
 """After the deadman the base ramps from its full speed to a stop in this time."""
 
 

@@ -13,6 +13,7 @@ RISE_DELAY_US = 450
 NOTHING_US = 38_000
 WHEEL_TICK_US = 1000
 LAG_S = 0.04
+FRICTION_MM_S = 2.0
 OK, DEAD, HANGS = 0, 1, 2
 PINS = 48
 SENSORS = 24
@@ -161,7 +162,9 @@ class Board:
             in1, in2, pwm = wheel.motor
             ask = self.levels[in1] - self.levels[in2]
             ask *= self.config.FULL_SPEED_MM_S * self.duties.get(pwm, 0) / 65535
-            wheel.speed = 0.0 if wheel.blocked else wheel.speed + (ask - wheel.speed) * dt / LAG_S
+            wheel.speed += (ask - wheel.speed) * dt / LAG_S
+            if wheel.blocked or (ask == 0.0 and abs(wheel.speed) < FRICTION_MM_S):
+                wheel.speed = 0.0
             wheel.way_mm += wheel.speed * dt
             way = wheel.way_mm * self.config.ENCODER_COUNTS_PER_M / 1000.0
             steps = int(way) - wheel.count

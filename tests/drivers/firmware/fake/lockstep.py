@@ -1,8 +1,8 @@
 """Runs the firmware in virtual time, driven by lines on standard input.
 
 `A MICROSECONDS HEX` gives the robot bytes and runs it up to a time; the answer is what it sent, as HEX.
-`S SENSOR STATE`, `W SENSOR WIDTH`, `B WHEEL BLOCKED`, `P PIN LEVEL` and `V READING` change the world.
-`H` answers the free bytes after a collection, `F SENSOR` how often it fired, `M WHEEL` its way, mm, and speed, mm/s.
+`S SENSOR STATE`, `W SENSOR WIDTH`, `U WIDTH…`, `B WHEEL BLOCKED`, `P PIN LEVEL` and `V READING` change the world.
+`H` answers the free bytes after a collection, `F SENSOR` how often it fired, `M` the ways of both wheels, mm.
 """
 
 import gc
@@ -40,11 +40,14 @@ def answer(kind: str, words):
     if kind == "H":
         gc.collect()
         return gc.mem_free()
+    if kind == "M":
+        return BOARD.wheels[0].way_mm, BOARD.wheels[1].way_mm
+    if kind == "U":
+        BOARD.widths = [int(word) for word in words]
+        return ""
     first = int(words[0])
     if kind == "F":
         return BOARD.fired[first]
-    if kind == "M":
-        return BOARD.wheels[first].way_mm, BOARD.wheels[first].speed
     if kind == "V":
         machine.ADC.reading = first
     elif kind == "S":
