@@ -17,6 +17,7 @@ import pytest
 from config.world import WorldConfig
 from drivers.emulator.faults import Fault
 from drivers.emulator.robot_device import RobotDevice
+from drivers.messages import Flags
 from drivers.registry import make_driver
 from tests.drivers.cable import Cable
 from tests.drivers.contract import test_connecting as connecting
@@ -103,7 +104,9 @@ LONG: tuple[Clause, ...] = (
     *(partial(motion.test_a_halt_is_kept_for_the_next_line_and_a_velocity_is_not, outage_s=s) for s in (0.005, 0.1)),
     motion.test_a_line_that_opens_again_moves_nothing_by_itself,
     partial(motion.test_the_base_stops_by_itself_when_the_host_is_gone, how="unplugged"),
-    partial(motion.test_a_contact_and_a_fault_of_the_motors_are_reported_and_hold_no_motion_back, kind="bumper"),
+    partial(
+        motion.test_what_is_wrong_with_the_base_is_reported_and_over_when_it_is, kind="bumper", flag=Flags.BUMPER
+    ),
 )
 
 
