@@ -1,4 +1,7 @@
-"""The emulator's end of a TCP port: one host at a time, as an on-board bridge serves it; others are refused."""
+"""The emulator's end of a TCP port: one host at a time, as an on-board bridge serves it; others are refused.
+
+Like a bridge it packs what leaves the robot's transmitter until that pauses, so that a host mostly gets whole frames.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,8 @@ LOCALHOST = "127.0.0.1"
 """Where it listens unless another address is given: nothing asks a host who it is."""
 PORT_MAX = 65_535
 _READ_MAX = 4096
+_PACKET_MAX = 512
+"""Bytes packed at most; a line that never pauses is sent in pieces of this size."""
 _BUFFER_BYTES = 16_384
 """The system's buffer for bytes to the host; what a stalled host does not take beyond it is lost."""
 
@@ -57,6 +62,8 @@ class TcpServerPort:
         self._listener: socket.socket | None = None
         self._connection: socket.socket | None = None
         self.dropped = 0
+        self._packet = bytearray()
+        self._is_growing = False
         self.open()
 
     @property
@@ -96,13 +103,17 @@ class TcpServerPort:
             if end is not None:
                 end.close()
         self._connection = self._listener = None
+        self._packet.clear()
 
     def close(self) -> None:
         """Hang up for good."""
         self.unplug()
 
     def read(self) -> bytes | None:
-        """Return the bytes that the host wrote; None if no host is connected."""
+        """Return the bytes that the host wrote, None without one; send the packed ones once they pause."""
+        if not self._is_growing:
+            self._flush()
+        self._is_growing = False
         if self._connection is None:
             self._accept()
         if self._connection is None:
@@ -120,12 +131,21 @@ class TcpServerPort:
         return data
 
     def write(self, data: bytes) -> None:
-        """Send bytes to the host, without waiting; those that do not fit are lost."""
+        """Pack bytes for the host; those that do not fit when they are sent are lost."""
+        self._packet += data
+        self._is_growing = True
+        if len(self._packet) > _PACKET_MAX:
+            self._flush()
+
+    def _flush(self) -> None:
+        if not self._packet:
+            return
         written = 0
         if self._connection is not None:
             with contextlib.suppress(OSError):  # full, or lost, which the next read reports
-                written = self._connection.send(data)
-        self.dropped += len(data) - written
+                written = self._connection.send(self._packet)
+        self.dropped += len(self._packet) - written
+        self._packet.clear()
 
     def _accept(self) -> None:
         if self._listener is None:

@@ -111,7 +111,24 @@ def test_what_is_no_address_is_a_wrong_call() -> None:
 def test_bytes_without_a_host_are_lost() -> None:
     port = ANY()
     port.write(b"no one")
-    assert port.dropped == 6
     assert port.read() is None
+    assert port.read() is None
+    assert port.dropped == 6
     port.close()
     assert port.read() is None
+
+
+def test_bytes_that_leave_one_by_one_come_as_one_packet_when_they_pause() -> None:
+    port = ANY()
+    with connect(port.path) as host:
+        while port.read() is None:
+            pass
+        for k in range(20):
+            port.write(bytes((k,)))
+            assert port.read() == b""
+        with pytest.raises(BlockingIOError):
+            host.recv(100)
+        assert port.read() == b""
+        host.settimeout(TIMEOUT_S)
+        assert host.recv(100) == bytes(range(20))
+    port.close()
