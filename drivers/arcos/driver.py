@@ -382,7 +382,7 @@ class ArcosDriver:
 
     def _follow_status(self, status: SipFlags) -> None:
         """Act on what the robot reports of its motors and its sonar."""
-        self._enabling.observe(status)
+        self._enabling.observe(status, self._run_s)
         if self._enabling.are_on and self._problem == diagnostics.MOTORS_STAY_OFF:
             self._problem = None
         if status & SipFlags.STOP_BUTTON:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import Final
 
@@ -15,6 +16,7 @@ from drivers.arcos.wire_units import Polling
 from drivers.messages import Firing, Flags, Odometry, Pose
 from drivers.odometry_history import OdometryHistory
 from drivers.odometry_jumps import OdometryJumps
+from drivers.token_bucket import TokenBucket
 
 SIP_PERIOD_S: Final = 0.1
 """Time from one SIP to the next of a robot that does not report it, s."""
@@ -25,6 +27,10 @@ _GAP_PERIODS: Final = 4.5
 _SIP_BYTES, _TAIL_BYTES, _READING_BYTES = 30, 11, 3
 """Length of a SIP with its frame, of the tail that newer firmware sends, and of one range."""
 _BITS_PER_BYTE: Final = 10
+_FIRINGS_SHARE, _FIRINGS_BURST = 4.0, 64.0
+"""Firings passed on are at most so many times as frequent as those of the pattern, and so many at once."""
+_EXCESS_NOTED: Final = 1000
+"""Firings dropped from one note about it to the next."""
 _NOTES_MAX: Final = 16
 """Notes kept if they are not taken."""
 
@@ -45,15 +51,18 @@ class PoseStamper:
     ----------
     late_echoes
         Firings dropped because their pose is not known.
+    excess_echoes
+        Firings dropped because the robot sends many more than its pattern has.
     """
 
     def __init__(self, config: RobotConfig, discs: tuple[int, ...]) -> None:
-        self.late_echoes = 0
+        self.late_echoes = self.excess_echoes = 0
         self._odometer = Odometer(config.arcos)
         self._jumps = OdometryJumps(config.body)
         self._history = OdometryHistory(_HISTORY)
         self._sonar = SonarRing(discs, config.arcos.range_factor)
         self._clock = SipClock(SIP_PERIOD_S)
+        self._firing_limit = TokenBucket(math.inf, math.inf)
         self._epoch_s: float | None = None
         self._is_set_to_zero = False
         self._notes: deque[str] = deque(maxlen=_NOTES_MAX)
@@ -75,7 +84,9 @@ class PoseStamper:
 
     def set_polling(self, polling: Polling) -> None:
         """Set the firing pattern that the robot carries out."""
-        self._sonar.set_cycle(1e-3 * polling.cycle_ms, polling.window_m)
+        cycle_s = 1e-3 * polling.cycle_ms
+        self._sonar.set_cycle(cycle_s, polling.window_m)
+        self._firing_limit = TokenBucket(_FIRINGS_SHARE / cycle_s, _FIRINGS_BURST)
 
     def set_period(self, period_s: float) -> None:
         """Set the time from one SIP to the next."""
@@ -144,14 +155,18 @@ class PoseStamper:
         if note is not None:
             self.note(note)
         self._history.add(sample)
-        return sample, self._firings(sip, sample.robot_s)
+        return sample, self._firings(sip, sample.robot_s, arrived_s)
 
-    def _firings(self, sip: Sip, sip_s: float) -> list[Firing]:
+    def _firings(self, sip: Sip, sip_s: float, arrived_s: float) -> list[Firing]:
         firings, period_s = [], self._clock.period_s
         for fired_s, ranges in self._sonar.firings(sip.sonar, sip_s, period_s):
             place = self._history.at(fired_s, _GAP_PERIODS * period_s)
             if place is None:
                 self.late_echoes += 1
+            elif not self._firing_limit.take(arrived_s):
+                self.excess_echoes += 1
+                if self.excess_echoes % _EXCESS_NOTED == 1:
+                    self.note(diagnostics.EXCESS_FIRINGS)
             else:
                 firings.append(Firing(fired_s, *place, ranges))
         return firings

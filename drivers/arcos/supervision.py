@@ -17,6 +17,8 @@ _REQUEST_S: Final = 0.25
 """Time from one request for an answer to the next, s."""
 _ENABLE_S: Final = 0.3
 """Time until motors that were switched on are reported so, s: two or three SIPs."""
+_SEEN_S: Final = 0.15
+"""Time after which a SIP reports what a command did, s: more than a period."""
 _UNSUPPORTED: Final = 8
 """Requests without any answer after which a robot counts as one that does not know them."""
 
@@ -92,7 +94,7 @@ class Enabling:
     @property
     def may_drive(self) -> bool:
         """Whether the motors are released and on."""
-        return self._is_released and self.are_on
+        return self._is_released and self.are_on and not self.is_waiting
 
     @property
     def tries(self) -> int:
@@ -100,19 +102,20 @@ class Enabling:
         return self._tries if self.is_waiting else 0
 
     def release(self) -> None:
-        """Switch the motors on."""
-        self._is_released, self.is_waiting, self._tries = True, not self.are_on, 0
+        """Switch the motors on, also if they seem to be: they may be about to go off."""
+        self._is_released, self.is_waiting, self._tries = True, True, 0
 
     def withdraw(self) -> None:
         """End the release: the motors are no longer switched on, nor the base driven."""
         self._is_released = self.is_waiting = False
 
-    def observe(self, status: SipFlags) -> None:
+    def observe(self, status: SipFlags, run_s: float) -> None:
         """Take what the robot reports; whatever switches motors off, only a release switches them on again."""
-        were_on, self.are_on = self.are_on, bool(status & SipFlags.MOTORS_ENABLED)
-        if self.are_on:
-            self.is_waiting = False
-        elif were_on:
+        self.are_on = bool(status & SipFlags.MOTORS_ENABLED)
+        if self.is_waiting:
+            # Before that, it may report what was before the command.
+            self.is_waiting = not self.are_on or self._tries == 0 or run_s - self._sent_s < _SEEN_S
+        elif not self.are_on:
             self.withdraw()
 
     def commands(self, run_s: float) -> tuple[Command, ...]:

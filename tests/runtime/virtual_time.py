@@ -148,10 +148,10 @@ class MemoryLink:
 
 @contextlib.contextmanager
 def in_virtual_time(
-    monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] = ()
+    monkeypatch: pytest.MonkeyPatch, *sets: str, faults: tuple[Fault, ...] = (), robot_file: str = "denning"
 ) -> Iterator[tuple[VirtualLoop, Settings, RobotDevice, list[MemoryLink]]]:
     """Give a loop in which `RobotProcess` runs on a robot in memory; the list will hold its link."""
-    settings = load_settings("hallway", ["link.port=memory", *sets])
+    settings = load_settings("hallway", ["link.port=memory", *sets], robot=robot_file)
     assert settings.world is not None
     loop, links = VirtualLoop(), list[MemoryLink]()
     robot = make_device(settings, settings.world, 3, faults=faults)

@@ -8,7 +8,7 @@ import pytest
 
 from drivers.arcos.frames import Sip, SonarReading
 from drivers.arcos.pose_stamping import PoseStamper
-from drivers.arcos.wire_units import discs_of
+from drivers.arcos.wire_units import discs_of, polling_of
 from drivers.messages import Firing, Flags, Odometry
 from tests.drivers.arcos.harness import P3DX_FILE
 from tests.drivers.arcos.vectors import TAIL
@@ -119,3 +119,15 @@ def test_a_robot_that_lost_its_session_and_its_odometry_has_restarted(
 
 def test_the_first_session_is_no_restart() -> None:
     assert not Driven().begin(was_reset=True, was_lost=True)
+
+
+def test_a_flood_of_ranges_is_bounded_and_reported() -> None:
+    driven = Driven()
+    driven.stamper.set_polling(polling_of(P3DX_FILE, discs_of(P3DX_FILE)))
+    passed = 0
+    for _ in range(1000):
+        driven.now -= 0.099  # a hundred times as often
+        passed += len(driven.sip(*range(16), speed=0)[1])
+    assert passed <= 64 + 4 / 0.041 + 1
+    assert passed + driven.stamper.excess_echoes + driven.stamper.late_echoes == 1000
+    assert sum("many more ranges than its sonar can measure" in note for note in driven.stamper.notes()) == 1

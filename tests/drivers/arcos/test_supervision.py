@@ -12,6 +12,7 @@ from tests.drivers.arcos.vectors import TAIL
 
 N = CommandNumber
 OFF = (*STOP, Command(N.ENABLE, 0))
+ON_STATUS, OFF_STATUS = SipFlags(0x1F), SipFlags(0x1E)
 MOVING = replace(TAIL, flags=0x1F, left=200, right=180)
 STANDING = replace(TAIL, flags=0x1F)
 TURNING = replace(TAIL, flags=0x1F, left=-90, right=90)
@@ -67,20 +68,32 @@ def test_motors_are_switched_on_until_they_are_reported_on() -> None:
     enabling.release()
     assert enabling.commands(0.0) == (Command(N.ENABLE, 1),)
     assert enabling.commands(0.29) == ()
-    enabling.observe(SipFlags(0x1E))
+    enabling.observe(OFF_STATUS, 0.3)
     assert enabling.commands(0.31) == (Command(N.ENABLE, 1),)
     assert enabling.tries == 2
-    enabling.observe(SipFlags(0x1F))
+    enabling.observe(ON_STATUS, 0.5)
     assert enabling.may_drive
     assert (enabling.tries, enabling.commands(9.0)) == (0, ())
+
+
+def test_motors_that_are_about_to_go_off_are_switched_on_too() -> None:
+    enabling = Enabling()
+    enabling.observe(ON_STATUS, 0.0)
+    enabling.release()
+    assert enabling.commands(0.0) == (Command(N.ENABLE, 1),)
+    for run_s, status in ((0.05, ON_STATUS), (0.15, OFF_STATUS)):
+        enabling.observe(status, run_s)
+        assert not enabling.may_drive
+    enabling.observe(ON_STATUS, 0.25)
+    assert enabling.may_drive
 
 
 def test_motors_that_something_switched_off_stay_off() -> None:
     enabling = Enabling()
     enabling.release()
-    enabling.observe(SipFlags(0x1F))
-    enabling.observe(SipFlags(0x3E))
-    enabling.observe(SipFlags(0x1F))
+    enabling.commands(0.0)
+    for run_s, status in ((0.2, ON_STATUS), (0.3, SipFlags(0x3E)), (0.4, ON_STATUS)):
+        enabling.observe(status, run_s)
     assert not enabling.may_drive, "the STOP button was pressed and released"
     assert enabling.commands(9.0) == ()
 

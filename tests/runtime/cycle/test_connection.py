@@ -12,7 +12,7 @@ from config.errors import FAILED, UserError
 from drivers.emulator.faults import Deaf, Fault, Garbage, Mute
 from drivers.messages import Flags
 from runtime.cycle.connection import CONNECT_MAX_S, HALT_MAX_S, POLL_S
-from runtime.cycle.process import RobotProcess
+from runtime.cycle.process import Observers, RobotProcess
 from tests.runtime.virtual_time import STEP_S, MemoryLink, in_virtual_time
 
 LONG_S = 600.0
@@ -76,9 +76,19 @@ def test_a_line_that_is_lost_before_the_handshake(monkeypatch: pytest.MonkeyPatc
     assert refusal(monkeypatch, silent, disturb=MemoryLink.pull) == "pulled out"
 
 
-def test_the_base_has_stopped_before_the_line_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
-    with in_virtual_time(monkeypatch) as (loop, settings, robot, links):
-        process, ends = RobotProcess(settings, LOG, clock=loop.time), list[tuple[float, float]]()
+@pytest.mark.parametrize(("robot_file", "farewell"), [("denning", ""), ("p3dx", "fafb06023b0100033b")])
+def test_the_base_has_stopped_and_its_session_has_ended_before_the_line_is_closed(
+    monkeypatch: pytest.MonkeyPatch, robot_file: str, farewell: str
+) -> None:
+    with in_virtual_time(monkeypatch, robot_file=robot_file) as (loop, settings, robot, links):
+        sent = bytearray()
+
+        def on_bytes(direction: str, _run_s: float, _host_s: float, data: bytes) -> None:
+            if direction == "out":
+                sent.extend(data)
+
+        process = RobotProcess(settings, LOG, Observers(on_bytes=on_bytes), clock=loop.time)
+        ends = list[tuple[float, float]]()
         stop = MemoryLink.stop
 
         async def noted(link: MemoryLink) -> None:
@@ -98,6 +108,7 @@ def test_the_base_has_stopped_before_the_line_is_closed(monkeypatch: pytest.Monk
         assert v == 0.0
         assert robot.truth.flags & Flags.LATCHED
         assert closed_s - asked_s < HALT_MAX_S, "it was confirmed"
+        assert sent.endswith(bytes.fromhex(farewell))
         assert not links[0].is_open
 
 
