@@ -284,6 +284,29 @@ def beacons(recording: Path, *, json: str = "beacons.json") -> int:
 
 
 @app.command
+def nees(*, json: str = "nees.json", drives: int = 100, first: int = 200) -> int:
+    """Measure whether the correction of drift is as wrong as it says: three rounds among eight drums.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    drives
+        Number of drives at each level of odometry's errors.
+    first
+        Seed of the first drive.
+    """
+    use_kernel_cache()
+    from bench.consistency import measure
+
+    seeds = range(first, first + max(1, drives))
+    return _try_in_rooms(
+        lambda settings, tell: measure(settings, seeds, tell),
+        lambda rows: rows_table("squared errors over the reported covariance, 95 % bands of the mean", rows), json,
+    )  # fmt: skip
+
+
+@app.command
 def sightings(folder: Path, *, robot: int = 1, json: str = "sightings.json") -> int:
     """Measure the landmark filter, beside gtsam's iSAM2, on recorded sightings of posts at unknown places.
 
