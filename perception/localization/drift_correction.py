@@ -22,8 +22,10 @@ from drivers.messages import Firing, Pose
 from perception.kernel import Floats
 from perception.localization.landmark_filter import add_landmark, remove_landmark
 from perception.localization.landmark_state import FIRST, HEADING, OFFSET, EstimateRecord, X, Y
-from perception.localization.landmark_tracker import HEADING_WALK, POSE, SLIP_SHARE, LandmarkTracker
+from perception.localization.landmark_tracker import HEADING_WALK, POSE, LandmarkTracker
 from perception.localization.map_heading import MapHeading
+from perception.localization.slip import echoes_of_cycle, find_slip
+from perception.sensor_mounts import mounts_array
 
 Status: TypeAlias = Literal["tracking", "localizing", "lost"]
 
@@ -47,6 +49,9 @@ CATCHING_UP: Final = 8
 NOT_FIRED: Final = -1.0
 SILENT_M: Final = 1e6
 """What a waiting firing holds in place of NaN and infinity: numbers, as everything that a recording holds."""
+CYCLE_FIRINGS: Final = 3
+CYCLE_FIRINGS_MAX: Final = 24
+"""Firings from one check for a slip to the next one, and the most firings of which one looks at the echoes."""
 TURN_PER_M: Final = math.radians(1.0)
 """The map frame turns no faster as the robot drives, rad/m: the map frame does not jump."""
 
@@ -94,6 +99,9 @@ class DriftCorrection:
     def __init__(self, ring: RingConfig) -> None:
         self._tracker = LandmarkTracker(ring)
         self._map_heading = MapHeading(ring)
+        self._mounts = mounts_array(ring.mounts)
+        self._half_angle = math.radians(ring.beam_half_angle_deg)
+        self._range_min_m = ring.range_min_m + 0.5 * ring.resolution_m
         self._waiting = np.zeros((WAITING_MAX, POSE + len(ring.mounts)))
         self.reset()
 
@@ -105,6 +113,8 @@ class DriftCorrection:
         self._has_started = False
         self._way_m = 0.0
         self._turned = 0.0
+        self._checked = 0
+        self._stands_firm = False
 
     @property
     def e(self) -> EstimateRecord:
@@ -141,6 +151,8 @@ class DriftCorrection:
             for _ in range(min(CATCHING_UP, self._arrived - self._tracker.entered)):
                 self._enter_next()
             self._map_heading.renew(self._tracker, self._way_m)
+            if self._arrived == self._tracker.entered:
+                self._check_for_slip()
 
     def learn(self, seen: Iterable[SeenObject]) -> None:
         """Make landmarks of recognised objects that are none yet; drop those that are no longer recognised.
@@ -160,7 +172,7 @@ class DriftCorrection:
         numbers, failures, xs, ys = self._tracker.landmarks("number", "failures", "x", "y")
         e, range_max = self.e[0], self._tracker.range_max_m
         is_near = [math.hypot(x - e.x, y - e.y) < range_max for x, y in zip(xs, ys, strict=True)]
-        has_slipped = e.fit_share <= SLIP_SHARE
+        has_slipped = self._tracker.is_doubtful and not self._stands_firm
         moved = {n for n, failed in zip(numbers, failures, strict=True) if failed >= FAILURES_MAX and not has_slipped}
         for i in range(len(numbers) - 1, -1, -1):
             if numbers[i] in moved or (is_near[i] and numbers[i] not in objects):
@@ -249,6 +261,23 @@ class DriftCorrection:
                 landmark.anchor_x, landmark.anchor_y = x, y
                 moved.append((number, dx, dy))
         return moved
+
+    def _check_for_slip(self) -> None:
+        """Once a cycle, while the pose is doubtful: look whether the robot slipped, and put it where it is now."""
+        if not self._tracker.is_doubtful:
+            self._stands_firm = False
+            return
+        if self._arrived - self._checked < CYCLE_FIRINGS:
+            return
+        self._checked = self._arrived
+        newest = np.arange(self._arrived - 1, max(-1, self._arrived - 1 - CYCLE_FIRINGS_MAX), -1) % WAITING_MAX
+        echoes = echoes_of_cycle(
+            self._waiting[newest], self._mounts, self._range_min_m, self._tracker.range_max_m, self.e[0].range_scale
+        )
+        found = find_slip(self._tracker, echoes, self._half_angle, self._tracker.range_max_m)
+        self._stands_firm = found is not None and found.pose == Pose(0.0, 0.0, 0.0)
+        if found is not None and not self._stands_firm:
+            self._tracker.displace(found.pose, found.covariance_matrix())
 
     def _enter_next(self) -> None:
         """Enter the oldest waiting firing."""

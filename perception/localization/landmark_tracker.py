@@ -8,9 +8,9 @@ from typing import Any, Final
 import numpy as np
 
 from config.robot import RingConfig
-from drivers.messages import wrap_angle
+from drivers.messages import Pose, wrap_angle
 from perception.kernel import Floats
-from perception.localization.landmark_filter import propagate
+from perception.localization.landmark_filter import propagate, rows_used, write_lever
 from perception.localization.landmark_ranges import update_with_firing
 from perception.localization.landmark_state import (
     HEADING,
@@ -20,6 +20,8 @@ from perception.localization.landmark_state import (
     ROWS_MAX,
     TURN,
     Estimate,
+    X,
+    Y,
 )
 from perception.records import records, zeros
 from perception.sensor_mounts import mounts_array
@@ -41,6 +43,11 @@ PLACE_WALK: Final = 0.002**2
 """Variance of a displacement by odometry on each axis, m²/m."""
 SLIP_SHARE: Final = 0.4
 """With fewer of the expected echoes than this, the wheels may have slipped: odometry is then trusted less."""
+FAILURES_DOUBTED: Final = 2
+LANDMARKS_DOUBTED: Final = 2
+"""So many failures in succession of so many landmarks at once let the pose be doubted."""
+RENEWED_SHARE: Final = 0.7
+"""Share of the expected echoes that is assumed after a displacement was found."""
 SLIP_M: Final = 0.02
 SLIP_RAD: Final = math.radians(1.0)
 """Standard deviations that each firing adds then."""
@@ -140,6 +147,37 @@ class LandmarkTracker:
         self.entered_at[:] = x, y, theta, yaw
         self.entered += 1
         update_with_firing(self.e, self.covariance, self._mounts, row[POSE:], x, y, yaw, *self._ring.tolist())
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether several landmarks fail at once, or hardly any echo comes: rather a robot that slipped."""
+        failing = self.estimate["landmarks"]["failures"][0, : int(self.estimate["count"][0])] >= FAILURES_DOUBTED
+        return bool(np.count_nonzero(failing) >= LANDMARKS_DOUBTED or self.e[0].fit_share < SLIP_SHARE)
+
+    def displace(self, by: Pose, covariance: Floats) -> None:
+        """Move the ring without odometry.
+
+        Parameters
+        ----------
+        by : Pose
+            Its true pose as seen from the believed one.
+        covariance : (3, 3) float
+            Of that: x, y (m) and turn (rad).
+        """
+        e = self.e[0]
+        c, s = math.cos(e.heading), math.sin(e.heading)
+        e.x, e.y, e.heading = e.x + c * by.x - s * by.y, e.y + s * by.x + c * by.y, e.heading + by.theta
+        n = rows_used(self.e)
+        write_lever(self.e, e.lever)
+        to = np.zeros((n, 3))
+        to[X, 0], to[X, 1], to[Y, 0], to[Y, 1] = c, -s, s, c
+        to[:, 2] = self.estimate["lever"][0, :n]
+        self.covariance[:n, :n] += to @ covariance @ to.T
+        for i in range(e.count):
+            e.landmarks[i].failures = 0
+        e.fit_share = max(e.fit_share, RENEWED_SHARE)
+        self._window_variance, self._window_m = -1.0, 0.0
+        e.offset_correction = e.heading_correction = 0.0
 
     def _move(self, x: float, y: float, theta: float, yaw: float) -> None:
         """Follow odometry to a position (m), a direction of travel and a direction of the ring (rad)."""

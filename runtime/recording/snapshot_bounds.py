@@ -80,7 +80,8 @@ UNHEARD: Final = "method.memory.state.sensors.last."
 
 _CONSTANTS: Final = (
     "_axes _mounts _half_angle _sensors _segments_min _reach_m sensor_monitor._neighbours "
-    "sensor_monitor._tolerance sensor_monitor._near state.sensor_count scratch.attracting_rows _tracker._ring"
+    "sensor_monitor._tolerance sensor_monitor._near state.sensor_count scratch.attracting_rows _tracker._ring "
+    "drift._range_min_m"
 )
 CONSTANTS: Final = frozenset(_CONSTANTS.split())
 """Numbers that the settings give and no cycle changes."""
@@ -98,14 +99,14 @@ _COUNTS: Final = (
     "_sensors.readings "
     "room.firings room.recent_count rejection_count run_firing run_length segments_made segments_numbered "
     "sensors.kept members_sum _archive.circles.count _archive.polygons.count _numbered waiting "
-    "drift._arrived _tracker.entered _tracker._windows landmarks.failures landmarks.hits "
+    "drift._arrived drift._checked _tracker.entered _tracker._windows landmarks.failures landmarks.hits "
     "_keyframes.count _keyframes._firings entered known_room._window_begin _grid._due _grid._searches"
 )
 _FLAGS: Final = (
     "_sets has_rested is_named has_gained refines_next is_confirmed has_challenger is_done is_crossed "
     "_is_due is_reported _circles_pending _polygons_pending _polygons_turn _placement_was_last _expected _heard "
-    "drift._has_started _tracker.is_synchro _map_heading._is_entering sensors.is_known _has_fired _is_started "
-    "_has_stood"
+    "drift._has_started drift._stands_firm _tracker.is_synchro _map_heading._is_entering sensors.is_known "
+    "_has_fired _is_started _has_stood"
 )
 
 BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(

@@ -25,10 +25,10 @@ def test_each_level_with_drift_has_a_row(monkeypatch: pytest.MonkeyPatch) -> Non
         return DriftOutcome((0.01, 0.03), 0, 0, 0.1, 0.2, float(seed), 2.0, errors.scale - 1.0, 0.002)
 
     monkeypatch.setattr(consistency, "drive", drive)
-    told: list[str] = []
-    rows = consistency.measure(load_settings(None), [2, 4], told.append)
+    reported: list[str] = []
+    rows = consistency.measure(load_settings(None), [2, 4], reported.append)
     assert len(rows) == len(LEVELS) - 1
-    assert len(told) == 2 * len(rows)
+    assert len(reported) == 2 * len(rows)
     row = rows["2%, 1°/√m"]
     assert (row["pose"], row["drums"], row["drives"]) == (3.0, 2.0, 2.0)
     assert (row["drum_m"], row["odometer_rms"]) == pytest.approx((0.02, 0.02))

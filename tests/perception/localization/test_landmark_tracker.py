@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from config.load import load_settings
+from drivers.messages import Pose
 from perception.kernel import Floats
 from perception.localization import landmark_tracker
 from perception.localization.landmark_filter import add_landmark
-from perception.localization.landmark_state import HEADING, X
+from perception.localization.landmark_state import FIRST, HEADING, X, Y
 from perception.localization.landmark_tracker import HEADING_WALK, POSE, LandmarkTracker
 
 RING = load_settings(None).ring
@@ -48,6 +49,39 @@ def test_while_no_echo_fits_odometry_is_trusted_less() -> None:
     tracker.e[0].fit_share = 0.3
     tracker.enter(silent(0.01, 0.0, 0.0))
     assert tracker.covariance[X, X] > 0.9 * landmark_tracker.SLIP_M**2
+
+
+def test_a_displacement_moves_the_ring_alone_and_makes_it_uncertain_alone() -> None:
+    tracker = LandmarkTracker(RING)
+    tracker.enter(silent(1.0, 0.5, 0.5))
+    add_landmark(tracker.e, tracker.covariance, 2.0, 1.0, 1e-4, 0.0, 1e-4)
+    e, n = tracker.e[0], FIRST + 2
+    landmark = e.landmarks[0].x, e.landmarks[0].y
+    tracker.covariance[:n, :n] = 0.0
+    given = np.array([[4e-4, 1e-5, 2e-5], [1e-5, 9e-4, -3e-5], [2e-5, -3e-5, 1e-4]])
+    tracker.displace(Pose(0.2, -0.1, 0.3), given)
+    true = Pose(1.0, 0.0, 0.5).compose(Pose(0.2, -0.1, 0.3))
+    assert (e.x, e.y, e.heading) == pytest.approx((true.x, true.y, true.theta))
+    assert (e.landmarks[0].x, e.landmarks[0].y) == landmark
+    to = np.zeros((5, n))
+    to[0, X] = to[1, Y] = to[2, HEADING] = to[3, FIRST] = to[4, FIRST + 1] = 1.0
+    to[:2, HEADING], to[3:, HEADING] = (-e.y, e.x), (-landmark[1], landmark[0])
+    real = to @ tracker.covariance[:n, :n] @ to.T
+    c, s = math.cos(0.5), math.sin(0.5)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    np.testing.assert_allclose(real[:3, :3], turn @ given @ turn.T, atol=1e-12)
+    np.testing.assert_allclose(real[3:], 0.0, atol=1e-12)
+
+
+def test_several_landmarks_that_fail_at_once_let_the_pose_be_doubted() -> None:
+    tracker = LandmarkTracker(RING)
+    for k in range(3):
+        add_landmark(tracker.e, tracker.covariance, 2.0, float(k), 1e-4, 0.0, 1e-4)
+    assert not tracker.is_doubtful
+    tracker.e[0].landmarks[0].failures = 5
+    assert not tracker.is_doubtful
+    tracker.e[0].landmarks[2].failures = 2
+    assert tracker.is_doubtful
 
 
 @pytest.mark.parametrize("degrees", [0.3, 3.0])
