@@ -4,14 +4,15 @@ import sys
 
 import machine
 import robot_config
-from ring.build import build
 from ring.robot import ConsoleRequested
 
 
 def run() -> None:
     """Run until the host asks for the console; after any error stop the motors and start anew."""
+    from ring.build import build
+
     robot = build(robot_config)
-    del sys.modules["ring.build"]  # it has done its work, and memory is scarce
+    del build, sys.modules["ring.build"]  # it has done its work, and memory is scarce
     watchdog = machine.WDT(timeout=2000) if robot_config.WATCHDOG else None
     try:
         while True:

@@ -1,6 +1,6 @@
 """The firmware as an emulated robot in a world: sensors get the echoes of its acoustics, wheels move the body.
 
-Its faults are those of a line and of a board: mute, deaf, garbage, bit errors, unplug, reboot, bumper.
+Its faults are those of a line and of a board: mute, deaf, garbage, bit errors, unplug, reboot, bumper, low battery.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from config.world import WorldConfig
 from drivers.denning.wire_frame_counter import WireFrameCounter
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.fault_schedule import FaultSchedule, flip_bits
-from drivers.emulator.faults import BitErrors, Bumper, Deaf, Fault, Garbage, Mute, Reboot, Unplug
+from drivers.emulator.faults import BitErrors, Bumper, Deaf, Fault, Garbage, LowBattery, Mute, Reboot, Unplug
 from drivers.emulator.robot_device import GroundTruth
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
@@ -53,7 +53,7 @@ class FirmwareDevice:
         folder = self._folder / f"boot{self._boots}"
         folder.mkdir(parents=True)
         self._boots += 1
-        self._board = BoardRobot(folder, changes=f"BUMPER = {BUMPER_PIN}")
+        self._board = BoardRobot(folder, changes=f"BUMPER = {BUMPER_PIN}\nBATTERY = (26, 13.2, 6.6)")
         self._board.wait_until_ready()
         self._booted_us, self._ways = self._now_us, (0.0, 0.0)
         self._widths: list[int] = []
@@ -118,6 +118,7 @@ class FirmwareDevice:
             self._widths = widths
         presses = self._touches or self._faults.has(Bumper)
         self._board.ask("P", BUMPER_PIN, int(not presses))
+        self._board.ask("V", 30_000 if self._faults.has(LowBattery) else 40_000)
 
     def _move(self) -> None:
         left, right = map(float, self._board.ask("M").strip("()").split(","))

@@ -104,8 +104,9 @@ LONG: tuple[Clause, ...] = (
     *(partial(motion.test_a_halt_is_kept_for_the_next_line_and_a_velocity_is_not, outage_s=s) for s in (0.005, 0.1)),
     motion.test_a_line_that_opens_again_moves_nothing_by_itself,
     partial(motion.test_the_base_stops_by_itself_when_the_host_is_gone, how="unplugged"),
-    partial(
-        motion.test_what_is_wrong_with_the_base_is_reported_and_over_when_it_is, kind="bumper", flag=Flags.BUMPER
+    *(
+        partial(motion.test_what_is_wrong_with_the_base_is_reported_and_over_when_it_is, kind=kind, flag=flag)
+        for kind, flag in (("bumper", Flags.BUMPER), ("low_battery", Flags.BATTERY_LOW))
     ),
 )
 

@@ -400,6 +400,36 @@ def test_a_low_battery_is_reported_and_stops_nothing(boards: Boards) -> None:
     assert h.flags() == Flags.NONE
 
 
+def test_an_error_in_the_control_stops_the_wheels_that_nothing_else_would_stop(boards: Boards) -> None:
+    robot = boards("pico", "BATTERY = (26, 13.2, 6.6)")
+    h = host(robot)
+    run(h, 1.0, drive=(300, 0))
+    robot.ask("V", -1)
+    run(h, 0.4, drive=(300, 0))
+    assert Flags.LATCHED | Flags.MOTOR_FAULT in h.flags()
+    way = robot.ask("M")
+    run(h, 0.5, drive=(300, 0))
+    assert robot.ask("M") == way
+
+
+def test_a_release_moves_nothing_before_the_next_drive(boards: Boards) -> None:
+    robot = boards("pico", EIGHT)
+    h = host(robot)
+    h.send(Drive, 300, 0)
+    h.send(Halt)
+    h.send(Release)
+    run(h, 0.3)
+    assert h.flags() == Flags.NONE
+    assert h.last(Odom).x_0p1mm == 0
+    h.send(Halt)
+    run(h, 0.05)
+    refused = h.send(Drive, 300, 0)
+    h.send(Release)
+    run(h, 0.3)
+    assert [nak.of for nak in h.of(Nak)] == [refused]
+    assert h.last(Odom).x_0p1mm == 0
+
+
 # Endurance.
 
 

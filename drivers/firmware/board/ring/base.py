@@ -76,12 +76,19 @@ class Base:
         self._right.brake()
 
     def release(self) -> None:
-        """Clear the latch; a bumper that is still pressed latches again."""
+        """Clear the latch; a bumper that is still pressed latches again. Nothing moves before the next DRIVE."""
+        self._target_v = self._target_w = 0.0
         self.flags &= _DEADMAN | _BATTERY_LOW
         self._check_bumper()
 
     def tick(self, _timer=None) -> None:
-        """Measure and control the wheels."""
+        """Measure and control the wheels; stop them if that fails, as nothing else would."""
+        try:
+            self._control()
+        except Exception:  # noqa: BLE001 - a timer only reports it, and the motors would go on as they are
+            self.halt(_MOTOR_FAULT)
+
+    def _control(self) -> None:
         now = ticks_us()
         dt_s = ticks_diff(now, self._ticks) * 1e-6
         if dt_s <= 0.0:

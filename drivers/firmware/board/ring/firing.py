@@ -11,7 +11,7 @@ from ring.wire import Encoder
 _ECHO = const(0x91)
 _ECHO2 = const(0x92)
 RANGE_UNIT_UM = 172
-"""A count of _ECHO2, µm: about a microsecond of flight at 343 m/s."""
+"""A count of ECHO2, µm: about a microsecond of flight at 343 m/s."""
 _NO_ECHO_COUNT = const(0xFFFF)
 _MASKS_MAX = const(24)
 _WINDOW_MIN = const(5)
@@ -27,14 +27,14 @@ def window_us(window: int) -> int:
 
 
 def echo_count(flight_us: int) -> int:
-    """Return the count of _ECHO2 for a time of flight, `NO_ECHO` or `FAULT`."""
+    """Return the count of ECHO2 for a time of flight, `NO_ECHO` or `FAULT`."""
     if flight_us < 0:
         return 0 if flight_us == FAULT else _NO_ECHO_COUNT
     return min(_NO_ECHO_COUNT - 1, max(1, (_SOUND_M_S * flight_us + RANGE_UNIT_UM) // (2 * RANGE_UNIT_UM)))
 
 
 def echo_byte(flight_us: int) -> int:
-    """Return the byte of _ECHO for a time of flight, `NO_ECHO` or `FAULT`: tenths of a foot."""
+    """Return the byte of ECHO for a time of flight, `NO_ECHO` or `FAULT`: tenths of a foot."""
     if flight_us < 0:
         return 0 if flight_us == FAULT else 255
     return min(254, max(5, (_SOUND_M_S * flight_us + _WINDOW_UM) // (2 * _WINDOW_UM)))
@@ -126,11 +126,8 @@ class Firing:
 
     def _start(self, now: int) -> None:
         if self._changed:
-            self._masks, self._period_us, self._window_us = (
-                self._next_masks,
-                self._next_period_us,
-                self._next_window_us,
-            )
+            self._masks, self._window_us = self._next_masks, self._next_window_us
+            self._period_us = self._next_period_us
             self._changed, self._step = False, 0
             for sensor in self._sensors:
                 sensor.prepare(self._window_us)

@@ -108,7 +108,7 @@ class Robot:
             self._encoder.send(_ACK, 1)
 
     def _refusal(self, kind: int, seq: int, payload: memoryview) -> int:
-        """Obey a command; return 0, the code of its _NAK, or −1 if it is answered otherwise."""
+        """Obey a command; return 0, the code of its NAK, or −1 if it is answered otherwise."""
         length = len(payload)
         if kind == _DRIVE:
             if length != 4:

@@ -42,6 +42,8 @@ class ADC:
         pass
 
     def read_u16(self) -> int:
+        if ADC.reading < 0:
+            raise OSError(5)
         return ADC.reading
 
 
