@@ -103,6 +103,7 @@ async def test_a_lost_connection_is_reported_and_made_again(peer: TcpPeer, how: 
             assert not link.send(b"gone")
 
 
+@pytest.mark.promise("P6")
 async def test_a_peer_that_does_not_read_gets_bounded_bytes_and_is_left_at_once(peer: TcpPeer) -> None:
     host = Host()
     link = host.link(peer.url)
