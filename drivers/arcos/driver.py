@@ -303,7 +303,7 @@ class ArcosDriver:
             self._go_on()
         if isinstance(packet, Sip):
             self._halting.observe(packet)
-            if self._is_set_up and not self._queue:
+            if self._state is LineState.READY or (self._is_set_up and not self._queue):
                 self._take_sip(packet)
         elif isinstance(packet, EncoderPacket):
             self._receiver.answered()

@@ -339,6 +339,18 @@ def test_a_new_pattern_is_sent_and_an_impossible_one_refused(harness: Harness) -
         harness.driver.set_firing(ring.model_copy(update={"firing": FiringConfig(preset="octets")}))
 
 
+def test_sips_count_while_commands_wait_on_a_line_that_takes_none(harness: Harness) -> None:
+    harness.ready()
+    ring = P3DX_FILE.ring.model_copy(update={"firing": FiringConfig(sets=((0, 8), (4, 12)), step_period_s=0.05)})
+    harness.driver.set_firing(ring)
+    for _ in range(6):
+        harness.now += 0.1
+        harness.to_driver(harness.controller.next_sip())
+        harness.driver.tick(harness.now)
+        assert harness.driver.outgoing(writable=False) == b""
+    assert harness.state() is LineState.READY
+
+
 def test_sonar_that_is_off_is_switched_on_again(harness: Harness) -> None:
     harness.ready()
     harness.controller.sonar = SipFlags(0)
