@@ -9,7 +9,7 @@ stands before the first of these directions is too old, and before its path turn
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -78,7 +78,8 @@ def oldest_look_s(view: FieldOfView, direction_rad: float, half_angle_rad: float
     direction_rad, half_angle_rad
         The directions from one to the other side of this one, in the odometry's frame.
     """
-    return _oldest_s(turn(direction_rad, view.bearings_rad), view.ages_s, view.half_angle_rad, half_angle_rad)
+    sectors = _sectors(view.bearings_rad, view.ages_s, view.half_angle_rad, direction_rad, half_angle_rad)
+    return max(age_s for _, _, age_s in sectors)
 
 
 def seen_for_s(
@@ -99,13 +100,12 @@ def seen_for_s(
     """
     beam, rate = view.half_angle_rad, abs(turn_rad_s)
     swept = min(rate * (horizon_s + REACTION_S), max(0.0, math.pi - half_angle_rad - beam))
-    widest = half_angle_rad + swept
-    begin, end, ages_s = _youngest(
-        turn(heading_rad, view.bearings_rad), view.ages_s, beam, (-widest, -half_angle_rad, half_angle_rad, widest)
-    )
-    outside = np.maximum(begin - half_angle_rad, -half_angle_rad - end)
-    reached_s = np.where(outside < -ROUNDING_RAD, -math.inf, outside / max(rate, ROUNDING_RAD) - REACTION_S)
-    return float(np.maximum(reached_s, view.age_max_s - ages_s).min(initial=math.inf))
+    soonest_s = math.inf
+    for begin, end, age_s in _sectors(view.bearings_rad, view.ages_s, beam, heading_rad, half_angle_rad + swept):
+        outside = max(begin - half_angle_rad, -half_angle_rad - end)
+        reached_s = -math.inf if outside < -ROUNDING_RAD else outside / max(rate, ROUNDING_RAD) - REACTION_S
+        soonest_s = min(soonest_s, max(reached_s, view.age_max_s - age_s))
+    return soonest_s
 
 
 def unseen_way(percept: Percept, direction_rad: float, body: BodyConfig, clearance_m: float) -> UnseenWay | None:
@@ -124,15 +124,15 @@ def unseen_way(percept: Percept, direction_rad: float, body: BodyConfig, clearan
         As for `seen_speed_m_s`.
     """
     view, half_angle = percept.field_of_view, path_half_angle_rad(body, clearance_m)
-    turned = turn(direction_rad, view.axes_rad)
-    age_s = _oldest_s(turned, view.sensor_ages_s, view.half_angle_rad, half_angle)
+    sectors = _sectors(view.axes_rad, view.sensor_ages_s, view.half_angle_rad, direction_rad, half_angle)
+    age_s = max(age_s for _, _, age_s in sectors)
     if age_s < view.age_max_s:
         return None
     turn_deg = math.degrees(wrap_angle(direction_rad - percept.pose.theta))
     side = "left" if turn_deg > 0.0 else "right"
     where = "ahead" if abs(turn_deg) < 1.0 else f"{abs(turn_deg):.0f}° to the {side} of the heading"
     lasting = f"for {age_s:.1f} s" if math.isfinite(age_s) else "yet"
-    looks_there = np.abs(turned) < half_angle + view.half_angle_rad
+    looks_there = np.abs(turn(direction_rad, view.axes_rad)) < half_angle + view.half_angle_rad
     missing = np.flatnonzero(looks_there & ~(view.sensor_ages_s < view.age_max_s)).tolist()
     cause = f"no usable range from sensor {listed(missing)}" if missing else "no sensor of the ring looks there"
     return UnseenWay(f"the ring has not looked {where} {lasting}: {cause}", age_s, tuple(missing))
@@ -149,33 +149,44 @@ def turn(begin_rad: float, ends_rad: Floats) -> Floats:
     return turned
 
 
-def _oldest_s(turned: Floats, ages_s: Floats, beam_rad: float, half_angle_rad: float) -> float:
-    """Return the largest age of any direction within `half_angle_rad` of 0, each being that of its youngest beam."""
-    _, _, youngest_s = _youngest(turned, ages_s, beam_rad, (-half_angle_rad, half_angle_rad))
-    return float(youngest_s.max(initial=-math.inf))
+def _sectors(
+    bearings_rad: Floats, ages_s: Floats, beam_rad: float, direction_rad: float, half_angle_rad: float
+) -> Iterator[tuple[float, float, float]]:
+    """Yield sectors that together are all directions within `half_angle_rad` of one: begin, end, age of the look.
 
-
-def _youngest(
-    turned: Floats, ages_s: Floats, beam_rad: float, ends_rad: Sequence[float]
-) -> tuple[Floats, Floats, Floats]:
-    """Return sectors in which the same beams lie: where they begin and end, and the age of the youngest beam in each.
+    Begin and end count from `direction_rad`. The youngest beam is laid out first, and each older one where no younger
+    one lies; where none lies, the age is infinite. Plain Python: a standing ring has a handful of beams ahead, for
+    which numpy's calls cost several times as much.
 
     Parameters
     ----------
-    turned, ages_s
+    bearings_rad, ages_s
         Axes and ages of the beams, shape (n,).
     beam_rad
         Half their width.
-    ends_rad
-        Ascending ends of further sectors; the first and the last are those of the whole.
+    direction_rad, half_angle_rad
+        As for `oldest_look_s`.
     """
-    low, high = ends_rad[0], ends_rad[-1]
-    near = (turned > low - beam_rad) & (turned < high + beam_rad)
-    turned, ages_s = turned[near], ages_s[near]
-    edges = np.concatenate((turned - beam_rad, turned + beam_rad, ends_rad))
-    edges = np.sort(np.minimum(np.maximum(edges, low), high))
-    begin, end = edges[:-1], edges[1:]
-    wide = end - begin > ROUNDING_RAD
-    begin, end = begin[wide], end[wide]
-    covers = np.abs(0.5 * (begin + end)[:, None] - turned) < beam_rad
-    return begin, end, np.where(covers, ages_s, math.inf).min(axis=1, initial=math.inf)
+    reach = half_angle_rad + beam_rad
+    axes = ((bearing - direction_rad + math.pi) % math.tau - math.pi for bearing in bearings_rad.tolist())
+    beams = sorted((age_s, axis) for age_s, axis in zip(ages_s.tolist(), axes, strict=True) if -reach < axis < reach)
+    open_sectors = [(-half_angle_rad, half_angle_rad)]
+    for age_s, axis in beams:
+        left, right = axis - beam_rad, axis + beam_rad
+        remaining = []
+        for begin, end in open_sectors:
+            low = begin if begin > left else left
+            high = end if end < right else right
+            if high - low <= ROUNDING_RAD:
+                remaining.append((begin, end))
+                continue
+            yield low, high, age_s
+            if low - begin > ROUNDING_RAD:
+                remaining.append((begin, low))
+            if end - high > ROUNDING_RAD:
+                remaining.append((high, end))
+        open_sectors = remaining
+        if not open_sectors:
+            return
+    for begin, end in open_sectors:
+        yield begin, end, math.inf
