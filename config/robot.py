@@ -174,12 +174,24 @@ class DriverConfig(Strict):
     """Version of the protocol, for a driver that knows several; by default the newest that the robot speaks."""
 
 
+class CalibrationConfig(Strict):
+    """What this robot's odometry and ranges are wrong by, as `echolocate calibrate` finds it: reported over true."""
+
+    distance_scale: float = Field(default=1.0, ge=0.5, le=2.0)
+    """Distance that the odometry reports, over the true one."""
+    turn_scale: float = Field(default=1.0, ge=0.5, le=2.0)
+    """Turn that the odometry reports, over the true one."""
+    range_scale: float = Field(default=1.0, ge=0.5, le=2.0)
+    """Range that the ring reports, over the true one."""
+
+
 class RobotConfig(Strict):
-    """A robot file: `[robot]`, `[ring]`, `[body]`, `[link]`, and a section of the driver's own."""
+    """A robot file: `[robot]`, `[ring]`, `[body]`, `[link]`, `[calibration]`, and a section of the driver's own."""
 
     robot: DriverConfig = DriverConfig()
     ring: RingConfig
     body: BodyConfig
     link: LinkConfig = LinkConfig()
+    calibration: CalibrationConfig = CalibrationConfig()
     arcos: ArcosConfig = ArcosConfig()
     """Of the driver "arcos", for the Pioneer family."""

@@ -16,6 +16,8 @@ from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Protocol, cast
 
+from config.robot import CalibrationConfig
+from drivers.calibrated_driver import CalibratedDriver
 from drivers.driver import DriverError
 
 if TYPE_CHECKING:
@@ -81,13 +83,16 @@ def make_driver(config: RobotConfig) -> RobotDriver:
     drivers.firing_pattern.FiringError
         The robot or its protocol cannot carry out the firing pattern of `config`.
     """
-    return _family(config.robot.driver).make_driver(config)
+    driver = _family(config.robot.driver).make_driver(config)
+    if config.calibration == CalibrationConfig():
+        return driver
+    return cast("RobotDriver", CalibratedDriver(driver, config.calibration, synchro=config.body.synchro))
 
 
 def make_device(
     config: RobotConfig, world: WorldConfig, seed: int, *, faults: Sequence[Fault] = (), clock_start_us: int = 0
 ) -> RobotDevice:
-    """Return an emulated robot that answers the driver of `config`.
+    """Return an emulated robot that answers the driver of `config`; its odometry and ranges err as the file says.
 
     Parameters
     ----------
@@ -108,6 +113,7 @@ def make_device(
         There is no driver named `config.robot.driver`, it cannot be loaded, it has no emulator, or its
         protocol cannot express `config`.
     """
+    world = _with_errors(world, config.calibration)
     family = _family(config.robot.driver)
     return family.make_device(config, world, seed, faults=faults, clock_start_us=clock_start_us)
 
@@ -126,3 +132,12 @@ def _family(name: str) -> DriverFamily:
             f'robot.driver = "{name}": cannot be loaded from {entry.value} ({error}); reinstall or update the '
             f"package that provides it"
         ) from error
+
+
+def _with_errors(world: WorldConfig, errors: CalibrationConfig) -> WorldConfig:
+    """Return a world in which the robot's odometry and ranges have these errors beside the world's own."""
+    odometry, acoustics = world.odometry, world.acoustics
+    scales = {"scale": odometry.scale * errors.distance_scale, "turn_scale": odometry.turn_scale * errors.turn_scale}
+    sound = {"sound_speed_scale": acoustics.sound_speed_scale / errors.range_scale}
+    update = {"odometry": odometry.model_copy(update=scales), "acoustics": acoustics.model_copy(update=sound)}
+    return world.model_copy(update=update)

@@ -17,7 +17,7 @@ from runtime import VERSION
 from runtime.cli.board_commands import firmware, ring_test_command
 from runtime.cli.experiment_commands import experiment
 from runtime.cli.first_signals import EXIT_CODE_BASE
-from runtime.cli.recording_commands import export, figures, map_command, recover, replay, report
+from runtime.cli.recording_commands import calibrate, export, figures, map_command, recover, replay, report
 from runtime.cli.robot_commands import check, emulate, run, service
 from runtime.cli.start_signals import ending_in_order
 
@@ -32,7 +32,7 @@ app = App(
 )
 for title, commands in (
     ("Robot", (run, emulate, check, service)),
-    ("Recordings", (replay, report, figures, export, map_command, recover)),
+    ("Recordings", (replay, report, figures, export, map_command, calibrate, recover)),
     ("Simulation", (experiment,)),
     ("A robot of your own", (firmware, ring_test_command)),
 ):

@@ -1,4 +1,4 @@
-"""The commands that read the recording of a finished run: replay, recover, figures, report, export, map."""
+"""The commands that read the recording of a finished run: replay, report, export, map, calibrate and others."""
 
 from __future__ import annotations
 
@@ -285,3 +285,38 @@ def map_command(
     from runtime.cli.commands.map_run import map_run
 
     return map_run(options.timeline_source(file, sets), out, grid, force=force)
+
+
+def calibrate(
+    file: File,
+    /,
+    *,
+    out: str,
+    way: float | None = None,
+    drum: Annotated[tuple[float, ...], Parameter(negative="", show_default=False)] = (),
+    force: Force = False,
+    robot: RobotFile = None,
+) -> int:
+    """Find a robot's mounts, beams and scales from a drive by a wall and a drum, and write them as a robot file.
+
+    The drive: stand a metre from a bare wall, turn slowly twice on the spot; drive some metres, away from the wall
+    and past something round; turn slowly twice again. Measure the way between both stands, and what is round.
+
+    Parameters
+    ----------
+    out
+        Robot file to write (TOML).
+    way
+        Measured distance between both stands, m; without it, the odometry's distance is taken as true.
+    drum
+        Measured radius of a round object beside the way, m; may be repeated.
+    force
+        Overwrite files that exist already.
+    file
+        Recording or ring log of the drive.
+    robot
+        Ring logs: the nominal robot, file or name of a shipped one; None for the default.
+    """
+    from runtime.cli.commands.calibrate import calibrate_robot
+
+    return calibrate_robot(file, out, way_m=way, radii_m=drum, robot=robot, force=force)

@@ -12,15 +12,28 @@ from runtime.recording.ring_log import write_ring_log
 def write_log(recording: Recording, path: Path) -> int:
     """Write the firings of a recording as a ring log and return their number.
 
-    When a robot restarts, its clock and its odometry restart, which a ring log cannot represent. Then only the
-    firings after the last restart are written.
-
     Raises
     ------
     RecordingError
         The recording holds no firing.
     RingLogError
         The file cannot be written.
+    """
+    firings = recorded_firings(recording)
+    write_ring_log(path, firings)
+    return len(firings)
+
+
+def recorded_firings(recording: Recording) -> list[Firing]:
+    """Return the firings of a recording, oldest first.
+
+    When a robot restarts, its clock and its odometry restart, which a list cannot represent. Then only the firings
+    after the last restart are returned.
+
+    Raises
+    ------
+    RecordingError
+        The recording holds no firing.
     """
     firings: list[Firing] = []
     for record in recording.cycle_records():
@@ -29,6 +42,5 @@ def write_log(recording: Recording, path: Path) -> int:
             firings.clear()
         firings.extend(received.firings)
     if not firings:
-        raise RecordingError(f"{recording.path}: holds no firing: there is nothing to write")
-    write_ring_log(path, firings)
-    return len(firings)
+        raise RecordingError(f"{recording.path}: holds no firing: there is nothing to use")
+    return firings

@@ -1,0 +1,164 @@
+"""A robot's calibration from one drive: what its mounts, beams and scales are, and how well each is known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.robot import RingConfig
+from drivers.messages import Firing
+from perception.calibration.beam_fit import BeamFit, Looks, fit_beams
+from perception.calibration.drive import Drive, Scales, drive_of
+from perception.calibration.geometry_fit import Geometry, GeometryFit, Priors, RangeNoise, fit_geometry, sensors_at
+from perception.calibration.surfaces import UNSURE_RAD, Echoes, find_surfaces, most_voted_wall
+from perception.kernel import Floats
+
+PRIORS: Final = Priors()
+"""What is known of any robot before the drive."""
+WALLS_MAX: Final = 4
+"""Most walls that are looked for."""
+ROUNDS: Final = 2
+"""Rounds of places and directions, each with the other's result."""
+TURN_SCALES: Final = (1.0, *(1.0 + sign * 0.005 * k for k in range(1, 11) for sign in (1, -1)))
+"""Turn scales that are tried first: a wall is smeared over two turns by twice the error."""
+ECHOES_MAX: Final = 3000
+"""Echoes that are enough for that."""
+LOOK_MAX_RAD: Final = math.radians(45.0)
+"""Greatest bearing of a surface off a sensor's axis at which its reading is a look at that surface."""
+SURE_RAD: Final = math.radians(5.0)
+"""Off-axis bearing at which a wall answers for sure."""
+LISTENED_SHARE: Final = 0.9
+"""Share of the longest range up to which silence means that nothing is there."""
+AGREE_SIGMAS: Final = 4.0
+"""A reading agrees with a surface's distance up to so many standard deviations."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """What a drive shows of a robot.
+
+    Attributes
+    ----------
+    mounts : (n, 3) float
+        Place (m) and direction (rad) of each sensor in the ring's frame.
+    place_sigmas_m, angle_sigmas_rad : (n,) float
+        Standard deviations; a direction's is inf where the drive does not show it: then the nominal one stands.
+    readings : (n,) int
+        Echoes of each sensor that took part.
+    half_angle_rad : float
+        Half of the beam's opening.
+    everything_echoes : bool
+        Whether all in the beam answers, not only mirrors.
+    scales, scale_sigmas : Scales
+        Of odometry and ranges, reported over true.
+    noise : RangeNoise
+        Of the ranges.
+    walls, drums : int
+        Surfaces that were found.
+    """
+
+    mounts: Floats
+    place_sigmas_m: Floats
+    angle_sigmas_rad: Floats
+    readings: NDArray[np.intp]
+    half_angle_rad: float
+    everything_echoes: bool
+    scales: Scales
+    scale_sigmas: Scales
+    noise: RangeNoise
+    walls: int
+    drums: int
+
+
+def calibrate(
+    firings: Sequence[Firing], ring: RingConfig, radii: Sequence[float], way_m: float | None, *, synchro: bool,
+) -> Calibration | None:  # fmt: skip
+    """Return what a drive by walls and round objects shows of the robot; None if no surface was found.
+
+    Parameters
+    ----------
+    firings
+        Those of the drive, oldest first.
+    ring
+        The nominal ring.
+    radii
+        Measured radius of each round object, m.
+    way_m
+        Measured distance from the first to the last pose, m; without it, the odometry's distance is taken as true.
+    synchro
+        The ring does not turn with the wheels.
+    """
+    drive = drive_of(firings, ring.range_min_m + ring.resolution_m)
+    nominal, half_angle = np.array(ring.mounts), math.radians(ring.beam_half_angle_deg)
+    firing, sensor = np.nonzero(np.isfinite(drive.ranges))
+    echoes = Echoes(firing, sensor, drive.ranges[firing, sensor])
+    start = _first_guess(drive, echoes, nominal, half_angle, radii, synchro=synchro)
+    if start is None:
+        return None
+    # At first, readings count only so far within the beam that the sensor hears the surface for sure.
+    angles, inside = nominal[:, 2], max(0.5 * half_angle, half_angle - UNSURE_RAD)
+    for _ in range(ROUNDS):
+        fit = fit_geometry(drive, echoes, angles, inside, start, PRIORS, way_m, synchro=synchro)
+        beam_fit = fit_beams(_looks(drive, fit, nominal[:, 2], synchro=synchro), len(nominal))
+        angles = nominal[:, 2] + beam_fit.turns
+        inside = beam_fit.half_angle
+    return _result(fit, beam_fit, angles)
+
+
+def _first_guess(
+    drive: Drive, echoes: Echoes, nominal: Floats, half_angle: float, radii: Sequence[float], *, synchro: bool
+) -> Geometry | None:
+    """Return the surfaces at the turn scale under which most readings lie on one line; None if there are none."""
+    bends = np.zeros(drive.knots)
+    few = echoes.chosen(slice(None, None, 1 + len(echoes.sensor) // ECHOES_MAX))
+
+    def sharpness(scales: Scales) -> int:
+        beams = sensors_at(drive.path(scales, bends, synchro=synchro), few, nominal[:, :2], nominal[:, 2])
+        return most_voted_wall(beams, few.range_m, half_angle)[0]
+
+    scales = max((Scales(turn=turn) for turn in TURN_SCALES), key=sharpness)
+    beams = sensors_at(drive.path(scales, bends, synchro=synchro), echoes, nominal[:, :2], nominal[:, 2])
+    surfaces = find_surfaces(beams, echoes.range_m, half_angle, WALLS_MAX, radii)
+    if not len(surfaces.walls) + len(surfaces.drums):
+        return None
+    return Geometry(scales, surfaces, nominal[:, :2], bends)
+
+
+def _looks(drive: Drive, fit: GeometryFit, angles: Floats, *, synchro: bool) -> Looks:
+    """Return the readings of sensors that have a surface near their beam, and hear nothing nearer."""
+    firing, sensor = np.nonzero(~np.isnan(drive.ranges))
+    fired = Echoes(firing, sensor, drive.ranges[firing, sensor])
+    geometry = fit.geometry
+    path = drive.path(geometry.scales, geometry.bends, synchro=synchro)
+    beams = sensors_at(path, fired, geometry.mounts, angles)
+    distance, bearing = geometry.surfaces.distances(beams.x, beams.y)
+    turned = np.remainder(bearing - beams.axis + math.pi, 2.0 * math.pi) - math.pi
+    read = fired.range_m / geometry.scales.range
+    tolerance = AGREE_SIGMAS * fit.noise.sigmas(distance)
+    answered = np.abs(read - distance) < tolerance
+    near = (np.abs(turned) < LOOK_MAX_RAD) & (distance > 0.0)
+    near &= (read > distance - tolerance) & (distance < LISTENED_SHARE * np.max(read[np.isfinite(read)]))
+    for k, angle in enumerate(geometry.surfaces.walls[:, 0].tolist()):
+        # A wall ends somewhere: beyond the echoes that it gave in the middle of the beams, silence means nothing.
+        along = math.cos(angle) * beams.y - math.sin(angle) * beams.x
+        sure = along[answered[k] & near[k] & (np.abs(turned[k]) < SURE_RAD)]
+        near[k] &= (along > np.min(sure, initial=math.inf)) & (along < np.max(sure, initial=-math.inf))
+    surface, look = np.nonzero(near)
+    walls = np.full(len(geometry.surfaces.walls), np.inf)
+    radii = np.concatenate([walls, geometry.surfaces.drums[:, 2]])
+    d = distance[surface, look]
+    return Looks(fired.sensor[look], turned[surface, look], d, radii[surface], read[look], fit.noise.sigmas(d))
+
+
+def _result(fit: GeometryFit, beams: BeamFit, angles: Floats) -> Calibration:
+    geometry = fit.geometry
+    return Calibration(
+        np.column_stack([geometry.mounts, angles]), fit.mount_sigmas_m, beams.sigmas, fit.readings, beams.half_angle,
+        beams.everything_echoes, geometry.scales, fit.scale_sigmas, fit.noise, len(geometry.surfaces.walls),
+        len(geometry.surfaces.drums),
+    )  # fmt: skip

@@ -1,0 +1,187 @@
+"""`echolocate calibrate`: a robot file from a drive by a wall and a drum."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from rich.table import Table
+
+from config.errors import DONE, FAILED, WRONG_CALL, UserError
+from config.files import utf8
+from config.load import load_settings
+from runtime.cli.commands.offline_io import plain_console
+from runtime.cli.commands.output_files import check_outputs, writing
+
+if TYPE_CHECKING:
+    from config.settings import Settings
+    from drivers.messages import Firing
+    from perception.calibration.calibrate import Calibration
+
+FIRINGS_MIN: Final = 100
+"""Fewest firings of a drive."""
+
+
+def calibrate_robot(
+    file: str, out: str, *, way_m: float | None, radii_m: Sequence[float], robot: str | None, force: bool
+) -> int:
+    """Calibrate a robot from a drive, print what was found and return the exit code.
+
+    Parameters
+    ----------
+    file, out, way_m, radii_m, robot, force
+        As of `runtime.cli.recording_commands.calibrate`.
+
+    Raises
+    ------
+    UserError
+        The file cannot be read or written, or the drive does not show what is needed.
+    """
+    from perception.calibration.calibrate import calibrate
+
+    for option, value in (*(("--drum", radius) for radius in radii_m), ("--way", way_m)):
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise UserError(f"{option} {value}: must be a length above 0, in metres", WRONG_CALL)
+    check_outputs({"--out": out}, (file,), force=force)
+    settings, firings = _drive(file, robot)
+    if len(firings) < FIRINGS_MIN:
+        raise UserError(f"{file}: holds only {len(firings)} firings; record the whole drive and try again", FAILED)
+    found = calibrate(firings, settings.ring, radii_m, way_m, synchro=settings.body.synchro)
+    if found is None:
+        raise UserError(
+            f"{file}: no surface was heard often enough from enough places; drive nearer to a wall and turn more "
+            "slowly",
+            FAILED,
+        )
+    with writing("--out", out):
+        Path(out).write_text(robot_text(settings, found, Path(file).name), encoding="utf-8")
+    output = plain_console()
+    output.print(sensors_table(settings, found))
+    output.print(scales_line(found))
+    unknown = [i for i, sigma in enumerate(found.angle_sigmas_rad.tolist()) if not math.isfinite(sigma)]
+    if unknown:
+        output.print(f"the directions of sensors {', '.join(map(str, unknown))} were not heard often enough and stay")
+    if way_m is None:
+        output.print("the odometry's distance was taken as true: measure the way and give --way to find its scale")
+    output.print(f"{out}: robot file written; check it with: echolocate check")
+    return DONE
+
+
+def sensors_table(settings: Settings, found: Calibration) -> Table:
+    """Return a table of the mounts, beside the nominal ones.
+
+    Parameters
+    ----------
+    settings : Settings
+        The nominal robot.
+    found : Calibration
+        The calibration.
+    """
+    table = Table(title="Sensors, as calibrated")
+    for name in ("sensor", "echoes", "x m", "y m", "± mm", "moved mm", "angle °", "± °", "turned °"):
+        table.add_column(name, justify="right")
+    for i, nominal in enumerate(settings.ring.mounts):
+        x, y, angle = found.mounts[i].tolist()
+        sigma = math.degrees(found.angle_sigmas_rad[i])
+        table.add_row(
+            str(i), str(found.readings[i]), f"{x:.4f}", f"{y:.4f}", f"{1e3 * found.place_sigmas_m[i]:.1f}",
+            f"{1e3 * math.hypot(x - nominal.x_m, y - nominal.y_m):.1f}", f"{math.degrees(angle):.2f}",
+            f"{sigma:.2f}" if math.isfinite(sigma) else "–", f"{math.degrees(angle - nominal.angle_rad):+.2f}",
+        )  # fmt: skip
+    return table
+
+
+def scales_line(found: Calibration) -> str:
+    """Return scales, beam and noise in words.
+
+    Parameters
+    ----------
+    found : Calibration
+        The calibration.
+    """
+    scales = ", ".join(
+        f"{name} {100.0 * (value - 1.0):+.2f} % (± {100.0 * sigma:.2f})"
+        for name, value, sigma in zip(
+            ("odometry's distance", "its turn", "range"), found.scales, found.scale_sigmas, strict=True
+        )
+    )
+    beam = "all in the beam answers" if found.everything_echoes else "mirrors answer"
+    return (
+        f"scales, reported over true: {scales}\n"
+        f"beam: half angle {math.degrees(found.half_angle_rad):.2f}°, {beam}; noise of a range: "
+        f"{1e3 * found.noise.constant_m:.1f} mm and {100.0 * found.noise.share:.2f} % of it"
+    )
+
+
+def robot_text(settings: Settings, found: Calibration, source: str) -> str:
+    """Return the robot file of a calibrated robot.
+
+    Parameters
+    ----------
+    settings : Settings
+        The nominal robot.
+    found : Calibration
+        The calibration.
+    source : str
+        Name of the drive's file.
+    """
+    import tomli_w
+
+    from config.robot import RobotConfig
+
+    parts = {name: getattr(settings, name) for name in RobotConfig.model_fields}
+    tables = RobotConfig(**parts).model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+    ring = tables.pop("ring")
+    for name in ("count", "radius_m", "sensors"):
+        ring.pop(name, None)
+    ring["beam_half_angle_deg"] = round(math.degrees(found.half_angle_rad), 2)
+    firing = ring.pop("firing", None)
+    before = settings.calibration
+    tables["calibration"] = {
+        "distance_scale": round(before.distance_scale * found.scales.distance, 5),
+        "turn_scale": round(before.turn_scale * found.scales.turn, 5),
+        "range_scale": round(before.range_scale * found.scales.range, 5),
+    }
+    rows = []
+    for mount, place_m, angle_rad in zip(
+        found.mounts.tolist(), found.place_sigmas_m, found.angle_sigmas_rad, strict=True
+    ):
+        x, y, angle = mount
+        sure = f"± {math.degrees(angle_rad):.2f}°" if math.isfinite(angle_rad) else "its direction is the nominal one"
+        rows.append(
+            f"    {{ x_m = {x:.4f}, y_m = {y:.4f}, angle_deg = {math.degrees(angle):.2f} }},"
+            f"  # ± {1e3 * place_m:.1f} mm, {sure}"
+        )
+    d, t, r = (100.0 * sigma for sigma in found.scale_sigmas)
+    head = [
+        f"# Calibrated from {utf8(Path(source).name)}.",
+        f"# Uncertainty of the scales (one standard deviation): distance {d:.2f} %, turn {t:.2f} %, range {r:.2f} %.",
+        "",
+        "[ring]",
+        *tomli_w.dumps(ring).splitlines(),
+        "sensors = [",
+        *rows,
+        "]",
+        "",
+    ]
+    if firing is not None:
+        head += tomli_w.dumps({"ring": {"firing": firing}}).splitlines()
+    return "\n".join([*head, *tomli_w.dumps(tables).splitlines(), ""])
+
+
+def _drive(file: str, robot: str | None) -> tuple[Settings, list[Firing]]:
+    """Return the nominal robot's settings and the firings of a drive."""
+    from runtime.analysis.export.ring_log_export import recorded_firings
+    from runtime.recording.reader import is_recording, open_recording
+    from runtime.recording.ring_log import read_ring_log
+
+    path = Path(file)
+    if not is_recording(path):
+        settings = load_settings(None, (), robot=robot)
+        return settings, list(read_ring_log(path, sensors=len(settings.ring.mounts)))
+    if robot is not None:
+        raise UserError(f"{file}: is a recording and contains its robot; --robot is for ring logs", WRONG_CALL)
+    with open_recording(path) as recording:
+        return recording.settings, recorded_firings(recording)
