@@ -21,11 +21,12 @@ SCHEMA: Final = "move_to_goal"
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A place to drive to (m, odometry's frame), and whether it has been reached."""
+    """A place to drive to (m), the frame in which it stays where it is, and whether it has been reached."""
 
     x: float
     y: float
     reached: bool = False
+    frame: Literal["odom", "map"] = "odom"
     kind: Literal["goal"] = "goal"
 
 
@@ -40,7 +41,7 @@ def move_to_goal(percept: Percept, goal: Goal, config: MoveToGoalConfig) -> tupl
     percept
         Only the pose is used.
     goal
-        The goal, and whether it has been reached.
+        The goal, whose coordinates are taken in the frame of the percept's pose, and whether it has been reached.
     config
         The schema's settings.
     """

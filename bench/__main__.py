@@ -241,7 +241,14 @@ def localization(*, json: str = "localization.json", rooms: int = 100, first: in
 
 
 @app.command
-def known_room(*, json: str = "known_room.json", rooms: int = 20, first: int = 1000) -> int:
+def known_room(
+    *,
+    json: str = "known_room.json",
+    rooms: int = 20,
+    first: int = 1000,
+    laser: tuple[Path, ...] = (),
+    seeds: int = 3,
+) -> int:
     """Measure tracking, global localisation and recovery from kidnapping in furnished rooms that are known.
 
     Parameters
@@ -249,17 +256,23 @@ def known_room(*, json: str = "known_room.json", rooms: int = 20, first: int = 1
     json
         File to write.
     rooms
-        Number of rooms.
+        Number of rooms; with --laser, of drives from an unknown start in each building.
     first
         Seed of the first room.
+    laser
+        Measure in real buildings instead: recordings of a laser with corrected poses, as CARMEN logs.
+    seeds
+        With --laser, number of drives that are tracked along the whole recording.
     """
     use_kernel_cache()
-    from bench.known_room import known_room_table, measure
+    from bench.known_room import known_room_table, measure, measure_lasers
 
-    seeds = range(first, first + max(1, rooms))
-    return _try_in_rooms(
-        lambda settings, tell: measure(settings.ring, seeds, tell), known_room_table, json, parts=(EMULATOR,)
-    )
+    def rows(settings: Settings, tell: Callable[[str], None]) -> dict[str, dict[str, float]]:
+        if laser:
+            return measure_lasers(laser, max(1, rooms), range(max(1, seeds)), tell)
+        return measure(settings.ring, range(first, first + max(1, rooms)), tell)
+
+    return _try_in_rooms(rows, known_room_table, json, parts=(EMULATOR,))
 
 
 @app.command

@@ -1,23 +1,31 @@
-"""A known room: global localisation on the way, tracking, and a robot that is carried to another place."""
+"""A known room: global localisation on the way, tracking, and a robot that is carried to another place.
+
+In furnished rooms of the emulator, or in real buildings, whose ranges are cut from a laser's recording.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Final, get_args
 
 import numpy as np
 from rich.table import Table
 
+from bench.laser_rooms import RING, LaserLog, laser_drive, read_carmen, wall_map
 from config.robot import RingConfig
+from drivers.messages import Pose
 from perception.localization.expected_ranges import Reflection
 from perception.localization.known_room import KnownRoom
-from perception.localization.room import room_of
+from perception.localization.room import Room, room_of
 from runtime.simulation.furnished_rooms import ACOUSTICS, furnished_room
-from runtime.simulation.known_room_trials import SURE, KnownDrive, figures, follow, furnished_drive
+from runtime.simulation.known_room_trials import SURE, KnownDrive, Trace, figures, follow, furnished_drive
 
 LENGTH_M: Final = 10.0
 """Way before the robot is carried, and after."""
+LASER_M: Final = 20.0
+"""The same in buildings that a laser has recorded."""
 Rows = dict[str, dict[str, float]]
 
 
@@ -63,6 +71,73 @@ def _figures_of(ring: RingConfig, drives: Iterable[KnownDrive], report: Callable
         traces.append(follow(KnownRoom(drive.room, ring), drive, costs_s))
     cost_ms = 1e3 * np.array(costs_s)
     return asdict(figures(traces)) | {"ms_median": float(np.median(cost_ms)), "ms_mean": float(cost_ms.mean())}
+
+
+def measure_lasers(paths: Sequence[Path], drives: int, seeds: Iterable[int], report: Callable[[str], None]) -> Rows:
+    """Return the figures in the buildings that a laser has recorded, by building and model of reflection.
+
+    Parameters
+    ----------
+    paths
+        CARMEN logs.
+    drives
+        Drives from an unknown start in each, evenly spaced along the recording; half-way the robot is carried.
+    seeds
+        Of the errors of the drives that are tracked from a known start along the whole recording.
+    report
+        Called with a line on what is running.
+    """
+    rows, seeds = {}, tuple(seeds)
+    for path in paths:
+        log = read_carmen(path)
+        report(f"{path.name}: the map")
+        every = range(len(log.poses))
+        room = wall_map(log, every)
+        for reflection in get_args(Reflection):
+            tracked = []
+            for seed in seeds:
+                report(f"{path.name}, {reflection}: tracking {seed}")
+                drive = laser_drive(log, room, every, reflection, seed)
+                localizer = KnownRoom(room, RING, seed=seed)
+                localizer.observe(drive.firings[0])
+                localizer.assume(Pose(*drive.truth[0].tolist()))
+                tracked.append(follow(localizer, drive))
+            traces, costs_s = [], list[float]()
+            for k in range(drives):
+                report(f"{path.name}, {reflection}: unknown start {k}")
+                drive = _carried_drive(log, room, k, drives, reflection)
+                traces.append(follow(KnownRoom(room, RING, seed=k), drive, costs_s))
+            rows[f"{path.name.split('.')[0]}, {reflection}"] = (
+                _tracking_figures(tracked) | asdict(figures(traces)) | {"ms_mean": 1e3 * float(np.mean(costs_s))}
+            )
+    return rows
+
+
+def _carried_drive(log: LaserLog, room: Room, k: int, drives: int, reflection: Reflection) -> KnownDrive:
+    """Return a drive of `LASER_M` from one of some evenly spaced starts, and as far again from another place."""
+    scans, way_m = len(log.poses), np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(log.poses[:, :2], axis=0).T))])
+    last = max(0, int(np.searchsorted(way_m, way_m[-1] - LASER_M)) - 1)
+    parts = []
+    for share in (k / drives, (k / drives + 0.5) % 1.0):
+        begin = int(share * last)
+        parts.append(range(begin, min(scans, int(np.searchsorted(way_m, way_m[begin] + LASER_M)) + 1)))
+    return laser_drive(log, room, [*parts[0], *parts[1]], reflection, k, carried_at=len(parts[0]))
+
+
+def _tracking_figures(traces: Sequence[Trace]) -> dict[str, float]:
+    """Return the errors at all firings of drives from a known start, sure of the place or not."""
+    error_m = np.concatenate([trace.error_m for trace in traces])
+    error_deg = np.degrees(np.concatenate([trace.error_rad for trace in traces]))
+    said = np.concatenate([trace.probability > SURE for trace in traces])
+    right = np.concatenate([trace.right for trace in traces])
+    return {
+        "tracked_median_m": float(np.median(error_m)),
+        "tracked_p95_m": float(np.quantile(error_m, 0.95)),
+        "tracked_median_deg": float(np.median(error_deg)),
+        "tracked_p95_deg": float(np.quantile(error_deg, 0.95)),
+        "tracked_sure_share": float(said.mean()),
+        "tracked_wrong_share": float((said & ~right).mean()),
+    }
 
 
 def known_room_table(rows: Rows) -> Table:

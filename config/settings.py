@@ -132,7 +132,10 @@ class LocalizationConfig(Strict):
         if self.known_room is None:
             return self
         if self.correct_drift:
-            raise ValueError("correct_drift and known_room exclude each other: each has a map frame of its own")
+            raise ValueError(
+                "correct_drift and known_room exclude each other: a known room corrects the drift itself, "
+                "so leave correct_drift out"
+            )
         if not self.known_room.sides_m() and not self.known_room.drum:
             raise ValueError("known_room has no surface: give it a wall, box, polygon or drum")
         return self
@@ -188,6 +191,16 @@ class AvoidStaticObstacleConfig(Strict):
         if self.avoid_obstacle_safety_margin_m >= self.avoid_obstacle_sphere_m:
             raise ValueError("avoid_obstacle_safety_margin_m is not below avoid_obstacle_sphere_m")
         return self
+
+
+class GoalConfig(Strict):
+    """`[goal]`: a place to which the robot drives once it is armed, instead of the configured legs."""
+
+    x_m: float = Field(ge=-10_000.0, le=10_000.0)
+    y_m: float = Field(ge=-10_000.0, le=10_000.0)
+    """The place, m."""
+    frame: Literal["odom", "map"] = "odom"
+    """`odom`: the place is fixed in the robot's odometry. `map`: in the map (`run --map`, or correction of drift)."""
 
 
 class MoveToGoalConfig(Strict):
@@ -315,6 +328,8 @@ class Settings(RobotConfig):
     cycle: CycleConfig = CycleConfig()
     perception: PerceptionConfig = PerceptionConfig()
     behaviors: BehaviorsConfig = BehaviorsConfig()
+    goal: GoalConfig | None = None
+    """Where to drive at the start; by default the robot follows the configured legs."""
     realtime: RealtimeConfig = RealtimeConfig()
     log: LogConfig = LogConfig()
     recording: RecordingConfig = RecordingConfig()

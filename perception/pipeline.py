@@ -243,6 +243,11 @@ class Perception:
             return self.known_room.localized()
         return None if self.map_frame is None else self.map_frame.localized()
 
+    def known_map_frame(self) -> Pose | None:
+        """Return the pose of the map frame in odometry's frame, None while the place is not known."""
+        here = self.localized()
+        return self.odometry_from_map() if here is not None and here.status == "tracking" else None
+
     def odometry_from_map(self) -> Pose:
         """Return the pose of the map frame in odometry's frame, at the last firing."""
         if self.known_room is not None:

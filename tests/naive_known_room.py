@@ -9,22 +9,51 @@ import numpy as np
 
 from perception.kernel import Floats
 from perception.localization.expected_ranges import Beams, Reflection, expected_ranges
+from perception.localization.mixed_reflection import LATE_M, WILD_HEARD
 from perception.localization.particle_update import FIT_STEPS, TEMPER
 from perception.localization.range_likelihood import HEARD_SHARE, RangeModel
 from perception.localization.room import Room
 
 
-def naive_density(model: RangeModel, measured: float, expected: float, variance: float) -> tuple[float, float]:
-    """Density of a reading by one model of reflection, or the probability of silence; and the echo's part of it."""
-    answers = expected <= model.window_m
-    if math.isinf(measured):
-        return (model.dropout if answers else 1.0 - model.outliers), 0.0
-    echo = 0.0
-    if answers:
+class Causes(NamedTuple):
+    """Weights of a reading's causes: they sum to its density, or to the probability of silence."""
+
+    cone: float
+    mirror: float
+    away: float
+    late: float
+    wild: float
+
+
+def naive_causes(
+    model: RangeModel, measured: float, cone: tuple[float, float], mirror: tuple[float, float],
+    shares: tuple[float, float, float],
+) -> Causes:  # fmt: skip
+    """The causes of a reading: each expectation is a range (inf: silence) and its variance; shares as in `Shares`."""
+    specular, late_share, wild_share = shares
+    silent, known = math.isinf(measured), 1.0 - wild_share
+
+    def echo(expected: float, variance: float) -> float:
+        if silent:
+            return model.dropout
         sigma = math.sqrt(float(model.sigma(np.array(expected))) ** 2 + variance)
-        echo = math.exp(-0.5 * ((measured - expected) / sigma) ** 2) / (sigma * math.sqrt(2.0 * math.pi))
-        echo *= 1.0 - model.dropout - model.outliers
-    return echo + model.outliers / model.window_m, echo
+        normal = math.exp(-0.5 * ((measured - expected) / sigma) ** 2) / (sigma * math.sqrt(2.0 * math.pi))
+        return (1.0 - model.dropout) * normal
+
+    answers, reflects = (expected[0] <= model.window_m for expected in (cone, mirror))
+    is_late = not silent and not reflects and cone[0] < measured <= cone[0] + LATE_M
+    return Causes(
+        cone=(1.0 - specular) * known * (echo(*cone) if answers else float(silent)),
+        mirror=specular * known * echo(*mirror) if reflects else 0.0,
+        away=specular * known * (1.0 - late_share) if silent and not reflects else 0.0,
+        late=specular * known * late_share / LATE_M if is_late else 0.0,
+        wild=wild_share * (1.0 - WILD_HEARD if silent else WILD_HEARD / model.window_m),
+    )
+
+
+def naive_ratio(model: RangeModel, measured: float, causes: Causes) -> float:
+    """Log likelihood ratio of a reading to one from anywhere."""
+    return math.log(sum(causes) / (1.0 - HEARD_SHARE if math.isinf(measured) else HEARD_SHARE / model.window_m))
 
 
 class Fitted(NamedTuple):
@@ -34,45 +63,45 @@ class Fitted(NamedTuple):
     covariance: Floats
     log_weight: float
     log_ratio: float
-    specular: float
+    causes: Causes
+    """Probabilities, summed over the readings."""
 
 
 def naive_update(
     room: Room, model: RangeModel, half_angle: float, heading: float, mean: Floats, covariance: Floats,
-    readings: Floats, specular_share: float,
+    readings: Floats, shares: tuple[float, float, float],
 ) -> Fitted:  # fmt: skip
     """A particle's place and scale after some readings, by numpy's matrices; `log_weight` is what is added to it."""
     start, prior = mean, np.linalg.inv(covariance)
     fitted = covariance
-    models: tuple[tuple[Reflection, float], ...] = ("cone", 1.0 - specular_share), ("specular", specular_share)
+    reflections: tuple[Reflection, ...] = ("cone", "specular")
     for step in range(FIT_STEPS + 1):
         information, rhs = prior.copy(), prior @ (start - mean)
-        log_ratio, specular = 0.0, 0.0
+        log_ratio, summed = 0.0, np.zeros(len(Causes._fields))
         for x, y, c, s, measured in readings.tolist():
             place = mean[:2] + np.array(
                 [math.cos(heading) * x - math.sin(heading) * y, math.sin(heading) * x + math.cos(heading) * y]
             )
             axis = heading + math.atan2(s, c)
-            parts = []
-            for reflection, share in models:
+            expected, gradients = [], []
+            for reflection in reflections:
                 found = expected_ranges(room, Beams(*np.array([[*place, axis]]).T), half_angle, reflection)
                 gradient = np.array([found.grad_x[0], found.grad_y[0], 0.0])
                 variance = 0.0 if step == FIT_STEPS else float(gradient @ fitted @ gradient)
-                density, echo = naive_density(model, measured, float(found.range_m[0]), variance)
-                parts.append((share * density, share * echo, float(found.range_m[0]), gradient))
-            total = sum(part[0] for part in parts)
-            anywhere = 1.0 - HEARD_SHARE if math.isinf(measured) else HEARD_SHARE / model.window_m
-            log_ratio += math.log(total / anywhere)
-            specular += parts[1][0] / total / len(readings)
-            for _, echo, expected, gradient in parts:
-                if echo > 0.0:
-                    weight = echo / total / float(model.sigma(np.array(expected))) ** 2
+                expected.append((float(found.range_m[0]), variance))
+                gradients.append(gradient)
+            causes = naive_causes(model, measured, expected[0], expected[1], shares)
+            log_ratio += naive_ratio(model, measured, causes)
+            summed += np.array(causes) / sum(causes)
+            for cause, (range_m, _), gradient in zip(causes[:2], expected, gradients, strict=True):
+                if cause > 0.0 and not math.isinf(measured):
+                    weight = cause / sum(causes) / float(model.sigma(np.array(range_m))) ** 2
                     information += weight * np.outer(gradient, gradient)
-                    rhs += weight * (measured - expected) * gradient
+                    rhs += weight * (measured - range_m) * gradient
         if step < FIT_STEPS:
             fitted = np.linalg.inv(information)
             mean = mean + fitted @ rhs
     off = mean - start
     log_weight = TEMPER * log_ratio - 0.5 * float(off @ prior @ off)
     log_weight += 0.5 * float(np.linalg.slogdet(fitted)[1] - np.linalg.slogdet(covariance)[1])
-    return Fitted(mean, fitted, log_weight, log_ratio, specular)
+    return Fitted(mean, fitted, log_weight, log_ratio, Causes(*summed.tolist()))

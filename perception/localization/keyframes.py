@@ -89,6 +89,11 @@ class Keyframes:
         x, y, yaw = self.odometry[number % KEYFRAMES_MAX].tolist()
         return Pose(x, y, yaw)
 
+    def latest_ranges(self) -> Floats:
+        """Return the ranges of the last keyframe, m, shape (readings,)."""
+        row = (self.count - 1) % KEYFRAMES_MAX
+        return self.readings[row, : self.counts[row], -1]
+
     def begin(self) -> None:
         """Begin a keyframe with the next firing; a robot that stands makes one again."""
         self._has_fired[:] = False

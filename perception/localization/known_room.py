@@ -15,21 +15,23 @@ import numpy as np
 
 from config.robot import RingConfig
 from drivers.messages import Firing, Pose, wrap_angle
+from perception.localization.background import Background
 from perception.localization.drift_correction import LocalizedPose, Status
 from perception.localization.keyframes import Keyframes
+from perception.localization.mixed_reflection import LearnedShares
 from perception.localization.pose_grid import CELL_M, READINGS_MAX, STEP_RAD, PoseGrid
-from perception.localization.pose_particles import HYPOTHESES_MAX
-from perception.localization.pose_track import RECENT_M, RECENT_READINGS, PoseTrack, heading_noise
+from perception.localization.pose_particles import HYPOTHESES_MAX, MERGE_M, MERGE_RAD
+from perception.localization.pose_track import LEAST_LOG, SEARCH_LEAST_LOG, PoseTrack, heading_noise
 from perception.localization.range_likelihood import RangeModel
 from perception.localization.room import Room
 from perception.localization.surroundings import make_surroundings
 from perception.sensor_mounts import mounts_array
 
-NOISE_M: Final = 0.02
+NOISE_M: Final = 0.03
 DROPOUT: Final = 0.15
 OUTLIERS: Final = 0.1
 """Errors of a range compared with the map, whose own errors they contain."""
-WINDOW_M: Final = 6.0
+WINDOW_M: Final = 9.0
 """Way over which odometry compounds keyframes for a search."""
 WINDOW_MAX: Final = 96
 """Most keyframes of it."""
@@ -38,25 +40,17 @@ SEARCH_GROWTH: Final = 1.5
 """Way until the first search, the longest one between two searches, and by how much it grows from one to the next."""
 STAND_SEARCH_M: Final = 0.3
 """A robot that stands searches if it has driven so far since the last search."""
-LOST_M: Final = 1.0
-LATEST_M: Final = 0.2
-"""Ways over which a place must explain the readings: otherwise it is lost, or its probability falls."""
-MISSED_SHARE: Final = 0.35
-REPORT_SHARE: Final = 0.7
-REPORT_SHARE_STANDING: Final = 0.85
-REPORT_M: Final = 0.5
-"""Shares of a true pose's log likelihood ratio: a place below the first is lost, one above the second is sure. The
-third is for a place known from less way than this: few readings fit somewhere in a wrong map by chance."""
 ASSUMED_M: Final = 0.3
 ASSUMED_RAD: Final = math.radians(12.0)
 """Standard deviation of a place that the operator names, on each axis, and half the width of its row of headings."""
+SUSPECT_LOG: Final = 4.5
+"""Evidence for a tracked place below which a search looks for a better one, nat: the robot may have been carried."""
+LEAD_LOG: Final = 2.0
+"""What a search finds must explain its readings better by this than what is tracked, nat."""
 SURE: Final = 0.9
 """Probability above which a place is the robot's."""
 DOUBT: Final = 0.5
 """Probability below which a tracked place is no longer its own."""
-SHARE_MEMORY: Final = 300.0
-"""Readings over which the share of specular echoes is learned."""
-SHARE_MIN: Final = 0.03
 STATUSES: Final[tuple[Status, ...]] = ("localizing", "tracking", "lost")
 LOCALIZING, TRACKING, LOST = range(3)
 IDLE, DUE, COMPARING, WEIGHING = range(4)
@@ -81,9 +75,12 @@ class KnownRoom:
     ----------
     probability : float
         That the reported place is the robot's.
-    specular_share : float
-        Share of the readings that mirrors explain, as learned so far.
+    shares : LearnedShares
+        How often a reading has which cause.
     """
+
+    SCRATCH: Final = ("_search_evidence",)
+    """What follows from the room."""
 
     def __init__(self, room: Room, ring: RingConfig, model: RangeModel | None = None, seed: int = 0) -> None:
         model = model or RangeModel(
@@ -92,11 +89,16 @@ class KnownRoom:
         surroundings = make_surroundings(room, model, math.radians(ring.beam_half_angle_deg))
         radius_m = max(math.hypot(x, y) for x, y, _ in ring.mounts)
         noise = heading_noise(seed)
-        self._grid = PoseGrid(room, surroundings, max(CELL_M, radius_m - CELL_M))
-        self._tracked = PoseTrack(surroundings, model, noise)
-        self._candidates = PoseTrack(surroundings, model, noise)
+        clear_m = max(CELL_M, radius_m - CELL_M)
+        self._grid = PoseGrid(room, surroundings, clear_m)
+        self._background = Background(room, surroundings, clear_m)
+        self._search_evidence = -math.log(max(1.0, room.area_m2 / MERGE_M**2) * math.pi / MERGE_RAD)
+        """Log odds of the best of all places of the room before any reading: some fit by chance."""
+        self._tracked = PoseTrack(surroundings, self._background, noise)
+        self._candidates = PoseTrack(surroundings, self._background, noise)
         """Hypotheses of a search, until they have entered all keyframes."""
         self._mounts = mounts_array(ring.mounts)
+        self.shares = LearnedShares()
         self._odometry = np.zeros(3)
         """Of the ring at the last firing."""
         self.reset()
@@ -109,10 +111,15 @@ class KnownRoom:
         self._grid.cancel()
         self._status = LOCALIZING
         self.probability = 0.0
-        self.specular_share = 0.5
+        self.shares.reset()
+        self._background.reset()
         self._window_begin = 0
         """Number of the first keyframe that a search uses."""
         self._stage = IDLE
+        self._search_begin = 0
+        """The same of the search whose hypotheses are weighed."""
+        self._is_complete = self._is_confirmed = False
+        """Whether the last search left out no place that may be the robot's; whether two have the same answer."""
         self._searched_at_m = -STAND_SEARCH_M
         self._pause_m = SEARCH_M[0]
         self._travel = 0.0
@@ -130,12 +137,17 @@ class KnownRoom:
         if not self._keyframes.observe(firing):
             return
         keyframes = self._keyframes
+        self._background.observe(keyframes.latest_ranges())
         if self._stage in {IDLE, DUE}:
             self._window_begin = max(self._window_begin, keyframes.count - WINDOW_MAX)
             while keyframes.way_since(self._window_begin) > WINDOW_M:
                 self._window_begin += 1
-        if self._stage != IDLE or self._status == TRACKING:
+        if self._stage != IDLE:
             return
+        if self._status == TRACKING:
+            if self._tracked.evidence > SUSPECT_LOG:
+                return
+            self._window_begin = max(self._window_begin, min(self._tracked.peak_at + 1, keyframes.count - 1))
         way_m = keyframes.driven_m - self._searched_at_m
         if way_m >= self._pause_m or (keyframes.is_stand and way_m >= STAND_SEARCH_M):
             self._searched_at_m = keyframes.driven_m
@@ -151,10 +163,10 @@ class KnownRoom:
         self._grid.cancel()
         self._candidates.clear()
         self._stage = IDLE
-        self._tracked.start(here, ASSUMED_M, ASSUMED_RAD, self._at_last_firing(), self._keyframes.count)
+        self._tracked.start(here, ASSUMED_M, ASSUMED_RAD, self._at_last_firing(), self._keyframes.count, 0.0)
         self._tracked.conclude()
         self._keyframes.begin()
-        self._status, self.probability = LOCALIZING, 0.0
+        self._status, self.probability, self._is_confirmed = LOCALIZING, 0.0, True
         self._searched_at_m, self._pause_m = self._keyframes.driven_m, SEARCH_M[0]
 
     @property
@@ -169,19 +181,21 @@ class KnownRoom:
                 self._judge()
         elif self._stage == DUE:
             readings = self._keyframes.compounded(self._window_begin, READINGS_MAX)
-            self._grid.begin(readings, self.specular_share)
+            self._grid.begin(readings, self.shares.records[0])
             self._stage = COMPARING if len(readings) else IDLE
         elif self._stage == COMPARING:
             self._grid.refine()
             if not self._grid.is_searching:
-                starts = self._grid.best_starts(HYPOTHESES_MAX)
-                begin = self._window_begin
-                self._candidates.start(starts, CELL_M, STEP_RAD, self._keyframes.pose(begin), begin)
+                begin = self._search_begin = self._window_begin
+                starts, self._is_complete = self._grid.best_starts(HYPOTHESES_MAX), self._grid.is_complete
+                self._candidates.start(
+                    starts, CELL_M, STEP_RAD, self._keyframes.pose(begin), begin, self._search_evidence
+                )
                 self._stage = WEIGHING if len(starts) else IDLE
         elif self._stage == WEIGHING:
             self._enter(self._candidates)
             if not self._candidates.is_behind(self._keyframes):
-                self._tracked, self._candidates = self._candidates, self._tracked
+                self._conclude_search()
                 self._candidates.clear()
                 self._stage = IDLE
                 self._judge()
@@ -212,21 +226,33 @@ class KnownRoom:
     def _enter(self, track: PoseTrack) -> bool:
         """Do a quantum of entering a keyframe; return whether it is done."""
         before = track.entered
-        readings = track.enter(self._keyframes, self.specular_share)
-        if readings and track.explains(LOST_M, MISSED_SHARE) > SURE:
-            share = self.specular_share + readings * (track.best.specular - self.specular_share) / SHARE_MEMORY
-            self.specular_share = min(1.0 - SHARE_MIN, max(SHARE_MIN, share))
+        least_log = LEAST_LOG if track is self._tracked else SEARCH_LEAST_LOG
+        readings = track.enter(self._keyframes, self.shares, least_log)
+        if readings and min(track.explains, track.fits) > SURE:
+            self.shares.learn(track.best, readings)
         return track.entered > before
+
+    def _conclude_search(self) -> None:
+        """Take what a search found if it explains its readings better than what is tracked; or confirm that."""
+        tracked, found = self._tracked, self._candidates
+        is_same = False
+        if len(tracked):
+            at = self._at_last_firing()
+            one, other = tracked.pose(at), found.pose(at)
+            turn = abs(wrap_angle(one.theta - other.theta))
+            is_same = math.hypot(one.x - other.x, one.y - other.y) <= MERGE_M and turn <= MERGE_RAD
+        begin = self._search_begin
+        is_better = not len(tracked) or found.gained_since(begin) > tracked.gained_since(begin) + LEAD_LOG
+        if is_better and not is_same:
+            self._tracked, self._candidates = found, tracked
+            self._status = LOCALIZING if self._status == TRACKING else self._status
+        self._is_confirmed = is_same or self._is_complete
 
     def _judge(self) -> None:
         """Set status and probability after a keyframe."""
         track = self._tracked
-        if track.readings < RECENT_READINGS:
-            return
-        explains = track.explains(LOST_M, MISSED_SHARE)
-        report_share = REPORT_SHARE if track.way_m >= REPORT_M else REPORT_SHARE_STANDING
-        reported = min(track.explains(RECENT_M, report_share), track.explains(LATEST_M, MISSED_SHARE))
-        self.probability = float(track.best.share) * reported
+        explains = track.explains
+        self.probability = float(track.best.share) * min(explains, track.fits) * (1.0 if self._is_confirmed else SURE)
         if self._status == TRACKING:
             if explains < DOUBT:
                 self._lose()
@@ -234,7 +260,8 @@ class KnownRoom:
             self._status = TRACKING if self.probability > SURE else LOST if explains < DOUBT else LOCALIZING
 
     def _lose(self) -> None:
-        """Begin anew: what was heard before may be from another place."""
+        """Begin anew, with what was heard since the readings began to speak against the place."""
         self._status = LOST
-        self._window_begin = self._keyframes.count - 1
+        self._window_begin = max(self._tracked.peak_at + 1, self._keyframes.count - WINDOW_MAX)
         self._pause_m, self._searched_at_m = SEARCH_M[0], self._keyframes.driven_m
+        self._stage = DUE

@@ -1,17 +1,90 @@
-"""The probability of a range in a room of which it is not known how it reflects: a mixture of both models.
+"""The probability of a range in a room of which it is not known how it reflects: a mixture of its causes.
 
 Rough surfaces answer from the nearest point in the beam (`cone`), smooth ones from the foot of the perpendicular
-(`specular`). Most rooms have both. Each reading is from one model with a probability that is learned on the way.
+(`specular`). Most rooms have both. A smooth surface that sends no sound straight back is silent, or answers late,
+over a second surface. And a real room has more than its map: a reading may be anything. How often each of
+these is the cause is learned on the way.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Final, Protocol
 
 from perception.kernel import kernel
 from perception.localization.range_likelihood import HEARD_SHARE
 from perception.localization.surroundings import SensorModel
-from perception.records import Records
+from perception.records import Record, Records, records, zeros
+
+WILD_HEARD: Final = 0.9
+"""Share of the readings that may be anything which hear something: they are of what the map lacks."""
+LATE_M: Final = 2.0
+"""An echo over a second surface is late by up to this."""
+SHARES: Final = (0.5, 0.1, 0.1)
+SHARES_MIN: Final = (0.03, 0.02, 0.05)
+SHARES_MAX: Final = (0.97, 0.5, 0.4)
+"""Shares at the start, and their bounds, in the order of `Shares`."""
+
+
+class Shares(Record):
+    """How often a reading has which cause, as learned so far."""
+
+    specular: float
+    """Share of the readings that are from a smooth surface."""
+    late: float
+    """Share of the smooth surfaces without a straight way back that answer over a second one."""
+    wild: float
+    """Share of the readings that are anything."""
+
+
+MEMORY: Final = 300.0
+"""Readings over which the shares are learned."""
+
+Causes = tuple[float, float, float, float, float, float]
+"""Probabilities that a reading is the echo that `cone` expects, and the one that `specular` expects (0 for silence);
+that it is of a smooth surface, of one without a straight way back, of such a one that answers over a second surface;
+and that it is anything."""
+
+
+class Counted(Protocol):
+    """Causes of some readings, as in `Causes`, summed."""
+
+    specular: float
+    turned_away: float
+    late: float
+    wild: float
+
+
+class LearnedShares:
+    """How often a reading has which cause, learned from the causes of readings at a place that is known.
+
+    Attributes
+    ----------
+    records : (1,) Shares
+        As kernels take them.
+    """
+
+    SCRATCH: Final = ("records",)
+    """A view of other memory."""
+
+    def __init__(self) -> None:
+        self._memory = zeros(Shares, 1)
+        self.records: Records[Shares] = records(Shares, self._memory)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what was learned."""
+        self._memory[0] = SHARES
+
+    def learn(self, causes: Counted, readings: int) -> None:
+        """Take the causes of some readings."""
+        share, least, most = self.records[0], SHARES_MIN, SHARES_MAX
+        specular = share.specular + (causes.specular - share.specular * readings) / MEMORY
+        late = share.late + (causes.late - share.late * causes.turned_away) / MEMORY
+        wild = share.wild + (causes.wild - share.wild * readings) / MEMORY
+        share.specular = min(most[0], max(least[0], specular))
+        share.late = min(most[1], max(least[1], late))
+        share.wild = min(most[2], max(least[2], wild))
 
 
 @kernel
@@ -22,39 +95,31 @@ def range_variance(sensor: Records[SensorModel], range_m: float) -> float:
 
 
 @kernel
-def range_density(
-    sensor: Records[SensorModel], measured: float, expected: float, variance: float
-) -> tuple[float, float]:  # fmt: skip
-    """Return the density (1/m) of a reading by one model, or its probability for silence, and the echo's part of it.
+def echo_density(sensor: Records[SensorModel], measured: float, expected: float, variance: float) -> float:
+    """Return the density (1/m) of an echo that a surface in the map sends, or the probability of silence.
 
     Parameters
     ----------
     sensor : (1,) SensorModel
         Errors of a range.
     measured, expected : float
-        Ranges, m; inf for silence. An expected range beyond the window is silence.
+        Ranges, m; inf for silence, which no expectation may be.
     variance : float
         Of the expected range, from the pose's, m².
     """
-    model = sensor[0]
-    answers = expected <= model.window_m
     if measured == math.inf:
-        return (model.dropout if answers else 1.0 - model.outliers), 0.0
-    echo = 0.0
-    if answers:
-        total = range_variance(sensor, expected) + variance
-        error = measured - expected
-        peak = (1.0 - model.dropout - model.outliers) / math.sqrt(2.0 * math.pi * total)
-        echo = peak * math.exp(-0.5 * error * error / total)
-    return echo + model.outliers / model.window_m, echo
+        return sensor[0].dropout
+    total = range_variance(sensor, expected) + variance
+    error = measured - expected
+    return (1.0 - sensor[0].dropout) / math.sqrt(2.0 * math.pi * total) * math.exp(-0.5 * error * error / total)
 
 
 @kernel
 def mixed_ratio(
     sensor: Records[SensorModel], measured: float, cone_m: float, cone_variance: float, specular_m: float,
-    specular_variance: float, specular_share: float,
-) -> tuple[float, float, float, float]:  # fmt: skip
-    """Return how well a reading fits.
+    specular_variance: float, shares: Records[Shares],
+) -> tuple[float, Causes]:  # fmt: skip
+    """Return how well a reading fits: its log likelihood ratio to a reading from anywhere, nat, and its causes.
 
     Parameters
     ----------
@@ -63,24 +128,37 @@ def mixed_ratio(
     measured : float
         Range, m; inf for silence.
     cone_m, specular_m : float
-        Expected by either model, m; inf for silence.
+        Expected by either model, m; inf for silence, and so is what is beyond the window.
     cone_variance, specular_variance : float
         Of the expected ranges, from the pose's, m².
-    specular_share : float
-        Probability that a reading is from the specular model.
-
-    Returns
-    -------
-    tuple of float
-        Log likelihood ratio to a reading from anywhere, nat; probabilities that the echo is the one that `cone`
-        expects, and the one that `specular` expects, 0 for silence; and that the reading, silence too, is from the
-        specular model.
+    shares : (1,) Shares
+        How often a reading has which cause.
     """
-    cone, cone_echo = range_density(sensor, measured, cone_m, cone_variance)
-    specular, specular_echo = range_density(sensor, measured, specular_m, specular_variance)
-    total = (1.0 - specular_share) * cone + specular_share * specular
-    anywhere = 1.0 - HEARD_SHARE if measured == math.inf else HEARD_SHARE / sensor[0].window_m
-    return (
-        math.log(total / anywhere), (1.0 - specular_share) * cone_echo / total,
-        specular_share * specular_echo / total, specular_share * specular / total,
+    share, window_m = shares[0], sensor[0].window_m
+    is_silent = measured == math.inf
+    known = 1.0 - share.wild
+    wild = share.wild * (1.0 - WILD_HEARD if is_silent else WILD_HEARD / window_m)
+    rough = mirror = away = late = 0.0
+    if cone_m <= window_m:
+        rough = (1.0 - share.specular) * known * echo_density(sensor, measured, cone_m, cone_variance)
+    elif is_silent:
+        rough = (1.0 - share.specular) * known
+    if specular_m <= window_m:
+        mirror = share.specular * known * echo_density(sensor, measured, specular_m, specular_variance)
+    else:
+        away = share.specular * known
+        if is_silent:
+            away *= 1.0 - share.late
+        elif cone_m < measured <= cone_m + LATE_M:
+            late = away * share.late / LATE_M
+            away = 0.0
+        else:
+            away = 0.0
+    total = rough + mirror + away + late + wild
+    anywhere = 1.0 - HEARD_SHARE if is_silent else HEARD_SHARE / window_m
+    smooth, turned_away = (mirror + away + late) / total, (away + late) / total
+    causes = (
+        0.0 if is_silent else rough / total, 0.0 if is_silent else mirror / total, smooth, turned_away, late / total,
+        wild / total,
     )  # fmt: skip
+    return math.log(total / anywhere), causes

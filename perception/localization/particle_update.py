@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 from perception.kernel import Floats, kernel
-from perception.localization.mixed_reflection import mixed_ratio, range_variance
+from perception.localization.mixed_reflection import Shares, mixed_ratio, range_variance
 from perception.localization.pose_particles import HypothesesRecord, Particle
 from perception.localization.surroundings import Surroundings, expect_cone, expect_specular, look_around
 from perception.records import Records
@@ -37,7 +37,7 @@ def inverse(xx: float, xy: float, xs: float, yy: float, ys: float, ss: float) ->
 
 @kernel
 def update_particle(
-    s: Surroundings, particles: Records[Particle], i: int, readings: Floats, count: int, specular_share: float
+    s: Surroundings, particles: Records[Particle], i: int, readings: Floats, count: int, shares: Records[Shares]
 ) -> None:  # fmt: skip
     """Fit the place of a particle to readings, and add to its log weight how likely they are.
 
@@ -53,8 +53,8 @@ def update_particle(
         In the ring's frame; silence is inf.
     count : int
         How many of them.
-    specular_share : float
-        Probability that a reading is from the specular model.
+    shares : (1,) Shares
+        How often a reading has which cause.
     """
     p = particles[i]
     cos, sin = math.cos(p.heading), math.sin(p.heading)
@@ -63,7 +63,7 @@ def update_particle(
     xs = ys = ss = det_information = p.log_ratio = p.specular = 0.0
     for step in range(FIT_STEPS + 1):
         is_fitted = step == FIT_STEPS
-        ax = ay = axy = bx = by = ratio = specular = 0.0
+        ax = ay = axy = bx = by = ratio = specular = turned_away = late = wild = 0.0
         for k in range(count):
             mx, my, c, sn, measured = readings[k]
             at_x, at_y = x + cos * mx - sin * my, y + sin * mx + cos * my
@@ -75,11 +75,13 @@ def update_particle(
                 cone_var = xx * cone_x * cone_x + 2.0 * xy * cone_x * cone_y + yy * cone_y * cone_y
                 specular_var = xx * specular_x * specular_x + yy * specular_y * specular_y
                 specular_var += 2.0 * xy * specular_x * specular_y
-            log_ratio, fits_cone, fits_specular, prefers = mixed_ratio(
-                s.sensor, measured, cone_m, cone_var, specular_m, specular_var, specular_share
-            )
+            log_ratio, causes = mixed_ratio(s.sensor, measured, cone_m, cone_var, specular_m, specular_var, shares)
+            fits_cone, fits_specular = causes[0], causes[1]
             ratio += log_ratio
-            specular += prefers
+            specular += causes[2]
+            turned_away += causes[3]
+            late += causes[4]
+            wild += causes[5]
             if fits_cone > 0.0:
                 weight = fits_cone / range_variance(s.sensor, cone_m)
                 error = weight * (measured - cone_m)
@@ -97,7 +99,7 @@ def update_particle(
                 bx += error * specular_x
                 by += error * specular_y
         if is_fitted:
-            p.log_ratio, p.specular = ratio, specular / count
+            p.log_ratio, p.specular, p.turned_away, p.late, p.wild = ratio, specular, turned_away, late, wild
         else:
             dx, dy, ds = p.x - x, p.y - y, p.scale - scale
             bx += lxx * dx + lxy * dy + lxs * ds
@@ -119,7 +121,7 @@ def update_particle(
 @kernel
 def update_particles(
     s: Surroundings, of: HypothesesRecord, h: int, first: int, end: int, readings: Floats, count: int,
-    specular_share: float,
+    shares: Records[Shares],
 ) -> None:  # fmt: skip
     """Enter readings into some particles of a hypothesis.
 
@@ -131,7 +133,7 @@ def update_particles(
         Updated.
     h, first, end : int
         The hypothesis, its first particle and the one after its last.
-    readings, count, specular_share
+    readings, count, shares
         As of `update_particle`.
     """
     x = y = within_m = 0.0
@@ -143,4 +145,4 @@ def update_particles(
         within_m = max(within_m, math.hypot(readings[k, 0], readings[k, 1]))
     look_around(s, x, y, within_m + SPREAD_M)
     for i in range(first, end):
-        update_particle(s, particles, i, readings, count, specular_share)
+        update_particle(s, particles, i, readings, count, shares)

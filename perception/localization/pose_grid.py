@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from perception.kernel import Floats, kernel
 from perception.localization.expected_ranges import Reflection
+from perception.localization.mixed_reflection import LATE_M, SHARES, WILD_HEARD, Shares
+from perception.localization.pose_starts import STARTS_MAX, Starts, offer
 from perception.localization.range_likelihood import HEARD_SHARE
 from perception.localization.room import Room
 from perception.localization.surroundings import Surroundings, expect_cone, expect_specular, look_around
@@ -30,43 +32,27 @@ CELLS_PER_QUANTUM: Final = 4
 """Cells of the table that one quantum computes."""
 BLOCK: Final = 16
 """Cells of a block's side: a quantum of a search compares one block at one heading."""
-READINGS_MAX: Final = 72
+READINGS_MAX: Final = 108
 """Readings that are compared."""
 SIGMA_M: Final = 0.12
 SIGMA_SHARE: Final = 0.03
 """Standard deviation of a range from the table: of half a cell, and a share of the range."""
-DROPOUT: Final = 0.3
-OUTLIERS: Final = 0.2
-"""Shares of expected echoes that are not heard, and of readings that are anything: the table knows no more."""
+DROPOUT: Final = 0.2
+WILD_MIN: Final = 0.2
+"""Shares of expected echoes that are not heard, and at least of readings that are anything: it is coarse."""
 OUTSIDE: Final = 0.125
 """Likelihood ratio of a reading that would be taken outside the table."""
 FACTORS: Final = 24
 """Ratios that are multiplied before their logarithm is taken: neither too small nor too large for a float."""
 SILENT: Final = 255
 """Code of silence in the table; a range is a share of 254 of the window."""
-STARTS_MAX: Final = 200
-APART_M: Final = 1.5 * CELL_M
-APART_RAD: Final = 1.5 * STEP_RAD
-"""Starts nearer to each other than this, on each axis, are one."""
+START_LOG: Final = 40.0
+"""A start less likely than the best one by more than this, nat, is not the place."""
+COMPLETE_LOG: Final = 20.0
+"""Where the worst of so many starts is less likely than the best by this, nat, the place is among them."""
 NONE: Final = -1
 
 Bytes = NDArray[np.uint8]
-
-
-class Start(Record):
-    """A pose (m, rad) and how well the readings fit there, nat."""
-
-    x: float
-    y: float
-    heading: float
-    score: float
-
-
-class Starts(Record):
-    """The best poses found so far, in any order."""
-
-    count: int
-    starts: Annotated[Records[Start], STARTS_MAX]
 
 
 class ScoreScratch(Record):
@@ -110,36 +96,6 @@ def fill_cell(
 
 
 @kernel
-def offer(to: Records[Starts], x: float, y: float, heading: float, score: float) -> None:
-    """Add a start, unless a better one is near it or all are better; it replaces a worse one near it.
-
-    Parameters
-    ----------
-    to : (1,) Starts
-        Updated.
-    x, y, heading, score : float
-        As of `Start`.
-    """
-    starts, worst = to[0].starts, 0
-    for k in range(to[0].count):
-        other = starts[k]
-        turn = abs((heading - other.heading + math.pi) % (2.0 * math.pi) - math.pi)
-        if abs(x - other.x) < APART_M and abs(y - other.y) < APART_M and turn < APART_RAD:
-            if score > other.score:
-                other.x, other.y, other.heading, other.score = x, y, heading, score
-            return
-        if other.score < starts[worst].score:
-            worst = k
-    if to[0].count < STARTS_MAX:
-        worst = to[0].count
-        to[0].count += 1
-    elif starts[worst].score >= score:
-        return
-    at = starts[worst]
-    at.x, at.y, at.heading, at.score = x, y, heading, score
-
-
-@kernel
 def score_block(
     table: Bytes, free: Bytes, likely: Floats, readings: Floats, count: int, direction: int, begin_i: int,
     begin_j: int, scratch: Records[ScoreScratch],
@@ -150,8 +106,8 @@ def score_block(
     ----------
     table, free : uint8
         As of `fill_cell`.
-    likely : (n, 2, 256) float
-        Each reading's likelihood ratio at each code of either model's table.
+    likely : (n, 3, 256) float
+        Each reading's likelihood ratio by cause at each code, as `PoseGrid` computes it.
     readings : (n, 5) float
         As of `perception.localization.particle_update`.
     count : int
@@ -179,7 +135,10 @@ def score_block(
                 j = begin_j + b + shift_j
                 ratio = OUTSIDE
                 if 0 <= i < rows and 0 <= j < columns:
-                    ratio = likely[n, 0, table[0, d, i, j]] + likely[n, 1, table[1, d, i, j]]
+                    cone, specular = table[0, d, i, j], table[1, d, i, j]
+                    ratio = likely[n, 0, cone] + likely[n, 1, specular]
+                    if specular == SILENT:
+                        ratio += likely[n, 2, cone]
                 product[BLOCK * a + b] *= ratio
         if n % FACTORS == FACTORS - 1 or n == count - 1:
             for k in range(BLOCK * BLOCK):
@@ -257,14 +216,15 @@ class PoseGrid:
         self._due = 0
         """Cells whose part is needed: quanta count on this, not on what memory holds after a restored snapshot."""
         self._found = zeros(Starts, 1)
+        self._found["least"] = -math.inf
         self.starts = records(Starts, self._found)
         self._scratch = records(ScoreScratch, zeros(ScoreScratch, 1))
         self._readings = np.zeros((READINGS_MAX, 5))
         self._count = self._searches = 0
-        self._specular_share = 0.5
+        self._shares = np.array(SHARES)
         self._quantum = NONE
         """Of the search; `NONE` without one."""
-        self._likely = np.zeros((READINGS_MAX, 2, SILENT + 1))
+        self._likely = np.zeros((READINGS_MAX, 3, SILENT + 1))
         self._likely_search = 0
         """Number of the search that the likelihoods are of."""
 
@@ -273,22 +233,22 @@ class PoseGrid:
         """Whether a search has work left."""
         return self._quantum != NONE
 
-    def begin(self, readings: Floats, specular_share: float) -> None:
+    def begin(self, readings: Floats, shares: Shares) -> None:
         """Begin a search.
 
         Parameters
         ----------
         readings : (n, 5) float
             Of a short drive, in one frame, as of `perception.localization.particle_update`; at most `READINGS_MAX`.
-        specular_share : float
-            Probability that a reading is from the specular model.
+        shares : Shares
+            How often a reading has which cause.
         """
         self._count = len(readings)
         self._readings[: self._count] = readings
-        self._specular_share = specular_share
+        self._shares[:] = shares.specular, shares.late, shares.wild
         self._searches += 1
         self._quantum = 0
-        self._found["count"] = 0
+        self._found["count"], self._found["least"] = 0, -math.inf
 
     def cancel(self) -> None:
         """End a search without an answer."""
@@ -318,10 +278,29 @@ class PoseGrid:
             self._quantum = NONE
 
     def best_starts(self, most: int) -> Floats:
-        """Return the poses that fit best: x, y (m), heading (rad), shape (n, 3), the best first."""
+        """Return the poses that fit best, the best first, without those that fit much worse.
+
+        Parameters
+        ----------
+        most : int
+            So many at most.
+
+        Returns
+        -------
+        (n, 3) float
+            x, y (m), heading (rad).
+        """
         found = self._found["starts"][0, : int(self._found["count"][0])]
         order = np.argsort(-found["score"], kind="stable")[:most]
+        order = order[found["score"][order] >= found["score"][order[:1]] - START_LOG]
         return np.column_stack([found[name][order] for name in ("x", "y", "heading")])
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all places but the offered ones fit much worse than the best one."""
+        count = int(self._found["count"][0])
+        scores = np.sort(self._found["starts"]["score"][0, :count])
+        return count < STARTS_MAX or bool(scores[-1] - scores[0] > COMPLETE_LOG)
 
     def drop_caches(self) -> None:
         """Discard what was computed for a search, after another state was restored."""
@@ -352,16 +331,29 @@ class PoseGrid:
             self._filled += 1
 
     def _likelihoods(self) -> Floats:
-        """Return each reading's likelihood ratio at each code of either model's table, shape (n, 2, 256)."""
-        measured = self._readings[: self._count, 4]
+        """Return each reading's likelihood ratio by cause at each code of the table, shape (n, 3, 256).
+
+        That of `perception.localization.mixed_reflection`, as coarse as the table: a rough surface, or anything, at
+        each code of `cone`; a smooth one at each of `specular`; an echo over a second surface at each of `cone`,
+        where `specular` is silent.
+        """
+        measured = self._readings[: self._count, 4:5]
         expected = np.append(np.arange(SILENT) * (self._window_m / 254.0), np.inf)
+        answers, heard = np.isfinite(expected), np.isfinite(measured)
+        specular, late, wild = self._shares.tolist()
+        wild = max(WILD_MIN, wild)
         sigma = np.hypot(SIGMA_M, SIGMA_SHARE * np.minimum(expected, self._window_m))
-        heard = np.isfinite(measured)[:, None]
         with np.errstate(invalid="ignore"):
-            error = (np.where(heard, measured[:, None], 0.0) - expected) / sigma
-        echo = (1.0 - DROPOUT - OUTLIERS) / (sigma * math.sqrt(2.0 * math.pi)) * np.exp(-0.5 * error**2)
-        echo = np.where(np.isfinite(expected), echo, 0.0) + OUTLIERS / self._window_m
-        silent = np.where(np.isfinite(expected), DROPOUT, 1.0 - OUTLIERS)
-        ratio = np.where(heard, echo / (HEARD_SHARE / self._window_m), silent / (1.0 - HEARD_SHARE))
-        share = self._specular_share
-        return np.stack([(1.0 - share) * ratio, share * ratio], axis=1)
+            after = np.where(heard, measured, 0.0) - expected
+            echo = np.exp(-0.5 * (after / sigma) ** 2) / (sigma * math.sqrt(2.0 * math.pi))
+        echo = np.where(heard, np.where(answers, (1.0 - DROPOUT) * echo, 0.0), np.where(answers, DROPOUT, 1.0))
+        turned_away = np.where(heard, 0.0, 1.0 - late) * ~answers
+        anything = np.where(heard, WILD_HEARD / self._window_m, 1.0 - WILD_HEARD)
+        second = heard & answers & (after > 0.0) & (after <= LATE_M)
+        causes = (
+            (1.0 - wild) * (1.0 - specular) * echo + wild * anything,
+            (1.0 - wild) * specular * np.where(answers, echo, turned_away),
+            (1.0 - wild) * specular * late / LATE_M * second,
+        )
+        anywhere = np.where(heard, HEARD_SHARE / self._window_m, 1.0 - HEARD_SHARE)
+        return np.stack([cause / anywhere for cause in causes], axis=1)

@@ -17,7 +17,7 @@ from perception.kernel import Floats, Ints, kernel
 from perception.localization.surroundings import insert_nearest
 from perception.records import Record, Records
 
-HEADINGS: Final = 13
+HEADINGS: Final = 25
 """Particles of a hypothesis."""
 HYPOTHESES_MAX: Final = 100
 SCALE_SIGMA: Final = 0.03
@@ -30,6 +30,10 @@ HEADING_WALK: Final = math.radians(1.0) ** 2
 """Variance of the heading by odometry, rad²/m."""
 TURN_SHARE: Final = 0.03
 """Standard deviation of a turn by odometry as a share of it."""
+TURN_WALK: Final = 0.0015
+"""Variance of a turn by odometry beyond that, rad²/rad: an error of scale adds up over many turns to one side."""
+SHARE_TEMPER: Final = 0.5
+"""Weight of log evidence between hypotheses: places that look alike differ by what is common to many readings."""
 RESAMPLE_SHARE: Final = 0.5
 """Particles are resampled where fewer than this share of them carry the weight."""
 MERGE_M: Final = 0.3
@@ -55,7 +59,10 @@ class Particle(Record):
     log_ratio: float
     """Log likelihood ratio of the readings of the last update to readings from anywhere, nat."""
     specular: float
-    """Mean probability of a reading of the last update to be from the specular model."""
+    turned_away: float
+    late: float
+    wild: float
+    """Causes of the readings of the last update, as in `perception.localization.mixed_reflection`, summed."""
 
 
 class Hypothesis(Record):
@@ -83,6 +90,9 @@ class Best(Record):
     hh: float
     log_ratio: float
     specular: float
+    turned_away: float
+    late: float
+    wild: float
     """Mean over its particles of their fields of the same name."""
 
 
@@ -133,7 +143,8 @@ def add_hypothesis(
         p.x, p.y, p.scale = x, y, 1.0
         p.xx, p.xy, p.xs = place_sigma_m * place_sigma_m, 0.0, 0.0
         p.yy, p.ys, p.ss = place_sigma_m * place_sigma_m, 0.0, SCALE_SIGMA * SCALE_SIGMA
-        p.log_weight, p.log_ratio, p.specular = -math.log(HEADINGS), 0.0, 0.0
+        p.log_weight, p.log_ratio = -math.log(HEADINGS), 0.0
+        p.specular = p.turned_away = p.late = p.wild = 0.0
     of[0].count = count + 1
 
 
@@ -154,7 +165,7 @@ def move(of: HypothesesRecord, forward_m: float, left_m: float, turn_rad: float,
     """
     way = math.hypot(forward_m, left_m)
     turn_sigma = TURN_SHARE * turn_rad
-    sigma = math.sqrt(HEADING_WALK * way + turn_sigma * turn_sigma)
+    sigma = math.sqrt(HEADING_WALK * way + TURN_WALK * abs(turn_rad) + turn_sigma * turn_sigma)
     for h in range(of[0].count):
         particles = of[0].hypotheses[h].particles
         for i in range(HEADINGS):
@@ -211,7 +222,8 @@ def copy_particle(source: Records[Particle], i: int, target: Records[Particle], 
     p, q = source[i], target[k]
     q.heading, q.x, q.y, q.scale = p.heading, p.x, p.y, p.scale
     q.xx, q.xy, q.xs, q.yy, q.ys, q.ss = p.xx, p.xy, p.xs, p.yy, p.ys, p.ss
-    q.log_weight, q.log_ratio, q.specular = p.log_weight, p.log_ratio, p.specular
+    q.log_weight, q.log_ratio = p.log_weight, p.log_ratio
+    q.specular, q.turned_away, q.late, q.wild = p.specular, p.turned_away, p.late, p.wild
 
 
 @kernel
@@ -230,7 +242,8 @@ def keep_marked(of: HypothesesRecord, scratch: Records[ParticleScratch]) -> None
         found[h].log_evidence = found[h].x = found[h].y = found[h].heading = 0.0
         for i in range(HEADINGS):
             p = found[h].particles[i]
-            p.heading = p.x = p.y = p.scale = p.log_weight = p.log_ratio = p.specular = 0.0
+            p.heading = p.x = p.y = p.scale = p.log_weight = p.log_ratio = 0.0
+            p.specular = p.turned_away = p.late = p.wild = 0.0
             p.xx = p.xy = p.xs = p.yy = p.ys = p.ss = 0.0
     of[0].count = count
 
@@ -300,17 +313,20 @@ def conclude(of: HypothesesRecord, least_log: float, most: int, scratch: Records
     """
     h, best = summarise(of, scratch), of[0].best
     normalise(of, h, scratch)
-    best.log_ratio = best.specular = 0.0
+    best.log_ratio = best.specular = best.turned_away = best.late = best.wild = 0.0
     for i in range(HEADINGS):
         p, weight = of[0].hypotheses[h].particles[i], scratch[0].weights[i]
         best.log_ratio += weight * p.log_ratio
         best.specular += weight * p.specular
+        best.turned_away += weight * p.turned_away
+        best.late += weight * p.late
+        best.wild += weight * p.wild
     prune(of, least_log, most, scratch)
     resample(of, scratch)
     h, total = summarise(of, scratch), 0.0
     middle = of[0].hypotheses[h]
     for k in range(of[0].count):
-        total += math.exp(of[0].hypotheses[k].log_evidence - middle.log_evidence)
+        total += math.exp(SHARE_TEMPER * (of[0].hypotheses[k].log_evidence - middle.log_evidence))
     normalise(of, h, scratch)
     best.share, best.x, best.y, best.heading = 1.0 / total, middle.x, middle.y, middle.heading
     best.xx = best.xy = best.xh = best.yy = best.yh = best.hh = 0.0

@@ -9,8 +9,10 @@ import numpy as np
 
 from drivers.messages import Pose, wrap_angle
 from perception.kernel import Floats
+from perception.localization.background import Background
 from perception.localization.keyframes import KEYFRAMES_MAX, Keyframes
-from perception.localization.particle_update import update_particles
+from perception.localization.mixed_reflection import LearnedShares
+from perception.localization.particle_update import TEMPER, update_particles
 from perception.localization.pose_particles import (
     HEADINGS,
     Best,
@@ -20,7 +22,6 @@ from perception.localization.pose_particles import (
     conclude,
     move,
 )
-from perception.localization.range_likelihood import RangeModel, log_ratio_of_true_pose
 from perception.localization.surroundings import Surroundings
 from perception.records import records, zeros
 
@@ -28,19 +29,22 @@ PARTICLES_PER_QUANTUM: Final = 7
 QUANTA: Final = math.ceil(HEADINGS / PARTICLES_PER_QUANTUM)
 """Of one hypothesis and one keyframe."""
 KEPT_MAX: Final = 40
+"""Most hypotheses that are kept."""
 LEAST_LOG: Final = 12.0
-"""Hypotheses less likely than the best by more than this are dropped, nat, and those beyond so many."""
-RECENT_M: Final = 3.0
-RECENT_MIN: Final = 3
-RECENT_MAX: Final = 64
-"""Way over which the fit is kept, with at least and at most so many keyframes."""
-RECENT_READINGS: Final = 20
-"""It is judged by at least so many readings."""
-EXCESS_MAX: Final = 50.0
-"""Greatest log odds that a place explains the readings, nat."""
+SEARCH_LEAST_LOG: Final = 30.0
+"""Hypotheses less likely than the best by more than this are dropped, nat: while they are tracked, and while those of
+a search enter its keyframes, over the first of which a wrong place may fit far better than the right one."""
+EVIDENCE_MIN: Final = 20.0
+EVIDENCE_MAX: Final = 7.0
+"""Most evidence against and for a place that is remembered, nat: what is heard later must not drown in a long way."""
+WILD_RIGHT: Final = 0.15
+WILD_ALIKE: Final = 0.4
+"""Shares of the echoes that no surface of the map explains: at the right place, and at the best one in a map of
+another room that is alike. In furnished rooms they are .03 and .38 to .67; what a real room has beyond its map adds.
+"""
+INDEPENDENT_M: Final = 0.5
+"""Readings on a way as short as this have errors in common, those of the map and of what it lacks."""
 NOISES: Final = 512
-WAY, LOG_RATIO, OF_TRUE_POSE, READINGS = range(4)
-"""Columns of the recent fit: way until the keyframe (m), log ratios (nat), number of readings."""
 
 
 def heading_noise(seed: int) -> Floats:
@@ -56,8 +60,8 @@ class PoseTrack:
     ----------
     surroundings : Surroundings
         Of the room.
-    model : RangeModel
-        Errors of a range.
+    background : Background
+        How likely the readings are without a place.
     noise : (NOISES, HEADINGS) float
         From `heading_noise`.
 
@@ -65,13 +69,19 @@ class PoseTrack:
     ----------
     entered : int
         Number of the next keyframe to enter.
+    evidence : float
+        Log odds that the best place is the robot's, compared with no place at all, nat.
+    likeness : float
+        Log odds that the place is the right one, compared with a place in another room that is alike, nat.
+    peak_at : int
+        Number of the keyframe at which they were greatest, the latest such one: what speaks against it began there.
     """
 
-    SCRATCH: Final = ("_model", "_noise", "_hypotheses", "_scratch")
+    SCRATCH: Final = ("_background", "_noise", "_hypotheses", "_scratch")
     """What is given, a view of other memory, and what is overwritten before each use."""
 
-    def __init__(self, surroundings: Surroundings, model: RangeModel, noise: Floats) -> None:
-        self._surroundings, self._model, self._noise = surroundings, model, noise
+    def __init__(self, surroundings: Surroundings, background: Background, noise: Floats) -> None:
+        self._surroundings, self._background, self._noise = surroundings, background, noise
         self._memory = zeros(Hypotheses, 1)
         self._hypotheses = records(Hypotheses, self._memory)
         self._scratch = records(ParticleScratch, zeros(ParticleScratch, 1))
@@ -80,17 +90,23 @@ class PoseTrack:
         """Quanta done for that keyframe."""
         self._at = np.zeros(3)
         """Odometry at the last keyframe that was entered."""
-        self._recent = np.zeros((RECENT_MAX, 4))
-        self._recent_count = 0
+        self.evidence = self.likeness = self._peak = 0.0
+        self.peak_at = 0
+        self._is_weighed = False
+        self._gains = np.zeros(KEYFRAMES_MAX)
+        """What each keyframe added to the evidence, nat, under its number modulo `KEYFRAMES_MAX`."""
 
     def clear(self) -> None:
         """Forget all hypotheses."""
         self._memory.view(np.uint8)[...] = 0
-        self._step = self._recent_count = 0
+        self._step = self.peak_at = 0
+        self._is_weighed = False
+        self.evidence = self.likeness = self._peak = 0.0
 
     def start(
-        self, poses: Floats, place_sigma_m: float, heading_half_rad: float, odometry: Pose, entered: int
-    ) -> None:
+        self, poses: Floats, place_sigma_m: float, heading_half_rad: float, odometry: Pose, entered: int,
+        evidence: float,
+    ) -> None:  # fmt: skip
         """Start anew with hypotheses of the pose.
 
         Parameters
@@ -103,8 +119,13 @@ class PoseTrack:
             The ring's pose by odometry there.
         entered : int
             Number of the next keyframe to enter.
+        evidence : float
+            Log odds that one of them is the robot's, nat.
         """
         self.clear()
+        self.evidence = self._peak = evidence
+        self.peak_at = entered
+        self._gains[:] = 0.0
         for x, y, heading in poses.tolist():
             add_hypothesis(self._hypotheses, x, y, heading, place_sigma_m, heading_half_rad)
         self.entered = entered
@@ -126,20 +147,17 @@ class PoseTrack:
         """The most likely hypothesis."""
         return self._hypotheses[0].best
 
-    @property
-    def readings(self) -> int:
-        """Readings of the recent keyframes."""
-        return int(self._recent[: self._recent_count, READINGS].sum())
-
-    def enter(self, keyframes: Keyframes, specular_share: float) -> int:
+    def enter(self, keyframes: Keyframes, shares: LearnedShares, least_log: float = LEAST_LOG) -> int:
         """Do a quantum of entering the next keyframe; return its readings if it is done, otherwise 0.
 
         Parameters
         ----------
         keyframes : Keyframes
             All.
-        specular_share : float
-            Probability that a reading is from the specular model.
+        shares : LearnedShares
+            How often a reading has which cause.
+        least_log : float
+            Hypotheses less likely than the best by more than this are dropped, nat.
         """
         if self._step == 0:
             self.entered = max(self.entered, keyframes.count - KEYFRAMES_MAX)
@@ -151,40 +169,30 @@ class PoseTrack:
             begin = part * PARTICLES_PER_QUANTUM
             update_particles(
                 self._surroundings, self._hypotheses, h, begin, min(HEADINGS, begin + PARTICLES_PER_QUANTUM),
-                keyframes.readings[row], count, specular_share,
+                keyframes.readings[row], count, shares.records,
             )  # fmt: skip
             self._step += 1
             if self._step < QUANTA * len(self):
                 return 0
-            conclude(self._hypotheses, LEAST_LOG, KEPT_MAX, self._scratch)
-            self._remember(keyframes.way_of(self.entered), keyframes.readings[row, :count, -1])
+            conclude(self._hypotheses, least_log, KEPT_MAX, self._scratch)
+            self._weigh(keyframes.way_of(self.entered), keyframes.readings[row, :count, -1], shares)
         self._step = 0
         self.entered += 1
         return count
 
     @property
-    def way_m(self) -> float:
-        """Way of the recent keyframes, m."""
-        return float(self._recent[: self._recent_count, WAY].sum())
+    def fits(self) -> float:
+        """Probability that the best place is the right one, and not one in another room that is alike."""
+        return 1.0 / (1.0 + math.exp(-self.likeness))
 
-    def explains(self, way_m: float, least_share: float) -> float:
-        """Return the probability that the best place explains the readings of the last way as a true one would.
+    def gained_since(self, number: int) -> float:
+        """Return what the keyframes from a number on have added to the evidence, nat."""
+        return float(self._gains[np.arange(number, self.entered) % KEYFRAMES_MAX].sum())
 
-        Parameters
-        ----------
-        way_m : float
-            The way, m.
-        least_share : float
-            Share of a true pose's log likelihood ratio that the readings must have.
-        """
-        excess, way, readings = 0.0, 0.0, 0.0
-        for step, log_ratio, of_true_pose, count in reversed(self._recent[: self._recent_count].tolist()):
-            excess += log_ratio - least_share * of_true_pose
-            way += step
-            readings += count
-            if way >= way_m and readings >= RECENT_READINGS:
-                break
-        return 1.0 / (1.0 + math.exp(-max(-EXCESS_MAX, min(EXCESS_MAX, excess)))) if readings else 0.0
+    @property
+    def explains(self) -> float:
+        """Probability that the best place explains the readings better than none would."""
+        return 1.0 / (1.0 + math.exp(-self.evidence))
 
     def pose(self, odometry: Pose) -> Pose:
         """Return the pose of the ring where odometry has it here; there must be a hypothesis."""
@@ -209,14 +217,17 @@ class PoseTrack:
         move(self._hypotheses, step.x, step.y, wrap_angle(step.theta), noise)
         self._at[:] = there.x, there.y, there.theta
 
-    def _remember(self, way: float, ranges_m: Floats) -> None:
-        """Add a keyframe to the recent fit, and drop those that are too long ago."""
-        of_true_pose, _ = log_ratio_of_true_pose(self._model, ranges_m)
-        rows, count = self._recent, self._recent_count
-        driven = float(rows[:count, WAY].sum()) + way
-        first = 1 if count == RECENT_MAX else 0
-        while first < count + 1 - RECENT_MIN and driven - float(rows[:first, WAY].sum()) > RECENT_M:
-            first += 1
-        rows[: count - first] = rows[first:count].copy()
-        rows[count - first] = way, self.best.log_ratio, of_true_pose, len(ranges_m)
-        self._recent_count = count - first + 1
+    def _weigh(self, way_m: float, ranges_m: Floats, shares: LearnedShares) -> None:
+        """Add what a keyframe says for or against the best place, compared with no place (Page's cumulative sum)."""
+        share = min(1.0, way_m / INDEPENDENT_M) if self._is_weighed else 1.0
+        weight, heard = TEMPER * share, float(np.isfinite(ranges_m).sum())
+        wild = min(heard, self.best.wild)
+        known = heard - wild
+        alike = wild * math.log(WILD_RIGHT / WILD_ALIKE) + known * math.log((1 - WILD_RIGHT) / (1 - WILD_ALIKE))
+        self.likeness = max(-EVIDENCE_MAX, min(EVIDENCE_MAX, self.likeness + share * alike))
+        gain = self.best.log_ratio - self._background.log_ratio(ranges_m, shares)
+        self._gains[self.entered % KEYFRAMES_MAX] = weight * gain
+        self.evidence = max(-EVIDENCE_MIN, min(EVIDENCE_MAX, self.evidence + weight * gain))
+        self._is_weighed = True
+        if self.evidence >= self._peak:
+            self._peak, self.peak_at = self.evidence, self.entered

@@ -15,6 +15,7 @@ from perception.kernel import Floats, Ints, kernel
 from perception.localization.expected_ranges import EDGE_REACH_M, SIGHT_SLACK_M
 from perception.localization.range_likelihood import RangeModel
 from perception.localization.room import Room
+from perception.localization.surface_index import CIRCLES, CORNERS, WALLS, Bins, listed, make_index
 from perception.records import Record, Records, records, zeros
 
 NEAR_MAX: Final = 256
@@ -81,11 +82,14 @@ class SensorModel(Record):
 
 
 class Surroundings(NamedTuple):
-    """What kernels take: the room, what is near a place in it, and the sensor's model."""
+    """What kernels take: the room, its index, what is near a place in it, and the sensor's model."""
 
     walls: Records[Wall]
     corners: Records[Corner]
     circles: Records[Circle]
+    bins: Records[Bins]
+    starts: Ints
+    items: Ints
     near: Records[Near]
     sensor: Records[SensorModel]
 
@@ -113,9 +117,10 @@ def make_surroundings(room: Room, model: RangeModel, half_angle: float) -> Surro
         half_angle, math.cos(half_angle), math.tan(half_angle), model.window_m,
         model.resolution_m**2 / 12.0 + model.noise_m**2, model.noise_relative, model.dropout, model.outliers,
     )  # fmt: skip
+    bins, starts, items = make_index(room, model.window_m)
     return Surroundings(
-        records(Wall, walls), records(Corner, corners), records(Circle, circles), records(Near, zeros(Near, 1)),
-        records(SensorModel, sensor),
+        records(Wall, walls), records(Corner, corners), records(Circle, circles), records(Bins, bins), starts, items,
+        records(Near, zeros(Near, 1)), records(SensorModel, sensor),
     )  # fmt: skip
 
 
@@ -162,7 +167,9 @@ def look_around(s: Surroundings, x: float, y: float, within_m: float) -> None:
     near, reach = s.near[0], within_m + s.sensor[0].window_m
     near.x, near.y = x, y
     count = 0
-    for i in range(len(s.walls)):
+    begin, end = listed(s.bins, s.starts, WALLS, x, y, within_m)
+    for k in range(end - begin if begin >= 0 else len(s.walls)):
+        i = s.items[begin + k] if begin >= 0 else k
         wall = s.walls[i]
         vx, vy = wall.x2 - wall.x1, wall.y2 - wall.y1
         share = ((x - wall.x1) * vx + (y - wall.y1) * vy) / (vx * vx + vy * vy)
@@ -172,14 +179,18 @@ def look_around(s: Surroundings, x: float, y: float, within_m: float) -> None:
             count = insert_nearest(near.walls, near.wall_m, count, i, away)
     near.wall_count = count
     count = 0
-    for i in range(len(s.corners)):
+    begin, end = listed(s.bins, s.starts, CORNERS, x, y, within_m)
+    for k in range(end - begin if begin >= 0 else len(s.corners)):
+        i = s.items[begin + k] if begin >= 0 else k
         corner = s.corners[i]
         away = math.hypot(corner.x - x, corner.y - y)
         if away <= (reach if corner.opening < math.pi else within_m + EDGE_REACH_M):
             count = insert_nearest(near.corners, near.corner_m, count, i, away)
     near.corner_count = count
     count = 0
-    for i in range(len(s.circles)):
+    begin, end = listed(s.bins, s.starts, CIRCLES, x, y, within_m)
+    for k in range(end - begin if begin >= 0 else len(s.circles)):
+        i = s.items[begin + k] if begin >= 0 else k
         circle = s.circles[i]
         away = math.hypot(circle.x - x, circle.y - y) - circle.radius
         if away <= reach:

@@ -8,7 +8,7 @@ legs.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal, TypeAlias
 
 from behaviors.arbiter import Decision, Drive, arbitrate, limit_velocity
@@ -23,7 +23,7 @@ from behaviors.response import Response
 from behaviors.teleoperation import SCHEMA as TELEOPERATION
 from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, is_expired, teleoperation
 from config.settings import Settings
-from drivers.messages import Twist
+from drivers.messages import Pose, Twist
 from perception.percept import Percept
 
 STANDSTILL: Final = Twist(0.0, 0.0)
@@ -33,6 +33,12 @@ SUM: Final = "sum"
 """Name of the sum of all responses, in place of a schema's name."""
 
 NO_CONTROL: Final = "no velocity arrives from an operator: teleoperate, set a goal, or resume the legs"
+NO_PLACE: Final = (
+    "the goal is a place in the map, and the robot does not know its own there: wait until it does, say where it is, "
+    "or set a goal in odometry's frame"
+)
+GOAL_SLEW_M_S: Final = 0.2
+"""So fast may a goal in the map move in odometry's frame, where the robot drives, when its place is corrected."""
 LEG_DONE: Final = "the leg is done"
 
 
@@ -44,6 +50,12 @@ class Legs:
 
 
 DriveRequest: TypeAlias = Legs | Goal | Teleoperate
+
+
+def first_request(settings: Settings) -> DriveRequest:
+    """Return what is driven at the start of a run: to the configured goal, otherwise the legs."""
+    goal = settings.goal
+    return Legs() if goal is None else Goal(goal.x_m, goal.y_m, frame=goal.frame)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,15 +72,54 @@ class DriveResult:
     """Why the robot does not move although it may drive, for the operator."""
 
 
+@dataclass(frozen=True, slots=True)
+class GoalPlace:
+    """Where a goal lies in odometry's frame, m, as the robot drives to it; and whether it truly lies there."""
+
+    x: float
+    y: float
+    is_exact: bool = True
+
+
+def goal_place(goal: Goal, before: GoalPlace | None, map_frame: Pose | None, step_s: float) -> GoalPlace | None:
+    """Return where a goal lies in odometry's frame; a corrected map moves it smoothly, so that the drive never jumps.
+
+    Parameters
+    ----------
+    goal : Goal
+        In either frame.
+    before : GoalPlace or None
+        In the cycle before; None if the goal is new, or its place was not known.
+    map_frame : Pose or None
+        The map frame in odometry's; None while the robot's place in the map is not known.
+    step_s : float
+        Time since the cycle before, s.
+
+    Returns
+    -------
+    GoalPlace or None
+        None while the place is not known.
+    """
+    if goal.frame == "odom":
+        return GoalPlace(goal.x, goal.y)
+    if map_frame is None:
+        return None
+    there = map_frame.compose(Pose(goal.x, goal.y, 0.0))
+    if before is None:
+        return GoalPlace(there.x, there.y)
+    dx, dy = there.x - before.x, there.y - before.y
+    away, most = math.hypot(dx, dy), GOAL_SLEW_M_S * step_s
+    if away <= most:
+        return GoalPlace(there.x, there.y)
+    return GoalPlace(before.x + dx * most / away, before.y + dy * most / away, is_exact=False)
+
+
 def validate(drive_request: DriveRequest) -> str | None:
     """Return why a drive request is invalid, None if it is valid."""
     match drive_request:
         case Goal(x, y):
             if not (abs(x) <= COORDINATE_MAX_M and abs(y) <= COORDINATE_MAX_M):
-                return (
-                    f"invalid goal ({x:g}, {y:g}): expected metres in the odometry's frame, "
-                    f"at most {COORDINATE_MAX_M:g} along each axis"
-                )
+                return f"invalid goal ({x:g}, {y:g}): expected metres, at most {COORDINATE_MAX_M:g} along each axis"
         case Teleoperate(v, w, valid_s):
             if not (math.isfinite(v) and math.isfinite(w) and valid_s >= 0.0):
                 return (
@@ -84,8 +135,9 @@ def after_stop(drive_request: DriveRequest) -> DriveRequest:
 
 
 def drive(
-    drive_request: DriveRequest, requested_run_s: float, run_s: float, leg: Leg, percept: Percept, settings: Settings
-) -> DriveResult:
+    drive_request: DriveRequest, requested_run_s: float, run_s: float, leg: Leg, percept: Percept, settings: Settings,
+    place: GoalPlace | None = None,
+) -> DriveResult:  # fmt: skip
     """Return the arbiter's decision on the responses of the schemas that the request asks for.
 
     Parameters
@@ -100,6 +152,8 @@ def drive(
         What the robot sees.
     settings : Settings
         The run's.
+    place : GoalPlace, optional
+        Where a goal lies, from `goal_place`.
     """
     behaviors, body = settings.behaviors, settings.body
     away = avoid_static_obstacle(percept, body.radius_m, behaviors.avoid_static_obstacle)
@@ -122,7 +176,12 @@ def drive(
             hold_reason = None if unseen is None else unseen.reason
         return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason)
     if isinstance(drive_request, Goal):
-        to_goal, drive_request = move_to_goal(percept, drive_request, behaviors.move_to_goal)
+        if place is None and not drive_request.reached:
+            return DriveResult(Drive(STANDSTILL), (), drive_request, leg, NO_PLACE)
+        there = drive_request if place is None else replace(drive_request, x=place.x, y=place.y)
+        to_goal, there = move_to_goal(percept, there, behaviors.move_to_goal)
+        is_reached = there.reached and (place is None or place.is_exact)
+        drive_request = replace(drive_request, reached=drive_request.reached or is_reached)
         responses = (to_goal, away)
         decision = arbitrate(responses, percept, body, behaviors.arbiter, (TO_GOAL, AVOID))
         if drive_request.reached and isinstance(decision, Drive):

@@ -21,6 +21,7 @@ from drivers.messages import Firing, Floats
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import Evidence, MapEdit, Segments
 from perception.pipeline import Perception
+from runtime.cycle.drive_requests import first_request
 from runtime.cycle.inputs import Inputs
 from runtime.cycle.step import Command, CycleRecord, State, step
 
@@ -101,12 +102,17 @@ class NoMethod:
 
 def prepared_state(settings: Settings) -> State:
     """Return the state of a process that begins to recognise: an empty map."""
-    return State(Perception(settings.ring, settings.models, settings.perception))
+    return State(
+        Perception(settings.ring, settings.models, settings.perception), drive_request=first_request(settings)
+    )
 
 
 def unprepared_state(settings: Settings) -> State:
     """Return the state of a process whose recognition is not ready."""
-    return State(Perception(settings.ring, settings.models, settings.perception, NoMethod()))
+    return State(
+        Perception(settings.ring, settings.models, settings.perception, NoMethod()),
+        drive_request=first_request(settings),
+    )
 
 
 def unprepared_step(

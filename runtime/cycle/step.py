@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Literal, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 from behaviors.arbiter import Drive, Stop, Unseen
 from behaviors.move_ahead import Leg
+from behaviors.move_to_goal import Goal
 from behaviors.response import Response
 from config.settings import Settings
 from drivers.driver import LineState, RobotDriver
@@ -21,7 +22,16 @@ from drivers.messages import Flags, Odometry, Twist
 from perception.edits import Edit
 from perception.percept import Percept
 from perception.pipeline import Perception
-from runtime.cycle.drive_requests import STANDSTILL, DriveRequest, Legs, after_stop, drive, validate
+from runtime.cycle.drive_requests import (
+    STANDSTILL,
+    DriveRequest,
+    GoalPlace,
+    Legs,
+    after_stop,
+    drive,
+    goal_place,
+    validate,
+)
 from runtime.cycle.inputs import Inputs
 from runtime.cycle.modes import Mode, ModeState, advance
 from runtime.cycle.motion_monitor import MotionMonitor, Movement
@@ -58,6 +68,12 @@ StopCause: TypeAlias = Literal["budget", "quota", "converged", "nothing"]
 """Why refinement ended: no time left, no quanta left for these firings, all improved, nothing there to improve."""
 
 
+NO_MAP: Final = (
+    "there is no map frame for this goal: run with --map FILE or with correction of drift, "
+    "or give it in odometry's frame"
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Refused:
     """A request of the operator that the cycle could not fulfil, and why."""
@@ -84,6 +100,8 @@ class State:
     """What is driven in DRIVE."""
     requested_run_s: float = 0.0
     """When the operator requested that, by the run's clock."""
+    goal_place: GoalPlace | None = None
+    """Where the goal lies in odometry's frame; None without a goal, or while its place is not known."""
     vectors: tuple[Response, ...] = ()
     """The schemas' responses in the last cycle, and their sum; empty if no schema was called."""
     hold_reason: str | None = None
@@ -207,11 +225,18 @@ def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
 
 def _accept_drive_request(state: State, inputs: Inputs) -> None:
     """Take over the operator's drive request where it is valid; legs that were done begin again."""
-    if inputs.drive_request is None or validate(inputs.drive_request) is not None:
+    if inputs.drive_request is None or _refusal(state, inputs.drive_request) is not None:
         return
-    state.drive_request, state.requested_run_s = inputs.drive_request, inputs.run_s
+    state.drive_request, state.requested_run_s, state.goal_place = inputs.drive_request, inputs.run_s, None
     if isinstance(inputs.drive_request, Legs) and state.leg is not None and state.leg.done:
         state.leg = None
+
+
+def _refusal(state: State, drive_request: DriveRequest) -> str | None:
+    """Return why a drive request cannot be carried out, None if it can."""
+    if isinstance(drive_request, Goal) and drive_request.frame == "map" and state.perception.localized() is None:
+        return NO_MAP
+    return validate(drive_request)
 
 
 def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
@@ -220,6 +245,9 @@ def _command(state: State, inputs: Inputs, settings: Settings) -> Command:
     before = state.mode
     gap_s = 0.0 if state.run_s is None else inputs.run_s - state.run_s
     state.run_s = inputs.run_s
+    goal = state.drive_request if isinstance(state.drive_request, Goal) else None
+    map_frame = state.perception.known_map_frame() if goal is not None and goal.frame == "map" else None
+    state.goal_place = None if goal is None else goal_place(goal, state.goal_place, map_frame, max(0.0, gap_s))
     movement = state.motion_monitor.movement
     state.mode = advance(before, inputs, flags, gap_s, movement)
     if state.mode.mode is Mode.DRIVE:
@@ -254,7 +282,9 @@ def _drive(state: State, inputs: Inputs, settings: Settings) -> Drive | Stop:
     if state.leg is None:
         state.leg = Leg.starting_at(odometry.pose)
     percept = Percept(odometry.pose, state.perception.obstacles(odometry.robot_s, age_max_s), view)
-    result = drive(state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings)
+    result = drive(
+        state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings, state.goal_place
+    )
     state.drive_request, state.leg = result.drive_request, result.leg
     state.vectors, state.hold_reason = result.vectors, result.hold_reason
     if isinstance(result.decision, Unseen):
@@ -268,7 +298,7 @@ def _drive(state: State, inputs: Inputs, settings: Settings) -> Drive | Stop:
 
 def _edit(state: State, inputs: Inputs) -> tuple[Refused, ...]:
     """Apply the operator's edits of the map; return what was refused, the drive request included."""
-    problem = None if inputs.drive_request is None else validate(inputs.drive_request)
+    problem = None if inputs.drive_request is None else _refusal(state, inputs.drive_request)
     refused = [] if problem is None else [Refused(None, problem)]
     for i, edit in enumerate(inputs.edits):
         problem = state.perception.edit(edit)

@@ -152,6 +152,9 @@ def check_state(state: Mapping[str, Any]) -> None:
     if state["leg"] is not None:
         _bounded("state.leg.origin_x", state["leg"].origin_x, PLACE_MAX_M)
         _bounded("state.leg.origin_y", state["leg"].origin_y, PLACE_MAX_M)
+    if state["goal_place"] is not None:
+        _bounded("state.goal_place.x", state["goal_place"].x, PLACE_MAX_M)
+        _bounded("state.goal_place.y", state["goal_place"].y, PLACE_MAX_M)
     if (problem := validate(state["drive_request"])) is not None:
         raise ValueError(f"state.drive_request: {problem}")
     _motion("state.motion_monitor", state["motion_monitor"])

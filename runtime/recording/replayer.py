@@ -18,6 +18,7 @@ from config.reload import differences
 from config.settings import Settings
 from perception.pipeline import Perception
 from perception.snapshot import Snapshot
+from runtime.cycle.drive_requests import first_request
 from runtime.cycle.step import CycleRecord, State, apply_settings, step
 from runtime.recording import channels
 from runtime.recording.channels import CYCLE, KEYFRAME, RUN_INFO, SETTINGS, RawMessage, decode
@@ -84,7 +85,9 @@ class ReplayStep(NamedTuple):
 
 def fresh_state(settings: Settings) -> State:
     """Return the state in which a run starts."""
-    return State(Perception(settings.ring, settings.models, settings.perception))
+    return State(
+        Perception(settings.ring, settings.models, settings.perception), drive_request=first_request(settings)
+    )
 
 
 def replay_cycle(state: State, record: CycleRecord, settings: Settings) -> CycleRecord:

@@ -34,14 +34,15 @@ from perception.bayes.scratch import POLYGON
 from perception.bayes.settings_record import CIRCLES_MAX, NOISES, POLYGONS_MAX
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED
 from perception.bayes.wall_records import IS_KNOWN, IS_TAKEN, MAX_WALLS, SPANS_MAX, WALL_BIN_M, WALL_BINS
+from perception.localization.background import HEARD_MIN
 from perception.localization.known_room import IDLE, STATUSES, WEIGHING
 from perception.localization.landmark_state import LANDMARKS_MAX
 from perception.localization.map_heading import FIRST_FIRINGS
 from perception.localization.pose_grid import NONE as NO_QUANTUM
-from perception.localization.pose_grid import READINGS_MAX, STARTS_MAX
+from perception.localization.pose_grid import READINGS_MAX
 from perception.localization.pose_particles import HYPOTHESES_MAX
+from perception.localization.pose_starts import STARTS_MAX
 from perception.localization.pose_track import QUANTA as QUANTA_OF_HYPOTHESIS
-from perception.localization.pose_track import RECENT_MAX
 from perception.paper.outline_map import PINNED
 from perception.paper.parameters import PINNED_SHARE_MAX, PLACEMENTS_MAX, READINGS_KEPT
 from perception.sensor_memory import SETS_MAX
@@ -88,7 +89,7 @@ CONSTANTS: Final = frozenset(_CONSTANTS.split())
 
 MAY_BE_INFINITE: Final = frozenset({
     "_sensors.last_m", "before_last_m", "run_m", "stuck_m", "job.best_nat", "_looked_x", "_looked_y",
-    "_keyframes._latest", "_keyframes.readings", "_grid._readings", "_echoes._times",
+    "_keyframes._latest", "_keyframes.readings", "_grid._readings", "_grid._found.least", "_echoes._times",
 })  # fmt: skip
 """Floats for which an infinity stands for no echo, for no evidence yet, or for no place or time yet."""
 
@@ -100,13 +101,14 @@ _COUNTS: Final = (
     "room.firings room.recent_count rejection_count run_firing run_length segments_made segments_numbered "
     "sensors.kept members_sum _archive.circles.count _archive.polygons.count _numbered waiting "
     "drift._arrived drift._checked _tracker.entered _tracker._windows landmarks.failures landmarks.hits "
-    "_keyframes.count _keyframes._firings entered known_room._window_begin _grid._due _grid._searches"
+    "_keyframes.count _keyframes._firings entered peak_at known_room._window_begin "
+    "known_room._search_begin _grid._due _grid._searches"
 )
 _FLAGS: Final = (
     "_sets has_rested is_named has_gained refines_next is_confirmed has_challenger is_done is_crossed "
     "_is_due is_reported _circles_pending _polygons_pending _polygons_turn _placement_was_last _expected _heard "
     "drift._has_started drift._stands_firm _tracker.is_synchro _map_heading._is_entering sensors.is_known "
-    "_has_fired _is_started _has_stood"
+    "_has_fired _is_started _has_stood _is_weighed _is_complete _is_confirmed"
 )
 
 BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
@@ -116,12 +118,14 @@ BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
         "_grid._count": Bound(0, READINGS_MAX),
         "_grid._found.count": Bound(0, STARTS_MAX),
         "_grid._quantum": Bound(NO_QUANTUM, COUNT.high),
-        "_grid._specular_share": SHARE,
+        "_grid._shares": SHARE,
         "_memory.count": Bound(0, HYPOTHESES_MAX),
-        "_recent_count": Bound(0, RECENT_MAX),
         "_step": Bound(0, QUANTA_OF_HYPOTHESIS * HYPOTHESES_MAX - 1),
         "known_room.probability": SHARE,
-        "known_room.specular_share": SHARE,
+        "known_room._background.heard_share": Bound(HEARD_MIN, 1.0 - HEARD_MIN),
+        "shares._memory.late": SHARE,
+        "shares._memory.specular": SHARE,
+        "shares._memory.wild": SHARE,
         "known_room._stage": Bound(IDLE, WEIGHING),
         "known_room._status": Bound(0, len(STATUSES) - 1),
         "_map_heading._kept": Bound(0, FIRST_FIRINGS),

@@ -22,7 +22,7 @@ from perception.detected_object import DetectedObject
 from perception.paper.cluster_view import ClusterView
 from perception.pipeline import Perception
 from runtime.console.frames.segment_delta import SegmentDelta
-from runtime.cycle.drive_requests import DriveRequest
+from runtime.cycle.drive_requests import DriveRequest, GoalPlace
 from runtime.cycle.step import CycleRecord, State
 
 NO_LINK_COUNTS: Final = LinkCounts()
@@ -175,7 +175,7 @@ class FrameEncoder:
             "clusters": self._cluster_boxes,
             "objects": [_object(detected) for detected in state.perception.labelled_objects()],
             "vectors": [[r.schema, round(r.x, 4), round(r.y, 4)] for r in state.vectors],
-            "drive_request": _drive_request(state.drive_request),
+            "drive_request": _drive_request(state.drive_request, state.goal_place),
             "phases": {name: round(1e6 * s, 1) for name, s in phases_s.items()},
             "cycle_us": round(1e6 * sum(phases_s.values()), 1),
             "late_us": round(1e6 * context.late_s, 1),
@@ -278,10 +278,11 @@ def _rounded(pose: Pose) -> list[float]:
     return [round(pose.x, 4), round(pose.y, 4), round(pose.theta, 5)]
 
 
-def _drive_request(drive_request: DriveRequest) -> dict[str, Any]:
+def _drive_request(drive_request: DriveRequest, place: GoalPlace | None) -> dict[str, Any]:
     match drive_request:
-        case Goal(x=x, y=y):
-            return {"kind": "goal", "x": x, "y": y, "reached": drive_request.reached}
+        case Goal(x=x, y=y, frame=frame):
+            at = None if place is None else [round(place.x, 4), round(place.y, 4)]
+            return {"kind": "goal", "x": x, "y": y, "frame": frame, "at": at, "reached": drive_request.reached}
         case Teleoperate(v=v, w=w):
             return {"kind": "teleoperate", "v": v, "w": w}
     return {"kind": "legs"}

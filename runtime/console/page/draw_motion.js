@@ -162,7 +162,9 @@ export function drawGoal(f) {
   const { ctx, run, theme, view } = f;
   const drive_request = run.state.drive_request;
   if (drive_request?.kind !== "goal") return;
-  const [x, y] = view.toScreen(drive_request.x, drive_request.y);
+  const at = drive_request.frame === "map" ? drive_request.at : [drive_request.x, drive_request.y];
+  if (!at) return; // a goal in the map, and the robot's place there is not known
+  const [x, y] = view.toScreen(...at);
   const [rx, ry] = view.toScreen(run.state.pose[0], run.state.pose[1]);
   f.onScreen();
   ctx.strokeStyle = ctx.fillStyle = theme.drive;

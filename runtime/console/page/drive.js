@@ -41,7 +41,7 @@ export class Drive {
   }
 
   goal(x, y) {
-    return this.connection.request({ type: "goal", x, y });
+    return this.connection.request({ type: "goal", ...inMap(this.run.state.localized, x, y) });
   }
 
   #goalByForm(event) {
@@ -126,9 +126,18 @@ export class Drive {
   }
 }
 
+// A place of the plane as a goal: in the map frame where the robot's place there is known, so that it stays in the room.
+function inMap(localized, x, y) {
+  if (localized?.status !== "tracking") return { x, y };
+  const [x0, y0, turn] = localized.frame, c = Math.cos(turn), s = Math.sin(turn);
+  return { x: c * (x - x0) + s * (y - y0), y: c * (y - y0) - s * (x - x0), frame: "map" };
+}
+
 function driveRequestText(drive_request, units) {
   if (!drive_request) return "No drive request yet.";
-  if (drive_request.kind === "goal" && drive_request.reached) return `At the goal at ${units.place(drive_request.x, drive_request.y)}.`;
-  if (drive_request.kind === "goal") return `To the goal at ${units.place(drive_request.x, drive_request.y)}.`;
+  if (drive_request.kind === "goal") {
+    const place = units.place(drive_request.x, drive_request.y) + (drive_request.frame === "map" ? " in the map" : "");
+    return `${drive_request.reached ? "At" : "To"} the goal at ${place}.`;
+  }
   return drive_request.kind === "teleoperate" ? "Teleoperation." : "Ahead, as configured.";
 }

@@ -9,6 +9,7 @@ import pytest
 
 from drivers.messages import Pose
 from perception.kernel import Floats
+from perception.localization.mixed_reflection import SHARES
 from perception.localization.particle_update import COLUMNS, inverse, update_particles
 from perception.localization.pose_particles import HEADINGS, ParticleScratch, conclude
 from perception.localization.range_likelihood import RangeModel
@@ -17,6 +18,7 @@ from perception.records import records, zeros
 from runtime.simulation.random_rooms import ACOUSTICS
 from tests.naive_known_room import naive_update
 from tests.perception.localization.rooms import CROOKED, HALF_ANGLE, RING, panorama_of, stand, world_of
+from tests.perception.localization.test_mixed_reflection import shares_of
 from tests.perception.localization.test_pose_particles import FIELDS, covariance_of, hypotheses_at, particles
 
 MODEL = RangeModel.of_ring(RING)
@@ -34,31 +36,34 @@ def test_an_update_is_the_formulas() -> None:
     found, rows = hypotheses_at((TRUTH.x + 0.1, TRUTH.y - 0.08, TRUTH.theta + 0.02)), readings()
     assert rows.shape == (24, COLUMNS)
     before = particles(found).copy()
-    update_particles(make_surroundings(ROOM, MODEL, HALF_ANGLE), found, 0, 4, 7, rows, 24, 0.4)
+    update_particles(make_surroundings(ROOM, MODEL, HALF_ANGLE), found, 0, 4, 7, rows, 24, shares_of(SHARES))
     after = particles(found)
     assert np.array_equal(after[:4], before[:4])
     assert np.array_equal(after[7:], before[7:])
     for i in (4, 6):
         mean = np.array([before[i][name] for name in FIELDS])
         heading = float(before[i]["heading"])
-        oracle = naive_update(ROOM, MODEL, HALF_ANGLE, heading, mean, covariance_of(before[i]), rows, 0.4)
+        oracle = naive_update(ROOM, MODEL, HALF_ANGLE, heading, mean, covariance_of(before[i]), rows, SHARES)
         assert [after[i][name] for name in FIELDS] == pytest.approx(oracle.mean)
         assert covariance_of(after[i]) == pytest.approx(oracle.covariance)
         assert after[i]["log_weight"] - before[i]["log_weight"] == pytest.approx(oracle.log_weight)
         assert after[i]["log_ratio"] == pytest.approx(oracle.log_ratio)
-        assert after[i]["specular"] == pytest.approx(oracle.specular)
+        causes = oracle.causes
+        assert after[i]["specular"] == pytest.approx(causes.mirror + causes.away + causes.late)
+        assert after[i]["turned_away"] == pytest.approx(causes.away + causes.late)
+        assert (after[i]["late"], after[i]["wild"]) == pytest.approx((causes.late, causes.wild))
 
 
 def test_an_update_finds_the_place_and_the_heading_and_prefers_the_right_hypothesis() -> None:
     found = hypotheses_at((TRUTH.x + 0.1, TRUTH.y - 0.08, TRUTH.theta + 0.02), (TRUTH.x, TRUTH.y + 1.0, 2.0))
     around = make_surroundings(ROOM, MODEL, HALF_ANGLE)
     for h in range(2):
-        update_particles(around, found, h, 0, HEADINGS, readings(), 24, 0.5)
+        update_particles(around, found, h, 0, HEADINGS, readings(), 24, shares_of(SHARES))
     assert particles(found, 0)["log_ratio"].max() > particles(found, 1)["log_ratio"].max() + 20.0
     conclude(found, 12.0, 40, records(ParticleScratch, zeros(ParticleScratch, 1)))
     best = found[0].best
     assert found[0].count == 1
-    assert best.specular > 0.5
+    assert best.specular > 12.0
     assert (best.x, best.y) == pytest.approx((TRUTH.x, TRUTH.y), abs=0.03)
     assert best.heading == pytest.approx(TRUTH.theta, abs=math.radians(2.0))
     assert 0.0 < math.sqrt(best.xx) < 0.02

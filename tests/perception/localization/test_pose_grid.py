@@ -10,11 +10,11 @@ import pytest
 from drivers.messages import Pose, wrap_angle
 from perception.kernel import Floats
 from perception.localization.expected_ranges import Beams, Reflection, expected_ranges
-from perception.localization.pose_grid import APART_M, CELL_M, STARTS_MAX, STEP_RAD, PoseGrid, Starts, offer
+from perception.localization.mixed_reflection import LearnedShares
+from perception.localization.pose_grid import CELL_M, STEP_RAD, PoseGrid
 from perception.localization.range_likelihood import RangeModel
 from perception.localization.room import Room, room_of
 from perception.localization.surroundings import make_surroundings
-from perception.records import array_of, records, zeros
 from perception.snapshot import put_back, snapshot_of
 from runtime.simulation.furnished_rooms import furnished_room
 from runtime.simulation.random_rooms import ACOUSTICS
@@ -56,7 +56,7 @@ def test_a_search_offers_the_pose_and_another_one_needs_no_table() -> None:
     grid, readings = crooked()
     quanta = []
     for _ in range(2):
-        grid.begin(readings, 0.5)
+        grid.begin(readings, LearnedShares().records[0])
         quanta.append(0)
         while grid.is_searching:
             grid.refine()
@@ -72,7 +72,7 @@ def test_a_search_offers_the_pose_and_another_one_needs_no_table() -> None:
 @pytest.mark.parametrize("quanta", [10, 200])
 def test_a_search_goes_on_from_a_snapshot_with_the_same_result(quanta: int) -> None:
     grid, readings = crooked()
-    grid.begin(readings, 0.4)
+    grid.begin(readings, LearnedShares().records[0])
     for _ in range(quanta):
         grid.refine()
     other = crooked()[0]
@@ -86,18 +86,6 @@ def test_a_search_goes_on_from_a_snapshot_with_the_same_result(quanta: int) -> N
 
 def test_a_cancelled_search_is_over() -> None:
     grid, readings = crooked()
-    grid.begin(readings, 0.5)
+    grid.begin(readings, LearnedShares().records[0])
     grid.cancel()
     assert not grid.is_searching
-
-
-def test_of_starts_side_by_side_the_best_is_kept_and_of_too_many_the_best() -> None:
-    found = records(Starts, zeros(Starts, 1))
-    scores = np.random.default_rng(0).permutation(STARTS_MAX + 50).astype(np.float64)
-    for k, score in enumerate(scores.tolist()):
-        offer(found, 1.0 * k, 0.0, 0.0, score)
-        offer(found, 1.0 * k + 0.9 * APART_M, 0.0, 2.0 * math.pi - 0.01, score - 0.5)
-        offer(found, 1.0 * k + 0.9 * APART_M, 0.0, 0.01, score + 0.5)
-    kept = array_of(found)["starts"][0]
-    assert found[0].count == STARTS_MAX
-    assert np.sort(kept["score"]) == pytest.approx(np.arange(50, STARTS_MAX + 50) + 0.5)

@@ -1,4 +1,4 @@
-"""A track of hypotheses: quanta, the recent fit, and the pose between keyframes."""
+"""A track of hypotheses: quanta, the evidence for a place, and the pose between keyframes."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from drivers.messages import Firing, Pose
+from perception.localization.background import Background
 from perception.localization.keyframes import KEYFRAMES_MAX, Keyframes
-from perception.localization.pose_track import RECENT_MAX, PoseTrack, heading_noise
+from perception.localization.mixed_reflection import LearnedShares
+from perception.localization.pose_track import EVIDENCE_MAX, EVIDENCE_MIN, QUANTA, PoseTrack, heading_noise
 from perception.localization.range_likelihood import RangeModel
 from perception.localization.surroundings import make_surroundings
 from runtime.simulation.random_rooms import ACOUSTICS
@@ -32,9 +34,10 @@ def keyframes_of(count: int, turn: float = 0.12) -> Keyframes:
 
 def track_at(*poses: Pose, keyframes: Keyframes) -> PoseTrack:
     """A track with hypotheses at these poses."""
-    track = PoseTrack(make_surroundings(ROOM, MODEL, HALF_ANGLE), MODEL, heading_noise(0))
+    around = make_surroundings(ROOM, MODEL, HALF_ANGLE)
+    track = PoseTrack(around, Background(ROOM, around, 0.2), heading_noise(0))
     starts = np.array([(pose.x, pose.y, pose.theta) for pose in poses])
-    track.start(starts, 0.1, math.radians(3.0), keyframes.pose(0), 0)
+    track.start(starts, 0.1, math.radians(3.0), keyframes.pose(0), 0, 0.0)
     return track
 
 
@@ -43,13 +46,12 @@ def test_a_keyframe_takes_quanta_for_each_hypothesis_and_the_right_one_is_left()
     track = track_at(Pose(TRUTH.x, TRUTH.y + 1.0, 2.0), TRUTH, keyframes=keyframes)
     done = []
     while track.is_behind(keyframes):
-        done.append(track.enter(keyframes, 0.5))
-    assert done == [0, 0, 0, 24]
+        done.append(track.enter(keyframes, LearnedShares()))
+    assert done == [0] * (2 * QUANTA - 1) + [24]
     assert len(track) == 1
-    assert track.readings == 24
-    assert track.way_m == 0.0
-    assert track.explains(1.0, 0.35) > track.explains(1.0, 3.0)
-    assert track.explains(1.0, 0.35) > 0.9
+    assert track.explains > 0.9
+    assert track.evidence == pytest.approx(EVIDENCE_MAX)
+    assert track.peak_at == 0
     pose = track.pose(Pose(0.1, 0.0, 0.12))  # odometry's frame is the ring's at the keyframe, but for the turn
     here = (
         Pose(track.best.x, track.best.y, track.best.heading).compose(Pose(0.0, 0.0, -0.12)).compose(Pose(0.1, 0, 0))
@@ -61,17 +63,23 @@ def test_a_keyframe_takes_quanta_for_each_hypothesis_and_the_right_one_is_left()
     assert not track.is_behind(keyframes)
 
 
-def test_a_place_that_does_not_explain_the_readings_says_so_and_memory_is_bounded() -> None:
-    keyframes = keyframes_of(RECENT_MAX + 10)
-    track = track_at(TRUTH, keyframes=keyframes)  # the true robot would not turn while its readings stay
+def test_what_speaks_against_a_place_adds_up_from_when_it_began() -> None:
+    keyframes = keyframes_of(1)
+    for k in range(1, 30):  # the true robot's readings would not stay while it drives
+        keyframes.observe(Firing(1.0 + k, Pose(0.12 * k, 0.0, 0.0), 0.12, STAND.ranges_m))
+    track, evidence = track_at(TRUTH, keyframes=keyframes), []
     while track.is_behind(keyframes):
-        track.enter(keyframes, 0.5)
-    assert track.explains(1.0, 0.35) < 0.1
-    assert track.readings == 24 * RECENT_MAX
+        if track.enter(keyframes, LearnedShares()):
+            evidence.append(track.evidence)
+    assert max(evidence) == pytest.approx(EVIDENCE_MAX)
+    assert track.peak_at == max(k for k, value in enumerate(evidence) if value == max(evidence))
+    assert evidence[-1] < 0.0
+    assert track.explains < 0.1
+    assert min(evidence) >= -EVIDENCE_MIN
 
 
 def test_what_was_not_entered_in_time_is_passed_over() -> None:
     keyframes = keyframes_of(KEYFRAMES_MAX + 5)
     track = track_at(TRUTH, keyframes=keyframes)
-    track.enter(keyframes, 0.5)
+    track.enter(keyframes, LearnedShares())
     assert track.entered == 5

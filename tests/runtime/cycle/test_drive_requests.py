@@ -15,10 +15,18 @@ from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate
 from config.load import load_settings
 from drivers.driver import LineState
 from drivers.messages import Flags, Pose, Twist
-from runtime.cycle.drive_requests import Legs
+from perception.pipeline import Perception
+from runtime.cycle.drive_requests import (
+    GOAL_SLEW_M_S,
+    NO_PLACE,
+    GoalPlace,
+    Legs,
+    first_request,
+    goal_place,
+)
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
-from runtime.cycle.step import STANDSTILL, CycleRecord, DriveRequest, Order
+from runtime.cycle.step import NO_MAP, STANDSTILL, CycleRecord, DriveRequest, Order
 from tests.runtime.scripted_step import PERIOD_S, ScriptedRobot
 
 FORWARD = Teleoperate(0.2, 0.1)
@@ -262,3 +270,59 @@ def test_vectors_of_a_stop_are_not_shown(drive_request: DriveRequest) -> None:
     record = script.request_drive(drive_request, firing=False)
     assert (record.mode.mode, record.command) == (Mode.SAFE_STOP, Order.HALT)
     assert script.state.vectors == ()
+
+
+def test_a_goal_in_the_map_moves_smoothly_with_it() -> None:
+    goal, frame = Goal(2.0, 1.0, frame="map"), Pose(0.5, 0.0, math.pi / 2)
+    assert goal_place(Goal(2.0, 1.0), None, None, PERIOD_S) == GoalPlace(2.0, 1.0)
+    assert goal_place(goal, None, None, PERIOD_S) is None
+    place = goal_place(goal, None, frame, PERIOD_S)
+    assert place == GoalPlace(pytest.approx(-0.5), pytest.approx(2.0))  # type: ignore[arg-type]
+    corrected, steps = Pose(0.8, 0.4, math.pi / 2), 0
+    while place is not None and (not place.is_exact or steps == 0):
+        before, place = place, goal_place(goal, place, corrected, PERIOD_S)
+        assert place is not None
+        assert math.hypot(place.x - before.x, place.y - before.y) <= GOAL_SLEW_M_S * PERIOD_S + 1e-12
+        steps += 1
+    assert place == GoalPlace(pytest.approx(-0.2), pytest.approx(2.4))  # type: ignore[arg-type]
+    assert steps == math.ceil(0.5 / (GOAL_SLEW_M_S * PERIOD_S))
+    assert goal_place(goal, place, None, PERIOD_S) is None
+
+
+def test_a_goal_in_the_map_is_driven_without_a_jump_and_only_where_the_place_is_known(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    frames: list[Pose | None] = [Pose(0.0, 0.0, 0.0)]
+    monkeypatch.setattr(Perception, "known_map_frame", lambda _: frames[-1])
+    monkeypatch.setattr(Perception, "localized", lambda _: "a place in the map")
+    script = driving()
+    assert script.request_drive(Goal(3.0, 0.0, frame="map")).command == near(0.3, 0.0)
+    frames.append(Pose(0.0, 1.0, 0.0))
+    turns = [script.request_drive(None).command for _ in range(10)]
+    ways = [command.w for command in turns if isinstance(command, Twist)]
+    assert len(ways) == 10
+    assert 0.0 < ways[0] < 0.05, "a correction by a metre turns the robot little by little"
+    assert max(abs(b - a) for a, b in pairwise(ways)) < 0.05
+    assert script.state.drive_request == Goal(3.0, 0.0, frame="map")
+    frames.append(None)
+    assert script.request_drive(None).command == STANDSTILL
+    assert hold_reason(script) == NO_PLACE
+    frames.append(Pose(0.0, -1.0, 0.0))
+    assert script.request_drive(None).command != STANDSTILL
+    assert script.state.goal_place == GoalPlace(3.0, -1.0)
+    record = script.move_to(Pose(3.0, -1.0, 0.0))
+    assert record.command == STANDSTILL
+    assert script.state.drive_request == Goal(3.0, 0.0, frame="map", reached=True)
+
+
+def test_without_a_map_a_goal_in_it_is_refused() -> None:
+    script = driving()
+    record = script.request_drive(Goal(3.0, 0.0, frame="map"))
+    assert [refused.why for refused in record.refused] == [NO_MAP]
+    assert script.state.drive_request == Legs()
+
+
+def test_a_configured_goal_is_driven_to_from_the_start() -> None:
+    settings = load_settings("hallway", ["goal.x_m=2.0", "goal.y_m=1.0", "goal.frame=map"])
+    assert first_request(settings) == Goal(2.0, 1.0, frame="map")
+    assert first_request(load_settings("hallway")) == Legs()

@@ -1,0 +1,66 @@
+"""The best poses that a search has found so far, apart from each other."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Final
+
+from perception.kernel import kernel
+from perception.records import Record, Records
+
+STARTS_MAX: Final = 200
+APART_M: Final = 0.3
+APART_RAD: Final = math.radians(9.0)
+"""Starts nearer to each other than this, on each axis, are one: one and a half steps of the search."""
+
+
+class Start(Record):
+    """A pose (m, rad) and how well the readings fit there, nat."""
+
+    x: float
+    y: float
+    heading: float
+    score: float
+
+
+class Starts(Record):
+    """The best poses found so far, in any order."""
+
+    count: int
+    least: float
+    """Score of the worst one if there is no room for more, otherwise -inf: a start must be better."""
+    starts: Annotated[Records[Start], STARTS_MAX]
+
+
+@kernel
+def offer(to: Records[Starts], x: float, y: float, heading: float, score: float) -> None:
+    """Add a start, unless a better one is near it or all are better; it replaces a worse one near it.
+
+    Parameters
+    ----------
+    to : (1,) Starts
+        Updated.
+    x, y, heading, score : float
+        As of `Start`.
+    """
+    if score <= to[0].least:
+        return
+    starts, worst = to[0].starts, 0
+    for k in range(to[0].count):
+        other = starts[k]
+        turn = abs((heading - other.heading + math.pi) % (2.0 * math.pi) - math.pi)
+        if abs(x - other.x) < APART_M and abs(y - other.y) < APART_M and turn < APART_RAD:
+            if score > other.score:
+                other.x, other.y, other.heading, other.score = x, y, heading, score
+            return
+        if other.score < starts[worst].score:
+            worst = k
+    if to[0].count < STARTS_MAX:
+        worst = to[0].count
+        to[0].count += 1
+    at = starts[worst]
+    at.x, at.y, at.heading, at.score = x, y, heading, score
+    if to[0].count == STARTS_MAX:
+        to[0].least = score
+        for k in range(STARTS_MAX):
+            to[0].least = min(to[0].least, starts[k].score)
