@@ -320,6 +320,29 @@ def nees(*, json: str = "nees.json", drives: int = 100, first: int = 200) -> int
 
 
 @app.command
+def slips(*, json: str = "slips.json", drives: int = 4, first: int = 300) -> int:
+    """Measure what remains of slips that the wheels do not report: three rounds among eight drums.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    drives
+        Number of halls.
+    first
+        Seed of the first hall.
+    """
+    use_kernel_cache()
+    from bench.slips import measure
+
+    seeds = range(first, first + max(1, drives))
+    return _try_in_rooms(
+        lambda settings, tell: measure(settings, seeds, tell),
+        lambda rows: rows_table("slips of the robot half-way, worst at the end", rows), json,
+    )  # fmt: skip
+
+
+@app.command
 def sightings(folder: Path, *, robot: int = 1, json: str = "sightings.json") -> int:
     """Measure the landmark filter, beside gtsam's iSAM2, on recorded sightings of posts at unknown places.
 

@@ -172,8 +172,9 @@ class DriftCorrection:
         numbers, failures, xs, ys = self._tracker.landmarks("number", "failures", "x", "y")
         e, range_max = self.e[0], self._tracker.range_max_m
         is_near = [math.hypot(x - e.x, y - e.y) < range_max for x, y in zip(xs, ys, strict=True)]
-        has_slipped = self._tracker.is_doubtful and not self._stands_firm
-        moved = {n for n, failed in zip(numbers, failures, strict=True) if failed >= FAILURES_MAX and not has_slipped}
+        moved = {number for number, failed in zip(numbers, failures, strict=True) if failed >= FAILURES_MAX}
+        if moved and self._tracker.is_doubtful and not self._stands_firm:
+            moved = set()  # rather the robot slipped
         for i in range(len(numbers) - 1, -1, -1):
             if numbers[i] in moved or (is_near[i] and numbers[i] not in objects):
                 remove_landmark(self.e, self.covariance, i)

@@ -108,6 +108,8 @@ def test_a_map_that_was_turned_is_turned_back_without_a_jump(turn: float) -> Non
     assert here.pose.theta == pytest.approx(0.0, abs=math.radians(0.3))
     assert (here.pose.x, here.pose.y) == pytest.approx((true.x, true.y), abs=0.06)
     assert abs(here.pose.theta) < 3.0 * math.sqrt(here.covariance[2, 2])
+    to = drift.odometry_from_map()
+    assert {type(v) for v in (here.pose.x, here.pose.theta, here.ring_yaw, to.x, to.theta)} == {float}
     assert drift.odometry_from_map().theta == pytest.approx(0.0, abs=math.radians(0.3))
 
 
