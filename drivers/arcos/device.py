@@ -48,6 +48,8 @@ from drivers.messages import Flags, Pose, Twist
 
 TICK_US = 5_000
 """Longest step of the body's simulation, µs."""
+PAUSE_MAX_US = 100_000
+"""Longest pause inside a packet, µs."""
 STALL_US = 200_000
 """The wheels are let go for this long after a stall, µs."""
 BATTERY_FULL, BATTERY_LOW, BATTERY_EMPTY = 126, 110, 107
@@ -106,7 +108,7 @@ class ArcosDevice:
         self._body = Body(robot.body, scene, start, world.odometry, drift_rng)
         sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
         self._touch = Touch(firmware, scene, robot.body.radius_m)
-        self._now_us = self._moved_us = 0
+        self._now_us = self._moved_us = self._heard_us = 0
         self._next_event_us: int | None = None  # None once something may have changed it
         self._faults = FaultSchedule(faults)
         self._line = FaultyLine(firmware.baud, self._faults, *line_rngs)
@@ -170,7 +172,10 @@ class ArcosDevice:
         if not data or self._faults.has(Reboot) or not (data := self._line.heard(data)):
             return
         self._next_event_us = None
-        for command in self._decoder.feed(data):
+        # The rest of a packet does not come after a pause: a false length would swallow the next client's SYNCs.
+        late = self._decoder.skip() if self._now_us - self._heard_us > PAUSE_MAX_US else []
+        self._heard_us = self._now_us
+        for command in (*late, *self._decoder.feed(data)):
             self._move()
             self._watchdog_us = self._now_us + 1000 * self._watchdog_ms
             self._tripped = False

@@ -56,6 +56,17 @@ def test_what_comes_before_does_not_matter(noise: bytes) -> None:
     assert client.of(SyncEcho)
 
 
+def test_a_client_that_was_cut_off_within_a_header_does_not_swallow_the_next_one_s_packets() -> None:
+    client = Client()
+    client.robot.receive(b"\xfa\xfb")
+    client.robot.receive(encode(SYNC[0]))
+    client.run(0.25)
+    assert client.heard == [], "250 bytes are announced"
+    client.robot.receive(encode(SYNC[0]))
+    client.run(0.05)
+    assert client.of(SyncEcho)
+
+
 def test_waiting_it_ignores_commands_and_an_open_or_close_with_an_argument() -> None:
     client = Client()
     for command in (Command(ENABLE, 1), Command(VEL, 200), Command(1, 1), Command(2, 1), Command(18, 1)):
