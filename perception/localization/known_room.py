@@ -2,8 +2,8 @@
 
 Readings are compounded by odometry into keyframes, so that those of one sensor are independent. Without a pose, a
 search of the whole room gives hypotheses, which the exact likelihood of all raw readings then weighs keyframe by
-keyframe. The robot tracks once one place has nearly all probability and explains the readings as a true one would.
-It is lost when its place no longer does. A firing is only taken down; all else is done in quanta.
+keyframe. The robot tracks once one place has nearly all probability and explains the readings better than no place
+would. It is lost when its place no longer does. A firing is only taken down; all else is done in quanta.
 """
 
 from __future__ import annotations
@@ -262,6 +262,7 @@ class KnownRoom:
     def _lose(self) -> None:
         """Begin anew, with what was heard since the readings began to speak against the place."""
         self._status = LOST
-        self._window_begin = max(self._tracked.peak_at + 1, self._keyframes.count - WINDOW_MAX)
+        latest = self._keyframes.count - 1
+        self._window_begin = max(min(self._tracked.peak_at + 1, latest), latest + 1 - WINDOW_MAX)
         self._pause_m, self._searched_at_m = SEARCH_M[0], self._keyframes.driven_m
         self._stage = DUE
