@@ -1,4 +1,4 @@
-"""The commands for a robot of one's own: `firmware` and `ring-test`."""
+"""The commands that find a robot and try it: `probe`, `firmware` and `ring-test`."""
 
 from __future__ import annotations
 
@@ -48,3 +48,23 @@ def ring_test_command(
     from runtime.cli.commands.ring_test import check_ring
 
     return check_ring(port, robot=robot, rounds=rounds, move=move)
+
+
+def probe_command(
+    port: str | None = None,
+    /,
+    *,
+    robot: RobotFile = None,
+) -> int:
+    """Find out which robots answer on which ports, without moving anything.
+
+    Parameters
+    ----------
+    port
+        Serial port, or socket://host:port; by default all serial ports of this computer.
+    robot
+        Try this robot, file or name of a shipped one, instead of all shipped ones.
+    """
+    from runtime.cli.commands.probe import probe
+
+    return probe(port, robot=robot)

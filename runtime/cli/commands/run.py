@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
-from config.files import is_utf8, utf8
+from config.files import is_utf8, one_line, utf8
 from config.load import ConfigError, load_settings, with_known_room
 from config.settings import Settings
 from runtime import VERSION
@@ -69,6 +69,13 @@ class EmulatorOptions:
         words = [word for option, value in named.items() if value is not None for word in (option, value)]
         overrides = [word for text in sets for word in ("--set", text)]
         return [*words, *(["--force"] if self.force else []), *overrides]
+
+
+def plugged_in() -> list[str]:
+    """Return the serial ports of USB devices: one of them may be a robot."""
+    from serial.tools.list_ports import comports
+
+    return sorted(one_line(found.device) for found in comports() if found.vid is not None)
 
 
 def run_robot(
@@ -142,6 +149,10 @@ def run_robot(
         log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
         for text in lint_settings(settings):
             log.warning(text)
+        if port is None and (plugged := plugged_in()):
+            log.info(
+                "serial port found", ports=plugged, hint="this run is emulated; `echolocate probe` names the robot"
+            )
 
         async def run() -> RunSummary:
             from runtime.simulation.emulator_process import start_emulator

@@ -10,12 +10,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from serial.tools.list_ports_common import ListPortInfo
 
 from config.errors import FAILED, WRONG_CALL
 from config.load import ConfigError
 from drivers.link import Link
 from runtime.cli.app import run_command
-from runtime.cli.commands.run import EmulatorOptions, reload_settings, signals
+from runtime.cli.commands.run import EmulatorOptions, plugged_in, reload_settings, signals
 from runtime.cli.first_signals import ENDING, Remembered
 from runtime.cycle.inputs import Request
 from runtime.support.file_lock import file_lock
@@ -207,3 +208,10 @@ def test_the_robot_named_on_the_command_line_is_that_of_the_emulator_and_of_ever
 def test_a_socket_without_a_robot_is_one_line(address: str, capfd: pytest.CaptureFixture[str]) -> None:
     assert run_command(["run", "--port", f"socket://{address}", *HEADLESS]) in {FAILED, WRONG_CALL}
     assert f"socket://{address}" in error_line(capfd)
+
+
+def test_only_usb_devices_may_be_robots(monkeypatch: pytest.MonkeyPatch) -> None:
+    adapter, on_board = ListPortInfo("/dev/ttyUSB0"), ListPortInfo("/dev/ttyS0")
+    adapter.vid = 0x0403
+    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [adapter, on_board])
+    assert plugged_in() == ["/dev/ttyUSB0"]

@@ -1,0 +1,186 @@
+"""`echolocate probe`: which robots answer on which ports, without moving anything."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import time
+from typing import Final, NamedTuple
+
+import numpy as np
+from serial.tools.list_ports import comports
+
+from config.errors import DONE, FAILED, WRONG_CALL, UserError
+from config.files import list_shipped, one_line
+from config.load import load_robot
+from config.robot import RobotConfig
+from drivers.driver import LineState
+from drivers.link import Link, LinkError
+from drivers.messages import Flags, Identity
+from drivers.registry import make_driver
+from runtime.cli.commands.offline_io import plain_console
+from runtime.cycle.connection import POLL_S, Connection
+
+ANSWER_MAX_S: Final = 2.0
+"""Longest wait for a robot's first frame, s; a controller that is being reset by the opened port takes longer."""
+READY_MAX_S: Final = 6.0
+"""Longest wait from the first frame until the robot is ready, s."""
+LOOK_S: Final = 1.0
+"""How long a robot that is ready is listened to, for its sensors and its state, s."""
+WARNINGS: Final = (
+    (Flags.BATTERY_LOW, "its battery is low"),
+    (Flags.MOTOR_FAULT, "a motor reports a fault"),
+    (Flags.BUMPER, "a bumper is pressed"),
+)
+
+
+class Finding(NamedTuple):
+    """What was found on a port."""
+
+    is_robot: bool
+    lines: tuple[str, ...]
+    """In words."""
+
+
+class _Answer(NamedTuple):
+    """What the driver of one robot found out."""
+
+    has_answered: bool
+    """Whether any of its frames arrived."""
+    text: str | None = None
+    """The robot in words; None if it is none of this kind."""
+    problem: str | None = None
+    """Why it is not, or why the port cannot be opened."""
+
+
+def probe(port: str | None, *, robot: str | None) -> int:
+    """Try the drivers on one port, or on all of this computer, print what answers and return the exit code.
+
+    Parameters
+    ----------
+    port
+        The port; None for all serial ports.
+    robot
+        Robot file, or name of a shipped one, to try instead of all shipped ones.
+
+    Raises
+    ------
+    UserError
+        This computer has no serial port, or the robot file is invalid.
+    """
+    ports = [port] if port is not None else sorted(str(found.device) for found in comports())
+    if not ports:
+        raise UserError(
+            "this computer has no serial port: plug the robot in, or name a port, as in `echolocate probe "
+            "socket://192.168.0.5:8101`",
+            FAILED if robot is None else WRONG_CALL,
+        )
+    robots = {name: load_robot(name) for name in (list_shipped("robots") if robot is None else (robot,))}
+    output, is_found = plain_console(), False
+    for each in ports:
+        finding = asyncio.run(probe_port(each, robots))
+        is_found |= finding.is_robot
+        for line in (f"{one_line(each)}:", *(f"  {line}" for line in finding.lines)):
+            output.print(line)
+    return DONE if is_found else FAILED
+
+
+async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
+    """Return what answers on a port.
+
+    Robots of one driver and one speed are tried one after the other as long as something answers them.
+
+    Parameters
+    ----------
+    port
+        The port.
+    robots
+        Robots by the names by which they are run.
+    """
+    said = list[str]()
+    for _, family in itertools.groupby(sorted(robots.items(), key=_family), key=_family):
+        for name, config in family:
+            answer = await _try(port, config)
+            if answer.text is not None:
+                return Finding(
+                    is_robot=True, lines=(answer.text, f"run it: echolocate run --robot {name} --port {port}")
+                )
+            if answer.problem is not None:
+                said.append(f"as {name}: {answer.problem}" if answer.has_answered else answer.problem)
+            if not answer.has_answered:
+                break
+        if said and not answer.has_answered and answer.problem is not None:
+            break  # the port cannot be opened
+    return Finding(is_robot=False, lines=tuple(said or ["nothing answers: is the robot on, and is this its cable?"]))
+
+
+def _family(item: tuple[str, RobotConfig]) -> tuple[str, int]:
+    return item[1].robot.driver, item[1].link.baud
+
+
+async def _try(port: str, config: RobotConfig) -> _Answer:
+    """Return what the driver of one robot finds out; it is never released, so nothing moves."""
+    driver, clock = make_driver(config), time.monotonic
+
+    def send() -> None:
+        link.set_baud(driver.line_baud)
+        if link.is_open and (data := driver.outgoing(writable=link.writable)):
+            link.send(data)
+
+    def opened() -> None:
+        driver.line_opened(clock())
+        send()
+
+    link = Link(
+        config.link.model_copy(update={"port": port}),
+        opened,
+        lambda data: driver.receive(data, clock()),
+        lambda _reason: driver.line_closed(),
+    )
+    try:
+        await link.open_once()
+    except LinkError as error:
+        return _Answer(has_answered=False, problem=str(error))
+    connection, begin_s = Connection(link, driver, send, clock), clock()
+    try:
+        while driver.state is not LineState.READY and link.is_open:
+            driver.tick(clock())
+            send()
+            has_answered = driver.counts.frames > 0
+            if driver.state is LineState.DOWN and has_answered:
+                return _Answer(has_answered=True, problem=driver.problem)
+            if clock() - begin_s > (READY_MAX_S if has_answered else ANSWER_MAX_S):
+                return _Answer(has_answered)
+            await asyncio.sleep(POLL_S)
+        if not link.is_open:
+            return _Answer(has_answered=False, problem=link.last_error)
+        return _Answer(has_answered=True, text=await _look(connection))
+    finally:
+        if driver.state is LineState.READY:
+            await connection.shut_down()
+        await link.stop()
+
+
+async def _look(connection: Connection) -> str:
+    """Return a robot that is ready in words, after listening to it for a while."""
+    driver, clock = connection.driver, connection.clock
+    flags, fired, heard = Flags.NONE, set[int](), set[int]()
+    end_s = clock() + LOOK_S
+    while clock() < end_s and connection.link.is_open:
+        driver.tick(clock())
+        connection.send()
+        received = driver.take_received()
+        flags |= received.flags
+        for firing in received.firings:
+            fired |= set(np.flatnonzero(~np.isnan(firing.ranges_m)).tolist())
+            heard |= set(np.flatnonzero(np.isfinite(firing.ranges_m)).tolist())
+        await asyncio.sleep(POLL_S)
+    identity = driver.identity
+    robot = "a robot" if identity is None else f"{_name(identity)}, {identity.sensors} sensors"
+    within = f"within {LOOK_S:g} s {len(fired)} have fired and {len(heard)} have heard something"
+    return "; ".join([robot, within, *(warning for flag, warning in WARNINGS if flag in flags)])
+
+
+def _name(identity: Identity) -> str:
+    """Return how a robot names itself, as a phrase."""
+    return f"robot '{identity.name}'" if identity.name else "a robot without a name"

@@ -1,0 +1,54 @@
+"""`echolocate probe`: what answers on a port, by emulated robots, and ports on which nothing does."""
+
+from __future__ import annotations
+
+import os
+import tty
+from pathlib import Path
+
+import pytest
+from serial.tools.list_ports_common import ListPortInfo
+
+from config.errors import DONE, FAILED
+from runtime.cli.app import run_command
+from runtime.cli.commands import probe
+from tests.hil.running import emulated
+from tests.hil.truth import Truth
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize(("robot", "sensors"), [("denning", 24), ("p3at", 16)])
+def test_a_robot_is_named_and_does_not_move(
+    robot: str, sensors: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with emulated(tmp_path, "--robot", robot) as found:
+        assert run_command(["probe", found.port]) == DONE
+    port, text, command = capsys.readouterr().out.splitlines()
+    assert port == f"{found.port}:"
+    assert f"{sensors} sensors" in text
+    assert "have heard something" in text
+    assert command.strip() == f"run it: echolocate run --robot {robot} --port {found.port}"
+    assert all(row.still for row in Truth(found.trace).read())
+
+
+def test_a_port_that_says_nothing(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(probe, "ANSWER_MAX_S", 0.05)
+    robot, line = os.openpty()
+    tty.setraw(line)
+    monkeypatch.setattr(probe, "comports", lambda: [ListPortInfo(os.ttyname(line))])
+    assert run_command(["probe"]) == FAILED
+    os.close(robot)
+    os.close(line)
+    assert capsys.readouterr().out.splitlines()[1:] == ["  nothing answers: is the robot on, and is this its cable?"]
+
+
+def test_no_port_and_one_that_cannot_be_opened(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(probe, "comports", list)
+    assert run_command(["probe"]) == FAILED
+    assert "this computer has no serial port: plug the robot in" in capsys.readouterr().err
+    assert run_command(["probe", str(tmp_path / "none")]) == FAILED
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 2, "the same for every robot, so it is said once"
+    assert "none" in lines[1]
