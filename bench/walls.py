@@ -1,4 +1,4 @@
-"""The walls found in random rooms with doorways and drums, by both models of reflection and at several steps."""
+"""Walls and corners found in random rooms with doorways and drums, by both models of reflection and several steps."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from runtime.simulation.furnished_rooms import ACOUSTICS, furnished_room
 from runtime.simulation.wall_trials import figures, try_room
 
 COLUMNS: Final = ("rooms", "walls", "found", "false", "lines_a_wall", "offset_mean_m", "offset_p95_m",
-                  "angle_mean_deg", "angle_p95_deg")  # fmt: skip
+                  "angle_mean_deg", "angle_p95_deg", "corners", "corners_found", "corner_mean_m", "corner_p95_m",
+                  "false_corners")  # fmt: skip
 
 
 def measure(

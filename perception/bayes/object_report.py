@@ -22,7 +22,7 @@ from perception.bayes.polygon_parameters import POLYGON_INFLATION, POLYGON_TURN_
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, Memory, PolygonTrack
 from perception.bayes.track_archive import TrackArchive
-from perception.bayes.wall_report import wall_segments
+from perception.bayes.wall_report import room_report
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
 
@@ -146,6 +146,16 @@ def wall_object(segment: Row) -> DetectedObject:
     )  # fmt: skip
 
 
+def corner_object(corner: Row) -> DetectedObject:
+    """Return a `CornerPoint` as a reported object, without a heading."""
+    x, y, xx, xy, yy, is_edge, echoes, log_odds = corner
+    probability = 1.0 / (1.0 + math.exp(-log_odds))
+    return DetectedObject(
+        "edge" if is_edge == 1 else "inside corner", x, y, 0.0, worst_sigma(xx, xy, yy), int(echoes), probability,
+        probability, (xx, xy, yy),
+    )  # fmt: skip
+
+
 def round_label(radius: float) -> str:
     """Return the label of a round object of this radius (m) that is not a model."""
     return "edge" if radius == 0.0 else "post" if radius < POST_RADIUS_M else "barrel"
@@ -194,8 +204,11 @@ def other_objects(
     named : sequence of DetectedObject
         The models.
     """
-    walls = [wall_object(segment.item()) for segment in wall_segments(memory)]
-    return walls + other_circles(memory.circles, memory, p, least, named)
+    segments, points = room_report(memory)
+    corners = [corner_object(point.item()) for point in points]
+    # What stands in a corner of the room is the corner: a thin object there is not another one.
+    circles = other_circles(memory.circles, memory, p, least, [*named, *corners])
+    return [*(wall_object(segment.item()) for segment in segments), *corners, *circles]
 
 
 def other_circles(

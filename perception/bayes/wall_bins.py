@@ -10,8 +10,8 @@ import numpy as np
 from perception.bayes.elements import Reading
 from perception.bayes.reservoir import copy_reading
 from perception.bayes.settings_record import SettingsRecord
-from perception.bayes.wall_contact import FOOT, edge_direction, wall_normal
-from perception.bayes.wall_records import WALL_BIN_M, WALL_BINS, Wall, WallBin
+from perception.bayes.wall_contact import BEAM_EDGE, edge_direction, range_sigma, wall_normal
+from perception.bayes.wall_records import WALL_BIN_M, WALL_BINS, Wall, WallBin, WallMap
 from perception.kernel import kernel
 
 HALF: Final = WALL_BINS // 2
@@ -50,7 +50,7 @@ def is_covered(of: WallBin) -> bool:
 def mean_error(wall: Wall, b: int) -> float:
     """Return how far behind the line the echoes of a bin lie on average, m; the bin is not empty."""
     of = wall.bins[b]
-    return of.offset_sum / of.weight - wall.offset - wall.slope * middle_of(b)
+    return of.offset_sum / of.precision - wall.offset - wall.slope * middle_of(b)
 
 
 @kernel
@@ -68,6 +68,7 @@ def clear_bins(wall: Wall) -> None:
     for b in range(WALL_BINS):
         of = wall.bins[b]
         of.weight = 0.0
+        of.precision = 0.0
         of.offset_sum = 0.0
         of.range_sum = 0.0
         of.passes = 0.0
@@ -86,45 +87,49 @@ def free(wall: Wall) -> None:
 
 
 @kernel
-def enter_reading(wall: Wall, q: Reading, kind: int, p: SettingsRecord) -> None:
+def fade(of: WallBin, share: float) -> None:
+    """Keep this share of a bin's echoes."""
+    of.weight *= share
+    of.precision *= share
+    of.offset_sum *= share
+    of.range_sum *= share
+
+
+@kernel
+def enter_reading(room: WallMap, wall: Wall, q: Reading, kind: int, p: SettingsRecord) -> None:
     """Enter an echo of a wall into the bin where it touches the wall.
 
     Parameters
     ----------
+    room : WallMap
+        The noise.
     wall : Wall
         Updated, but not fitted.
     q, kind, p
         The reading, `FOOT` or `BEAM_EDGE`, and the settings.
     """
-    dx = q.x - wall.origin_x
-    dy = q.y - wall.origin_y
-    along = wall.normal_x * dy - wall.normal_y * dx
-    across = wall.normal_x * dx + wall.normal_y * dy
-    at = along
-    if kind == FOOT:
-        offset = across + q.range_m
-        at -= wall.slope * (wall.offset + wall.slope * along - across)
-        weight = 1.0
-    else:
-        nx, ny = wall_normal(wall)
-        ex, ey = edge_direction(q, nx, ny, p)
-        offset = across + q.range_m * (wall.normal_x * ex + wall.normal_y * ey)
-        along += q.range_m * (wall.normal_x * ey - wall.normal_y * ex)
-        at = along
+    nx, ny = wall_normal(wall)
+    weight = 1.0
+    if kind == BEAM_EDGE:
+        nx, ny = edge_direction(q, nx, ny, p)
         weight = EDGE_WEIGHT
-    b = bin_of(at)
+    dx = q.x + q.range_m * nx - wall.origin_x
+    dy = q.y + q.range_m * ny - wall.origin_y
+    along = wall.normal_x * dy - wall.normal_y * dx
+    offset = wall.normal_x * dx + wall.normal_y * dy
+    b = bin_of(along)
     if not 0 <= b < WALL_BINS:
         return
     of = wall.bins[b]
     if of.weight >= BIN_WEIGHT_MAX:
-        share = (BIN_WEIGHT_MAX - 1.0) / of.weight
-        of.weight *= share
-        of.offset_sum *= share
-        of.range_sum *= share
+        fade(of, (BIN_WEIGHT_MAX - 1.0) / of.weight)
     of.weight += weight
+    # A near echo places the wall better than a far one.
+    precision = weight / range_sigma(room, q.range_m) ** 2
+    of.precision += precision
     # The line's offset at the bin's middle, not at the place itself.
-    of.offset_sum += weight * (offset + wall.slope * (middle_of(b) - along))
-    of.range_sum += weight * q.range_m
+    of.offset_sum += precision * (offset + wall.slope * (middle_of(b) - along))
+    of.range_sum += precision * q.range_m
     of.passes *= PASSES_KEPT
     copy_reading(q, of.newest)
     wall.is_changed = 1
@@ -143,6 +148,4 @@ def enter_pass(wall: Wall, b: int, weight: float) -> None:
     """
     of = wall.bins[b]
     of.passes = min(of.passes + weight, PASSES_MAX)
-    of.weight *= WEIGHT_KEPT
-    of.offset_sum *= WEIGHT_KEPT
-    of.range_sum *= WEIGHT_KEPT
+    fade(of, WEIGHT_KEPT)

@@ -22,8 +22,8 @@ BEAM_EDGE: Final = 2
 """Where an echo comes from."""
 EXPLAINED_SIGMAS: Final = 3.2
 """Greatest error of an explained range, in σ of range and wall together."""
-SLANTING_MIN_COS: Final = 0.6
-"""Cosine between axis and normal beyond which a slanting wall's echo is too weak to count on."""
+SLANTING_MIN_COS: Final = 0.25
+"""Cosine between axis and normal beyond which nothing is known of a slanting wall's echo."""
 SPAN_MARGIN_M: Final = 0.09
 """A wall explains a reading as far as this beyond the ends of its spans: a bin and a half."""
 CIRCLE_MARGIN_M: Final = 0.05
@@ -31,8 +31,15 @@ CIRCLE_MARGIN_M: Final = 0.05
 END_SLACK_M: Final = 0.05
 CORNER_SLACK_M: Final = 0.03
 """Uncertainty of an end's and of a corner's place."""
+ONLY_NAMED: Final = 2.0
+"""A probability that only named circles have."""
+STRAIGHT_CHI2: Final = 60.0
+STRAIGHT_WEIGHT: Final = 20.0
+"""A span of more evidence than this and of this weight is straight beyond doubt."""
 EDGES_LEAD: Final = 4.0
-"""Lead of echoes from the beam's edge over silences at which edges count."""
+EDGES_SHARE: Final = 0.25
+"""Edges count if their echoes exceed this share of their silences by this lead. Mirrors leave 1 %; of surfaces that
+answer at any angle, half: drop-outs, and walls that are not yet known well."""
 
 
 @kernel
@@ -44,13 +51,14 @@ def range_sigma(room: WallMap, range_m: float) -> float:
 @kernel
 def edges_answer(room: WallMap) -> bool:
     """Return whether slanting walls answer from the beam's edge here."""
-    return bool(room.edge_echoes > room.edge_silences + EDGES_LEAD)
+    return bool(room.edge_echoes > EDGES_SHARE * room.edge_silences + EDGES_LEAD)
 
 
 @kernel
 def wall_normal(wall: Wall) -> tuple[float, float]:
-    """Return the normal of the fitted line, away from the sensors; a unit vector to first order in the slope."""
-    return wall.normal_x + wall.slope * wall.normal_y, wall.normal_y - wall.slope * wall.normal_x
+    """Return the normal of the fitted line, a unit vector away from the sensors."""
+    c = 1.0 / math.sqrt(1.0 + wall.slope * wall.slope)
+    return c * (wall.normal_x + wall.slope * wall.normal_y), c * (wall.normal_y - wall.slope * wall.normal_x)
 
 
 @kernel
@@ -78,8 +86,9 @@ def distance_and_foot(wall: Wall, x: float, y: float) -> tuple[float, float]:
     dy = y - wall.origin_y
     across = wall.normal_x * dx + wall.normal_y * dy
     along = wall.normal_x * dy - wall.normal_y * dx
-    distance = wall.offset + wall.slope * along - across
-    return distance, along - wall.slope * distance
+    c2 = 1.0 / (1.0 + wall.slope * wall.slope)
+    off = wall.offset + wall.slope * along - across
+    return math.sqrt(c2) * off, along - wall.slope * c2 * off
 
 
 @kernel
@@ -116,7 +125,8 @@ def contact(wall: Wall, q: Reading, p: SettingsRecord) -> tuple[int, float, floa
         return FOOT, distance, foot, dot
     ex, ey = edge_direction(q, nx, ny, p)
     reach = distance / (nx * ex + ny * ey)
-    return BEAM_EDGE, reach, foot + reach * (nx * ey - ny * ex), dot
+    along = wall.normal_x * (q.y + reach * ey - wall.origin_y) - wall.normal_y * (q.x + reach * ex - wall.origin_x)
+    return BEAM_EDGE, reach, along, dot
 
 
 @kernel
@@ -126,7 +136,7 @@ def line_variance(wall: Wall, along: float) -> float:
 
 
 @kernel
-def tolerance(room: WallMap, wall: Wall, along: float, range_m: float) -> float:
+def tolerance(room: WallMap, wall: Wall, along: float, range_m: float, dot: float) -> float:
     """Return the greatest error of a range that a wall explains, m.
 
     Parameters
@@ -135,8 +145,10 @@ def tolerance(room: WallMap, wall: Wall, along: float, range_m: float) -> float:
         The noise, and the wall.
     along, range_m : float
         Position along the wall, and the range, m.
+    dot : float
+        Cosine between the sensor's axis and the wall's normal.
     """
-    return EXPLAINED_SIGMAS * math.sqrt(range_sigma(room, range_m) ** 2 + line_variance(wall, along))
+    return EXPLAINED_SIGMAS * math.sqrt(range_sigma(room, range_m) ** 2 + line_variance(wall, along) / dot**2)
 
 
 @kernel
@@ -150,8 +162,20 @@ def is_on_span(wall: Wall, along: float, margin: float) -> bool:
 
 
 @kernel
-def explaining_wall(room: WallMap, q: Reading, p: SettingsRecord, growth: float) -> tuple[int, int]:
-    """Return the wall that explains an echo best, and where from; −1 and `NOWHERE` where none does.
+def is_on_straight_span(wall: Wall, along: float) -> bool:
+    """Return whether a position lies on a span of a wall that is straight beyond doubt."""
+    for k in range(wall.span_count):
+        span = wall.spans[k]
+        if span.low <= along <= span.high:
+            return bool(span.chi2 > STRAIGHT_CHI2 and span.weight > STRAIGHT_WEIGHT)
+    return False
+
+
+@kernel
+def explaining_wall(room: WallMap, q: Reading, p: SettingsRecord, growth: float) -> tuple[int, int, float]:
+    """Return the wall that explains an echo best, where from, and the error as a share of the greatest explained.
+
+    −1, `NOWHERE` and 1 where none does.
 
     Parameters
     ----------
@@ -172,10 +196,10 @@ def explaining_wall(room: WallMap, q: Reading, p: SettingsRecord, growth: float)
         wall = room.walls[k]
         if wall.weight <= 0.0:
             continue
-        kind, expected, along, _ = contact(wall, q, p)
+        kind, expected, along, dot = contact(wall, q, p)
         if kind == NOWHERE or (kind == BEAM_EDGE and not edges):
             continue
-        error = abs(q.range_m - expected) / tolerance(room, wall, along, expected)
+        error = abs(q.range_m - expected) / tolerance(room, wall, along, expected, dot)
         if error < least and is_on_span(wall, along, SPAN_MARGIN_M):
             least = error
             best = k
@@ -185,8 +209,8 @@ def explaining_wall(room: WallMap, q: Reading, p: SettingsRecord, growth: float)
             beyond = k
             beyond_kind = kind
     if best < 0 and growth > 0.0:
-        return beyond, beyond_kind
-    return best, best_kind
+        return beyond, beyond_kind, least_beyond
+    return best, best_kind, least
 
 
 @kernel
@@ -209,8 +233,10 @@ def is_from_point(room: WallMap, q: Reading, x: float, y: float, slack: float, p
 
 
 @kernel
-def is_from_circle(room: WallMap, tracks: CircleTracks, q: Reading, p: SettingsRecord) -> bool:
-    """Return whether an established circle explains an echo, by its nearest point or where the beam's edge meets it.
+def is_from_circle(
+    room: WallMap, tracks: CircleTracks, q: Reading, p: SettingsRecord, probability: float
+) -> bool:  # fmt: skip
+    """Return whether a certain circle explains an echo, by its nearest point or where the beam's edge meets it.
 
     Parameters
     ----------
@@ -218,11 +244,13 @@ def is_from_circle(room: WallMap, tracks: CircleTracks, q: Reading, p: SettingsR
         The noise, the echo and the settings.
     tracks : (n,) CircleTrack
         The circles.
+    probability : float
+        A circle is certain from here on; a named one is at any.
     """
     edges = edges_answer(room)
     for t in range(len(tracks)):
         track = tracks[t]
-        if track.status != ESTABLISHED:
+        if track.status != ESTABLISHED or (track.is_named == 0 and track.probability < probability):
             continue
         dx = track.x - q.x
         dy = track.y - q.y

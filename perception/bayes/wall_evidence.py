@@ -11,8 +11,8 @@ from typing import Final
 
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.wall_bins import is_covered, mean_error, middle_of
-from perception.bayes.wall_contact import range_sigma, wall_normal, wall_point
-from perception.bayes.wall_records import Wall, WallMap
+from perception.bayes.wall_contact import wall_normal, wall_point
+from perception.bayes.wall_records import Wall
 from perception.kernel import kernel
 
 RIVAL_RADIUS_M: Final = 0.7
@@ -31,13 +31,13 @@ WALL_MIN_M: Final = 0.5
 
 
 @kernel
-def flatness(room: WallMap, wall: Wall, first: int, end: int, p: SettingsRecord) -> tuple[float, float]:
+def flatness(wall: Wall, first: int, end: int, p: SettingsRecord) -> tuple[float, float]:
     """Return the evidence for a line against a circle with its own place and turn, and how well the line fits.
 
     Parameters
     ----------
-    room, wall, p
-        The noise, the wall and the settings.
+    wall, p
+        The wall and the settings.
     first, end : int
         The spans compared, end excluded.
 
@@ -63,8 +63,8 @@ def flatness(room: WallMap, wall: Wall, first: int, end: int, p: SettingsRecord)
                 continue
             n += 1
             u = middle_of(b) - middle
-            d = of.range_sum / of.weight
-            w = 1.0 / (range_sigma(room, d) ** 2 / of.weight + SYSTEMATIC_M**2)
+            d = of.range_sum / of.precision
+            w = 1.0 / (1.0 / of.precision + SYSTEMATIC_M**2)
             e = mean_error(wall, b)
             g = math.sqrt((d + RIVAL_RADIUS_M) ** 2 + u * u) - d - RIVAL_RADIUS_M
             s0 += w
@@ -95,13 +95,13 @@ def flatness(room: WallMap, wall: Wall, first: int, end: int, p: SettingsRecord)
 
 
 @kernel
-def judge(room: WallMap, wall: Wall, p: SettingsRecord) -> None:
+def judge(wall: Wall, p: SettingsRecord) -> None:
     """Write the weights and the evidence of a fitted wall, and of each of its spans.
 
     Parameters
     ----------
-    room, wall, p
-        The noise, the wall, updated, and the settings.
+    wall, p
+        The wall, updated, and the settings.
     """
     for k in range(wall.span_count):
         span = wall.spans[k]
@@ -110,7 +110,7 @@ def judge(room: WallMap, wall: Wall, p: SettingsRecord) -> None:
         for b in range(span.first_bin, span.end_bin):
             span.weight += wall.bins[b].weight
             span.passes += wall.bins[b].passes
-        span.chi2, wall.misfit = flatness(room, wall, k, k + 1, p)
+        span.chi2, wall.misfit = flatness(wall, k, k + 1, p)
     wall.chi2 = wall.spans[0].chi2
     if wall.span_count > 1:
-        wall.chi2, wall.misfit = flatness(room, wall, 0, wall.span_count, p)
+        wall.chi2, wall.misfit = flatness(wall, 0, wall.span_count, p)

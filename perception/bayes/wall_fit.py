@@ -8,7 +8,7 @@ from typing import Final
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import StateRecord
 from perception.bayes.wall_bins import HALF, clear_wall, is_covered, mean_error, middle_of
-from perception.bayes.wall_contact import edges_answer, range_sigma
+from perception.bayes.wall_contact import edges_answer
 from perception.bayes.wall_evidence import judge
 from perception.bayes.wall_records import SPANS_MAX, WALL_BIN_M, WALL_BINS, Wall, WallMap
 from perception.kernel import kernel
@@ -20,7 +20,10 @@ OFFSET_INFORMATION: Final = 1e-3
 WALL_WEIGHT_MIN: Final = 3.0
 """A wall of less weight ends."""
 GAP_MAX_M: Final = 0.6
-"""Longest gap without readings inside a span."""
+ROUGH_GAP_MAX_M: Final = 0.3
+"""Longest gap without readings inside a span; where everything echoes, a wall leaves none so long."""
+ROUGH_WEIGHT_MIN: Final = 0.6
+"""There a bin counts if it holds more than one echo from a beam's edge: echoes of posts lie near the line too."""
 OPENING_MIN_M: Final = 0.3
 """Least width of an opening."""
 OPENING_PASSES_MIN: Final = 1.0
@@ -43,7 +46,7 @@ TRIM_SYSTEMATIC_M: Final = 0.005
 
 
 @kernel
-def fit_line(room: WallMap, wall: Wall) -> None:
+def fit_line(wall: Wall) -> None:
     """Fit a wall's line to the covered bins of its spans, to all where it has none, by weighted least squares."""
     s0 = OFFSET_INFORMATION
     s1 = 0.0
@@ -60,11 +63,10 @@ def fit_line(room: WallMap, wall: Wall) -> None:
         for b in range(first, end):
             of = wall.bins[b]
             if is_covered(of):
-                n = of.weight
-                total += n
+                total += of.weight
                 u = middle_of(b)
-                w = n / range_sigma(room, of.range_sum / n) ** 2
-                z = of.offset_sum / n
+                w = of.precision
+                z = of.offset_sum / w
                 s0 += w
                 s1 += w * u
                 s2 += w * u * u
@@ -80,7 +82,7 @@ def fit_line(room: WallMap, wall: Wall) -> None:
 
 
 @kernel
-def trimmed_end(room: WallMap, wall: Wall, low: int, high: int, side: int) -> int:
+def trimmed_end(wall: Wall, low: int, high: int, side: int) -> int:
     """Return the last bin of a run of bins at one side, by likelihood.
 
     A sensor beyond the end of a wall hears the end. Its range is longer than the line's would be, at first by less
@@ -88,8 +90,8 @@ def trimmed_end(room: WallMap, wall: Wall, low: int, high: int, side: int) -> in
 
     Parameters
     ----------
-    room, wall
-        The noise, and the wall.
+    wall : Wall
+        The wall.
     low, high : int
         First and last bin of the run.
     side : int
@@ -105,10 +107,10 @@ def trimmed_end(room: WallMap, wall: Wall, low: int, high: int, side: int) -> in
             of = wall.bins[end + side * j]
             if is_covered(of):
                 e = mean_error(wall, end + side * j)
-                d = of.range_sum / of.weight
+                d = of.range_sum / of.precision
                 x = (j - 0.5) * WALL_BIN_M
                 longer = math.sqrt(d * d + x * x) - d
-                var = range_sigma(room, d) ** 2 / of.weight + TRIM_SYSTEMATIC_M**2
+                var = 1.0 / of.precision + TRIM_SYSTEMATIC_M**2
                 gain += (e * e - (e - longer) ** 2) / (2.0 * var)
         if gain > best + TRIM_GAIN_NAT:
             best = gain
@@ -120,6 +122,7 @@ def trimmed_end(room: WallMap, wall: Wall, low: int, high: int, side: int) -> in
 def is_stray(room: WallMap, wall: Wall, b: int) -> bool:
     """Return whether the echoes of a covered bin and its neighbours lie too far behind the line."""
     total = 0.0
+    precision = 0.0
     error = 0.0
     passes = 0.0
     for k in range(max(0, b - STRAY_BINS), min(WALL_BINS, b + STRAY_BINS + 1)):
@@ -127,12 +130,11 @@ def is_stray(room: WallMap, wall: Wall, b: int) -> bool:
         passes += of.passes
         if is_covered(of):
             total += of.weight
-            error += of.weight * mean_error(wall, k)
+            precision += of.precision
+            error += of.precision * mean_error(wall, k)
     if edges_answer(room) and passes >= PASSED_MIN and passes > PASSED_SHARE * total:
         return True
-    of = wall.bins[b]
-    sigma = range_sigma(room, of.range_sum / of.weight) / math.sqrt(total)
-    return error / total > STRAY_SIGMAS * sigma + STRAY_SLACK_M
+    return error / precision > STRAY_SIGMAS / math.sqrt(precision) + STRAY_SLACK_M
 
 
 @kernel
@@ -142,6 +144,8 @@ def find_spans(room: WallMap, wall: Wall) -> None:
     What the ends of a run explain better than the line is left out.
     """
     wall.span_count = 0
+    is_rough = edges_answer(room)
+    gap_max = ROUGH_GAP_MAX_M if is_rough else GAP_MAX_M
     first = -1
     last = -1
     passes = 0.0
@@ -149,20 +153,20 @@ def find_spans(room: WallMap, wall: Wall) -> None:
         is_end = b == WALL_BINS
         if not is_end:
             of = wall.bins[b]
-            if not is_covered(of):
+            if not is_covered(of) or (is_rough and of.weight < ROUGH_WEIGHT_MIN):
                 passes += of.passes
                 continue
             if is_stray(room, wall, b):
                 passes += of.weight
                 continue
         width = (b - last - 1) * WALL_BIN_M
-        is_opening = width > GAP_MAX_M or passes >= CRACK_PASSES_MIN
+        is_opening = width > gap_max or passes >= CRACK_PASSES_MIN
         is_opening = is_opening or (width >= OPENING_MIN_M and passes >= OPENING_PASSES_MIN)
         if first >= 0 and (is_end or is_opening) and wall.span_count < SPANS_MAX:
             low = first
             high = last
             for side in range(1, -2, -2):  # a literal in the call would be a type of its own, compiled by itself
-                end = trimmed_end(room, wall, low, high, side)
+                end = trimmed_end(wall, low, high, side)
                 low = low if side > 0 else end
                 high = end if side > 0 else high
             span = wall.spans[wall.span_count]
@@ -194,10 +198,10 @@ def fit_walls(s: StateRecord, p: SettingsRecord, first: int, end: int, step: int
         if wall.is_changed == 1:
             wall.is_changed = 0
             if wall.span_count == 0:
-                fit_line(room, wall)
+                fit_line(wall)
             find_spans(room, wall)
-            fit_line(room, wall)
+            fit_line(wall)
             if wall.span_count == 0 or wall.weight < WALL_WEIGHT_MIN:
                 clear_wall(wall)
             else:
-                judge(room, wall, p)
+                judge(wall, p)

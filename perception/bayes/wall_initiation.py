@@ -269,11 +269,11 @@ def enter_recent(s: StateRecord, p: SettingsRecord) -> int:
         if kind == NOWHERE or (kind == BEAM_EDGE and not edges):
             continue
         e = q.range_m - expected
-        slack = tolerance(room, wall, along, expected)
+        slack = tolerance(room, wall, along, expected, dot)
         if abs(e) < slack:
             if recent.is_free == IS_FREE:
                 recent.is_free = IS_TAKEN
-                enter_reading(wall, q, kind, p)
+                enter_reading(room, wall, q, kind, p)
                 echoes += 1
         elif e > slack and kind == FOOT and dot >= p[0].cos_must_answer:
             b = bin_of(along)
@@ -310,8 +310,10 @@ def fit_candidate(memory: Memory, p: SettingsRecord) -> bool:
     return is_wall(memory.s)
 
 
-def try_wall(memory: Memory, p: SettingsRecord, newest: int) -> None:
-    """Look for a wall through a recent echo, and add it; it replaces a light one where there are too many.
+def try_wall(memory: Memory, p: SettingsRecord, newest: int) -> bool:
+    """Look for a wall through a recent echo, and add it; return whether there is one.
+
+    It replaces a light wall where there are too many.
 
     Parameters
     ----------
@@ -321,7 +323,7 @@ def try_wall(memory: Memory, p: SettingsRecord, newest: int) -> None:
         The echo's place among the recent readings.
     """
     if not best_line(memory.s, p, newest):
-        return
+        return False
     is_new = fit_candidate(memory, p)
     walls: NDArray[Any] = memory.state["room"]["walls"][0]
     if is_new:
@@ -332,3 +334,4 @@ def try_wall(memory: Memory, p: SettingsRecord, newest: int) -> None:
     walls["weight"][CANDIDATE] = 0.0
     marks: NDArray[Any] = memory.state["room"]["recent"]["is_free"][0]
     marks[marks == IS_TAKEN] = IS_KNOWN if is_new else IS_FREE
+    return is_new

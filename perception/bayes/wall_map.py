@@ -15,7 +15,6 @@ import math
 from typing import Final
 
 from perception.bayes.elements import Reading
-from perception.bayes.noise_estimation import noise_variance
 from perception.bayes.range_fit import FAR
 from perception.bayes.reservoir import copy_reading
 from perception.bayes.settings_record import SettingsRecord
@@ -23,24 +22,27 @@ from perception.bayes.state import CircleTracks, Memory, StateRecord
 from perception.bayes.wall_bins import SILENT_PASS, bin_of, enter_pass, enter_reading
 from perception.bayes.wall_contact import (
     BEAM_EDGE,
-    CORNER_SLACK_M,
     EXPLAINED_SIGMAS,
+    FOOT,
     NOWHERE,
+    ONLY_NAMED,
     contact,
-    corner_of,
+    distance_and_foot,
     explaining_wall,
     is_from_circle,
     is_from_end,
     is_on_span,
-    range_sigma,
+    is_on_straight_span,
     tolerance,
 )
-from perception.bayes.wall_corners import find_corners
+from perception.bayes.wall_corners import EDGE_WALL_WEIGHT_MIN, enter_echo, enter_looks, find_corners, point_of
 from perception.bayes.wall_fit import fit_walls
 from perception.bayes.wall_initiation import try_wall
 from perception.bayes.wall_merging import drop_explained, merge_walls
+from perception.bayes.wall_noise import add_residual, estimate_noise
 from perception.bayes.wall_records import (
     CORNERS_MAX,
+    EDGES_MAX,
     GOLDEN_RATIO,
     IS_FREE,
     IS_KNOWN,
@@ -54,19 +56,20 @@ from perception.kernel import kernel
 GROWTH_M: Final = 0.75
 """A wall may continue this far beyond its spans."""
 RECENT_SPACING_M: Final = 0.08
-"""Least distance between the recent readings of a sensor."""
+KNOWN_SPACING_M: Final = 0.24
+"""Least distance between the recent readings of a sensor, of echoes that nothing explains and of others."""
 FIT_FIRINGS: Final = 2
 """Each wall is fitted again at every second firing."""
 TIDY_FIRINGS: Final = 8
 """Firings between two passes over pairs of walls."""
-EDGE_WALL_WEIGHT_MIN: Final = 40.0
+BEAM_WALL_WEIGHT_MIN: Final = 40.0
 EDGE_WITHIN_M: Final = 0.15
 """Walls of this weight show, this far inside their ends, whether slanting walls answer from the beam's edge."""
+THIN_M: Final = 0.2
+"""Echoes of round objects thinner than this start no wall and extend none."""
 EDGE_SLACK_M: Final = 0.05
 EDGES_COUNTED_MAX: Final = 400.0
 """Greatest count of edge echoes and silences; then both are halved."""
-CORNER_PASS_SLACK_M: Final = 0.1
-"""A range this much longer than to a corner passed it."""
 
 
 @kernel
@@ -82,15 +85,16 @@ def weaken(room: WallMap, q: Reading, own: int, p: SettingsRecord) -> None:
     """
     for k in range(MAX_WALLS):
         wall = room.walls[k]
-        if wall.weight <= 0.0 or k == own:
+        if wall.weight <= 0.0:
             continue
         kind, expected, along, dot = contact(wall, q, p)
-        if kind == NOWHERE:
+        if kind == NOWHERE or (kind == FOOT and k == own):
             continue
         e = q.range_m - expected
-        slack = tolerance(room, wall, along, expected)
+        slack = tolerance(room, wall, along, expected, dot)
         if kind == BEAM_EDGE:
-            if wall.weight > EDGE_WALL_WEIGHT_MIN and own < 0 and is_on_span(wall, along, -EDGE_WITHIN_M):
+            is_free = own < 0 or k == own
+            if wall.weight > BEAM_WALL_WEIGHT_MIN and is_free and is_on_span(wall, along, -EDGE_WITHIN_M):
                 if abs(e) < slack:
                     room.edge_echoes += 1.0
                 elif e > slack + EDGE_SLACK_M:
@@ -107,33 +111,26 @@ def weaken(room: WallMap, q: Reading, own: int, p: SettingsRecord) -> None:
 
 
 @kernel
-def enter_corners(room: WallMap, q: Reading, p: SettingsRecord) -> None:
-    """Count a reading for or against the corners towards which it looked."""
-    for c in range(CORNERS_MAX):
-        corner = room.corners[c]
-        if corner.is_used == 0:
-            continue
-        dx = corner.x - q.x
-        dy = corner.y - q.y
-        d = math.sqrt(dx * dx + dy * dy)
-        if dx * q.axis_x + dy * q.axis_y < p[0].cos_must_answer * d:
-            continue
-        if q.range_m > d + EXPLAINED_SIGMAS * range_sigma(room, d) + CORNER_PASS_SLACK_M + CORNER_SLACK_M:
-            corner.passes += 1.0
-        else:
-            corner.ended += 1.0
+def enter_point(room: WallMap, q: Reading, p: SettingsRecord, less_than: float) -> float:
+    """Enter an echo that a corner or an edge explains with less error than this; return its error, else 1."""
+    corner, error = point_of(room, room.corners, CORNERS_MAX, q, p)
+    edge, error_of_edge = point_of(room, room.edges, EDGES_MAX, q, p)
+    if min(error, error_of_edge) >= less_than:
+        return 1.0
+    if error <= error_of_edge:
+        enter_echo(room, room.corners[corner], q)
+    else:
+        enter_echo(room, room.edges[edge], q)
+    return min(error, error_of_edge)
 
 
 @kernel
-def is_explained_by_point(room: WallMap, q: Reading, p: SettingsRecord) -> bool:
-    """Return whether a corner or the end of a wall explains an echo; count it for the corner."""
-    corner = corner_of(room, q, p)
-    if corner >= 0:
-        room.corners[corner].echoes += 1.0
-        return True
+def is_from_any_end(room: WallMap, q: Reading, p: SettingsRecord) -> bool:
+    """Return whether the end of a wall explains an echo."""
     is_from_any = False
     for k in range(MAX_WALLS):
-        is_from_any = is_from_any or is_from_end(room, room.walls[k], q, p)
+        is_known = room.walls[k].weight >= EDGE_WALL_WEIGHT_MIN
+        is_from_any = is_from_any or (is_known and is_from_end(room, room.walls[k], q, p))
     return is_from_any
 
 
@@ -149,7 +146,8 @@ def keep_recent(room: WallMap, sensor: int, q: Reading, is_free: int) -> int:
         As in `RecentReading`.
     """
     is_first = room.kept[sensor] == 0.0
-    if not is_first and math.hypot(q.x - room.kept_x[sensor], q.y - room.kept_y[sensor]) <= RECENT_SPACING_M:
+    spacing = RECENT_SPACING_M if is_free == IS_FREE else KNOWN_SPACING_M
+    if not is_first and math.hypot(q.x - room.kept_x[sensor], q.y - room.kept_y[sensor]) <= spacing:
         return -1
     room.kept[sensor] = 1.0
     room.kept_x[sensor] = q.x
@@ -168,27 +166,52 @@ def enter_firing(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int
     Parameters
     ----------
     s, tracks, p
-        Memory, updated, circles and settings; echoes that an established object explains support no wall.
+        Memory, updated, circles and settings; echoes that a named object explains support no wall.
     m : int
         Readings of this firing.
     """
     room = s[0].room
     scratch = s[0].scratch
-    room.variance_m2, room.relative_variance = noise_variance(s, p)
+    estimate_noise(s, p)
     newest = -1
     unexplained = 0
     for i in range(m):
         q = scratch.fired[i]
-        is_known = q.range_m >= FAR or scratch.explained_by[i] >= 0 or is_from_circle(room, tracks, q, p)
+        of = scratch.explained_by[i]
+        is_named = of >= len(tracks) or (of >= 0 and tracks[of].is_named == 1)
+        is_named = is_named or is_from_circle(room, tracks, q, p, ONLY_NAMED)
+        # A wall's side and a large round object are alike until the object is named.
+        is_known = is_named or q.range_m >= FAR or (of >= 0 and tracks[of].radius < THIN_M)
         own = -1
-        if not is_known:
-            own, kind = explaining_wall(room, q, p, GROWTH_M)
+        is_point = False
+        if q.range_m < FAR and not is_named:
+            own, kind, error = explaining_wall(room, q, p, 0.0)
+            if own >= 0 and is_known and not is_on_straight_span(room.walls[own], contact(room.walls[own], q, p)[2]):
+                own = -1
+            if own < 0:
+                # A wall either ends or goes on: what explains the echo better.
+                if not is_known:
+                    own, kind, error = explaining_wall(room, q, p, GROWTH_M)
+                error_of_point = enter_point(room, q, p, error)
+                is_point = error_of_point < 1.0
+                if is_point and own >= 0:
+                    lead = 0.5 * EXPLAINED_SIGMAS**2 * (error**2 - error_of_point**2)
+                    b = bin_of(contact(room.walls[own], q, p)[2])
+                    if 0 <= b < WALL_BINS:
+                        enter_pass(room.walls[own], b, min(lead, 1.0))
+                    own = -1
             if own >= 0:
-                enter_reading(room.walls[own], q, kind, p)
+                if kind == FOOT:
+                    expected, along = distance_and_foot(room.walls[own], q.x, q.y)
+                    add_residual(room, room.walls[own], q.range_m - expected, along, expected)
+                enter_reading(room, room.walls[own], q, kind, p)
         weaken(room, q, own, p)
-        enter_corners(room, q, p)
-        is_known = is_known or own >= 0 or is_explained_by_point(room, q, p)
-        slot = keep_recent(room, scratch.fired_sensors[i], q, IS_KNOWN if is_known else IS_FREE)
+        enter_looks(room, room.corners, CORNERS_MAX, q, p)
+        enter_looks(room, room.edges, EDGES_MAX, q, p)
+        is_known = is_known or own >= 0 or is_point or is_from_any_end(room, q, p)
+        # The echoes of a wall that may be another one may also start that.
+        is_open = own >= 0 and not is_on_straight_span(room.walls[own], contact(room.walls[own], q, p)[2])
+        slot = keep_recent(room, scratch.fired_sensors[i], q, IS_KNOWN if is_known and not is_open else IS_FREE)
         if slot >= 0 and not is_known:
             unexplained += 1
             # Any of them with equal chance: else the echoes of one corner keep the others waiting.
@@ -203,12 +226,11 @@ def update_walls(memory: Memory, p: SettingsRecord, m: int) -> None:
     newest = enter_firing(memory.s, memory.tracks, p, m)
     firings = int(memory.state["room"]["firings"][0])
     fit_walls(memory.s, p, firings % FIT_FIRINGS, MAX_WALLS, FIT_FIRINGS)
-    if newest >= 0:
-        try_wall(memory, p, newest)
+    is_new = newest >= 0 and try_wall(memory, p, newest)
     turn, phase = divmod(firings, TIDY_FIRINGS)
-    if phase == 0:
+    if phase == 0 or is_new:
         merge_walls(memory, p)
-    elif phase == TIDY_FIRINGS // 3:
+    if phase == TIDY_FIRINGS // 3:
         drop_explained(memory.s, memory.tracks, p, turn)
     elif phase == TIDY_FIRINGS * 2 // 3:
         find_corners(memory.s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -16,6 +17,7 @@ from perception.bayes.wall_contact import (
     BEAM_EDGE,
     FOOT,
     NOWHERE,
+    ONLY_NAMED,
     SPAN_MARGIN_M,
     contact,
     corner_of,
@@ -23,11 +25,21 @@ from perception.bayes.wall_contact import (
     is_from_circle,
     is_from_end,
     is_on_span,
+    is_on_straight_span,
     line_variance,
     tolerance,
 )
 from perception.bayes.wall_fit import fit_walls
-from perception.bayes.wall_records import IS_FREE, MAX_WALLS, RECENT_MAX, WALL_BIN_M, WALL_BINS, Wall, WallMap
+from perception.bayes.wall_records import (
+    CANDIDATE,
+    IS_FREE,
+    MAX_WALLS,
+    RECENT_MAX,
+    WALL_BIN_M,
+    WALL_BINS,
+    Wall,
+    WallMap,
+)
 from perception.kernel import kernel
 
 SAME_TURN_RAD: Final = 0.14
@@ -46,7 +58,11 @@ FREE_BINS_MIN: Final = 4
 MISFIT_MAX: Final = 3.0
 """Greatest χ² of a wall for each degree of freedom."""
 EDGE_BINS: Final = 24
-"""A frame moves when readings come so near its first or its last bin."""
+"""A frame moves when readings come so near its first or its last bin …"""
+FRAME_TURN_MAX: Final = 0.02
+"""… and turns when the line is turned by more than this against it, rad."""
+BARREL_PROBABILITY: Final = 0.9
+"""Least probability of a round object without a name that explains a wall's echoes."""
 HIDDEN_M: Final = 0.05
 HIDDEN_WITHIN_M: Final = 0.1
 """A range this much longer than to another wall, this far inside its ends, cannot come from behind it."""
@@ -91,12 +107,12 @@ def find_same(s: StateRecord) -> int:
     return -1
 
 
-def merge(main: Wall, part: Wall) -> None:
+def move_bins(main: Wall, part: Wall) -> None:
     """Move the readings of a wall to another one, and end it."""
     source: NDArray[Any] = np.asarray(part.bins)
     bins = np.flatnonzero(source["weight"] > 0.0)
     source = source[bins]
-    off, u = source["offset_sum"] / source["weight"], (bins - HALF + 0.5) * WALL_BIN_M
+    off, u = source["offset_sum"] / source["precision"], (bins - HALF + 0.5) * WALL_BIN_M
     dx = part.origin_x + part.normal_x * off - part.normal_y * u - main.origin_x
     dy = part.origin_y + part.normal_y * off + part.normal_x * u - main.origin_y
     across, along = main.normal_x * dx + main.normal_y * dy, main.normal_x * dy - main.normal_y * dx
@@ -106,52 +122,64 @@ def merge(main: Wall, part: Wall) -> None:
     at, place, source, across, along = at[inside], place[inside], source[inside], across[inside], along[inside]
     across += main.slope * ((place + 0.5) * WALL_BIN_M - along)
     target: NDArray[Any] = np.asarray(main.bins)
-    np.add.at(target["weight"], at, source["weight"])
-    np.add.at(target["offset_sum"], at, source["weight"] * across)
-    np.add.at(target["range_sum"], at, source["range_sum"])
+    np.add.at(target["offset_sum"], at, source["precision"] * across)
+    for name in ("weight", "precision", "range_sum"):
+        np.add.at(target[name], at, source[name])
     np.maximum.at(target["passes"], at, source["passes"])
     target["newest"][at] = source["newest"]
     main.is_changed = 1
     free(part)
 
 
-def move_frame(wall: Wall) -> None:
-    """Move a wall's frame along it by whole bins, if its readings come near the first or the last bin."""
-    bins: NDArray[Any] = np.asarray(wall.bins)
-    filled = np.flatnonzero(bins["weight"] > 0.0)
-    if not len(filled) or EDGE_BINS <= filled[0] <= filled[-1] < WALL_BINS - EDGE_BINS:
-        return
-    shift = int(filled[0] + filled[-1] + 1) // 2 - HALF
-    if abs(shift) < EDGE_BINS // 2:
-        return
-    moved = np.zeros_like(bins)
-    kept = np.arange(max(0, shift), min(WALL_BINS, WALL_BINS + shift))
-    moved[kept - shift] = bins[kept]
-    by = shift * WALL_BIN_M
-    bins[...] = moved
-    wall.origin_x -= wall.normal_y * by
-    wall.origin_y += wall.normal_x * by
-    wall.offset += wall.slope * by
-    wall.variance_offset += 2.0 * by * wall.covariance + by * by * wall.variance_slope
-    wall.covariance += by * wall.variance_slope
-    spans: NDArray[Any] = np.asarray(wall.spans)
-    spans["low"] -= by
-    spans["high"] -= by
-    wall.is_changed = 1
+def frameless(walls: NDArray[Any]) -> Iterator[int]:
+    """Yield the walls that have turned away from their frames, or come near the frames' ends, by their numbers."""
+    used = np.flatnonzero(walls["weight"][:MAX_WALLS] > 0.0)
+    spans, last = walls["spans"], np.maximum(walls["span_count"][used] - 1, 0)
+    is_out = (spans["first_bin"][used, 0] < EDGE_BINS) | (spans["end_bin"][used, last] > WALL_BINS - EDGE_BINS)
+    is_turned = np.abs(walls["slope"][used]) > FRAME_TURN_MAX
+    for k, turned in zip(used[is_out | is_turned].tolist(), is_turned[is_out | is_turned].tolist(), strict=True):
+        filled = np.flatnonzero(walls["bins"]["weight"][k] > 0.0)
+        if len(filled) and (turned or abs(_middle(filled)) >= EDGE_BINS // 2):
+            yield k
+
+
+def _middle(filled: NDArray[np.int64]) -> int:
+    """Return the middle of the filled bins, from the frame's."""
+    return int(filled[0] + filled[-1] + 1) // 2 - HALF
+
+
+def reframe(walls: NDArray[Any], k: int) -> None:
+    """Give wall `k` a frame along its line, about the middle of its readings.
+
+    Parameters
+    ----------
+    walls : (MAX_WALLS + 1,) record of `Wall`
+        All walls; the candidate's place is used, and free afterwards.
+    k : int
+        The wall, updated, to be fitted again.
+    """
+    wall, old = walls[k], walls[CANDIDATE]
+    walls[CANDIDATE] = wall
+    u = _middle(np.flatnonzero(np.asarray(old.bins)["weight"] > 0.0)) * WALL_BIN_M
+    off, c = old.offset + old.slope * u, 1.0 / math.hypot(1.0, old.slope)
+    nx, ny, slope = old.normal_x, old.normal_y, old.slope
+    free(wall)
+    wall.weight = old.weight
+    wall.origin_x, wall.origin_y = old.origin_x + nx * off - ny * u, old.origin_y + ny * off + nx * u
+    wall.normal_x, wall.normal_y = c * (nx + slope * ny), c * (ny - slope * nx)
+    wall.offset = wall.slope = 0.0
+    move_bins(wall, old)
 
 
 def merge_walls(memory: Memory, p: SettingsRecord) -> None:
-    """Merge two walls that are one into the heavier one; move the frames of walls that outgrow them."""
+    """Merge walls that are one into the heaviest one; give walls that outgrow or leave their frames new ones."""
     walls: NDArray[Any] = memory.state["room"]["walls"][0]
-    pair = find_same(memory.s)
-    if pair >= 0:
-        merge(walls[pair // MAX_WALLS], walls[pair % MAX_WALLS])
+    while (pair := find_same(memory.s)) >= 0:
+        move_bins(walls[pair // MAX_WALLS], walls[pair % MAX_WALLS])
         fit_walls(memory.s, p, 0, MAX_WALLS, 1)
-    spans, used = walls["spans"], np.flatnonzero(walls["weight"] > 0.0)
-    last = walls["span_count"][used] - 1
-    first_bins, end_bins = spans["first_bin"][used, 0], spans["end_bin"][used, last]
-    for k in used[(first_bins < EDGE_BINS) | (end_bins > WALL_BINS - EDGE_BINS)]:
-        move_frame(walls[k])
+    for k in frameless(walls):
+        reframe(walls, k)
+        fit_walls(memory.s, p, k, k + 1, 1)
 
 
 @kernel
@@ -160,7 +188,7 @@ def is_from_wall(room: WallMap, wall: Wall, q: Reading, p: SettingsRecord) -> bo
     kind, expected, along, dot = contact(wall, q, p)
     if kind == FOOT or (kind == BEAM_EDGE and edges_answer(room)):
         error = q.range_m - expected
-        slack = tolerance(room, wall, along, expected)
+        slack = tolerance(room, wall, along, expected, dot)
         if abs(error) < slack and is_on_span(wall, along, SPAN_MARGIN_M):
             return True
         is_certain = kind == FOOT and dot >= p[0].cos_must_answer and is_on_span(wall, along, -HIDDEN_WITHIN_M)
@@ -180,8 +208,8 @@ def release(room: WallMap, wall: Wall, p: SettingsRecord) -> None:
     """
     for j in range(min(room.recent_count, RECENT_MAX)):
         q = room.recent[j].reading
-        kind, expected, along, _ = contact(wall, q, p)
-        if kind != NOWHERE and abs(q.range_m - expected) < tolerance(room, wall, along, expected):
+        kind, expected, along, dot = contact(wall, q, p)
+        if kind != NOWHERE and abs(q.range_m - expected) < tolerance(room, wall, along, expected, dot):
             room.recent[j].is_free = IS_FREE
 
 
@@ -216,7 +244,9 @@ def drop_explained(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, turn
         if of.weight <= 0.0:
             continue
         count += 1
-        is_taken = is_from_circle(room, tracks, of.newest, p) or corner_of(room, of.newest, p) >= 0
+        # A barrel's side is a wall's until it is heard from farther round.
+        least = ONLY_NAMED if is_on_straight_span(room.walls[own], middle_of(b)) else BARREL_PROBABILITY
+        is_taken = is_from_circle(room, tracks, of.newest, p, least) or corner_of(room, of.newest, p) >= 0
         for k in range(MAX_WALLS):
             is_heavier = room.walls[k].weight > room.walls[own].weight
             is_taken = is_taken or (is_heavier and is_from_wall(room, room.walls[k], of.newest, p))

@@ -24,6 +24,7 @@ WALL_BIN_M: Final = 0.06
 SPANS_MAX: Final = 6
 """Spans of one wall, with openings between them."""
 CORNERS_MAX: Final = 24
+EDGES_MAX: Final = 24
 RECENT_MAX: Final = 768
 """Spaced readings of all sensors that are remembered for new walls."""
 IS_KNOWN: Final = 0
@@ -38,10 +39,12 @@ class WallBin(Record):
     """The readings of one place along a wall; a weight of 1 is an echo from the perpendicular's foot."""
 
     weight: float
+    precision: float
+    """Sum of the echoes' weights, each divided by the variance of its range, m⁻²."""
     offset_sum: float
-    """Sum of the distances from the origin along the frame's normal at which the echoes lie, weighted, m."""
+    """Sum of the distances from the origin along the frame's normal at which the echoes lie, by precision, m⁻¹."""
     range_sum: float
-    """Sum of the ranges, weighted, m."""
+    """Sum of the ranges, by precision, m⁻¹."""
     passes: float
     """Ranges that passed through, less with each new echo."""
     newest: Reading
@@ -89,21 +92,43 @@ class Wall(Record):
     bins: Annotated[Records[WallBin], WALL_BINS]
 
 
-class RoomCorner(Record):
-    """A point where two walls meet, or would meet."""
+class PointInformation(Record):
+    """What is known of the place of a point: the sum of information (m⁻²), and of information times place (m⁻¹)."""
 
-    is_used: int
+    xx: float
+    xy: float
+    yy: float
     x: float
     y: float
+
+
+class RoomCorner(Record):
+    """A point where two walls meet, or would meet, or where one ends."""
+
+    is_used: int
+    is_edge: int
+    """1 where it juts out, as the post of a doorway does; 0 for an inside corner."""
+    x: float
+    y: float
+    covariance_xx: float
+    """m²"""
+    covariance_xy: float
+    covariance_yy: float
+    heard: PointInformation
+    """From its echoes, without its walls."""
     echoes: float
     """Echoes from the point itself."""
     passes: float
     """Ranges towards it that went on …"""
     ended: float
     """… and those that did not."""
+    far_echoes: float
+    """The echoes and passes from where an edge between mirrors is not heard."""
+    far_passes: float
     first: int
-    """The walls."""
+    """The walls; where a wall ends alone, that wall …"""
     second: int
+    """… and 1 if it is its high end, 0 for its low end."""
 
 
 class RecentReading(Record):
@@ -119,6 +144,10 @@ class WallMap(Record):
 
     walls: Annotated[Records[Wall], MAX_WALLS + 1]
     corners: Annotated[Records[RoomCorner], CORNERS_MAX]
+    edges: Annotated[Records[RoomCorner], EDGES_MAX]
+    """Where walls end alone."""
+    lines: PointInformation
+    """From a corner's walls, while it is located."""
     recent: Annotated[Records[RecentReading], RECENT_MAX]
     recent_count: int
     """Readings ever put there."""
@@ -135,3 +164,6 @@ class WallMap(Record):
     variance_m2: float
     """Variance of a range r, as assumed now: `variance_m2` + `relative_variance` · r²."""
     relative_variance: float
+    noise_sums: Annotated[Floats, 5]
+    """Of the errors e of echoes of known walls: sums of w, w · r², w · r⁴, w · e² and w · r² · e²; w (m⁻⁴) is one
+    divided by the square of the range's variance."""

@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 
 from perception.bayes.state import Memory
 from perception.bayes.wall_bins import bin_of
-from perception.bayes.wall_corners import CORNER_ECHOES_MIN, CORNER_REACH_M
+from perception.bayes.wall_corners import (
+    CORNER_ECHOES_MIN,
+    CORNER_INSIDE_M,
+    CORNER_REACH_M,
+    EDGE_ECHOES_MIN,
+    EDGE_SAME_M,
+)
 from perception.bayes.wall_evidence import SPAN_CHI2_MIN, WALL_MIN_M
 from perception.bayes.wall_fit import OPENING_PASSES_MIN
 from perception.bayes.wall_records import MAX_WALLS, WALL_BINS
@@ -35,6 +41,22 @@ TOGETHER_WEIGHT_MIN: Final = 5.0
 """Weight of two spans, at least, that are evidence together."""
 PRIOR_NAT: Final = -2.0
 """Log prior odds of a line that passed the tests, before its evidence."""
+PROVEN_WEIGHT_MIN: Final = 6.0
+"""… of a wall that a corner proves …"""
+SPAN_DENSITY: Final = 4.0
+"""… and least weight for each metre."""
+PROOF_ECHOES: Final = 5.0
+PROOF_LEAD: Final = 3.0
+"""Echoes of a corner that proves its walls, and so many times its passes; …"""
+PROOF_SINE: Final = 0.8
+"""… least sine of the angle between them: a line across a corner meets its walls at half of theirs."""
+EDGE_SIGMA_MAX_M: Final = 0.05
+"""Greatest uncertainty of a sure edge."""
+CORNER_MET_M: Final = 0.3
+"""A corner is reported if both walls come so near it."""
+POINT_PRIOR_NAT: Final = 0.0
+POINT_ECHO_NAT: Final = 1.0
+"""Log prior odds of a corner where walls end, and evidence of each echo."""
 EVIDENCE_MAX_NAT: Final = 12.0
 """Greatest evidence that is believed: readings are not independent."""
 FRAME: Final = ("origin_x", "origin_y", "normal_x", "normal_y", "offset", "slope")
@@ -52,6 +74,21 @@ class WallSegment(Record):
     """Of its middle, across the wall, m²."""
     variance_turn: float
     """rad²"""
+    echoes: float
+    log_odds: float
+
+
+class CornerPoint(Record):
+    """A reported corner."""
+
+    x: float
+    y: float
+    covariance_xx: float
+    """m²"""
+    covariance_xy: float
+    covariance_yy: float
+    is_edge: int
+    """1 where it juts out, 0 for an inside corner."""
     echoes: float
     log_odds: float
 
@@ -96,11 +133,17 @@ class Straight:
 
 def wall_segments(memory: Memory) -> NDArray[Any]:
     """Return the walls that are sure, one segment for each span, as records of `WallSegment`, shape (n,)."""
+    return room_report(memory)[0]
+
+
+def room_report(memory: Memory) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the walls and the corners that are sure: `WallSegment`, one for each span, and `CornerPoint`."""
     with np.errstate(all="ignore"):  # numbers of a damaged recording
         room = memory.state["room"][0]
-        walls = sure_walls(room["walls"][:MAX_WALLS])
-        reach_corners(walls, room["corners"])
-        return np.array([row for wall in walls.values() for row in _segments(wall)], WallSegment.DTYPE)
+        walls = sure_walls(room["walls"][:MAX_WALLS], room["corners"])
+        points = [*reach_corners(walls, room["corners"]), *end_at_edges(walls, room["edges"])]
+        segments = [row for wall in walls.values() for row in _segments(wall)]
+        return np.array(segments, WallSegment.DTYPE), np.array(points, CornerPoint.DTYPE)
 
 
 def _segments(of: Straight) -> Iterator[tuple[float, ...]]:
@@ -112,26 +155,36 @@ def _segments(of: Straight) -> Iterator[tuple[float, ...]]:
         yield (*of.point(low), *of.point(high), across, variance_turn, weight, PRIOR_NAT + evidence)
 
 
-def sure_walls(walls: NDArray[Any]) -> dict[int, Straight]:
-    """Return the walls that are sure, by their number.
+def sure_walls(walls: NDArray[Any], corners: NDArray[Any]) -> dict[int, Straight]:
+    """Return the walls that are sure, by their number: alone, or as a sure wall's neighbour at a corner.
 
     Parameters
     ----------
     walls : (n,) record of `Wall`
         All walls.
+    corners : (n,) record of `RoomCorner`
+        All corners.
     """
-    found = {}
-    for number in np.flatnonzero((walls["weight"] > 0.0) & (walls["misfit"] < MISFIT_MAX)).tolist():
-        wall = walls[number]
-        spans = wall["spans"][: wall["span_count"]]
-        spans = spans[sure_spans(spans, wall["chi2"])]
-        if len(spans):
-            frame = tuple(float(wall[name]) for name in FRAME)
-            found[number] = Straight(wall, spans, frame, np.column_stack([spans["low"], spans["high"]]))
+    found: dict[int, Straight] = {}
+    fitting = np.flatnonzero((walls["weight"] > 0.0) & (walls["misfit"] < MISFIT_MAX)).tolist()
+    heard = corners[(corners["is_used"] == 1) & (corners["echoes"] >= PROOF_ECHOES) & (corners["is_edge"] == 0)]
+    heard = heard[heard["echoes"] > PROOF_LEAD * heard["passes"]]
+    first, second = walls[heard["first"]], walls[heard["second"]]
+    sine = first["normal_x"] * second["normal_y"] - first["normal_y"] * second["normal_x"]
+    pairs = np.column_stack([heard["first"], heard["second"]])[np.abs(sine) > PROOF_SINE]
+    for is_neighbour in (False, True):
+        proven = {int(b if a in found else a) for a, b in pairs if (a in found) != (b in found)}
+        for number in fitting if not is_neighbour else sorted(proven.intersection(fitting)):
+            wall = walls[number]
+            spans = wall["spans"][: wall["span_count"]]
+            spans = spans[sure_spans(spans, wall["chi2"], is_neighbour)]
+            if len(spans):
+                frame = tuple(float(wall[name]) for name in FRAME)
+                found[number] = Straight(wall, spans, frame, np.column_stack([spans["low"], spans["high"]]))
     return found
 
 
-def sure_spans(spans: NDArray[Any], chi2: float) -> NDArray[np.bool_]:
+def sure_spans(spans: NDArray[Any], chi2: float, is_proven: bool) -> NDArray[np.bool_]:
     """Return which spans of a wall can be reported: none unless it is a wall, by its best span or by all together.
 
     Parameters
@@ -140,17 +193,20 @@ def sure_spans(spans: NDArray[Any], chi2: float) -> NDArray[np.bool_]:
         All spans of the wall.
     chi2 : float
         Evidence of all together.
+    is_proven : bool
+        Whether a corner proves that it is a wall.
     """
     length, weight, straight = spans["high"] - spans["low"], spans["weight"], spans["chi2"]
-    sure = (length >= SPAN_MIN_M) & (weight >= SPAN_WEIGHT_MIN) & (straight > SPAN_CHI2_MIN)
-    if sure.any():
+    least = PROVEN_WEIGHT_MIN if is_proven else SPAN_WEIGHT_MIN
+    sure = (length >= SPAN_MIN_M) & (weight >= np.maximum(least, SPAN_DENSITY * length)) & (straight > SPAN_CHI2_MIN)
+    if sure.any() and not is_proven:
         together = chi2 if np.count_nonzero(sure & (weight >= TOGETHER_WEIGHT_MIN)) > 1 else -np.inf
         is_large = length[sure].max() >= WALL_MIN_M and weight[sure].max() >= WALL_WEIGHT_MIN
         sure &= bool(max(straight[sure].max(), together) >= WALL_CHI2_MIN and is_large)
     return np.asarray(sure)
 
 
-def reach_corners(walls: dict[int, Straight], corners: NDArray[Any]) -> None:
+def reach_corners(walls: dict[int, Straight], corners: NDArray[Any]) -> list[tuple[float, ...]]:
     """Move the outer ends of walls outwards to the corners in which they end, unless ranges passed there.
 
     A corner that is heard is reached from afar; one that is not, only if both walls end near it.
@@ -161,7 +217,13 @@ def reach_corners(walls: dict[int, Straight], corners: NDArray[Any]) -> None:
         The walls by their number; their ends are updated.
     corners : (n,) record of `RoomCorner`
         All corners.
+
+    Returns
+    -------
+    list of tuple
+        The corners that are sure, as `CornerPoint` has them.
     """
+    found = []
     for corner in corners[corners["is_used"] == 1]:
         x, y, echoes, passes, ended = (float(corner[name]) for name in ("x", "y", "echoes", "passes", "ended"))
         owners = [walls[number] for number in (int(corner["first"]), int(corner["second"])) if number in walls]
@@ -169,10 +231,55 @@ def reach_corners(walls: dict[int, Straight], corners: NDArray[Any]) -> None:
         is_heard = echoes >= CORNER_ECHOES_MIN and echoes > passes
         is_near = len(owners) == 2 and max(gap for _, gap, _ in places) < CORNER_NEAR_M
         is_near = is_near and passes < CORNER_PASSED_SHARE * ended
+        is_met = len(owners) == 2
         for owner, (along, gap, side) in zip(owners, places, strict=True):
             end = owner.ends[-side, side]
-            if (is_heard or is_near) and 0.0 < gap < CORNER_REACH_M and not owner.is_passed(along, end):
+            if (is_heard or is_near) and -CORNER_INSIDE_M < gap < CORNER_REACH_M and not owner.is_passed(along, end):
                 owner.ends[-side, side] = along
+            is_met = is_met and abs(owner.ends[-side, side] - along) < CORNER_MET_M
+        if is_met and (is_heard or is_near):
+            found.append(_point(corner))
+    return found
+
+
+def end_at_edges(walls: dict[int, Straight], edges: NDArray[Any]) -> list[tuple[float, ...]]:
+    """Move the ends of walls to the edges that are heard there.
+
+    Parameters
+    ----------
+    walls : dict of Straight
+        The walls by their number; their ends are updated.
+    edges : (n,) record of `RoomCorner`
+        All edges.
+
+    Returns
+    -------
+    list of tuple
+        The edges that are sure, as `CornerPoint` has them.
+    """
+    found = []
+    for edge in edges[edges["is_used"] == 1]:
+        echoes, passes, owner = float(edge["echoes"]), float(edge["passes"]), walls.get(int(edge["first"]))
+        variance = float(edge["covariance_xx"] + edge["covariance_yy"])
+        if owner is None or echoes < EDGE_ECHOES_MIN or echoes <= passes or variance > EDGE_SIGMA_MAX_M**2:
+            continue
+        along, side = owner.beyond(float(edge["x"]), float(edge["y"]))[0], int(edge["second"])
+        reach = EDGE_SAME_M if edge["is_edge"] == 1 else CORNER_REACH_M
+        beyond = (along - owner.ends[:, side]) * (2 * side - 1)
+        span = int(np.abs(beyond).argmin())
+        is_own = -EDGE_SAME_M < beyond[span] < reach and (owner.ends[span, 1 - side] < along) == bool(side)
+        if is_own and not owner.is_passed(along, owner.ends[span, side]):
+            owner.ends[span, side] = along
+            found.append(_point(edge))
+    return found
+
+
+def _point(corner: NDArray[Any]) -> tuple[float, ...]:
+    """Return a corner as `CornerPoint` has it."""
+    log_odds = POINT_PRIOR_NAT + POINT_ECHO_NAT * (float(corner["echoes"]) - float(corner["passes"]))
+    place = (float(corner[name]) for name in ("x", "y", "covariance_xx", "covariance_xy", "covariance_yy"))
+    clipped = min(max(log_odds, -EVIDENCE_MAX_NAT), EVIDENCE_MAX_NAT)
+    return (*place, int(corner["is_edge"]), float(corner["echoes"]), clipped)
 
 
 def wall_ends(memory: Memory) -> Floats:

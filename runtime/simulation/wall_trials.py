@@ -1,4 +1,4 @@
-"""The walls that perception reports in random rooms, compared with the truth.
+"""The walls and corners that perception reports in random rooms, compared with the truth.
 
 Truth is what answered: of each wall the 5 cm places from which an echo came, and what lies between two of them that
 are near each other. Reported length is right where it lies on a wall in its direction, and false elsewhere.
@@ -38,6 +38,10 @@ RIGHT_RAD: Final = math.radians(3.0)
 """Reported length is right within this of a wall and of its direction."""
 ON_WALL_M: Final = 1e-3
 """An echo comes from a wall if its point lies this near."""
+CORNER_ECHOES_MIN: Final = 10
+"""A corner or an edge counts if so many echoes came from the point itself."""
+CORNER_WITHIN_M: Final = 0.15
+"""A reported one is right within this of a true one of its kind."""
 DRIVE_M: Final = 25.0
 DENSE_DRIVE_M: Final = 12.0
 DENSE_STEP_M: Final = 0.15 * FOOT_M
@@ -74,6 +78,39 @@ class Segment:
 
 
 @dataclass(frozen=True, slots=True)
+class Corner:
+    """A point where two walls meet, or where one ends: an edge."""
+
+    x: float
+    y: float
+    is_edge: bool
+
+    def distance(self, other: Corner) -> float:
+        """Return the distance from another point of the same kind, m; +inf from one of the other kind."""
+        return math.dist((self.x, self.y), (other.x, other.y)) if self.is_edge == other.is_edge else math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class CornerTrial:
+    """The corners and edges of one drive.
+
+    Attributes
+    ----------
+    answered, found : int
+        How many answered, and how many of these were found.
+    errors_m : tuple of float
+        Of all right ones, m.
+    false : int
+        How many false ones were reported.
+    """
+
+    answered: int
+    found: int
+    errors_m: tuple[float, ...]
+    false: int
+
+
+@dataclass(frozen=True, slots=True)
 class WallTrial:
     """Lengths (m), counts and errors of one drive; errors are of the reported walls that lie on a true one."""
 
@@ -85,6 +122,45 @@ class WallTrial:
     lines: int
     offsets_m: tuple[float, ...]
     angles_rad: tuple[float, ...]
+    corners: CornerTrial
+
+
+def reported_corners(objects: Iterable[DetectedObject]) -> list[Corner]:
+    """Return the corners and edges among reported objects."""
+    kinds = {"edge": True, "inside corner": False}
+    return [Corner(seen.x, seen.y, is_edge=kinds[seen.model]) for seen in objects if seen.model in kinds]
+
+
+def true_corners(walls: Sequence[Segment]) -> list[Corner]:
+    """Return the points where walls meet, and those where one ends alone."""
+    ends = np.concatenate([[wall.begin, wall.end] for wall in walls])
+    is_same = np.hypot(*(ends[:, None] - ends[None]).transpose(2, 0, 1)) < ON_WALL_M
+    firsts = np.flatnonzero(is_same.argmax(axis=1) == np.arange(len(ends)))
+    return [
+        Corner(float(ends[k, 0]), float(ends[k, 1]), is_edge=bool(is_same[k].sum() == 1)) for k in firsts.tolist()
+    ]
+
+
+def compare_corners(true: Sequence[Corner], echoes: Sequence[int], found: Sequence[Corner]) -> CornerTrial:
+    """Return how reported corners compare with the true ones.
+
+    Parameters
+    ----------
+    true : sequence of Corner
+        The true corners.
+    echoes : sequence of int
+        The echoes that came from each of them.
+    found : sequence of Corner
+        The reported ones.
+    """
+    errors = np.array([[a.distance(b) for b in found] for a in true]).reshape(len(true), len(found))
+    is_right = errors < CORNER_WITHIN_M
+    heard = np.asarray(echoes) >= CORNER_ECHOES_MIN
+    nearest = errors.min(axis=1, initial=math.inf)
+    return CornerTrial(
+        int(heard.sum()), int((heard & is_right.any(axis=1)).sum()),
+        tuple(nearest[nearest < CORNER_WITHIN_M].tolist()), int((~is_right.any(axis=0)).sum()),
+    )  # fmt: skip
 
 
 def reported_walls(objects: Iterable[DetectedObject]) -> list[Segment]:
@@ -113,32 +189,43 @@ def try_room(settings: Settings, room: FurnishedRoom, seed: int, step_m: float) 
     length_m = DENSE_DRIVE_M if step_m < DENSE_STEP_M else DRIVE_M
     walls = [Segment(np.array([w.x1_m, w.y1_m]), np.array([w.x2_m, w.y2_m])) for w in room.world.wall]
     answered = [np.zeros(math.ceil(wall.length_m / PLACE_M), dtype=np.bool_) for wall in walls]
+    corners = true_corners(walls)
+    echoes = np.zeros(len(corners), dtype=np.int64)
     for k, (x, y, yaw) in enumerate(drive(room, seed, step_m / len(pattern.masks), length_m).tolist()):
         fired = sensors(pattern.masks[k % len(pattern.masks)])
         pose = Pose(x, y, yaw)
         mask = np.isin(np.arange(len(ring.mounts)), fired)
-        _mark(walls, answered, sonar, pose, mask, ring.window_m)
+        points = _echo_points(sonar, pose, mask, ring.window_m)
+        _mark(walls, answered, points)
+        echoes += [int((np.hypot(*(points - (it.x, it.y)).T) < ON_WALL_M).sum()) for it in corners]
         ranges = sonar.fire(pose, yaw, fired)
         perception.observe(Firing(k * ring.firing.step_period_s, pose, yaw, ranges))
         while perception.can_refine and perception.refine():
             pass
-    return compare(walls, answered, reported_walls(perception.labelled_objects()))
+    seen = perception.labelled_objects()
+    return compare(
+        walls, answered, reported_walls(seen), compare_corners(corners, echoes.tolist(), reported_corners(seen))
+    )
 
 
-def _mark(
-    walls: Sequence[Segment], answered: Sequence[Places], sonar: Sonar, pose: Pose, fired: Places, window_m: float
-) -> None:  # fmt: skip
-    """Mark the places of the walls that answer a firing."""
+def _echo_points(sonar: Sonar, pose: Pose, fired: Places, window_m: float) -> Floats:
+    """Return the points from which a firing's echoes come, shape (n, 2)."""
     echoes = sonar.true_echoes(pose, pose.theta, fired)
     heard = echoes[fired & (echoes["distance"] < window_m)]
-    points = np.column_stack([heard["x"], heard["y"]])
+    return np.column_stack([heard["x"], heard["y"]])
+
+
+def _mark(walls: Sequence[Segment], answered: Sequence[Places], points: Floats) -> None:
+    """Mark the places of the walls at these points."""
     for wall, places in zip(walls, answered, strict=True):
         off, along = wall.off_and_along(points)
         is_on = (np.abs(off) < ON_WALL_M) & (along > -ON_WALL_M) & (along < wall.length_m + ON_WALL_M)
         places[np.clip((along[is_on] / PLACE_M).astype(np.int64), 0, len(places) - 1)] = True
 
 
-def compare(walls: Sequence[Segment], answered: Sequence[Places], found: Sequence[Segment]) -> WallTrial:
+def compare(
+    walls: Sequence[Segment], answered: Sequence[Places], found: Sequence[Segment], corners: CornerTrial
+) -> WallTrial:  # fmt: skip
     """Return how reported walls compare with the true ones.
 
     Parameters
@@ -149,6 +236,8 @@ def compare(walls: Sequence[Segment], answered: Sequence[Places], found: Sequenc
         Which places of each wall answered, from its beginning.
     found : sequence of Segment
         The reported walls.
+    corners : CornerTrial
+        The comparison of the corners.
     """
     owners: list[int] = []
     offsets: list[float] = []
@@ -180,7 +269,7 @@ def compare(walls: Sequence[Segment], answered: Sequence[Places], found: Sequenc
         found_m += float((truth & covered).sum()) * PLACE_M
     return WallTrial(
         count, answered_m, found_m, sum(line.length_m for line in found), false_m,
-        sum(owner >= 0 for owner in owners), tuple(offsets), tuple(angles),
+        sum(owner >= 0 for owner in owners), tuple(offsets), tuple(angles), corners,
     )  # fmt: skip
 
 
@@ -203,7 +292,7 @@ def _with_gaps_filled(places: Places) -> Places:
 
 @dataclass(frozen=True, slots=True)
 class WallFigures:
-    """Figures of many drives: shares of length, lines for each wall, and errors (m, degrees)."""
+    """Figures of many drives: shares of length, lines for each wall, errors (m, degrees), false corners a room."""
 
     rooms: int
     walls: int
@@ -214,6 +303,11 @@ class WallFigures:
     offset_p95_m: float
     angle_mean_deg: float
     angle_p95_deg: float
+    corners: int
+    corners_found: float
+    corner_mean_m: float
+    corner_p95_m: float
+    false_corners: float
 
 
 def figures(trials: Sequence[WallTrial]) -> WallFigures:
@@ -223,6 +317,9 @@ def figures(trials: Sequence[WallTrial]) -> WallFigures:
     walls = sum(trial.walls for trial in trials)
     reported_m = sum(trial.reported_m for trial in trials)
     is_any = len(offsets) > 0
+    corners = [trial.corners for trial in trials]
+    errors = np.array([error for it in corners for error in it.errors_m])
+    heard = sum(it.answered for it in corners)
     return WallFigures(
         rooms=len(trials),
         walls=walls,
@@ -233,4 +330,9 @@ def figures(trials: Sequence[WallTrial]) -> WallFigures:
         offset_p95_m=float(np.percentile(offsets, 95.0)) if is_any else math.nan,
         angle_mean_deg=float(angles.mean()) if is_any else math.nan,
         angle_p95_deg=float(np.percentile(angles, 95.0)) if is_any else math.nan,
+        corners=heard,
+        corners_found=sum(it.found for it in corners) / max(heard, 1),
+        corner_mean_m=float(errors.mean()) if len(errors) else math.nan,
+        corner_p95_m=float(np.percentile(errors, 95.0)) if len(errors) else math.nan,
+        false_corners=sum(it.false for it in corners) / max(len(corners), 1),
     )

@@ -43,7 +43,7 @@ def room_evidence(w: Array, walls: list[tuple[float, float]], corner: Array, edg
         for normal, distance in walls:
             off = abs((axis - normal + math.pi) % (2.0 * math.pi) - math.pi)
             ahead = distance - q[:2] @ (math.cos(normal), math.sin(normal))
-            if ahead <= 0.0 or math.cos(off) < 0.6 or (off > S.half_angle_rad and not edges):
+            if ahead <= 0.0 or math.cos(off) < 0.25 or (off > S.half_angle_rad and not edges):
                 continue
             reach, along = naive_walls.answer(q[:2], axis, S.half_angle_rad, normal, distance)
             if SPAN[0] - 0.2 <= along <= SPAN[1] + 0.2:

@@ -34,7 +34,7 @@ def test_echoes_from_feet_and_beam_edges_give_the_true_line_from_a_turned_frame(
             q = reading(*pair(sensor), axis, exact + rng.normal(0, SIGMA))
             kind = contact(wall, q, P)[0]
             kinds.add(kind)
-            wall_bins.enter_reading(wall, q, kind, P)
+            wall_bins.enter_reading(room, wall, q, kind, P)
         for _ in range(2):
             refit(memory, wall)
         nx, ny = wall_normal(wall)

@@ -1,4 +1,4 @@
-"""Corners of walls, against the solution of two equations."""
+"""Corners of walls, against the solution of two equations, and the places of points by their echoes."""
 
 from __future__ import annotations
 
@@ -8,10 +8,22 @@ import numpy as np
 import pytest
 
 from perception.bayes import wall_corners
-from perception.bayes.wall_map import enter_corners
+from perception.bayes.state import Memory
+from perception.bayes.wall_records import CORNERS_MAX, EDGES_MAX, WallMap
 from tests import naive_walls
-from tests.perception.bayes.rooms import fill, new_room, place_wall, reading
-from tests.perception.bayes.tracks import P, examples
+from tests.perception.bayes.rooms import SIGMA, fill, new_room, place_wall, reading
+from tests.perception.bayes.tracks import P, S, examples, pair
+
+
+def corner_room() -> tuple[Memory, WallMap]:
+    """Return a room whose two walls end near their crossing at (2, 2)."""
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    place_wall(room.walls[1], np.zeros(2), math.pi / 2, 2.0)
+    fill(memory, room.walls[0], 0.0, 1.5)
+    fill(memory, room.walls[1], -1.5, 0.0)
+    wall_corners.find_corners(memory.s)
+    return memory, room
 
 
 @examples(30, 300)
@@ -38,26 +50,101 @@ def test_walls_that_end_near_their_crossing_have_a_corner_there(examples: int) -
         assert is_corner == (math.sin(turn) > 0.4)
         if is_corner:
             assert found == pytest.approx(point, abs=1e-9)
+            # The first wall leaves the point along its tangent: before the second wall, or behind it.
+            tangent = np.array([-normals[0][1], normals[0][0]])
+            assert wall_corners.is_edge(first, second, *found) == (normals[1] @ tangent > 0.0)
         second.spans[0].low = feet[1] - 1.0
         assert not wall_corners.crossing(first, second)[0]
 
 
 def test_a_corner_keeps_its_echoes_while_its_walls_last() -> None:
-    memory, room = new_room()
-    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
-    place_wall(room.walls[1], np.zeros(2), math.pi / 2, 2.0)
-    fill(memory, room.walls[0], 0.0, 1.5)
-    fill(memory, room.walls[1], -1.5, 0.0)
-    wall_corners.find_corners(memory.s)
+    memory, room = corner_room()
     corner = room.corners[0]
-    assert (corner.x, corner.y, corner.echoes) == pytest.approx((2.0, 2.0, 0.0))
-    corner.echoes = 3.0
+    assert (corner.x, corner.y, corner.echoes, corner.is_edge) == pytest.approx((2.0, 2.0, 0.0, 0))
     for _ in range(3):
-        enter_corners(room, reading(0.0, 0.0, math.pi / 4, 4.0), P)
-        enter_corners(room, reading(0.0, 0.0, math.pi / 4, 1.0), P)
-        enter_corners(room, reading(0.0, 0.0, 0.0, 4.0), P)
+        wall_corners.enter_echo(room, corner, reading(0.5, 0.5, math.pi / 4, math.hypot(1.5, 1.5)))
+        for axis, range_m in ((math.pi / 4, 4.0), (math.pi / 4, 1.0), (0.0, 4.0)):
+            wall_corners.enter_looks(room, room.corners, CORNERS_MAX, reading(0.0, 0.0, axis, range_m), P)
     wall_corners.find_corners(memory.s)
     assert (corner.is_used, corner.echoes, corner.passes, corner.ended) == (1, 3.0, 3.0, 3.0)
+    assert (corner.far_echoes, corner.far_passes) == (3.0, 3.0)
     room.walls[1].weight = 0.0
     wall_corners.find_corners(memory.s)
     assert corner.is_used == 0
+
+
+@examples(10, 100)
+def test_the_place_of_a_corner_is_the_weighted_mean_of_its_lines_and_echoes(examples: int) -> None:
+    rng = np.random.default_rng(47)
+    for _ in range(examples):
+        memory, room = corner_room()
+        corner, point = room.corners[0], np.array([2.0, 2.0])
+        rows: list[tuple[float, float]] = []
+        levels: list[float] = []
+        weights: list[float] = []
+        for wall, normal in ((room.walls[0], (1.0, 0.0)), (room.walls[1], (0.0, 1.0))):
+            u = wall_corners.position_along(wall, 2.0, 2.0)
+            rows.append(normal)
+            levels.append(2.0)
+            variance = wall.variance_offset + 2.0 * u * wall.covariance + u * u * wall.variance_slope
+            weights.append(1.0 / (variance + 0.002**2))
+        for _ in range(int(rng.integers(1, 9))):
+            sensor = rng.uniform(-1.0, 1.0, 2)
+            away = math.dist(sensor, point)
+            range_m = away + float(rng.normal(0.0, SIGMA))
+            wall_corners.enter_echo(room, corner, reading(*pair(sensor), 0.8, range_m))
+            rows.append(pair((point - sensor) / away))
+            levels.append(float(np.array(rows[-1]) @ sensor) + range_m)
+            weights.append(1.0 / SIGMA**2)
+        a, w = np.array(rows), np.array(weights)
+        covariance = np.linalg.inv(a.T @ (w[:, None] * a))
+        wall_corners.find_corners(memory.s)
+        assert (corner.x, corner.y) == pytest.approx(covariance @ (a.T @ (w * levels)), abs=1e-6)
+        found = [corner.covariance_xx, corner.covariance_xy, corner.covariance_yy]
+        assert found == pytest.approx([covariance[0, 0], covariance[0, 1], covariance[1, 1]], rel=1e-6, abs=1e-12)
+
+
+def test_the_end_of_a_wall_moves_to_the_edge_that_is_heard() -> None:
+    memory, room = new_room()
+    room.edge_echoes = 100.0
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -2.0, 1.0)
+    wall_corners.find_corners(memory.s)
+    edges = [edge for edge in room.edges if edge.is_used == 1]
+    edges.sort(key=lambda edge: edge.y)
+    assert [edge.y for edge in edges] == pytest.approx([-1.98, 1.02], abs=0.06)
+    assert [edge.second for edge in edges] == [0, 1]
+    post, rng = np.array([2.0, 1.13]), np.random.default_rng(48)
+    for _ in range(2):
+        for y in np.linspace(1.3, 2.6, 12):
+            sensor = np.array([0.7, y])
+            off = post - sensor
+            range_m = float(np.hypot(*off) + rng.normal(0.0, SIGMA))
+            q = reading(*pair(sensor), math.atan2(off[1], off[0]), range_m)
+            at, error = wall_corners.point_of(room, room.edges, EDGES_MAX, q, P)
+            assert error < 1.0
+            wall_corners.enter_echo(room, room.edges[at], q)
+        wall_corners.find_corners(memory.s)
+    (edge,) = (edge for edge in room.edges if edge.is_used == 1 and edge.second == 1)
+    assert (edge.x, edge.y) == pytest.approx(post, abs=0.01)
+    assert (edge.echoes, edge.is_edge) == (24.0, 1)
+
+
+def test_a_point_that_mirrors_answer_from_afar_is_an_inside_corner() -> None:
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -2.0, 1.0)
+    for is_edge, far_passes in ((0, 3.0), (1, 30.0)):
+        wall_corners.find_corners(memory.s)
+        (edge,) = (edge for edge in room.edges if edge.is_used == 1 and edge.second == 1)
+        edge.far_echoes, edge.far_passes = 20.0, far_passes
+        wall_corners.find_corners(memory.s)
+        assert edge.is_edge == is_edge
+
+
+def test_a_point_explains_only_echoes_of_beams_that_hold_it() -> None:
+    _, room = corner_room()
+    away, half = math.hypot(2.0, 2.0), S.half_angle_rad
+    for turn, error, expected in ((0.0, 0.0, 0), (0.9 * half, 0.02, 0), (1.1 * half, 0.0, -1), (0.0, 0.2, -1)):
+        q = reading(0.0, 0.0, math.pi / 4 + turn, away + error)
+        assert wall_corners.point_of(room, room.corners, CORNERS_MAX, q, P)[0] == expected

@@ -30,11 +30,12 @@ def test_evidence_against_a_circle_is_that_of_two_least_squares_fits(examples: i
         for k, b in enumerate(bins.tolist()):
             of = wall.bins[b]
             z[k] = 2.0 + rng.normal(0, 0.003)
-            of.weight, of.offset_sum, of.range_sum = n[k], n[k] * z[k], n[k] * d[k]
+            of.weight, of.precision = n[k], n[k] / SIGMA**2
+            of.offset_sum, of.range_sum = of.precision * z[k], of.precision * d[k]
         low, high = spans(wall)[0]
         u = (bins - 95.5) * 0.06 - 0.5 * (low + high)
         expected, line = naive_walls.bend(u, z, d, np.hypot(SIGMA / np.sqrt(n), 0.005), 0.7)
-        found, misfit = wall_evidence.flatness(room, wall, 0, 1, P)
+        found, misfit = wall_evidence.flatness(wall, 0, 1, P)
         outside = round((found - expected) / 4.0)
         assert found == pytest.approx(expected + 4.0 * outside, abs=1e-3)
         assert outside >= 0
@@ -52,7 +53,7 @@ def test_a_long_flat_line_has_evidence_and_a_drums_tangent_has_none() -> None:
     wall.weight = 1.0
     for y in np.arange(-0.4, 0.4, 0.01).tolist():
         q = reading(1.0, y, math.atan2(-y, 1.3), math.hypot(1.3, y) - 0.3)
-        enter_reading(wall, q, FOOT, P)
+        enter_reading(room, wall, q, FOOT, P)
     refit(memory, wall)
     assert wall.chi2 < 0.0
 
@@ -66,6 +67,6 @@ def test_spans_are_judged_alone_and_together() -> None:
     first, second = (wall.spans[k] for k in range(2))
     assert (first.weight, second.weight) == pytest.approx((5.0, 1.5))
     for k, span in enumerate((first, second)):
-        assert span.chi2 == wall_evidence.flatness(room, wall, k, k + 1, P)[0]
-    assert wall.chi2 == wall_evidence.flatness(room, wall, 0, 2, P)[0]
+        assert span.chi2 == wall_evidence.flatness(wall, k, k + 1, P)[0]
+    assert wall.chi2 == wall_evidence.flatness(wall, 0, 2, P)[0]
     assert wall.chi2 > first.chi2 > second.chi2 > 0.0

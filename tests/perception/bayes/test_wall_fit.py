@@ -26,10 +26,11 @@ def test_the_line_is_the_least_squares_fit_of_the_covered_bins(examples: int) ->
         u, z, n = (bins - 95.5) * 0.06, rng.normal(1.0, 0.02, 40), rng.uniform(1.0, 9.0, 40)
         for b, offset, weight in zip(bins.tolist(), z.tolist(), n.tolist(), strict=True):
             of = wall.bins[b]
-            of.weight, of.offset_sum, of.range_sum = weight, weight * offset, 2.0 * weight
+            of.weight, of.precision = weight, weight / SIGMA**2
+            of.offset_sum, of.range_sum = of.precision * offset, 2.0 * of.precision
             of.passes = weight + 1.0 if b % 4 == 0 else 0.0
         covered = bins % 4 != 0
-        wall_fit.fit_line(room, wall)
+        wall_fit.fit_line(wall)
         (offset, slope), cov = naive_walls.line_fit(u[covered], z[covered], n[covered] / SIGMA**2)
         assert (wall.offset, wall.slope) == pytest.approx((offset, slope), abs=1e-9)
         row = (wall.variance_offset, wall.covariance, wall.variance_slope)
@@ -58,7 +59,7 @@ def test_echoes_of_an_end_do_not_lengthen_a_wall() -> None:
     fill(memory, wall, -1.5, 0.9, 8.0)
     for y in np.arange(0.9, 1.5, 0.01).tolist():
         q = reading(1.0, y, facing(0.0, rng), math.hypot(1.0, y - 0.9) + rng.normal(0, SIGMA))
-        wall_bins.enter_reading(wall, q, FOOT, P)
+        wall_bins.enter_reading(room, wall, q, FOOT, P)
     refit(memory, wall)
     assert spans(wall)[-1, 1] == pytest.approx(0.9, abs=0.13)
     assert wall.offset == pytest.approx(2.0, abs=0.005)

@@ -62,9 +62,9 @@ def test_each_wall_of_a_room_is_found_once_and_its_doorway_stays_open(model: Ref
     assert sides["upper"] in {1, 2}
 
 
-def test_echoes_of_an_established_drum_make_no_wall() -> None:
+def test_echoes_of_a_named_drum_make_no_wall() -> None:
     world = WorldConfig(drum=(DrumConfig(x_m=0.0, y_m=1.2, radius_m=0.3048),), acoustics=AcousticsConfig())
     memory = new_memory()
     track = memory.tracks[0]
-    track.status, track.x, track.y, track.radius = ESTABLISHED, 0.0, 1.2, 0.3048
+    track.status, track.x, track.y, track.radius, track.is_named = ESTABLISHED, 0.0, 1.2, 0.3048, 1
     assert len(walls_after(world, PATH * (1.0, 0.3), memory)) == 0

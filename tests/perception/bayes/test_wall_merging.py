@@ -11,7 +11,7 @@ from perception.bayes import wall_merging
 from perception.bayes.state import ESTABLISHED
 from perception.bayes.wall_records import IS_FREE, IS_KNOWN
 from perception.bayes.wall_report import wall_ends
-from tests.perception.bayes.rooms import fill, new_room, place_wall, refit, spans
+from tests.perception.bayes.rooms import SIGMA, fill, new_room, place_wall, refit, spans
 from tests.perception.bayes.tracks import P
 
 
@@ -58,7 +58,7 @@ def test_a_line_behind_a_wall_and_one_on_a_drum_end() -> None:
     fill(memory, alone, -0.4, 0.4, 1.0)
     track = memory.tracks[0]
     track.status, track.x, track.y, track.radius = ESTABLISHED, -2.3, 0.0, 0.3
-    track.root_xx = 0.05
+    track.root_xx, track.is_named = 0.05, 1
     wall_merging.merge_walls(memory, P)
     for k in (1, 2, 3):
         wall_merging.drop_explained(memory.s, memory.tracks, P, k)
@@ -94,3 +94,22 @@ def test_the_frame_of_a_wall_that_outgrows_it_moves_along_it() -> None:
     assert wall.spans[0].first_bin > 38
     refit(memory, wall)
     assert wall_ends(memory) == pytest.approx(before, abs=1e-6)
+
+
+def test_the_frame_of_a_wall_that_turned_away_from_it_turns_onto_the_line() -> None:
+    memory, room = new_room()
+    wall = room.walls[0]
+    place_wall(wall, np.array([1.0, -0.5]), 0.4, 2.0)
+    for b in range(80, 130):
+        of, u = wall.bins[b], (b - 95.5) * 0.06
+        of.weight, of.precision = 5.0, 5.0 / SIGMA**2
+        of.offset_sum, of.range_sum = of.precision * (2.0 - 0.2 * u), of.precision
+    refit(memory, wall)
+    before = wall_ends(memory)
+    assert wall.slope == pytest.approx(-0.2, abs=1e-3)
+    for _ in range(2):
+        wall_merging.merge_walls(memory, P)
+    assert wall.slope == pytest.approx(0.0, abs=1e-3)
+    assert math.hypot(wall.normal_x, wall.normal_y) == pytest.approx(1.0)
+    assert wall_ends(memory) == pytest.approx(before, abs=0.07)
+    assert wall.weight == pytest.approx(50 * 5.0, rel=0.1)

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from perception.bayes.object_report import wall_object
+from perception.bayes.object_report import corner_object, wall_object
 from perception.bayes.wall_bins import bin_of, enter_pass, free
 from perception.bayes.wall_corners import find_corners
-from perception.bayes.wall_report import wall_ends, wall_segments
+from perception.bayes.wall_report import room_report, wall_ends, wall_segments
 from tests.perception.bayes.rooms import fill, new_room, place_wall
 
 
@@ -77,3 +77,41 @@ def test_a_segment_is_an_object_with_its_length_in_its_covariance() -> None:
     assert seen.model == "wall"
     assert seen.probability is not None
     assert 0.9 < seen.probability < 1.0
+
+
+def test_a_corner_that_is_heard_proves_a_short_wall_and_is_reported() -> None:
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -1.0, 1.7)
+    place_wall(room.walls[1], np.zeros(2), math.pi / 2, 2.0)
+    fill(memory, room.walls[1], -1.8, -1.2, 0.8)
+    find_corners(memory.s)
+    assert len(wall_ends(memory)) == 1
+    (corner,) = (it for it in room.corners if it.is_used == 1)
+    corner.echoes, corner.passes, corner.ended = 9.0, 1.0, 9.0
+    segments, points = room_report(memory)
+    assert len(segments) == 2
+    (point,) = points
+    seen = corner_object(point.item())
+    assert seen.model == "inside corner"
+    assert (seen.x, seen.y) == pytest.approx((2.0, 2.0), abs=0.01)
+    assert seen.support == 9
+    assert seen.score > 0.99
+    corner.passes = 5.0
+    assert len(wall_ends(memory)) == 1
+
+
+def test_a_wall_ends_at_the_edge_that_is_heard_and_the_edge_is_reported() -> None:
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -1.0, 1.0)
+    find_corners(memory.s)
+    assert len(room_report(memory)[1]) == 0
+    (edge,) = (it for it in room.edges if it.is_used == 1 and it.second == 1)
+    edge.echoes, edge.y = 6.0, 1.13
+    edge.covariance_xx = edge.covariance_yy = 1e-5
+    segments, points = room_report(memory)
+    assert segments["y2"] == pytest.approx([1.13])
+    assert [corner_object(point.item()).model for point in points] == ["edge"]
+    edge.passes = 7.0
+    assert len(room_report(memory)[1]) == 0

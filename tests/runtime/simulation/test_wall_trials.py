@@ -8,7 +8,18 @@ import numpy as np
 import pytest
 
 from perception.detected_object import DetectedObject
-from runtime.simulation.wall_trials import PLACE_M, Segment, compare, figures, reported_walls
+from runtime.simulation.wall_trials import (
+    PLACE_M,
+    Corner,
+    CornerTrial,
+    Segment,
+    compare,
+    compare_corners,
+    figures,
+    reported_corners,
+    reported_walls,
+    true_corners,
+)
 
 
 def segment(x1: float, y1: float, x2: float, y2: float) -> Segment:
@@ -21,13 +32,14 @@ PLACES = np.zeros(80, dtype=np.bool_)
 PLACES[20:60] = True
 PLACES[40:44] = False
 """What answered: from 1 to 3 m, but for a short gap."""
+NONE = CornerTrial(0, 0, (), 0)
 
 
 def test_a_wall_found_whole_with_its_offset_and_angle() -> None:
     turn = math.radians(1.0)
     along = np.array([math.cos(turn), math.sin(turn)])
     middle = np.array([2.0, 0.01])
-    trial = compare([WALL], [PLACES], [Segment(middle - 1.02 * along, middle + 1.02 * along)])
+    trial = compare([WALL], [PLACES], [Segment(middle - 1.02 * along, middle + 1.02 * along)], NONE)
     assert (trial.walls, trial.lines) == (1, 1)
     assert trial.answered_m == pytest.approx(2.0)
     assert trial.found_m == pytest.approx(2.0)
@@ -38,7 +50,7 @@ def test_a_wall_found_whole_with_its_offset_and_angle() -> None:
 
 def test_length_off_the_wall_or_across_it_is_false() -> None:
     beyond, across = segment(3.0, 0.0, 5.0, 0.0), segment(2.0, -0.5, 2.0, 0.5)
-    trial = compare([WALL], [PLACES], [beyond, across])
+    trial = compare([WALL], [PLACES], [beyond, across], NONE)
     assert trial.false_m == pytest.approx(2.0, abs=2 * PLACE_M)
     assert trial.reported_m == pytest.approx(3.0)
     assert trial.found_m == 0.0
@@ -48,7 +60,7 @@ def test_length_off_the_wall_or_across_it_is_false() -> None:
 def test_a_wall_that_hardly_answered_does_not_count() -> None:
     few = np.zeros(80, dtype=np.bool_)
     few[:8] = True
-    trial = compare([WALL], [few], [])
+    trial = compare([WALL], [few], [], NONE)
     assert (trial.walls, trial.answered_m) == (0, 0.0)
 
 
@@ -62,9 +74,35 @@ def test_a_reported_wall_ends_where_its_covariance_says() -> None:
 
 
 def test_figures_of_several_drives() -> None:
-    found = figures([compare([WALL], [PLACES], [segment(1.0, 0.02, 3.0, 0.02)]), compare([WALL], [PLACES], [])])
+    seen = CornerTrial(3, 2, (0.01, 0.02, 0.03), 1)
+    found = figures(
+        [compare([WALL], [PLACES], [segment(1.0, 0.02, 3.0, 0.02)], seen), compare([WALL], [PLACES], [], NONE)]
+    )
     assert (found.rooms, found.walls) == (2, 2)
     assert found.found == pytest.approx(0.5)
     assert found.lines_a_wall == 0.5
     assert found.offset_mean_m == pytest.approx(0.02)
-    assert figures([compare([WALL], [PLACES], [])]).false == 0.0
+    assert (found.corners, found.false_corners) == (3, 0.5)
+    assert found.corners_found == pytest.approx(2 / 3)
+    assert found.corner_mean_m == pytest.approx(0.02)
+    nothing = figures([compare([WALL], [PLACES], [], NONE)])
+    assert (nothing.false, nothing.corners_found, nothing.false_corners) == (0.0, 0.0, 0.0)
+
+
+def test_walls_meet_in_inside_corners_and_end_at_edges() -> None:
+    walls = [segment(0.0, 0.0, 4.0, 0.0), segment(4.0, 3.0, 4.0, 0.0)]
+    assert true_corners(walls) == [
+        Corner(0.0, 0.0, is_edge=True),
+        Corner(4.0, 0.0, is_edge=False),
+        Corner(4.0, 3.0, is_edge=True),
+    ]
+
+
+def test_reported_corners_are_right_near_a_true_one_of_their_kind() -> None:
+    names = (("edge", 0.1, 0.0), ("inside corner", 4.0, 0.03), ("inside corner", 0.0, 0.0), ("post", 4.0, 0.0))
+    objects = [DetectedObject(name, x, y, 0.0, 0.01, 9, 1.0) for name, x, y in names]
+    true = [Corner(0.0, 0.0, is_edge=True), Corner(4.0, 0.0, is_edge=False), Corner(4.0, 3.0, is_edge=True)]
+    trial = compare_corners(true, [9, 40, 30], reported_corners(objects))
+    assert (trial.answered, trial.found, trial.false) == (2, 1, 1)
+    assert trial.errors_m == pytest.approx((0.1, 0.03))
+    assert compare_corners(true, [9, 40, 30], []) == CornerTrial(2, 0, (), 0)
