@@ -288,32 +288,41 @@ def claimed_by(q: Array, tracks: Iterable[tuple[int, Array, float, float]], opt:
 
 
 def is_hidden(
-    q: Array, centre: Array, rho: float, others: Iterable[tuple[Array, float, float]], gate: float
+    q: Array, centre: Array, rho: float, others: Iterable[tuple[Array, float, float, bool]], gate: float
 ) -> bool:  # fmt: skip
-    """Return whether a reading passed a circle and another circle (centre, radius, σ) stands between."""
+    """Return whether a reading passed a circle and another circle (centre, radius, σ, kind) stands between."""
     ray = complex(*(centre - q[:2]))
     if abs(ray) <= rho or q[4] - (abs(ray) - rho) <= gate:
         return False
-    for place, radius, _ in others:
+    for place, radius, _, _ in others:
         seen = complex(*(place - q[:2])) / (ray / abs(ray))
         if 0 < seen.real < abs(ray) - rho and abs(seen.imag) < radius:
             return True
     return False
 
 
+def is_elsewhere(apart: float, rho: float, other: float, is_model: bool, merge: float, gate: float) -> bool:
+    """Return whether circles this far apart are two bodies: a rival all but touches what it is a part of."""
+    return apart >= merge and (is_model or apart >= rho + other + gate)
+
+
 def is_explained_elsewhere(
-    q: Array, centre: Array, rho: float, others: Iterable[tuple[Array, float, float]], gate: float, merge: float,
-    opt: float, half_box: float, variance: tuple[float, float],
+    q: Array, centre: Array, rho: float, others: Iterable[tuple[Array, float, float, bool]], gate: float,
+    merge: float, opt: float, half_box: float, variance: tuple[float, float],
 ) -> bool:  # fmt: skip
-    """Return whether another circle, not in the same place, explains a reading with a smaller error."""
+    """Return whether another body explains a reading with a smaller error; each has a place, radius, σ and kind."""
     own = q[4] - (math.dist(centre, q[:2]) - rho)
     if own > gate:
         return False
-    for place, radius, sigma in others:
+    for place, radius, sigma, is_model in others:
         d, ahead = off_axis(q, place)
         error = abs(q[4] - (d - radius))
         tight = half_box + 3.0 * math.sqrt(variance[0] + variance[1] * d**2) + 2.0 * sigma
-        if math.dist(place, centre) >= merge and ahead >= opt * d and error < min(abs(own), tight):
+        if (
+            is_elsewhere(math.dist(place, centre), rho, radius, is_model, merge, gate)
+            and ahead >= opt * d
+            and error < min(abs(own), tight)
+        ):
             return True
     return False
 
@@ -358,8 +367,8 @@ def next_in_turn(
 
 
 def probability(
-    own: float, known: bool, prior: float, general: float, unknown: float, leads: dict[int, float], models: int,
-    line: int, in_wall: bool,
+    own: float, known: bool, prior: float, general: float, unknown: float, leads: dict[int, float], outline: float,
+    radius: float, models: int, line: int, in_wall: bool,
 ) -> float:  # fmt: skip
     """Return a track's share among all explanations, each weighted by its evidence and its prior."""
 
@@ -368,6 +377,10 @@ def probability(
 
     bonus = (prior if known else 0.0) + (-8.0 if known and in_wall else 0.0)
     total = 1.0 + weight(-own - bonus) + weight(unknown + general - own - bonus)
+    total += weight(outline - general) if known and outline != 0.0 else 0.0
+    if known and radius > 0.0:
+        rivals = sum(weight(lead - general) for k, lead in leads.items() if models <= k < line)
+        total += max(0.0, weight(radius - general) - rivals)
     for k, lead in leads.items():
         theirs = prior if k < models else general + 1.0 if k == line else 0.0
         total += weight(lead + theirs - bonus)
@@ -399,6 +412,50 @@ def model_check(
     misfit = (short.sum() - max(0.0, short.max(initial=0.0))) / math.sqrt(max(0.25, np.maximum(0.25, variance).sum()))
     sides = {int(v) % 36 for v in np.floor((bearings[own > 0] / (2.0 * math.pi) + 0.5) * 36)}
     return float(misfit), float((room - own).sum()), len(sides)
+
+
+def outline_lead(bearings: Array, errors: Array, variances: Array) -> float:
+    """Return the lead (nat) of a smooth outline about a circle over the circle, from 36 bearings' mean errors.
+
+    Parameters
+    ----------
+    bearings, errors, variances
+        Direction to the centre (rad), error (m) and its variance (m²) of each reading.
+    """
+    bins, mean, own = np.floor((bearings / (2.0 * math.pi) + 0.5) * 36).astype(int) % 36, [], []
+    used = [b for b in range(36) if (bins == b).sum() >= 3]
+    for b in used:
+        here, variance = errors[bins == b][:20], variances[bins == b][:20].mean()
+        middle, most = np.median(here), 3.0 * math.sqrt(variance)
+        mean.append(np.clip(here, middle - most, middle + most).mean())
+        own.append(variance / len(here) + 0.005**2)
+    if len(used) < 4:
+        return 0.0
+    turn = np.subtract.outer(used, used) * math.radians(10.0)
+    circle, outline = np.diag(own), 0.05**2 * np.exp((np.cos(turn) - 1.0) / 0.45**2) + np.diag(own)
+    m, determinants = np.array(mean), [np.linalg.slogdet(v).logabsdet for v in (circle, outline)]
+    chi2 = [m @ np.linalg.solve(v, m) for v in (circle, outline)]
+    return float(0.5 * (chi2[0] - chi2[1] + determinants[0] - determinants[1]))
+
+
+def round_lead(w: Array, centre: Array, rho: float, variances: Array) -> float:
+    """Return the lead (nat) of a circle of unknown radius over a circle, from readings in its beam and gate.
+
+    Parameters
+    ----------
+    w, centre, rho, variances
+        Readings (n, 5), the circle, and the variance of each range (m²).
+    """
+    towards = centre - w[:, :2]
+    d = np.hypot(*towards.T)
+    sigma = np.sqrt(variances)
+    error = np.clip(w[:, 4] - (d - rho), -3.0 * sigma, 3.0 * sigma) / sigma
+    columns = np.column_stack([towards / d[:, None], -np.ones(len(w))]) / sigma[:, None]
+    covariance = np.linalg.inv(columns.T @ columns)
+    change, own = float((covariance @ columns.T @ error)[2]), float(covariance[2, 2]) + 0.015**2
+    if not 0.015**2 < own <= 0.04**2:
+        return 0.0
+    return 0.5 * (change**2 / own - change**2 / (own + 0.04) + math.log(own / (own + 0.04)))
 
 
 def is_doubtful(careful: bool, misfit: float, room_lead: float, sides: int, confirmed: bool) -> bool:

@@ -180,7 +180,7 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
         "P27": Promise(
             "No false drum where none stands",
             "rooms of four walls and two boxes without a drum, .3 % noise, 90 s where everything echoes (soak: ten "
-            "rooms for thirty minutes each, `specular`): at most 1 look in 1,000 with a drum at ≥ .95; in `cone` 20",
+            "rooms for thirty minutes each, `cone` and `specular`): at most 1 look in 1,000 with a drum at ≥ .95",
         ),
         "P28": Promise(
             "Anyone's account and terminal",

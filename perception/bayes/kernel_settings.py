@@ -201,7 +201,8 @@ def make_settings(ring: RingConfig, models: Sequence[ModelConfig], config: Bayes
     it.cos_half_angle, it.sin_half_angle = math.cos(half_angle), math.sin(half_angle)
     it.cos_may_answer, it.cos_must_answer = math.cos(may), math.cos(must)
     it.sin_must_answer = math.sqrt(1.0 - it.cos_must_answer * it.cos_must_answer)
-    it.half_resolution_m, it.range_max_m = 0.5 * ring.resolution_m, ring.range_max_m
+    it.half_resolution_m = 0.5 * ring.resolution_m
+    it.range_min_m, it.range_max_m = ring.range_min_m, ring.range_max_m
     it.gate_m = GATE_M
     it.missed_echo_nat = math.log(MISSED_ECHO_PROBABILITY)
     it.short_echo_nat = SHORT_ECHO_NAT

@@ -28,6 +28,14 @@ from perception.records import Records
 
 SHARP: Final = 1e-3
 """Least half box, as a share of σ: below it the difference of two error functions only loses digits."""
+EXPONENT_MAX: Final = 60.0
+"""Exponents are clipped to ± this: what lies beyond is negligible in a sum."""
+
+
+@kernel
+def bounded_exp(v: float) -> float:
+    """Return e to the power of `v`, clipped to ± `EXPONENT_MAX`."""
+    return math.exp(min(EXPONENT_MAX, max(-EXPONENT_MAX, v)))
 
 
 @kernel

@@ -1,9 +1,10 @@
 """Whether a model is right where it is the best explanation so far, and how much the surroundings ask for.
 
-The alternatives of `perception.bayes.alternatives` are not all there is: a box of a drum's size, or a wall that
-answers from the beam's edge, is none of them, and then the model wins by default. Three checks need no alternative:
-the readings must scatter about the model as the ranges' noise does; the mapped walls and corners must not explain
-them; and where an echo says little about the shape, the object must have been heard from all over its front.
+The alternatives of `perception.bayes.alternatives` are not all there is: a wall that answers from the beam's edge is
+none of them, and then the model wins by default. `perception.bayes.outline_check` compares it with bodies of any
+outline. Three more checks need no alternative: the readings must scatter about the model as the ranges' noise does;
+the mapped walls and corners must not explain them; and where an echo says little about the shape, the object must
+have been heard from all over its front.
 
 An echo says little where everything echoes, because then it may come from anywhere in the beam; and a short look
 says little where names that it gave were withdrawn and no model was confirmed for a while.
@@ -145,6 +146,16 @@ def is_named_near(tracks: CircleTracks, x: float, y: float, apart: float) -> boo
 
 
 @kernel
+def leads_alone(track: CircleTrack, p: SettingsRecord) -> bool:
+    """Return whether a model leads without its prior: this cannot confirm a name that rests on it alone."""
+    best = track.outline_lead  # 0, so not confirmed, where the outline was not compared
+    for k in range(p[0].circle_count + 2):
+        if k != track.kind and track.leads[k] != 0.0:
+            best = max(best, track.leads[k])
+    return best < -p[0].model_prior_nat
+
+
+@kernel
 def count_names(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int, x: float, y: float) -> None:
     """Count the name of a track that was named before its refinement: as confirmed, as withdrawn, or not yet.
 
@@ -159,7 +170,7 @@ def count_names(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int,
     """
     track = tracks[t]
     if track.status == ESTABLISHED and track.is_named == 1:
-        if track.sides >= CONFIRMED_SIDES:
+        if track.sides >= CONFIRMED_SIDES and leads_alone(track, p):
             track.is_confirmed = 1
             s[0].names_withdrawn = 0
             s[0].unconfirmed_m = 0.0

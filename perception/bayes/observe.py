@@ -11,6 +11,7 @@ from typing import Final
 from perception.bayes.elements import HISTORY, Reading
 from perception.bayes.model_check import count_surroundings
 from perception.bayes.noise_estimation import add_roughness, choose_noise, noise_variance, tolerance_m
+from perception.bayes.occlusion import is_elsewhere
 from perception.bayes.pairing import make_segments
 from perception.bayes.parameters import (
     ASSOCIATION_MARGIN_M,
@@ -172,6 +173,8 @@ def keep_readings(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: in
             q = s[0].scratch.fired[i]
             owner = s[0].scratch.explained_by[i]
             is_own = owner in (UNEXPLAINED, t) or (owner < 0 and track.status != TENTATIVE)
+            if 0 <= owner < len(tracks) and not is_own:  # a part of the same body answered
+                is_own = not is_elsewhere(tracks[owner], p, cx, cy, track.radius)
             if bears_on_circle(q, cx, cy, track.radius, owner == UNEXPLAINED, is_own, p):
                 keep_reading(track, cx, cy, q)
                 track.unseen += 1

@@ -50,9 +50,29 @@ def is_hidden(
 
 
 @kernel
+def is_elsewhere(track: CircleTrack, p: Records[Settings], cx: float, cy: float, radius: float) -> bool:
+    """Return whether a circle's track is another body than a circle about (cx, cy), rather than a part of it.
+
+    Bodies do not overlap, and a rival that all but touches a model is a part of the body that the model stands for:
+    an edge of the box that was taken for a drum. It takes no readings from the model, which has to explain them.
+
+    Parameters
+    ----------
+    track, p
+        The track and the settings.
+    cx, cy, radius : float
+        The circle, m.
+    """
+    apart: float = p[0].merge_m
+    if track.kind >= p[0].model_count:
+        apart = max(apart, track.radius + radius + p[0].gate_m)
+    return math.hypot(track.x - cx, track.y - cy) >= apart
+
+
+@kernel
 def is_explained_elsewhere(
-    tracks: Records[CircleTrack], p: Records[Settings], q: Reading, cx: float, cy: float, off: float, own: int,
-    var0: float, rel2: float,
+    tracks: Records[CircleTrack], p: Records[Settings], q: Reading, cx: float, cy: float, radius: float, off: float,
+    own: int, var0: float, rel2: float,
 ) -> bool:  # fmt: skip
     """Return whether another established circle explains a reading, with an error smaller than `off`.
 
@@ -62,8 +82,8 @@ def is_explained_elsewhere(
         The circles and the settings.
     q : Reading
         The reading.
-    cx, cy, off : float
-        The circle's centre, and its error for the reading, m.
+    cx, cy, radius, off : float
+        The circle, and its error for the reading, m.
     own : int
         Its track.
     var0, rel2 : float
@@ -73,7 +93,7 @@ def is_explained_elsewhere(
         track = tracks[t]
         if track.status != ESTABLISHED or t == own or (p[0].polygon_count > 0 and track.kind >= p[0].model_count):
             continue
-        if math.hypot(track.x - cx, track.y - cy) < p[0].merge_m:
+        if not is_elsewhere(track, p, cx, cy, radius):
             continue
         dx = track.x - q.x
         dy = track.y - q.y
@@ -94,16 +114,14 @@ def is_relevant(
 
     Parameters
     ----------
-    tracks, p, q, cx, cy, own, var0, rel2
+    tracks, p, q, cx, cy, radius, own, var0, rel2
         As for `is_explained_elsewhere`.
-    radius : float
-        The circle's, m.
     """
     d = math.hypot(cx - q.x, cy - q.y)
     e = q.range_m - (d - radius)
     if e > p[0].gate_m:
         return not (d > radius and is_hidden(tracks, q.x, q.y, cx, cy, d, radius, own))
-    return not is_explained_elsewhere(tracks, p, q, cx, cy, abs(e), own, var0, rel2)
+    return not is_explained_elsewhere(tracks, p, q, cx, cy, radius, abs(e), own, var0, rel2)
 
 
 @kernel

@@ -333,6 +333,22 @@ MISFIT_MAX: Final = 3.0
 """Greatest shortfall of the hits' log likelihood, in σ, of a model where an echo says little."""
 VARIANCE_MIN_NAT2: Final = 0.25
 """Least variance assumed of a hit's log likelihood: exact ranges have none, and one outlier would decide."""
+OUTLINE_SIGMA_M: Final = 0.05
+OUTLINE_SCALE_RAD: Final = 0.45
+"""Deviation of an unknown outline from a model's, and over which bearing it changes: those of boxes of its size."""
+OUTLINE_SURFACE_M: Final = 0.005
+"""Deviation of a model's own surface, and of the poses from which it was heard."""
+OUTLINE_READINGS_MIN: Final = 3
+"""Least readings of a bearing that counts, so that their median ignores an outlier, …"""
+OUTLINE_CLIP_SIGMAS: Final = 3.0
+"""… from which errors count as no farther than this."""
+OUTLINE_BEARINGS_MIN: Final = 4
+"""Least bearings: two of them are needed for the place, and a third has an outlier now and then."""
+OTHER_RADIUS_SIGMA_M: Final = 0.2
+OTHER_RADIUS_SAME_M: Final = 0.015
+"""Deviation of other round bodies' radii from a model's; below the second a radius is the model's own."""
+OTHER_RADIUS_ERROR_M: Final = 0.04
+"""Greatest standard deviation at which a radius is compared; before that the rivals suffice."""
 ROOM_LEAD_NAT: Final = -5.0
 """Lead of the mapped walls and corners at which they explain an object."""
 ROOM_MARGIN_M: Final = 0.2

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from perception.bayes.elements import MAX_LINES, Reading
+from perception.bayes.likelihood import bounded_exp
 from perception.bayes.noise_estimation import noise_variance, tolerance_m
 from perception.bayes.parameters import FIT_SOFTNESS
 from perception.bayes.polygon_parameters import (
@@ -19,7 +20,6 @@ from perception.bayes.polygon_parameters import (
     POLYGON_WALL_SHARE,
 )
 from perception.bayes.range_fit import fit_circle, score_circle
-from perception.bayes.refine import bounded_exp
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import ESTABLISHED, FREE, CircleTracks, Line, PolygonTrack, StateRecord
 from perception.bayes.walls import off_and_along, reaches

@@ -8,16 +8,17 @@ passes cost less than the first.
 from __future__ import annotations
 
 import math
-from typing import Final
 
 from perception.bayes.alternatives import fit_other_circle, fit_other_line, score
 from perception.bayes.circle_posterior import posterior_circle
 from perception.bayes.corner_model import score_corner
 from perception.bayes.lateral_search import search_across
+from perception.bayes.likelihood import bounded_exp
 from perception.bayes.model_check import check_model, count_names, is_careful
 from perception.bayes.naming import update_name
 from perception.bayes.noise_estimation import add_residuals, noise_variance
 from perception.bayes.occlusion import keep_relevant
+from perception.bayes.outline_check import other_bodies, outline_lead, round_lead
 from perception.bayes.parameters import (
     ALTERNATIVE_STEPS,
     APART_RADII,
@@ -58,15 +59,6 @@ from perception.bayes.track_labels import drop_track, is_rejected, outlives
 from perception.bayes.track_selection import choose_circle, is_waiting
 from perception.bayes.walls import add_line, is_in_wall
 from perception.kernel import kernel
-
-EXPONENT_MAX: Final = 60.0
-"""Exponents are clipped to ± this: what lies beyond is negligible in a sum."""
-
-
-@kernel
-def bounded_exp(v: float) -> float:
-    """Return e to the power of `v`, clipped to ± `EXPONENT_MAX`."""
-    return math.exp(min(EXPONENT_MAX, max(-EXPONENT_MAX, v)))
 
 
 @kernel
@@ -189,6 +181,8 @@ def change_kind(s: StateRecord, p: SettingsRecord, track: CircleTrack, k: int, e
         track.leads[z] += track.log_likelihood_ratio - evidence_nat
     track.kind = k
     track.leads[k] = 0.0
+    track.outline_lead = 0.0
+    track.round_lead = 0.0
     track.log_likelihood_ratio = evidence_nat
     track.refinements = 0
     track.unseen += SWITCH_UNSEEN
@@ -260,7 +254,7 @@ def compare_alternatives(s: StateRecord, p: SettingsRecord, track: CircleTrack, 
 
 @kernel
 def existence_probability(s: StateRecord, p: SettingsRecord, track: CircleTrack, prior: float) -> float:
-    """Return the probability of a track's explanation among all: radii, line, corner, unknown object, nothing.
+    """Return the probability of a track's explanation among all: radii, line, corner, other bodies, nothing.
 
     Parameters
     ----------
@@ -277,6 +271,8 @@ def existence_probability(s: StateRecord, p: SettingsRecord, track: CircleTrack,
     in_wall = IN_WALL_NAT if kind < p[0].model_count and is_in_wall(s, track.x, track.y, track.radius) else 0.0
     own = track.log_likelihood_ratio + own_prior + in_wall
     total = 1.0 + bounded_exp(-own) + bounded_exp(track.unknown_nat + p[0].model_prior_nat - own)
+    if kind < p[0].model_count:
+        total += other_bodies(track, p)
     for k in range(line + 2):
         if k != kind and track.leads[k] != 0.0:
             lead = prior if k < p[0].model_count else (p[0].model_prior_nat + LINE_PRIOR_NAT if k == line else 0.0)
@@ -324,12 +320,15 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
         return
     careful = is_careful(s, p)
     add_residuals(s, tracks, p, t, n, careful)
+    is_due = track.is_named == 0 or track.refinements % MODEL_CHECK_EVERY == 0
+    if track.kind < p[0].model_count and is_due:
+        track.outline_lead = outline_lead(s, p, track, n)
+        track.round_lead = round_lead(s, p, track, n)
     track.probability = existence_probability(s, p, track, prior)
     evidence = track.log_likelihood_ratio
     if (evidence < 0.0 or evidence < track.unknown_nat - UNKNOWN_LEAD_NAT) and drop_track(track):
         return
     update_status(track, p)
-    is_due = track.is_named == 0 or track.refinements % MODEL_CHECK_EVERY == 0
     if track.status == ESTABLISHED and track.kind < p[0].model_count and is_due:
         check_model(s, p, track, n)
     report = p[0].report_probability
@@ -344,6 +343,8 @@ def refine(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, t: int) -> N
 def merge_duplicates(tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
     """Merge a track with others in the same place: keep the one with more evidence, or the one that a user marked.
 
+    A model that was reported, or confirmed, keeps its number, whichever of the two is older.
+
     Parameters
     ----------
     tracks, p, t
@@ -355,9 +356,14 @@ def merge_duplicates(tracks: CircleTracks, p: SettingsRecord, t: int) -> None:
         if k != t and other.status != FREE:
             apart = max(p[0].merge_m, APART_RADII * max(track.radius, other.radius))
             if math.hypot(other.x - track.x, other.y - track.y) < apart:
+                lead = track.is_named + track.is_confirmed - other.is_named - other.is_confirmed
+                named = track.number if lead > 0 else other.number
+                is_one_named = lead != 0 and track.marks == 0 and other.marks == 0
                 if outlives(other, track, other.log_likelihood_ratio > track.log_likelihood_ratio):
+                    other.number = named if is_one_named else other.number
                     track.status = FREE
                     return
+                track.number = named if is_one_named else track.number
                 other.status = FREE
 
 

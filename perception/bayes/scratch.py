@@ -8,6 +8,7 @@ from config.robot import SENSORS_MAX
 from perception.bayes.elements import (
     ATTRACTING_MAX,
     BEARING_BINS,
+    BIN_CAPACITY,
     GRID_CELLS,
     PAIRS_PER_SENSOR,
     READINGS_MAX,
@@ -127,6 +128,21 @@ class CirclePosterior(Record):
     covariance_yy: float
 
 
+class BearingErrors(Record):
+    """The errors of a circle's readings from one bearing."""
+
+    count: int
+    errors: Annotated[Floats, BIN_CAPACITY]
+    """Ascending, m."""
+    variance: float
+    """Sum of their variances, m²."""
+    mean: float
+    """m"""
+    accuracy: float
+    """Inverse of the mean's standard deviation, 1/m; 0 with too few readings."""
+    whitened: float
+
+
 class Scratch(Record):
     """Values that kernels overwrite before each use."""
 
@@ -147,6 +163,9 @@ class Scratch(Record):
     """Log likelihood of each cell of a posterior's grid, nat."""
     sides: Annotated[Ints, BEARING_BINS]
     """1 for each bearing bin from which an object was heard."""
+    bearings: Annotated[Records[BearingErrors], BEARING_BINS]
+    outline_root: Annotated[Floats, BEARING_BINS, BEARING_BINS]
+    """Lower Cholesky root of an unknown outline's covariance; see `perception.bayes.outline_check`."""
     near: Annotated[Records[MappedSegment], 32]
     """Segments near a place."""
     attracting: Annotated[Floats, ATTRACTING_MAX, 5]

@@ -96,6 +96,8 @@ class Settings(Record):
     sin_must_answer: float
     half_resolution_m: float
     """A range is rounded by at most this."""
+    range_min_m: float
+    """The ring measures no shorter range: what is nearer has this one, too."""
     range_max_m: float
     gate_m: float
     """A range this near to the predicted one is attributed to the object."""

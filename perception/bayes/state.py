@@ -163,6 +163,10 @@ class CircleTrack(Track):
     """Evidence of an unknown object in its place."""
     misfit: float
     """Shortfall of its hits' log likelihood from what the noise lets expect, in σ."""
+    outline_lead: float
+    """Lead of a body of unknown outline, nat; 0 where it was not compared."""
+    round_lead: float
+    """Lead of a circle of unknown radius, nat; 0 where it was not compared."""
     room_lead: float
     """Lead of the mapped walls and corners, nat."""
     sides: int

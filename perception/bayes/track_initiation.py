@@ -174,6 +174,8 @@ def reset_circle(track: CircleTrack) -> None:
     track.dispersion = 0.0
     track.unknown_nat = 0.0
     track.misfit = 0.0
+    track.outline_lead = 0.0
+    track.round_lead = 0.0
     track.room_lead = 0.0
     track.sides = 0
     track.is_confirmed = 0

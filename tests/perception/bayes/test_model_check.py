@@ -131,6 +131,10 @@ def test_a_withdrawn_name_makes_careful_until_a_model_is_confirmed() -> None:
     model_check.count_names(memory.s, memory.tracks, P, 1, 5.0, 5.1)
     assert other.is_confirmed == 0
     other.sides = CONFIRMED_SIDES
+    other.outline_lead, other.leads[1] = -9.0, -2.0
+    model_check.count_names(memory.s, memory.tracks, P, 1, 5.0, 5.1)
+    assert other.is_confirmed == 0, "only its prior makes it likelier than the first alternative"
+    other.leads[1] = -4.0
     model_check.count_names(memory.s, memory.tracks, P, 1, 5.0, 5.1)
     assert (other.is_confirmed, memory.s[0].names_withdrawn, memory.s[0].unconfirmed_m) == (1, 0, 0.0)
     assert not model_check.is_careful(memory.s, P)

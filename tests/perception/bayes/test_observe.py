@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -91,10 +93,17 @@ def test_readings_go_to_the_circle_with_the_least_error_and_every_circle_they_be
         observe.keep_readings(memory.s, memory.tracks, P, SENSORS)
         for k in range(TRACKS):
             status, centre, radius = circles["status"][k], place_of(memory, k), float(circles["radius"][k])
+            same = {
+                o for o in range(TRACKS)
+                if not naive_tracks.is_elsewhere(
+                    math.dist(centre, place_of(memory, o)), radius, circles["radius"][o],
+                    circles["kind"][o] < S.model_count, S.merge_m, S.gate_m,
+                )
+            }  # fmt: skip
             want = [
                 q for q, o in zip(fired.copy(), explained_by.tolist(), strict=True)
                 if status != FREE and naive_tracks.bears_on(
-                    q, centre, radius, o == -1, o in (-1, k) or (o < 0 and status == ESTABLISHED),
+                    q, centre, radius, o == -1, o in (-1, k, *same) or (o < 0 and status == ESTABLISHED),
                     S.cos_may_answer, S.cos_must_answer, S.gate_m, S.pair_range_max_m,
                 )
             ]  # fmt: skip

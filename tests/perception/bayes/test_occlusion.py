@@ -38,7 +38,8 @@ def test_the_relevant_readings_equal_their_oracle_and_keep_their_order(examples:
         w = around(rng, 30, place, radius)
         enter_readings(memory, w)
         others = [
-            (place_of(memory, t), float(circles["radius"][t]), float(circles["root_xx"][t]))
+            (place_of(memory, t), float(circles["radius"][t]), float(circles["root_xx"][t]),
+             circles["kind"][t] < S.model_count)
             for t in range(TRACKS) if circles["status"][t] == ESTABLISHED and t != own
         ]  # fmt: skip
         variance = noise_estimation.noise_variance(memory.s, P)

@@ -62,6 +62,7 @@ def test_probability_is_a_share_among_all_explanations(examples: int) -> None:
             rng.random(ALTERNATIVES) < 0.3, 0.0, rng.normal(-10, 15, ALTERNATIVES)
         )  # fmt: skip
         prior, kind = rng.normal(2, 2), track.kind
+        track.outline_lead, track.round_lead = rng.normal(0, 5, 2) * (rng.random(2) < 0.5)
         place, rho = place_of(memory, 0), float(track.radius)
         in_wall = naive_tracks.stands_in_wall(lines.values(), place, rho)
         assert walls.is_in_wall(memory.s, *pair(place), rho) == in_wall
@@ -69,7 +70,8 @@ def test_probability_is_a_share_among_all_explanations(examples: int) -> None:
         leads = {k: float(v) for k, v in enumerate(track.leads) if k != kind and v != 0.0}
         want = naive_tracks.probability(
             float(track.log_likelihood_ratio), bool(kind < S.model_count), prior, S.model_prior_nat,
-            float(track.unknown_nat), leads, S.model_count, len(RADII), in_wall,
+            float(track.unknown_nat), leads, float(track.outline_lead), float(track.round_lead), S.model_count,
+            len(RADII), in_wall,
         )  # fmt: skip
         assert refine.existence_probability(memory.s, P, track, prior) == pytest.approx(want, rel=1e-12, abs=1e-12)
     assert inside > 0.015 * examples
