@@ -4,30 +4,37 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from importlib.util import find_spec
-from pathlib import Path
-from typing import Annotated, Final, Literal, TypeAlias, TypeVar, get_args
+from typing import Annotated, Final, TypeAlias
 
 from cyclopts import App, Parameter
 from rich.console import Console
-from rich.table import Table
 
 from bench.console import console_table
 from bench.console import figures as figures_of
 from bench.console import measure as measure_console
 from bench.estimator import Peer
 from bench.measure import Plan, measure
+from bench.place_commands import (
+    beacons,
+    false_drums,
+    known_room,
+    localization,
+    map_size,
+    nees,
+    sightings,
+    slips,
+    walls,
+)  # fmt: skip
 from bench.recording import measure_recording
 from bench.runners import Method, candidates
-from bench.table import results_table, rows_table
+from bench.table import report, results_table, wide
 from bench.timing import Timing, TimingPlan, measure_timing
 from bench.timing_table import figures_table, quantiles_table, read_earlier
 from bench.waking import figures, waking_table
 from bench.waking import measure as measure_waking
 from config.errors import UserError
 from config.load import load_settings
-from config.settings import Settings
-from runtime.support.kernel_cache import EMULATOR, PARTS, prepare_kernels, use_kernel_cache
+from runtime.support.kernel_cache import PARTS, prepare_kernels, use_kernel_cache
 
 OURS: Final = (
     Method("echolocate, bayes", ("perception.method=bayes",)),
@@ -41,10 +48,6 @@ QUICK: Final = Plan(repetitions=1, halls_max=2, passes=4)
 TIMING: Final = TimingPlan(seconds=20.0, rounds=3, busy=0)
 RECORDING: Final = TimingPlan(seconds=60.0, rounds=1, busy=0)
 WAKING_TURNS: Final = 10
-STEPS_FT: Final = (0.05, 0.2, 0.5, 1.0)
-"""Distances between two firings of one sensor in the rooms with walls, ft."""
-
-Furniture: TypeAlias = Literal["boxes", "clutter"]
 
 Measure: TypeAlias = Callable[[TimingPlan, tuple[str, ...], Callable[[str], None]], Timing]
 
@@ -86,7 +89,7 @@ def bench(
         return 2
     with console.status("bench") as status:
         results = measure(selected, settings.ring, plan, status.update)
-    return _report(
+    return report(
         json,
         {"repetitions": plan.repetitions, "passes": plan.passes, "results": results},
         results_table(results, plan),
@@ -171,7 +174,7 @@ def console(*, json: str = "console.json", seconds: float = 30.0, rounds: int = 
     prepare_kernels(load_settings("hallway"), out)
     with out.status("bench") as status:
         rows = figures_of(measure_console(seconds, rounds, status.update))
-    return _report(json, {"seconds": seconds, "rounds": rounds, "rows": rows}, console_table(rows, seconds, rounds))
+    return report(json, {"seconds": seconds, "rounds": rounds, "rows": rows}, console_table(rows, seconds, rounds))
 
 
 @app.command
@@ -193,259 +196,12 @@ def waking(*, json: str = "waking.json", turns: int = WAKING_TURNS, busy: int = 
         by_load = {
             f"{count} busy": figures(measure_waking(max(1, turns), count, status.update)) for count in (0, busy)
         }
-    return _report(json, by_load, waking_table(by_load))
+    return report(json, by_load, waking_table(by_load))
 
 
-Rows = TypeVar("Rows")
-
-BY_BAYES: Final = ("perception.method=bayes",)
-"""The setting of benches that are about the Bayesian method."""
-
-
-def _try_in_rooms(
-    measure: Callable[[Settings, Callable[[str], None]], Rows],
-    table: Callable[[Rows], Table],
-    json: str,
-    sets: tuple[str, ...] = (),
-    parts: tuple[str, ...] | None = None,
-) -> int:
-    """Write and print what is measured in rooms or halls, with these settings and parts of the kernels."""
-    console = Console(stderr=True)
-    settings = load_settings("hallway", sets)
-    prepare_kernels(settings, console, parts)
-    with console.status("bench") as status:
-        rows = measure(settings, status.update)
-    return _report(json, rows, table(rows))
-
-
-@app.command
-def localization(*, json: str = "localization.json", rooms: int = 100, first: int = 0) -> int:
-    """Measure global localisation from one stand of the ring in random known rooms.
-
-    Parameters
-    ----------
-    json
-        File to write.
-    rooms
-        Number of rooms.
-    first
-        Seed of the first room.
-    """
-    use_kernel_cache()
-    from bench.localization import localization_table, measure
-
-    seeds = range(first, first + max(1, rooms))
-    return _try_in_rooms(
-        lambda settings, tell: measure(settings.ring, seeds, tell), localization_table, json, parts=(EMULATOR,)
-    )
-
-
-@app.command
-def known_room(
-    *,
-    json: str = "known_room.json",
-    rooms: int = 20,
-    first: int = 1000,
-    laser: tuple[Path, ...] = (),
-    seeds: int = 3,
-) -> int:
-    """Measure tracking, global localisation and recovery from kidnapping in furnished rooms that are known.
-
-    Parameters
-    ----------
-    json
-        File to write.
-    rooms
-        Number of rooms; with --laser, of drives from an unknown start in each building.
-    first
-        Seed of the first room.
-    laser
-        Measure in real buildings instead: recordings of a laser with corrected poses, as CARMEN logs.
-    seeds
-        With --laser, number of drives that are tracked along the whole recording.
-    """
-    use_kernel_cache()
-    from bench.known_room import known_room_table, measure, measure_lasers
-
-    def rows(settings: Settings, tell: Callable[[str], None]) -> dict[str, dict[str, float]]:
-        if laser:
-            return measure_lasers(laser, max(1, rooms), range(max(1, seeds)), tell)
-        return measure(settings.ring, range(first, first + max(1, rooms)), tell)
-
-    return _try_in_rooms(rows, known_room_table, json, parts=(EMULATOR,))
-
-
-@app.command
-def beacons(recording: Path, *, json: str = "beacons.json") -> int:
-    """Measure the landmark filter on recorded ranges to beacons at unknown places.
-
-    Parameters
-    ----------
-    recording
-        `Plaza1_.mat`, from the examples of gtsam.
-    json
-        File to write.
-    """
-    use_kernel_cache()
-    from bench.beacons import figures, read_plaza, track
-
-    if not recording.is_file():
-        raise UserError(f"{recording}: there is no such file; Plaza1_.mat comes with the examples of gtsam")
-    data = read_plaza(recording)
-    row = figures(data, track(data))
-    return _report(json, row, rows_table("landmark filter on ranges to beacons at unknown places", {"ours": row}))
-
-
-@app.command
-def nees(*, json: str = "nees.json", drives: int = 100, first: int = 200) -> int:
-    """Measure whether the correction of drift is as wrong as it says: three rounds among eight drums.
-
-    Parameters
-    ----------
-    json
-        File to write.
-    drives
-        Number of drives at each level of odometry's errors.
-    first
-        Seed of the first drive.
-    """
-    use_kernel_cache()
-    from bench.consistency import measure
-
-    seeds = range(first, first + max(1, drives))
-    return _try_in_rooms(
-        lambda settings, tell: measure(settings, seeds, tell),
-        lambda rows: rows_table("squared errors over the reported covariance, 95 % bands of the mean", rows), json,
-    )  # fmt: skip
-
-
-@app.command
-def slips(*, json: str = "slips.json", drives: int = 4, first: int = 300) -> int:
-    """Measure what remains of slips that the wheels do not report: three rounds among eight drums.
-
-    Parameters
-    ----------
-    json
-        File to write.
-    drives
-        Number of halls.
-    first
-        Seed of the first hall.
-    """
-    use_kernel_cache()
-    from bench.slips import measure
-
-    seeds = range(first, first + max(1, drives))
-    return _try_in_rooms(
-        lambda settings, tell: measure(settings, seeds, tell),
-        lambda rows: rows_table("slips of the robot half-way, worst at the end", rows), json,
-    )  # fmt: skip
-
-
-@app.command
-def sightings(folder: Path, *, robot: int = 1, json: str = "sightings.json") -> int:
-    """Measure the landmark filter, beside gtsam's iSAM2, on recorded sightings of posts at unknown places.
-
-    Parameters
-    ----------
-    folder
-        MRCLAM's data set 1, unpacked.
-    robot
-        Whose drive.
-    json
-        File to write.
-    """
-    use_kernel_cache()
-    from bench.sightings import figures, read_mrclam, track
-
-    if not (folder / f"Robot{robot}_Odometry.dat").is_file():
-        raise UserError(
-            f"{folder}: there is no Robot{robot}_Odometry.dat; it is in the first data set of UTIAS MRCLAM"
-        )
-    data = read_mrclam(folder, robot)
-    found = track(data)
-    rows = {"ours": figures(data, found)}
-    if find_spec("gtsam"):
-        from bench.peers import gtsam_sightings
-
-        rows["gtsam iSAM2"] = gtsam_sightings.figures(data, found.odometer_scale, found.turn_scale)
-    return _report(json, rows, rows_table("sightings of posts at unknown places", rows))
-
-
-@app.command(name="map")
-def map_size(*, json: str = "map.json", drums: tuple[int, ...] = (40, 200), seed: int = 0) -> int:
-    """Measure what a firing costs in halls of more and more drums, driven through once and back.
-
-    Parameters
-    ----------
-    json
-        File to write.
-    drums
-        Number of drums of each hall.
-    seed
-        Of their places and of the noise.
-    """
-    use_kernel_cache()
-    from bench.map_size import map_table, measure
-
-    return _try_in_rooms(lambda settings, tell: measure(settings, drums, seed, tell), map_table, json)
-
-
-@app.command
-def walls(*, json: str = "walls.json", seeds: int = 100, first: int = 0, steps: tuple[float, ...] = STEPS_FT) -> int:
-    """Measure the walls found in random rooms with doorways and drums, at several distances between firings.
-
-    Parameters
-    ----------
-    json
-        File to write.
-    seeds
-        Number of rooms.
-    first
-        Seed of the first room.
-    steps
-        Distances between two firings of one sensor, ft.
-    """
-    use_kernel_cache()
-    from bench.walls import measure, walls_table
-
-    rooms = range(first, first + max(1, seeds))
-    return _try_in_rooms(lambda settings, tell: measure(settings, rooms, steps, tell), walls_table, json, BY_BAYES)
-
-
-@app.command
-def false_drums(
-    *,
-    json: str = "false_drums.json",
-    rooms: int = 10,
-    minutes: float = 30.0,
-    first: int = 100,
-    furniture: tuple[Furniture, ...] = get_args(Furniture),
-) -> int:  # fmt: skip
-    """Measure how often a drum is reported in rooms without one: walls and two boxes, and these among clutter.
-
-    Parameters
-    ----------
-    json
-        File to write.
-    rooms
-        Number of rooms.
-    minutes
-        Duration of the drive through each, by each model of reflection, in virtual time.
-    first
-        Seed of the first room.
-    furniture
-        Two boxes, or these among clutter.
-    """
-    use_kernel_cache()
-    from bench.false_drums import measure
-
-    seeds = range(first, first + max(1, rooms))
-    title = f"false drums in rooms without a drum, {minutes:g} min each"
-    return _try_in_rooms(
-        lambda settings, tell: measure(settings, seeds, max(0.01, minutes), furniture, tell),
-        lambda rows: rows_table(title, rows), json, BY_BAYES,
-    )  # fmt: skip
+for command in (localization, known_room, beacons, nees, slips, sightings, walls, false_drums):
+    app.command(command)
+app.command(map_size, name="map")
 
 
 def _measured(measure: Measure, plan: TimingPlan, sets: tuple[str, ...], json: str, against: str | None) -> int:
@@ -461,25 +217,10 @@ def _measured(measure: Measure, plan: TimingPlan, sets: tuple[str, ...], json: s
     with console.status("bench") as status:
         result = measure(plan, sets, status.update)
     write_json(json, result.as_json())
-    wide = _wide()
-    wide.print(quantiles_table(result, earlier))
-    wide.print(figures_table(result, earlier))
+    out = wide()
+    out.print(quantiles_table(result, earlier))
+    out.print(figures_table(result, earlier))
     return 0
-
-
-def _report(json: str, rows: object, table: Table) -> int:
-    """Write what was measured and print its table; return the exit code."""
-    from runtime.cycle.summary import write_json
-
-    write_json(json, rows)
-    _wide().print(table)
-    return 0
-
-
-def _wide() -> Console:
-    """Return a console for tables: the terminal, or 180 columns where output is redirected."""
-    out = Console()
-    return out if out.is_terminal else Console(width=180)
 
 
 def load_peers() -> tuple[Peer, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from rich.console import Console
 from rich.table import Table
 
 from bench.measure import Plan, Result, SceneScore, Times
@@ -86,3 +87,18 @@ def rows_table(title: str, rows: Mapping[str, Mapping[str, float]]) -> Table:
     for method, row in rows.items():
         table.add_row(method, *(f"{row[column]:.3g}" if column in row else "" for column in columns))
     return table
+
+
+def report(json: str, rows: object, table: Table) -> int:
+    """Write what was measured and print its table; return the exit code."""
+    from runtime.cycle.summary import write_json
+
+    write_json(json, rows)
+    wide().print(table)
+    return 0
+
+
+def wide() -> Console:
+    """Return a console for tables: the terminal, or 180 columns where output is redirected."""
+    out = Console()
+    return out if out.is_terminal else Console(width=180)
