@@ -65,7 +65,7 @@ def calibrate_robot(
         output.print(f"the directions of sensors {', '.join(map(str, unknown))} were not heard often enough and stay")
     if way_m is None:
         output.print("the odometry's distance was taken as true: measure the way and give --way to find its scale")
-    output.print(f"{out}: robot file written; check it with: echolocate check")
+    output.print(f"{out}: robot file written; use it with: echolocate run --robot {out} --port DEVICE")
     return DONE
 
 
@@ -80,14 +80,15 @@ def sensors_table(settings: Settings, found: Calibration) -> Table:
         The calibration.
     """
     table = Table(title="Sensors, as calibrated")
-    for name in ("sensor", "echoes", "x m", "y m", "± mm", "moved mm", "angle °", "± °", "turned °"):
+    for name in ("sensor", "echoes", "x mm", "y mm", "±", "moved", "angle °", "±", "turned"):
         table.add_column(name, justify="right")
     for i, nominal in enumerate(settings.ring.mounts):
         x, y, angle = found.mounts[i].tolist()
         sigma = math.degrees(found.angle_sigmas_rad[i])
         table.add_row(
-            str(i), str(found.readings[i]), f"{x:.4f}", f"{y:.4f}", f"{1e3 * found.place_sigmas_m[i]:.1f}",
-            f"{1e3 * math.hypot(x - nominal.x_m, y - nominal.y_m):.1f}", f"{math.degrees(angle):.2f}",
+            str(i), str(found.readings[i]), f"{1e3 * x:.1f}", f"{1e3 * y:.1f}",
+            f"{1e3 * found.place_sigmas_m[i]:.1f}", f"{1e3 * math.hypot(x - nominal.x_m, y - nominal.y_m):.1f}",
+            f"{math.degrees(angle):.2f}",
             f"{sigma:.2f}" if math.isfinite(sigma) else "–", f"{math.degrees(angle - nominal.angle_rad):+.2f}",
         )  # fmt: skip
     return table
@@ -167,7 +168,7 @@ def robot_text(settings: Settings, found: Calibration, source: str) -> str:
         "",
     ]
     if firing is not None:
-        head += tomli_w.dumps({"ring": {"firing": firing}}).splitlines()
+        head += [*tomli_w.dumps({"ring": {"firing": firing}}).splitlines(), ""]
     return "\n".join([*head, *tomli_w.dumps(tables).splitlines(), ""])
 
 
