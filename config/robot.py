@@ -8,6 +8,7 @@ from typing import Annotated, Literal, NamedTuple, TypeAlias
 from pydantic import BeforeValidator, Field, model_validator
 
 from config.arcos import ArcosConfig
+from config.rflex import RflexConfig
 from config.strict import Strict, TomlList
 
 SOUND_SPEED_M_S = 343.0
@@ -195,3 +196,5 @@ class RobotConfig(Strict):
     calibration: CalibrationConfig = CalibrationConfig()
     arcos: ArcosConfig = ArcosConfig()
     """Of the driver "arcos", for the Pioneer family."""
+    rflex: RflexConfig = RflexConfig()
+    """Of the driver "rflex", for the B21r, ATRV-Jr and Magellan."""

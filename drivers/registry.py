@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 GROUP: Final = "echolocate.drivers"
 
 SHIPPED: Final[Mapping[str, EntryPoint]] = MappingProxyType(
-    {name: EntryPoint(name, f"drivers.{name}.family", GROUP) for name in ("arcos", "denning")}
+    {name: EntryPoint(name, f"drivers.{name}.family", GROUP) for name in ("arcos", "denning", "rflex")}
 )
 
 

@@ -45,6 +45,7 @@ WITHOUT_TEST: Final = MappingProxyType(
         "behaviors/response.py": "one dataclass",
         "config/units.py": "one constant",
         "drivers/arcos/frames.py": "dataclasses and constants",
+        "drivers/rflex/diagnostics.py": "messages",
         "perception/bayes/parameters.py": "constants",
         "perception/bayes/polygon_parameters.py": "constants",
         "perception/localization/landmark_state.py": "records and constants",

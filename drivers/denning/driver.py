@@ -14,11 +14,11 @@ from drivers.denning.codec import Decoder, encode
 from drivers.denning.frames import Ack, Drive, Echo, Echo2, Frame, Hello, Ident, Nak, NakCode, Odom
 from drivers.denning.pending_command import PendingCommand, pending_command
 from drivers.denning.pose_stamping import PoseStamper
-from drivers.denning.robot_clock import Jump
 from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout
 from drivers.denning.wire_units import identity_of, newest_version, to_wire, wire_pattern
 from drivers.driver import LineState, Received
 from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
+from drivers.robot_clock import Jump
 
 _UNACKNOWLEDGED_SHARE = 0.75
 """DRIVEs unacknowledged for this share of the longest silence are not received; below 1, as cycles take time."""

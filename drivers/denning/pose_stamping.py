@@ -16,11 +16,11 @@ import numpy as np
 from config.robot import BodyConfig
 from drivers.denning import diagnostics
 from drivers.denning.frames import TENTH_FT_M, WINDOW_MAX, Echo, Echo2, Odom
-from drivers.denning.robot_clock import Jump, RobotClock
 from drivers.denning.wire_units import odometry_of, ranges_of
 from drivers.messages import Firing, Floats, Odometry, Pose
 from drivers.odometry_history import OdometryHistory
 from drivers.odometry_jumps import OdometryJumps
+from drivers.robot_clock import Jump, RobotClock
 from drivers.token_bucket import TokenBucket
 
 _HISTORY_S = 2.5

@@ -92,7 +92,9 @@ def test_a_conflict_in_a_model_file(tmp_path: Path) -> None:
 def test_a_section_that_no_robot_file_may_have(tmp_path: Path) -> None:
     mine = write(tmp_path / "mine.toml", {**ROBOT, "cycle": {"rate_hz": 5}})
     run = write(tmp_path / "run.toml", {"robot": "mine.toml"})
-    assert problem(run) == f"{mine}: cycle: unknown key; known here: robot, ring, body, link, arcos"
+    assert (
+        problem(run) == f"{mine}: cycle: unknown key; known here: robot, ring, body, link, calibration, arcos, rflex"
+    )
 
 
 def test_too_many_problems_are_counted_not_listed(tmp_path: Path) -> None:

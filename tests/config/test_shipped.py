@@ -18,7 +18,19 @@ TABLE_2 = {(1.0, 4.0), (4.0, 4.0), (7.0, 4.0), (1.0, -4.0), (4.0, -4.0), (7.0, -
 
 
 def test_the_names_of_shipped_files() -> None:
-    assert list_shipped("robots") == ("amigo", "denning", "p3at", "p3dx", "p3dx-sh", "peoplebot", "powerbot")
+    assert list_shipped("robots") == (
+        "amigo",
+        "atrvjr",
+        "b21r",
+        "b21r-base",
+        "denning",
+        "magellan",
+        "p3at",
+        "p3dx",
+        "p3dx-sh",
+        "peoplebot",
+        "powerbot",
+    )
     assert list_shipped("worlds") == ("hallway", "irregular")
     assert list_shipped("models") == ("box", "drum", "semicircle")
     assert list_shipped("runs") == ("hallway", "irregular")

@@ -32,11 +32,25 @@ ARCOS = {
     "turn_factor": 0.0034,
     "discs": [0, 1],
 }
+RFLEX = {
+    "name": "B21r",
+    "distance_factor": 103000.0,
+    "angle_factor": 35000.0,
+    "range_factor": 1474.0,
+    "banks": [12, 12],
+    "first_bank": 6,
+    "ping_delay_us": 1250,
+    "bumpers": [64, 65],
+    "bumper_mask": 255,
+    "fail_safe_s": 0.5,
+    "battery_low_v": 21.0,
+}
 ROBOT: dict[str, Any] = {
     "ring": REGULAR_RING,
     "body": BODY,
     "link": {"port": "/dev/ttyS0", "baud": 9600},
     "arcos": ARCOS,
+    "rflex": RFLEX,
 }
 MODEL: dict[str, Any] = {
     "name": "corner",

@@ -102,6 +102,11 @@ ARCOS: Final = Family(
     P3DX, ring_with(P3DX.ring, sets=[[k, 15 - k] for k in (3, 4, 0, 7)], step_period_s=0.06), connect_s=1.5,
     silent_s=0.65, deaf_s=1.6, halt_s=0.3, handshake_bytes=0, cut_stride=29,
 )  # fmt: skip
+B21R: Final = load_robot("b21r")
+RFLEX: Final = Family(
+    B21R, B21R.ring.model_copy(update={"firing": B21R.ring.firing.model_copy(update={"step_period_s": 0.04})}),
+    connect_s=0.4, silent_s=0.5, deaf_s=1.0, halt_s=0.35, handshake_bytes=0, cut_stride=29,
+)  # fmt: skip
 CHIRP_RING: Final = RingConfig.model_validate({
     "count": 12, "radius_m": 0.2, "beam_half_angle_deg": 15.0, "resolution_m": 0.001, "range_min_m": 0.05,
     "range_max_m": 4.0, "firing": {"preset": "thirds", "step_period_s": 0.05},
@@ -116,7 +121,7 @@ CHIRP: Final = Family(
 )  # fmt: skip
 """The example of docs/extending.md."""
 CHIRP_ENTRY: Final = EntryPoint("chirp", "tests.drivers.contract.example.family", GROUP)
-FAMILIES: Final = MappingProxyType({"arcos": ARCOS, "chirp": CHIRP, "denning": DENNING})
+FAMILIES: Final = MappingProxyType({"arcos": ARCOS, "chirp": CHIRP, "denning": DENNING, "rflex": RFLEX})
 
 
 def is_near(twist: Twist, wanted: Twist) -> bool:

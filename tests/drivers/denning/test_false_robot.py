@@ -14,9 +14,9 @@ from dataclasses import replace
 import pytest
 
 from drivers.denning.frames import Ack, Drive, Echo, Halt, Hello, Nak, Odom, Pattern, RobotFrame
-from drivers.denning.robot_clock import Jump, RobotClock
 from drivers.driver import LineState
 from drivers.messages import Twist
+from drivers.robot_clock import Jump, RobotClock
 from tests.drivers.driver_harness import IDENT, ODOM, PERIOD_US, DriverHarness, only
 
 pytestmark = pytest.mark.promise("P22")

@@ -1,4 +1,7 @@
-"""Pioneers recognise the six drums of the hall: their sonar has no times, and their SIPs come ten times a second."""
+"""Robots that people have recognise the six drums of the hall.
+
+The sonar of a Pioneer has no times, and its SIPs come ten times a second; an rFLEX fires its banks by itself.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from runtime.simulation.closed_loop import simulate
 
 pytestmark = pytest.mark.compiled
 
-PIONEERS = tuple(name for name in list_shipped("robots") if load_robot(name).robot.driver == "arcos")
+ROBOTS = tuple(name for name in list_shipped("robots") if load_robot(name).robot.driver in {"arcos", "rflex"})
 OFF_MAX_FT = 0.005
 
 
@@ -32,12 +35,13 @@ def check_drums(name: str, model: str, seed: int, seconds: float) -> str:
     return f"{name}, {model}: 6/6, 0 false, worst {max(off_ft):.4f} ft"
 
 
-def test_a_pioneer_finds_six_drums(measured: Callable[[str], None]) -> None:
-    measured(check_drums("p3dx", "specular", 4, 18.0))
+@pytest.mark.parametrize(("name", "seconds"), [("p3dx", 18.0), ("b21r", 18.0)])
+def test_a_robot_finds_six_drums(name: str, seconds: float, measured: Callable[[str], None]) -> None:
+    measured(check_drums(name, "specular", 4, seconds))
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("model", ["specular", "cone"])
-@pytest.mark.parametrize("name", PIONEERS)
-def test_every_pioneer_finds_six_drums(name: str, model: str, measured: Callable[[str], None]) -> None:
+@pytest.mark.parametrize("name", ROBOTS)
+def test_every_robot_finds_six_drums(name: str, model: str, measured: Callable[[str], None]) -> None:
     measured(check_drums(name, model, 5, 26.0))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from drivers.denning.frames import Echo
-from drivers.denning.robot_clock import Jump, RobotClock
 from drivers.driver import LineState
+from drivers.robot_clock import Jump, RobotClock
 from tests.drivers.driver_harness import PERIOD_US, DriverHarness
 
 WRAP = 2**32

@@ -1,0 +1,398 @@
+"""The emulated robot with an rFLEX controller: its side of the protocol, without I/O and in its own time.
+
+It reports nothing until it is asked, moves only with its brake off, fires its sonar banks by itself, and stops when
+no motion command comes. It sends without escapes, and no ESC where it can choose: in packet numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from config.robot import SOUND_SPEED_M_S, RobotConfig
+from config.world import WorldConfig
+from drivers.emulator.acoustics import clearance
+from drivers.emulator.body import BRAKE_S, RAMP_S, Body
+from drivers.emulator.fault_schedule import FaultSchedule
+from drivers.emulator.faults import (
+    BlockedWheels,
+    Bumper,
+    Deadman,
+    Fault,
+    IgnoredHalt,
+    LowBattery,
+    MotorFault,
+    OdometryJump,
+    Outliers,
+    Reboot,
+    Runaway,
+    StopButton,
+    StuckSensor,
+)
+from drivers.emulator.faulty_line import FaultyLine
+from drivers.emulator.robot_device import GroundTruth
+from drivers.emulator.scene import compile_scene
+from drivers.emulator.sonar import Sonar
+from drivers.messages import Flags, Pose, Twist
+from drivers.rflex.codec import (
+    DIO,
+    JOYSTICK,
+    NO_ECHO,
+    ROTATION,
+    TRANSLATION,
+    AxisReport,
+    Decoder,
+    Frame,
+    Input,
+    Report,
+    SonarReport,
+    Status,
+    direction_of,
+    encode,
+    frame_of,
+    position_of,
+    sonar_delays_of,
+)
+from drivers.rflex.wire_frame_counter import WireFrameCounter
+from drivers.rflex.wire_units import sonar_ids
+
+TICK_US = 5_000
+"""Longest step of the body's simulation, µs."""
+PERIOD_MIN_US = 10_000
+"""Shortest period of reports, and shortest sonar step, µs."""
+VOLTS, VOLTS_LOW, VOLTS_OFFSET = 25.2, 20.0, 1.2
+"""The battery: full, nearly empty, and what the controller does not measure of it, V."""
+STILL = Twist(0.0, 0.0)
+_PRESSED_M = 1e-3
+"""A bumper is pressed by a surface this near, m."""
+_I32 = 1 << 32
+
+
+class RflexDevice:
+    """A `drivers.emulator.robot_device.RobotDevice` that speaks the rFLEX protocol.
+
+    Parameters
+    ----------
+    robot, world
+        What the robot is, and what surrounds it.
+    seed
+        Seed of all random numbers.
+    faults
+        What goes wrong, and when.
+    clock_start_us
+        First reading of its clock.
+
+    Raises
+    ------
+    DriverError
+        The sonar banks do not fit the ring.
+    """
+
+    # Reset by a restart; see `_boot`.
+    _decoder: Decoder
+    _brake: bool
+    _tripped: bool
+    _target: Twist
+    _driven: Twist
+    _rates: tuple[float, float]
+    _commanded_us: int
+    _zero_m: float
+    _offsets: list[int]
+    _report_us: int | None
+    _input_us: int | None
+    _fire_us: int | None
+    _heard: tuple[tuple[int, int], ...] | None
+    _was_touched: bool
+    _has_touched: bool
+    _number: int
+
+    def __init__(
+        self, robot: RobotConfig, world: WorldConfig, seed: int, faults: Sequence[Fault] = (), clock_start_us: int = 0
+    ) -> None:
+        seeds = np.random.SeedSequence(seed).spawn(5)
+        sonar_rng, drift_rng, self._outlier_rng, *line_rngs = map(np.random.default_rng, seeds)
+        self._config, self._rflex = robot, robot.rflex
+        self._ids = sonar_ids(robot)
+        self._scene = scene = compile_scene(world)
+        start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
+        self._body = Body(robot.body, scene, start, world.odometry, drift_rng)
+        self._sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
+        self._faults = FaultSchedule(faults)
+        self._line = FaultyLine(robot.link.baud, self._faults, *line_rngs)
+        self._now_us = self._moved_us = 0
+        self._clock_start_us, self._booted_us = clock_start_us, 0
+        self._fail_safe_us = round(1e6 * self._rflex.fail_safe_s)
+        self._touched_at: tuple[Pose, bool] | None = None
+        self._next_us: int | None = None  # None once something may have changed it
+        self._boot()
+        # Load the compiled kernels now, so that the first firing is not late.
+        clearance(start.x, start.y, scene.circles, scene.segments)
+        self._sonar.true_echoes(start, start.theta, np.zeros(len(robot.ring.mounts), dtype=np.bool_))
+
+    @property
+    def truth(self) -> GroundTruth:
+        """The true state at the last event."""
+        body = self._body
+        return GroundTruth(self._moved_us * 1e-6, body.pose, body.ring_yaw, body.twist, self.flags, body.contacts)
+
+    @property
+    def flags(self) -> Flags:
+        """The base's status; the brake counts as its latch."""
+        status = {
+            Flags.LATCHED: self._brake,
+            Flags.BUMPER: self._is_touched(),
+            Flags.MOTOR_FAULT: self._faults.has(MotorFault),
+            Flags.DEADMAN: self._tripped,
+            Flags.BATTERY_LOW: self._faults.has(LowBattery),
+        }
+        return Flags(sum(flag for flag, is_set in status.items() if is_set))
+
+    @property
+    def plugged(self) -> bool:
+        """False while the line is unplugged."""
+        return self._line.plugged
+
+    def advance(self, to_s: float) -> bytes:
+        """Simulate up to `to_s` seconds after the start and return the bytes that have left the robot by then."""
+        to_us = round(to_s * 1e6)
+        while (at_us := self._next_event_us() if self._next_us is None else self._next_us) <= to_us:
+            self._now_us, self._next_us = at_us, None
+            self._move()
+            self._update_faults()
+            if not self._faults.has(Reboot):
+                self._handle_events()
+        self._now_us, self._next_us = max(self._now_us, to_us), at_us
+        self._line.collect(self._now_us)
+        return self._line.take()
+
+    def frame_counter(self) -> WireFrameCounter:
+        """Return a new counter of this protocol's ranges and velocities, for a line that is in use already."""
+        return WireFrameCounter()
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes from the host, at the time to which the robot has advanced."""
+        if not data or self._faults.has(Reboot) or not (data := self._line.heard(data)):
+            return
+        self._next_us = None
+        for frame in self._decoder.feed(data):
+            self._move()
+            self._obey(frame)
+
+    # Commands of the host.
+
+    def _obey(self, frame: Frame) -> None:
+        match frame.port, frame.opcode, len(frame.data):
+            case 2, 7, 14:
+                self._set_speed(*direction_of(frame))
+            case 2, 8, 17:
+                axis, position = position_of(frame)
+                if axis in (TRANSLATION, ROTATION):
+                    self._set_speed(axis, 0, 0)
+                    self._offsets[axis] = position - self._counts()[axis]
+            case 2, 10, _:
+                self._target = STILL
+            case 2, 11, _:
+                self._brake, self._target = True, STILL
+            case 2, 12, _:
+                self._brake = self._faults.has(StopButton)
+            case 2, 34, 8:
+                self._mask = int.from_bytes(frame.data[4:], "big")
+                self._report_period_us = self._period(frame.data[:4])
+                self._report_us = self._start(self._report_period_us if self._mask & 3 else 0)
+            case 1, 1, _:
+                volts = VOLTS_LOW if self._faults.has(LowBattery) else VOLTS
+                self._send(Status(self._clock(), round(100.0 * (volts - VOLTS_OFFSET)), int(self._brake)))
+            case 3, 0, _:
+                self._send(Frame(JOYSTICK, 0, self._clock().to_bytes(4, "big") + bytes(9)))
+            case 4, 0, 13:
+                step_us, on = sonar_delays_of(frame)
+                self._heard, self._step = None, 0
+                self._step_us = max(PERIOD_MIN_US, step_us)
+                self._fire_us = self._now_us if on else None
+            case 5, 0, 4:
+                self._input_period_us = self._period(frame.data)
+                self._input_us = self._start(self._input_period_us)
+                self._send(Frame(DIO, 0, bytes(4) + self._clock().to_bytes(4, "big")))
+            case _:
+                pass
+
+    def _set_speed(self, axis: int, speed: int, acceleration: int) -> None:
+        """Take a motion command, which also keeps the fail-safe from stopping the base."""
+        self._commanded_us, self._tripped = self._now_us, False
+        if self._brake:
+            return
+        v, w = self._target.v, self._target.w
+        body, rflex = self._config.body, self._rflex
+        if axis == TRANSLATION:
+            self._target = Twist(speed / rflex.distance_factor, w)
+            self._rates = (acceleration / rflex.distance_factor or body.acceleration_max_m_s2, self._rates[1])
+        elif axis == ROTATION:
+            self._target = Twist(v, speed / rflex.angle_factor)
+            self._rates = (self._rates[0], acceleration / rflex.angle_factor or body.turn_acceleration_max_rad_s2)
+
+    @staticmethod
+    def _period(data: bytes) -> int:
+        period_us = int.from_bytes(data, "big")
+        return max(PERIOD_MIN_US, period_us) if period_us else 0
+
+    def _start(self, period_us: int) -> int | None:
+        return self._now_us + period_us if period_us else None
+
+    # Events.
+
+    def _next_event_us(self) -> int:
+        others = [self._moved_us // TICK_US * TICK_US + TICK_US, self._faults.next_us]
+        if not self._faults.has(Reboot):
+            others += [self._report_us, self._input_us, self._fire_us]
+            others += [None if self._tripped else self._commanded_us + self._fail_safe_us]
+        return max(self._now_us, min(other for other in others if other is not None))
+
+    def _move(self) -> None:
+        """Move the body up to the present event."""
+        dt_s = (self._now_us - self._moved_us) * 1e-6
+        if dt_s > 0.0:
+            target, within_s = self._wheels()
+            self._body.step(dt_s, target, within_s=within_s, rates=None if within_s else self._rates)
+            self._moved_us = self._now_us
+
+    def _wheels(self) -> tuple[Twist, float | None]:
+        """Return the velocity that the wheels go for, and the time of a stop that is harder than commanded."""
+        faults = self._faults
+        if any(faults.has(kind) for kind in (Reboot, BlockedWheels, MotorFault, StopButton)):
+            return STILL, BRAKE_S
+        if faults.has(IgnoredHalt) and (self._brake or self._target == STILL):
+            return self._driven, None
+        if self._brake:
+            return STILL, BRAKE_S
+        for runaway in faults.all(Runaway):
+            return Twist(runaway.v_m_s, runaway.w_rad_s), None
+        if self._tripped:
+            return STILL, RAMP_S
+        self._driven = self._target
+        return self._target, None
+
+    def _handle_events(self) -> None:
+        now = self._now_us
+        if now >= self._commanded_us + self._fail_safe_us:
+            self._tripped, self._target = True, STILL
+        if self._fire_us is not None and self._fire_us <= now:
+            self._fire()
+        if self._report_us is not None and self._report_us <= now:
+            self._report_us += self._report_period_us
+            self._report_axes()
+        if self._input_us is not None and self._input_us <= now:
+            self._input_us += self._input_period_us
+            self._report_bumpers(always=True)
+        self._report_bumpers(always=False)
+        self._line.add_garbage(now, TICK_US)
+
+    def _fire(self) -> None:
+        """Report what was heard since the last firing, and fire the next sonar of each bank."""
+        if self._heard is not None:
+            self._send(SonarReport(self._clock(), self._heard))
+        indices = max(self._rflex.banks)
+        sensors = [sensor for sensor, one in enumerate(self._ids) if one % 16 == self._step % indices]
+        self._step += 1
+        self._heard = self._readings(sensors)
+        self._fire_us = self._now_us + self._step_us
+
+    def _readings(self, sensors: list[int]) -> tuple[tuple[int, int], ...]:
+        body = self._body
+        window_m = min(self._config.ring.window_m, 0.5e-6 * self._step_us * SOUND_SPEED_M_S)
+        ranges = self._sonar.fire(body.pose, body.ring_yaw, sensors, window_m)
+        for outliers in self._faults.all(Outliers):
+            wild = self._outlier_rng.random(len(ranges)) < outliers.share
+            ranges[wild] = self._outlier_rng.uniform(0.0, window_m, len(ranges))[wild]
+        stuck = {fault.sensor: fault.range_m for fault in self._faults.all(StuckSensor)}
+        readings = []
+        for sensor in sensors:
+            range_m = stuck.get(sensor, float(ranges[sensor]))
+            if range_m is not None:  # else a sonar that reports nothing
+                heard = math.isfinite(range_m)
+                raw = min(NO_ECHO, round(range_m * self._rflex.range_factor)) if heard else NO_ECHO
+                readings.append((self._ids[sensor], raw))
+        return tuple(readings)
+
+    def _counts(self) -> tuple[int, int]:
+        """Return the counts of both axes before their offsets."""
+        body, rflex = self._body, self._rflex
+        way_m = body.odometry_m - self._zero_m
+        return round(way_m * rflex.distance_factor), round(body.odometry_pose.theta * rflex.angle_factor)
+
+    def _report_axes(self) -> None:
+        twist, rflex, clock = self._body.twist, self._rflex, self._clock()
+        speeds = (round(twist.v * rflex.distance_factor), round(twist.w * rflex.angle_factor))
+        factors = (rflex.distance_factor, rflex.angle_factor)
+        for axis, count in enumerate(self._counts()):
+            if self._mask >> axis & 1:
+                position = (count + self._offsets[axis] + _I32 // 2) % _I32 - _I32 // 2
+                rate = round(self._rates[axis] * factors[axis])
+                self._send(AxisReport(clock, axis, position, speeds[axis], rate & 0xFFFFFFFF))
+
+    def _report_bumpers(self, *, always: bool) -> None:
+        """Report the first panel when it changes, and with each period once it has been pressed."""
+        is_touched = self._is_touched()
+        changed = is_touched != self._was_touched
+        if self._rflex.bumpers and self._input_us is not None and (changed or (always and self._has_touched)):
+            self._was_touched, self._has_touched = is_touched, True
+            self._send(Input(self._clock(), self._rflex.bumpers[0], int(is_touched)))
+
+    def _is_touched(self) -> bool:
+        pose = self._body.pose
+        if self._touched_at is None or self._touched_at[0] is not pose:
+            room_m = clearance(pose.x, pose.y, self._scene.circles, self._scene.segments)
+            self._touched_at = (pose, room_m - self._config.body.radius_m < _PRESSED_M)
+        return self._touched_at[1] or self._faults.has(Bumper)
+
+    # Faults.
+
+    def _update_faults(self) -> None:
+        """Start and end the faults whose time has come."""
+        if self._faults.next_us is None:
+            return
+        for begins, fault in self._faults.due(self._now_us):
+            self._line.collect(self._now_us)
+            self._faults.set_active(fault, on=begins)
+            match fault:
+                case Reboot():
+                    self._body.reset_odometry()
+                    self._boot()
+                case StopButton() if begins:
+                    self._brake, self._target = True, STILL
+                case MotorFault() if begins:
+                    self._target = STILL
+                case Deadman() if begins:
+                    self._fail_safe_us = 1000 * fault.deadman_ms
+                case OdometryJump() if begins:
+                    heading = self._body.odometry_pose.theta
+                    self._zero_m -= fault.dx_m * math.cos(heading) + fault.dy_m * math.sin(heading)
+                    self._body.jump_odometry(fault.dx_m, fault.dy_m, fault.dheading_rad)
+                case _:
+                    pass
+
+    def _boot(self) -> None:
+        """Start as after power-on, except for the body, which stays where it is."""
+        body = self._config.body
+        self._decoder = Decoder()
+        self._brake, self._tripped = True, True
+        self._target = self._driven = STILL
+        self._rates = (body.acceleration_max_m_s2, body.turn_acceleration_max_rad_s2)
+        self._commanded_us = self._booted_us = self._now_us
+        self._zero_m, self._offsets = self._body.odometry_m, [0, 0]
+        self._mask = self._report_period_us = self._input_period_us = self._step = self._step_us = 0
+        self._report_us = self._input_us = self._fire_us = None
+        self._heard = None
+        self._was_touched = self._has_touched = False
+        self._number = 0
+        self._line.clear()
+
+    def _clock(self) -> int:
+        return (self._clock_start_us + self._now_us - self._booted_us) % _I32
+
+    def _send(self, report: Report) -> None:
+        self._number = (self._number + 1) % 0x100
+        self._number += self._number == 0x1B
+        frame = frame_of(report, self._number)
+        self._line.send(encode(Frame(frame.port, frame.opcode, frame.data, self._number)), self._now_us)

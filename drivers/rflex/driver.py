@@ -1,0 +1,381 @@
+"""The driver for robots with an rFLEX controller: commands and supervision; without I/O and without a clock.
+
+The controller acknowledges nothing. What a command did is seen in its reports: the counts of both axes, the brake in
+its status, ranges that come. It loses commands sent too rapidly, so that each gets a gap of its own, and all that
+matters is repeated until it is seen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import Final
+
+from config.robot import RingConfig, RobotConfig
+from drivers import line_diagnostics
+from drivers.driver import LineState, Received
+from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
+from drivers.rflex import diagnostics
+from drivers.rflex.codec import (
+    BRAKE_SET,
+    SET_DEFAULTS,
+    AxisReport,
+    Decoder,
+    Frame,
+    Input,
+    SonarReport,
+    Status,
+    encode,
+    input_request,
+    report_of,
+    report_request,
+    sonar_run,
+)
+from drivers.rflex.measurements import REPORT_PERIOD_S, Measurements
+from drivers.rflex.supervision import Brake, Mode, StallMonitor
+from drivers.rflex.wire_units import drive_commands, pattern_of, sonar_ids, stop_commands
+from drivers.robot_clock import Jump
+
+_GAP_S: Final = 0.0099
+"""Least time between two commands, s: 10 ms, less the rounding of times."""
+_BOTH_AXES: Final = 3
+_INPUT_PERIOD_US: Final = 100_000
+_CALLING_S: Final = 1.0
+"""Time for which the robot is called before the line counts as down, s."""
+_SILENT_ECHO_S: Final = 0.5
+"""Time without a range after which the sonars are started again, s, besides two steps of their pattern."""
+_DRIVEN_S: Final = 0.5
+"""A base that gets no velocity for so long is stopped, s: the time of its own fail-safe is not documented."""
+_HALTING_MAX_S: Final = 2.5
+"""Longest time that a halted base may take until its brake is on, s."""
+_VOLTS_OFFSET: Final = 1.2
+"""The controller measures its voltage behind a diode, V."""
+_FIRINGS_MAX: Final = 1024
+"""Firings kept if they are not taken; the oldest are dropped."""
+
+
+class RflexDriver:
+    """A `drivers.driver.RobotDriver` for robots with an rFLEX controller.
+
+    Parameters
+    ----------
+    config
+        The robot file.
+
+    Raises
+    ------
+    drivers.firing_pattern.FiringError
+        The ring or the controller cannot carry out the firing pattern.
+    DriverError
+        The sonar banks do not fit the ring.
+    """
+
+    line_baud: int | None = None
+
+    def __init__(self, config: RobotConfig) -> None:
+        self._config = config
+        self._pattern = pattern_of(config, config.ring)
+        self._measurements = Measurements(config, sonar_ids(config))
+        self._measurements.set_pattern(self._pattern)
+        self._decoder, self._earlier = Decoder(), LinkCounts()
+        self._state = LineState.CLOSED
+        self._problem: str | None = None
+        self._identity: Identity | None = None
+        self._boots = 0
+        self._run_s = self._sent_s = self._called_s = self._setup_s = self._report_s = 0.0
+        self._sample_s = self._echo_s = self._answer_s = self._driven_s = 0.0
+        self._bad_at_sample = 0
+        self._brake, self._stall = Brake(config), StallMonitor()
+        self._queue: deque[Frame] = deque()
+        self._drive: Twist | None = None
+        self._second_axis: Frame | None = None
+        self._is_ending = self._is_moving = False
+        self._pressed: dict[int, int] = {}
+        self._volts = math.inf
+        self._firings: deque[Firing] = deque(maxlen=_FIRINGS_MAX)
+        self._noted: set[str] = set()
+        self._odometry: Odometry | None = None
+        self._flags, self._rebooted = Flags.NONE, False
+
+    @property
+    def state(self) -> LineState:
+        """The state of the connection."""
+        return self._state
+
+    @property
+    def problem(self) -> str | None:
+        """What is wrong, in one line; None if nothing is."""
+        halting_s = self._brake.halting_s(self._run_s)
+        if self._state is LineState.READY and halting_s > _HALTING_MAX_S:
+            return diagnostics.not_stopping(halting_s)
+        return self._problem
+
+    @property
+    def identity(self) -> Identity | None:
+        """What the robot file says of the robot, which reports nothing of itself; None before it answers."""
+        return self._identity
+
+    @property
+    def counts(self) -> LinkCounts:
+        """Frames received so far, over all lines; lost ones are not known, as not all numbers are used."""
+        return LinkCounts(self._earlier.frames + self._decoder.frames, self._earlier.bad + self._decoder.bad, 0)
+
+    @property
+    def odometry_origin(self) -> Pose:
+        """The origin of the poses passed on, in the robot's own odometry; it moves when that jumps."""
+        return self._measurements.origin
+
+    @property
+    def firings_waiting(self) -> int:
+        """Number of firings that `take_received` would return."""
+        return len(self._firings)
+
+    def line_opened(self, run_s: float) -> None:
+        """Stop the base and request reports, on a line that has just been opened."""
+        self.line_closed()
+        self._run_s = run_s
+        self._begin(LineState.HANDSHAKE, None)
+
+    def line_closed(self) -> None:
+        """Forget commands in progress; only a halt is kept for the next line until the brake is reported."""
+        self._earlier, self._decoder = self.counts, Decoder()
+        self._state, self._is_ending = LineState.CLOSED, False
+        self._abandon()
+
+    def receive(self, data: bytes, run_s: float) -> None:
+        """Take bytes from the line, split anywhere."""
+        self._run_s = run_s
+        if self._state is not LineState.CLOSED:
+            for frame in self._decoder.feed(data):
+                self._take(frame)
+
+    def tick(self, run_s: float) -> None:
+        """Let time pass: call the robot again, stop a base that gets no velocity, go DOWN if the robot is silent."""
+        self._run_s = run_s
+        if self._state is LineState.READY:
+            self._supervise()
+        elif self._state is not LineState.CLOSED:
+            if run_s - self._setup_s >= self._config.link.reply_timeout_s and not self._queue:
+                self._set_up()
+            if run_s - self._called_s > _CALLING_S and self._state is LineState.HANDSHAKE:
+                heard = self._decoder.frames + self._decoder.bad > 0
+                self._state, self._problem = LineState.DOWN, diagnostics.no_answer(heard=heard)
+
+    def drive(self, twist: Twist) -> None:
+        """Request a velocity, clamped to the limits; sent only in state READY and with the brake off.
+
+        Raises
+        ------
+        ValueError
+            The velocity is not finite.
+        """
+        if not (math.isfinite(twist.v) and math.isfinite(twist.w)):
+            raise ValueError(f"cannot drive at {twist}: a velocity must be finite; something divided by zero")
+        self._drive = twist
+
+    def halt(self) -> None:
+        """Stop the base at once, repeat that until it stands, then set its brake."""
+        self._drive = self._second_axis = None
+        self._is_moving = False
+        self._stall.stop()
+        self._brake.halt()
+
+    def release(self) -> None:
+        """Release the brake; without effect unless READY, so that the base is never released unnoticed."""
+        if self._state is LineState.READY:
+            self._brake.release()
+
+    def set_firing(self, ring: RingConfig) -> None:
+        """Change the firing pattern to that of `ring`; does nothing if it is the current one.
+
+        Raises
+        ------
+        drivers.firing_pattern.FiringError
+            The ring or the controller cannot carry out the pattern; the current one stays.
+        """
+        pattern = pattern_of(self._config, ring)
+        if pattern != self._pattern:
+            self._pattern = pattern
+            self._measurements.set_pattern(pattern)
+            if self._state is not LineState.CLOSED:
+                self._queue.append(pattern.command)
+
+    def end_session(self) -> None:
+        """Stop the base, set its brake, and end all reports."""
+        self._is_ending = self._state is not LineState.CLOSED
+
+    def outgoing(self, *, writable: bool) -> bytes:
+        """Return the command to send now, one at a time; only those of a halt while the line is not `writable`."""
+        if self._state is LineState.CLOSED:
+            self._drive = None
+            return b""
+        if self._is_ending:
+            self._is_ending, self._state = False, LineState.CLOSED
+            stop = (*stop_commands(self._config, 0), BRAKE_SET)
+            ends = (sonar_run(0, 0, on=False), input_request(0), report_request(0, 0))
+            return b"".join(map(encode, (*stop, *ends)))
+        is_halting = self._brake.mode is Mode.HALTING
+        has_gap = self._run_s - self._sent_s >= _GAP_S
+        # A velocity does not wait either: if it is lost, the next one comes within a cycle.
+        is_driven = writable and self._drive is not None and self._brake.may_drive
+        is_urgent = is_driven or (is_halting and self._brake.halting_s(self._run_s) == 0.0)
+        if not is_urgent and not (has_gap and (writable or is_halting)):
+            return b""
+        frame = self._brake.due(self._run_s) if is_halting else None
+        if frame is None and writable:
+            frame = self._next_command()
+        if frame is None:
+            return b""
+        self._sent_s = self._run_s
+        return encode(frame)
+
+    def take_received(self) -> Received:
+        """Return what was received since the last call, and remove it."""
+        notes = self._measurements.notes()
+        received = Received(tuple(self._firings), self._odometry, self._rebooted, notes, self._flags)
+        self._firings.clear()
+        self._odometry, self._flags, self._rebooted = None, Flags.NONE, False
+        return received
+
+    def _next_command(self) -> Frame | None:
+        """Return the next command that is due: a velocity first, its second axis next, then all that can wait."""
+        drive, self._drive = self._drive, None
+        if drive is not None and self._state is LineState.READY and self._brake.may_drive:
+            frame, self._second_axis = drive_commands(drive, self._config)
+            self._stall.command(drive, self._run_s)
+            self._driven_s, self._is_moving = self._run_s, drive != Twist(0.0, 0.0)
+            return frame
+        if self._second_axis is not None:
+            frame, self._second_axis = self._second_axis, None
+            return frame
+        if self._queue:
+            return self._queue.popleft()
+        return self._brake.due(self._run_s)
+
+    def _begin(self, state: LineState, problem: str | None) -> None:
+        """Give up what there was and call the robot: stop the base, whether it hears that or not."""
+        self._state, self._problem = state, problem
+        self._abandon()
+        self.halt()
+        self._called_s = self._run_s
+        self._set_up()
+
+    def _set_up(self) -> None:
+        self._setup_s = self._run_s
+        self._queue.clear()
+        self._queue += (
+            report_request(round(1e6 * REPORT_PERIOD_S), _BOTH_AXES),
+            input_request(_INPUT_PERIOD_US),
+            SET_DEFAULTS,
+            self._pattern.command,
+        )
+
+    def _abandon(self) -> None:
+        """Drop all commands but a halt, and all that does not outlast an interruption."""
+        self._queue.clear()
+        self._drive = self._second_axis = None
+        self._is_moving = False
+        self._brake.forget()
+        self._stall.stop()
+        self._pressed.clear()
+        self._measurements.break_off()
+        self._bad_at_sample = self._decoder.bad
+        self._sent_s = self._report_s = self._sample_s = -math.inf
+
+    def _supervise(self) -> None:
+        """Detect a robot that is silent or does not receive, sonars that are, and a brake that stays on."""
+        link, now_s = self._config.link, self._run_s
+        silent_s, unanswered_s = now_s - self._sample_s, now_s - self._answer_s
+        if silent_s > link.silence_max_s:
+            others = self._report_s - self._sample_s > 0.5 * link.silence_max_s
+            bad = self._decoder.bad - self._bad_at_sample
+            self._begin(LineState.DOWN, line_diagnostics.silence(silent_s, others=others, bad=bad))
+        elif unanswered_s > 2.0 * link.silence_max_s:
+            self._begin(LineState.DOWN, diagnostics.not_receiving(unanswered_s))
+        elif self._brake.mode is Mode.RELEASING and self._brake.tries > link.tries:
+            self.halt()
+            self._problem = diagnostics.BRAKE_STAYS_ON
+        elif self._is_moving and now_s - self._driven_s > _DRIVEN_S:
+            self._is_moving, self._drive = False, Twist(0.0, 0.0)
+            self._measurements.note(diagnostics.NOT_DRIVEN)
+        if now_s - self._echo_s > _SILENT_ECHO_S + 2e-6 * self._pattern.step_us:
+            self._echo_s = now_s
+            self._queue.append(self._pattern.command)
+            self._note_once(diagnostics.NO_SONAR)
+
+    def _take(self, frame: Frame) -> None:
+        self._report_s = self._run_s
+        match report_of(frame):
+            case AxisReport() as axis:
+                self._take_axis(axis)
+            case SonarReport() as sonar:
+                self._echo_s = self._run_s
+                if self._state is LineState.READY:
+                    self._measurements.sonar(sonar)
+                    self._firings += self._measurements.firings(self._run_s)
+            case Status() as status:
+                self._answer_s = self._run_s
+                self._volts = 0.01 * status.voltage + _VOLTS_OFFSET
+                self._brake.observe_status(self._run_s, on=status.brake != 0)
+                if self._brake.may_drive and self._problem == diagnostics.BRAKE_STAYS_ON:
+                    self._problem = None
+            case Input() as bits if bits.address in self._config.rflex.bumpers:
+                self._pressed[bits.address] = bits.bits & self._config.rflex.bumper_mask
+            case _:
+                pass
+
+    def _take_axis(self, report: AxisReport) -> None:
+        """Take an axis; the first sample of a session with a status makes the line READY."""
+        flags = self._status()
+        sample = self._measurements.axis(report, self._run_s, flags)
+        if sample is Jump.BACK:
+            self._restarted()
+        if not isinstance(sample, Odometry):
+            return
+        self._sample_s, self._bad_at_sample = self._run_s, self._decoder.bad
+        self._brake.observe_speed(sample.twist)
+        self._stall.observe(sample.twist, self._run_s)
+        if self._state is not LineState.READY:
+            if self._brake.is_on is None:
+                return
+            self._meet()
+        if self._state is LineState.READY:
+            self._odometry, self._flags = sample, self._flags | flags
+            self._firings += self._measurements.firings(self._run_s)
+
+    def _meet(self) -> None:
+        """Adopt what the robot file says of a robot that answers, unless it may not be driven."""
+        config = self._config
+        wrong = line_diagnostics.deadman_refused(config.rflex.name, config.rflex.fail_safe_s, config.link)
+        if wrong is not None:
+            self._state, self._problem = LineState.DOWN, wrong
+            return
+        radius_m = max(math.hypot(mount.x_m, mount.y_m) for mount in config.ring.mounts)
+        name, count, deadman_s = config.rflex.name, len(config.ring.mounts), config.rflex.fail_safe_s
+        self._identity = Identity(name, count, radius_m, deadman_s, REPORT_PERIOD_S, self._boots)
+        self._note_once(diagnostics.fail_safe(config.rflex.fail_safe_s))
+        if config.body.synchro:
+            self._note_once(diagnostics.SYNCHRO)
+        self._state, self._problem, self._echo_s = LineState.READY, None, self._run_s
+
+    def _restarted(self) -> None:
+        self._boots += 1
+        self._firings.clear()
+        self._odometry, self._flags, self._rebooted = None, Flags.NONE, True
+        self._measurements.note(diagnostics.RESTARTED)
+        self._begin(LineState.HANDSHAKE, None)
+
+    def _status(self) -> Flags:
+        """Return the base's status; its brake is its latch."""
+        status = {
+            Flags.LATCHED: bool(self._brake.is_on),
+            Flags.BUMPER: any(self._pressed.values()),
+            Flags.MOTOR_FAULT: self._stall.is_stalled,
+            Flags.BATTERY_LOW: self._volts < self._config.rflex.battery_low_v,
+        }
+        return Flags(sum(flag for flag, is_set in status.items() if is_set))
+
+    def _note_once(self, text: str) -> None:
+        if text not in self._noted:
+            self._noted.add(text)
+            self._measurements.note(text)

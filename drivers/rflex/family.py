@@ -1,0 +1,32 @@
+"""The rFLEX family's entry in the driver registry: fulfils `drivers.registry.DriverFamily`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from config.robot import RobotConfig
+from config.world import WorldConfig
+from drivers.driver import RobotDriver
+from drivers.emulator.faults import Fault
+from drivers.emulator.robot_device import RobotDevice
+from drivers.rflex.driver import RflexDriver
+
+
+def make_driver(config: RobotConfig) -> RobotDriver:
+    """Return the host's end; see `drivers.registry.make_driver`."""
+    return RflexDriver(config)
+
+
+def make_device(
+    config: RobotConfig, world: WorldConfig, seed: int, *, faults: Sequence[Fault], clock_start_us: int
+) -> RobotDevice:
+    """Return an emulated robot, whose clock wraps at 2³² µs.
+
+    Parameters
+    ----------
+    config, world, seed, faults, clock_start_us
+        As of `drivers.registry.make_device`.
+    """
+    from drivers.rflex.device import RflexDevice  # it loads compiled kernels, which a real robot does not need
+
+    return RflexDevice(config, world, seed, faults, clock_start_us)

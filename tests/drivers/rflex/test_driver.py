@@ -1,0 +1,107 @@
+"""What the contract leaves open: gaps, sonars that stop, a fail-safe, a driver that is held up, the end of a run."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+from config.load import load_robot
+from drivers.driver import LineState
+from drivers.messages import Flags, Twist
+from drivers.registry import make_driver
+from drivers.rflex import diagnostics
+from drivers.rflex.codec import (
+    BRAKE_SET,
+    Decoder,
+    Input,
+    encode,
+    frame_of,
+    input_request,
+    report_request,
+    sonar_run,
+)
+from tests.drivers.contract.families import PLAIN, RFLEX
+
+
+def test_commands_have_gaps_and_are_sent_one_at_a_time() -> None:
+    cable = RFLEX.cable()
+    decoder, times = Decoder(), list[float]()
+    receive = cable.robot.receive
+
+    def counting(data: bytes) -> None:
+        frames = decoder.feed(data)
+        assert len(frames) <= 1
+        times.extend([cable.now_s] * len(frames))
+        receive(data)
+
+    cable.robot.receive = counting  # type: ignore[method-assign]
+    cable.plug()
+    cable.run(1.0)
+    assert len(times) > 10
+    assert min(b - a for a, b in itertools.pairwise(times)) >= 0.0099
+
+
+def test_sonars_that_stop_are_started_again() -> None:
+    cable = RFLEX.connected()
+    cable.robot.receive(encode(sonar_run(0, 0, on=False)))
+    cable.run(0.3)
+    cable.firings.clear()
+    cable.until_echo(1.0)
+    assert diagnostics.NO_SONAR in cable.notes
+
+
+def test_the_fail_safe_is_what_the_robot_file_says_and_must_suit() -> None:
+    cable = RFLEX.connected()
+    assert diagnostics.fail_safe(1.0) in cable.notes
+    slow = RFLEX.robot.model_copy(update={"rflex": RFLEX.robot.rflex.model_copy(update={"fail_safe_s": 5.0})})
+    driver = make_driver(slow)
+    cable.driver = driver
+    cable.plug()
+    cable.run(0.5)
+    assert driver.state is LineState.DOWN
+    assert "5 s" in (driver.problem or "")
+
+
+def test_a_base_that_gets_no_velocity_is_stopped_by_the_driver_too() -> None:
+    cable = RFLEX.driving()
+    cable.twist = None
+    cable.until(lambda: diagnostics.NOT_DRIVEN in cable.notes, 0.6, "note")
+    cable.run(0.7)
+    assert abs(cable.robot.truth.twist.v) < 1e-4
+
+
+def test_a_brake_that_stays_on_is_a_problem() -> None:
+    cable = RFLEX.connected(world=PLAIN)
+    cable.robot._obey = lambda _: None  # type: ignore[attr-defined]
+    cable.driver.release()
+    cable.run(0.5)
+    assert cable.driver.problem == diagnostics.BRAKE_STAYS_ON
+
+
+def test_only_the_bits_of_bumper_panels_are_contacts() -> None:
+    cable = RFLEX.connected()
+    for report in (Input(0, 0x31, 0xFF), Input(0, 0x42, 0xF0)):
+        cable.driver.receive(encode(frame_of(report)), cable.now_s)
+    cable.run(0.1)
+    assert not cable.flags & Flags.BUMPER
+    cable.driver.receive(encode(frame_of(Input(0, 0x42, 0x05))), cable.now_s)
+    cable.run(0.1)
+    assert cable.flags & Flags.BUMPER
+
+
+def test_the_end_of_a_session_brakes_and_ends_all_reports() -> None:
+    cable = RFLEX.driving(Twist(0.2, 0.0))
+    cable.driver.end_session()
+    frames = Decoder().feed(cable.driver.outgoing(writable=True))
+    assert frames[2:] == [BRAKE_SET, sonar_run(0, 0, on=False), input_request(0), report_request(0, 0)]
+    assert cable.driver.state is LineState.CLOSED
+    assert cable.driver.outgoing(writable=True) == b""
+
+
+def test_a_synchro_ring_keeps_its_direction() -> None:
+    family = replace(RFLEX, robot=load_robot("b21r-base"))
+    cable = family.driving(Twist(0.2, 0.5))
+    cable.run(1.0)
+    assert cable.odometry[-1].pose.theta > 0.4
+    assert cable.odometry[-1].ring_yaw == cable.robot.truth.ring_yaw == 0.0
+    assert diagnostics.SYNCHRO in cable.notes
