@@ -40,6 +40,8 @@ _GAP_S: Final = 0.0099
 """Least time between two commands, s: 10 ms, less the rounding of times."""
 _BOTH_AXES: Final = 3
 _INPUT_PERIOD_US: Final = 100_000
+_INPUT_REQUEST_S: Final = 2.0
+"""Time from one request for the bumpers' reports to the next, s: a lost one would go unnoticed."""
 _CALLING_S: Final = 1.0
 """Time for which the robot is called before the line counts as down, s."""
 _SILENT_ECHO_S: Final = 0.5
@@ -83,7 +85,7 @@ class RflexDriver:
         self._identity: Identity | None = None
         self._boots = 0
         self._run_s = self._sent_s = self._called_s = self._setup_s = self._report_s = 0.0
-        self._sample_s = self._echo_s = self._answer_s = self._driven_s = 0.0
+        self._sample_s = self._echo_s = self._answer_s = self._driven_s = self._input_s = 0.0
         self._bad_at_sample = 0
         self._brake, self._stall = Brake(config), StallMonitor()
         self._queue: deque[Frame] = deque()
@@ -298,6 +300,9 @@ class RflexDriver:
         elif self._is_moving and now_s - self._driven_s > _DRIVEN_S:
             self._is_moving, self._drive = False, Twist(0.0, 0.0)
             self._measurements.note(diagnostics.NOT_DRIVEN)
+        if self._config.rflex.bumpers and now_s - self._input_s > _INPUT_REQUEST_S:
+            self._input_s = now_s
+            self._queue.append(input_request(_INPUT_PERIOD_US))
         if now_s - self._echo_s > _SILENT_ECHO_S + 2e-6 * self._pattern.step_us:
             self._echo_s = now_s
             self._queue.append(self._pattern.command)

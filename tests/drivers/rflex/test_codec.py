@@ -84,13 +84,12 @@ def test_a_corrupt_frame_is_dropped_and_the_next_one_found(at: int) -> None:
     assert decoder.bad > 0
 
 
-@pytest.mark.promise("P4")
-def test_noise_is_survived_in_any_chunks(measured: Callable[[str], None]) -> None:
-    """Noise, pieces of frames and flipped bits: chunked as whole, never more held than a frame, in step after it."""
-    rng = random.Random(7)
+def check_noise(blocks: int, seed: int) -> str:
+    """Decode noise, pieces of frames and flipped bits: chunked as whole, bounded, in step after it."""
+    rng = random.Random(seed)
     good = [bytes.fromhex(text) for text in (*COMMANDS, *REPORTS)]
     chunked, whole, held, total = Decoder(), Decoder(), 0, 0
-    for _ in range(600):
+    for _ in range(blocks):
         parts = [rng.choice(good) for _ in range(5)] + [rng.randbytes(30), bytes(rng.choices((0, 1, 2, 3, 27), k=60))]
         rng.shuffle(parts)
         block = bytearray(b"".join(parts))
@@ -105,7 +104,18 @@ def test_noise_is_survived_in_any_chunks(measured: Callable[[str], None]) -> Non
         assert chunked.feed(STOP * 70)[-1:] == whole.feed(STOP * 70)[-1:] == [Frame(2, 11)]
     assert held <= ESCAPED_MAX
     assert (chunked.frames, chunked.bad) == (whole.frames, whole.bad)
-    measured(f"rflex: {total:,} bytes of noise: {chunked.bad:,} dropped, ≤ {held} held")
+    return f"rflex, {total:,} bytes of noise: {chunked.bad:,} dropped, ≤ {held} held"
+
+
+@pytest.mark.promise("P4")
+def test_noise_is_survived_in_any_chunks(measured: Callable[[str], None]) -> None:
+    measured(check_noise(300, 7))
+
+
+@pytest.mark.soak
+@pytest.mark.promise("P4")
+def test_ten_million_bytes(measured: Callable[[str], None]) -> None:
+    measured(check_noise(54_000, 8))
 
 
 def test_the_longest_frame() -> None:

@@ -21,6 +21,7 @@ from drivers.rflex.codec import (
     sonar_run,
 )
 from tests.drivers.contract.families import PLAIN, RFLEX
+from tests.drivers.device_host import script
 
 
 def test_commands_have_gaps_and_are_sent_one_at_a_time() -> None:
@@ -76,6 +77,13 @@ def test_a_brake_that_stays_on_is_a_problem() -> None:
     cable.driver.release()
     cable.run(0.5)
     assert cable.driver.problem == diagnostics.BRAKE_STAYS_ON
+
+
+def test_a_lost_request_for_the_bumpers_is_made_good() -> None:
+    cable = RFLEX.connected(*script(kind="bumper", at_s=4.0, duration_s=1.0))
+    cable.robot.receive(encode(input_request(0)))
+    cable.run(4.2 - cable.now_s)
+    assert cable.flags & Flags.BUMPER
 
 
 def test_only_the_bits_of_bumper_panels_are_contacts() -> None:
