@@ -86,6 +86,7 @@ class Measurements:
         self._notes: deque[str] = deque(maxlen=_NOTES_MAX)
         self._held: deque[tuple[float, Floats]] = deque(maxlen=_HELD_MAX)
         self._step_s, self._window_m = 0.0, math.inf
+        self._is_clock_noted = False
         self._limit = TokenBucket(math.inf, math.inf)
         self._reset()
 
@@ -144,7 +145,8 @@ class Measurements:
             self._clock.trust_next()
         if isinstance(read, Jump):
             return self._restarted() if self._backs >= _BACK_MAX else None
-        if (error := self._clock.rate_error) is not None:
+        if (error := self._clock.rate_error) is not None and not self._is_clock_noted:
+            self._is_clock_noted = True
             self.note(diagnostics.wrong_clock_rate(error))
         return read
 

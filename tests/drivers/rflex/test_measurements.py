@@ -109,3 +109,12 @@ def test_a_firing_lies_one_step_before_its_report() -> None:
     assert robot.fires((0, 1476)) == [], "none twice"
     assert robot.fires((240, 1476)) == []
     assert robot.measurements.late_echoes == 1
+
+
+def test_timestamps_that_are_no_microseconds_are_noted_once() -> None:
+    robot = Robot()
+    for _ in range(400):
+        robot.t_us += 450_000  # ten times too fast
+        robot.says(0, 0)
+    (note,) = robot.measurements.notes()
+    assert "timestamps run" in note
