@@ -75,6 +75,7 @@ RUN: dict[str, Any] = {
     "perception": {"segments": {}, "map": {}, "clusters": {}, "relaxation": {}, "recognition": {}},
     "behaviors": {"move_ahead": {}, "avoid_static_obstacle": {}, "arbiter": {}},
     "log": {},
+    "goal": {"x_m": 1.0, "y_m": 2.0},
 }
 """A run file that names no other file."""
 
