@@ -233,7 +233,11 @@ class KnownRoom:
         return track.entered > before
 
     def _conclude_search(self) -> None:
-        """Take what a search found if it explains its readings better than what is tracked; or confirm that."""
+        """Take what a search found if it explains its readings better than what is tracked; or confirm that.
+
+        The best of all places fits by chance what the one that is tracked does not. So that is kept until the search
+        overcomes this too, and has found one place rather than many.
+        """
         tracked, found = self._tracked, self._candidates
         is_same = False
         if len(tracked):
@@ -242,11 +246,16 @@ class KnownRoom:
             turn = abs(wrap_angle(one.theta - other.theta))
             is_same = math.hypot(one.x - other.x, one.y - other.y) <= MERGE_M and turn <= MERGE_RAD
         begin = self._search_begin
-        is_better = not len(tracked) or found.gained_since(begin) > tracked.gained_since(begin) + LEAD_LOG
-        if is_better and not is_same:
+        is_sure = len(tracked) > 0 and float(tracked.best.share) * tracked.explains > SURE
+        lead = LEAD_LOG - (self._search_evidence if is_sure else 0.0)
+        is_better = not len(tracked) or found.gained_since(begin) > tracked.gained_since(begin) + lead
+        is_choice = self._status != TRACKING or float(found.best.share) > DOUBT
+        if is_better and is_choice and not is_same:
             self._tracked, self._candidates = found, tracked
             self._status = LOCALIZING if self._status == TRACKING else self._status
-        self._is_confirmed = is_same or self._is_complete
+            self._is_confirmed = self._is_complete
+        elif is_same or self._is_complete:
+            self._is_confirmed = True
 
     def _judge(self) -> None:
         """Set status and probability after a keyframe."""

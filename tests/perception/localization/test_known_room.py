@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Firing, Pose
 from perception.localization.expected_ranges import Reflection
-from perception.localization.known_room import KnownRoom
+from perception.localization.known_room import TRACKING, KnownRoom
 from perception.localization.room import room_of
 from perception.snapshot import put_back, snapshot_of
 from runtime.simulation.furnished_rooms import ACOUSTICS
@@ -164,6 +165,44 @@ def test_what_the_operator_says_is_confirmed_or_refuted(off: float) -> None:
     ]
     assert {type(number) for number in numbers} == {float}, "the console writes them as JSON, which knows no numpy"
     assert (trace.error_m[-1] < 0.05) == (off < 1.0)
+
+
+class Track:
+    """Stands in for what is tracked, or for what a search found."""
+
+    def __init__(self, x: float, gained: float, explains: float, share: float) -> None:
+        self._x, self._gained, self.explains, self.best = x, gained, explains, SimpleNamespace(share=share)
+
+    def __len__(self) -> int:
+        return 1
+
+    def gained_since(self, _number: int) -> float:
+        return self._gained
+
+    def pose(self, _odometry: Pose) -> Pose:
+        return Pose(self._x, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("explains", "tracked_share", "found_share", "gained", "is_replaced"),
+    [
+        (0.99, 1.0, 1.0, 26.0, False),
+        (0.99, 1.0, 1.0, 60.0, True),
+        (0.99, 1.0, 0.3, 60.0, False),
+        (0.8, 1.0, 1.0, 26.0, True),
+        (0.99, 0.4, 1.0, 26.0, True),
+        (0.8, 1.0, 1.0, 21.0, False),
+    ],
+)
+def test_a_place_that_is_sure_is_left_only_for_one_that_is_clearly_better(
+    explains: float, tracked_share: float, found_share: float, gained: float, is_replaced: bool
+) -> None:
+    """The best of all places of a room fits by chance, by some ten nat in a small room."""
+    localizer = KnownRoom(driven(CROOKED, 0.2).room, RING)
+    tracked, found = Track(0.0, 20.0, explains, tracked_share), Track(3.0, gained, 0.99, found_share)
+    vars(localizer).update(_tracked=tracked, _candidates=found, _status=TRACKING)
+    localizer._conclude_search()
+    assert (vars(localizer)["_tracked"] is found) == is_replaced
 
 
 def test_after_a_reset_the_place_is_unknown_again() -> None:
