@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -44,8 +44,7 @@ def calibrate_robot(
     for option, value in (*(("--drum", radius) for radius in radii_m), ("--way", way_m)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise UserError(f"{option} {value}: must be a length above 0, in metres", WRONG_CALL)
-    check_outputs({"--out": out}, (file,), force=force)
-    settings, firings = _drive(file, robot)
+    settings, firings = _drive(file, robot, lambda: check_outputs({"--out": out}, (file,), force=force))
     if len(firings) < FIRINGS_MIN:
         raise UserError(f"{file}: holds only {len(firings)} firings; record the whole drive and try again", FAILED)
     found = calibrate(firings, settings.ring, radii_m, way_m, synchro=settings.body.synchro)
@@ -172,8 +171,8 @@ def robot_text(settings: Settings, found: Calibration, source: str) -> str:
     return "\n".join([*head, *tomli_w.dumps(tables).splitlines(), ""])
 
 
-def _drive(file: str, robot: str | None) -> tuple[Settings, list[Firing]]:
-    """Return the nominal robot's settings and the firings of a drive."""
+def _drive(file: str, robot: str | None, check: Callable[[], None]) -> tuple[Settings, list[Firing]]:
+    """Return the nominal robot's settings and the firings of a drive; `check` is called between the two."""
     from runtime.analysis.export.ring_log_export import recorded_firings
     from runtime.recording.reader import is_recording, open_recording
     from runtime.recording.ring_log import read_ring_log
@@ -181,8 +180,10 @@ def _drive(file: str, robot: str | None) -> tuple[Settings, list[Firing]]:
     path = Path(file)
     if not is_recording(path):
         settings = load_settings(None, (), robot=robot)
+        check()
         return settings, list(read_ring_log(path, sensors=len(settings.ring.mounts)))
     if robot is not None:
         raise UserError(f"{file}: is a recording and contains its robot; --robot is for ring logs", WRONG_CALL)
     with open_recording(path) as recording:
+        check()
         return recording.settings, recorded_firings(recording)

@@ -136,35 +136,37 @@ def test_a_leap_is_reported_and_the_robot_drives_on(measured: Callable[[str], No
 @promise
 @pytest.mark.parametrize("rate", [200.0, 8000.0])
 def test_noise_stops_it_only_where_it_lasts_and_is_named(rate: float, measured: Callable[[str], None]) -> None:
-    """A frame with noise before it is lost, so no echo arrives. The robot slows down so that it stands when the last
-    echo is too old (`echo_age_max_s`, 1.5 s), then stops with the cause named, and does not resume by itself."""
+    """A frame with noise before it is lost. Without odometry the robot stops after .4 s (`link.silence_max_s`); where
+    an odometry happens to follow an echo's end it arrives, and the robot stops once the last echo is too old, 1.5 s.
+    Either way the cause is named, and it does not resume by itself."""
+    latest_s = 0.0
     for seed in SEEDS:
         noise = [
             Garbage(kind="garbage", at_s=at_s + 0.017 * seed, duration_s=lasts_s, bytes_per_s=rate)
-            for at_s, lasts_s in ((10.0, 0.5), (FROM_S, 1.8))
+            for at_s, lasts_s in ((10.0, 0.3), (FROM_S, 1.8))
         ]
         run = hallway(seed, *noise)
         run.until(FROM_S)
         driving = run.state.mode
-        assert driving.mode is Mode.DRIVE, "half a second does not stop it"
+        assert driving.mode is Mode.DRIVE, "a third of a second does not stop it"
         bad = run.driver.counts.bad
         run.until(FROM_S + 1.9)
         assert run.driver.counts.bad > bad + 50
         stopped = run.state.mode
         assert stopped.mode is Mode.SAFE_STOP
         reason = str(stopped.reason)
-        assert "corrupt frames came in place of its echoes: noise on the line" in reason
-        assert reason.endswith(", then re-arm")
-        assert 1.4 < stopped.entered_run_s - (FROM_S + 0.017 * seed) < 1.7
+        assert "corrupt frames came in" in reason
+        assert "noise on the line" in reason
+        after_s = stopped.entered_run_s - (FROM_S + 0.017 * seed)
+        assert 0.35 < after_s < 1.7
+        latest_s = max(latest_s, after_s)
         firings = len(run.firings)
         run.until(FROM_S + 3.6)
         assert run.driver.state is LineState.READY
         assert run.driver.problem is None
         assert len(run.firings) > firings + 20
         assert run.state.mode == stopped, "motion never resumes by itself"
-    measured(
-        f"{rate:g} bytes of noise a second: no stop for 0.5 s; after 1.5 s without an echo SAFE_STOP, cause named"
-    )
+    measured(f"{rate:g} bytes of noise a second: no stop for 0.3 s; SAFE_STOP after {latest_s:.2f} s, cause named")
 
 
 @pytest.mark.promise("P8")

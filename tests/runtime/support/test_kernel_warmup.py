@@ -14,7 +14,7 @@ from numba.core import event
 
 from config.load import load_settings
 from perception.bayes import polygon_tracks, refine
-from perception.localization import drift_correction, pose_grid, pose_track
+from perception.localization import drift_correction, landmark_tracker, pose_grid, pose_track
 from perception.pipeline import Perception
 from runtime.support import kernel_cache as kernels
 from runtime.support import kernel_warmup
@@ -44,7 +44,8 @@ def test_a_second_process_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) 
     assert started[0].returncode is not None
 
 
-DRIFT = frozenset({"add_landmark", "propagate", "remove_landmark", "update_with_firing"})
+DRIFT = frozenset({"add_landmark", "remove_landmark"})
+TRACKER = frozenset({"propagate", "update_with_firing"})
 GRID = frozenset({"fill_cell", "score_block", "offer_peaks"})
 TRACK = frozenset({"add_hypothesis", "move", "update_particles", "conclude"})
 
@@ -61,7 +62,7 @@ def test_each_compiled_kernel_leaves_a_mark(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("part", "names"),
     [
-        (kernels.LOCALIZATION, {drift_correction: DRIFT}),
+        (kernels.LOCALIZATION, {drift_correction: DRIFT, landmark_tracker: TRACKER}),
         (kernels.KNOWN_ROOM, {pose_grid: GRID, pose_track: TRACK}),
     ],
 )
