@@ -26,6 +26,7 @@ from drivers.arcos.wire_frame_counter import WireFrameCounter
 from drivers.driver import DriverError
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.body import BRAKE_S, Body
+from drivers.emulator.event_device import EventDevice
 from drivers.emulator.fault_schedule import FaultSchedule
 from drivers.emulator.faults import (
     BlockedWheels,
@@ -41,7 +42,6 @@ from drivers.emulator.faults import (
     StopButton,
 )
 from drivers.emulator.faulty_line import FaultyLine
-from drivers.emulator.robot_device import GroundTruth
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Flags, Pose, Twist
@@ -64,7 +64,7 @@ class Session(Enum):
     OPENED = "opened"
 
 
-class ArcosDevice:
+class ArcosDevice(EventDevice):
     """A `drivers.emulator.robot_device.RobotDevice` that speaks the protocol of the Pioneer family.
 
     Parameters
@@ -105,13 +105,12 @@ class ArcosDevice:
         self._firmware = firmware
         scene = compile_scene(world)
         start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
-        self._body = Body(robot.body, scene, start, world.odometry, drift_rng)
+        body = Body(robot.body, scene, start, world.odometry, drift_rng)
         sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
         self._touch = Touch(firmware, scene, robot.body.radius_m)
-        self._now_us = self._moved_us = self._heard_us = 0
-        self._next_event_us: int | None = None  # None once something may have changed it
-        self._faults = FaultSchedule(faults)
-        self._line = FaultyLine(firmware.baud, self._faults, *line_rngs)
+        self._heard_us = 0
+        schedule = FaultSchedule(faults)
+        super().__init__(body, schedule, FaultyLine(firmware.baud, schedule, *line_rngs))
         self._readings = SonarReadings(firmware, sonar, robot.ring.window_m, self._faults, outlier_rng)
         self._watchdog_ms = firmware.watchdog_ms
         self._driven = STILL
@@ -120,12 +119,6 @@ class ArcosDevice:
         # Load the compiled kernels now, so that the first firing is not late.
         clearance(start.x, start.y, scene.circles, scene.segments)
         sonar.true_echoes(start, start.theta, np.zeros(len(robot.ring.mounts), dtype=np.bool_))
-
-    @property
-    def truth(self) -> GroundTruth:
-        """The true state at the last event."""
-        body = self._body
-        return GroundTruth(self._moved_us * 1e-6, body.pose, body.ring_yaw, body.twist, self.flags, body.contacts)
 
     @property
     def flags(self) -> Flags:
@@ -140,38 +133,14 @@ class ArcosDevice:
         }
         return Flags(sum(flag for flag, is_set in status.items() if is_set))
 
-    @property
-    def plugged(self) -> bool:
-        """False while the line is unplugged."""
-        return self._line.plugged
-
-    @property
-    def dropped(self) -> int:
-        """Number of packets that did not fit into the transmitter's queue."""
-        return self._line.dropped
-
-    def advance(self, to_s: float) -> bytes:
-        """Simulate up to `to_s` seconds after the start and return the bytes that have left the robot by then."""
-        to_us = round(to_s * 1e6)
-        while (at_us := self._next_us() if self._next_event_us is None else self._next_event_us) <= to_us:
-            self._now_us, self._next_event_us = at_us, None
-            self._move()
-            self._update_faults()
-            if not self._faults.has(Reboot):
-                self._handle_events()
-        self._now_us, self._next_event_us = max(self._now_us, to_us), at_us
-        self._line.collect(self._now_us)
-        return self._line.take()
-
     def frame_counter(self) -> WireFrameCounter:
         """Return a new counter of this protocol's ranges and velocities, for a line that is in use already."""
         return WireFrameCounter()
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the host, at the time to which the robot has advanced."""
-        if not data or self._faults.has(Reboot) or not (data := self._line.heard(data)):
+        if not (data := self._hear(data)):
             return
-        self._next_event_us = None
         # The rest of a packet does not come after a pause: a false length would swallow the next client's SYNCs.
         late = self._decoder.skip() if self._now_us - self._heard_us > PAUSE_MAX_US else []
         self._heard_us = self._now_us

@@ -25,6 +25,7 @@ from drivers.denning.wire_units import emulated_version
 from drivers.driver import DriverError
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.body import BRAKE_S, RAMP_S, Body
+from drivers.emulator.event_device import EventDevice
 from drivers.emulator.fault_schedule import FaultSchedule
 from drivers.emulator.faults import (
     BlockedWheels,
@@ -40,7 +41,6 @@ from drivers.emulator.faults import (
     StopButton,
 )
 from drivers.emulator.faulty_line import FaultyLine
-from drivers.emulator.robot_device import GroundTruth
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Flags, Pose, Twist
@@ -56,7 +56,7 @@ _LATCHED, _DEADMAN = int(Flags.LATCHED), int(Flags.DEADMAN)  # used at every eve
 _STILL = Twist(0.0, 0.0)
 
 
-class DenningDevice:
+class DenningDevice(EventDevice):
     """A `drivers.emulator.robot_device.RobotDevice` that speaks the ring-and-base protocol.
 
     Parameters
@@ -107,13 +107,11 @@ class DenningDevice:
         self._ring_radius_mm = round(1000.0 * max(math.hypot(m.x_m, m.y_m) for m in mounts))
         scene = compile_scene(world)
         start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
-        self._body = Body(robot.body, scene, start, world.odometry, drift_rng)
+        body = Body(robot.body, scene, start, world.odometry, drift_rng)
         sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
         self._newest = emulated_version(robot)
-        self._now_us = self._moved_us = 0
-        self._next_event_us: int | None = None  # None once something may have changed it
-        self._faults = FaultSchedule(faults)
-        self._line = FaultyLine(robot.link.baud, self._faults, *line_rngs)
+        schedule = FaultSchedule(faults)
+        super().__init__(body, schedule, FaultyLine(robot.link.baud, schedule, *line_rngs))
         self._reporter = EchoReporter(robot.ring, sonar, self._faults, outlier_rng)
         self._deadman_ms = DEADMAN_MS
         self._boot_id = self._new_boot_id()
@@ -121,12 +119,6 @@ class DenningDevice:
         # Load the compiled kernels now, so that the first firing is not late.
         clearance(start.x, start.y, scene.circles, scene.segments)
         sonar.true_echoes(start, start.theta, np.zeros(self._sensors, dtype=np.bool_))
-
-    @property
-    def truth(self) -> GroundTruth:
-        """The true state at the last event."""
-        body = self._body
-        return GroundTruth(self._moved_us * 1e-6, body.pose, body.ring_yaw, body.twist, self.flags, body.contacts)
 
     @property
     def flags(self) -> Flags:
@@ -138,38 +130,14 @@ class DenningDevice:
         """The random number of this start, as in IDENT."""
         return self._boot_id
 
-    @property
-    def plugged(self) -> bool:
-        """False while the line is unplugged."""
-        return self._line.plugged
-
-    @property
-    def dropped(self) -> int:
-        """Number of frames that did not fit into the transmitter's queue."""
-        return self._line.dropped
-
-    def advance(self, to_s: float) -> bytes:
-        """Simulate up to `to_s` seconds after the start and return the bytes that have left the robot by then."""
-        to_us = round(to_s * 1e6)
-        while (at_us := self._next_us() if self._next_event_us is None else self._next_event_us) <= to_us:
-            self._now_us, self._next_event_us = at_us, None
-            self._move()
-            self._update_faults()
-            if not self._faults.has(Reboot):
-                self._handle_events()
-        self._now_us, self._next_event_us = max(self._now_us, to_us), at_us
-        self._line.collect(self._now_us)
-        return self._line.take()
-
     def frame_counter(self) -> WireFrameCounter:
         """Return a new counter of this protocol's echoes and drive commands, for a line that is in use already."""
         return WireFrameCounter()
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the host, at the time to which the robot has advanced."""
-        if not data or self._faults.has(Reboot) or not (data := self._line.heard(data)):
+        if not (data := self._hear(data)):
             return
-        self._next_event_us = None
         for frame in self._decoder.feed(data):
             self._move()
             self._obey(frame)

@@ -15,6 +15,7 @@ from config.robot import SOUND_SPEED_M_S, RobotConfig
 from config.world import WorldConfig
 from drivers.emulator.acoustics import clearance
 from drivers.emulator.body import BRAKE_S, RAMP_S, Body
+from drivers.emulator.event_device import EventDevice
 from drivers.emulator.fault_schedule import FaultSchedule
 from drivers.emulator.faults import (
     BlockedWheels,
@@ -32,7 +33,6 @@ from drivers.emulator.faults import (
     StuckSensor,
 )
 from drivers.emulator.faulty_line import FaultyLine
-from drivers.emulator.robot_device import GroundTruth
 from drivers.emulator.scene import compile_scene
 from drivers.emulator.sonar import Sonar
 from drivers.messages import Flags, Pose, Twist
@@ -70,7 +70,7 @@ _PRESSED_M = 1e-3
 _I32 = 1 << 32
 
 
-class RflexDevice:
+class RflexDevice(EventDevice):
     """A `drivers.emulator.robot_device.RobotDevice` that speaks the rFLEX protocol.
 
     Parameters
@@ -117,25 +117,17 @@ class RflexDevice:
         self._ids = sonar_ids(robot)
         self._scene = scene = compile_scene(world)
         start = Pose(world.start.x_m, world.start.y_m, math.radians(world.start.heading_deg))
-        self._body = Body(robot.body, scene, start, world.odometry, drift_rng)
+        body = Body(robot.body, scene, start, world.odometry, drift_rng)
         self._sonar = Sonar(robot.ring, scene, world.acoustics, sonar_rng)
-        self._faults = FaultSchedule(faults)
-        self._line = FaultyLine(robot.link.baud, self._faults, *line_rngs)
-        self._now_us = self._moved_us = 0
+        schedule = FaultSchedule(faults)
+        super().__init__(body, schedule, FaultyLine(robot.link.baud, schedule, *line_rngs))
         self._clock_start_us, self._booted_us = clock_start_us, 0
         self._fail_safe_us = round(1e6 * self._rflex.fail_safe_s)
         self._touched_at: tuple[Pose, bool] | None = None
-        self._next_us: int | None = None  # None once something may have changed it
         self._boot()
         # Load the compiled kernels now, so that the first firing is not late.
         clearance(start.x, start.y, scene.circles, scene.segments)
         self._sonar.true_echoes(start, start.theta, np.zeros(len(robot.ring.mounts), dtype=np.bool_))
-
-    @property
-    def truth(self) -> GroundTruth:
-        """The true state at the last event."""
-        body = self._body
-        return GroundTruth(self._moved_us * 1e-6, body.pose, body.ring_yaw, body.twist, self.flags, body.contacts)
 
     @property
     def flags(self) -> Flags:
@@ -149,33 +141,14 @@ class RflexDevice:
         }
         return Flags(sum(flag for flag, is_set in status.items() if is_set))
 
-    @property
-    def plugged(self) -> bool:
-        """False while the line is unplugged."""
-        return self._line.plugged
-
-    def advance(self, to_s: float) -> bytes:
-        """Simulate up to `to_s` seconds after the start and return the bytes that have left the robot by then."""
-        to_us = round(to_s * 1e6)
-        while (at_us := self._next_event_us() if self._next_us is None else self._next_us) <= to_us:
-            self._now_us, self._next_us = at_us, None
-            self._move()
-            self._update_faults()
-            if not self._faults.has(Reboot):
-                self._handle_events()
-        self._now_us, self._next_us = max(self._now_us, to_us), at_us
-        self._line.collect(self._now_us)
-        return self._line.take()
-
     def frame_counter(self) -> WireFrameCounter:
         """Return a new counter of this protocol's ranges and velocities, for a line that is in use already."""
         return WireFrameCounter()
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the host, at the time to which the robot has advanced."""
-        if not data or self._faults.has(Reboot) or not (data := self._line.heard(data)):
+        if not (data := self._hear(data)):
             return
-        self._next_us = None
         for frame in self._decoder.feed(data):
             self._move()
             self._obey(frame)
@@ -242,7 +215,7 @@ class RflexDevice:
 
     # Events.
 
-    def _next_event_us(self) -> int:
+    def _next_us(self) -> int:
         others = [self._moved_us // TICK_US * TICK_US + TICK_US, self._faults.next_us]
         if not self._faults.has(Reboot):
             others += [self._report_us, self._input_us, self._fire_us]
