@@ -18,8 +18,8 @@ import numpy as np
 from behaviors.clearance import stoppable_speed_m_s
 from behaviors.field_of_view import UnseenWay, seen_speed_m_s, unseen_way
 from behaviors.response import Response
+from config.behaviors import ArbiterConfig
 from config.robot import BodyConfig
-from config.settings import ArbiterConfig
 from perception.percept import Percept, Twist, wrap_angle
 
 NEGLIGIBLE: Final = 0.01

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from behaviors.response import Response
-from config.settings import AvoidStaticObstacleConfig
+from config.behaviors import AvoidStaticObstacleConfig
 from perception.percept import Floats, Percept
 
 SCHEMA: Final = "avoid_static_obstacle"

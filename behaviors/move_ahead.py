@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from behaviors.response import Response
-from config.settings import MoveAheadConfig
+from config.behaviors import MoveAheadConfig
 from perception.percept import Percept, Pose
 
 SCHEMA: Final = "move_ahead"

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from behaviors.response import Response
-from config.settings import MoveToGoalConfig
+from config.behaviors import MoveToGoalConfig
 from perception.percept import Percept
 
 SCHEMA: Final = "move_to_goal"

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from behaviors.response import Response
-from config.settings import TeleoperationConfig
+from config.behaviors import TeleoperationConfig
 from perception.percept import Percept
 
 SCHEMA: Final = "teleoperation"

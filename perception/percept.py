@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from drivers.messages import Floats, Pose, Twist, wrap_angle
 
-__all__ = ["FieldOfView", "Floats", "Percept", "Pose", "Twist", "wrap_angle"]
+__all__ = ["Canyon", "FieldOfView", "Floats", "OccupancyWindow", "Percept", "Pose", "Twist", "wrap_angle"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +47,52 @@ class FieldOfView:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class OccupancyWindow:
+    """What the evidence grid holds around the robot.
+
+    Attributes
+    ----------
+    occupied : (n, n) float32
+        Probability that something in the cell has answered in some direction, row by row from the smallest y; 0.5
+        where nothing is known.
+    x_m, y_m : float
+        The outer corner of the first cell, in the odometry's frame, m.
+    cell_m : float
+        Side of a cell, m.
+    """
+
+    occupied: NDArray[np.float32]
+    x_m: float
+    y_m: float
+    cell_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Canyon:
+    """A box canyon: a dead end whose only way out for this robot is its mouth (m, rad, odometry's frame).
+
+    Attributes
+    ----------
+    number : int
+        The same for the same canyon as long as the robot remembers it.
+    mouth : tuple of float
+        Ends of the mouth, x1, y1, x2, y2.
+    axis_rad : float
+        Direction inwards, from the middle of the mouth to the back.
+    depth_m : float
+        Distance from the mouth to the back.
+    probability : float
+        That the back and both sides are closed for this robot, 0 to 1.
+    """
+
+    number: int
+    mouth: tuple[float, float, float, float]
+    axis_rad: float
+    depth_m: float
+    probability: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Percept:
     """The surroundings in one cycle, in the odometry's frame (m, rad).
 
@@ -57,9 +106,15 @@ class Percept:
         Where the ring has looked.
     objects : tuple of DetectedObject
         The objects recognised so far, for schemas that approach one.
+    occupancy : OccupancyWindow or None
+        The evidence grid around the robot; None where no schema needs it.
+    canyons : tuple of Canyon
+        The box canyons near the robot.
     """
 
     pose: Pose
     obstacles: Floats
     field_of_view: FieldOfView
     objects: tuple[object, ...] = ()
+    occupancy: OccupancyWindow | None = None
+    canyons: tuple[Canyon, ...] = ()

@@ -28,10 +28,10 @@ from runtime.cycle.drive_requests import (
     GoalPlace,
     Legs,
     after_stop,
-    drive,
     goal_place,
     validate,
 )
+from runtime.cycle.driving import drive
 from runtime.cycle.inputs import Inputs
 from runtime.cycle.modes import Mode, ModeState, advance
 from runtime.cycle.motion_monitor import MotionMonitor, Movement

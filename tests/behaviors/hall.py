@@ -13,8 +13,8 @@ import numpy as np
 from behaviors import avoid_static_obstacle as avoid
 from behaviors import move_ahead as ahead
 from behaviors.arbiter import Drive, arbitrate
+from config.behaviors import BehaviorsConfig
 from config.robot import BodyConfig
-from config.settings import BehaviorsConfig
 from perception.percept import Percept, Pose
 from tests.behaviors.views import EVERYWHERE
 

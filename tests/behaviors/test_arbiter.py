@@ -11,8 +11,8 @@ import pytest
 
 from behaviors.arbiter import Drive, Stop, arbitrate
 from behaviors.response import Response
+from config.behaviors import ArbiterConfig
 from config.robot import BodyConfig
-from config.settings import ArbiterConfig
 from perception.percept import Percept, Pose, Twist
 from tests.behaviors.views import EVERYWHERE
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from behaviors.avoid_static_obstacle import SCHEMA, UNBOUNDED, avoid_static_obstacle, repulsions
-from config.settings import AvoidStaticObstacleConfig
+from config.behaviors import AvoidStaticObstacleConfig
 from perception.percept import Percept, Pose
 from tests.behaviors.views import EVERYWHERE
 

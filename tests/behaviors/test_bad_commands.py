@@ -10,8 +10,8 @@ import pytest
 
 from behaviors.arbiter import Drive, Stop, arbitrate
 from behaviors.response import Response
+from config.behaviors import ArbiterConfig
 from config.robot import BodyConfig
-from config.settings import ArbiterConfig
 from drivers.denning import frames
 from drivers.denning.codec import Decoder
 from drivers.messages import Twist

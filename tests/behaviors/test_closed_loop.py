@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from config.settings import ArbiterConfig, AvoidStaticObstacleConfig, BehaviorsConfig, MoveAheadConfig
+from config.behaviors import ArbiterConfig, AvoidStaticObstacleConfig, BehaviorsConfig, MoveAheadConfig
 from perception.percept import Pose
 from tests.behaviors.hall import FOOT, STEP_S, Run, World, drive, hallway
 

@@ -18,8 +18,8 @@ from behaviors.field_of_view import (
     unseen_way,
 )
 from behaviors.response import Response
+from config.behaviors import ArbiterConfig
 from config.robot import BodyConfig
-from config.settings import ArbiterConfig
 from perception.percept import FieldOfView, Percept, Pose, Twist
 from tests.behaviors.views import EVERYWHERE, ring_view
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from behaviors.move_ahead import SCHEMA, Leg, move_ahead
-from config.settings import MoveAheadConfig
+from config.behaviors import MoveAheadConfig
 from perception.percept import Percept, Pose
 from tests.behaviors.views import EVERYWHERE
 

@@ -9,7 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from behaviors.move_to_goal import Goal, move_to_goal
-from config.settings import MoveToGoalConfig
+from config.behaviors import MoveToGoalConfig
 from perception.percept import Percept, Pose
 from tests.behaviors.views import EVERYWHERE
 

@@ -10,8 +10,8 @@ import pytest
 from behaviors.arbiter import Drive, Stop, limit_velocity
 from behaviors.response import Response
 from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, is_expired, teleoperation
+from config.behaviors import ArbiterConfig, TeleoperationConfig
 from config.robot import BodyConfig
-from config.settings import ArbiterConfig, TeleoperationConfig
 from perception.percept import Percept, Pose, Twist
 from tests.behaviors.views import EVERYWHERE
 

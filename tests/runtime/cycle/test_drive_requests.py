@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from itertools import pairwise
-from typing import Any
 
 import pytest
 
@@ -14,11 +12,9 @@ from behaviors.response import Response
 from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate
 from config.load import load_settings
 from drivers.driver import LineState
-from drivers.messages import Flags, Pose, Twist
-from perception.pipeline import Perception
+from drivers.messages import Flags, Pose
 from runtime.cycle.drive_requests import (
     GOAL_SLEW_M_S,
-    NO_PLACE,
     GoalPlace,
     Legs,
     first_request,
@@ -26,51 +22,9 @@ from runtime.cycle.drive_requests import (
 )
 from runtime.cycle.inputs import Request
 from runtime.cycle.modes import Mode
-from runtime.cycle.step import NO_MAP, STANDSTILL, CycleRecord, DriveRequest, Order
-from tests.runtime.scripted_step import PERIOD_S, ScriptedRobot
-
-FORWARD = Teleoperate(0.2, 0.1)
-
-
-class RequestedRobot(ScriptedRobot):
-    """A scripted robot that gets drive requests."""
-
-    def request_drive(self, drive_request: DriveRequest | None, **found: object) -> CycleRecord:
-        self.drive_request = drive_request
-        return self.cycle(**found)  # type: ignore[arg-type]
-
-    def move_to(self, pose: Pose) -> CycleRecord:
-        self.pose = pose
-        return self.request_drive(None)
-
-
-def near(v: float, w: float) -> Any:
-    """Return what equals a velocity up to rounding."""
-    return Twist(pytest.approx(v), pytest.approx(w))  # type: ignore[arg-type]
-
-
-def robot(*sets: str) -> RequestedRobot:
-    return RequestedRobot(load_settings("hallway", ["perception.method=paper", *sets])) if sets else RequestedRobot()
-
-
-def driving(*sets: str) -> RequestedRobot:
-    script = robot(*sets)
-    script.driving()
-    return script
-
-
-def hold_reason(script: RequestedRobot) -> str:
-    """Return why it stands, empty where it drives."""
-    return script.state.hold_reason or ""
-
-
-def arm(script: RequestedRobot) -> CycleRecord:
-    record = script.request_drive(None, request=Request.ARM)
-    assert record.command is Order.RELEASE
-    while script.state.mode.mode is not Mode.DRIVE:
-        record = script.request_drive(None)
-        assert record.mode.mode is Mode.DRIVE or record.command in {STANDSTILL, None}
-    return record
+from runtime.cycle.step import NO_MAP, STANDSTILL, DriveRequest, Order
+from tests.runtime.cycle.requested_robot import FORWARD, arm, driving, hold_reason, near, robot
+from tests.runtime.scripted_step import PERIOD_S
 
 
 def test_without_a_drive_request_the_legs_are_driven() -> None:
@@ -82,63 +36,6 @@ def test_without_a_drive_request_the_legs_are_driven() -> None:
         Response("move_ahead", 1.0, 0.0), Response("avoid_static_obstacle", 0.0, 0.0), Response("sum", 1.0, 0.0),
     )  # fmt: skip
     assert hold_reason(script) == ""
-
-
-def test_a_goal_is_approached_and_the_robot_stands_there() -> None:
-    script = driving("behaviors.move_to_goal.success_radius_m=0.2")
-    assert script.request_drive(Goal(0.0, 5.0)).command == near(0.0, script.settings.body.turn_max_rad_s)
-    to_goal = script.state.vectors[0]
-    assert to_goal.schema == "move_to_goal"
-    assert (to_goal.x, to_goal.y) == pytest.approx((0.0, 1.0))
-    assert script.move_to(Pose(0.0, 1.0, math.pi / 2)).command == near(0.3, 0.0)
-    speeds = []
-    for y in (4.3, 4.5, 4.7):
-        command = script.move_to(Pose(0.0, y, math.pi / 2)).command
-        assert isinstance(command, Twist)
-        speeds.append(command.v)
-    assert all(later < earlier for earlier, later in pairwise(speeds)), "it comes in slowly"
-    assert hold_reason(script) == ""
-    record = script.move_to(Pose(0.0, 4.9, math.pi / 2))
-    assert (record.mode.mode, record.command) == (Mode.DRIVE, STANDSTILL)
-    assert hold_reason(script) == "the goal (0.00 m, 5.00 m) is reached"
-    assert script.move_to(Pose(0.0, 3.0, 0.0)).command == STANDSTILL, "pushed away it does not set out again"
-    command = script.request_drive(Goal(0.0, 5.0)).command
-    assert command != STANDSTILL, "requested again, it drives"
-    assert hold_reason(script) == ""
-
-
-def test_teleoperation_drives_while_velocities_arrive_and_stops_within_a_quarter_second() -> None:
-    script = driving()
-    begin_s = script.run_s + PERIOD_S
-    for _ in range(10):
-        record = script.request_drive(FORWARD)
-        assert record.command == near(0.2, 0.1)
-        assert hold_reason(script) == ""
-    last_s = script.run_s
-    assert last_s - begin_s > 0.4, "longer than one velocity is valid"
-    while (record := script.request_drive(None)).command != STANDSTILL:
-        assert record.command == near(0.2, 0.1)
-    assert 0.19 < script.run_s - last_s < 0.251
-    assert record.mode.mode is Mode.DRIVE
-    assert "no velocity arrives from an operator" in hold_reason(script)
-    assert script.state.drive_request == TELEOPERATION_ENDED
-    for _ in range(50):
-        assert script.request_drive(None).command == STANDSTILL
-    assert script.request_drive(FORWARD).command != STANDSTILL
-
-
-def test_teleoperation_is_limited_by_echoes_and_by_the_validity_of_a_velocity() -> None:
-    """3 m of free space; the schema of the settings may be switched off, the clearance may not."""
-    for avoid in ("true", "false"):
-        script = driving(f"behaviors.teleoperation.avoid={avoid}", "behaviors.arbiter.clearance_m=3.0")
-        assert script.request_drive(FORWARD).command == near(0.0, 0.1)
-        assert [r.schema for r in script.state.vectors] == [
-            "teleoperation", *(["avoid_static_obstacle"] if avoid == "true" else []), "sum",
-        ]  # fmt: skip
-    script = driving()
-    script.request_drive(replace(FORWARD, valid_s=0.12))
-    assert script.request_drive(None).command != STANDSTILL
-    assert script.request_drive(None).command == STANDSTILL
 
 
 @pytest.mark.parametrize("drive_request", [Legs(), Goal(3.0, 0.0), FORWARD], ids=["legs", "goal", "teleoperation"])
@@ -234,19 +131,6 @@ def test_disarming_during_arming_ends_it_and_sets_the_latch_again() -> None:
         assert script.request_drive(None).command is None
 
 
-def test_legs_that_are_done_begin_again_on_request() -> None:
-    script = driving("behaviors.move_ahead.distance_m=1.0", "behaviors.move_ahead.at_end=stop")
-    assert script.move_to(Pose(1.1, 0.0, 0.0)).command == STANDSTILL
-    assert hold_reason(script) == "the leg is done"
-    assert script.request_drive(None).command == STANDSTILL
-    assert script.request_drive(Legs()).command == near(0.3, 0.0)
-    script.move_to(Pose(1.5, 0.0, 0.0))
-    script.request_drive(Goal(9.0, 0.0))
-    script.request_drive(Legs())
-    assert script.move_to(Pose(2.0, 0.0, 0.0)).command != STANDSTILL, "one under way goes on"
-    assert script.move_to(Pose(2.2, 0.0, 0.0)).command == STANDSTILL
-
-
 @pytest.mark.parametrize(
     "drive_request",
     [
@@ -261,15 +145,6 @@ def test_an_invalid_drive_request_changes_nothing(drive_request: DriveRequest) -
     assert record.command == near(0.3, 0.0)
     assert script.state.drive_request == Goal(9.0, 0.0)
     assert record.inputs.drive_request is drive_request
-
-
-@pytest.mark.parametrize("drive_request", [Legs(), Goal(9.0, 0.0), FORWARD], ids=["legs", "goal", "teleoperation"])
-def test_vectors_of_a_stop_are_not_shown(drive_request: DriveRequest) -> None:
-    script = driving()
-    script.pose = Pose(math.nan, 0.0, 0.0)
-    record = script.request_drive(drive_request, firing=False)
-    assert (record.mode.mode, record.command) == (Mode.SAFE_STOP, Order.HALT)
-    assert script.state.vectors == ()
 
 
 def test_a_goal_in_the_map_moves_smoothly_with_it() -> None:
@@ -287,32 +162,6 @@ def test_a_goal_in_the_map_moves_smoothly_with_it() -> None:
     assert place == GoalPlace(pytest.approx(-0.2), pytest.approx(2.4))  # type: ignore[arg-type]
     assert steps == math.ceil(0.5 / (GOAL_SLEW_M_S * PERIOD_S))
     assert goal_place(goal, place, None, PERIOD_S) is None
-
-
-def test_a_goal_in_the_map_is_driven_without_a_jump_and_only_where_the_place_is_known(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    frames: list[Pose | None] = [Pose(0.0, 0.0, 0.0)]
-    monkeypatch.setattr(Perception, "known_map_frame", lambda _: frames[-1])
-    monkeypatch.setattr(Perception, "localized", lambda _: "a place in the map")
-    script = driving()
-    assert script.request_drive(Goal(3.0, 0.0, frame="map")).command == near(0.3, 0.0)
-    frames.append(Pose(0.0, 1.0, 0.0))
-    turns = [script.request_drive(None).command for _ in range(10)]
-    ways = [command.w for command in turns if isinstance(command, Twist)]
-    assert len(ways) == 10
-    assert 0.0 < ways[0] < 0.05, "a correction by a metre turns the robot little by little"
-    assert max(abs(b - a) for a, b in pairwise(ways)) < 0.05
-    assert script.state.drive_request == Goal(3.0, 0.0, frame="map")
-    frames.append(None)
-    assert script.request_drive(None).command == STANDSTILL
-    assert hold_reason(script) == NO_PLACE
-    frames.append(Pose(0.0, -1.0, 0.0))
-    assert script.request_drive(None).command != STANDSTILL
-    assert script.state.goal_place == GoalPlace(3.0, -1.0)
-    record = script.move_to(Pose(3.0, -1.0, 0.0))
-    assert record.command == STANDSTILL
-    assert script.state.drive_request == Goal(3.0, 0.0, frame="map", reached=True)
 
 
 def test_without_a_map_a_goal_in_it_is_refused() -> None:

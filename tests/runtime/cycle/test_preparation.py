@@ -81,6 +81,7 @@ class Run:
             self.last_speed = robot.truth.twist.v
 
 
+@pytest.mark.usefixtures("warm_kernels")  # it counts compilations
 def test_echoes_are_shown_and_the_robot_stands_until_recognition_is_ready(monkeypatch: pytest.MonkeyPatch) -> None:
     run = Run(monkeypatch, Preparation())
     run.drive(3.0)

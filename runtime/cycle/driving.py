@@ -1,0 +1,136 @@
+"""The schemas that each drive request uses, and the arbiter's decision on their responses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+from behaviors.arbiter import Decision, Drive, arbitrate, limit_velocity
+from behaviors.avoid_static_obstacle import SCHEMA as AVOID
+from behaviors.avoid_static_obstacle import avoid_static_obstacle
+from behaviors.field_of_view import unseen_way
+from behaviors.move_ahead import SCHEMA as AHEAD
+from behaviors.move_ahead import Leg, move_ahead
+from behaviors.move_to_goal import SCHEMA as TO_GOAL
+from behaviors.move_to_goal import Goal, move_to_goal
+from behaviors.response import Response
+from behaviors.teleoperation import SCHEMA as TELEOPERATION
+from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, is_expired, teleoperation
+from config.settings import Settings
+from drivers.messages import Twist
+from perception.percept import Percept
+from runtime.cycle.drive_requests import STANDSTILL, DriveRequest, GoalPlace
+
+SUM: Final = "sum"
+"""Name of the sum of all responses, in place of a schema's name."""
+NO_CONTROL: Final = "no velocity arrives from an operator: teleoperate, set a goal, or resume the legs"
+NO_PLACE: Final = (
+    "the goal is a place in the map, and the robot does not know its own there: wait until it does, say where it is, "
+    "or set a goal in odometry's frame"
+)
+LEG_DONE: Final = "the leg is done"
+
+
+@dataclass(frozen=True, slots=True)
+class DriveResult:
+    """What a drive request led to in one cycle."""
+
+    decision: Decision
+    vectors: tuple[Response, ...]
+    """The schemas' responses and, last, their sum under the name `SUM`."""
+    drive_request: DriveRequest
+    """The request after the cycle: a goal may have been reached, a velocity may have expired."""
+    leg: Leg
+    hold_reason: str | None = None
+    """Why the robot does not move although it may drive, for the operator."""
+
+
+def drive(
+    drive_request: DriveRequest, requested_run_s: float, run_s: float, leg: Leg, percept: Percept, settings: Settings,
+    place: GoalPlace | None = None,
+) -> DriveResult:  # fmt: skip
+    """Return the arbiter's decision on the responses of the schemas that the request asks for.
+
+    Parameters
+    ----------
+    drive_request : DriveRequest
+        The motion requested of the robot.
+    requested_run_s, run_s : float
+        When that was requested, and now, by the run's clock.
+    leg : Leg
+        How far the current leg has come, for `Legs`.
+    percept : Percept
+        What the robot sees.
+    settings : Settings
+        The run's.
+    place : GoalPlace, optional
+        Where a goal lies, from `goal_place`.
+    """
+    away = avoid_static_obstacle(percept, settings.body.radius_m, settings.behaviors.avoid_static_obstacle)
+    match drive_request:
+        case Teleoperate():
+            return _teleoperate(drive_request, run_s - requested_run_s, leg, percept, settings, away)
+        case Goal():
+            return _to_goal(drive_request, place, leg, percept, settings, away)
+        case _:
+            return _along_legs(drive_request, leg, percept, settings, away)
+
+
+def _teleoperate(
+    drive_request: Teleoperate, age_s: float, leg: Leg, percept: Percept, settings: Settings, away: Response
+) -> DriveResult:
+    """Return what an operator's velocity leads to; `away` is avoid-static-obstacle's response."""
+    behaviors, body = settings.behaviors, settings.body
+    # The last cycle before the deadline stops: the next one would come after it.
+    if drive_request != TELEOPERATION_ENDED and is_expired(
+        drive_request, age_s + 1.0 / settings.cycle.rate_hz, behaviors.teleoperation
+    ):
+        drive_request = TELEOPERATION_ENDED
+    steer = teleoperation(percept, drive_request, behaviors.arbiter.base_velocity_m_s)
+    avoids = behaviors.teleoperation.avoid
+    responses, expected = ((steer, away), (TELEOPERATION, AVOID)) if avoids else ((steer,), (TELEOPERATION,))
+    requested = Twist(drive_request.v, drive_request.w)
+    decision = limit_velocity(requested, responses, percept, body, behaviors.arbiter, expected)
+    hold_reason = NO_CONTROL if drive_request == TELEOPERATION_ENDED else None
+    if hold_reason is None and requested.v != 0.0 and isinstance(decision, Drive) and decision.twist.v == 0.0:
+        way = percept.pose.theta + (0.0 if requested.v > 0.0 else math.pi)
+        unseen = unseen_way(percept, way, body, behaviors.arbiter.clearance_m)
+        hold_reason = None if unseen is None else unseen.reason
+    return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason)
+
+
+def _to_goal(
+    drive_request: Goal, place: GoalPlace | None, leg: Leg, percept: Percept, settings: Settings, away: Response
+) -> DriveResult:
+    """Return what a goal leads to; one in the map waits until the robot's own place there is known."""
+    if place is None and not drive_request.reached:
+        return DriveResult(Drive(STANDSTILL), (), drive_request, leg, NO_PLACE)
+    there = drive_request if place is None else replace(drive_request, x=place.x, y=place.y)
+    to_goal, there = move_to_goal(percept, there, settings.behaviors.move_to_goal)
+    is_reached = there.reached and (place is None or place.is_exact)
+    drive_request = replace(drive_request, reached=drive_request.reached or is_reached)
+    responses = (to_goal, away)
+    decision = arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, (TO_GOAL, AVOID))
+    if drive_request.reached and isinstance(decision, Drive):
+        reached = f"the goal ({drive_request.x:.2f} m, {drive_request.y:.2f} m) is reached"
+        return DriveResult(Drive(STANDSTILL), with_sum(responses, decision), drive_request, leg, reached)
+    return DriveResult(decision, with_sum(responses, decision), drive_request, leg)
+
+
+def _along_legs(
+    drive_request: DriveRequest, leg: Leg, percept: Percept, settings: Settings, away: Response
+) -> DriveResult:
+    """Return what the configured legs lead to."""
+    ahead, leg = move_ahead(percept, leg, settings.behaviors.move_ahead)
+    responses = (ahead, away)
+    decision = arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, (AHEAD, AVOID))
+    hold_reason = LEG_DONE if leg.done else None
+    return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason)
+
+
+def with_sum(responses: tuple[Response, ...], decision: Decision) -> tuple[Response, ...]:
+    """Return the responses and, last, their sum; nothing where the decision is a stop, as they may not be finite."""
+    if not isinstance(decision, Drive):
+        return ()
+    return (*responses, Response(SUM, sum(r.x for r in responses), sum(r.y for r in responses)))

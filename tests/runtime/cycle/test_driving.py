@@ -1,0 +1,128 @@
+"""What each drive request leads to: the schemas that it uses, and the velocity that follows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+
+from behaviors.move_to_goal import Goal
+from behaviors.teleoperation import TELEOPERATION_ENDED
+from drivers.messages import Pose, Twist
+from perception.pipeline import Perception
+from runtime.cycle.drive_requests import (
+    GoalPlace,
+    Legs,
+)
+from runtime.cycle.driving import NO_PLACE
+from runtime.cycle.modes import Mode
+from runtime.cycle.step import STANDSTILL, DriveRequest, Order
+from tests.runtime.cycle.requested_robot import FORWARD, driving, hold_reason, near
+from tests.runtime.scripted_step import PERIOD_S
+
+
+def test_a_goal_is_approached_and_the_robot_stands_there() -> None:
+    script = driving("behaviors.move_to_goal.success_radius_m=0.2")
+    assert script.request_drive(Goal(0.0, 5.0)).command == near(0.0, script.settings.body.turn_max_rad_s)
+    to_goal = script.state.vectors[0]
+    assert to_goal.schema == "move_to_goal"
+    assert (to_goal.x, to_goal.y) == pytest.approx((0.0, 1.0))
+    assert script.move_to(Pose(0.0, 1.0, math.pi / 2)).command == near(0.3, 0.0)
+    speeds = []
+    for y in (4.3, 4.5, 4.7):
+        command = script.move_to(Pose(0.0, y, math.pi / 2)).command
+        assert isinstance(command, Twist)
+        speeds.append(command.v)
+    assert all(later < earlier for earlier, later in pairwise(speeds)), "it comes in slowly"
+    assert hold_reason(script) == ""
+    record = script.move_to(Pose(0.0, 4.9, math.pi / 2))
+    assert (record.mode.mode, record.command) == (Mode.DRIVE, STANDSTILL)
+    assert hold_reason(script) == "the goal (0.00 m, 5.00 m) is reached"
+    assert script.move_to(Pose(0.0, 3.0, 0.0)).command == STANDSTILL, "pushed away it does not set out again"
+    command = script.request_drive(Goal(0.0, 5.0)).command
+    assert command != STANDSTILL, "requested again, it drives"
+    assert hold_reason(script) == ""
+
+
+def test_teleoperation_drives_while_velocities_arrive_and_stops_within_a_quarter_second() -> None:
+    script = driving()
+    begin_s = script.run_s + PERIOD_S
+    for _ in range(10):
+        record = script.request_drive(FORWARD)
+        assert record.command == near(0.2, 0.1)
+        assert hold_reason(script) == ""
+    last_s = script.run_s
+    assert last_s - begin_s > 0.4, "longer than one velocity is valid"
+    while (record := script.request_drive(None)).command != STANDSTILL:
+        assert record.command == near(0.2, 0.1)
+    assert 0.19 < script.run_s - last_s < 0.251
+    assert record.mode.mode is Mode.DRIVE
+    assert "no velocity arrives from an operator" in hold_reason(script)
+    assert script.state.drive_request == TELEOPERATION_ENDED
+    for _ in range(50):
+        assert script.request_drive(None).command == STANDSTILL
+    assert script.request_drive(FORWARD).command != STANDSTILL
+
+
+def test_teleoperation_is_limited_by_echoes_and_by_the_validity_of_a_velocity() -> None:
+    """3 m of free space; the schema of the settings may be switched off, the clearance may not."""
+    for avoid in ("true", "false"):
+        script = driving(f"behaviors.teleoperation.avoid={avoid}", "behaviors.arbiter.clearance_m=3.0")
+        assert script.request_drive(FORWARD).command == near(0.0, 0.1)
+        assert [r.schema for r in script.state.vectors] == [
+            "teleoperation", *(["avoid_static_obstacle"] if avoid == "true" else []), "sum",
+        ]  # fmt: skip
+    script = driving()
+    script.request_drive(replace(FORWARD, valid_s=0.12))
+    assert script.request_drive(None).command != STANDSTILL
+    assert script.request_drive(None).command == STANDSTILL
+
+
+def test_legs_that_are_done_begin_again_on_request() -> None:
+    script = driving("behaviors.move_ahead.distance_m=1.0", "behaviors.move_ahead.at_end=stop")
+    assert script.move_to(Pose(1.1, 0.0, 0.0)).command == STANDSTILL
+    assert hold_reason(script) == "the leg is done"
+    assert script.request_drive(None).command == STANDSTILL
+    assert script.request_drive(Legs()).command == near(0.3, 0.0)
+    script.move_to(Pose(1.5, 0.0, 0.0))
+    script.request_drive(Goal(9.0, 0.0))
+    script.request_drive(Legs())
+    assert script.move_to(Pose(2.0, 0.0, 0.0)).command != STANDSTILL, "one under way goes on"
+    assert script.move_to(Pose(2.2, 0.0, 0.0)).command == STANDSTILL
+
+
+@pytest.mark.parametrize("drive_request", [Legs(), Goal(9.0, 0.0), FORWARD], ids=["legs", "goal", "teleoperation"])
+def test_vectors_of_a_stop_are_not_shown(drive_request: DriveRequest) -> None:
+    script = driving()
+    script.pose = Pose(math.nan, 0.0, 0.0)
+    record = script.request_drive(drive_request, firing=False)
+    assert (record.mode.mode, record.command) == (Mode.SAFE_STOP, Order.HALT)
+    assert script.state.vectors == ()
+
+
+def test_a_goal_in_the_map_is_driven_without_a_jump_and_only_where_the_place_is_known(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    frames: list[Pose | None] = [Pose(0.0, 0.0, 0.0)]
+    monkeypatch.setattr(Perception, "known_map_frame", lambda _: frames[-1])
+    monkeypatch.setattr(Perception, "localized", lambda _: "a place in the map")
+    script = driving()
+    assert script.request_drive(Goal(3.0, 0.0, frame="map")).command == near(0.3, 0.0)
+    frames.append(Pose(0.0, 1.0, 0.0))
+    turns = [script.request_drive(None).command for _ in range(10)]
+    ways = [command.w for command in turns if isinstance(command, Twist)]
+    assert len(ways) == 10
+    assert 0.0 < ways[0] < 0.05, "a correction by a metre turns the robot little by little"
+    assert max(abs(b - a) for a, b in pairwise(ways)) < 0.05
+    assert script.state.drive_request == Goal(3.0, 0.0, frame="map")
+    frames.append(None)
+    assert script.request_drive(None).command == STANDSTILL
+    assert hold_reason(script) == NO_PLACE
+    frames.append(Pose(0.0, -1.0, 0.0))
+    assert script.request_drive(None).command != STANDSTILL
+    assert script.state.goal_place == GoalPlace(3.0, -1.0)
+    record = script.move_to(Pose(3.0, -1.0, 0.0))
+    assert record.command == STANDSTILL
+    assert script.state.drive_request == Goal(3.0, 0.0, frame="map", reached=True)
