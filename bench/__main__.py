@@ -14,6 +14,7 @@ from bench.console import figures as figures_of
 from bench.console import measure as measure_console
 from bench.estimator import Peer
 from bench.measure import Plan, measure
+from bench.page_growth import measure_page_growth
 from bench.place_commands import (
     beacons,
     false_drums,
@@ -175,6 +176,26 @@ def console(*, json: str = "console.json", seconds: float = 30.0, rounds: int = 
     with out.status("bench") as status:
         rows = figures_of(measure_console(seconds, rounds, status.update))
     return report(json, {"seconds": seconds, "rounds": rounds, "rows": rows}, console_table(rows, seconds, rounds))
+
+
+@app.command
+def pages(*, json: str = "pages.json", hours: float = 2.0) -> int:
+    """Measure whether a run grows while pages of the operator console come and go.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    hours
+        Duration, h.
+    """
+    use_kernel_cache()
+
+    console = Console(stderr=True)
+    prepare_kernels(load_settings("hallway"), console)
+    with console.status("bench") as status:
+        growth = measure_page_growth(3600.0 * max(0.005, hours), status.update)
+    return report(json, growth.as_json(), growth.table())
 
 
 @app.command
