@@ -82,6 +82,10 @@ class RobotDriver(Protocol):
         """
 
     @property
+    def battery_v(self) -> float | None:
+        """The battery's voltage as last reported, V; None if the robot has not reported one, or never does."""
+
+    @property
     def counts(self) -> LinkCounts:
         """Frames received so far, over all lines."""
 

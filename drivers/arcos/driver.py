@@ -23,8 +23,9 @@ from drivers.arcos.handshake import CLOSE, STOP, Handshake, Stage
 from drivers.arcos.pose_stamping import SIP_PERIOD_S, PoseStamper
 from drivers.arcos.supervision import Enabling, Halting, ReceiverMonitor
 from drivers.arcos.wire_units import discs_of, drive_commands, flags_of, limit_commands, limits_of, polling_of
-from drivers.driver import LineState, Received
-from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
+from drivers.driver import LineState
+from drivers.messages import Identity, LinkCounts
+from drivers.session import Session
 
 _PULSE_S: Final = 0.5
 """Longest time without a command, s: a quarter of the watchdog."""
@@ -40,11 +41,9 @@ _SONAR_S: Final = 0.5
 """Time from one attempt to switch the sonar on to the next, s."""
 _MOVING_MAX_S: Final = 2.5
 """Longest time that a halted base may take to stand, s: from 2 m/s at 0.8 m/s²."""
-_FIRINGS_MAX: Final = 1024
-"""Firings kept if they are not taken; the oldest are dropped."""
 
 
-class ArcosDriver:
+class ArcosDriver(Session[PoseStamper]):
     """A `drivers.driver.RobotDriver` for the Pioneer family.
 
     Parameters
@@ -63,34 +62,20 @@ class ArcosDriver:
     def __init__(self, config: RobotConfig) -> None:
         self._config = config
         self._discs = discs_of(config)
+        super().__init__(PoseStamper(config, self._discs))
         self._polling = polling_of(config, self._discs)
         self._handshake = Handshake(config.link, has_speed="://" not in (config.link.port or ""))
         self._limits = limits_of(config.body, None)
         self._decoder = Decoder(decode_packet)
-        self._earlier_counts = LinkCounts()
-        self._state = LineState.CLOSED
-        self._problem: str | None = None
-        self._identity: Identity | None = None
         self._boots = 0
-        self._run_s = self._sent_s = self._data_s = self._packet_s = self._sip_s = 0.0
+        self._sent_s = self._data_s = self._packet_s = self._sip_s = 0.0
         self._called_s = self._refused_until_s = self._sonar_on_s = -math.inf
         self._queue: deque[Command] = deque()
         self._is_set_up = self._is_first_sip = False
         self._has_session = self._was_reset = self._is_ending = False
         self._halting, self._enabling, self._receiver = Halting(), Enabling(), ReceiverMonitor()
-        self._drive: Twist | None = None
-        self._bad_at_sip = 0
-        self._stamper = PoseStamper(config, self._discs)
-        self._stamper.set_polling(self._polling)
-        self._firings: deque[Firing] = deque(maxlen=_FIRINGS_MAX)
-        self._noted: set[str] = set()
-        self._odometry: Odometry | None = None
-        self._flags, self._rebooted = Flags.NONE, False
-
-    @property
-    def state(self) -> LineState:
-        """The state of the connection."""
-        return self._state
+        self._bad_at_sip = self._battery = 0
+        self.stamper.set_polling(self._polling)
 
     @property
     def problem(self) -> str | None:
@@ -101,30 +86,20 @@ class ArcosDriver:
         return self._problem
 
     @property
-    def identity(self) -> Identity | None:
-        """The robot's description of itself; the last one known during a new handshake."""
-        return self._identity
+    def battery_v(self) -> float | None:
+        """The battery's voltage by the last SIP, V; None before the first, or if it has none."""
+        return 0.1 * self._battery if self._battery else None
 
     @property
-    def counts(self) -> LinkCounts:
-        """Frames received so far, over all lines; lost ones are not known, as frames have no numbers."""
-        earlier, now = self._earlier_counts, self._decoder
-        return LinkCounts(earlier.frames + now.frames, earlier.bad + now.bad, 0)
-
-    @property
-    def odometry_origin(self) -> Pose:
-        """The origin of the poses passed on, in the robot's own odometry; it moves when that jumps."""
-        return self._stamper.origin
+    def _line_counts(self) -> LinkCounts:
+        return LinkCounts(
+            self._decoder.frames, self._decoder.bad, 0
+        )  # frames have no numbers: lost ones are not known
 
     @property
     def line_baud(self) -> int | None:
         """The speed that the line must have now; None on a line without one."""
         return self._handshake.baud if self._handshake.bauds else None
-
-    @property
-    def firings_waiting(self) -> int:
-        """Number of firings that `take_received` would return."""
-        return len(self._firings)
 
     def line_opened(self, run_s: float) -> None:
         """Start the handshake on a line that has just been opened."""
@@ -167,18 +142,6 @@ class ArcosDriver:
             self._handshake.tick(run_s)
             self._go_on()
 
-    def drive(self, twist: Twist) -> None:
-        """Request a velocity, clamped to the limits; sent only in state READY and with the motors on.
-
-        Raises
-        ------
-        ValueError
-            The velocity is not finite.
-        """
-        if not (math.isfinite(twist.v) and math.isfinite(twist.w)):
-            raise ValueError(f"cannot drive at {twist}: a velocity must be finite; something divided by zero")
-        self._drive = twist
-
     def halt(self) -> None:
         """Stop the base at once, repeat that until it stands, then switch its motors off."""
         self._drive = None
@@ -203,7 +166,7 @@ class ArcosDriver:
         if polling == self._polling:
             return
         self._polling = polling
-        self._stamper.set_polling(polling)
+        self.stamper.set_polling(polling)
         if self._is_set_up:
             self._queue += polling.commands
 
@@ -227,14 +190,6 @@ class ArcosDriver:
         if commands:
             self._sent_s = self._run_s
         return b"".join(map(encode, commands))
-
-    def take_received(self) -> Received:
-        """Return what was received since the last call, and remove it."""
-        notes = self._stamper.notes()
-        received = Received(tuple(self._firings), self._odometry, self._rebooted, notes, self._flags)
-        self._firings.clear()
-        self._odometry, self._flags, self._rebooted = None, Flags.NONE, False
-        return received
 
     def _due_commands(self) -> tuple[Command, ...]:
         """Return the commands that are due besides a stop; one at a time of those that can wait."""
@@ -273,7 +228,7 @@ class ArcosDriver:
         self._queue.clear()
         self._drive, self._is_set_up = None, False
         self._enabling, self._receiver = Enabling(), ReceiverMonitor()
-        self._stamper.break_off()
+        self.stamper.break_off()
         self._bad_at_sip = 0
 
     def _go_down(self, problem: str) -> None:
@@ -294,7 +249,7 @@ class ArcosDriver:
         if isinstance(packet, ResetNotice):
             self._was_reset = True
             if self._state is LineState.READY:
-                self._stamper.note(diagnostics.RESET)
+                self.stamper.note(diagnostics.RESET)
             self._go_down(diagnostics.RESET)
             self._state = LineState.HANDSHAKE
             return
@@ -345,7 +300,7 @@ class ArcosDriver:
         period_s = 1e-3 * ((packet and packet.sip_cycle_ms) or 1e3 * SIP_PERIOD_S)
         radius_m = max(math.hypot(mount.x_m, mount.y_m) for mount in config.ring.mounts)
         self._identity = Identity(shown, len(self._discs), radius_m, deadman_s, period_s, self._boots)
-        self._stamper.set_period(period_s)
+        self.stamper.set_period(period_s)
         self._limits = limits_of(config.body, packet)
         self._queue += (
             Command(CommandNumber.ENABLE, 0),
@@ -363,18 +318,18 @@ class ArcosDriver:
             self._begin_session(sip)
         packet, after_loss = self._handshake.config, self._decoder.bad != self._bad_at_sip
         flags = flags_of(sip, (packet and packet.low_battery) or 0)
-        self._odometry, firings = self._stamper.sip(sip, self._run_s, flags, self.line_baud, after_loss=after_loss)
+        self._odometry, firings = self.stamper.sip(sip, self._run_s, flags, self.line_baud, after_loss=after_loss)
         self._sip_s, self._bad_at_sip = self._run_s, self._decoder.bad
         self._flags |= flags
+        self._battery = sip.battery_10 or sip.battery
         self._firings += firings
         self._follow_status(SipFlags(sip.flags))
 
     def _begin_session(self, sip: Sip) -> None:
         was_lost = self._has_session and not self._handshake.was_open
-        if self._stamper.begin_session(sip, was_reset=self._was_reset, was_lost=was_lost):
+        if self.stamper.begin_session(sip, was_reset=self._was_reset, was_lost=was_lost):
             self._boots += 1
-            self._firings.clear()
-            self._odometry, self._flags, self._rebooted = None, Flags.NONE, True
+            self._forget_received()
             if self._identity is not None:
                 self._identity = replace(self._identity, boot_id=self._boots)
         self._has_session, self._is_first_sip, self._was_reset = True, False, False
@@ -393,8 +348,3 @@ class ArcosDriver:
             self._sonar_on_s = self._run_s
             self._queue.append(Command(CommandNumber.SONAR, 1))
             self._note_once(diagnostics.SONAR_OFF)
-
-    def _note_once(self, text: str) -> None:
-        if text not in self._noted:
-            self._noted.add(text)
-            self._stamper.note(text)

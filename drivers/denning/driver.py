@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections import deque
 from dataclasses import replace
 
 from config.files import one_line
@@ -16,9 +14,10 @@ from drivers.denning.pending_command import PendingCommand, pending_command
 from drivers.denning.pose_stamping import PoseStamper
 from drivers.denning.timeouts import CommandAckMonitor, EchoTimeout
 from drivers.denning.wire_units import identity_of, newest_version, to_wire, wire_pattern
-from drivers.driver import LineState, Received
-from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
+from drivers.driver import LineState
+from drivers.messages import Flags, LinkCounts
 from drivers.robot_clock import Jump
+from drivers.session import Session
 
 _UNACKNOWLEDGED_SHARE = 0.75
 """DRIVEs unacknowledged for this share of the longest silence are not received; below 1, as cycles take time."""
@@ -26,13 +25,11 @@ _MISSED_STEPS_MAX = 2
 """Firings that the ring may miss, beyond the longest silence, before the robot must identify itself again."""
 _SETTLING_STEPS = 3
 """Steps after a new pattern was accepted until the last echo of the previous one has arrived."""
-_FIRINGS_MAX = 1024
-"""Firings kept if they are not taken; the oldest are dropped. At 20 firings a second this is almost a minute."""
 _SEND_ORDER = ("HALT", "HELLO", "PATTERN", "RELEASE")
 """Commands in the order in which they are sent."""
 
 
-class DenningDriver:
+class DenningDriver(Session[PoseStamper]):
     """A `drivers.driver.RobotDriver` for the ring-and-base protocol.
 
     Parameters
@@ -48,29 +45,20 @@ class DenningDriver:
         The robot file names a version of the protocol that does not exist.
     """
 
-    line_baud: int | None = None
-    """The line keeps the speed of the robot file."""
-
     def __init__(self, config: RobotConfig) -> None:
         self._config = config
         self._pattern = wire_pattern(config.ring)
-        self.stamper = PoseStamper(len(config.ring.mounts), config.body)
+        super().__init__(PoseStamper(len(config.ring.mounts), config.body))
         self.stamper.set_pattern(self._pattern.window, self._pattern.step_period_ms)
-        self._state = LineState.CLOSED
-        self._problem: str | None = None
-        self._identity: Identity | None = None
         self._newest = self._version = newest_version(config)  # what to ask for first, and what to ask for now
         self._unit_m = 0.0  # of a count in ECHO2
         self._jump: Jump | None = None
         self._decoder = Decoder("robot", midway=True)
-        self._earlier_counts = LinkCounts()
-        self._run_s = 0.0
         self._odometry_s = self._last_frame_s = 0.0
         self._bad_at_odometry = 0
         self._seq = 0
         self._flush_first = False
         self._commands: dict[str, PendingCommand] = {}
-        self._drive: Twist | None = None
         self._drive_acks = CommandAckMonitor()
         self._echo_timeout = EchoTimeout(
             config.link.silence_max_s + _MISSED_STEPS_MAX * 1e-3 * self._pattern.step_period_ms
@@ -78,14 +66,6 @@ class DenningDriver:
         self._pattern_acked_s = 0.0
         self._settling_s = 0.0
         self._must_identify = False
-        self._firings: deque[Firing] = deque(maxlen=_FIRINGS_MAX)
-        self._odometry: Odometry | None = None
-        self._flags, self._rebooted = Flags.NONE, False
-
-    @property
-    def state(self) -> LineState:
-        """The state of the connection."""
-        return self._state
 
     @property
     def problem(self) -> str | None:
@@ -96,25 +76,8 @@ class DenningDriver:
         return self._problem
 
     @property
-    def identity(self) -> Identity | None:
-        """The robot's description of itself; the last one known during a new handshake."""
-        return self._identity
-
-    @property
-    def counts(self) -> LinkCounts:
-        """Frames received so far, over all lines."""
-        earlier, now = self._earlier_counts, self._decoder
-        return LinkCounts(earlier.frames + now.frames, earlier.bad + now.bad, earlier.lost + now.lost)
-
-    @property
-    def firings_waiting(self) -> int:
-        """Number of firings that `take_received` would return."""
-        return len(self._firings)
-
-    @property
-    def odometry_origin(self) -> Pose:
-        """The origin of the poses passed on, in the robot's own odometry; it moves when that jumps."""
-        return self.stamper.origin
+    def _line_counts(self) -> LinkCounts:
+        return LinkCounts(self._decoder.frames, self._decoder.bad, self._decoder.lost)
 
     def line_opened(self, run_s: float) -> None:
         """Start the handshake on a line that has just been opened: HELLO, then PATTERN."""
@@ -156,18 +119,6 @@ class DenningDriver:
             self._check_timeouts()
             if "PATTERN" not in self._commands and run_s - self._pattern_acked_s > self._settling_s:
                 self.stamper.set_pattern(self._pattern.window, self._pattern.step_period_ms)
-
-    def drive(self, twist: Twist) -> None:
-        """Request a velocity, clamped to the body's limits; sent only in state READY and while no HALT is pending.
-
-        Raises
-        ------
-        ValueError
-            The velocity is not finite.
-        """
-        if not (math.isfinite(twist.v) and math.isfinite(twist.w)):
-            raise ValueError(f"cannot drive at {twist}: a velocity must be finite; something divided by zero")
-        self._drive = twist
 
     def halt(self) -> None:
         """Stop the robot at once and latch it: sent before everything else, and repeated until acknowledged."""
@@ -231,14 +182,6 @@ class DenningDriver:
             self._flush_first = False
             return b"\0" + bytes(out)
         return bytes(out)
-
-    def take_received(self) -> Received:
-        """Return what was received since the last call, and remove it."""
-        firings, notes = tuple(self._firings), self.stamper.notes()
-        received = Received(firings, self._odometry, self._rebooted, notes, self._flags)
-        self._firings.clear()
-        self._odometry, self._flags, self._rebooted = None, Flags.NONE, False
-        return received
 
     def _check_timeouts(self) -> None:
         """Detect a robot that is silent, one that does not receive, and a ring that does not fire."""
@@ -328,8 +271,7 @@ class DenningDriver:
         if restarted:
             self._abandon()
             self.stamper.restart()
-            self._firings.clear()
-            self._odometry, self._flags, self._rebooted = None, Flags.NONE, True
+            self._forget_received()
             self._drive_acks = CommandAckMonitor()
         elif self._jump is not None:
             self.stamper.break_off()

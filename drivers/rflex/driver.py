@@ -13,8 +13,8 @@ from typing import Final
 
 from config.robot import RingConfig, RobotConfig
 from drivers import line_diagnostics
-from drivers.driver import LineState, Received
-from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
+from drivers.driver import LineState
+from drivers.messages import Flags, Identity, LinkCounts, Odometry, Twist
 from drivers.rflex import diagnostics
 from drivers.rflex.codec import (
     BRAKE_SET,
@@ -35,6 +35,7 @@ from drivers.rflex.measurements import REPORT_PERIOD_S, Measurements
 from drivers.rflex.supervision import Brake, Mode, StallMonitor
 from drivers.rflex.wire_units import drive_commands, pattern_of, sonar_ids, stop_commands
 from drivers.robot_clock import Jump
+from drivers.session import Session
 
 _GAP_S: Final = 0.0099
 """Least time between two commands, s: 10 ms, less the rounding of times."""
@@ -52,11 +53,9 @@ _HALTING_MAX_S: Final = 2.5
 """Longest time that a halted base may take until its brake is on, s."""
 _VOLTS_OFFSET: Final = 1.2
 """The controller measures its voltage behind a diode, V."""
-_FIRINGS_MAX: Final = 1024
-"""Firings kept if they are not taken; the oldest are dropped."""
 
 
-class RflexDriver:
+class RflexDriver(Session[Measurements]):
     """A `drivers.driver.RobotDriver` for robots with an rFLEX controller.
 
     Parameters
@@ -72,37 +71,22 @@ class RflexDriver:
         The sonar banks do not fit the ring.
     """
 
-    line_baud: int | None = None
-
     def __init__(self, config: RobotConfig) -> None:
         self._config = config
         self._pattern = pattern_of(config, config.ring)
-        self._measurements = Measurements(config, sonar_ids(config))
-        self._measurements.set_pattern(self._pattern)
-        self._decoder, self._earlier = Decoder(), LinkCounts()
-        self._state = LineState.CLOSED
-        self._problem: str | None = None
-        self._identity: Identity | None = None
+        super().__init__(Measurements(config, sonar_ids(config)))
+        self.stamper.set_pattern(self._pattern)
+        self._decoder = Decoder()
         self._boots = 0
-        self._run_s = self._sent_s = self._called_s = self._setup_s = self._report_s = 0.0
+        self._sent_s = self._called_s = self._setup_s = self._report_s = 0.0
         self._sample_s = self._echo_s = self._answer_s = self._driven_s = self._input_s = 0.0
         self._bad_at_sample = 0
         self._brake, self._stall = Brake(config), StallMonitor()
         self._queue: deque[Frame] = deque()
-        self._drive: Twist | None = None
         self._second_axis: Frame | None = None
         self._is_ending = self._is_moving = False
         self._pressed: dict[int, int] = {}
         self._volts = math.inf
-        self._firings: deque[Firing] = deque(maxlen=_FIRINGS_MAX)
-        self._noted: set[str] = set()
-        self._odometry: Odometry | None = None
-        self._flags, self._rebooted = Flags.NONE, False
-
-    @property
-    def state(self) -> LineState:
-        """The state of the connection."""
-        return self._state
 
     @property
     def problem(self) -> str | None:
@@ -113,24 +97,15 @@ class RflexDriver:
         return self._problem
 
     @property
-    def identity(self) -> Identity | None:
-        """What the robot file says of the robot, which reports nothing of itself; None before it answers."""
-        return self._identity
+    def battery_v(self) -> float | None:
+        """The battery's voltage by the last status, V; None before the first."""
+        return self._volts if math.isfinite(self._volts) else None
 
     @property
-    def counts(self) -> LinkCounts:
-        """Frames received so far, over all lines; lost ones are not known, as not all numbers are used."""
-        return LinkCounts(self._earlier.frames + self._decoder.frames, self._earlier.bad + self._decoder.bad, 0)
-
-    @property
-    def odometry_origin(self) -> Pose:
-        """The origin of the poses passed on, in the robot's own odometry; it moves when that jumps."""
-        return self._measurements.origin
-
-    @property
-    def firings_waiting(self) -> int:
-        """Number of firings that `take_received` would return."""
-        return len(self._firings)
+    def _line_counts(self) -> LinkCounts:
+        return LinkCounts(
+            self._decoder.frames, self._decoder.bad, 0
+        )  # not all numbers are used: lost ones are not known
 
     def line_opened(self, run_s: float) -> None:
         """Stop the base and request reports, on a line that has just been opened."""
@@ -140,7 +115,7 @@ class RflexDriver:
 
     def line_closed(self) -> None:
         """Forget commands in progress; only a halt is kept for the next line until the brake is reported."""
-        self._earlier, self._decoder = self.counts, Decoder()
+        self._earlier_counts, self._decoder = self.counts, Decoder()
         self._state, self._is_ending = LineState.CLOSED, False
         self._abandon()
 
@@ -162,18 +137,6 @@ class RflexDriver:
             if run_s - self._called_s > _CALLING_S and self._state is LineState.HANDSHAKE:
                 heard = self._decoder.frames + self._decoder.bad > 0
                 self._state, self._problem = LineState.DOWN, diagnostics.no_answer(heard=heard)
-
-    def drive(self, twist: Twist) -> None:
-        """Request a velocity, clamped to the limits; sent only in state READY and with the brake off.
-
-        Raises
-        ------
-        ValueError
-            The velocity is not finite.
-        """
-        if not (math.isfinite(twist.v) and math.isfinite(twist.w)):
-            raise ValueError(f"cannot drive at {twist}: a velocity must be finite; something divided by zero")
-        self._drive = twist
 
     def halt(self) -> None:
         """Stop the base at once, repeat that until it stands, then set its brake."""
@@ -198,7 +161,7 @@ class RflexDriver:
         pattern = pattern_of(self._config, ring)
         if pattern != self._pattern:
             self._pattern = pattern
-            self._measurements.set_pattern(pattern)
+            self.stamper.set_pattern(pattern)
             if self._state is not LineState.CLOSED:
                 self._queue.append(pattern.command)
 
@@ -230,14 +193,6 @@ class RflexDriver:
             return b""
         self._sent_s = self._run_s
         return encode(frame)
-
-    def take_received(self) -> Received:
-        """Return what was received since the last call, and remove it."""
-        notes = self._measurements.notes()
-        received = Received(tuple(self._firings), self._odometry, self._rebooted, notes, self._flags)
-        self._firings.clear()
-        self._odometry, self._flags, self._rebooted = None, Flags.NONE, False
-        return received
 
     def _next_command(self) -> Frame | None:
         """Return the next command that is due: a velocity first, its second axis next, then all that can wait."""
@@ -280,7 +235,7 @@ class RflexDriver:
         self._brake.forget()
         self._stall.stop()
         self._pressed.clear()
-        self._measurements.break_off()
+        self.stamper.break_off()
         self._bad_at_sample = self._decoder.bad
         self._sent_s = self._report_s = self._sample_s = -math.inf
 
@@ -299,7 +254,7 @@ class RflexDriver:
             self._problem = diagnostics.BRAKE_STAYS_ON
         elif self._is_moving and now_s - self._driven_s > _DRIVEN_S:
             self._is_moving, self._drive = False, Twist(0.0, 0.0)
-            self._measurements.note(diagnostics.NOT_DRIVEN)
+            self.stamper.note(diagnostics.NOT_DRIVEN)
         if self._config.rflex.bumpers and now_s - self._input_s > _INPUT_REQUEST_S:
             self._input_s = now_s
             self._queue.append(input_request(_INPUT_PERIOD_US))
@@ -316,8 +271,8 @@ class RflexDriver:
             case SonarReport() as sonar:
                 self._echo_s = self._run_s
                 if self._state is LineState.READY:
-                    self._measurements.sonar(sonar)
-                    self._firings += self._measurements.firings(self._run_s)
+                    self.stamper.sonar(sonar)
+                    self._firings += self.stamper.firings(self._run_s)
             case Status() as status:
                 self._answer_s = self._run_s
                 self._volts = 0.01 * status.voltage + _VOLTS_OFFSET
@@ -332,7 +287,7 @@ class RflexDriver:
     def _take_axis(self, report: AxisReport) -> None:
         """Take an axis; the first sample of a session with a status makes the line READY."""
         flags = self._status()
-        sample = self._measurements.axis(report, self._run_s, flags)
+        sample = self.stamper.axis(report, self._run_s, flags)
         if sample is Jump.BACK:
             self._restarted()
         if not isinstance(sample, Odometry):
@@ -346,7 +301,7 @@ class RflexDriver:
             self._meet()
         if self._state is LineState.READY:
             self._odometry, self._flags = sample, self._flags | flags
-            self._firings += self._measurements.firings(self._run_s)
+            self._firings += self.stamper.firings(self._run_s)
 
     def _meet(self) -> None:
         """Adopt what the robot file says of a robot that answers, unless it may not be driven."""
@@ -365,9 +320,8 @@ class RflexDriver:
 
     def _restarted(self) -> None:
         self._boots += 1
-        self._firings.clear()
-        self._odometry, self._flags, self._rebooted = None, Flags.NONE, True
-        self._measurements.note(diagnostics.RESTARTED)
+        self._forget_received()
+        self.stamper.note(diagnostics.RESTARTED)
         self._begin(LineState.HANDSHAKE, None)
 
     def _status(self) -> Flags:
@@ -379,8 +333,3 @@ class RflexDriver:
             Flags.BATTERY_LOW: self._volts < self._config.rflex.battery_low_v,
         }
         return Flags(sum(flag for flag, is_set in status.items() if is_set))
-
-    def _note_once(self, text: str) -> None:
-        if text not in self._noted:
-            self._noted.add(text)
-            self._measurements.note(text)

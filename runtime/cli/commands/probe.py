@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import shlex
 import time
 from typing import Final, NamedTuple
 
@@ -28,7 +29,6 @@ READY_MAX_S: Final = 6.0
 LOOK_S: Final = 1.0
 """How long a robot that is ready is listened to, for its sensors and its state, s."""
 WARNINGS: Final = (
-    (Flags.BATTERY_LOW, "its battery is low"),
     (Flags.MOTOR_FAULT, "a motor reports a fault"),
     (Flags.BUMPER, "a bumper is pressed"),
 )
@@ -37,9 +37,10 @@ WARNINGS: Final = (
 class Finding(NamedTuple):
     """What was found on a port."""
 
-    is_robot: bool
-    lines: tuple[str, ...]
-    """In words."""
+    robot: str | None
+    """The name by which the robot is run; None if there is none."""
+    said: tuple[str, ...]
+    """The robot in words, or why there is none."""
 
 
 class _Answer(NamedTuple):
@@ -79,8 +80,9 @@ def probe(port: str | None, *, robot: str | None) -> int:
     output, is_found = plain_console(), False
     for each in ports:
         finding = asyncio.run(probe_port(each, robots))
-        is_found |= finding.is_robot
-        for line in (f"{one_line(each)}:", *(f"  {line}" for line in finding.lines)):
+        is_found |= finding.robot is not None
+        run = () if finding.robot is None else (f"run it: {run_it(each, finding.robot)}",)
+        for line in (f"{one_line(each)}:", *(f"  {line}" for line in (*finding.said, *run))):
             output.print(line)
     return DONE if is_found else FAILED
 
@@ -102,16 +104,19 @@ async def probe_port(port: str, robots: dict[str, RobotConfig]) -> Finding:
         for name, config in family:
             answer = await _try(port, config)
             if answer.text is not None:
-                return Finding(
-                    is_robot=True, lines=(answer.text, f"run it: echolocate run --robot {name} --port {port}")
-                )
+                return Finding(name, (answer.text,))
             if answer.problem is not None:
                 said.append(f"as {name}: {answer.problem}" if answer.has_answered else answer.problem)
             if not answer.has_answered:
                 break
         if said and not answer.has_answered and answer.problem is not None:
             break  # the port cannot be opened
-    return Finding(is_robot=False, lines=tuple(said or ["nothing answers: is the robot on, and is this its cable?"]))
+    return Finding(None, tuple(said or ["nothing answers: is the robot on, and is this its cable?"]))
+
+
+def run_it(port: str, robot: str) -> str:
+    """Return the command that runs a robot on a port."""
+    return shlex.join(("echolocate", "run", "--robot", robot, "--port", port))
 
 
 def _family(item: tuple[str, RobotConfig]) -> tuple[str, int]:
@@ -178,7 +183,15 @@ async def _look(connection: Connection) -> str:
     identity = driver.identity
     robot = "a robot" if identity is None else f"{_name(identity)}, {identity.sensors} sensors"
     within = f"within {LOOK_S:g} s {len(fired)} have fired and {len(heard)} have heard something"
-    return "; ".join([robot, within, *(warning for flag, warning in WARNINGS if flag in flags)])
+    battery = _battery(driver.battery_v, is_low=Flags.BATTERY_LOW in flags)
+    return "; ".join([robot, battery, within, *(warning for flag, warning in WARNINGS if flag in flags)])
+
+
+def _battery(volts: float | None, *, is_low: bool) -> str:
+    """Return the battery's state as a phrase."""
+    if volts is None:
+        return "battery low" if is_low else "battery not reported"
+    return f"battery {volts:.1f} V, low" if is_low else f"battery {volts:.1f} V"
 
 
 def _name(identity: Identity) -> str:

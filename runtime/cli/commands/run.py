@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import signal
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,12 +14,12 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from config.errors import DONE, FAILED, WRONG_CALL, UserError
-from config.files import is_utf8, one_line, utf8
-from config.load import ConfigError, load_settings, with_known_room
 from config.settings import Settings
 from runtime import VERSION
+from runtime.cli.commands.offer import plugged_in
 from runtime.cli.commands.output_files import check_outputs, refuse_existing
 from runtime.cli.commands.run_recording import RunRecording, open_run_recording
+from runtime.cli.commands.run_settings import reload_settings, settings_of_files, with_port
 from runtime.cli.first_signals import is_remembered
 from runtime.cli.start_signals import ending_the_start, handled_by_loop
 from runtime.cli.tables import objects_table, timing_line, timing_table
@@ -29,7 +30,6 @@ from runtime.support.kernel_cache import prepare_kernels
 from runtime.support.kernel_loader import KernelPreparation, begin_preparation
 from runtime.support.length_format import Units
 from runtime.support.logs import LogStatus, log_path, open_log
-from runtime.support.pattern_check import refuse_undrivable
 from runtime.support.sd_notify import SdNotifier
 from runtime.timing.run_clock import RunClock, ScaledClock
 
@@ -56,6 +56,11 @@ class EmulatorOptions:
     force: bool = False
     """Whether the trace may overwrite an existing file."""
 
+    @property
+    def is_chosen(self) -> bool:
+        """Whether an option was given that has a meaning for the emulator only."""
+        return any(option is not None for option in (self.world, self.trace, self.faults))
+
     def arguments(self, config: str | None, sets: Sequence[str], robot: str | None = None) -> list[str]:
         """Return the command line of ``echolocate emulate`` with these options."""
         named = {
@@ -69,13 +74,6 @@ class EmulatorOptions:
         words = [word for option, value in named.items() if value is not None for word in (option, value)]
         overrides = [word for text in sets for word in ("--set", text)]
         return [*words, *(["--force"] if self.force else []), *overrides]
-
-
-def plugged_in() -> list[str]:
-    """Return the serial ports of USB devices: one of them may be a robot."""
-    from serial.tools.list_ports import comports
-
-    return sorted(one_line(found.device) for found in comports() if found.vid is not None)
 
 
 def run_robot(
@@ -112,14 +110,19 @@ def run_robot(
     UserError
         An option is wrong, a file cannot be written, the run ended in FAULT, or the recording is incomplete.
     """
-    settings = load_settings(config, sets, robot=robot, world=emulator.world)
-    if map_file is not None:
-        settings = with_known_room(settings, map_file)
-    refuse_undrivable(settings)
-    if no_console:
-        settings = without_console(settings)
     if seconds is not None and not seconds > 0.0:
         raise UserError(f"--seconds {seconds}: must be above 0", WRONG_CALL)
+    settings = settings_of_files(config, sets, emulator.world, robot, map_file, no_console=no_console)
+    console = EscapingConsole(stderr=True)
+    live = not headless and console.is_terminal and not console.is_dumb_terminal
+    plugged = [] if (port or settings.link.port) is not None else plugged_in()
+    if plugged and live and sys.stdin.isatty() and not emulator.is_chosen:
+        from runtime.cli.commands.offer import ask_for_robot
+
+        found = ask_for_robot(plugged, None if config is None and robot is None else settings, console, sys.stdin)
+        if found is not None:
+            port, robot, arm = found.port, found.robot or robot, False
+            settings = settings_of_files(config, sets, emulator.world, robot, map_file, no_console=no_console)
     port_option, port = port, port if port is not None else settings.link.port
     if port is not None:
         settings = with_port(settings, port)
@@ -128,11 +131,9 @@ def run_robot(
         {**own_files, "--trace": emulator.trace}, (emulator.faults, port), force=force,
         appended={"log.file": log_path(settings.log)},
     )  # fmt: skip
-    console = EscapingConsole(stderr=True)
     preparation = begin_preparation(settings)
     if preparation is None:
         prepare_kernels(settings, console)
-    live = not headless and console.is_terminal and not console.is_dumb_terminal
     log_status = LogStatus()
     with contextlib.ExitStack() as stack:
         for option, path in own_files.items():
@@ -149,10 +150,9 @@ def run_robot(
         log.info("start", version=VERSION, settings=settings.model_dump(mode="json"))
         for text in lint_settings(settings):
             log.warning(text)
-        if port is None and (plugged := plugged_in()):
-            log.info(
-                "serial port found", ports=plugged, hint="this run is emulated; `echolocate probe` names the robot"
-            )
+        if port is None and plugged:
+            runs = f"`echolocate probe` names the robot, `echolocate run --port {plugged[0]}` runs it"
+            log.info("serial port found", ports=plugged, hint=f"this run is emulated; {runs}")
 
         async def run() -> RunSummary:
             from runtime.simulation.emulator_process import start_emulator
@@ -200,62 +200,6 @@ def run_robot(
         raise UserError(summary["stop_reasons"][-1], FAILED)
     recording.raise_if_incomplete()
     return DONE
-
-
-def without_console(settings: Settings) -> Settings:
-    """Return the settings with the operator console switched off."""
-    return settings.model_copy(update={"console": settings.console.model_copy(update={"enabled": False})})
-
-
-def with_port(settings: Settings, port: str) -> Settings:
-    """Return the settings with the serial port replaced.
-
-    Raises
-    ------
-    UserError
-        No settings can hold the port's path.
-    """
-    if not is_utf8(port):
-        raise UserError(f"the port {utf8(port)}: its path is not UTF-8 text; use a link at another path", WRONG_CALL)
-    return settings.model_copy(update={"link": settings.link.model_copy(update={"port": port})})
-
-
-def reload_settings(
-    config: str | None,
-    sets: Sequence[str],
-    world: str | None,
-    port: str | None,
-    emulator_port: str | None,
-    *,
-    robot: str | None = None,
-    map_file: str | None = None,
-    no_console: bool = False,
-) -> Settings:
-    """Return the settings as the files are now, for a run on the same port as before.
-
-    Parameters
-    ----------
-    config, sets, world, port, robot, map_file, no_console
-        As of `runtime.cli.robot_commands.run`.
-    emulator_port : str, optional
-        Port of the emulator, which is used if the settings name none.
-
-    Raises
-    ------
-    ConfigError
-        The settings are wrong, or no robot can carry them out.
-    """
-    settings = load_settings(config, sets, robot=robot, world=world)
-    if map_file is not None:
-        settings = with_known_room(settings, map_file)
-    try:
-        refuse_undrivable(settings)
-    except UserError as error:
-        raise ConfigError(str(error)) from error
-    if no_console:
-        settings = without_console(settings)
-    port = port or settings.link.port or emulator_port
-    return settings if port is None else with_port(settings, port)
 
 
 async def run_process(

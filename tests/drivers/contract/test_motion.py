@@ -162,6 +162,21 @@ def test_what_is_wrong_with_the_base_is_reported_and_over_when_it_is(family: Fam
     assert not cable.odometry[-1].flags & flag
 
 
+VOLTS = {"arcos": (12.6, 10.7), "rflex": (25.2, 20.0)}
+"""The emulated batteries, full and nearly empty, of the families whose robots report a voltage."""
+
+
+def test_the_voltage_of_the_battery_is_the_last_reported(family: Family) -> None:
+    cable = family.cable(*script(kind="low_battery", at_s=family.connect_s + 1.0, duration_s=1.0))
+    assert cable.driver.battery_v is None
+    cable.plug()
+    family.until_ready(cable)
+    expected = VOLTS.get(family.name)
+    assert cable.driver.battery_v == (expected and pytest.approx(expected[0], abs=0.01))
+    cable.run(family.connect_s + 1.5 - cable.now_s)
+    assert cable.driver.battery_v == (expected and pytest.approx(expected[1], abs=0.01))
+
+
 def test_driven_into_a_wall_it_reports_the_contact(family: Family) -> None:
     cable = family.connected(world=ROOM)
     cable.driver.release()

@@ -69,6 +69,10 @@ class PlainDriver:
         return out
 
     @property
+    def battery_v(self) -> float | None:
+        return None
+
+    @property
     def odometry_origin(self) -> Pose:
         return Pose(0.0, 0.0, 0.0)
 

@@ -24,6 +24,7 @@ class ChirpDriver:
     """A line is READY once the robot has answered HELLO and FIRE; each command is repeated until it is answered."""
 
     line_baud: int | None = None
+    battery_v: float | None = None  # the Chirp reports none
 
     def __init__(self, config: RobotConfig) -> None:
         self._config = config

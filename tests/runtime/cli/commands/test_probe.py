@@ -17,18 +17,26 @@ from tests.hil.truth import Truth
 
 
 @pytest.mark.realtime
-@pytest.mark.parametrize(("robot", "sensors"), [("denning", 24), ("p3at", 16)])
+@pytest.mark.parametrize(
+    ("robot", "said"),
+    [("denning", "24 sensors; battery not reported; "), ("p3at", "16 sensors; battery 12.6 V; ")],
+)
 def test_a_robot_is_named_and_does_not_move(
-    robot: str, sensors: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    robot: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with emulated(tmp_path, "--robot", robot) as found:
         assert run_command(["probe", found.port]) == DONE
     port, text, command = capsys.readouterr().out.splitlines()
     assert port == f"{found.port}:"
-    assert f"{sensors} sensors" in text
+    assert said in text
     assert "have heard something" in text
     assert command.strip() == f"run it: echolocate run --robot {robot} --port {found.port}"
     assert all(row.still for row in Truth(found.trace).read())
+
+
+def test_a_battery_that_is_low_is_named_with_and_without_its_voltage() -> None:
+    assert probe._battery(10.94, is_low=True) == "battery 10.9 V, low"
+    assert probe._battery(None, is_low=True) == "battery low"
 
 
 def test_a_port_that_says_nothing(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

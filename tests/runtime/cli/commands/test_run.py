@@ -10,13 +10,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from serial.tools.list_ports_common import ListPortInfo
 
 from config.errors import FAILED, WRONG_CALL
-from config.load import ConfigError
 from drivers.link import Link
 from runtime.cli.app import run_command
-from runtime.cli.commands.run import EmulatorOptions, plugged_in, reload_settings, signals
+from runtime.cli.commands.run import EmulatorOptions, signals
 from runtime.cli.first_signals import ENDING, Remembered
 from runtime.cycle.inputs import Request
 from runtime.support.file_lock import file_lock
@@ -183,35 +181,24 @@ async def test_a_halt_from_before_the_run_stops_it_from_arming_the_robot() -> No
 
 
 @pytest.mark.promise("P24")
-def test_a_pattern_with_which_it_could_not_drive_is_refused_at_the_start_and_in_a_reload(
+def test_a_pattern_with_which_it_could_not_drive_is_refused_at_the_start(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     backwards = "ring.firing={sets=[[10, 12, 14]]}"
     assert run_command(["run", "--set", backwards, *HEADLESS]) == WRONG_CALL
     assert "the pattern does not look ahead" in error_line(capfd)
-    with pytest.raises(ConfigError, match="the pattern does not look ahead"):
-        reload_settings(None, [backwards], None, None, None)
 
 
-def test_the_robot_named_on_the_command_line_is_that_of_the_emulator_and_of_every_reload(
+def test_the_robot_named_on_the_command_line_is_that_of_the_emulator(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     assert run_command(["run", "--robot", "p3xd", *HEADLESS]) == WRONG_CALL
     assert "p3dx" in error_line(capfd)
     emulator = EmulatorOptions(world=None, seed=1, trace=None, faults=None)
     assert emulator.arguments(None, [], "p3dx")[:2] == ["--robot", "p3dx"]
-    settings = reload_settings(None, [], None, "socket://localhost:8101", None, robot="p3dx")
-    assert (settings.robot.driver, settings.link.port) == ("arcos", "socket://localhost:8101")
 
 
 @pytest.mark.parametrize("address", ["127.0.0.1:1", "127.0.0.1", "no.such.host.invalid:8101"])
 def test_a_socket_without_a_robot_is_one_line(address: str, capfd: pytest.CaptureFixture[str]) -> None:
     assert run_command(["run", "--port", f"socket://{address}", *HEADLESS]) in {FAILED, WRONG_CALL}
     assert f"socket://{address}" in error_line(capfd)
-
-
-def test_only_usb_devices_may_be_robots(monkeypatch: pytest.MonkeyPatch) -> None:
-    adapter, on_board = ListPortInfo("/dev/ttyUSB0"), ListPortInfo("/dev/ttyS0")
-    adapter.vid = 0x0403
-    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [adapter, on_board])
-    assert plugged_in() == ["/dev/ttyUSB0"]

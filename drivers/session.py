@@ -1,0 +1,129 @@
+"""What every driver keeps of its session with a robot: the line's state, the requested velocity, what came."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections import deque
+from typing import Final, Generic, Protocol, TypeVar
+
+from drivers.driver import LineState, Received
+from drivers.messages import Firing, Flags, Identity, LinkCounts, Odometry, Pose, Twist
+
+FIRINGS_MAX: Final = 1024
+"""Firings kept if they are not taken; the oldest are dropped. At 20 firings a second this is almost a minute."""
+
+
+class Stamper(Protocol):
+    """What gives firings and samples of the odometry their poses, and keeps the messages for the operator."""
+
+    @property
+    def origin(self) -> Pose:
+        """The origin of the poses passed on, in the robot's own odometry."""
+
+    def note(self, text: str) -> None:
+        """Add a message for the operator."""
+
+    def notes(self) -> tuple[str, ...]:
+        """Return the messages for the operator, and remove them."""
+
+
+S = TypeVar("S", bound=Stamper)
+
+
+class Session(ABC, Generic[S]):
+    """The part of a `drivers.driver.RobotDriver` that does not depend on the protocol; a driver is a subclass of it.
+
+    Parameters
+    ----------
+    stamper
+        That of the protocol.
+    """
+
+    def __init__(self, stamper: S) -> None:
+        self.stamper = stamper
+        self._state = LineState.CLOSED
+        self._problem: str | None = None
+        self._identity: Identity | None = None
+        self._earlier_counts = LinkCounts()
+        self._run_s = 0.0
+        self._drive: Twist | None = None
+        self._firings: deque[Firing] = deque(maxlen=FIRINGS_MAX)
+        self._odometry: Odometry | None = None
+        self._flags, self._rebooted = Flags.NONE, False
+        self._noted = set[str]()
+
+    @property
+    def state(self) -> LineState:
+        """The state of the connection."""
+        return self._state
+
+    @property
+    def problem(self) -> str | None:
+        """What is wrong, in one line; None if nothing is."""
+        return self._problem
+
+    @property
+    def identity(self) -> Identity | None:
+        """The robot's description of itself; the last one known during a new handshake."""
+        return self._identity
+
+    @property
+    def battery_v(self) -> float | None:
+        """The battery's voltage as last reported, V; None if the robot reports none."""
+        return None
+
+    @property
+    def counts(self) -> LinkCounts:
+        """Frames received so far, over all lines."""
+        earlier, now = self._earlier_counts, self._line_counts
+        return LinkCounts(earlier.frames + now.frames, earlier.bad + now.bad, earlier.lost + now.lost)
+
+    @property
+    def line_baud(self) -> int | None:
+        """The speed that the line must have now; None for that of the robot file."""
+        return None
+
+    @property
+    def odometry_origin(self) -> Pose:
+        """The origin of the poses passed on, in the robot's own odometry; it moves when that jumps."""
+        return self.stamper.origin
+
+    @property
+    def firings_waiting(self) -> int:
+        """Number of firings that `take_received` would return."""
+        return len(self._firings)
+
+    def drive(self, twist: Twist) -> None:
+        """Request a velocity, clamped to the limits; dropped unless the robot may be driven when it would be sent.
+
+        Raises
+        ------
+        ValueError
+            The velocity is not finite.
+        """
+        if not (math.isfinite(twist.v) and math.isfinite(twist.w)):
+            raise ValueError(f"cannot drive at {twist}: a velocity must be finite; something divided by zero")
+        self._drive = twist
+
+    def take_received(self) -> Received:
+        """Return what was received since the last call, and remove it."""
+        received = Received(tuple(self._firings), self._odometry, self._rebooted, self.stamper.notes(), self._flags)
+        self._firings.clear()
+        self._odometry, self._flags, self._rebooted = None, Flags.NONE, False
+        return received
+
+    @property
+    @abstractmethod
+    def _line_counts(self) -> LinkCounts:
+        """Frames received on the present line."""
+
+    def _note_once(self, text: str) -> None:
+        if text not in self._noted:
+            self._noted.add(text)
+            self.stamper.note(text)
+
+    def _forget_received(self) -> None:
+        """Discard what was received, as the robot has restarted since."""
+        self._firings.clear()
+        self._odometry, self._flags, self._rebooted = None, Flags.NONE, True
