@@ -224,6 +224,9 @@ class ConsoleConfig(Strict):
     """TCP port; if it is in use, the next free one. 0 = any free one."""
     watch_without_token: bool = False
     """Allow monitoring without the token. Halting, changing and driving always require the token of the start URL."""
+    keep_token: bool = False
+    """Keep the token across restarts, as a service does, so that open pages come back by themselves. It is in the
+    file `console-token` of the state folder, which only its owner can read; delete that file for a new token."""
     clients_max: int = Field(default=16, ge=1, le=256)
     """Largest number of pages open at a time."""
     command_age_max_s: float = Field(default=1.0, ge=0.3, le=60.0)

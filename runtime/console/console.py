@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
+from config.errors import UserError
 from config.reload import Difference
 from config.settings import Settings
 from drivers.driver import RobotDriver
@@ -35,7 +36,9 @@ from runtime.cycle.inputs import Request
 from runtime.cycle.live_settings import PrepareSettings
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import CycleRecord, State
+from runtime.support.kept_token import kept_token
 from runtime.support.length_format import Units
+from runtime.support.user_folders import state_folder
 from runtime.timing.cycle_stats import CycleStats
 from runtime.timing.time_control import TimeControl
 
@@ -164,7 +167,7 @@ class Console:
         files = page_files()
         listening = await listen(self._config)
         address, port = listening.getsockname()[:2]
-        token, host = new_token(), self._config.host
+        token, host = self._token(), self._config.host
         own_names = (socket.gethostname(), f"{socket.gethostname()}.local")
         names = (host,) if is_loopback(address) else (host, *own_names)
         self.hub.bind(asyncio.get_running_loop())
@@ -194,6 +197,18 @@ class Console:
         if self.tunnel is not None:
             lines.append(f"from another machine: {self.tunnel}, then the same address there")
         return lines
+
+    def _token(self) -> str:
+        """Return the token of this run; the kept one if the settings say so. Trouble with its file stops no robot."""
+        if not self._config.keep_token:
+            return new_token()
+        try:
+            return kept_token(state_folder(), new_token)
+        except UserError as error:
+            self._log.warning(
+                "this run has a token of its own: pages opened before cannot come back", reason=str(error)
+            )
+            return new_token()
 
     def _server_context(self, auth: Auth, files: dict[str, StaticFile]) -> ServerContext:
         return ServerContext(

@@ -28,6 +28,9 @@ LOOK_S: Final = 0.05
 HEARTBEAT_S: Final = 1.0
 KINDS: Final = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 
+RECORDED: Final = {"mode": "DRIVE", "reason": None, "link": None, "late": None, "missed": None, "clients": 0,
+                   "recording": None, "paused": False, "speed": 1.0}  # fmt: skip
+"""Fields of a frame of a recording, in which the robot drove."""
 HALTED: Final = "halted by the operator; re-arm to continue"
 
 
@@ -143,12 +146,16 @@ class FakeServer:
         client.sent_segments, client.whole = known, False
         client.gone |= set(removed)
         stopped = {} if self.mode == "DRIVE" else {"twist": [0.0, 0.0]}
-        return self.hall.frame(self.cycle) | stopped | {
-            "type": "state", "mode": self.mode,
-            "flags": self.flags, "reason": self.reason, "segments": segments, "drive_request": self.drive_request,
-            "dropped": 0, "clients": len(self.clients), "controller": self.controller == client.number,
-            "recording": self.recording, "paused": self.paused, "speed": self.speed, "playback": self.playback,
+        frame = self.hall.frame(self.cycle) | stopped | self.robot() | {
+            "type": "state", "flags": self.flags, "segments": segments, "drive_request": self.drive_request,
+            "dropped": 0, "controller": self.controller == client.number, "playback": self.playback,
         }  # fmt: skip
+        return frame if self.playback is None else frame | RECORDED
+
+    def robot(self) -> dict[str, Any]:
+        """Return the state of the robot itself."""
+        return {"mode": self.mode, "reason": self.reason, "hold_reason": None, "arming": False, "paused": self.paused,
+                "clients": len(self.clients), "recording": self.recording, "speed": self.speed}  # fmt: skip
 
     async def send_states(self) -> None:
         """Send the present state to every page."""
@@ -161,6 +168,8 @@ class FakeServer:
         client.last = frame
         with contextlib.suppress(ConnectionError):
             await client.socket.send_str(json.dumps(frame))
+            if self.playback is not None:
+                await client.socket.send_str(json.dumps({"type": "robot", **self.robot()}))
 
     async def run(self) -> None:
         """Send states that have changed, and one as a heartbeat."""

@@ -60,6 +60,9 @@ async def test_old_data_are_reported_as_old(server: FakeServer, opener: Opener) 
     await expect(old).to_have_count(0)
     await opened.run_for(400)
     await expect(old).to_have_text("data age")
+    await opened.says("#mode-name", "NO DATA")
+    await opened.says("#mode-robot", "the robot was in DRIVE")
+    await expect(opened.page.locator("#fact-twist")).to_have_text("unknown")
     await expect(stale).to_have_count(0)
     await opened.run_for(600)
     await opened.says("#banner-stale", "what you see is old")
@@ -67,6 +70,7 @@ async def test_old_data_are_reported_as_old(server: FakeServer, opener: Opener) 
     server.silent = False
     await opened.sync()
     await opened.run_for(200)
+    await opened.says("#mode-name", "DRIVE")
     await expect(stale).to_have_count(0)
     await expect(old).to_have_count(0)
 
@@ -80,6 +84,7 @@ async def test_it_reconnects_and_receives_the_whole_map(server: FakeServer, open
     for losses, pause_ms in enumerate(RETRY_MS, start=1):
         await opened.until(f"window.losses === {losses}", f"loss {losses} of the connection")
         await opened.says("#banner-connection", "No connection")
+        await opened.says("#mode-name", "NO DATA")
         await opened.run_for(pause_ms - 1)
         assert server.connections == losses, "it tries again too early"
         if losses == len(RETRY_MS):

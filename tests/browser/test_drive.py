@@ -219,6 +219,12 @@ async def test_keys_drive_only_where_they_are_meant_to(server: FakeServer, opene
     assert await drives(server, opened) == (0, -0.5)
     await page.keyboard.up("d")
     await has_let_go(server, opened)
+    await page.keyboard.press("Space")
+    await opened.says("#mode-name", "SAFE STOP")
+    await page.keyboard.press("Shift+A")
+    await server.wait("arm")
+    await opened.says("#mode-name", "DRIVE")
+    await has_let_go(server, opened)
 
     await page.locator("#teleop-limit").focus()
     await page.keyboard.press("End")

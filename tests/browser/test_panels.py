@@ -72,7 +72,7 @@ async def test_ring_charts_and_facts(server: FakeServer, opener: Opener) -> None
     for phase in ("gather", "perceive", "decide", "command", "refine", "observers"):
         await opened.says("#phases-legend", phase)
     await opened.says("#late-legend", "1 missed")
-    await opened.says("#late-legend", "ended by budget")
+    await opened.says("#late-legend", "then no time left")
     assert await opened.world("run.chart.filter((one) => one.missed === 1).length") == 1
     assert await opened.page.evaluate(MARKS) > 10, "a miss has no mark above its column"
     await opened.says("#fact-link", "1 / 0")

@@ -20,6 +20,8 @@ async def test_pause_single_step_speed_record_and_bookmark(server: FakeServer, o
     await page.get_by_role("button", name="Pause").click()
     assert await server.wait("pause") == {}
     await opened.says("#time-text", "paused")
+    await opened.says("#mode-name", "PAUSED")
+    await opened.says("#mode-robot", "the robot: DRIVE")
     await page.get_by_role("button", name="One cycle", exact=True).click()
     assert await server.wait("single_step") == {}
     await page.locator("#map-front").focus()
@@ -58,7 +60,12 @@ async def test_a_recording_is_opened_scrubbed_played_and_left(server: FakeServer
     await page.get_by_role("button", name="Open").click()
     assert await server.wait("open_recording") == {"file": "2026-01-02-first.mcap"}
     await opened.says("#banner-playback", "This is a recording, not the live run: 2026-01-02-first.mcap")
-    await opened.says("#mode-name", "then: DRIVE")
+    await opened.says("#mode-name", "PLAYBACK")
+    await opened.says("#mode-robot", "the robot: DRIVE")
+    await opened.says("#time-text", "the robot then in DRIVE")
+    await opened.says("#fact-link", "not recorded")
+    await expect(page.locator("#fact-clients")).to_have_text("1")
+    await expect(page.locator("#record")).to_be_disabled()
     await opened.says("#robot-name", "older")
     await page.locator("#scrub").focus()
     await page.keyboard.press("ArrowRight")
@@ -82,11 +89,19 @@ async def test_a_recording_is_opened_scrubbed_played_and_left(server: FakeServer
     await opened.save_screenshot("recording")
     await page.keyboard.press("Space")
     await server.wait("halt")  # HALT means the robot, whatever is looked at
+    await opened.says("#mode-name", "PLAYBACK")
+    await opened.says("#mode-robot", "the robot: SAFE STOP")
+    await opened.says("#announce", "playback, the robot: SAFE STOP: halted by the operator")
+    await opened.says("#banner-stopped", "The robot itself: stopped: halted by the operator")
+    await expect(page.locator("#banner-stopped button")).to_have_count(0)
     await page.locator("#banner-playback").get_by_role("button", name="Back to the live run").click()
     await server.wait("close_recording")
     await expect(page.locator("#banner-playback")).to_have_count(0)
     await expect(page.locator("#playback")).to_be_hidden()
     await opened.says("#robot-name", "denning")
+    await expect(page.locator("#mode-name")).to_have_text("SAFE STOP")
+    await opened.tab("Drive")
+    await expect(page.locator("#arm")).to_be_enabled()
 
 
 async def test_teleoperation_is_refused_while_a_recording_is_shown(server: FakeServer, opener: Opener) -> None:

@@ -111,7 +111,9 @@ def service_command(config: str | None, sets: Sequence[str], port: str) -> list[
     # A file must be found from any folder; a shipped run is found by its name.
     named = [] if config is None else [str(Path(config).resolve()) if Path(config).exists() else config]
     overrides = [word for text in sets for word in ("--set", text)]
-    return [*program, "run", *named, "--port", port, "--headless", *overrides]
+    # Pages that are open come back after a restart; the user's own choice comes later and counts.
+    kept = ["--set", "console.keep_token=true"]
+    return [*program, "run", *named, "--port", port, "--headless", *kept, *overrides]
 
 
 def quote_for_systemd(word: str) -> str:

@@ -110,6 +110,15 @@ class ClientHub:
             if client.is_live:
                 client.show(frame)
 
+    def inform_viewers(self, status: Mapping[str, Any]) -> None:
+        """Send the state of the robot to every client that watches a recording, whose frames do not show it."""
+        if all(client.is_live for client in self.clients.values()):
+            return
+        data = orjson.dumps({"type": "robot", **status})
+        for client in list(self.clients.values()):
+            if not client.is_live:
+                client.send_newest("robot", data)
+
     def issue_challenge(self) -> None:
         """Send every client a new challenge."""
         if self.clients:

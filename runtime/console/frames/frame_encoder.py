@@ -52,9 +52,10 @@ class FrameContext:
     """Duration of each phase of the last cycle."""
     late_s: float = 0.0
     """How long after its deadline that cycle began."""
-    missed: int = 0
-    late: int = 0
-    link: LinkCounts = NO_LINK_COUNTS
+    missed: int | None = 0
+    late: int | None = 0
+    link: LinkCounts | None = NO_LINK_COUNTS
+    """Counts that a recording does not hold are None in a replayed frame, not 0."""
     recording: RecordingStatus | None = None
     is_paused: bool = False
     speed: float = 1.0
@@ -158,13 +159,10 @@ class FrameEncoder:
         link, phases_s = context.link, context.phases_s or {}
         head: dict[str, Any] = {
             "type": "state",
+            **robot_status(state, context),
             "cycle": state.cycle,
             "robot_s": robot_s,
             "host_s": round(context.host_s, 4),
-            "mode": state.mode.mode.value,
-            "reason": state.mode.reason,
-            "hold_reason": state.hold_reason,
-            "arming": state.mode.arming_run_s is not None,
             "pose": [0.0, 0.0, 0.0],
             "ring_yaw": 0.0,
             "twist": [0.0, 0.0],
@@ -183,14 +181,10 @@ class FrameEncoder:
             "late": context.late,
             "quanta": 0 if record is None else record.quanta,
             "refinement": "nothing" if record is None else record.refinement,
-            "link": {"frames": link.frames, "bad": link.bad, "lost": link.lost},
+            "link": None if link is None else {"frames": link.frames, "bad": link.bad, "lost": link.lost},
             "waiting": state.perception.counts.waiting,
             "localized": _localized(state.perception),
             "sensors": [[r.sensor, r.fault, r.reason] for r in state.perception.sensor_reports()],
-            "clients": context.clients,
-            "recording": None if context.recording is None else context.recording._asdict(),
-            "paused": context.is_paused,
-            "speed": context.speed,
             "playback": context.playback,
         }
         if odometry is not None:
@@ -235,6 +229,20 @@ class FrameEncoder:
         self._cluster_boxes = [list(box) for box in self._clusters.boxes(now.geometry)]
         rows = np.column_stack([now.geometry, now.times])
         return self._segments.update(now.numbers, rows, now.numbers[now.pinned == 1])
+
+
+def robot_status(state: State, context: FrameContext) -> dict[str, Any]:
+    """Return what a page always shows of the robot itself, also while it shows a recording."""
+    return {
+        "mode": state.mode.mode.value,
+        "reason": state.mode.reason,
+        "hold_reason": state.hold_reason,
+        "arming": state.mode.arming_run_s is not None,
+        "clients": context.clients,
+        "recording": None if context.recording is None else context.recording._asdict(),
+        "paused": context.is_paused,
+        "speed": context.speed,
+    }
 
 
 def _json_numbers(values: Iterable[float], places: int) -> list[float | None]:

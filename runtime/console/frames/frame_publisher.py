@@ -14,7 +14,7 @@ from config.settings import Settings
 from drivers.driver import RobotDriver
 from runtime.console.clients.client_hub import ClientHub
 from runtime.console.commands.command import CommandContext
-from runtime.console.frames.frame_encoder import NO_LINK_COUNTS, FrameContext, FrameEncoder
+from runtime.console.frames.frame_encoder import NO_LINK_COUNTS, FrameContext, FrameEncoder, robot_status
 from runtime.console.protocols import Run
 from runtime.cycle.callbacks import CONSOLE_FRAME
 from runtime.cycle.step import CycleRecord, State
@@ -174,6 +174,7 @@ class FramePublisher:
             speed=1.0 if time is None else time.speed,
         )
         self._hub.publish(self._encoder.frame(state, record, context))
+        self._hub.inform_viewers(robot_status(state, context))
 
     def _tick(self) -> None:
         """Publish a frame if no cycle has had one for a while."""

@@ -8,6 +8,7 @@ const COLUMN_PX = 3;
 const LEFT = 34;
 const TOP = 14;
 const BOTTOM = 4;
+const ENDS = { budget: "no time left", quota: "quota used", converged: "nothing left to improve", nothing: "nothing to refine" };
 const TOPS_MS = [0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
 
 class Strip {
@@ -167,7 +168,8 @@ export class Charts {
     strip.ctx.fill(path);
     strip.marks(shown);
     const { missed, late, quanta, refinement } = this.#run.state;
-    setText(this.#lateLegend, `${missed} missed, ${late} late; ${quanta} quanta, ended by ${refinement || "–"}`);
+    const counts = missed === null ? "not recorded" : `${missed} missed, ${late} late`;
+    setText(this.#lateLegend, `${counts}; ${quanta} steps of refinement, then ${ENDS[refinement] ?? "–"}`);
     const last = shown.at(-1);
     if (last && shown.length % 20 === 0) {
       setAttribute(strip.canvas, "aria-label", `Lateness of the last ${shown.length} cycles, the last one ${last.late_ms.toFixed(2)} ms`);

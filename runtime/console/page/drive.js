@@ -17,11 +17,11 @@ export class Drive {
     byId("drive-request-goal").addEventListener("click", () => tools.choose("goal", { focus: true }));
     byId("goal-form").addEventListener("submit", (event) => this.#goalByForm(event));
     run.on("session", () => {
-      this.controller = undefined; // new fields may have appeared, which must be disabled for observers
+      this.enabled = undefined; // new fields may have appeared, which must be disabled for observers
     });
     run.on("state", () => this.#refresh());
     run.on("role", (message) => this.#role(message));
-    run.on("mode", (state) => this.#mode(state));
+    run.on("mode", () => this.#mode());
     units.on("changed", () => setText(byId("goal-unit"), units.name));
     this.#watchTeleoperation();
   }
@@ -55,29 +55,36 @@ export class Drive {
     this.goal(x, y).then(() => setText(error, ""), (refusal) => setText(error, refusal.message));
   }
 
-  #mode({ mode, reason }) {
-    const { controller } = this.run.state;
+  // A stop of the robot is shown also beside a recording; arming requires the live run on the screen.
+  #mode() {
+    const { mode, reason } = this.run.robot;
     setText(byId("arm"), mode === "SAFE_STOP" ? "Re-arm" : "Arm");
     if (mode === "SAFE_STOP" || mode === "FAULT") {
-      const buttons = mode === "SAFE_STOP" && controller ? [["Re-arm", () => this.arm()]] : [];
-      this.notifications.banner("stopped", `${mode === "FAULT" ? "Fault" : "Stopped"}: ${reason ?? "no reason given"}`, { bad: true, buttons });
+      const buttons = mode === "SAFE_STOP" && this.enabled ? [["Re-arm", () => this.arm()]] : [];
+      const what = mode === "FAULT" ? "Fault" : "Stopped";
+      this.notifications.banner("stopped", `${this.run.watchesRecording ? `The robot itself: ${what.toLowerCase()}` : what}: ${reason ?? "no reason given"}`, { bad: true, buttons });
     } else this.notifications.banner("stopped", null);
   }
 
   #refresh() {
-    const { mode, controller, drive_request, clients } = this.run.state;
+    const { controller, drive_request } = this.run.state;
+    const { mode, clients } = this.run.robot;
+    const enabled = controller && !this.run.watchesRecording;
+    if (this.enabled !== enabled) {
+      this.enabled = enabled;
+      for (const element of document.querySelectorAll(".control")) element.disabled = !enabled;
+      this.#mode();
+    }
     if (this.controller !== controller) {
       this.controller = controller;
-      for (const element of document.querySelectorAll(".control")) element.disabled = !controller;
-      this.#mode(this.run.state);
       if (!controller) this.teleoperation.stop("another client controls");
       this.notifications.banner("watching", controller ? null : "You are watching.", { buttons: [
         ["Ask for control", () => this.#ask({ type: "take_control" })], ["Just watch", () => this.notifications.banner("watching", null)],
       ] });
       if (controller) this.notifications.banner("asked", null);
     }
-    byId("arm").disabled = !controller || mode === "DRIVE" || mode === "FAULT";
-    byId("disarm").disabled = !controller || mode !== "DRIVE";
+    byId("arm").disabled = !enabled || mode === "DRIVE" || mode === "FAULT";
+    byId("disarm").disabled = !enabled || mode !== "DRIVE";
     byId("take-control").disabled = controller;
     byId("give-control").disabled = !controller;
     setAttribute(byId("pad"), "aria-disabled", this.teleoperation.refusalReason() !== null);

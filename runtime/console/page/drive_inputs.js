@@ -46,7 +46,8 @@ export function watchPad(drive) {
 }
 
 export function watchKeys(drive, enabled, elsewhere) {
-  holdKeys(drive, window, (event) => (enabled() && !elsewhere() ? KEYS[event.code] : undefined), "key");
+  // With Shift the letters keep their other meanings: Shift+A arms.
+  holdKeys(drive, window, (event) => (enabled() && !event.shiftKey && !elsewhere() ? KEYS[event.code] : undefined), "key");
 }
 
 // A key counts as held from keydown to keyup; auto-repeat changes nothing.

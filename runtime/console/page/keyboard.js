@@ -64,7 +64,7 @@ export function watchKeyboard({ drive, tools, view, fit, units, chosen, time, pa
     }
     if (target instanceof HTMLSelectElement) return; // letters and arrows choose there
     if (key === "Escape") notifications.close();
-    if (drivingByKeys() && "wasdWASD".includes(key)) return;
+    if (drivingByKeys() && !event.shiftKey && "wasdWASD".includes(key)) return;
     const act = acts[key];
     if (!act) return;
     event.preventDefault();

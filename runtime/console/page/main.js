@@ -184,6 +184,7 @@ function fitUntouched(room = 0) {
 
 connection.on("session", (session) => run.beginSession(session));
 connection.on("state", (state) => run.apply(state, performance.now()));
+connection.on("robot", (status) => run.applyRobot(status, performance.now()));
 connection.on("log", (entry) => run.note(entry));
 connection.on("role", (message) => run.emit("role", message));
 connection.on("evidence", (message) => objects.showEvidence(message));

@@ -11,15 +11,19 @@ const CHART_MAX = 600;
 const EMPTY = {
   cycle: 0, robot_s: 0, mode: "no data", reason: null, hold_reason: null, arming: false, pose: [0, 0, 0], ring_yaw: 0, twist: [0, 0], flags: [], firing: [],
   ranges: [], age: [], clusters: [], objects: [], vectors: [], drive_request: null, phases: {}, cycle_us: 0, late_us: 0,
-  waiting: 0, localized: null, missed: 0, late: 0, quanta: 0, refinement: "", link: null, sensors: [], dropped: 0, clients: 0, controller: false,
+  waiting: 0, localized: null, missed: null, late: null, quanta: 0, refinement: "", link: null, sensors: [], dropped: 0, clients: 0, controller: false,
   recording: null, paused: false, speed: 1, playback: null,
 };
 
+// What a frame says of the robot itself. While a recording is shown, messages of their own bring it.
+const ROBOT = ["mode", "reason", "hold_reason", "arming", "clients", "recording", "paused", "speed"];
+
 export class RunState extends Emitter {
   session = null;
-  state = EMPTY;
+  state = EMPTY; // what is shown: the live run, or a moment of a recording
+  robot = pick(EMPTY, ROBOT); // the robot as it is now, whatever is shown
   fresh = false; // whether a state has arrived since the session began
-  received_ms = 0;
+  received_ms = null;
   archived = []; // objects left behind; a frame lists them when they have changed
   segments = new Map();
   segmentsVersion = 0;
@@ -64,20 +68,34 @@ export class RunState extends Emitter {
     const before = this.state;
     const state = { ...EMPTY, ...frame };
     const jumped = state.robot_s < before.robot_s - 1e-9 || (state.playback === null) !== (before.playback === null);
+    const switched = !this.fresh || state.controller !== before.controller || (state.playback === null) !== (before.playback === null);
     this.archived = frame.archived ?? this.archived;
     state.objects = [...state.objects, ...this.archived].sort((a, b) => (a.number ?? Infinity) - (b.number ?? Infinity)); // frames list them by score, which changes
     this.state = state;
-    this.received_ms = now_ms;
     if (jumped) this.#forgetTime();
     this.#applySegments(frame.segments);
     this.#applyTrail(state);
     this.#applyEchoes(state);
-    this.#applyChart(state, before, this.fresh && !jumped);
-    const changed = !this.fresh || state.mode !== before.mode || state.reason !== before.reason
-      || state.hold_reason !== before.hold_reason || state.arming !== before.arming || state.controller !== before.controller || (state.playback === null) !== (before.playback === null);
+    if (state.playback === null) this.#applyChart(state, before, this.fresh && !jumped);
     this.fresh = true;
+    const changed = state.playback === null && this.#takeRobot(frame, now_ms);
     this.emit("state", state);
-    if (changed) this.emit("mode", state, before);
+    if (changed || switched) this.emit("mode", this.robot);
+  }
+
+  // The robot's own state, while the frames show a recording.
+  applyRobot(status, now_ms) {
+    const changed = this.#takeRobot(status, now_ms);
+    this.emit("state", this.state);
+    if (changed) this.emit("mode", this.robot);
+  }
+
+  // Returns whether the mode or what belongs to it has changed.
+  #takeRobot(status, now_ms) {
+    const before = this.robot;
+    this.robot = pick({ ...EMPTY, ...status }, ROBOT);
+    this.received_ms = now_ms;
+    return ["mode", "reason", "hold_reason", "arming", "paused"].some((key) => this.robot[key] !== before[key]);
   }
 
   #forgetTime() {
@@ -138,8 +156,12 @@ export class RunState extends Emitter {
     this.emit("log", entry);
   }
 
-  // The age of the displayed state by the page's clock, s.
+  // How long ago the robot's process last reported its state, by the page's clock, s.
   age(now_ms) {
-    return this.fresh ? (now_ms - this.received_ms) / 1000 : Infinity;
+    return this.received_ms === null ? Infinity : (now_ms - this.received_ms) / 1000;
   }
+}
+
+function pick(from, keys) {
+  return Object.fromEntries(keys.map((key) => [key, from[key]]));
 }

@@ -1,10 +1,12 @@
-// The status bar: mode and reason, age of the data, line counters; announces changes of mode to screen readers.
+// The status bar: one state for the whole page, which always names the robot's own mode; its reason, the age of the
+// data, line counters. Changes of the state are announced to screen readers.
 
 import { byId, setAttribute, setText } from "./dom.js";
 import { degrees } from "./units.js";
 
 const STALE_S = 2.5; // while the robot does not answer, updates come once a second
 const RECENT_MS = 5000;
+const ICONS = { "NO DATA": "m-connecting", PLAYBACK: "i-play", PAUSED: "i-pause" };
 const SILENT_S = 3; // the text changes seldom, so that a screen reader does not repeat it all the time
 
 export class Status {
@@ -15,51 +17,86 @@ export class Status {
   #announce = byId("announce");
   #announced = null;
   #closed = null;
+  #trouble = null; // why there is no connection, where that is known
   #silent = false;
+  #version = null;
+  #was_open = false;
   #counts = new Map();
 
   constructor({ run, units, connection, notifications }) {
     [this.#run, this.#units, this.#connection, this.#notifications] = [run, units, connection, notifications];
     run.on("session", (session) => {
       setText(byId("robot-name"), session.name || "echolocate");
-      document.title = `${session.name || "robot"} · echolocate`;
+      // The page's own files are those of the program that served it.
+      this.#version ??= session.version;
+      notifications.banner("version", session.version === this.#version ? null : "The robot's program was replaced by another version.",
+        { buttons: [["Reload the page", () => location.reload()]] });
+      this.#show();
     });
-    run.on("state", () => this.#facts());
-    run.on("mode", (state) => this.#mode(state));
+    run.on("state", () => {
+      this.#facts();
+      this.#show();
+    });
+    run.on("mode", (robot) => this.#preparation(robot));
     connection.on("open", () => {
-      this.#closed = null;
+      this.#was_open = true;
+      this.#closed = this.#trouble = null;
       notifications.banner("connection", null);
     });
     connection.on("closed", ({ opened }) => this.#lost(opened));
     setInterval(() => this.#age(), 200);
   }
 
-  #mode({ mode, reason: why, hold_reason, arming }) {
-    const reason = why ?? (arming ? "arming…" : hold_reason);
-    setAttribute(byId("mode"), "data-mode", mode);
-    setAttribute(byId("mode-icon"), "href", `#m-${mode.toLowerCase()}`);
-    setText(byId("mode-name"), `${this.#run.watchesRecording ? "then: " : ""}${mode.replace("_", " ")}`);
-    setText(byId("reason"), reason ?? "");
-    // The bar has no room for the progress, which counts.
-    const preparing = mode === "CONNECTING" && Boolean(reason?.startsWith("recognition is being prepared"));
-    this.#notifications.banner("preparation", preparing ? "Recognition is being prepared." : null);
-    this.#notifications.updateBanner("preparation", `The robot stands: ${reason}.`);
-    // A reason that counts is announced once, not each second.
-    const kind = `${mode} ${reason ?? ""}`.replace(/\d+/g, "");
-    if (kind !== this.#announced) setText(this.#announce, `Mode ${mode.replace("_", " ").toLowerCase()}${reason ? `: ${reason}` : ""}`);
+  get #isOld() {
+    return this.#closed !== null || this.#run.age(performance.now()) > STALE_S;
+  }
+
+  #show() {
+    const { robot } = this.#run;
+    const old = this.#isOld, mode = robot.mode.replace("_", " ");
+    const special = old ? "NO DATA" : this.#run.watchesRecording ? "PLAYBACK" : robot.paused ? "PAUSED" : null;
+    const reason = old ? this.#trouble ?? "" : reasonOf(robot) ?? "";
+    const named = special === null || robot.mode === "no data" ? "" : old ? `the robot was in ${mode}` : `the robot: ${mode}`;
+    setAttribute(byId("mode"), "data-mode", special === null ? robot.mode : special.replace(" ", "_"));
+    setAttribute(byId("mode-icon"), "href", `#${special === null ? `m-${robot.mode.toLowerCase()}` : ICONS[special]}`);
+    setText(byId("mode-name"), special ?? mode);
+    setText(byId("mode-robot"), named);
+    setText(byId("reason"), reason);
+    document.body.classList.toggle("old", old);
+    setAttribute(byId("facts"), "aria-label", this.#run.watchesRecording ? "State in the recording" : "State of the run");
+    if (old) fact("twist", "unknown");
+    const title = `${special ?? mode} · ${this.#run.session?.name || "robot"} · echolocate`;
+    if (document.title !== title) document.title = title;
+    // A reason that counts is announced once, not each second; that data are missing is announced by #age and #lost.
+    const kind = `${special ?? ""} ${mode} ${reason}`.replace(/\d+/g, "");
+    if (kind !== this.#announced && !old) {
+      const shown = special === null ? `Mode ${mode.toLowerCase()}` : `${special.toLowerCase()}, ${named}`;
+      setText(this.#announce, `${shown}${reason ? `: ${reason}` : ""}`);
+    }
     this.#announced = kind;
   }
 
+  // The bar has no room for the progress, which counts.
+  #preparation(robot) {
+    const { mode } = robot, reason = reasonOf(robot);
+    const preparing = mode === "CONNECTING" && Boolean(reason?.startsWith("recognition is being prepared"));
+    this.#notifications.banner("preparation", preparing ? "Recognition is being prepared." : null);
+    this.#notifications.updateBanner("preparation", `The robot stands: ${reason}.`);
+  }
+
   #facts() {
-    const { twist, localized, flags, link, dropped, late, missed, clients, controller, recording } = this.#run.state;
+    const { twist, localized, flags, link, dropped, late, missed, controller } = this.#run.state;
+    const { clients, recording } = this.#run.robot;
     const turn = Math.round((twist[1] * 180) / Math.PI);
     fact("twist", `${this.#units.number(twist[0])} ${this.#units.name}/s ${turn < 0 ? "↻" : turn > 0 ? "↺" : ""} ${Math.abs(turn)}°/s`);
     byId("place").hidden = localized === null;
     if (localized !== null) fact("place", this.#place(localized), localized.status === "lost");
-    fact("link", link ? `${link.bad} / ${link.lost}` : "none", this.#hasGrown("link", link ? link.bad + link.lost : 0));
+    if (link === null) fact("link", "not recorded");
+    else fact("link", `${link.bad} / ${link.lost}`, this.#hasGrown("link", link.bad + link.lost));
     fact("flags", flags.join(", ").toLowerCase() || "none", flags.length > 0);
     fact("dropped", String(dropped), this.#hasGrown("dropped", dropped));
-    fact("late", `${late} / ${missed}`, this.#hasGrown("late", late + missed));
+    if (late === null) fact("late", "not recorded");
+    else fact("late", `${late} / ${missed}`, this.#hasGrown("late", late + missed));
     fact("clients", String(clients));
     fact("role", controller ? "control" : "watch");
     const size = recording ? `${(recording.bytes / 1e6).toFixed(1)} MB${recording.dropped ? `, ${recording.dropped} lost` : ""}` : "off";
@@ -87,7 +124,8 @@ export class Status {
 
   #age() {
     const age = this.#run.age(performance.now());
-    const quiet = age > STALE_S && !this.#run.state.paused && !this.#run.watchesRecording;
+    const quiet = age > STALE_S;
+    if (this.#isOld !== document.body.classList.contains("old")) this.#show();
     fact("age", age === Infinity ? "none" : age < 1 ? `${age.toFixed(1)} s` : `${Math.round(age)} s`, quiet);
     if (this.#closed === null) {
       const text = `No update for ${Math.round(age)} s: what you see is old.`;
@@ -103,6 +141,7 @@ export class Status {
   async #lost(opened) {
     if (this.#closed === null) setText(this.#announce, "Connection lost");
     this.#closed ??= performance.now();
+    this.#show();
     this.#notifications.banner("stale", null);
     const lost = "No connection to the robot's process; trying again. The base stops by itself without commands.";
     if (opened) {
@@ -112,10 +151,16 @@ export class Status {
     const status = await this.#connection.probe();
     if (this.#connection.open) return;
     if (status === 401 || status === 403) {
-      this.#notifications.banner("connection", "The token is missing or wrong: open the address that the run printed when it started.", { bad: true });
-      setText(byId("reason"), "token missing or wrong");
+      const why = this.#was_open ? "The run was started again with another token" : "The token is missing or wrong";
+      this.#notifications.banner("connection", `${why}: open the address that the run printed when it started.`, { bad: true });
+      this.#trouble = "token missing or wrong";
+      this.#show();
     } else this.#notifications.banner("connection", lost, { bad: true });
   }
+}
+
+function reasonOf({ reason, arming, hold_reason: hold }) {
+  return reason ?? (arming ? "arming…" : hold);
 }
 
 function fact(name, text, bad = false) {

@@ -31,7 +31,7 @@ export class Teleoperation extends Emitter {
     if (!document.hasFocus()) return "the window does not have the focus"; // a gamepad would drive all the same
     if (this.run.watchesRecording) return "a recording is shown: go back to the live run first";
     if (!this.run.state.controller) return "this page only watches: ask for control first";
-    if (this.run.state.mode !== "DRIVE") return "the robot is not armed";
+    if (this.run.robot.mode !== "DRIVE") return "the robot is not armed";
     return null;
   }
 

@@ -14,7 +14,7 @@ export class Time {
     const on = (id, act) => byId(id).addEventListener("click", act);
     on("pause", () => this.pause());
     on("single-step", () => this.#ask({ type: "single_step" }));
-    on("record", () => this.#ask({ type: "record", on: run.state.recording === null }));
+    on("record", () => this.#ask({ type: "record", on: run.robot.recording === null }));
     on("recordings-again", () => this.#list(notifications.showError));
     on("open", () => this.#open());
     on("play", () => this.#ask({ type: "play_recording", speed: this.#playing ? 0 : Number(byId("play-speed").value) }));
@@ -49,16 +49,19 @@ export class Time {
   }
 
   pause() {
-    return this.#ask({ type: this.run.state.paused ? "resume" : "pause" });
+    return this.#ask({ type: this.run.robot.paused ? "resume" : "pause" });
   }
 
   #refresh() {
-    const { robot_s, cycle, paused, speed, recording, playback, controller } = this.run.state;
-    const emulated = this.run.session?.emulated ?? false;
-    const where = playback ? `Recording ${name(this.#file)}` : emulated ? "Live, in the emulator" : "Live";
-    setText(byId("time-text"), `${where}: ${clock(robot_s)}, cycle ${cycle}${paused ? ", paused" : ""}${speed !== 1 ? `, × ${speed}` : ""}`);
+    const { robot_s, cycle, mode, reason, playback, controller } = this.run.state;
+    const { paused, speed, recording } = this.run.robot;
+    const emulated = (this.#liveSession ?? this.run.session)?.emulated ?? false;
+    const at = `${clock(robot_s)}, cycle ${cycle}`;
+    const then = `in ${mode.replace("_", " ")}${reason ? ` (${reason})` : ""}`;
+    const live = `${emulated ? "Live, in the emulator" : "Live"}: ${at}${paused ? ", paused" : ""}${speed !== 1 ? `, × ${speed}` : ""}`;
+    setText(byId("time-text"), playback ? `Recording ${name(this.#file)}: ${at}, the robot then ${then}` : live);
     setText(byId("pause"), paused ? "Resume" : "Pause");
-    for (const id of ["pause", "single-step", "speed"]) byId(id).disabled = !controller || !emulated;
+    for (const id of ["pause", "single-step", "speed"]) byId(id).disabled = !controller || !emulated || playback !== null;
     if (document.activeElement !== byId("speed")) choose(byId("speed"), String(speed));
     setAttribute(byId("record"), "aria-pressed", recording !== null);
     setText(byId("record-text"), recording ? `to ${name(recording.file)}` : "off");

@@ -41,7 +41,7 @@ class ReplayFrames:
 
     def frame(self, replayed: ReplayedCycle, position: PlaybackPosition) -> FrameParts:
         """Return the frame of a cycle."""
-        context = FrameContext(host_s=position.s, playback=position._asdict())
+        context = FrameContext(host_s=position.s, playback=position._asdict(), missed=None, late=None, link=None)
         frame = self._encoder.frame(replayed.state, replayed.record, context)
         return FrameParts(frame.head, frame.changes, frame.whole())
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import pytest
+
 from tests.runtime.console.console_case import open_console
 
 
@@ -28,3 +32,19 @@ async def test_a_console_that_stops_listening_is_unhealthy() -> None:
         assert server._server is not None
         server._server.close()
         assert case.console.probe() == "it does not listen any more"
+
+
+async def test_a_kept_token_is_that_of_the_run_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    tokens = []
+    for sets in (["console.keep_token=true"], ["console.keep_token=true"], []):
+        async with open_console(*sets) as case:
+            tokens.append(case.token)
+            assert not [line for line in case.log if line["level"] == "warning"]
+    assert tokens[0] == tokens[1] != tokens[2]
+    (tmp_path / "echolocate" / "console-token").chmod(0o644)
+    async with open_console("console.keep_token=true") as case:
+        assert case.token not in tokens, "others could know it"
+        assert [line["event"] for line in case.log if line["level"] == "warning"] == [
+            "this run has a token of its own: pages opened before cannot come back"
+        ]

@@ -20,7 +20,8 @@ def test_the_unit_that_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert printed.err == ""
     lines = printed.out.splitlines()
     (start,) = [line for line in lines if line.startswith("ExecStart=")]
-    assert "run hallway --port /dev/ttyUSB0 --headless --set behaviors.arbiter.base_velocity_m_s=0.2" in start
+    shared = "run hallway --port /dev/ttyUSB0 --headless --set console.keep_token=true"
+    assert f"{shared} --set behaviors.arbiter.base_velocity_m_s=0.2" in start
     assert "--arm" not in printed.out
     for line in ("Type=notify", "WatchdogSec=2", "Restart=on-failure", "DynamicUser=yes", "KillSignal=SIGTERM"):
         assert line in lines

@@ -84,3 +84,14 @@ async def test_changes_of_parameters_do_not_fill_the_queues_of_others() -> None:
         assert len(lines) == LOG_LINES_BURST
         for one in (tuner, watcher):
             case.console.hub.leave(one.client)
+
+
+async def test_a_client_that_watches_a_recording_gets_the_state_of_the_robot_itself() -> None:
+    async with open_console() as case:
+        live, viewer = await case.page(), await case.page()
+        next(reversed(case.console.hub.clients.values())).switch(live=False)
+        case.cycles()
+        status = await viewer.next("robot", "state")
+        assert status["type"] == "robot"
+        assert (status["mode"], status["clients"], status["paused"]) == ("CONNECTING", 2, False)
+        assert (await live.next("robot", "state"))["type"] == "state"

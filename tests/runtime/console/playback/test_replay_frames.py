@@ -61,6 +61,7 @@ def test_the_changes_of_all_frames_add_up_to_the_last_map(folder: Path) -> None:
     assert (head["cycle"], head["mode"]) == (cursor.cycles, "DRIVE")
     assert head["playback"] == {"s": cursor.t_s, "is_playing": True, "speed": 2.0}
     assert (head["paused"], head["speed"]) == (False, 1.0), "time control is shown of the live run only"
+    assert (head["link"], head["late"], head["missed"]) == (None, None, None), "a recording does not hold them"
     assert len(head["objects"]) == len(replayed.state.perception.labelled_objects())
 
 
