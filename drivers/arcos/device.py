@@ -60,6 +60,7 @@ class Session(Enum):
     """The state of the connection: three synchronising packets lead from one to the next."""
 
     WAIT = "wait"
+    SYNCING = "syncing"
     READY = "ready"
     OPENED = "opened"
 
@@ -153,15 +154,19 @@ class ArcosDevice(EventDevice):
     # Commands of the host.
 
     def _take(self, command: Command) -> None:
-        """Obey a command as the state of the connection has it: in READY, OPEN has the bytes of SYNC1."""
+        """Obey a command as the state of the connection has it.
+
+        In READY, OPEN has the bytes of SYNC1. In WAIT, SYNC2 has those of the CLOSE with which a client ends what an
+        earlier one may have left: it expects no answer, and would take one for that to its SYNC0.
+        """
         if self._session is Session.OPENED:
             self._obey(command)
         elif command.number == CommandNumber.OPEN and self._session is Session.READY:
             self._open()
         elif command.argument is None and command.number in (0, 1):
-            self._session = Session.WAIT
+            self._session = Session.SYNCING
             self._send(SyncEcho(command.number))
-        elif command.argument is None and command.number == 2:
+        elif command.argument is None and command.number == 2 and self._session is not Session.WAIT:
             self._session = Session.READY
             self._send(RobotName(self._firmware.name, self._firmware.class_name, self._firmware.subclass))
 

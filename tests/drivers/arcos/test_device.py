@@ -87,6 +87,17 @@ def test_in_the_middle_of_synchronising_a_client_may_begin_again() -> None:
     assert client.of(Sip)
 
 
+def test_a_close_before_any_sync_is_not_answered_as_its_bytes_would_be_later() -> None:
+    client = Client()
+    client.robot.receive(encode(Command(CommandNumber.CLOSE)))
+    client.run(0.5)
+    assert client.heard == []
+    for command in SYNC[1:]:
+        client.robot.receive(encode(command))
+        client.run(0.02)
+    assert [type(packet) for _, packet in client.heard] == [SyncEcho, RobotName], "as a simulator does it"
+
+
 def test_close_stops_the_base_and_the_sips_and_it_can_be_opened_again() -> None:
     client = Client().opened(motors=True)
     client.send(VEL, 300)
