@@ -101,7 +101,7 @@ def rosaria(client: Stock) -> None:
 
 
 def p2os(client: Stock) -> None:
-    """The p2os drivers read one packet for each command, and drive the wheels: raw bytes, also of a negative speed."""
+    """The p2os drivers read a packet for each command, and drive the wheels: raw bytes, also of negative speeds."""
     client.synchronises(0.2)
     client.says(Command(N.OPEN), 0.2)
     assert any(isinstance(p, Sip) for p in client.says(Command(N.PULSE), 0.2))
