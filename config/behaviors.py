@@ -55,11 +55,73 @@ class MoveToGoalConfig(Strict):
     """Distance at which the goal is reached and the robot stops, m."""
     controlled_zone_m: float = Field(default=0.6, gt=0.0, le=100.0)
     """Distance within which the robot slows down in proportion, m."""
+    stuck_after_s: float = Field(default=20.0, ge=1.0, le=3600.0)
+    """The goal is given up after the robot has moved less than `stuck_m` for so long, or, if something stands on the
+    goal, has come no nearer, s."""
+    stuck_m: float = Field(default=0.3, gt=0.0, le=10.0)
+    """See `stuck_after_s`, m."""
+    unreachable_after_s: float = Field(default=90.0, ge=1.0, le=1e5)
+    """The goal is given up after the robot has not come nearer to it than ever before for so long, s."""
 
     @model_validator(mode="after")
     def _ordered(self) -> MoveToGoalConfig:
         if self.success_radius_m > self.controlled_zone_m:
             raise ValueError("success_radius_m is above controlled_zone_m")
+        return self
+
+
+class FollowValleyConfig(Strict):
+    """The follow-valley schema: towards a goal through the free valleys between obstacles (VFH+, with look-ahead)."""
+
+    follow_valley_gain: float = Field(default=1.0, ge=0.0, le=100.0)
+    """Factor on move-to-goal's vector, whose direction this schema replaces; 0 drives straight towards the goal."""
+    safety_m: float = Field(default=0.2, ge=0.0, le=10.0)
+    """Room to keep between rim and obstacle, m. Choose it above the arbiter's clearance, which stops the robot."""
+    comfort_m: float = Field(default=0.35, ge=0.0, le=10.0)
+    """A direction that passes an obstacle nearer than this is chosen only if it saves a turn or a way, m."""
+    block_m: float = Field(default=0.7, gt=0.0, le=100.0)
+    """A direction is blocked if the robot cannot drive so far in it, m."""
+    free_m: float = Field(default=0.9, gt=0.0, le=100.0)
+    """A blocked direction is free again if the robot can drive so far in it, m."""
+    occupied_probability: float = Field(default=0.6, ge=0.5, lt=1.0)
+    """Probability from which on a cell of the evidence grid counts as an obstacle, …"""
+    sure_probability: float = Field(default=0.8, gt=0.5, le=1.0)
+    """… and from which it is sure. One in between blocks a shorter way."""
+    wide_valley_deg: float = Field(default=40.0, ge=5.0, le=180.0)
+    """A valley from this width on is wide: its sides are driven at half of it from the border, degrees."""
+    target_weight: float = Field(default=5.0, ge=0.0, le=1000.0)
+    """μ₁: cost of a direction for each 5° from the target's."""
+    heading_weight: float = Field(default=2.0, ge=0.0, le=1000.0)
+    """μ₂: the same from the drive heading."""
+    last_weight: float = Field(default=2.0, ge=0.0, le=1000.0)
+    """μ₃: the same from the direction chosen before."""
+    near_cost: float = Field(default=20.0, ge=0.0, le=1e6)
+    """Cost of a direction that passes an obstacle nearer than `comfort_m`."""
+    turning_radius_m: float = Field(default=0.0, ge=0.0, le=100.0)
+    """Least radius that the robot drives, m; 0 if it can turn on the spot."""
+    look_ahead_step_m: float = Field(default=0.5, gt=0.05, le=10.0)
+    """Length of a step of the look-ahead (VFH*), m."""
+    look_ahead_nodes_max: int = Field(default=600, ge=0, le=2000)
+    """Most places that a look-ahead projects; 0 for none, which is VFH+."""
+    look_ahead_period_s: float = Field(default=1.0, ge=0.0, le=60.0)
+    """Time from one look-ahead to the next, s."""
+    carrot_m: float = Field(default=1.0, gt=0.0, le=10.0)
+    """Distance of the target on the way that the look-ahead has found, m."""
+    near_share: float = Field(default=0.5, ge=0.0, le=100.0)
+    """Cost of a step that passes an obstacle nearer than `comfort_m`, as a share of its length."""
+    turn_cost_m_per_rad: float = Field(default=0.1, ge=0.0, le=10.0)
+    """Cost of a turn on the way, m for each radian."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> FollowValleyConfig:
+        if self.free_m < self.block_m:
+            raise ValueError("free_m is below block_m")
+        if self.sure_probability <= self.occupied_probability:
+            raise ValueError("sure_probability is not above occupied_probability")
+        if self.target_weight <= self.heading_weight + self.last_weight:
+            raise ValueError(
+                "target_weight is not above heading_weight + last_weight: the robot would not turn to it"
+            )
         return self
 
 
@@ -94,5 +156,6 @@ class BehaviorsConfig(Strict):
     move_ahead: MoveAheadConfig = MoveAheadConfig()
     avoid_static_obstacle: AvoidStaticObstacleConfig = AvoidStaticObstacleConfig()
     move_to_goal: MoveToGoalConfig = MoveToGoalConfig()
+    follow_valley: FollowValleyConfig = FollowValleyConfig()
     teleoperation: TeleoperationConfig = TeleoperationConfig()
     arbiter: ArbiterConfig = ArbiterConfig()

@@ -12,8 +12,7 @@ from behaviors.avoid_static_obstacle import avoid_static_obstacle
 from behaviors.field_of_view import unseen_way
 from behaviors.move_ahead import SCHEMA as AHEAD
 from behaviors.move_ahead import Leg, move_ahead
-from behaviors.move_to_goal import SCHEMA as TO_GOAL
-from behaviors.move_to_goal import Goal, move_to_goal
+from behaviors.move_to_goal import Goal
 from behaviors.response import Response
 from behaviors.teleoperation import SCHEMA as TELEOPERATION
 from behaviors.teleoperation import TELEOPERATION_ENDED, Teleoperate, is_expired, teleoperation
@@ -21,6 +20,7 @@ from config.settings import Settings
 from drivers.messages import Twist
 from perception.percept import Percept
 from runtime.cycle.drive_requests import STANDSTILL, DriveRequest, GoalPlace
+from runtime.cycle.goal_drive import GoalDrive, drive_to_goal
 
 SUM: Final = "sum"
 """Name of the sum of all responses, in place of a schema's name."""
@@ -44,11 +44,13 @@ class DriveResult:
     leg: Leg
     hold_reason: str | None = None
     """Why the robot does not move although it may drive, for the operator."""
+    goal_drive: GoalDrive | None = None
+    """What a drive to a goal keeps for the next cycle."""
 
 
 def drive(
     drive_request: DriveRequest, requested_run_s: float, run_s: float, leg: Leg, percept: Percept, settings: Settings,
-    place: GoalPlace | None = None,
+    place: GoalPlace | None = None, goal_drive: GoalDrive | None = None,
 ) -> DriveResult:  # fmt: skip
     """Return the arbiter's decision on the responses of the schemas that the request asks for.
 
@@ -66,13 +68,15 @@ def drive(
         The run's.
     place : GoalPlace, optional
         Where a goal lies, from `goal_place`.
+    goal_drive : GoalDrive, optional
+        Of the cycle before, for a goal.
     """
     away = avoid_static_obstacle(percept, settings.body.radius_m, settings.behaviors.avoid_static_obstacle)
     match drive_request:
         case Teleoperate():
             return _teleoperate(drive_request, run_s - requested_run_s, leg, percept, settings, away)
         case Goal():
-            return _to_goal(drive_request, place, leg, percept, settings, away)
+            return _to_goal(drive_request, place, run_s, leg, goal_drive, percept, settings, away)
         case _:
             return _along_legs(drive_request, leg, percept, settings, away)
 
@@ -101,21 +105,22 @@ def _teleoperate(
 
 
 def _to_goal(
-    drive_request: Goal, place: GoalPlace | None, leg: Leg, percept: Percept, settings: Settings, away: Response
-) -> DriveResult:
+    drive_request: Goal, place: GoalPlace | None, run_s: float, leg: Leg, goal_drive: GoalDrive | None,
+    percept: Percept, settings: Settings, away: Response,
+) -> DriveResult:  # fmt: skip
     """Return what a goal leads to; one in the map waits until the robot's own place there is known."""
     if place is None and not drive_request.reached:
-        return DriveResult(Drive(STANDSTILL), (), drive_request, leg, NO_PLACE)
+        return DriveResult(Drive(STANDSTILL), (), drive_request, leg, NO_PLACE, goal_drive)
     there = drive_request if place is None else replace(drive_request, x=place.x, y=place.y)
-    to_goal, there = move_to_goal(percept, there, settings.behaviors.move_to_goal)
+    there, goal_drive, responses, decision, hold_reason = drive_to_goal(
+        there, goal_drive, percept, run_s, away, settings
+    )
     is_reached = there.reached and (place is None or place.is_exact)
     drive_request = replace(drive_request, reached=drive_request.reached or is_reached)
-    responses = (to_goal, away)
-    decision = arbitrate(responses, percept, settings.body, settings.behaviors.arbiter, (TO_GOAL, AVOID))
     if drive_request.reached and isinstance(decision, Drive):
-        reached = f"the goal ({drive_request.x:.2f} m, {drive_request.y:.2f} m) is reached"
-        return DriveResult(Drive(STANDSTILL), with_sum(responses, decision), drive_request, leg, reached)
-    return DriveResult(decision, with_sum(responses, decision), drive_request, leg)
+        decision = Drive(STANDSTILL)
+        hold_reason = f"the goal ({drive_request.x:.2f} m, {drive_request.y:.2f} m) is reached"
+    return DriveResult(decision, with_sum(responses, decision), drive_request, leg, hold_reason, goal_drive)
 
 
 def _along_legs(

@@ -32,6 +32,7 @@ from runtime.cycle.drive_requests import (
     validate,
 )
 from runtime.cycle.driving import drive
+from runtime.cycle.goal_drive import GoalDrive, can_look_ahead, look_ahead
 from runtime.cycle.inputs import Inputs
 from runtime.cycle.modes import Mode, ModeState, advance
 from runtime.cycle.motion_monitor import MotionMonitor, Movement
@@ -108,6 +109,10 @@ class State:
     """Why the robot does not move although it may drive; None if it moves."""
     motion_monitor: MotionMonitor = field(default_factory=MotionMonitor)
     """Whether the base moves as commanded."""
+    goal_drive: GoalDrive | None = None
+    """The drive to a goal so far; None without a goal, or before its first cycle in DRIVE."""
+    percept: Percept | None = None
+    """What the last cycle decided on; None if it did not drive. It is made anew each cycle and not recorded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +165,7 @@ def step(
     carry_out(command)
     mark(Phase.COMMAND)
     refused = _edit(state, inputs)
-    quanta, iterations, refinement = _refine(state.perception, may_refine)
+    quanta, iterations, refinement = _refine(state, settings, may_refine)
     mark(Phase.REFINE)
     state.cycle += 1
     counts = state.perception.counts
@@ -209,7 +214,7 @@ def _perceive(state: State, inputs: Inputs) -> int:
 def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
     """Return the command; any stop, also one from another mode, drops a goal and an operator's velocity."""
     before = state.mode
-    state.vectors, state.hold_reason = (), None
+    state.vectors, state.hold_reason, state.percept = (), None, None
     _accept_drive_request(state, inputs)
     state.motion_monitor = state.motion_monitor.observe(inputs.received.odometry, inputs.run_s, settings.body)
     command = _command(state, inputs, settings)
@@ -220,6 +225,8 @@ def _decide(state: State, inputs: Inputs, settings: Settings) -> Command:
     stopped = after.mode in {Mode.SAFE_STOP, Mode.FAULT} and after.entered_since(before)
     if stopped or (before.mode is Mode.DRIVE and after.mode is not Mode.DRIVE):
         state.drive_request = after_stop(state.drive_request)
+    if not isinstance(state.drive_request, Goal):
+        state.goal_drive = None
     return command
 
 
@@ -228,6 +235,7 @@ def _accept_drive_request(state: State, inputs: Inputs) -> None:
     if inputs.drive_request is None or _refusal(state, inputs.drive_request) is not None:
         return
     state.drive_request, state.requested_run_s, state.goal_place = inputs.drive_request, inputs.run_s, None
+    state.goal_drive = None
     if isinstance(inputs.drive_request, Legs) and state.leg is not None and state.leg.done:
         state.leg = None
 
@@ -283,9 +291,11 @@ def _drive(state: State, inputs: Inputs, settings: Settings) -> Drive | Stop:
         state.leg = Leg.starting_at(odometry.pose)
     percept = Percept(odometry.pose, state.perception.obstacles(odometry.robot_s, age_max_s), view)
     result = drive(
-        state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings, state.goal_place
-    )
-    state.drive_request, state.leg = result.drive_request, result.leg
+        state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings, state.goal_place,
+        state.goal_drive,
+    )  # fmt: skip
+    state.drive_request, state.leg, state.goal_drive = result.drive_request, result.leg, result.goal_drive
+    state.percept = percept
     state.vectors, state.hold_reason = result.vectors, result.hold_reason
     if isinstance(result.decision, Unseen):
         driven_s = inputs.run_s - state.mode.entered_run_s
@@ -307,13 +317,16 @@ def _edit(state: State, inputs: Inputs) -> tuple[Refused, ...]:
     return tuple(refused)
 
 
-def _refine(perception: Perception, may_refine: Callable[[int], bool]) -> tuple[int, int, StopCause]:
-    """Refine quantum by quantum; return quanta, iterations, and why it ended."""
-    quanta = iterations = 0
-    while perception.can_refine:
+def _refine(state: State, settings: Settings, may_refine: Callable[[int], bool]) -> tuple[int, int, StopCause]:
+    """Refine the look-ahead to a goal and perception in turns; return quanta, iterations, and why it ended."""
+    perception, quanta, iterations = state.perception, 0, 0
+    while (is_looking := can_look_ahead(state.goal_drive, state.percept)) or perception.can_refine:
         if not may_refine(quanta):
             return quanta, iterations, "budget"
-        iterations += perception.refine()
+        if is_looking and (quanta % 2 == 0 or not perception.can_refine):
+            state.goal_drive = look_ahead(state.goal_drive, state.percept, settings)
+        else:
+            iterations += perception.refine()
         quanta += 1
     if quanta == 0:
         return quanta, iterations, "nothing"

@@ -13,8 +13,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from behaviors.valley.polar_histogram import SECTORS
 from drivers.messages import Firing, Floats, Odometry, Pose, Twist
 from runtime.cycle.drive_requests import validate
+from runtime.cycle.goal_drive import GoalDrive
 from runtime.cycle.modes import ModeState
 from runtime.cycle.motion_monitor import DIRECTIONS, MotionMonitor
 from runtime.cycle.step import CycleRecord
@@ -155,12 +157,37 @@ def check_state(state: Mapping[str, Any]) -> None:
     if state["goal_place"] is not None:
         _bounded("state.goal_place.x", state["goal_place"].x, PLACE_MAX_M)
         _bounded("state.goal_place.y", state["goal_place"].y, PLACE_MAX_M)
+    if state["goal_drive"] is not None:
+        _goal_drive("state.goal_drive", state["goal_drive"])
     if (problem := validate(state["drive_request"])) is not None:
         raise ValueError(f"state.drive_request: {problem}")
     _motion("state.motion_monitor", state["motion_monitor"])
     for response in state["vectors"]:
         _bounded("state.vectors.x", response.x, PLACE_MAX_M)
         _bounded("state.vectors.y", response.y, PLACE_MAX_M)
+
+
+def _goal_drive(what: str, drive: GoalDrive) -> None:
+    """Check the drive to a goal: its places, times and costs, and the numbers by which places name one another."""
+    progress, valley, search = drive.progress, drive.valley, drive.search
+    for name, time_s in (
+        ("progress.moved_run_s", progress.moved_run_s), ("progress.nearer_run_s", progress.nearer_run_s),
+        ("searched_run_s", drive.searched_run_s),
+    ):  # fmt: skip
+        _time(f"{what}.{name}", time_s)
+    nodes = [value for node in search.nodes for value in (node.x, node.y, node.direction, node.cost_m)]
+    places = [value for place in search.way for value in place]
+    for value in (
+        progress.x, progress.y, progress.nearest_m, valley.direction_rad or 0.0, *(search.goal or ()), *nodes,
+        *places, *(cost for cost, _ in search.waiting), *(value for square in search.passed for value in square),
+    ):  # fmt: skip
+        _bounded(f"{what}'s number", value, PLACE_MAX_M)
+    if len(valley.blocked) != SECTORS or valley.blocked.strip("01"):
+        raise ValueError(f"{what}.valley.blocked: expected {SECTORS} digits 0 or 1")
+    if any(not -1 <= node.parent < k for k, node in enumerate(search.nodes)):
+        raise ValueError(f"{what}.search: a node whose parent does not come before it")
+    if any(not 0 <= number < len(search.nodes) for _, number in search.waiting):
+        raise ValueError(f"{what}.search: a number of no node")
 
 
 def check_pieces(after_us: Sequence[int], sizes: Sequence[int], data: str) -> None:

@@ -102,7 +102,7 @@ def test_a_goal_set_before_arming_is_driven_after_it() -> None:
     script = robot()
     script.request_drive(Goal(9.0, 0.0))
     assert arm(script).command == near(0.3, 0.0)
-    assert script.state.vectors[0].schema == "move_to_goal"
+    assert script.state.vectors[0].schema == "follow_valley"
 
 
 def test_a_disarmed_robot_stands_in_ready_and_can_be_armed_again() -> None:

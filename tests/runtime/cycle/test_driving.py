@@ -27,7 +27,7 @@ def test_a_goal_is_approached_and_the_robot_stands_there() -> None:
     script = driving("behaviors.move_to_goal.success_radius_m=0.2")
     assert script.request_drive(Goal(0.0, 5.0)).command == near(0.0, script.settings.body.turn_max_rad_s)
     to_goal = script.state.vectors[0]
-    assert to_goal.schema == "move_to_goal"
+    assert to_goal.schema == "follow_valley"
     assert (to_goal.x, to_goal.y) == pytest.approx((0.0, 1.0))
     assert script.move_to(Pose(0.0, 1.0, math.pi / 2)).command == near(0.3, 0.0)
     speeds = []

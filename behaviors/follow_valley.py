@@ -1,0 +1,95 @@
+"""The follow-valley schema: towards the goal through the free valley that VFH+ chooses, its target from a look-ahead.
+
+Each cycle VFH+ answers at once (`behaviors.valley`). What time is left improves its target (`look_ahead`). Behaviours
+hold no state, so the valley is passed in and returned with each call.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from behaviors.response import Response
+from behaviors.valley.choice import apart, candidates, cheapest
+from behaviors.valley.look_ahead import Search, carrot
+from behaviors.valley.polar_histogram import (
+    SECTOR_RAD,
+    SECTORS,
+    blocked_sectors,
+    cells_near,
+    masked_by_turning,
+    room_m,
+)
+from config.behaviors import FollowValleyConfig
+from perception.percept import Percept
+
+SCHEMA: Final = "follow_valley"
+STRAIGHT: Final = 0.5
+"""A target within so many sectors of the goal's direction is the goal: the way is straight."""
+
+
+@dataclass(frozen=True, slots=True)
+class Valley:
+    """What the schema keeps from one cycle to the next."""
+
+    blocked: str = "0" * SECTORS
+    """The sectors of the odometry's frame, from its x axis counter-clockwise: 1 where something stands in the way."""
+    direction_rad: float | None = None
+    """The direction that was chosen; None if none is free, or before the first choice."""
+
+
+def follow_valley(
+    percept: Percept, to_goal: Response, goal_m: float, before: Valley, search: Search, body_radius_m: float,
+    config: FollowValleyConfig,
+) -> tuple[Response, Valley]:  # fmt: skip
+    """Return the schema's vector, of length zero if no direction is free, and the valley for the next call.
+
+    Parameters
+    ----------
+    percept : Percept
+        Pose, evidence grid and fresh echoes.
+    to_goal : Response
+        The vector of move-to-goal: its length is kept, its direction replaced.
+    goal_m : float
+        Distance of the goal, m.
+    before : Valley
+        From the call before; ``Valley()`` at first.
+    search : Search
+        The look-ahead, whose way the target is on; without one it is the goal.
+    body_radius_m : float
+        Radius of the robot, m.
+    config : FollowValleyConfig
+        The schema's settings.
+    """
+    length = config.follow_valley_gain * math.hypot(to_goal.x, to_goal.y)
+    pose = percept.pose
+    if not (math.isfinite(length) and math.isfinite(pose.theta)) or length == 0.0:
+        return Response(SCHEMA, to_goal.x, to_goal.y), before
+    target_rad, target_m = math.atan2(to_goal.y, to_goal.x), goal_m
+    if (ahead := carrot(search, pose.x, pose.y, config.carrot_m)) is not None:
+        dx, dy = ahead[0] - pose.x, ahead[1] - pose.y
+        bearing = math.atan2(dy, dx)
+        if apart(bearing / SECTOR_RAD, target_rad / SECTOR_RAD) > STRAIGHT:
+            target_rad, target_m = bearing, math.hypot(dx, dy)
+    room_max_m, comfort_m = body_radius_m + config.safety_m, body_radius_m + config.comfort_m
+    cells = cells_near(percept, pose.x, pose.y, config.free_m + max(room_max_m, comfort_m), config)
+    radius_m = room_m(cells, body_radius_m, room_max_m)
+    flags = before.blocked.encode("ascii").translate(_FLAGS)
+    blocked, near = blocked_sectors(cells, flags, radius_m, max(radius_m, comfort_m), max(target_m, radius_m), config)
+    kept = blocked
+    if config.turning_radius_m > 0.0:
+        kept = blocked | masked_by_turning(cells, pose.theta, radius_m, config.turning_radius_m)
+    target = target_rad / SECTOR_RAD
+    last = None if before.direction_rad is None else before.direction_rad / SECTOR_RAD
+    found = candidates(kept.tobytes(), target, math.radians(config.wide_valley_deg) / SECTOR_RAD)
+    chosen = cheapest(found, target, pose.theta / SECTOR_RAD, last, near.tobytes(), config)
+    shown = blocked.tobytes().translate(_DIGITS).decode("ascii")
+    if chosen is None:
+        return Response(SCHEMA, 0.0, 0.0), Valley(shown, None)
+    direction = chosen * SECTOR_RAD
+    return Response(SCHEMA, length * math.cos(direction), length * math.sin(direction)), Valley(shown, direction)
+
+
+_DIGITS: Final = bytes.maketrans(b"\0\1", b"01")
+_FLAGS: Final = bytes.maketrans(b"01", b"\0\1")

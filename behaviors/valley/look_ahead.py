@@ -1,0 +1,204 @@
+r"""VFH*: a search over projected places, which finds the way that VFH+ alone would have to try.
+
+After Ulrich & Borenstein, *VFH\*: Local Obstacle Avoidance with Look-Ahead Verification*, ICRA 2000. Each candidate
+of VFH+ is driven a step ahead in the evidence grid, and its candidates follow from there; A* picks what is continued.
+In place of weighted sectors and a fixed number of steps, costs are metres and the search ends at the goal, or where
+the grid ends: what is unknown is free. A place that the search has passed is not passed again.
+
+One call expands one place: a quantum. The search in progress is a value that is passed in and returned; until it
+ends, the way found before stays in force.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from heapq import heappop, heappush
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from behaviors.valley.choice import apart, candidates
+from behaviors.valley.polar_histogram import (
+    SECTOR_RAD,
+    SECTORS,
+    cells_near,
+    crossed,
+    room_m,
+)
+from config.behaviors import FollowValleyConfig
+from perception.percept import OccupancyWindow, Percept
+
+Place: TypeAlias = tuple[float, float]
+
+SQUARES_M: Final = 0.5
+"""Places in one square of this share of a step are the same place."""
+AWAY_M: Final = 1.0
+"""A robot farther than this from its way needs another one, m."""
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A projected place: m, in odometry's frame."""
+
+    x: float
+    y: float
+    direction: float
+    """In which it was reached, in sectors."""
+    cost_m: float
+    """Of the way to it."""
+    parent: int
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """A look-ahead in progress, and the way that the last one found."""
+
+    goal: Place | None = None
+    """None before the first search."""
+    nodes: tuple[Node, ...] = ()
+    waiting: tuple[tuple[float, int], ...] = ()
+    """A heap of estimated costs of the whole way, m, and numbers of nodes."""
+    passed: tuple[tuple[int, int], ...] = ()
+    """Squares that are expanded."""
+    way: tuple[Place, ...] = ()
+    """The way in force, from where its search began; empty without one."""
+    reaches: bool = True
+    """Whether that way leads to the goal; otherwise to the place nearest to it that can be reached."""
+
+    @property
+    def is_done(self) -> bool:
+        """Whether the search has ended."""
+        return not self.waiting
+
+
+def begin(search: Search, percept: Percept, goal: Place) -> Search:
+    """Return a search that starts anew from where the robot is; the way in force stays.
+
+    Parameters
+    ----------
+    search : Search
+        The last one.
+    percept : Percept
+        Only the pose is used.
+    goal : tuple of float
+        In odometry's frame, m.
+    """
+    pose = percept.pose
+    root = Node(pose.x, pose.y, pose.theta / SECTOR_RAD, 0.0, -1)
+    return Search(goal, (root,), ((math.dist((pose.x, pose.y), goal), 0),), (), search.way, search.reaches)
+
+
+def expand(search: Search, percept: Percept, body_radius_m: float, config: FollowValleyConfig) -> Search:
+    """Return the search after one quantum: the most promising place is expanded, or the search ends.
+
+    Parameters
+    ----------
+    search : Search
+        From `begin`, not done.
+    percept : Percept
+        Evidence grid and fresh echoes of this cycle.
+    body_radius_m : float
+        Radius of the robot, m.
+    config : FollowValleyConfig
+        The schema's settings.
+    """
+    heap, goal, step_m = list(search.waiting), search.goal or (0.0, 0.0), config.look_ahead_step_m
+    while heap:
+        number = heappop(heap)[1]
+        node = search.nodes[number]
+        square = (math.floor(node.x / (SQUARES_M * step_m)), math.floor(node.y / (SQUARES_M * step_m)))
+        if square in search.passed:
+            continue
+        distance = math.dist((node.x, node.y), goal)
+        if distance < 1e-9 or _is_beyond(percept.occupancy, node, search.nodes[0]):
+            return _ended(search, number, reaches=True)
+        nodes = [*search.nodes]
+        for child in _children(node, number, distance, goal, percept, body_radius_m, config, is_root=number == 0):
+            heappush(heap, (child.cost_m + math.dist((child.x, child.y), goal), len(nodes)))
+            nodes.append(child)
+        if len(nodes) > config.look_ahead_nodes_max:
+            break
+        return replace(search, nodes=tuple(nodes), waiting=tuple(heap), passed=(*search.passed, square))
+    nearest = min(range(len(search.nodes)), key=lambda k: math.dist((search.nodes[k].x, search.nodes[k].y), goal))
+    return _ended(search, nearest, reaches=False)
+
+
+def _children(
+    node: Node, number: int, distance: float, goal: Place, percept: Percept, body_radius_m: float,
+    config: FollowValleyConfig, *, is_root: bool,
+) -> list[Node]:  # fmt: skip
+    """Return the places a step ahead of one in the directions of its candidates."""
+    room_max_m = body_radius_m + config.safety_m
+    step_m = min(config.look_ahead_step_m, distance)
+    comfort_m = body_radius_m + config.comfort_m
+    cells = cells_near(percept, node.x, node.y, step_m + comfort_m, config)
+    radius_m = room_m(cells, body_radius_m, room_max_m) if is_root else room_max_m
+    blocked, near = map(bytes, crossed(cells, np.array([radius_m, max(radius_m, comfort_m)]), np.full(2, step_m)))
+    target = math.atan2(goal[1] - node.y, goal[0] - node.x) / SECTOR_RAD
+    found = []
+    for c in candidates(blocked, target, math.radians(config.wide_valley_deg) / SECTOR_RAD):
+        turned_rad = apart(c, node.direction) * SECTOR_RAD
+        cost_m = step_m * (1.0 + (config.near_share if near[round(c) % SECTORS] else 0.0))
+        cost_m += config.turn_cost_m_per_rad * turned_rad
+        angle = c * SECTOR_RAD
+        x, y = node.x + step_m * math.cos(angle), node.y + step_m * math.sin(angle)
+        if c == target and step_m == distance:
+            x, y = goal
+        found.append(Node(x, y, c, node.cost_m + cost_m, number))
+    return found
+
+
+def _is_beyond(window: OccupancyWindow | None, node: Node, root: Node) -> bool:
+    """Return whether a place lies where nothing is known, so that the way to it is as good as any to the goal."""
+    if window is None:
+        return math.dist((node.x, node.y), (root.x, root.y)) > AWAY_M
+    rows, columns = window.occupied.shape
+    return not (
+        0.0 <= node.x - window.x_m < columns * window.cell_m and 0.0 <= node.y - window.y_m < rows * window.cell_m
+    )
+
+
+def _ended(search: Search, number: int, *, reaches: bool) -> Search:
+    way: list[Place] = []
+    while number >= 0:
+        node = search.nodes[number]
+        way.append((node.x, node.y))
+        number = node.parent
+    return Search(search.goal, way=tuple(reversed(way)), reaches=reaches)
+
+
+def carrot(search: Search, x: float, y: float, ahead_m: float) -> Place | None:
+    """Return the place some way ahead on the way in force; None without a way, or far from it.
+
+    Parameters
+    ----------
+    search : Search
+        The search.
+    x, y : float
+        Where the robot is, in odometry's frame, m.
+    ahead_m : float
+        How far ahead, along the way from the point of it that is nearest to the robot, m.
+    """
+    nearest, leg, rest_m = AWAY_M, -1, 0.0
+    way = search.way
+    for k in range(len(way) - 1):
+        (ax, ay), (bx, by) = way[k], way[k + 1]
+        ux, uy = bx - ax, by - ay
+        length = math.hypot(ux, uy)
+        if length == 0.0:
+            continue
+        share = min(1.0, max(0.0, ((x - ax) * ux + (y - ay) * uy) / (length * length)))
+        away = math.hypot(ax + share * ux - x, ay + share * uy - y)
+        if away <= nearest:
+            nearest, leg, rest_m = away, k, (1.0 - share) * length
+    if leg < 0:
+        return None
+    while ahead_m > rest_m and leg + 2 < len(way):
+        ahead_m -= rest_m
+        leg += 1
+        rest_m = math.dist(way[leg], way[leg + 1])
+    (ax, ay), (bx, by) = way[leg], way[leg + 1]
+    length = math.hypot(bx - ax, by - ay)
+    back = max(0.0, rest_m - ahead_m) / length if length > 0.0 else 0.0
+    return bx - back * (bx - ax), by - back * (by - ay)

@@ -1,0 +1,202 @@
+"""The binary polar histogram of VFH+: the directions in which something stands in the way.
+
+After Ulrich & Borenstein, *VFH+: Reliable Obstacle Avoidance for Fast Mobile Robots*, ICRA 1998, in units: a cell's
+magnitude is its certainty over its distance, so that both thresholds are distances at which a sure cell blocks. The
+magnitudes of a sector are not summed, as the grid spreads one echo over the many cells of its arc.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.behaviors import FollowValleyConfig
+from perception.percept import Floats, Percept
+
+SECTORS: Final = 72
+"""Sectors of 5°, numbered counter-clockwise; the first has its middle along the x axis of odometry."""
+SECTOR_RAD: Final = math.tau / SECTORS
+FIRM_M: Final = 0.02
+"""The robot asks for this much less room than it has where it stands, m: what is beside it does not hold it."""
+
+LINE: Final = 2 * SECTORS + 2
+"""Places on a line twice round, on which runs of sectors are laid out."""
+
+Sectors: TypeAlias = NDArray[np.bool_]
+"""A flag for each sector, shape (SECTORS,) or, of several discs, (n, SECTORS)."""
+ALL_FREE: Final = bytes(SECTORS)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells:
+    """What may stand in the way near a place.
+
+    Attributes
+    ----------
+    dx, dy : (k,) float
+        From the place to each occupied cell or fresh echo, m.
+    distances : (k,) float
+        Their lengths, m.
+    certainties : (k,) float
+        Above 0, and 1 for a sure cell and for an echo.
+    """
+
+    dx: Floats
+    dy: Floats
+    distances: Floats
+    certainties: Floats
+
+
+def cells_near(percept: Percept, x: float, y: float, reach_m: float, config: FollowValleyConfig) -> Cells:
+    """Return the cells and fresh echoes within a distance of a place.
+
+    Parameters
+    ----------
+    percept : Percept
+        Its evidence grid and its echoes.
+    x, y : float
+        The place in odometry's frame, m.
+    reach_m : float
+        The distance, m.
+    config : FollowValleyConfig
+        From which probability on a cell counts, and from which it is sure.
+    """
+    dx, dy = percept.obstacles[:, 0] - x, percept.obstacles[:, 1] - y
+    certainties = np.ones(len(dx))
+    window = percept.occupancy
+    if window is not None:
+        rows, columns = window.occupied.shape
+        left, low = (x - window.x_m) / window.cell_m, (y - window.y_m) / window.cell_m
+        reach = reach_m / window.cell_m
+        column, row = max(0, int(left - reach)), max(0, int(low - reach))
+        part = window.occupied[
+            row : max(row, min(rows, int(low + reach) + 1)), column : max(column, min(columns, int(left + reach) + 1))
+        ]
+        at_row, at_column = np.nonzero(part > config.occupied_probability)
+        span = config.sure_probability - config.occupied_probability
+        sure = (part[at_row, at_column].astype(np.float64) - config.occupied_probability) / span
+        certainties = np.concatenate([np.minimum(sure, 1.0), certainties])
+        dx = np.concatenate([(at_column + (column + 0.5 - left)) * window.cell_m, dx])
+        dy = np.concatenate([(at_row + (row + 0.5 - low)) * window.cell_m, dy])
+    distances = np.hypot(dx, dy)
+    near = distances < reach_m
+    return Cells(dx[near], dy[near], distances[near], certainties[near])
+
+
+def room_m(cells: Cells, body_radius_m: float, room_max_m: float) -> float:
+    """Return the radius of the disc that is driven along a direction: the wanted one, or what there is room for.
+
+    Parameters
+    ----------
+    cells : Cells
+        Around the robot.
+    body_radius_m, room_max_m : float
+        The least and the wanted radius, m.
+    """
+    nearest = float(cells.distances.min(initial=math.inf)) - FIRM_M
+    return min(room_max_m, max(body_radius_m, nearest))
+
+
+def crossed(cells: Cells, radii_m: Floats, ways_m: Floats, shares: Floats | None = None) -> Sectors:
+    """Return the sectors along whose middle a disc cannot drive some way without touching a cell.
+
+    Several discs at once cost hardly more than one.
+
+    Parameters
+    ----------
+    cells : Cells
+        The cells.
+    radii_m : (n,) float
+        Of the discs, m.
+    ways_m : (n,) float
+        Their ways, m. A cell beside a way's end blocks fewer directions than one that is passed.
+    shares : (k,) float, optional
+        What share of the ways each cell blocks; 1 if not given.
+
+    Returns
+    -------
+    Sectors
+        Shape (n, SECTORS).
+    """
+    discs = len(radii_m)
+    if len(cells.distances) == 0:
+        return np.zeros((discs, SECTORS), dtype=np.bool_)
+    radii, ways = radii_m[:, None], ways_m[:, None]
+    d = np.maximum(cells.distances, radii + 1e-9)
+    squares, reaches = d * d, radii * radii
+    is_beyond = squares > ways * ways + reaches
+    # Passed on the way: asin(R/d), the enlargement of VFH+. Beside its end: the law of cosines; beyond it: none.
+    cosines = (squares + (ways * ways - reaches)) / (2.0 * ways * d)
+    half = np.where(is_beyond, np.arccos(np.minimum(cosines, 1.0)), np.arcsin(radii / d))
+    half *= 1.0 / SECTOR_RAD
+    middle = np.arctan2(cells.dy, cells.dx) / SECTOR_RAD
+    first, last = np.ceil(middle - half).astype(np.int64), np.floor(middle + half).astype(np.int64)
+    reached = (last >= first) & ~(is_beyond & (cosines > 1.0))
+    if shares is not None:
+        reached &= cells.distances < radii + ways * shares
+    # Each run adds 1 where it begins and takes it away behind its end, on a line twice round for each disc.
+    rows = (np.arange(discs) * LINE + SECTORS)[:, None]
+    begins = np.bincount((first + rows)[reached], minlength=discs * LINE)
+    ends = np.bincount((last + rows)[reached] + 1, minlength=discs * LINE)
+    counts = (begins - ends).cumsum().reshape(discs, LINE)
+    covered: Sectors = (counts[:, :SECTORS] > 0) | (counts[:, SECTORS : 2 * SECTORS] > 0)
+    covered[:, 0] |= counts[:, 2 * SECTORS] > 0
+    return covered
+
+
+def masked_by_turning(cells: Cells, heading_rad: float, radius_m: float, turning_radius_m: float) -> Sectors:
+    """Return the sectors to which the robot cannot turn, because a cell stands in its turning circle.
+
+    Parameters
+    ----------
+    cells : Cells
+        Around the robot.
+    heading_rad : float
+        The drive heading, rad.
+    radius_m : float
+        Of the robot and its safety, m.
+    turning_radius_m : float
+        Of the least circle that it drives, m; above 0.
+    """
+    c, s = math.cos(heading_rad), math.sin(heading_rad)
+    ahead, left = c * cells.dx + s * cells.dy, c * cells.dy - s * cells.dx
+    bearing = np.arctan2(left, ahead)
+    reach = (turning_radius_m + radius_m) ** 2
+    on_left = (ahead**2 + (left - turning_radius_m) ** 2 < reach) & (bearing >= 0.0)
+    on_right = (ahead**2 + (left + turning_radius_m) ** 2 < reach) & (bearing <= 0.0)
+    left_limit = float(bearing[on_left].min(initial=math.pi))
+    right_limit = float(bearing[on_right].max(initial=-math.pi))
+    offsets = (np.arange(SECTORS) * SECTOR_RAD - heading_rad + math.pi) % math.tau - math.pi
+    masked: Sectors = (offsets > left_limit) | (offsets < right_limit)
+    return masked
+
+
+def blocked_sectors(
+    cells: Cells, before: bytes, radius_m: float, comfort_m: float, target_m: float, config: FollowValleyConfig
+) -> tuple[Sectors, Sectors]:
+    """Return the blocked sectors, and those that pass something near.
+
+    A sector is blocked if the disc cannot drive one way, or was blocked and the disc cannot drive a longer way.
+
+    Parameters
+    ----------
+    cells : Cells
+        Around the robot, at least as far as it looks.
+    before : bytes
+        The blocked sectors before, a byte each.
+    radius_m, comfort_m : float
+        Of the disc that is driven, and of the one for which there is room where nothing is near, m.
+    target_m : float
+        What lies farther than the target does not block, m.
+    config : FollowValleyConfig
+        The two ways for a sure cell; an uncertain one blocks a part of them.
+    """
+    block_m = min(config.block_m, target_m)
+    radii = np.array([radius_m, radius_m, comfort_m])
+    ways = np.array([block_m, min(config.free_m, target_m), block_m])
+    blocks, keeps, near = crossed(cells, radii, ways, cells.certainties)
+    return blocks | (keeps & np.frombuffer(before, dtype=np.bool_)), near

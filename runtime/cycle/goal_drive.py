@@ -1,0 +1,131 @@
+"""A drive to a goal: its valley, its look-ahead and its progress, from one cycle to the next."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from behaviors.arbiter import Decision, Drive, arbitrate
+from behaviors.avoid_static_obstacle import SCHEMA as AVOID
+from behaviors.avoid_static_obstacle import avoid_static_obstacle
+from behaviors.follow_valley import SCHEMA as FOLLOW_VALLEY
+from behaviors.follow_valley import Valley, follow_valley
+from behaviors.goal_progress import Progress, observe_progress
+from behaviors.move_to_goal import SCHEMA as TO_GOAL
+from behaviors.move_to_goal import Goal, move_to_goal
+from behaviors.response import Response
+from behaviors.valley.look_ahead import Search, begin, expand
+from behaviors.valley.polar_histogram import cells_near
+from config.behaviors import AvoidStaticObstacleConfig, BehaviorsConfig
+from config.settings import Settings
+from perception.percept import Percept
+from runtime.cycle.drive_requests import STANDSTILL
+
+MOVED_M: Final = 0.1
+"""A goal whose place is corrected by more than this needs another way, m."""
+FAINT_M: Final = 0.01
+"""Least depth of the zone in which avoid-static-obstacle pushes with a bound, m."""
+NO_VALLEY: Final = "obstacles on all sides: no direction is free"
+
+
+@dataclass(frozen=True, slots=True)
+class GoalDrive:
+    """What a drive to a goal keeps from one cycle to the next."""
+
+    progress: Progress
+    valley: Valley = field(default_factory=Valley)
+    search: Search = field(default_factory=Search)
+    searched_run_s: float | None = None
+    """When the look-ahead began, by the run's clock."""
+
+
+def drive_to_goal(
+    goal: Goal, before: GoalDrive | None, percept: Percept, run_s: float, away: Response, settings: Settings
+) -> tuple[Goal, GoalDrive, tuple[Response, ...], Decision, str | None]:
+    """Return the goal and the drive for the next cycle, the responses, the decision, and why the robot holds.
+
+    Parameters
+    ----------
+    goal : Goal
+        In odometry's frame.
+    before : GoalDrive or None
+        From the cycle before; None in the first one.
+    percept : Percept
+        What the robot sees.
+    run_s : float
+        Now, by the run's clock, s.
+    away : Response
+        Of avoid-static-obstacle.
+    settings : Settings
+        The run's.
+    """
+    behaviors, body = settings.behaviors, settings.body
+    distance_m = math.hypot(goal.x - percept.pose.x, goal.y - percept.pose.y)
+    now = GoalDrive(Progress.starting_at(percept.pose, distance_m, run_s)) if before is None else before
+    response, goal = move_to_goal(percept, goal, behaviors.move_to_goal)
+    expected, hold_reason = TO_GOAL, None
+    if behaviors.follow_valley.follow_valley_gain > 0.0 and not goal.reached:
+        now = _with_search(now, goal, percept, run_s, settings)
+        response, valley = follow_valley(
+            percept, response, distance_m, now.valley, now.search, body.radius_m, behaviors.follow_valley
+        )
+        now, expected = replace(now, valley=valley), FOLLOW_VALLEY
+        hold_reason = NO_VALLEY if valley.direction_rad is None else None
+        away = avoid_static_obstacle(percept, body.radius_m, _underneath(behaviors))
+    responses = (response, away)
+    decision = arbitrate(responses, percept, body, behaviors.arbiter, (expected, AVOID))
+    if isinstance(decision, Drive) and not goal.reached:
+        progress = observe_progress(
+            now.progress, percept.pose, distance_m, run_s, hold_reason, behaviors.move_to_goal,
+            is_blocked=not now.search.reaches, is_occupied=_is_occupied(percept, goal, settings),
+        )  # fmt: skip
+        now = replace(now, progress=progress)
+        if progress.given_up is not None:
+            return goal, now, responses, Drive(STANDSTILL), progress.given_up
+    return goal, now, responses, decision, hold_reason
+
+
+def _is_occupied(percept: Percept, goal: Goal, settings: Settings) -> bool:
+    """Return whether something sure stands where the robot would stand at the goal."""
+    config, body = settings.behaviors.follow_valley, settings.body
+    return bool((cells_near(percept, goal.x, goal.y, body.radius_m, config).certainties == 1.0).any())
+
+
+def _underneath(behaviors: BehaviorsConfig) -> AvoidStaticObstacleConfig:
+    """Return avoid-static-obstacle's settings beside follow-valley, which keeps the distance itself.
+
+    It pushes the robot out of the room that follow-valley wants, and out of the arbiter's clearance without bound.
+    """
+    margin_m = behaviors.arbiter.clearance_m
+    sphere_m = max(behaviors.follow_valley.safety_m, margin_m + FAINT_M)
+    return behaviors.avoid_static_obstacle.model_copy(
+        update={"avoid_obstacle_sphere_m": sphere_m, "avoid_obstacle_safety_margin_m": margin_m}
+    )
+
+
+def _with_search(now: GoalDrive, goal: Goal, percept: Percept, run_s: float, settings: Settings) -> GoalDrive:
+    """Return the drive with a look-ahead that has just started, where one is due."""
+    config, search, place = settings.behaviors.follow_valley, now.search, (goal.x, goal.y)
+    if not all(map(math.isfinite, (percept.pose.x, percept.pose.y, percept.pose.theta, *place))):
+        return now
+    if config.look_ahead_nodes_max == 0:
+        return now
+    if search.goal is not None and math.dist(search.goal, place) > MOVED_M:
+        return replace(now, search=begin(search, percept, place), searched_run_s=run_s)
+    age_s = math.inf if now.searched_run_s is None else run_s - now.searched_run_s
+    if search.is_done and age_s >= config.look_ahead_period_s:
+        return replace(now, search=begin(search, percept, place), searched_run_s=run_s)
+    return now
+
+
+def can_look_ahead(now: GoalDrive | None, percept: Percept | None) -> bool:
+    """Return whether a quantum of the look-ahead would find anything."""
+    return now is not None and percept is not None and not now.search.is_done and now.progress.given_up is None
+
+
+def look_ahead(now: GoalDrive | None, percept: Percept | None, settings: Settings) -> GoalDrive | None:
+    """Return the drive after a quantum of its look-ahead, if there is one."""
+    if now is None or percept is None:
+        return now
+    return replace(now, search=expand(now.search, percept, settings.body.radius_m, settings.behaviors.follow_valley))

@@ -1,0 +1,128 @@
+"""A drive to a goal over its cycles: quanta of the look-ahead, what is kept and recorded, and when it is given up."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from behaviors.move_to_goal import Goal
+from drivers.messages import Pose
+from runtime.cycle.drive_requests import Legs
+from runtime.cycle.goal_drive import GoalDrive
+from runtime.cycle.step import STANDSTILL
+from runtime.recording.channels import decode, encode
+from runtime.recording.schema import Keyframe, carried_state, keyframe, state_fields
+from tests.runtime.cycle.requested_robot import RequestedRobot, driving, hold_reason
+
+FAR = Goal(5.5, 0.0)
+
+
+def goal_drive(script: RequestedRobot) -> GoalDrive:
+    assert script.state.goal_drive is not None
+    return script.state.goal_drive
+
+
+def test_vfh_plus_answers_at_once_and_the_look_ahead_follows_quantum_by_quantum() -> None:
+    script = driving()
+    script.quanta = 3
+    record = script.request_drive(FAR)
+    assert next(entry[0] for entry in script.log if isinstance(entry, tuple)) == "command", "before any quantum"
+    assert record.quanta == 3
+    found = []
+    while not goal_drive(script).search.is_done:
+        found.append(len(goal_drive(script).search.nodes))
+        script.request_drive(None)
+    assert all(earlier < later for earlier, later in pairwise(found))
+    assert goal_drive(script).search.way
+    assert goal_drive(script).search.reaches
+
+
+def test_without_a_look_ahead_it_is_vfh_plus_and_without_a_gain_move_to_goal() -> None:
+    script = driving("behaviors.follow_valley.look_ahead_nodes_max=0")
+    script.request_drive(FAR)
+    assert (script.state.vectors[0].schema, goal_drive(script).search.nodes) == ("follow_valley", ())
+    script = driving("behaviors.follow_valley.follow_valley_gain=0.0")
+    script.request_drive(FAR)
+    assert (script.state.vectors[0].schema, goal_drive(script).search.nodes) == ("move_to_goal", ())
+
+
+def test_a_robot_that_does_not_come_on_gives_up_with_the_reason_and_a_new_request_starts_anew() -> None:
+    for gain in ("0.0", "1.0"):
+        script = driving(
+            "behaviors.move_to_goal.stuck_after_s=2.0", f"behaviors.follow_valley.follow_valley_gain={gain}"
+        )
+        script.request_drive(FAR)
+        for k in range(42):
+            record = script.move_to(Pose(0.2 * (k % 2), 0.0, 0.0))
+        assert record.command == STANDSTILL
+        assert "stuck 5.5 m short of the goal" in hold_reason(script)
+        assert script.move_to(Pose(1.0, 0.0, 0.0)).command == STANDSTILL, "carried on, it does not set out again"
+        assert script.request_drive(FAR).command != STANDSTILL
+        assert hold_reason(script) == ""
+
+
+def test_other_requests_and_stops_forget_the_drive() -> None:
+    script = driving()
+    script.request_drive(FAR)
+    script.request_drive(Legs())
+    assert script.state.goal_drive is None
+    script.request_drive(FAR)
+    script.pose = Pose(math.nan, 0.0, 0.0)
+    script.request_drive(None, firing=False)
+    assert script.state.goal_drive is None
+
+
+def test_a_keyframe_in_the_middle_of_a_look_ahead_goes_on_to_the_bit() -> None:
+    script = driving()
+    script.quanta = 2
+    script.request_drive(FAR)
+    frame = decode(Keyframe, encode(keyframe(7, 0.35, carried_state(script.state), {})))
+    found = state_fields(frame)
+    assert repr(found["goal_drive"]) == repr(goal_drive(script))
+    assert not goal_drive(script).search.is_done
+    other = copy.deepcopy(script)
+    other.state.goal_drive = found["goal_drive"]
+    for _ in range(20):
+        assert repr(script.request_drive(None)) == repr(other.request_drive(None))
+    assert repr(script.state.goal_drive) == repr(other.state.goal_drive)
+
+
+@pytest.mark.promise("P21")
+@pytest.mark.parametrize(
+    ("path", "poison"),
+    [
+        (("search", "nodes", 1, "x"), 1e308), (("search", "nodes", 1, "parent"), 5),
+        (("search", "waiting", 0, 1), 99),
+        (("search", "nodes", 0, "parent"), -2), (("search", "goal", 0), "NaN"), (("valley", "blocked"), "01"),
+        (("valley", "direction_rad"), "Infinity"), (("progress", "nearest_m"), "NaN"), (("searched_run_s",), 1e308),
+        (("search", "passed", 0, 0), 10**30), (("progress", "moved_run_s"), "-Infinity"),
+    ],
+)  # fmt: skip
+def test_an_impossible_drive_in_a_keyframe_is_refused(path: tuple[Any, ...], poison: object) -> None:
+    script = driving()
+    script.quanta = 2
+    script.request_drive(FAR)
+    tree = json.loads(encode(keyframe(7, 0.35, carried_state(script.state), {})))
+    at = tree["state"]["goal_drive"]
+    for key in path[:-1]:
+        at = at[key]
+    at[path[-1]] = poison
+    with pytest.raises(ValidationError):
+        decode(Keyframe, json.dumps(tree).encode())
+
+
+def test_a_goal_that_is_corrected_gets_another_way() -> None:
+    script = driving()
+    script.request_drive(FAR)
+    first = goal_drive(script)
+    assert first.search.is_done
+    script.state.drive_request = replace(FAR, y=1.0)
+    script.request_drive(None)
+    assert goal_drive(script).search.goal == (5.5, 1.0)
