@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import ast
+import contextlib
+import io
+import json
 import re
 from pathlib import Path
 
 import pytest
+
+from config.reference import markdown
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
@@ -46,3 +51,20 @@ def test_the_walk_names_functions_that_exist() -> None:
         assert named, module
         unknown = set(named) - definitions(ROOT / module)
         assert not unknown, f"{module} does not define {sorted(unknown)}"
+
+
+def test_the_page_of_settings_is_that_of_the_models() -> None:
+    """Renew it with `echolocate settings --out docs/settings.md --force`."""
+    assert (ROOT / "docs" / "settings.md").read_text("utf-8") == markdown()
+
+
+@pytest.mark.compiled
+def test_the_notebook_prints_what_it_shows(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    names: dict[str, object] = {}
+    for cell in json.loads((ROOT / "docs" / "library.ipynb").read_text("utf-8"))["cells"]:
+        if cell["cell_type"] == "code":
+            with contextlib.redirect_stdout(io.StringIO()) as printed:
+                exec("".join(cell["source"]), names)
+            shown = ("".join(output["text"]) for output in cell["outputs"])
+            assert printed.getvalue() == "".join(shown)

@@ -18,7 +18,7 @@ from runtime.cli.board_commands import firmware, probe_command, ring_test_comman
 from runtime.cli.experiment_commands import experiment
 from runtime.cli.first_signals import EXIT_CODE_BASE
 from runtime.cli.recording_commands import calibrate, export, figures, map_command, recover, replay, report
-from runtime.cli.robot_commands import check, emulate, run, service
+from runtime.cli.robot_commands import check, emulate, run, service, settings_command
 from runtime.cli.start_signals import ending_in_order
 
 app = App(
@@ -31,7 +31,7 @@ app = App(
     group_parameters=Group("Options"),
 )
 for title, commands in (
-    ("Robot", (run, emulate, check, service)),
+    ("Robot", (run, emulate, check, settings_command, service)),
     ("Recordings", (replay, report, figures, export, map_command, calibrate, recover)),
     ("Simulation", (experiment,)),
     ("A robot of your own", (probe_command, firmware, ring_test_command)),

@@ -1,4 +1,4 @@
-"""The commands that run or describe a robot: `run`, `emulate`, `check`, `service`."""
+"""The commands that run or describe a robot: `run`, `emulate`, `check`, `settings`, `service`."""
 
 from __future__ import annotations
 
@@ -176,3 +176,20 @@ def service(
     from runtime.cli.commands.service import print_service
 
     return print_service(config, sets, port=port, user=user)
+
+
+def settings_command(text: str = "", /, *, out: str | None = None, force: Force = False) -> int:
+    """List the keys of all files with values, defaults and meaning.
+
+    Parameters
+    ----------
+    text
+        List only keys whose name or meaning contains this.
+    out
+        Write the whole list into this file, as Markdown.
+    force
+        Overwrite an existing file.
+    """
+    from runtime.cli.commands.settings import run_settings
+
+    return run_settings(text, out, force=force)

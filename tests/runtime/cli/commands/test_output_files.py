@@ -52,6 +52,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         "--json {0}",
         "--trajectory {1}",
     ),
+    "settings": ("settings", "--out {0}"),
     "recover": ("recover", "my.mcap", "--out {0}"),
     "report": ("report", "my.mcap", "--world my_world.toml", "--out {0}"),
     "report of a ring log": ("report", "my.csv", "--robot my_robot.toml", "--out {0}"),

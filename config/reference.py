@@ -1,0 +1,184 @@
+"""The reference of every key in a file: type, bounds, default and description, derived from the models themselves."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
+
+import annotated_types
+import tomli_w
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from config.model import ModelConfig
+from config.robot import RobotConfig
+from config.settings import Settings
+from config.world import WorldConfig
+
+FILES: Final = (
+    ("run", Settings, "run file, `echolocate run FILE`; the tables of a robot file may stand in it as well"),
+    ("robot", RobotConfig, "robot file, `--robot FILE`"),
+    ("world", WorldConfig, "world file, `--world FILE`, `--map FILE`"),
+    ("model", ModelConfig, "object model, `--model FILE`"),
+)
+"""The kinds of files: name, model, and what each is for."""
+PLAIN: Final = ((bool, "true or false"), (int, "integer"), (float, "number"), (str, "text"))
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One key of a file."""
+
+    file: str
+    """Kind of file."""
+    table: str
+    """The table that holds it, as in ``behaviors.arbiter``; ``[]`` ends the name of a list of tables."""
+    key: str
+    type: str
+    bounds: str
+    default: str
+    """As in TOML; empty if the key is required, ``not set`` if nothing stands for it."""
+    help: str
+
+    @property
+    def path(self) -> str:
+        """The whole name, as after ``--set``."""
+        return f"{self.table}.{self.key}" if self.table else self.key
+
+
+def settings_of(file: str) -> Iterator[Setting]:
+    """Return every key of one kind of file, table by table.
+
+    Parameters
+    ----------
+    file
+        A name of `FILES`.
+    """
+    model = next(model for name, model, _ in FILES if name == file)
+    # A run file names these files, whose keys are listed with them.
+    others = {*RobotConfig.model_fields, "models", "world", "known_room"}
+    yield from _settings(file, model, "", others if model is Settings else set())
+
+
+def table_help(file: str, table: str) -> str:
+    """Return what a table is for: the first paragraph of its model's documentation."""
+    model: type[BaseModel] = next(model for name, model, _ in FILES if name == file)
+    for name in table.removesuffix("[]").split(".") if table else ():
+        model = next(_models(model.model_fields[name.removesuffix("[]")].annotation))
+    if not table:
+        return ""
+    return " ".join((model.__doc__ or "").split("\n\n")[0].split())
+
+
+def _settings(file: str, model: type[BaseModel], table: str, leave_out: set[str]) -> Iterator[Setting]:
+    """Return a table's own keys, then those of the tables in it."""
+    fields = {name: field for name, field in model.model_fields.items() if name not in leave_out}
+    own = {name: field for name, field in fields.items() if next(_models(field.annotation), None) is None}
+    help_text = ""
+    described = {}
+    for name in reversed(own):  # one description after several keys is that of all of them
+        help_text = " ".join((own[name].description or help_text).split())
+        described[name] = help_text
+    for name, field in own.items():
+        yield Setting(
+            file, table, name, type_of(field.annotation), bounds_of(field), default_of(field), described[name]
+        )
+    for name, field in fields.items():
+        for inner in _models(field.annotation):
+            is_list = get_origin(_without_none(field.annotation)[0]) in (tuple, Annotated)
+            inner_table = f"{table}.{name}".lstrip(".") + ("[]" if is_list else "")
+            yield from _settings(file, inner, inner_table, leave_out)
+
+
+def _without_none(annotation: Any) -> tuple[Any, ...]:  # noqa: ANN401 - an annotation can be anything
+    """Return the members of a union but None, or the annotation alone."""
+    options = get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
+    return tuple(option for option in options if option is not type(None))
+
+
+def _models(annotation: Any) -> Iterator[type[BaseModel]]:  # noqa: ANN401 - an annotation can be anything
+    """Return the models within an annotation: one of a table, or of a list of tables."""
+    for option in _without_none(annotation):
+        if isinstance(option, type) and issubclass(option, BaseModel):
+            yield option
+        elif get_origin(option) is Annotated or get_origin(option) is tuple:
+            yield from _models(get_args(option)[0])
+
+
+def type_of(annotation: Any) -> str:  # noqa: ANN401 - an annotation can be anything
+    """Return a type in words: its choices, a plain type, or a list."""
+    options = _without_none(annotation)
+    if len(options) > 1:
+        return " or ".join(type_of(option) for option in options)
+    only = options[0]
+    if get_origin(only) is Annotated:
+        return type_of(get_args(only)[0])
+    if get_origin(only) is Literal:
+        return " or ".join(f'"{choice}"' if isinstance(choice, str) else str(choice) for choice in get_args(only))
+    if get_origin(only) is tuple:
+        inner = [part for part in get_args(only) if part is not ...]
+        if ... in get_args(only):
+            return f"list of {type_of(inner[0])}"
+        return f"list of {len(inner)} × {type_of(inner[0])}"
+    return next((words for plain, words in PLAIN if only is plain), getattr(only, "__name__", str(only)))
+
+
+def bounds_of(field: FieldInfo) -> str:
+    """Return a field's bounds, as in ``> 0, ≤ 100``."""
+    found = []
+    for bound in field.metadata:
+        match bound:
+            case annotated_types.Ge(ge=value):
+                found.append(f"≥ {value:g}")
+            case annotated_types.Gt(gt=value):
+                found.append(f"> {value:g}")
+            case annotated_types.Le(le=value):
+                found.append(f"≤ {value:g}")
+            case annotated_types.Lt(lt=value):
+                found.append(f"< {value:g}")
+            case annotated_types.MinLen(min_length=value):
+                found.append(f"at least {value} long")
+            case annotated_types.MaxLen(max_length=value):
+                found.append(f"at most {value} long")
+    return ", ".join(found)
+
+
+def default_of(field: FieldInfo) -> str:
+    """Return a field's default as in TOML."""
+    if field.is_required():
+        return ""
+    value = field.get_default(call_default_factory=True)
+    if value is None:
+        return "not set"
+    if isinstance(value, tuple):
+        return str(list(value))
+    return tomli_w.dumps({"x": value}).removeprefix("x = ").strip()
+
+
+def markdown() -> str:
+    """Return the reference of all kinds of files as a page."""
+    lines = [
+        "# Settings",
+        "",
+        "Every key of every kind of file; `echolocate settings TEXT` finds one, and `echolocate settings --out FILE`",
+        "writes this page. Lengths are metres, angles radians where the name does not say degrees. Unknown keys are",
+        "errors. A key without a default is required where its table stands.",
+    ]
+    for file, _, purpose in FILES:
+        lines += ["", f"## {file.capitalize()}: {purpose}"]
+        table = None
+        for setting in settings_of(file):
+            if setting.table != table:
+                table = setting.table
+                name = f"[[{table.removesuffix('[]')}]]" if table.endswith("[]") else f"[{table}]"
+                title = f"`{name}`" if table else "Top of the file"
+                lines += ["", f"### {title}", ""]
+                lines += [text, ""] if (text := table_help(file, table)) else []
+                lines += ["| key | value | default | meaning |", "|---|---|---|---|"]
+            value = ", ".join(part for part in (setting.type, setting.bounds) if part)
+            default = f"`{setting.default}`" if setting.default not in {"", "not set"} else setting.default
+            cells = (f"`{setting.key}`", value, default, setting.help)
+            lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,52 @@
+"""`echolocate settings`: every key of every file, found by a text, or written as a page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.padding import Padding
+from rich.text import Text
+
+from config.errors import DONE, FAILED, WRONG_CALL, UserError
+from config.reference import FILES, markdown, settings_of
+from runtime.cli.commands.output_files import check_outputs
+
+
+def run_settings(text: str, out: str | None, *, force: bool) -> int:
+    """Print the keys whose name or description contains a text, or write the page of all of them.
+
+    Parameters
+    ----------
+    text
+        What to look for; all keys if empty.
+    out
+        Markdown file to write instead.
+    force
+        Overwrite that file.
+
+    Raises
+    ------
+    UserError
+        No key contains the text, or the file cannot be written.
+    """
+    if out is not None:
+        check_outputs({"--out": out}, (), force=force)
+        try:
+            Path(out).write_text(markdown(), "utf-8")
+        except OSError as error:
+            raise UserError(f"cannot write {out}: {error.strerror}", FAILED) from error
+        return DONE
+    wanted = text.lower()
+    console, count = Console(), 0
+    for file, _, _ in FILES:
+        for found in settings_of(file):
+            if wanted in found.path.lower() or wanted in found.help.lower():
+                count += 1
+                console.print(Text.assemble((found.path, "bold"), f" = {found.default or '…'}", style="none"))
+                value = ", ".join(part for part in (found.type, found.bounds) if part)
+                console.print(Padding(Text(f"{file} file: {value}", style="dim"), (0, 0, 0, 4), expand=False))
+                console.print(Padding(Text(found.help), (0, 0, 0, 4), expand=False))
+    if not count:
+        raise UserError(f"no setting contains {text!r}: call `echolocate settings` for all of them", WRONG_CALL)
+    return DONE
