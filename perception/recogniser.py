@@ -81,7 +81,7 @@ class Recogniser:
         return self.perception.objects()
 
     def surroundings(self) -> tuple[DetectedObject, ...]:
-        """Return what has a label near the robot: models, walls, corners, edges, posts, unknown things."""
+        """Return what has a label near the robot: models, walls, corners, edges, posts, unknown objects."""
         return self.perception.labelled_objects()
 
     def _check(self, poses: Floats, ranges_m: Floats, times_s: Floats, ring_yaws: Floats) -> None:
