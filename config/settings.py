@@ -142,13 +142,26 @@ class LocalizationConfig(Strict):
         return self
 
 
+class GridConfig(Strict):
+    """`[perception.grid]`: the evidence grid around the robot, for schemas that steer by free space, and for maps."""
+
+    method: Literal["off", "directed", "moravec_elfes", "elfes"] = "off"
+    """How cells are updated: `directed` keeps evidence apart for eight looking directions, `moravec_elfes` is the
+    method of 1985 and `elfes` that of 1989; `off` keeps no grid."""
+    cell_m: float = Field(default=0.1, ge=0.02, le=1.0)
+    """Side of a cell, m."""
+    cells: Literal[32, 64, 128, 256, 512, 1024] = 128
+    """Cells along each side of the window, which moves with the robot."""
+
+
 class PerceptionConfig(Strict):
-    """Perception: the method and its settings; the sections after `localization` are the paper's steps."""
+    """Perception: the method and its settings; the sections after `grid` are the paper's steps."""
 
     method: Literal["paper", "bayes"] = "bayes"
     """How objects are recognised: `paper` as Santamaría & Arkin do, `bayes` by comparing raw ranges."""
     bayes: BayesConfig = BayesConfig()
     localization: LocalizationConfig = LocalizationConfig()
+    grid: GridConfig = GridConfig()
 
     segments: SegmentsConfig = SegmentsConfig()
     map: MapConfig = MapConfig()

@@ -8,18 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Protocol
 
 from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import PerceptionConfig
 from drivers.messages import Firing, Pose
-from perception.bayes.bayes_method import BayesPerception
 from perception.detected_object import DetectedObject, MapCounts
 from perception.edits import (
     Edit,
     Evidence,
-    MapEdit,
     MoveObject,
     PlaceModel,
     PlaceRobot,
@@ -33,110 +30,15 @@ from perception.localization.drift_correction import LocalizedPose
 from perception.localization.known_room import KnownRoom
 from perception.localization.map_frame import MapFrame
 from perception.localization.room import room_of
-from perception.paper.paper_method import PaperPerception
-from perception.percept import FieldOfView
+from perception.mapping.grid.evidence_grid import EvidenceGrid
+from perception.method import Method, make_method
+from perception.percept import FieldOfView, OccupancyWindow
 from perception.sensor_monitor import SensorMonitor
 from perception.sensor_mounts import mounts_array, reach_m
 from perception.sensor_report import SensorReport
 from perception.snapshot import Snapshot, put_back, snapshot_of
 
 __all__ = ["DetectedObject", "Method", "Perception", "make_method"]
-
-
-class Method(Protocol):
-    """A method of recognising objects."""
-
-    @property
-    def can_refine(self) -> bool:
-        """Whether `refine` has anything to improve now."""
-        ...
-
-    @property
-    def converged(self) -> bool:
-        """Whether nothing is left to improve, now or with the next firing."""
-        ...
-
-    @property
-    def counts(self) -> MapCounts:
-        """The numbers of segments and hypotheses."""
-        ...
-
-    def observe(self, firing: Firing) -> int:
-        """Enter one firing and return how many outline segments it completed."""
-        ...
-
-    def refine(self) -> int:
-        """Do one quantum of refinement and return its iterations, zero if nothing is left to improve."""
-        ...
-
-    def objects(self) -> tuple[DetectedObject, ...]:
-        """Return the models recognised so far: those near the robot, best first, then those left behind."""
-        ...
-
-    def near_objects(self) -> tuple[DetectedObject, ...]:
-        """Return the models recognised near the robot, best first; the cost does not depend on the map's size."""
-        ...
-
-    def labelled_objects(self) -> tuple[DetectedObject, ...]:
-        """Return the models recognised near the robot and everything else there that has a label."""
-        ...
-
-    def archived_objects(self) -> tuple[DetectedObject, ...]:
-        """Return what has a label and was left behind; the same tuple until it changes."""
-        ...
-
-    def segment_geometry(self) -> Floats:
-        """Return a copy of the outline segments: end points x1, y1, x2, y2 (m) and normal (rad), shape (n, 5)."""
-        ...
-
-    def segments(self) -> Segments:
-        """Return the outline segments with their numbers, times and pins."""
-        ...
-
-    def edit(self, edit: MapEdit) -> str | None:
-        """Apply an operator's edit; return None, or why it cannot be applied."""
-        ...
-
-    def evidence(self, number: int) -> Evidence | None:
-        """Return the evidence for an object, None if no object has this number; changes nothing."""
-        ...
-
-    def shift_object(self, number: int, dx: float, dy: float) -> None:
-        """Move an object and what is kept for it by a vector (m), after its place in the map was corrected."""
-        ...
-
-    def reset(self) -> None:
-        """Start again with an empty map, as after a reset of the odometry."""
-        ...
-
-    def apply_settings(self, config: PerceptionConfig) -> None:
-        """Use other settings, of those that a running process may change (`config.reload.LIVE_SETTINGS`)."""
-        ...
-
-    def set_models(self, models: Sequence[ModelConfig]) -> None:
-        """Recognise further models, which follow the present ones in `models`."""
-        ...
-
-    def drop_caches(self) -> None:
-        """Discard cached results, after the memory was restored from a snapshot."""
-        ...
-
-
-def make_method(ring: RingConfig, models: Sequence[ModelConfig], config: PerceptionConfig) -> Method:
-    """Return the method that the settings name.
-
-    Parameters
-    ----------
-    ring : RingConfig
-        The sensors.
-    models : sequence of ModelConfig
-        The objects to recognise.
-    config : PerceptionConfig
-        The method and its settings.
-    """
-    if config.method == "paper":
-        return PaperPerception(ring, models, config)
-    return BayesPerception(ring, models, config.bayes)
 
 
 class Perception:
@@ -151,7 +53,7 @@ class Perception:
     config : PerceptionConfig
         The method and its settings.
     method : Method, optional
-        In place of the one that `config` names.
+        In place of the one that `config` names; there is no evidence grid then.
     """
 
     def __init__(
@@ -169,6 +71,9 @@ class Perception:
         known_room = config.localization.known_room
         self.known_room = None if known_room is None else KnownRoom(room_of(known_room), ring)
         """Finds the robot in the room of the settings, where there is one."""
+        has_grid = method is None and config.grid.method != "off"
+        self.grid = EvidenceGrid(ring, config.grid) if has_grid else None
+        """The evidence grid in the odometry's frame, where the settings have one."""
         mounts = mounts_array(ring.mounts)
         self._axes = mounts[:, 2].copy()
         self._half_angle = math.radians(ring.beam_half_angle_deg)
@@ -210,11 +115,16 @@ class Perception:
         self._echoes.update(possible)
         if self.known_room is not None:
             self.known_room.observe(trusted)
+        placed = trusted
         if self.map_frame is not None:
-            trusted = self.map_frame.follow(trusted, self.method.near_objects())
+            placed = self.map_frame.follow(trusted, self.method.near_objects())
             for number, dx, dy in self.map_frame.shifts():
                 self.method.shift_object(number, dx, dy)
-        return self.method.observe(trusted)
+        made = self.method.observe(placed)
+        if self.grid is not None:
+            self.method.locate_echoes(self.grid.bearings)
+            self.grid.observe(trusted)
+        return made
 
     def refine(self) -> int:
         """Do one quantum of refinement and return its iterations, zero if nothing is left to improve.
@@ -336,9 +246,15 @@ class Perception:
             age_max_s,
         )
 
+    def occupancy(self) -> OccupancyWindow | None:
+        """Return the evidence grid around the robot, None where the settings have none."""
+        return None if self.grid is None else self.grid.occupancy()
+
     def reset(self) -> None:
         """Start again with an empty map, as after a reset of the odometry."""
         self.method.reset()
+        if self.grid is not None:
+            self.grid.clear()
         if self.map_frame is not None:
             self.map_frame.reset()
         if self.known_room is not None:

@@ -16,6 +16,7 @@ from config.model import ModelConfig
 from config.robot import RingConfig
 from config.settings import BayesConfig, PerceptionConfig
 from drivers.messages import Firing
+from perception.bayes.echo_sources import locate_echoes
 from perception.bayes.elements import MAX_POLYGONS
 from perception.bayes.evidence import evidence_of
 from perception.bayes.kernel_settings import apply_config, apply_library, circle_models, copied, make_settings
@@ -73,7 +74,7 @@ class BayesPerception:
         The settings that a user may change.
     """
 
-    SCRATCH: Final = ("_sure", "_last_reported", "_reported", "_counted_at", "_segment_count")
+    SCRATCH: Final = ("_sure", "_last_reported", "_reported", "_counted_at", "_segment_count", "_readings")
     """Attributes that are derived from the rest; they are not in a snapshot."""
 
     def __init__(self, ring: RingConfig, models: Sequence[ModelConfig], config: BayesConfig) -> None:
@@ -97,6 +98,8 @@ class BayesPerception:
         self._objects: tuple[DetectedObject, ...] | None = None
         self._archived: tuple[DetectedObject, ...] | None = None
         self._archived_labels: tuple[DetectedObject, ...] | None = None
+        self._readings = 0
+        """Readings of the last firing that were not redundant."""
         self._left = 0
         self._polygons_left = 0
         self._circles_pending = False
@@ -133,6 +136,7 @@ class BayesPerception:
             s, tracks, settings, self._mounts, float(pose.x), float(pose.y), float(firing.ring_yaw), time_s,
             firing.ranges_m,
         )  # fmt: skip
+        self._readings = readings
         if len(self._outlines) > 0:
             # Not in the kernel: where all models are round, it need not be compiled.
             associate_polygons(s, tracks, settings, readings)
@@ -218,6 +222,11 @@ class BayesPerception:
             others = others[others["is_reported"] == 0]
             self._archived_labels = (*models, *other_circles(others, self.memory, self.settings, least, ()))
         return self._archived_labels
+
+    def locate_echoes(self, bearings: Floats) -> None:
+        """Write where in its beam each echo of the last firing came from; see `Method.locate_echoes`."""
+        sure = self._config.report_probability
+        locate_echoes(self.memory.s, self.memory.tracks, self.settings, self._readings, sure, bearings)
 
     def segment_geometry(self) -> Floats:
         """Return the mapped segments: ends x, y, x, y (m) and normal (rad), shape (n, 5), a copy."""

@@ -53,7 +53,7 @@ class NoMethod:
     converged = True
     counts = NOTHING
 
-    def observe(self, firing: Firing) -> int:  # noqa: ARG002 - as of `perception.pipeline.Method`
+    def observe(self, firing: Firing) -> int:  # noqa: ARG002 - as of `perception.method.Method`
         """Return 0: no segment was completed."""
         return 0
 
@@ -83,6 +83,9 @@ class NoMethod:
     def evidence(self, number: int) -> Evidence | None:  # noqa: ARG002
         """Return None: there are no objects."""
         return None
+
+    def locate_echoes(self, bearings: Floats) -> None:
+        """Write nothing: there are no objects."""
 
     def shift_object(self, number: int, dx: float, dy: float) -> None:
         """Move nothing: there are no objects."""

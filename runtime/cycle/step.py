@@ -289,7 +289,10 @@ def _drive(state: State, inputs: Inputs, settings: Settings) -> Drive | Stop:
         )
     if state.leg is None:
         state.leg = Leg.starting_at(odometry.pose)
-    percept = Percept(odometry.pose, state.perception.obstacles(odometry.robot_s, age_max_s), view)
+    percept = Percept(
+        odometry.pose, state.perception.obstacles(odometry.robot_s, age_max_s), view,
+        occupancy=state.perception.occupancy(),
+    )  # fmt: skip
     result = drive(
         state.drive_request, state.requested_run_s, inputs.run_s, state.leg, percept, settings, state.goal_place,
         state.goal_drive,

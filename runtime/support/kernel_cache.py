@@ -37,6 +37,7 @@ PACKAGES: Final = (
     "perception.paper",
     "perception.bayes",
     "perception.localization",
+    "perception.mapping.grid",
     "drivers.emulator",
 )
 """Packages that hold kernels."""
@@ -47,10 +48,11 @@ POLYGONS: Final = "polygons"
 EMULATOR: Final = "emulator"
 LOCALIZATION: Final = "localization"
 KNOWN_ROOM: Final = "known_room"
-PARTS: Final = (EMULATOR, BAYES, POLYGONS, PAPER, LOCALIZATION, KNOWN_ROOM)
+GRIDS: Final = ("directed", "moravec_elfes", "elfes")
+PARTS: Final = (EMULATOR, BAYES, POLYGONS, PAPER, LOCALIZATION, KNOWN_ROOM, *GRIDS)
 """What is compiled separately: a method by its name, what the Bayesian method needs beyond it for polygons, the
-emulator, the correction of drift, and finding the robot in a known room. A file with the name of a part in the cache
-folder says that it is compiled."""
+emulator, the correction of drift, finding the robot in a known room, and each kind of evidence grid. A file with the
+name of a part in the cache folder says that it is compiled."""
 
 COMPILED_SUFFIX: Final = ".compiled"
 """Ending of empty files in the cache folder, one for each kernel that was compiled, from which progress is shown."""
@@ -126,7 +128,8 @@ def needed_parts(settings: Settings) -> tuple[str, ...]:
     polygons = (POLYGONS,) if has_polygons and settings.perception.method == BAYES else ()
     localization = (LOCALIZATION,) if settings.perception.localization.correct_drift else ()
     known_room = () if settings.perception.localization.known_room is None else (KNOWN_ROOM,)
-    return (EMULATOR, settings.perception.method, *polygons, *localization, *known_room)
+    grid = () if settings.perception.grid.method == "off" else (settings.perception.grid.method,)
+    return (EMULATOR, settings.perception.method, *polygons, *localization, *known_room, *grid)
 
 
 def uncompiled_parts(folder: Path, parts: Iterable[str]) -> list[str]:

@@ -14,6 +14,7 @@ import math
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
@@ -22,6 +23,7 @@ from runtime.support.kernel_cache import (
     BAYES,
     COMPILED_SUFFIX,
     EMULATOR,
+    GRIDS,
     KNOWN_ROOM,
     LOCALIZATION,
     PAPER,
@@ -67,6 +69,16 @@ def _drive(settings: Settings, perception: Perception, firings: int = FIRINGS, *
             perception.refine()
     perception.labelled_objects()
     perception.counts  # noqa: B018 - a property that runs kernels
+
+
+def _grid(settings: Settings, method: str) -> None:
+    """Drive past a wall with an evidence grid, and ask for it."""
+    from perception.pipeline import Perception
+
+    grid = settings.perception.grid.model_copy(update={"method": method})
+    perception = Perception(settings.ring, settings.models, settings.perception.model_copy(update={"grid": grid}))
+    _drive(settings, perception, refines=False)
+    perception.occupancy()
 
 
 def _square() -> ModelConfig:
@@ -178,7 +190,7 @@ def _known_room(settings: Settings) -> None:
 
 RUN_ONCE: Final[Mapping[str, Callable[[Settings], None]]] = MappingProxyType({
     EMULATOR: _emulator, BAYES: _circles, POLYGONS: _polygons, PAPER: _paper, LOCALIZATION: _localization,
-    KNOWN_ROOM: _known_room,
+    KNOWN_ROOM: _known_room, **{method: partial(_grid, method=method) for method in GRIDS},
 })  # fmt: skip
 """Runs each part once."""
 

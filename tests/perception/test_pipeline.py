@@ -7,20 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from config.load import load_model, load_settings, load_world, with_known_room
+from config.load import load_model, load_world, with_known_room
 from drivers.messages import Firing, Pose
-from perception.bayes.bayes_method import BayesPerception
 from perception.edits import PlaceRobot
-from perception.paper.paper_method import PaperPerception
-from perception.pipeline import Perception, make_method
+from perception.pipeline import Perception
 from tests.perception.edited import settle
 from tests.perception.halls import drive, settings
-
-
-@pytest.mark.parametrize(("name", "kind"), [("paper", PaperPerception), ("bayes", BayesPerception)])
-def test_the_settings_name_the_method(name: str, kind: type) -> None:
-    chosen = load_settings("hallway", [f"perception.method={name}"])
-    assert isinstance(make_method(chosen.ring, chosen.models, chosen.perception), kind)
 
 
 @pytest.mark.parametrize("count", [0, 23, 25])

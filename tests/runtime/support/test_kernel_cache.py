@@ -178,6 +178,8 @@ def test_a_run_compiles_only_the_parts_that_it_needs() -> None:
     assert kernels.needed_parts(corrected) == (kernels.EMULATOR, kernels.BAYES, kernels.LOCALIZATION)
     mapped = with_known_room(load_settings("hallway"), "irregular")
     assert kernels.needed_parts(mapped) == (kernels.EMULATOR, kernels.BAYES, kernels.KNOWN_ROOM)
+    with_grid = load_settings("hallway", ["perception.grid.method=directed"])
+    assert kernels.needed_parts(with_grid) == (kernels.EMULATOR, kernels.BAYES, "directed")
     assert set(warming.RUN_ONCE) == set(kernels.PARTS)
 
 
@@ -205,7 +207,7 @@ def test_each_part_is_compiled_once_and_then_warmed_up(home: Path, monkeypatch: 
     assert happened == ["compile polygons", "bayes"]
     (home / kernels.BAYES).unlink()
     assert kernels.uncompiled_parts(home, kernels.PARTS) == [
-        kernels.BAYES, kernels.PAPER, kernels.LOCALIZATION, kernels.KNOWN_ROOM,
+        kernels.BAYES, kernels.PAPER, kernels.LOCALIZATION, kernels.KNOWN_ROOM, *kernels.GRIDS,
     ]  # fmt: skip
     happened.clear()
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")

@@ -1,0 +1,385 @@
+"""The directed evidence grid: every cell remembers its evidence apart for each of eight looking directions.
+
+A smooth wall answers a beam that is square to it and no other. A grid with one number a cell takes the silence of the
+slanting beams as proof that there is no wall (Howard and Kitchen's response grid, 1996, Konolige's MURIEL, 1997, and
+Lim and Cho, 1992, are the remedies this grid builds on). Here:
+
+- one echo is one unit of evidence, shared over its arc by what the cells already hold (Moravec and Elfes, 1985); an
+  echo whose bearing is known, because a recognised object or wall gave it, marks its contact only;
+- what a beam has passed is free, for its looking direction only;
+- several readings of a cell from one place and direction count as the strongest of them: repeats do not multiply;
+- evidence fades with the robot's way and not with time.
+
+Beside the eight there is a ninth, undirected evidence, in which every reading counts against every other, as in a
+classic grid: where all surfaces answer at any angle that uses more of what was heard. How often a cell that was heard
+from one direction also answers from another shows which kind of place this is; the two are mixed by it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.messages import Firing
+from perception.kernel import Floats, Ints, kernel
+from perception.mapping.grid.window import OCTANTS, Ring, Window, octant, row_of_beam, set_edges
+
+UNDIRECTED: Final = OCTANTS
+"""Index of the undirected evidence of a cell, behind those of the looking directions."""
+BASE: Final = 0
+HIT: Final = 1
+FREE: Final = 2
+STAMP: Final = 3
+"""What is kept of each evidence: its value when the robot came to this place; the strongest hit and the strongest
+passage since; and the place."""
+NAT: Final = 1024
+"""One nat of log odds; evidence is kept in whole numbers, which replay to the bit."""
+PLACE_M: Final = 0.1
+"""Readings on so much way are from one place."""
+PLACES: Final = 1 << 15
+"""Places are numbered modulo this."""
+CERTAIN: Final = 3 * NAT
+"""Greatest evidence for and against, so that contradiction is soon seen."""
+FADING: Final = 1
+"""Evidence that is lost for each place: 1 nat on about 100 m of way."""
+
+SPREAD_CELLS: Final = 0.5
+SPREAD_RELATIVE: Final = 0.01
+"""Standard deviation of an echo's range, in cells and as a share of the range, at least."""
+ARC_SIGMAS: Final = 1.5
+"""Half the thickness of an echo's arc; …"""
+PASSED_SIGMAS: Final = 1.0
+"""… and what is nearer than the range by this was passed."""
+PASSED: Final = int(1.2 * NAT)
+"""Evidence of a passage through the middle of a beam; towards the edge it vanishes …"""
+SILENCE: Final = 1.5
+"""… and that of a beam without an echo, which neither a chance echo nor crosstalk has cut short, is so much more."""
+UNDIRECTED_UNIT: Final = 4.0
+"""An echo's unit of evidence in the undirected grid: there the passages of all directions count against it."""
+SURE: Final = NAT // 2
+MIDDLE: Final = 0.75
+"""A cell of so much evidence from other directions, in the middle of a beam (see `inside`), should answer, …"""
+BEYOND_M: Final = 0.3
+"""… and has not if the beam went on for this much, m."""
+
+PRIOR_ANSWERS: Final = 4.0
+"""Answers and silences that are assumed at the start."""
+ANSWERS_MAX: Final = 1000.0
+"""When so many were counted, both are halved."""
+DIFFUSE_SHARE: Final = 0.2
+MIRROR_SHARE: Final = 0.4
+"""Share of silences from which on, and up to which, the undirected evidence counts less and less."""
+FAINT: Final = int(0.15 * NAT)
+"""Directed evidence up to this is as good as none: any cell of a single echo's arc has it."""
+
+Cells = NDArray[np.int16]
+
+
+@kernel
+def evidence_now(kept: Cells, place: int) -> int:
+    """Return the evidence of a cell in one direction, faded by the way since it was last renewed.
+
+    Parameters
+    ----------
+    kept : (4,) int16
+        As kept.
+    place : int
+        Where the robot is now.
+    """
+    value = min(CERTAIN, max(-CERTAIN, int(kept[BASE]) + int(kept[HIT]) + int(kept[FREE])))
+    faded = FADING * ((place - int(kept[STAMP])) & (PLACES - 1))
+    return max(0, value - faded) if value > 0 else min(0, value + faded)
+
+
+@kernel
+def renew(kept: Cells, place: int) -> None:
+    """Begin a new place: what was found at the last one becomes the base."""
+    if kept[STAMP] != place:
+        kept[BASE] = evidence_now(kept, place)
+        kept[HIT] = 0
+        kept[FREE] = 0
+        kept[STAMP] = place
+
+
+@kernel
+def base_elsewhere(cell: Cells, own: int, place: int) -> int:
+    """Return the greatest evidence of a cell in any looking direction but one, without this place's readings."""
+    most = 0
+    for k in range(OCTANTS):
+        if k != own:
+            kept = cell[k]
+            value = int(kept[BASE]) if kept[STAMP] == place else evidence_now(kept, place)
+            most = max(most, value)
+    return most
+
+
+@kernel
+def enter_readings(
+    cells: Cells, corner: Ints, cell_m: float, place: int, x: float, y: float, yaw: float, ranges: Floats,
+    mounts: Floats, bearings: Floats, half_angle: float, rounding_m: float, silence_m: float, answers: Floats,
+    arc: Ints, shares: Floats, edges: Floats,
+) -> None:  # fmt: skip
+    """Enter the readings of a firing: first what they passed, then their hits, so that their order does not matter.
+
+    Parameters
+    ----------
+    cells : (n, n, 9, 4) int16
+        The torus. Updated.
+    corner : (2,) int
+        Number of the window's first cell in x and y.
+    cell_m : float
+        Side of a cell, m.
+    place : int
+        Where on its way the robot is.
+    x, y, yaw : float
+        Place (m) and direction (rad) of the ring.
+    ranges : (n,) float
+        As in a `Firing`, m.
+    mounts : (n, 3) float
+        x, y (m), direction (rad) of each sensor in the ring's frame.
+    bearings : (n,) float
+        Where in its beam each echo came from, rad from the axis; NaN where that is not known.
+    half_angle : float
+        Half the beam's width, rad.
+    rounding_m : float
+        Standard deviation of a range by its rounding, m.
+    silence_m : float
+        Distance to which a beam without an echo shows free space, m.
+    answers : (2,) float
+        How often a cell that was heard from other directions answered, and how often not. Updated.
+    arc : (k, 4) int
+        Scratch: the cells of all arcs, their looking directions, and the sensors.
+    shares : (k,) float
+        Scratch: the share of its echo that each of these would have by itself.
+    edges : (4,) float
+        Scratch.
+    """
+    mask = cells.shape[0] - 1
+    square_sine = math.sin(half_angle) ** 2
+    c = math.cos(yaw)
+    s = math.sin(yaw)
+    m = 0
+    for i in range(ranges.shape[0]):
+        r = ranges[i]
+        if math.isnan(r):
+            continue
+        is_echo = math.isfinite(r)
+        sx = x + c * mounts[i, 0] - s * mounts[i, 1]
+        sy = y + s * mounts[i, 0] + c * mounts[i, 1]
+        axis = yaw + mounts[i, 2]
+        ux = math.cos(axis)
+        uy = math.sin(axis)
+        set_edges(axis, half_angle, edges)
+        sigma = max(SPREAD_CELLS * cell_m, rounding_m, SPREAD_RELATIVE * r) if is_echo else 0.0
+        passed = r - PASSED_SIGMAS * sigma if is_echo else silence_m
+        end = r + ARC_SIGMAS * sigma if is_echo else silence_m
+        is_located = is_echo and not math.isnan(bearings[i])
+        weight = PASSED if is_echo else SILENCE * PASSED
+        first = m
+        nearest = math.inf
+        low_y = max(int(corner[1]), math.floor((sy - end) / cell_m))
+        high_y = min(int(corner[1]) + mask, math.floor((sy + end) / cell_m))
+        for iy in range(low_y, high_y + 1):
+            dy = (iy + 0.5) * cell_m - sy
+            low, high = row_of_beam(dy, end, edges)
+            if low > high:
+                continue
+            low_x = max(int(corner[0]), math.ceil((sx + low) / cell_m - 0.5))
+            high_x = min(int(corner[0]) + mask, math.floor((sx + high) / cell_m - 0.5))
+            for ix in range(low_x, high_x + 1):
+                dx = (ix + 0.5) * cell_m - sx
+                square = dx * dx + dy * dy
+                across = ux * dy - uy * dx
+                inside = 1.0 - across * across / (square * square_sine) if square > 0.0 else 0.0
+                if inside <= 0.0:
+                    continue
+                d = math.sqrt(square)
+                k = octant(dx, dy)
+                cell = cells[iy & mask, ix & mask]
+                if is_echo and not is_located and abs(d - r) <= ARC_SIGMAS * sigma and m < arc.shape[0]:
+                    arc[m, 0] = iy & mask
+                    arc[m, 1] = ix & mask
+                    arc[m, 2] = k
+                    arc[m, 3] = i
+                    shares[m] = inside * math.exp(-0.5 * ((d - r) / sigma) ** 2)
+                    m += 1
+                if d < nearest and inside >= MIDDLE and base_elsewhere(cell, k, place) >= SURE:
+                    nearest = d
+                if d < passed:
+                    own = cell[k]
+                    renew(own, place)
+                    own[FREE] = min(int(own[FREE]), -int(weight * inside))
+                    both = cell[UNDIRECTED]
+                    renew(both, place)
+                    both[FREE] = min(int(both[FREE]), -int(weight * inside))
+        if is_located and m < arc.shape[0]:
+            px = r * math.cos(axis + bearings[i])
+            py = r * math.sin(axis + bearings[i])
+            ix = math.floor((sx + px) / cell_m)
+            iy = math.floor((sy + py) / cell_m)
+            if 0 <= ix - corner[0] <= mask and 0 <= iy - corner[1] <= mask:
+                arc[m, 0] = iy & mask
+                arc[m, 1] = ix & mask
+                arc[m, 2] = octant(px, py)
+                arc[m, 3] = i
+                shares[m] = 1.0
+                m += 1
+        if nearest < math.inf:
+            if is_echo and abs(r - nearest) <= 2.0 * sigma + cell_m:
+                answers[0] += 1.0
+            elif nearest < passed - BEYOND_M:
+                answers[1] += 1.0
+    first = 0
+    while first < m:
+        last = first
+        total = 0.0
+        total_both = 0.0
+        while last < m and arc[last, 3] == arc[first, 3]:
+            cell = cells[arc[last, 0], arc[last, 1]]
+            own = cell[arc[last, 2]]
+            renew(own, place)
+            both = cell[UNDIRECTED]
+            renew(both, place)
+            total += shares[last] * prior(own)
+            total_both += shares[last] * prior(both)
+            last += 1
+        for n in range(first, last):
+            cell = cells[arc[n, 0], arc[n, 1]]
+            own = cell[arc[n, 2]]
+            both = cell[UNDIRECTED]
+            h = hit_nat(shares[n] * prior(own) / total)
+            own[HIT] = max(int(own[HIT]), h)
+            h = hit_nat(UNDIRECTED_UNIT * shares[n] * prior(both) / total_both)
+            both[HIT] = max(int(both[HIT]), h)
+        first = last
+
+
+@kernel
+def prior(kept: Cells) -> float:
+    """Return how much of an echo a cell draws: the square of its probability, this place's hits left out."""
+    value = min(CERTAIN, max(-CERTAIN, int(kept[BASE]) + int(kept[FREE])))
+    probability = 1.0 / (1.0 + math.exp(-value / NAT))
+    return probability * probability
+
+
+@kernel
+def hit_nat(share: float) -> int:
+    """Return the evidence of a share of an echo, in units."""
+    q = 0.5 + 0.49 * min(1.0, share)
+    return int(NAT * math.log(q / (1.0 - q)))
+
+
+@kernel
+def fill_evidence(
+    cells: Cells, corner: Ints, cell_m: float, place: int, mirrors: float, from_x: float, from_y: float,
+    odds: NDArray[np.float32], out: NDArray[np.float32],
+) -> None:  # fmt: skip
+    """Write the probability of each cell.
+
+    Parameters
+    ----------
+    cells, corner, cell_m, place
+        As of `enter_readings`.
+    mirrors : float
+        Weight of the looking directions, 0 to 1; the rest is that of the undirected evidence.
+    from_x, from_y : float
+        The place from which the cells are asked, m; NaN: from any direction.
+    odds : (2 CERTAIN + 1,) float32
+        Probability by evidence, from −`CERTAIN`.
+    out : (n, n) float32
+        Out: the probabilities, row by row from the smallest y.
+    """
+    count = cells.shape[0]
+    for row in range(count):
+        iy = int(corner[1]) + row
+        for column in range(count):
+            ix = int(corner[0]) + column
+            cell = cells[iy & (count - 1), ix & (count - 1)]
+            directed = 0
+            if math.isnan(from_x):
+                least = 0
+                for k in range(OCTANTS):
+                    value = evidence_now(cell[k], place)
+                    directed = max(directed, value)
+                    least = min(least, value)
+                directed = directed if directed > 0 else least
+            else:
+                k = octant((ix + 0.5) * cell_m - from_x, (iy + 0.5) * cell_m - from_y)
+                directed = evidence_now(cell[k], place)
+            directed = directed if directed <= 0 else max(0, directed - FAINT)
+            mixed = mirrors * directed + (1.0 - mirrors) * evidence_now(cell[UNDIRECTED], place)
+            out[row, column] = odds[CERTAIN + int(mixed)]
+
+
+class DirectedGrid:
+    """The grid's memory.
+
+    Parameters
+    ----------
+    window : Window
+        Where its cells are.
+    ring : Ring
+        The sensors.
+    """
+
+    SCRATCH: Final = ("window", "_mounts", "_half_angle", "_rounding_m", "_arc", "_shares", "_edges", "_odds")
+
+    def __init__(self, window: Window, ring: Ring) -> None:
+        self.window = window
+        self._mounts = ring.mounts
+        self._half_angle = ring.half_angle
+        self._rounding_m = ring.rounding_m
+        self.cells: Cells = np.zeros((window.cells, window.cells, OCTANTS + 1, 4), np.int16)
+        self._answers = np.zeros(2)
+        self._place = 0
+        room = len(ring.mounts) * arc_cells_max(window, ring)
+        self._arc = np.zeros((room, 4), np.int64)
+        self._shares = np.zeros(room)
+        self._edges = np.zeros(4)
+        evidence = np.arange(-CERTAIN, CERTAIN + 1) / NAT
+        self._odds = (1.0 / (1.0 + np.exp(-evidence))).astype(np.float32)
+
+    @property
+    def mirrors(self) -> float:
+        """How far cells answer in the direction only from which they were heard, 0 to 1."""
+        answered, passed = self._answers.tolist()
+        share = (passed + PRIOR_ANSWERS) / (answered + passed + 2.0 * PRIOR_ANSWERS)
+        return min(1.0, max(0.0, (share - DIFFUSE_SHARE) / (MIRROR_SHARE - DIFFUSE_SHARE)))
+
+    def observe(self, firing: Firing, bearings: Floats, place: int, silence_m: float) -> None:
+        """Enter a firing; see `EvidenceGrid.observe`."""
+        if not self.window.follow(firing.pose, (self.cells,)):
+            return
+        self._place = place % PLACES
+        enter_readings(
+            self.cells, self.window.corner, self.window.cell_m, self._place, float(firing.pose.x),
+            float(firing.pose.y), float(firing.ring_yaw), firing.ranges_m, self._mounts, bearings, self._half_angle,
+            self._rounding_m, silence_m, self._answers, self._arc, self._shares, self._edges,
+        )  # fmt: skip
+        if self._answers.sum() > ANSWERS_MAX:
+            self._answers *= 0.5
+
+    def probability(self, seen_from: tuple[float, float] | None) -> NDArray[np.float32]:
+        """Return the probability of each cell; see `EvidenceGrid.occupancy`."""
+        out = np.empty(self.cells.shape[:2], np.float32)
+        x, y = (math.nan, math.nan) if seen_from is None else seen_from
+        fill_evidence(
+            self.cells, self.window.corner, self.window.cell_m, self._place, self.mirrors, x, y, self._odds, out
+        )
+        return out
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self.window.clear()
+        self.cells[:] = 0
+        self._answers[:] = 0.0
+
+
+def arc_cells_max(window: Window, ring: Ring) -> int:
+    """Return how many cells the arc of one echo has at most."""
+    reach = min(ring.reach_m, math.sqrt(2.0) * window.cells * window.cell_m) / window.cell_m
+    thickness = 2.0 * ARC_SIGMAS * max(SPREAD_CELLS, ring.rounding_m / window.cell_m, SPREAD_RELATIVE * reach)
+    return int((2.0 * ring.half_angle * (reach + thickness) + 4.0) * (thickness + 2.0))

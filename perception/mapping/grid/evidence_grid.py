@@ -1,0 +1,148 @@
+"""The evidence grid as perception keeps it: the method of the settings, fed with firings, asked for a window.
+
+It counts the robot's way, by which evidence ages and repeats are recognised, and learns how far this place answers at
+all: silence shows free space only to the range from which echoes really come.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.robot import RingConfig
+from config.settings import GridConfig
+from drivers.messages import Firing
+from perception.kernel import Floats
+from perception.mapping.grid.window import Ring, Window
+from perception.percept import OccupancyWindow
+from perception.sensor_mounts import mounts_array
+
+PLACE_M: Final = 0.1
+"""Readings on so much way are from one place."""
+HEARD_M: Final = 0.25
+"""Width of the bins in which ranges are counted."""
+HEARD_SHARE: Final = 0.98
+"""Silence shows free space up to the range below which this share of the echoes was."""
+HEARD_MIN: Final = 20
+"""Echoes before which silence shows nothing."""
+
+
+class GridMethod(Protocol):
+    """A method of updating cells."""
+
+    def observe(self, firing: Firing, bearings: Floats, place: int, silence_m: float) -> None:
+        """Enter a firing.
+
+        Parameters
+        ----------
+        firing : Firing
+            In the odometry's frame.
+        bearings : (n,) float
+            Where in its beam each echo came from, rad from the axis; NaN where that is not known.
+        place : int
+            Where on its way the robot is, in steps of `PLACE_M`.
+        silence_m : float
+            Distance to which a beam without an echo shows free space, m.
+        """
+        ...
+
+    def probability(self, seen_from: tuple[float, float] | None) -> NDArray[np.float32]:
+        """Return the probability of each cell, row by row from the smallest y; see `EvidenceGrid.occupancy`."""
+        ...
+
+    def clear(self) -> None:
+        """Forget everything."""
+        ...
+
+
+def make_grid_method(config: GridConfig, window: Window, ring: Ring) -> GridMethod:
+    """Return the method that the settings name; only its kernels are imported, and so compiled."""
+    if config.method == "moravec_elfes":
+        from perception.mapping.grid.moravec_elfes import MoravecElfesGrid
+
+        return MoravecElfesGrid(window, ring)
+    if config.method == "elfes":
+        from perception.mapping.grid.elfes import ElfesGrid
+
+        return ElfesGrid(window, ring)
+    from perception.mapping.grid.directed import DirectedGrid
+
+    return DirectedGrid(window, ring)
+
+
+class EvidenceGrid:
+    """The grid around the robot, in the odometry's frame.
+
+    Parameters
+    ----------
+    ring : RingConfig
+        The sensors.
+    config : GridConfig
+        Method, cells and window; the method is not `off`.
+    """
+
+    SCRATCH: Final = ("_ring",)
+
+    def __init__(self, ring: RingConfig, config: GridConfig) -> None:
+        self._ring = Ring(
+            mounts_array(ring.mounts), math.radians(ring.beam_half_angle_deg), ring.resolution_m / math.sqrt(12.0),
+            ring.range_max_m,
+        )  # fmt: skip
+        self.window = Window(config.cells, config.cell_m)
+        self.method = make_grid_method(config, self.window, self._ring)
+        self._way_m = 0.0
+        self._at = np.full(2, math.nan)
+        self._heard = np.zeros(int(ring.range_max_m / HEARD_M) + 2, np.int64)
+        self._firings = 0
+        self.bearings: Floats = np.full(len(ring.mounts), math.nan)
+        """Where in its beam each echo of the next firing came from, rad from the axis; NaN where unknown."""
+
+    def observe(self, firing: Firing) -> None:
+        """Enter a firing, which is given in the odometry's frame."""
+        pose, ranges = firing.pose, firing.ranges_m
+        moved = math.hypot(pose.x - self._at[0], pose.y - self._at[1])
+        if math.isfinite(moved):
+            self._way_m += moved
+        self._at[:] = pose.x, pose.y
+        echoes = ranges[ranges < math.inf]
+        np.add.at(self._heard, np.minimum(echoes / HEARD_M, len(self._heard) - 1).astype(np.int64), 1)
+        self.method.observe(firing, self.bearings, 1 + int(self._way_m / PLACE_M), self.silence_m)
+        self._firings += 1
+
+    @property
+    def silence_m(self) -> float:
+        """Distance to which a beam without an echo shows free space, learnt from the ranges heard, m."""
+        total = int(self._heard.sum())
+        if total < HEARD_MIN:
+            return 0.0
+        farthest = int(np.searchsorted(self._heard.cumsum(), HEARD_SHARE * total))
+        return min(self._ring.reach_m, HEARD_M * (farthest + 1))
+
+    @property
+    def firings(self) -> int:
+        """How many firings were entered."""
+        return self._firings
+
+    def occupancy(self, seen_from: tuple[float, float] | None = None) -> OccupancyWindow:
+        """Return the window.
+
+        Parameters
+        ----------
+        seen_from : (float, float), optional
+            A place x, y, m: then each cell's probability is that of an answer towards it. By default it is that of an
+            answer in any direction.
+        """
+        cell_m = self.window.cell_m
+        x, y = (cell_m * float(number) for number in self.window.corner)
+        return OccupancyWindow(self.method.probability(seen_from), x, y, cell_m)
+
+    def clear(self) -> None:
+        """Forget everything, as after a reset of the odometry."""
+        self.method.clear()
+        self._heard[:] = 0
+        self.bearings[:] = math.nan
+        self._at[:] = math.nan
+        self._way_m = 0.0

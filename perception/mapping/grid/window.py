@@ -1,0 +1,177 @@
+"""The window of cells that moves with the robot, and the cells of a beam: what all grids share.
+
+The window is a torus: a cell keeps its place in memory as long as it is in the window, and only the rows and columns
+that leave are cleared. Cells are numbered from the odometry's origin, so that a cell covers the same floor for ever.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.messages import Firing, Pose
+from perception.kernel import Floats, Ints, kernel
+
+OCTANTS: Final = 8
+"""Looking directions, 45° each; the first is around +x, then counter-clockwise."""
+EIGHTH_TAN: Final = math.tan(0.125 * math.pi)
+"""Of half a looking direction."""
+CENTRED_CELLS: Final = 4
+"""The window follows once the robot is so many cells from its middle."""
+COORDINATE_MAX_M: Final = 1e6
+"""No robot drives so far; a pose beyond it is a fault."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ring:
+    """What a grid knows of the sensors.
+
+    Attributes
+    ----------
+    mounts : (n, 3) float
+        x, y (m), direction (rad) of each sensor in the ring's frame.
+    half_angle : float
+        Half the beam's width, rad.
+    rounding_m : float
+        Standard deviation of a range by its rounding, m.
+    reach_m : float
+        Longest range, m.
+    """
+
+    mounts: Floats
+    half_angle: float
+    rounding_m: float
+    reach_m: float
+
+
+@kernel
+def octant(dx: float, dy: float) -> int:
+    """Return the looking direction of a vector, 0 to 7."""
+    if abs(dy) <= EIGHTH_TAN * abs(dx):
+        return 0 if dx > 0.0 else 4
+    if abs(dx) <= EIGHTH_TAN * abs(dy):
+        return 2 if dy > 0.0 else 6
+    if dx > 0.0:
+        return 1 if dy > 0.0 else 7
+    return 3 if dy > 0.0 else 5
+
+
+@kernel
+def row_of_beam(dy: float, reach: float, edges: Floats) -> tuple[float, float]:
+    """Return between which x from the sensor a row of cells lies in a beam, m; the first is greater if nowhere.
+
+    Parameters
+    ----------
+    dy : float
+        The row's y from the sensor, m.
+    reach : float
+        Length of the beam, m.
+    edges : (4,) float
+        The directions of its right and its left edge, unit vectors x, y, x, y; less than 180° apart.
+    """
+    square = reach * reach - dy * dy
+    if square <= 0.0:
+        return 1.0, -1.0
+    high = math.sqrt(square)
+    low = -high
+    if edges[1] > 0.0:
+        high = min(high, dy * edges[0] / edges[1])
+    elif edges[1] < 0.0:
+        low = max(low, dy * edges[0] / edges[1])
+    elif dy * edges[0] < 0.0:
+        return 1.0, -1.0
+    if edges[3] > 0.0:
+        low = max(low, dy * edges[2] / edges[3])
+    elif edges[3] < 0.0:
+        high = min(high, dy * edges[2] / edges[3])
+    elif dy * edges[2] > 0.0:
+        return 1.0, -1.0
+    return low, high
+
+
+@kernel
+def set_edges(bearing: float, half_angle: float, edges: Floats) -> None:
+    """Write the edges of a beam as `row_of_beam` takes them."""
+    edges[0] = math.cos(bearing - half_angle)
+    edges[1] = math.sin(bearing - half_angle)
+    edges[2] = math.cos(bearing + half_angle)
+    edges[3] = math.sin(bearing + half_angle)
+
+
+def placed(firing: Firing, mounts: Floats) -> list[list[float]]:
+    """Return place x, y (m) and direction (rad) of each sensor at a firing.
+
+    Parameters
+    ----------
+    firing : Firing
+        The firing.
+    mounts : (n, 3) float
+        As of `Ring`.
+    """
+    c, s = math.cos(firing.ring_yaw), math.sin(firing.ring_yaw)
+    x = firing.pose.x + c * mounts[:, 0] - s * mounts[:, 1]
+    y = firing.pose.y + s * mounts[:, 0] + c * mounts[:, 1]
+    return np.column_stack([x, y, firing.ring_yaw + mounts[:, 2]]).tolist()  # type: ignore[no-any-return]
+
+
+class Window:
+    """The place of the window.
+
+    Parameters
+    ----------
+    cells : int
+        Cells along each side, a power of two.
+    cell_m : float
+        Side of a cell, m.
+    """
+
+    def __init__(self, cells: int, cell_m: float) -> None:
+        self.cells = cells
+        self.cell_m = cell_m
+        self.corner: Ints = np.zeros(2, np.int64)
+        """The number of the first cell in x and y, counted from the odometry's origin."""
+        self.placed = False
+
+    def follow(self, pose: Pose, planes: tuple[NDArray[np.generic], ...]) -> bool:
+        """Move the window after the robot and clear what comes in; return whether the pose is a possible one.
+
+        Parameters
+        ----------
+        pose : Pose
+            The robot's.
+        planes : tuple of array
+            The cells' memory, each of shape (cells, cells, …): y, then x. Updated.
+        """
+        if not (abs(pose.x) < COORDINATE_MAX_M and abs(pose.y) < COORDINATE_MAX_M and math.isfinite(pose.theta)):
+            return False
+        for axis, at in enumerate((pose.x, pose.y)):
+            wanted = math.floor(at / self.cell_m) - self.cells // 2
+            moved = wanted - int(self.corner[axis])
+            if self.placed and abs(moved) <= CENTRED_CELLS:
+                continue
+            if self.placed:
+                count = min(abs(moved), self.cells)
+                first = int(self.corner[axis]) + (self.cells if moved > 0 else -count)
+                lines = np.arange(first, first + count) & (self.cells - 1)
+                for plane in planes:
+                    if axis == 0:
+                        plane[:, lines] = 0
+                    else:
+                        plane[lines] = 0
+            self.corner[axis] = wanted
+        self.placed = True
+        return True
+
+    def unrolled(self, plane: Floats) -> Floats:
+        """Return a plane of the torus row by row from the smallest y, as an array of its own."""
+        x, y = (int(first) & (self.cells - 1) for first in self.corner)
+        return np.roll(plane, (-y, -x), axis=(0, 1))
+
+    def clear(self) -> None:
+        """Forget the place."""
+        self.corner[:] = 0
+        self.placed = False
