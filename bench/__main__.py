@@ -18,6 +18,7 @@ from bench.page_growth import measure_page_growth
 from bench.place_commands import (
     beacons,
     false_drums,
+    false_walls,
     known_room,
     localization,
     map_size,
@@ -220,7 +221,7 @@ def waking(*, json: str = "waking.json", turns: int = WAKING_TURNS, busy: int = 
     return report(json, by_load, waking_table(by_load))
 
 
-for command in (localization, known_room, beacons, nees, slips, sightings, walls, false_drums):
+for command in (localization, known_room, beacons, nees, slips, sightings, walls, false_drums, false_walls):
     app.command(command)
 app.command(map_size, name="map")
 

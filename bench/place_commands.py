@@ -230,6 +230,30 @@ def walls(*, json: str = "walls.json", seeds: int = 100, first: int = 0, steps: 
     return _try_in_rooms(lambda settings, tell: measure(settings, rooms, steps, tell), walls_table, json, BY_BAYES)
 
 
+def false_walls(*, json: str = "false_walls.json", halls: int = 100, hours: float = 10.0, first: int = 0) -> int:
+    """Measure whether walls are reported where nothing but drums stands.
+
+    Parameters
+    ----------
+    json
+        File to write.
+    halls
+        Number of random halls of drums, posts and barrels, at steps of .05 to 1 ft in turn; 0: none.
+    hours
+        Virtual time in the hall of `make run`, by each model of reflection; 0: none.
+    first
+        Seed of the first hall.
+    """
+    use_kernel_cache()
+    from bench.false_walls import measure
+
+    seeds = range(first, first + max(0, halls))
+    return _try_in_rooms(
+        lambda settings, tell: measure(settings, seeds, max(0.0, hours), tell),
+        lambda rows: rows_table("walls reported where nothing but drums stands", rows), json, BY_BAYES,
+    )  # fmt: skip
+
+
 def false_drums(
     *,
     json: str = "false_drums.json",

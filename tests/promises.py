@@ -192,6 +192,12 @@ PROMISES: Mapping[str, Promise] = MappingProxyType(
             "an emulated p3dx in the paper's hallway, `specular`, 15 s in virtual time: six drums of six, none "
             "false, error ≤ .02 ft; every driver and its emulated robot keep one contract",
         ),
+        "P30": Promise(
+            "No jump of the drive at a correction",
+            "the map frame corrected by up to 5 m and 30°, at random, 200 times, while the robot drives to a goal in "
+            "it: the goal moves in odometry's frame by at most .2 m/s, the velocities follow without a step; "
+            "while the place is unknown the robot stands and says so",
+        ),
     }
 )  # fmt: skip
 

@@ -22,13 +22,16 @@ from perception.bayes.polygon_parameters import POLYGON_INFLATION, POLYGON_TURN_
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CONFIRMED, ESTABLISHED, FREE, PLACED, Memory, PolygonTrack
 from perception.bayes.track_archive import TrackArchive
-from perception.bayes.wall_report import room_report
+from perception.bayes.wall_contact import EDGE_REACH_M
+from perception.bayes.wall_report import has_mirrors, room_report
 from perception.detected_object import DetectedObject
 from perception.kernel import Floats
 
 CIRCLE_FIELDS: Final = (
     "x", "y", "covariance_xx", "covariance_xy", "covariance_yy", "hits", "number", "marks",
 )  # fmt: skip
+READINGS: Final = "readings"
+"""Field of an archived circle."""
 Row = tuple[float, ...]
 
 
@@ -183,6 +186,23 @@ def rival_label(memory: Memory, x: float, y: float, radius: float) -> str:
     return "edge"
 
 
+def is_heard_from_afar(circle: NDArray[Any]) -> bool:
+    """Return whether most readings of a point are from where, between mirrors, an edge is not heard.
+
+    Parameters
+    ----------
+    circle : record of `CircleTrack` or of `archived_tracks.archived_dtype`
+        The point.
+    """
+    if READINGS in (circle.dtype.names or ()):
+        ranges = circle[READINGS][: int(circle["kept"]), 3]
+    else:
+        bins = circle["bins"]
+        kept = np.arange(bins["readings"].shape[1]) < bins["count"][:, None]
+        ranges = bins["readings"]["range_m"][kept]
+    return bool(np.count_nonzero(ranges > EDGE_REACH_M) > 0.5 * len(ranges))
+
+
 def alternative_labels(p: SettingsRecord, rounds: Sequence[str]) -> tuple[str, ...]:
     """Return the labels of a circle's alternatives: the round models, their rivals, a line and a corner."""
     settings = p[0]
@@ -228,10 +248,13 @@ def other_circles(
     shown = np.flatnonzero((circles["status"] != FREE) & (circles["hits"] >= UNKNOWN_HITS_MIN))
     names = (*CIRCLE_FIELDS, "probability", "status", "kind", "radius")
     columns = (circles[name][shown].tolist() for name in names)  # at once: a value at a time takes five times as long
-    for *row, probability, status, kind, radius in zip(*columns, strict=True):
+    are_mirrors = has_mirrors(memory)
+    for at, *row, probability, status, kind, radius in zip(shown.tolist(), *columns, strict=True):
         if any(math.dist(row[:2], (o.x, o.y)) < merge_m for o in named):
             continue
         is_rival = status == ESTABLISHED and kind >= models and probability >= least
         label = rival_label(memory, row[0], row[1], radius) if is_rival else "unknown"
+        if label == "edge" and are_mirrors and is_heard_from_afar(circles[at]):
+            label = "inside corner"
         found.append(circle_object(tuple(row), label, probability if is_rival else 1.0 - probability))
     return found

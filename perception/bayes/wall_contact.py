@@ -31,11 +31,17 @@ CIRCLE_MARGIN_M: Final = 0.05
 END_SLACK_M: Final = 0.05
 CORNER_SLACK_M: Final = 0.03
 """Uncertainty of an end's and of a corner's place."""
+HIDING_PROBABILITY: Final = 0.9
+"""Least probability of a round object without a name that hides what lies behind it."""
 ONLY_NAMED: Final = 2.0
 """A probability that only named circles have."""
 STRAIGHT_CHI2: Final = 60.0
 STRAIGHT_WEIGHT: Final = 20.0
 """A span of more evidence than this and of this weight is straight beyond doubt."""
+MIRRORS_SILENCES: Final = 20.0
+"""So many silences of beam edges, with so few echoes, show mirrors."""
+EDGE_REACH_M: Final = 1.0
+"""An edge between mirrors is heard from within this."""
 EDGES_LEAD: Final = 4.0
 EDGES_SHARE: Final = 0.25
 """Edges count if their echoes exceed this share of their silences by this lead. Mirrors leave 1 %; of surfaces that
@@ -52,6 +58,12 @@ def range_sigma(room: WallMap, range_m: float) -> float:
 def edges_answer(room: WallMap) -> bool:
     """Return whether slanting walls answer from the beam's edge here."""
     return bool(room.edge_echoes > EDGES_SHARE * room.edge_silences + EDGES_LEAD)
+
+
+@kernel
+def are_mirrors(room: WallMap) -> bool:
+    """Return whether the walls here are known to be mirrors: slanting ones do not answer."""
+    return bool(room.edge_silences >= MIRRORS_SILENCES and not edges_answer(room))
 
 
 @kernel
@@ -267,6 +279,35 @@ def is_from_circle(
             half = track.radius**2 - d * d + reach * reach
             if half > -CIRCLE_MARGIN_M * track.radius:
                 return abs(q.range_m - reach + math.sqrt(max(half, 0.0))) < slack + CIRCLE_MARGIN_M
+    return False
+
+
+@kernel
+def is_hidden(tracks: CircleTracks, q: Reading, x: float, y: float) -> bool:
+    """Return whether a round object stands between a sensor and a point, so that no echo can come from there.
+
+    Parameters
+    ----------
+    tracks : (n,) CircleTrack
+        The circles; only certain ones count.
+    q : Reading
+        The sensor.
+    x, y : float
+        The point, m.
+    """
+    dx = x - q.x
+    dy = y - q.y
+    d2 = dx * dx + dy * dy
+    for t in range(len(tracks)):
+        track = tracks[t]
+        if track.status != ESTABLISHED or (track.is_named == 0 and track.probability < HIDING_PROBABILITY):
+            continue
+        cx = track.x - q.x
+        cy = track.y - q.y
+        along = cx * dx + cy * dy
+        across = cx * dy - cy * dx
+        if 0.0 < along < d2 and across * across < track.radius * track.radius * d2:
+            return True
     return False
 
 

@@ -14,11 +14,13 @@ from typing import Final
 
 from perception.bayes.elements import Reading
 from perception.bayes.settings_record import SettingsRecord
-from perception.bayes.state import StateRecord
+from perception.bayes.state import CircleTracks, StateRecord
 from perception.bayes.wall_contact import (
+    EDGE_REACH_M,
     EXPLAINED_SIGMAS,
     distance_and_foot,
     edges_answer,
+    is_hidden,
     is_on_span,
     line_variance,
     range_sigma,
@@ -37,8 +39,10 @@ from perception.bayes.wall_records import (
 from perception.kernel import kernel
 from perception.records import Records
 
+CROSSING_REACH_M: Final = 3.0
+"""Farthest that walls may meet beyond their ends, …"""
 CORNER_REACH_M: Final = 2.0
-"""Farthest that a corner may lie beyond the ends of its walls …"""
+"""… and that a wall goes on to a corner that is heard …"""
 CORNER_INSIDE_M: Final = 0.4
 """… and inside them."""
 CORNER_SINE_MIN: Final = 0.4
@@ -50,14 +54,14 @@ EDGE_SIGMA_M: Final = 0.1
 """Uncertainty of an edge along its wall, before its echoes …"""
 EDGE_SAME_M: Final = 0.3
 """… and how far it may lie from the end of a span that is its own."""
+EDGE_MOVED_M: Final = 0.1
+"""After a move by this much, what was seen of an edge's place was another place."""
 EDGE_OFF_M: Final = 0.1
 """Greatest distance of an edge from its wall's line."""
 EDGE_WALL_WEIGHT_MIN: Final = 20.0
 """The ends of a wall of less weight are not known."""
 EDGE_ECHOES_MIN: Final = 4.0
 """Echoes of a sure edge."""
-EDGE_REACH_M: Final = 1.0
-"""An edge between mirrors is heard from within this."""
 SYSTEMATIC_M: Final = 0.002
 """Least uncertainty of a line at a corner."""
 POINT_SLACK_M: Final = 0.03
@@ -89,7 +93,7 @@ def crossing(a: Wall, b: Wall) -> tuple[bool, float, float]:
     y = (ax * level_b - bx * level_a) / det
     along_a = position_along(a, x, y)
     along_b = position_along(b, x, y)
-    is_near = is_on_span(a, along_a, CORNER_REACH_M) and is_on_span(b, along_b, CORNER_REACH_M)
+    is_near = is_on_span(a, along_a, CROSSING_REACH_M) and is_on_span(b, along_b, CROSSING_REACH_M)
     is_within = is_on_span(a, along_a, -CORNER_INSIDE_M) or is_on_span(b, along_b, -CORNER_INSIDE_M)
     return is_near and not is_within, x, y
 
@@ -274,7 +278,10 @@ def find_edges(room: WallMap) -> None:
             nx, ny = wall_normal(wall)
             add_line(wall, x, y, room.lines)
             add_information(room.lines, -ny, nx, nx * y - ny * x, 1.0 / EDGE_SIGMA_M**2)
+            old_x, old_y = edge.x, edge.y
             locate(edge, room.lines)
+            # Ranges that went on past another place say nothing of this one: ends move as their walls grow.
+            edge.passes *= max(0.0, 1.0 - math.hypot(edge.x - old_x, edge.y - old_y) / EDGE_MOVED_M)
     for c in range(EDGES_MAX):
         edge = room.edges[c]
         if edge.is_used == PENDING or (edge.is_used == KEPT and is_near_corner(room, edge.first, edge.x, edge.y)):
@@ -341,13 +348,15 @@ def enter_echo(room: WallMap, corner: RoomCorner, q: Reading) -> None:
 
 
 @kernel
-def enter_looks(room: WallMap, corners: Records[RoomCorner], count: int, q: Reading, p: SettingsRecord) -> None:
+def enter_looks(
+    room: WallMap, tracks: CircleTracks, corners: Records[RoomCorner], count: int, q: Reading, p: SettingsRecord
+) -> None:  # fmt: skip
     """Count a reading for or against the corners towards which it looked.
 
     Parameters
     ----------
-    room, q, p
-        The noise, the reading and the settings.
+    room, tracks, q, p
+        The noise, the circles, what lies behind which is not seen, the reading and the settings.
     corners, count
         The corners or the edges, updated, and their number.
     """
@@ -361,6 +370,8 @@ def enter_looks(room: WallMap, corners: Records[RoomCorner], count: int, q: Read
         if dx * q.axis_x + dy * q.axis_y < p[0].cos_must_answer * d:
             continue
         is_passed = q.range_m > d + EXPLAINED_SIGMAS * range_sigma(room, d) + PASS_SLACK_M + POINT_SLACK_M
+        if is_passed and is_hidden(tracks, q, corner.x, corner.y):
+            continue
         if is_passed and d > EDGE_REACH_M:
             corner.far_passes += 1.0
         if corner.is_edge == 1 and d > EDGE_REACH_M and not edges_answer(room):

@@ -8,7 +8,7 @@ from typing import Final
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import StateRecord
 from perception.bayes.wall_bins import HALF, clear_wall, is_covered, mean_error, middle_of
-from perception.bayes.wall_contact import edges_answer
+from perception.bayes.wall_contact import EDGE_REACH_M, are_mirrors, edges_answer
 from perception.bayes.wall_evidence import judge
 from perception.bayes.wall_records import SPANS_MAX, WALL_BIN_M, WALL_BINS, Wall, WallMap
 from perception.kernel import kernel
@@ -19,7 +19,7 @@ OFFSET_INFORMATION: Final = 1e-3
 """Prior information on a wall's offset, m⁻²."""
 WALL_WEIGHT_MIN: Final = 3.0
 """A wall of less weight ends."""
-GAP_MAX_M: Final = 0.6
+GAP_MAX_M: Final = 0.75
 ROUGH_GAP_MAX_M: Final = 0.3
 """Longest gap without readings inside a span; where everything echoes, a wall leaves none so long."""
 ROUGH_WEIGHT_MIN: Final = 0.6
@@ -41,6 +41,9 @@ PASSED_SHARE: Final = 0.4
 TRIM_BINS_MAX: Final = 13
 TRIM_GAIN_NAT: Final = 0.5
 """Gain required of each earlier end."""
+TRIM_FAR_NAT: Final = 2.0
+TRIM_REACH_SLACK_M: Final = 0.2
+"""Loss for each bin that is left out although its echoes are from where an end between mirrors is not heard."""
 TRIM_SYSTEMATIC_M: Final = 0.005
 """Error that the mean of many readings keeps."""
 
@@ -82,7 +85,7 @@ def fit_line(wall: Wall) -> None:
 
 
 @kernel
-def trimmed_end(wall: Wall, low: int, high: int, side: int) -> int:
+def trimmed_end(wall: Wall, low: int, high: int, side: int, reach: float) -> int:
     """Return the last bin of a run of bins at one side, by likelihood.
 
     A sensor beyond the end of a wall hears the end. Its range is longer than the line's would be, at first by less
@@ -96,6 +99,8 @@ def trimmed_end(wall: Wall, low: int, high: int, side: int) -> int:
         First and last bin of the run.
     side : int
         1 for the high end, −1 for the low one.
+    reach : float
+        The end is not heard from beyond, m.
     """
     best = 0.0
     outer = high if side > 0 else low
@@ -111,7 +116,10 @@ def trimmed_end(wall: Wall, low: int, high: int, side: int) -> int:
                 x = (j - 0.5) * WALL_BIN_M
                 longer = math.sqrt(d * d + x * x) - d
                 var = 1.0 / of.precision + TRIM_SYSTEMATIC_M**2
-                gain += (e * e - (e - longer) ** 2) / (2.0 * var)
+                if d > reach:
+                    gain -= TRIM_FAR_NAT
+                else:
+                    gain += (e * e - (e - longer) ** 2) / (2.0 * var)
         if gain > best + TRIM_GAIN_NAT:
             best = gain
             last = end
@@ -146,6 +154,7 @@ def find_spans(room: WallMap, wall: Wall) -> None:
     wall.span_count = 0
     is_rough = edges_answer(room)
     gap_max = ROUGH_GAP_MAX_M if is_rough else GAP_MAX_M
+    reach = EDGE_REACH_M + TRIM_REACH_SLACK_M if are_mirrors(room) else math.inf
     first = -1
     last = -1
     passes = 0.0
@@ -166,7 +175,7 @@ def find_spans(room: WallMap, wall: Wall) -> None:
             low = first
             high = last
             for side in range(1, -2, -2):  # a literal in the call would be a type of its own, compiled by itself
-                end = trimmed_end(wall, low, high, side)
+                end = trimmed_end(wall, low, high, side, reach)
                 low = low if side > 0 else end
                 high = end if side > 0 else high
             span = wall.spans[wall.span_count]

@@ -19,7 +19,7 @@ from perception.bayes.range_fit import FAR
 from perception.bayes.reservoir import copy_reading
 from perception.bayes.settings_record import SettingsRecord
 from perception.bayes.state import CircleTracks, Memory, StateRecord
-from perception.bayes.wall_bins import SILENT_PASS, bin_of, enter_pass, enter_reading
+from perception.bayes.wall_bins import PASSES_KEPT, SILENT_PASS, bin_of, enter_pass, enter_reading
 from perception.bayes.wall_contact import (
     BEAM_EDGE,
     EXPLAINED_SIGMAS,
@@ -31,9 +31,11 @@ from perception.bayes.wall_contact import (
     explaining_wall,
     is_from_circle,
     is_from_end,
+    is_hidden,
     is_on_span,
     is_on_straight_span,
     tolerance,
+    wall_point,
 )
 from perception.bayes.wall_corners import EDGE_WALL_WEIGHT_MIN, enter_echo, enter_looks, find_corners, point_of
 from perception.bayes.wall_fit import fit_walls
@@ -73,13 +75,13 @@ EDGES_COUNTED_MAX: Final = 400.0
 
 
 @kernel
-def weaken(room: WallMap, q: Reading, own: int, p: SettingsRecord) -> None:
+def weaken(room: WallMap, tracks: CircleTracks, q: Reading, own: int, p: SettingsRecord) -> None:
     """Weaken the walls that a reading passed through, and count whether slanting walls answer.
 
     Parameters
     ----------
-    room, q, p
-        The walls, updated, the reading and the settings.
+    room, tracks, q, p
+        The walls, updated, the circles, what lies behind which is not seen, the reading and the settings.
     own : int
         The wall that explains it, −1 if none does.
     """
@@ -102,7 +104,12 @@ def weaken(room: WallMap, q: Reading, own: int, p: SettingsRecord) -> None:
         elif dot >= p[0].cos_must_answer and e > slack:
             b = bin_of(along)
             if 0 <= b < WALL_BINS:
-                enter_pass(wall, b, 1.0 if q.range_m < FAR else SILENT_PASS)
+                x, y = wall_point(wall, along)
+                if is_hidden(tracks, q, x, y):
+                    # All looks at this place are along its normal: earlier ones were as blind.
+                    wall.bins[b].passes *= PASSES_KEPT
+                else:
+                    enter_pass(wall, b, 1.0 if q.range_m < FAR else SILENT_PASS)
                 if is_on_span(wall, along, 0.0):
                     wall.is_changed = 1
     if room.edge_echoes + room.edge_silences > EDGES_COUNTED_MAX:
@@ -205,9 +212,9 @@ def enter_firing(s: StateRecord, tracks: CircleTracks, p: SettingsRecord, m: int
                     expected, along = distance_and_foot(room.walls[own], q.x, q.y)
                     add_residual(room, room.walls[own], q.range_m - expected, along, expected)
                 enter_reading(room, room.walls[own], q, kind, p)
-        weaken(room, q, own, p)
-        enter_looks(room, room.corners, CORNERS_MAX, q, p)
-        enter_looks(room, room.edges, EDGES_MAX, q, p)
+        weaken(room, tracks, q, own, p)
+        enter_looks(room, tracks, room.corners, CORNERS_MAX, q, p)
+        enter_looks(room, tracks, room.edges, EDGES_MAX, q, p)
         is_known = is_known or own >= 0 or is_point or is_from_any_end(room, q, p)
         # The echoes of a wall that may be another one may also start that.
         is_open = own >= 0 and not is_on_straight_span(room.walls[own], contact(room.walls[own], q, p)[2])

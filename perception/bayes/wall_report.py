@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from perception.bayes.state import Memory
 from perception.bayes.wall_bins import bin_of
+from perception.bayes.wall_contact import EDGES_LEAD, EDGES_SHARE, MIRRORS_SILENCES
 from perception.bayes.wall_corners import (
     CORNER_ECHOES_MIN,
     CORNER_INSIDE_M,
@@ -26,7 +27,7 @@ from perception.records import Record
 
 WALL_CHI2_MIN: Final = 20.0
 """Least evidence of the best span, or of all together."""
-SPAN_MIN_M: Final = 0.3
+SPAN_MIN_M: Final = 0.29
 SPAN_WEIGHT_MIN: Final = 3.0
 """Least length and weight of a span that is reported, …"""
 MISFIT_MAX: Final = 3.0
@@ -52,8 +53,16 @@ PROOF_SINE: Final = 0.8
 """… least sine of the angle between them: a line across a corner meets its walls at half of theirs."""
 EDGE_SIGMA_MAX_M: Final = 0.05
 """Greatest uncertainty of a sure edge."""
+EDGE_LEAD_MIN: Final = 2.0
+"""Least lead of echoes over passes, of an edge where a sure wall ends."""
+EDGE_NEAR_M: Final = 0.18
+"""Ranges that passed so near the end of a span, three bins, may have passed beyond the edge."""
 CORNER_MET_M: Final = 0.3
-"""A corner is reported if both walls come so near it."""
+"""A corner is reported if both walls come so near it, …"""
+ALONE_ECHOES: Final = 8.0
+ALONE_LEAD: Final = 2.0
+"""… or, where walls are mirrors, if so many echoes come from it from afar, and so many times its passes. So many show
+an edge, too, whatever is known of its wall."""
 POINT_PRIOR_NAT: Final = 0.0
 POINT_ECHO_NAT: Final = 1.0
 """Log prior odds of a corner where walls end, and evidence of each echo."""
@@ -141,9 +150,19 @@ def room_report(memory: Memory) -> tuple[NDArray[Any], NDArray[Any]]:
     with np.errstate(all="ignore"):  # numbers of a damaged recording
         room = memory.state["room"][0]
         walls = sure_walls(room["walls"][:MAX_WALLS], room["corners"])
-        points = [*reach_corners(walls, room["corners"]), *end_at_edges(walls, room["edges"])]
+        are_mirrors = has_mirrors(memory)
+        points = [
+            *reach_corners(walls, room["corners"], are_mirrors),
+            *end_at_edges(walls, room["edges"], are_mirrors),
+        ]
         segments = [row for wall in walls.values() for row in _segments(wall)]
         return np.array(segments, WallSegment.DTYPE), np.array(points, CornerPoint.DTYPE)
+
+
+def has_mirrors(memory: Memory) -> bool:
+    """Return whether the walls are known to be mirrors, as `wall_contact.are_mirrors` does in compiled code."""
+    echoes, silences = (float(memory.state["room"][name][0]) for name in ("edge_echoes", "edge_silences"))
+    return silences >= MIRRORS_SILENCES and not echoes > EDGES_SHARE * silences + EDGES_LEAD
 
 
 def _segments(of: Straight) -> Iterator[tuple[float, ...]]:
@@ -206,10 +225,13 @@ def sure_spans(spans: NDArray[Any], chi2: float, is_proven: bool) -> NDArray[np.
     return np.asarray(sure)
 
 
-def reach_corners(walls: dict[int, Straight], corners: NDArray[Any]) -> list[tuple[float, ...]]:
+def reach_corners(
+    walls: dict[int, Straight], corners: NDArray[Any], are_mirrors: bool
+) -> list[tuple[float, ...]]:  # fmt: skip
     """Move the outer ends of walls outwards to the corners in which they end, unless ranges passed there.
 
-    A corner that is heard is reached from afar; one that is not, only if both walls end near it.
+    A corner that is heard is reached from afar; one that is not, only if both walls end near it. Nothing but a corner
+    between mirrors answers from afar, so that one is sure whatever is known of its walls.
 
     Parameters
     ----------
@@ -217,6 +239,8 @@ def reach_corners(walls: dict[int, Straight], corners: NDArray[Any]) -> list[tup
         The walls by their number; their ends are updated.
     corners : (n,) record of `RoomCorner`
         All corners.
+    are_mirrors : bool
+        Whether the walls are known to be mirrors.
 
     Returns
     -------
@@ -237,12 +261,16 @@ def reach_corners(walls: dict[int, Straight], corners: NDArray[Any]) -> list[tup
             if (is_heard or is_near) and -CORNER_INSIDE_M < gap < CORNER_REACH_M and not owner.is_passed(along, end):
                 owner.ends[-side, side] = along
             is_met = is_met and abs(owner.ends[-side, side] - along) < CORNER_MET_M
-        if is_met and (is_heard or is_near):
+        far = float(corner["far_echoes"])
+        is_proven = are_mirrors and far >= ALONE_ECHOES and far > ALONE_LEAD * passes and corner["is_edge"] == 0
+        if is_proven or (is_met and (is_heard or is_near)):
             found.append(_point(corner))
     return found
 
 
-def end_at_edges(walls: dict[int, Straight], edges: NDArray[Any]) -> list[tuple[float, ...]]:
+def end_at_edges(
+    walls: dict[int, Straight], edges: NDArray[Any], are_mirrors: bool
+) -> list[tuple[float, ...]]:  # fmt: skip
     """Move the ends of walls to the edges that are heard there.
 
     Parameters
@@ -251,6 +279,8 @@ def end_at_edges(walls: dict[int, Straight], edges: NDArray[Any]) -> list[tuple[
         The walls by their number; their ends are updated.
     edges : (n,) record of `RoomCorner`
         All edges.
+    are_mirrors : bool
+        Whether the walls are known to be mirrors; an edge is heard from near then.
 
     Returns
     -------
@@ -260,16 +290,24 @@ def end_at_edges(walls: dict[int, Straight], edges: NDArray[Any]) -> list[tuple[
     found = []
     for edge in edges[edges["is_used"] == 1]:
         echoes, passes, owner = float(edge["echoes"]), float(edge["passes"]), walls.get(int(edge["first"]))
+        if are_mirrors and edge["is_edge"] == 1:
+            echoes -= float(edge["far_echoes"])
         variance = float(edge["covariance_xx"] + edge["covariance_yy"])
-        if owner is None or echoes < EDGE_ECHOES_MIN or echoes <= passes or variance > EDGE_SIGMA_MAX_M**2:
+        if echoes - passes < EDGE_LEAD_MIN or variance > EDGE_SIGMA_MAX_M**2:
             continue
-        along, side = owner.beyond(float(edge["x"]), float(edge["y"]))[0], int(edge["second"])
-        reach = EDGE_SAME_M if edge["is_edge"] == 1 else CORNER_REACH_M
-        beyond = (along - owner.ends[:, side]) * (2 * side - 1)
-        span = int(np.abs(beyond).argmin())
-        is_own = -EDGE_SAME_M < beyond[span] < reach and (owner.ends[span, 1 - side] < along) == bool(side)
-        if is_own and not owner.is_passed(along, owner.ends[span, side]):
-            owner.ends[span, side] = along
+        is_sure = are_mirrors and echoes >= ALONE_ECHOES and echoes > ALONE_LEAD * passes
+        if owner is not None:
+            along, side = owner.beyond(float(edge["x"]), float(edge["y"]))[0], int(edge["second"])
+            reach = EDGE_SAME_M if edge["is_edge"] == 1 else CORNER_REACH_M
+            beyond = (along - owner.ends[:, side]) * (2 * side - 1)
+            span = int(np.abs(beyond).argmin())
+            is_own = -EDGE_SAME_M < beyond[span] < reach and (owner.ends[span, 1 - side] < along) == bool(side)
+            is_near = abs(beyond[span]) < EDGE_NEAR_M
+            is_end = echoes >= EDGE_ECHOES_MIN or is_near
+            if is_own and is_end and (is_near or not owner.is_passed(along, owner.ends[span, side])):
+                owner.ends[span, side] = along
+                is_sure = True
+        if is_sure:
             found.append(_point(edge))
     return found
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from perception.bayes import wall_contact
+from perception.bayes.state import ESTABLISHED, TENTATIVE
 from perception.bayes.wall_contact import BEAM_EDGE, FOOT, NOWHERE
 from tests import naive_walls
 from tests.perception.bayes.rooms import facing, fill, new_room, place_wall, reading
@@ -76,3 +77,29 @@ def test_ends_and_corners_explain_echoes() -> None:
     corner.is_used, corner.x, corner.y = 1, 0.0, 3.0
     assert wall_contact.corner_of(room, reading(0.0, 1.0, math.pi / 2, 2.0), P) == 3
     assert wall_contact.corner_of(room, reading(0.0, 1.0, 0.0, 2.0), P) == -1
+
+
+@examples(100, 1000)
+def test_a_certain_round_object_hides_what_lies_behind_it(examples: int) -> None:
+    rng = np.random.default_rng(44)
+    memory, _ = new_room()
+    drum, hidden = memory.tracks[0], 0
+    drum.status, drum.is_named, drum.radius = ESTABLISHED, 1, 0.3
+    for _ in range(examples):
+        sensor, point, centre = rng.uniform(-1.0, 1.0, (3, 2))
+        drum.x, drum.y = pair(centre)
+        way = sensor + np.linspace(0.0, 1.0, 2001)[:, None] * (point - sensor)
+        nearest = np.hypot(*(way - centre).T)
+        is_between = 0 < nearest.argmin() < 2000
+        if abs(nearest.min() - 0.3) < 1e-3:
+            continue
+        q = reading(*pair(sensor), 0.0, 1.0)
+        found = wall_contact.is_hidden(memory.tracks, q, *pair(point))
+        assert found == (is_between and nearest.min() < 0.3)
+        hidden += found
+        drum.is_named, drum.probability = 0, 0.5
+        assert not wall_contact.is_hidden(memory.tracks, q, *pair(point)), "it may be something else"
+        drum.status, drum.probability = TENTATIVE, 1.0
+        assert not wall_contact.is_hidden(memory.tracks, q, *pair(point))
+        drum.status, drum.is_named = ESTABLISHED, 1
+    assert 0.05 * examples < hidden < 0.95 * examples

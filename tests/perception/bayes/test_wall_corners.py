@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from perception.bayes import wall_corners
-from perception.bayes.state import Memory
+from perception.bayes.state import ESTABLISHED, Memory
 from perception.bayes.wall_records import CORNERS_MAX, EDGES_MAX, WallMap
 from tests import naive_walls
 from tests.perception.bayes.rooms import SIGMA, fill, new_room, place_wall, reading
@@ -64,10 +64,15 @@ def test_a_corner_keeps_its_echoes_while_its_walls_last() -> None:
     for _ in range(3):
         wall_corners.enter_echo(room, corner, reading(0.5, 0.5, math.pi / 4, math.hypot(1.5, 1.5)))
         for axis, range_m in ((math.pi / 4, 4.0), (math.pi / 4, 1.0), (0.0, 4.0)):
-            wall_corners.enter_looks(room, room.corners, CORNERS_MAX, reading(0.0, 0.0, axis, range_m), P)
+            q = reading(0.0, 0.0, axis, range_m)
+            wall_corners.enter_looks(room, memory.tracks, room.corners, CORNERS_MAX, q, P)
     wall_corners.find_corners(memory.s)
     assert (corner.is_used, corner.echoes, corner.passes, corner.ended) == (1, 3.0, 3.0, 3.0)
     assert (corner.far_echoes, corner.far_passes) == (3.0, 3.0)
+    drum = memory.tracks[0]
+    drum.status, drum.is_named, drum.x, drum.y, drum.radius = ESTABLISHED, 1, 1.0, 1.0, 0.3
+    wall_corners.enter_looks(room, memory.tracks, room.corners, CORNERS_MAX, reading(0.0, 0.0, math.pi / 4, 4.0), P)
+    assert (corner.passes, corner.far_passes) == (3.0, 3.0), "what stands behind a drum cannot be seen to be missing"
     room.walls[1].weight = 0.0
     wall_corners.find_corners(memory.s)
     assert corner.is_used == 0

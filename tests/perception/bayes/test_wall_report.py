@@ -115,3 +115,29 @@ def test_a_wall_ends_at_the_edge_that_is_heard_and_the_edge_is_reported() -> Non
     assert [corner_object(point.item()).model for point in points] == ["edge"]
     edge.passes = 7.0
     assert len(room_report(memory)[1]) == 0
+
+
+def test_between_mirrors_a_corner_or_an_edge_that_is_heard_often_is_reported_whatever_is_known_of_its_walls() -> None:
+    memory, room = new_room()
+    place_wall(room.walls[0], np.zeros(2), 0.0, 2.0)
+    fill(memory, room.walls[0], -1.0, 0.0)
+    place_wall(room.walls[1], np.zeros(2), math.pi / 2, 2.0)
+    fill(memory, room.walls[1], 0.0, 0.24)
+    find_corners(memory.s)
+    (corner,) = (it for it in room.corners if it.is_used == 1)
+    room.edge_silences = 50.0
+    assert len(room_report(memory)[1]) == 0
+    corner.echoes = corner.far_echoes = 12.0
+    assert [corner_object(point.item()).model for point in room_report(memory)[1]] == ["inside corner"]
+    corner.passes = 7.0
+    assert len(room_report(memory)[1]) == 0, "too many ranges went on"
+    corner.passes, room.edge_echoes = 0.0, 100.0
+    assert len(room_report(memory)[1]) == 0, "where everything answers, edges are heard from afar, too"
+    room.edge_echoes, corner.echoes = 0.0, 0.0
+    corner.far_echoes = 0.0
+    edge = room.edges[20]
+    edge.is_used, edge.is_edge, edge.first, edge.echoes = 1, 1, 15, 9.0
+    edge.covariance_xx = edge.covariance_yy = 1e-5
+    assert [corner_object(point.item()).model for point in room_report(memory)[1]] == ["edge"]
+    edge.far_echoes = 5.0
+    assert len(room_report(memory)[1]) == 0, "from afar it is not heard"

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from behaviors.move_to_goal import Goal
 from behaviors.teleoperation import TELEOPERATION_ENDED
 from drivers.messages import Pose, Twist
 from perception.pipeline import Perception
-from runtime.cycle.drive_requests import (
-    GoalPlace,
-    Legs,
-)
+from runtime.cycle.drive_requests import GOAL_SLEW_M_S, GoalPlace, Legs
 from runtime.cycle.driving import NO_PLACE
 from runtime.cycle.modes import Mode
 from runtime.cycle.step import STANDSTILL, DriveRequest, Order
@@ -102,6 +101,43 @@ def test_vectors_of_a_stop_are_not_shown(drive_request: DriveRequest) -> None:
     assert script.state.vectors == ()
 
 
+DRIVES, CORRECTIONS, HELD_CYCLES = 40, 5, 3
+
+
+@pytest.mark.promise("P30")
+def test_no_correction_of_the_map_makes_the_drive_jump(
+    monkeypatch: pytest.MonkeyPatch, measured: Callable[[str], None]
+) -> None:
+    rng = np.random.default_rng(0)
+    frame = Pose(0.0, 0.0, 0.0)
+    monkeypatch.setattr(Perception, "known_map_frame", lambda _: frame)
+    monkeypatch.setattr(Perception, "localized", lambda _: "a place in the map")
+    steps, changes = list[float](), list[float]()
+    for _ in range(DRIVES):  # short ones: this robot does not move, and the motion monitor stops it for that
+        frame = Pose(0.0, 0.0, 0.0)
+        script = driving()
+        script.request_drive(Goal(20.0, 0.0, frame="map"))
+        places, turns = [GoalPlace(20.0, 0.0)], [0.0]
+        for _ in range(CORRECTIONS):
+            x, y, turn = (rng.uniform(-1.0, 1.0, 3) * (5.0, 5.0, math.pi / 6)).tolist()
+            frame = Pose(x, y, turn)
+            for _ in range(HELD_CYCLES):
+                command = script.request_drive(None).command
+                assert isinstance(command, Twist)
+                assert script.state.goal_place is not None
+                places.append(script.state.goal_place)
+                turns.append(command.w)
+        steps += [math.dist((a.x, a.y), (b.x, b.y)) for a, b in pairwise(places)]
+        changes += [abs(b - a) for a, b in pairwise(turns)]
+    assert max(steps) <= GOAL_SLEW_M_S * PERIOD_S * (1.0 + 1e-9)
+    assert max(changes) < 0.01, "without a limit it is the whole rate of turn"
+    measured(
+        f"{DRIVES * CORRECTIONS} corrections: the goal moves by at most {max(steps) / PERIOD_S:.2f} m/s, "
+        f"the rate of turn changes by at most {max(changes):.3f} rad/s from cycle to cycle"
+    )
+
+
+@pytest.mark.promise("P30")
 def test_a_goal_in_the_map_is_driven_without_a_jump_and_only_where_the_place_is_known(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
